@@ -1,0 +1,4 @@
+//! leafdyn
+
+pub mod relax;
+pub mod scenario;

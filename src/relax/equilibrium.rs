@@ -1,0 +1,145 @@
+//! What a relaxation returns: the shape, and everything that judges it.
+
+use glam::{DQuat, DVec3};
+
+/// How a run ended: one word per way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// At rest in a stable equilibrium, within the tolerance.
+    Converged,
+    /// As `Converged`, but a saddle was met on the way: the leaf was pushed
+    /// off along the unstable mode and came to rest elsewhere.
+    ConvergedAfterSaddle,
+    /// At rest within the tolerance in an unstable equilibrium, and kept
+    /// there because that was asked for.
+    Saddle,
+    /// At rest, but the finest grid allowed does not reach the tolerance.
+    ToleranceNotReached,
+    /// The step limit came before rest.
+    NotAtRest,
+    /// Energy grew beyond what the method allows, or a value was not finite.
+    Diverged,
+}
+
+impl Outcome {
+    /// The word used in `summary.json`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Outcome::Converged => "converged",
+            Outcome::ConvergedAfterSaddle => "converged-after-saddle",
+            Outcome::Saddle => "saddle",
+            Outcome::ToleranceNotReached => "tolerance-not-reached",
+            Outcome::NotAtRest => "not-at-rest",
+            Outcome::Diverged => "diverged",
+        }
+    }
+
+    /// Whether the leaf is at rest within the tolerance (exit status 0).
+    pub fn is_success(self) -> bool {
+        matches!(self, Outcome::Converged | Outcome::ConvergedAfterSaddle | Outcome::Saddle)
+    }
+}
+
+/// Work done by a solver, counted so that tests can pin it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Accepted steps (time steps or Newton iterations).
+    pub steps: usize,
+    /// Factorisations of a leaf matrix, rod by rod or sparse.
+    pub factorizations: usize,
+    /// Evaluations of all internal forces of the leaf.
+    pub force_evaluations: usize,
+    /// Iterations of the conjugate gradients, all steps together.
+    pub cg_iterations: usize,
+}
+
+/// A saddle that was met on the way to rest, and left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Saddle {
+    /// Its energy.
+    pub energy: f64,
+    /// Its number of negative eigenvalues (Morse index).
+    pub negative_eigenvalues: usize,
+    /// Position of the joint tip, or of the first rod's.
+    pub tip: DVec3,
+}
+
+/// The state of one rod at one station. Strains and stress resultants are
+/// components along the directors (d1, d2, d3).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NodeState {
+    /// Centerline r.
+    pub position: DVec3,
+    /// Directors as a unit quaternion, w >= 0 at the base: R e_i = d_i.
+    pub rotation: DQuat,
+    /// Stretch and shears v = R^T r'.
+    pub v: DVec3,
+    /// Twist and bends u.
+    pub u: DVec3,
+    /// Stress resultant n (axial force, shear forces).
+    pub n: DVec3,
+    /// Stress couple m (twisting moment, bending moments).
+    pub m: DVec3,
+}
+
+/// One rod at rest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RodShape {
+    /// Reference length.
+    pub length: f64,
+    /// One state per station.
+    pub nodes: Vec<NodeState>,
+}
+
+/// A leaf at rest (or as far as it came), in the units of its scenario.
+#[derive(Clone, Debug)]
+pub struct Equilibrium {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Name of the method.
+    pub method: &'static str,
+    /// How the run ended.
+    pub outcome: Outcome,
+    /// What would help, when the run did not succeed: one sentence for the user.
+    pub remark: Option<String>,
+    /// Segments per rod of each grid used, coarse to fine.
+    pub segments: Vec<usize>,
+    /// Wanted accuracy, relative to the largest rod length.
+    pub tolerance: f64,
+    /// Largest unbalanced nodal force or moment, in units of A/L^2 and A/L
+    /// (A: the leaf's mean bending stiffness, L: largest rod length).
+    pub residual: f64,
+    /// Bound on the error of the positions, in units of length; `None` on a
+    /// single grid, which has nothing to compare with.
+    pub error_estimate: Option<f64>,
+    /// Total potential energy.
+    pub energy: f64,
+    /// Whether the tips share one point.
+    pub joined: bool,
+    /// The joint tip alone, or one tip per rod.
+    pub tips: Vec<DVec3>,
+    /// Sum over the rods of the force each passes to its tip.
+    pub tip_force_sum: DVec3,
+    /// Morse index: negative eigenvalues of the energy's Hessian. `None` if
+    /// the leaf is not at rest.
+    pub negative_eigenvalues: Option<usize>,
+    /// A saddle that was met and left.
+    pub saddle: Option<Saddle>,
+    /// Work done.
+    pub work: Work,
+    /// Time of the solve alone, in seconds.
+    pub wall_seconds: f64,
+    /// Fractions of the length at which `rods` are given, base to tip.
+    pub stations: Vec<f64>,
+    /// Best values at the stations, extrapolated where several grids were used.
+    pub rods: Vec<RodShape>,
+    /// Centerlines on the finest grid, one per rod, for drawing.
+    pub curves: Vec<Vec<DVec3>>,
+}
+
+impl Equilibrium {
+    /// Whether the equilibrium is stable: no negative eigenvalue.
+    pub fn stable(&self) -> Option<bool> {
+        self.negative_eigenvalues.map(|count| count == 0)
+    }
+}

@@ -1,0 +1,49 @@
+//! A scenario: what a leaf is made of, as read from TOML and checked once.
+//!
+//! Everything below this module trusts a [`Scenario`]: lengths of lists agree,
+//! stiffnesses are positive, angles finite.
+
+mod profile;
+
+pub use profile::Profile;
+
+/// A checked scenario. All quantities are in the units the file was written
+/// in, which only have to be consistent with each other.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scenario {
+    /// Name of the scenario; output goes to `out/<name>` by default.
+    pub name: String,
+    /// The veins, from one edge of the leaf to the other; at least one.
+    pub rods: Vec<Rod>,
+    /// Whether all tips share one point.
+    pub joined: bool,
+    /// Coupling stiffness of each gap between neighbouring rods along the lab
+    /// axes x, y, z: force per unit displacement and unit length of leaf, the
+    /// length of a gap being the mean of its two rods'. N - 1 entries.
+    pub coupling: Vec<[f64; 3]>,
+    /// Gravity, force per unit reference length.
+    pub gravity: [f64; 3],
+    /// Dead force on the joint tip, or on every tip when the tips are free.
+    pub tip_force: [f64; 3],
+    /// Dead moment about the lab axes on the tip of a single rod.
+    pub tip_moment: [f64; 3],
+    /// Wanted accuracy of the centerlines, relative to the largest rod length.
+    pub tolerance: f64,
+}
+
+/// One vein as a special Cosserat rod. Index 0 of every triple belongs to the
+/// tangent-like director d1, so that a stiffness triple is (torsion, bending
+/// about d2, bending about d3) or (axial, shear along d2, shear along d3).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rod {
+    /// Reference length L.
+    pub length: f64,
+    /// Base angle phi of d1(0) in the e1-e2 plane, in radians (paper, section 2.4 (c)).
+    pub angle: f64,
+    /// A1, A2, A3 of eq. (5): moment times length.
+    pub couple_stiffness: [Profile; 3],
+    /// H1, H2, H3 of eq. (6): a force; infinite means rigid.
+    pub force_stiffness: [Profile; 3],
+    /// u0: twist, bend about d2, bend about d3; per length.
+    pub rest_curvature: [Profile; 3],
+}
