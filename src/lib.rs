@@ -1,4 +1,7 @@
 //! leafdyn
 
+pub mod leaf;
 pub mod relax;
+pub mod rod;
+pub mod rotation;
 pub mod scenario;

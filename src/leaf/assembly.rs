@@ -1,0 +1,300 @@
+//! The discretised leaf: its unbalanced forces, its matrix, its energy.
+
+use super::chain::Block;
+use super::dimensionless::Leaf;
+use super::grid::Grid;
+use super::state::{State, shift, turn};
+use super::system::{RodSystem, System, each_rod};
+use crate::rod::{Blocks, Ends, Section, Segment};
+use glam::{DMat3, DVec3};
+
+/// Radius of gyration of a vein with the tissue it carries, in units of the
+/// leaf's length: its rotary inertia per unit length and mass is the square.
+/// A thin rod's own is smaller, but a vein turns with its strip of blade.
+const RADIUS_OF_GYRATION: f64 = 0.1;
+
+/// A leaf on a grid.
+#[derive(Clone, Debug)]
+pub struct DiscreteLeaf<'a> {
+    /// The leaf.
+    pub leaf: &'a Leaf<'a>,
+    /// Its grid.
+    pub grid: Grid,
+    /// Sections of all segments, rod after rod.
+    pub sections: Vec<Section>,
+    /// Coupling of each gap, per unit of sigma.
+    coupling: Vec<DVec3>,
+    /// Trapezoidal weights of the nodes as fractions of the length.
+    weights: Vec<f64>,
+}
+
+/// What an assembly sums up over all rods.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sums {
+    /// Merit function with the forces of the state itself (see [`Section::merit`]).
+    pub merit: f64,
+    /// Merit function with the forces the state had before the last step.
+    pub merit_before: f64,
+    /// Largest rotation between the ends of a segment.
+    pub turn: f64,
+}
+
+impl<'a> DiscreteLeaf<'a> {
+    /// Discretises `leaf` on `grid`.
+    pub fn new(leaf: &'a Leaf<'a>, grid: Grid) -> Self {
+        let n = grid.segments();
+        let sections = (0..leaf.rods())
+            .flat_map(|j| (0..n).map(move |i| (j, i)))
+            .map(|(j, i)| leaf.section(j, grid.middle(i), grid.width(i)))
+            .collect();
+        let coupling = (1..leaf.rods()).map(|g| leaf.coupling(g - 1)).collect();
+        let weights = (0..=n).map(|i| grid.weight(i)).collect();
+        DiscreteLeaf { leaf, grid, sections, coupling, weights }
+    }
+
+    /// Segments per rod.
+    pub fn segments(&self) -> usize {
+        self.grid.segments()
+    }
+
+    /// Number of rods.
+    pub fn rods(&self) -> usize {
+        self.leaf.rods()
+    }
+
+    /// Whether the rods feel each other other than through the tip.
+    pub fn coupled(&self) -> bool {
+        self.coupling.iter().any(|&k| k != DVec3::ZERO)
+    }
+
+    /// Coupling of gap `g` at node `i`, force per displacement; none at a
+    /// joint tip, which all rods share.
+    pub(super) fn spring(&self, g: usize, i: usize) -> DVec3 {
+        if self.leaf.joined() && i == self.segments() {
+            DVec3::ZERO
+        } else {
+            self.coupling[g] * self.weights[i]
+        }
+    }
+
+    /// Mass of node `i` of rod `j` at unit density: rotary, translational.
+    pub(super) fn mass(&self, j: usize, i: usize) -> [f64; 2] {
+        let mass = self.weights[i] * self.leaf.length(j);
+        [RADIUS_OF_GYRATION * RADIUS_OF_GYRATION * mass, mass]
+    }
+
+    /// Segment `i` of rod `j` in `state`, carrying the force `n`.
+    pub fn segment(&self, state: &State, j: usize, i: usize, n: DVec3) -> Segment {
+        let k = state.base(j) + i;
+        let ends = Ends { x: [state.x[k], state.x[k + 1]], q: [state.q[k], state.q[k + 1]] };
+        Segment::new(self.section(j, i), &ends, n)
+    }
+
+    /// Section of segment `i` of rod `j`.
+    #[inline]
+    pub fn section(&self, j: usize, i: usize) -> &Section {
+        &self.sections[j * self.segments() + i]
+    }
+
+    /// Dead load and coupling on node `i` of rod `j`, and its share of the
+    /// potential energy (a gap's belongs to its lower rod). The tip force acts
+    /// on every free tip, and once on a joint one, through the first rod.
+    #[inline]
+    pub fn load(&self, state: &State, j: usize, i: usize) -> (DVec3, f64) {
+        let k = state.base(j) + i;
+        let x = state.x[k];
+        let mut force = self.leaf.gravity * (self.weights[i] * self.leaf.length(j));
+        if i == self.segments() && (j == 0 || !self.leaf.joined()) {
+            force += self.leaf.tip_force;
+        }
+        let mut energy = -force.dot(x);
+        if j > 0 {
+            force += self.spring(j - 1, i) * (state.x[k - self.segments() - 1] - x);
+        }
+        if j + 1 < self.rods() {
+            let stretch = state.x[k + self.segments() + 1] - x;
+            let pull = self.spring(j, i) * stretch;
+            force += pull;
+            energy += 0.5 * pull.dot(stretch);
+        }
+        (force, energy)
+    }
+
+    /// Assembles matrix and right-hand side of Newton's equations into
+    /// `system`. `before`: the forces of the state before the last step.
+    pub fn assemble(&self, state: &State, before: &[DVec3], system: &mut System) -> Sums {
+        let parallel = system.parallel();
+        each_rod(parallel, &mut system.rods, |j, rod| {
+            rod.sums = self.assemble_rod(j, state, before, rod);
+        });
+        let mut total = Sums::default();
+        for rod in &system.rods {
+            total.merit += rod.sums.merit;
+            total.merit_before += rod.sums.merit_before;
+            total.turn = total.turn.max(rod.sums.turn);
+        }
+        total
+    }
+
+    fn assemble_rod(&self, j: usize, state: &State, before: &[DVec3], rod: &mut RodSystem) -> Sums {
+        let n = self.segments();
+        let mut sums = Sums::default();
+        let chain = &mut rod.chain;
+        for i in 0..n {
+            let force = state.n[j * n + i];
+            let section = self.section(j, i);
+            let segment = self.segment(state, j, i, force);
+            sums.merit += section.merit(&segment, force);
+            sums.merit_before += section.merit(&segment, before[j * n + i]);
+            sums.turn = sums.turn.max(segment.turn());
+            let (g_x, g_a, g_b) = segment.condensed_gradient(section);
+            let blocks = segment.hessian(section);
+            if i > 0 {
+                add_left(&mut chain.diagonal[i - 1], &blocks);
+                couple(&mut chain.off[i - 1], &blocks);
+                add(&mut rod.rhs[i - 1], -g_a, g_x);
+            }
+            set_right(&mut chain.diagonal[i], &blocks);
+            let (load, potential) = self.load(state, j, i + 1);
+            sums.merit += potential;
+            sums.merit_before += potential;
+            rod.rhs[i] = [0.0; 6];
+            add(&mut rod.rhs[i], -g_b, load - g_x);
+            for g in [j.wrapping_sub(1), j] {
+                if g < self.coupling.len() {
+                    let spring = self.spring(g, i + 1);
+                    for c in 0..3 {
+                        chain.diagonal[i][3 + c][3 + c] += spring[c];
+                    }
+                }
+            }
+        }
+        if self.rods() == 1 {
+            add(&mut rod.rhs[n - 1], self.leaf.tip_moment, DVec3::ZERO);
+        }
+        sums
+    }
+
+    /// The state after `step` times the increments in `solution` (rod after
+    /// rod, nodes 1 to n), written over `next`.
+    pub fn advance(
+        &self,
+        state: &State,
+        solution: &System,
+        step: f64,
+        next: &mut State,
+    ) {
+        let n = self.segments();
+        next.clone_from(state);
+        for (j, rod) in solution.rods.iter().enumerate() {
+            let base = state.base(j);
+            let (mut a, mut dx0) = (DVec3::ZERO, DVec3::ZERO);
+            for i in 0..n {
+                let increment = &rod.solution[i];
+                let (b, dx1) = (turn(increment), shift(increment));
+                let force = state.n[j * n + i];
+                let segment = self.segment(state, j, i, force);
+                next.n[j * n + i] =
+                    force + step * segment.force_increment(self.section(j, i), dx1 - dx0, a, b);
+                next.advance(base + i + 1, increment, step);
+                (a, dx0) = (b, dx1);
+            }
+        }
+    }
+
+    /// Largest unbalanced nodal force or moment, or violation of the
+    /// constitutive law (as length), of a state.
+    pub fn residual(&self, state: &State) -> f64 {
+        let n = self.segments();
+        let mut largest = 0.0_f64;
+        let mut tip = DVec3::ZERO;
+        for j in 0..self.rods() {
+            let (mut force, mut moment) = (DVec3::ZERO, DVec3::ZERO);
+            for i in 0..n {
+                let segment = self.segment(state, j, i, state.n[j * n + i]);
+                let (g_x, g_a, g_b) = segment.gradient(self.section(j, i));
+                if i > 0 {
+                    let unbalanced = (force + g_x).abs().max_element();
+                    largest = largest.max(unbalanced).max((moment - g_a).abs().max_element());
+                }
+                force = self.load(state, j, i + 1).0 - g_x;
+                moment = -g_b;
+                largest = largest.max(segment.gap.abs().max_element());
+            }
+            if self.rods() == 1 {
+                moment += self.leaf.tip_moment;
+            }
+            largest = largest.max(moment.abs().max_element());
+            tip += force;
+            if !self.leaf.joined() {
+                largest = largest.max(force.abs().max_element());
+            }
+        }
+        if self.leaf.joined() { largest.max(tip.abs().max_element()) } else { largest }
+    }
+
+    /// Potential energy of a state: elastic, of the coupling, and of the loads.
+    /// The dead moment on a rod's tip has no potential and is left out.
+    pub fn energy(&self, state: &State) -> f64 {
+        let n = self.segments();
+        let mut energy = 0.0;
+        for j in 0..self.rods() {
+            for i in 0..n {
+                let segment = self.segment(state, j, i, state.n[j * n + i]);
+                energy += self.section(j, i).elastic_energy(&segment) + self.load(state, j, i + 1).1;
+            }
+        }
+        energy
+    }
+}
+
+#[inline]
+fn add(increment: &mut [f64; 6], moment: DVec3, force: DVec3) {
+    for c in 0..3 {
+        increment[c] += moment[c];
+        increment[3 + c] += force[c];
+    }
+}
+
+#[inline]
+fn place(block: &mut Block, row: usize, column: usize, k: &DMat3, sign: f64) {
+    for c in 0..3 {
+        let values = k.col(c);
+        for r in 0..3 {
+            block[row + r][column + c] = sign * values[r];
+        }
+    }
+}
+
+/// The block of a segment's right node.
+#[inline]
+fn set_right(block: &mut Block, k: &Blocks) {
+    place(block, 0, 0, &k.bb, 1.0);
+    place(block, 0, 3, &k.xb.transpose(), 1.0);
+    place(block, 3, 0, &k.xb, 1.0);
+    place(block, 3, 3, &k.xx, 1.0);
+}
+
+/// Adds the block of a segment's left node.
+#[inline]
+fn add_left(block: &mut Block, k: &Blocks) {
+    let mut left = [[0.0; 6]; 6];
+    place(&mut left, 0, 0, &k.aa, 1.0);
+    place(&mut left, 0, 3, &k.xa.transpose(), -1.0);
+    place(&mut left, 3, 0, &k.xa, -1.0);
+    place(&mut left, 3, 3, &k.xx, 1.0);
+    for r in 0..6 {
+        for c in 0..6 {
+            block[r][c] += left[r][c];
+        }
+    }
+}
+
+/// The block between a segment's left and right node.
+#[inline]
+fn couple(block: &mut Block, k: &Blocks) {
+    place(block, 0, 0, &k.ab, 1.0);
+    place(block, 0, 3, &k.xa.transpose(), 1.0);
+    place(block, 3, 0, &k.xb, -1.0);
+    place(block, 3, 3, &k.xx, -1.0);
+}

@@ -1,0 +1,136 @@
+//! A scenario in dimensionless form.
+
+use crate::rod::Section;
+use crate::rotation;
+use crate::scenario::{Rod, Scenario};
+use glam::{DQuat, DVec3};
+
+/// Units in which a [`Leaf`] is dimensionless: lengths in units of `length`,
+/// couple stiffnesses in units of `stiffness`, hence forces in A/L^2, moments
+/// and energies in A/L and A/L.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    /// L: the largest rod length.
+    pub length: f64,
+    /// A: geometric mean of the bending stiffnesses of all rods, mid-rod.
+    pub stiffness: f64,
+}
+
+impl Scale {
+    /// Unit of force, A/L^2.
+    pub fn force(&self) -> f64 {
+        self.stiffness / (self.length * self.length)
+    }
+
+    /// Unit of moment and of energy, A/L.
+    pub fn moment(&self) -> f64 {
+        self.stiffness / self.length
+    }
+}
+
+/// A leaf with all quantities dimensionless, not yet discretised.
+#[derive(Clone, Debug)]
+pub struct Leaf<'a> {
+    scenario: &'a Scenario,
+    /// The units.
+    pub scale: Scale,
+    /// Gravity per unit length.
+    pub gravity: DVec3,
+    /// Dead force on the tip.
+    pub tip_force: DVec3,
+    /// Dead moment on the tip of a single rod.
+    pub tip_moment: DVec3,
+    kinks: Vec<f64>,
+}
+
+impl<'a> Leaf<'a> {
+    /// Scales a checked scenario.
+    pub fn new(scenario: &'a Scenario) -> Self {
+        let length = scenario.rods.iter().fold(0.0_f64, |m, rod| m.max(rod.length));
+        let logs: f64 = scenario
+            .rods
+            .iter()
+            .map(|rod| rod.couple_stiffness[1].at(0.5).ln() + rod.couple_stiffness[2].at(0.5).ln())
+            .sum();
+        let scale =
+            Scale { length, stiffness: (logs / (2 * scenario.rods.len()) as f64).exp() };
+        let mut kinks: Vec<f64> = scenario
+            .rods
+            .iter()
+            .flat_map(|rod| {
+                [&rod.couple_stiffness, &rod.force_stiffness, &rod.rest_curvature]
+                    .into_iter()
+                    .flatten()
+                    .flat_map(|profile| profile.kinks().iter().copied())
+            })
+            .collect();
+        kinks.sort_by(f64::total_cmp);
+        kinks.dedup();
+        let vector = |a: [f64; 3], unit: f64| DVec3::from_array(a) / unit;
+        Leaf {
+            scenario,
+            scale,
+            gravity: vector(scenario.gravity, scale.force() / length),
+            tip_force: vector(scenario.tip_force, scale.force()),
+            tip_moment: vector(scenario.tip_moment, scale.moment()),
+            kinks,
+        }
+    }
+
+    /// The scenario it was made from.
+    pub fn scenario(&self) -> &'a Scenario {
+        self.scenario
+    }
+
+    /// Number of rods.
+    pub fn rods(&self) -> usize {
+        self.scenario.rods.len()
+    }
+
+    /// Whether all tips share one point.
+    pub fn joined(&self) -> bool {
+        self.scenario.joined
+    }
+
+    /// Fractions of the length where some profile has a kink, ascending.
+    pub fn kinks(&self) -> &[f64] {
+        &self.kinks
+    }
+
+    /// Length of rod `j`.
+    pub fn length(&self, j: usize) -> f64 {
+        self.rod(j).length / self.scale.length
+    }
+
+    /// Base rotation of rod `j` (paper, section 2.4 (c)).
+    pub fn base(&self, j: usize) -> DQuat {
+        rotation::exp(self.rod(j).angle * DVec3::Z)
+    }
+
+    /// Section of rod `j` at `sigma`, for a segment that is the fraction
+    /// `width` of the rod.
+    pub fn section(&self, j: usize, sigma: f64, width: f64) -> Section {
+        let rod = self.rod(j);
+        let at = |p: &[crate::scenario::Profile; 3]| {
+            DVec3::new(p[0].at(sigma), p[1].at(sigma), p[2].at(sigma))
+        };
+        Section {
+            ds: self.length(j) * width,
+            couple_stiffness: at(&rod.couple_stiffness) / self.scale.stiffness,
+            rest_curvature: at(&rod.rest_curvature) * self.scale.length,
+            compliance: (at(&rod.force_stiffness) / self.scale.force()).recip(),
+        }
+    }
+
+    /// Coupling of gap `g` between rods g and g + 1: force per unit
+    /// displacement and unit of sigma.
+    pub fn coupling(&self, g: usize) -> DVec3 {
+        let gap_length = 0.5 * (self.length(g) + self.length(g + 1));
+        DVec3::from_array(self.scenario.coupling[g]) * gap_length * self.scale.length.powi(2)
+            / self.scale.force()
+    }
+
+    fn rod(&self, j: usize) -> &'a Rod {
+        &self.scenario.rods[j]
+    }
+}

@@ -1,0 +1,16 @@
+//! The whole leaf, dimensionless and discretised: numbering, loads, coupling,
+//! the joint tip, assembly, and the linear algebra that its structure allows.
+
+mod assembly;
+mod chain;
+mod dimensionless;
+mod grid;
+mod state;
+mod system;
+
+pub use assembly::{DiscreteLeaf, Sums};
+pub use chain::Pivots;
+pub use dimensionless::{Leaf, Scale};
+pub use grid::Grid;
+pub use state::{Increment, State};
+pub use system::{System, Solved};

@@ -1,0 +1,69 @@
+//! Positions, rotations and segment forces of all nodes of a leaf.
+
+use crate::rotation;
+use glam::{DQuat, DVec3};
+
+/// The state of a discretised leaf with N rods of n segments, rod after rod,
+/// base to tip. Of a joined leaf all last positions are equal.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    /// Nodal positions, N (n + 1).
+    pub x: Vec<DVec3>,
+    /// Nodal rotations as unit quaternions, N (n + 1).
+    pub q: Vec<DQuat>,
+    /// Spatial force of each segment, N n.
+    pub n: Vec<DVec3>,
+    segments: usize,
+}
+
+/// Increments of one node in the order of elimination: spatial rotation, then
+/// displacement.
+pub type Increment = [f64; 6];
+
+/// The rotation part of an increment.
+#[inline]
+pub fn turn(increment: &Increment) -> DVec3 {
+    DVec3::new(increment[0], increment[1], increment[2])
+}
+
+/// The displacement part of an increment.
+#[inline]
+pub fn shift(increment: &Increment) -> DVec3 {
+    DVec3::new(increment[3], increment[4], increment[5])
+}
+
+impl State {
+    /// From nodal positions and rotations, without forces.
+    pub fn new(segments: usize, x: Vec<DVec3>, q: Vec<DQuat>) -> Self {
+        let rods = x.len() / (segments + 1);
+        State { x, q, n: vec![DVec3::ZERO; rods * segments], segments }
+    }
+
+    /// Segments per rod.
+    pub fn segments(&self) -> usize {
+        self.segments
+    }
+
+    /// Number of rods.
+    pub fn rods(&self) -> usize {
+        self.x.len() / (self.segments + 1)
+    }
+
+    /// Index of the first node of rod `j`.
+    #[inline]
+    pub fn base(&self, j: usize) -> usize {
+        j * (self.segments + 1)
+    }
+
+    /// Position of the tip of rod `j`.
+    pub fn tip(&self, j: usize) -> DVec3 {
+        self.x[self.base(j) + self.segments]
+    }
+
+    /// Turns and moves node `k` by `step` times the increment.
+    #[inline]
+    pub fn advance(&mut self, k: usize, increment: &Increment, step: f64) {
+        self.q[k] = (rotation::exp(step * turn(increment)) * self.q[k]).normalize();
+        self.x[k] += step * shift(increment);
+    }
+}
