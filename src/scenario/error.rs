@@ -75,7 +75,7 @@ pub enum ScenarioError {
         key: Key,
         spot: Spot,
         found: String,
-        problem: Problem,
+        problem: Box<Problem>,
     },
 }
 

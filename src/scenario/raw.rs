@@ -239,7 +239,7 @@ impl<'e> Item<'e> {
             key: self.key,
             spot: self.spot,
             found: self.source.found(self.value),
-            problem,
+            problem: Box::new(problem),
         }
     }
 }
