@@ -361,7 +361,7 @@ fn tolerances() {
     tolerance(
         "0",
         &[
-            "leaf.toml:28: solve.tolerance = 0: must be greater than 0 and at most 1e-1",
+            "leaf.toml:28: solve.tolerance = 0: must be greater than 0 and at most 0.1",
             "relative to the length",
         ],
     );
@@ -371,7 +371,7 @@ fn tolerances() {
     );
     tolerance(
         "0.5",
-        &["solve.tolerance = 0.5: must be greater than 0 and at most 1e-1"],
+        &["solve.tolerance = 0.5: must be greater than 0 and at most 0.1"],
     );
     tolerance(
         "1e-20",
@@ -394,28 +394,28 @@ fn moments_need_a_single_rod() {
 fn limits_that_values_set_together() {
     refused! {
         "tip_force = [0.0, 0.0, 0.0]" => "tip_force = [1e300, 0.0, 0.0]" =>
-            "leaf.toml:25: load.tip_force = [1e300, 0.0, 0.0]: gives |F| L^2/A = 4.00e301, the limit is 1e8",
+            "leaf.toml:25: load.tip_force = [1e300, 0.0, 0.0]: gives |F| L^2/A = 4.000e301, the limit is 1e8",
             "confined to less than 1e-4 of the length";
         "tip_force = [0.0, 0.0, 0.0]" => "tip_force = [1.7e308, 1.7e308, 1.7e308]" =>
             "load.tip_force",
             "the limit is 1e8";
         "gravity = [0.0, 0.0, -1.0]" => "gravity = [0, 0, -1e7]" =>
             "load.gravity",
-            "|g| L^3/A = 8.00e8, the limit is 1e8";
+            "|g| L^3/A = 8.000e8, the limit is 1e8";
         "y = 1.0" => "y = 1e12" =>
-            "leaf.toml:21: coupling.y = 1e12: gives kappa L^4/A = 1.60e14, the limit is 1e12";
+            "leaf.toml:21: coupling.y = 1e12: gives kappa L^4/A = 1.600e14, the limit is 1e12";
         "z = [1.0, 2.0]" => "z = [1, 1e300]" =>
             "leaf.toml:22: coupling.z, entry 2 = 1e300",
             "kappa L^4/A";
         "torsion = 1.0" => "torsion = [1, 1e-13, 1]" =>
-            "leaf.toml:9: stiffness.torsion, entry 2 = 1e-13: gives A_max/A = 1.00e13, the limit is 1e12";
+            "leaf.toml:9: stiffness.torsion, entry 2 = 1e-13: gives A_max/A = 1.000e13, the limit is 1e12";
         "twist = 0.0" => "twist = -501" =>
-            "leaf.toml:16: rest.twist = -501: gives |u0| L = 1.00e3, the limit is 1e3";
+            "leaf.toml:16: rest.twist = -501: gives |u0| L = 1.002e3, the limit is 1e3";
         "shear_3 = 100.0" => "shear_3 = 1e-9" =>
-            "leaf.toml:14: stiffness.shear_3 = 1e-9: gives H L^2/A = 4.00e-8, the limit is 1e-6",
+            "leaf.toml:14: stiffness.shear_3 = 1e-9: gives H L^2/A = 4.000e-8, the limit is 1e-6",
             "softer in stretch or shear";
         "length = 2.0" => "length = [2.0, 1.9e-3, 2.0]" =>
-            "leaf.toml:5: leaf.length, entry 2 = 1.9e-3: gives L_max/L = 1.05e3, the limit is 1e3";
+            "leaf.toml:5: leaf.length, entry 2 = 1.9e-3: gives L_max/L = 1.053e3, the limit is 1e3";
     }
     let wound = with(&[
         "leaf.rods=1",
@@ -426,7 +426,7 @@ fn limits_that_values_set_together() {
     ]);
     let message = wound.unwrap_err().to_string();
     assert!(
-        message.contains("load.tip_moment") && message.contains("|M| L/A = 2.00e10"),
+        message.contains("load.tip_moment") && message.contains("|M| L/A = 2.000e10"),
         "{message}"
     );
 }
@@ -602,7 +602,7 @@ fn ten_thousand_rods_are_read_quickly() {
     assert_eq!(Scenario::from_toml(&text).unwrap().rods.len(), rods);
     let taken = start.elapsed();
     println!("{taken:?}");
-    // Ten times what it takes: a busy machine must not fail this.
+    // Well above what it takes (30 ms): a busy machine must not fail this.
     assert!(taken.as_millis() < 500, "{taken:?}");
 }
 

@@ -178,14 +178,14 @@ pub enum Problem {
     #[error("a moment at the tip needs leaf.rods = 1 (here {rods}): joined tips pass on no moment")]
     MomentOnManyRods { rods: usize },
     #[error(
-        "must be greater than 0 and at most {most:e}: it is the error of the centerlines relative to the length of a rod"
+        "must be greater than 0 and at most {most}: it is the error of the centerlines relative to the length of a rod"
     )]
     Tolerance { most: f64 },
     #[error(
         "must be at least {least:e}: double precision carries 16 digits, and rounding in the solve takes about four of them"
     )]
     ToleranceTooSmall { least: f64 },
-    #[error("gives {formula} = {value:.2e}, the limit is {limit:e}: {because}")]
+    #[error("gives {formula} = {value:.3e}, the limit is {limit:e}: {because}")]
     Limit {
         formula: &'static str,
         value: f64,
