@@ -3,8 +3,17 @@
 //! Everything below this module trusts a [`Scenario`]: lengths of lists agree,
 //! stiffnesses are positive, angles finite.
 
+mod check;
+mod error;
+mod key;
+mod limits;
 mod profile;
+mod quantity;
+mod raw;
+mod read;
 
+pub use error::{Because, Needed, Place, Problem, ScenarioError, Spot};
+pub use key::Key;
 pub use profile::Profile;
 
 /// A checked scenario. All quantities are in the units the file was written

@@ -21,7 +21,9 @@ impl Profile {
         match self {
             Profile::Constant(value) => *value,
             Profile::Linear { at, value } => {
-                let right = at.partition_point(|&knot| knot < sigma).clamp(1, at.len() - 1);
+                let right = at
+                    .partition_point(|&knot| knot < sigma)
+                    .clamp(1, at.len() - 1);
                 let t = (sigma - at[right - 1]) / (at[right] - at[right - 1]);
                 value[right - 1] + t.clamp(0.0, 1.0) * (value[right] - value[right - 1])
             }
@@ -51,5 +53,51 @@ impl Profile {
             Profile::Constant(value) => std::slice::from_ref(value),
             Profile::Linear { value, .. } => value,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tent() -> Profile {
+        Profile::Linear {
+            at: vec![0.0, 0.25, 1.0],
+            value: vec![1.0, 3.0, -6.0],
+        }
+    }
+
+    #[test]
+    fn a_constant_is_the_same_everywhere() {
+        let rigid = Profile::Constant(f64::INFINITY);
+        assert_eq!(rigid.at(0.0), f64::INFINITY);
+        assert_eq!(rigid.at(1.0), f64::INFINITY);
+        assert!(rigid.kinks().is_empty());
+        assert_eq!(Profile::Constant(-2.0).max_abs(), 2.0);
+        assert_eq!(Profile::Constant(-2.0).min(), -2.0);
+    }
+
+    #[test]
+    fn linear_between_knots_and_exact_at_them() {
+        let tent = tent();
+        for (sigma, value) in [
+            (0.0, 1.0),
+            (0.125, 2.0),
+            (0.25, 3.0),
+            (0.5, 0.0),
+            (1.0, -6.0),
+        ] {
+            assert_eq!(tent.at(sigma), value, "at {sigma}");
+        }
+        assert_eq!(tent.kinks(), [0.25]);
+        assert_eq!(tent.max_abs(), 6.0);
+        assert_eq!(tent.min(), -6.0);
+    }
+
+    #[test]
+    fn beyond_the_ends_the_end_values_hold() {
+        // A fraction may come out a rounding error outside [0, 1].
+        assert_eq!(tent().at(-1e-17), 1.0);
+        assert_eq!(tent().at(1.0 + 1e-15), -6.0);
     }
 }

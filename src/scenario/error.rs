@@ -1,0 +1,331 @@
+//! Every message a person can get about a scenario, as values.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use super::key::Key;
+
+/// Why a scenario was refused. Its text is the whole message: where, which
+/// key, what was found, and what to change.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ScenarioError {
+    #[error("{}: cannot be read: {reason}", path.display())]
+    Unreadable {
+        path: PathBuf,
+        reason: std::io::Error,
+    },
+
+    #[error("{}: is a folder: give the TOML file itself", path.display())]
+    Folder { path: PathBuf },
+
+    #[error("{}: is larger than {limit} bytes: this is no scenario", path.display())]
+    TooLarge { path: PathBuf, limit: u64 },
+
+    #[error(
+        "{file}:{line}: is not text in UTF-8: byte {offset} is 0x{byte:02x}: save the file as UTF-8"
+    )]
+    NotUtf8 {
+        file: String,
+        line: usize,
+        offset: usize,
+        byte: u8,
+    },
+
+    #[error("{place}: not valid TOML: {message}{snippet}")]
+    Syntax {
+        place: Place,
+        message: String,
+        snippet: String,
+    },
+
+    #[error("{place}: unknown key {key}{}: allowed here: {}{snippet}", did_you_mean(*meant), allowed.join(", "))]
+    UnknownKey {
+        place: Place,
+        key: String,
+        meant: Option<&'static str>,
+        allowed: Vec<&'static str>,
+        snippet: String,
+    },
+
+    #[error(
+        "{place}: {table} = {found}: must be a table: write [{table}] on a line of its own, below it {}",
+        allowed.join(", ")
+    )]
+    NotATable {
+        place: Place,
+        table: &'static str,
+        found: String,
+        allowed: Vec<&'static str>,
+    },
+
+    #[error("--set {given}: must be KEY=VALUE, e.g. --set load.gravity=[0,0,-0.5]")]
+    NotAnOverride { given: String },
+
+    #[error("{file}: {} is missing: {}", key.path(), how_to_add(*key, *has_table))]
+    Missing {
+        file: String,
+        key: Key,
+        has_table: bool,
+    },
+
+    #[error("{place}: {}{spot} = {found}: {problem}", key.path())]
+    Value {
+        place: Place,
+        key: Key,
+        spot: Spot,
+        found: String,
+        problem: Box<Problem>,
+    },
+}
+
+/// Where a value was written.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Place {
+    /// In a file; lines count from 1.
+    Line { file: String, line: usize },
+    /// On the command line.
+    Set { given: String },
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Place::Line { file, line } => write!(f, "{file}:{line}"),
+            Place::Set { given } => write!(f, "--set {given}"),
+        }
+    }
+}
+
+/// Which part of a value; indices count from 0 here and from 1 in the text.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Spot {
+    Whole,
+    /// Entry of a list.
+    Entry(usize),
+    /// `at`, or one of its entries.
+    At(Option<usize>),
+    /// `value`, or one of its entries.
+    Value(Option<usize>),
+    /// Entry of one rod's list inside `value`.
+    RodValue(usize, usize),
+}
+
+impl fmt::Display for Spot {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Spot::Whole => Ok(()),
+            Spot::Entry(i) => write!(f, ", entry {}", i + 1),
+            Spot::At(None) => write!(f, ", at"),
+            Spot::At(Some(i)) => write!(f, ", at, entry {}", i + 1),
+            Spot::Value(None) => write!(f, ", value"),
+            Spot::Value(Some(i)) => write!(f, ", value, entry {}", i + 1),
+            Spot::RodValue(rod, i) => write!(f, ", value, list {}, entry {}", rod + 1, i + 1),
+        }
+    }
+}
+
+/// What is wrong with a value, and what is allowed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Problem {
+    #[error("must be {needed}")]
+    WrongType { needed: Needed },
+    #[error("must be a finite number")]
+    NotFinite,
+    #[error(
+        "must be a finite number; inf (rigid) is allowed for stiffness.axial, shear_2 and shear_3 only, not in a profile"
+    )]
+    Infinite,
+    #[error("is not a number a computer can hold (the largest is 1.8e308)")]
+    Overflow,
+    #[error("must be greater than 0")]
+    NotPositive,
+    #[error("must not be negative")]
+    Negative,
+    #[error("must lie between {least:e} and {most:e}: choose other units", least = super::check::MAGNITUDES.0, most = super::check::MAGNITUDES.1)]
+    Magnitude,
+    #[error("must be a whole number from 1 to {most}, without a decimal point")]
+    Rods { most: usize },
+    #[error("has {found} entries: must have {needed}, {because}")]
+    Entries {
+        found: usize,
+        needed: usize,
+        because: Because,
+    },
+    #[error("at least two knots are needed, the first at 0 and the last at 1")]
+    TooFewKnots,
+    #[error("must start at 0 (the base)")]
+    FirstKnot,
+    #[error("must end at 1 (the tip)")]
+    LastKnot,
+    #[error(
+        "must be greater than the entry before it, {before}: knots rise strictly (write a step as a steep ramp)"
+    )]
+    KnotsNotRising { before: f64 },
+    #[error("unknown key {key}: a profile is {{ at = [0.0, 1.0], value = [1.0, 0.5] }}")]
+    ProfileKey { key: String },
+    #[error("{key} is missing: a profile is {{ at = [0.0, 1.0], value = [1.0, 0.5] }}")]
+    ProfileWithout { key: &'static str },
+    #[error(
+        "must be \"paper\" or \"symmetric\", or a list of {rods} angles in radians, one per rod"
+    )]
+    Fan { rods: usize },
+    #[error(
+        "must be usable as a folder name: 1 to {most} letters, digits and the signs _ - . + with a letter, digit or _ first"
+    )]
+    Name { most: usize },
+    #[error("a moment at the tip needs leaf.rods = 1 (here {rods}): joined tips pass on no moment")]
+    MomentOnManyRods { rods: usize },
+    #[error(
+        "must be greater than 0 and at most {most}: it is the error of the centerlines relative to the length of a rod"
+    )]
+    Tolerance { most: f64 },
+    #[error(
+        "must be at least {least:e}: double precision carries 16 digits, and rounding in the solve takes about four of them"
+    )]
+    ToleranceTooSmall { least: f64 },
+    #[error("gives {formula} = {value:.3e}, the limit is {limit:e}: {because}")]
+    Limit {
+        formula: &'static str,
+        value: f64,
+        limit: f64,
+        because: &'static str,
+    },
+}
+
+/// Kinds of value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Needed {
+    Number,
+    Text,
+    TrueOrFalse,
+    Vector,
+    /// Number, list or profile, for this many rods.
+    Quantity(usize),
+    /// Number or list, for this many rods.
+    LengthOf(usize),
+    /// Number or list, for this many gaps.
+    PerGap(usize),
+    ListOfNumbers,
+    /// The `value` of a profile: numbers, or one list per rod.
+    ProfileValue(usize),
+}
+
+impl fmt::Display for Needed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Needed::Number => write!(f, "a number"),
+            Needed::Text => write!(f, "text in quotes"),
+            Needed::TrueOrFalse => write!(f, "true or false"),
+            Needed::Vector => write!(f, "a list of three numbers [x, y, z]"),
+            Needed::Quantity(rods) => write!(
+                f,
+                "a number, a list of {rods} (one per rod), or a profile {{ at = [0.0, 1.0], value = [1.0, 0.5] }}"
+            ),
+            Needed::LengthOf(rods) => write!(f, "a number or a list of {rods} (one per rod)"),
+            Needed::PerGap(gaps) => write!(
+                f,
+                "a number or a list of {gaps} (one per gap between neighbouring rods)"
+            ),
+            Needed::ListOfNumbers => write!(f, "a list of numbers"),
+            Needed::ProfileValue(rods) => {
+                write!(
+                    f,
+                    "a list of numbers, or a list of {rods} such lists (one per rod)"
+                )
+            }
+        }
+    }
+}
+
+/// Why a list must have so many entries.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Because {
+    OnePerRod,
+    OnePerGap,
+    OnePerKnot,
+    Axes,
+}
+
+impl fmt::Display for Because {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Because::OnePerRod => "one per rod (leaf.rods)",
+            Because::OnePerGap => "one per gap between neighbouring rods (leaf.rods - 1)",
+            Because::OnePerKnot => "one per entry of at",
+            Because::Axes => "one per axis x, y, z",
+        })
+    }
+}
+
+fn did_you_mean(meant: Option<&str>) -> String {
+    meant.map_or(String::new(), |key| format!(" (did you mean {key}?)"))
+}
+
+fn how_to_add(key: Key, has_table: bool) -> String {
+    let line = format!("`{} = {}`", key.short_name(), key.example());
+    match (key.table(), has_table) {
+        ("", _) => format!("add a line such as {line} at the top of the file"),
+        (table, true) => format!("add a line such as {line} below [{table}]"),
+        (table, false) => format!("add the table [{table}], and below it a line such as {line}"),
+    }
+}
+
+/// The line of `text` that holds byte `at`, counted from 1.
+pub(super) fn line_of(text: &[u8], at: usize) -> usize {
+    1 + text[..at.min(text.len())]
+        .iter()
+        .filter(|byte| **byte == b'\n')
+        .count()
+}
+
+/// The offending line with a caret below, to be put after a message; empty
+/// where the line is too long to be read.
+pub(super) fn snippet(text: &str, span: std::ops::Range<usize>) -> String {
+    const WIDEST: usize = 120;
+    let at = span.start.min(text.len());
+    let (Some(before), Some(after)) = (text.get(..at), text.get(at..)) else {
+        return String::new();
+    };
+    let start = before.rfind('\n').map_or(0, |newline| newline + 1);
+    let line = text[start..at + after.find('\n').unwrap_or(after.len())].trim_end();
+    if line.chars().count() > WIDEST {
+        return String::new();
+    }
+    let number = line_of(text.as_bytes(), at).to_string();
+    let gap = " ".repeat(number.len());
+    // Tabs stay tabs, so that the caret stands below its character.
+    let indent: String = text[start..at]
+        .chars()
+        .map(|c| if c == '\t' { '\t' } else { ' ' })
+        .collect();
+    let width = text
+        .get(span.start..span.end.max(span.start))
+        .map_or(1, |s| s.trim_end().chars().count());
+    let room = line
+        .chars()
+        .count()
+        .saturating_sub(indent.chars().count())
+        .max(1);
+    let carets = "^".repeat(width.clamp(1, room));
+    format!("\n{gap} |\n{number} | {line}\n{gap} | {indent}{carets}")
+}
+
+/// `text` on one line and not too long.
+pub(super) fn shorten(text: &str) -> String {
+    const LONGEST: usize = 60;
+    let mut short = String::new();
+    for word in text.split_whitespace() {
+        if !short.is_empty() {
+            short.push(' ');
+        }
+        short.push_str(word);
+        if let Some((cut, _)) = short.char_indices().nth(LONGEST) {
+            short.truncate(cut);
+            short.push_str(" ...");
+            break;
+        }
+    }
+    short
+}

@@ -1,0 +1,75 @@
+//! Reading a scenario: from a file, or from text.
+
+use std::fs::File;
+use std::io::{ErrorKind, Read};
+use std::path::Path;
+
+use super::error::{ScenarioError, line_of};
+use super::raw::Raw;
+use super::{Scenario, check};
+
+/// Most bytes of a file; 100,000 rods with every quantity listed stay below.
+const MOST_BYTES: u64 = 64 << 20;
+
+impl Scenario {
+    /// Reads and checks the TOML in `text`.
+    ///
+    /// ```
+    /// let scenario = leafdyn::scenario::Scenario::from_toml(
+    ///     r#"
+    ///     name = "cantilever"
+    ///     leaf = { rods = 1, length = 1.0, fan = [0.0] }
+    ///     stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = inf, shear_2 = inf, shear_3 = inf }
+    ///     load = { tip_force = [0.0, 0.0, -1.0] }
+    ///     "#,
+    /// )?;
+    /// assert_eq!(scenario.rods.len(), 1);
+    /// # Ok::<(), leafdyn::scenario::ScenarioError>(())
+    /// ```
+    pub fn from_toml(text: &str) -> Result<Scenario, ScenarioError> {
+        Scenario::from_toml_with(text, "scenario", &[])
+    }
+
+    /// As [`Scenario::from_toml`], with the entries `overrides` replaced
+    /// (`KEY=VALUE`, such as `load.gravity=[0,0,-0.5]`; the value is TOML, and
+    /// what is no TOML is taken as text). Messages call the text `file`.
+    pub fn from_toml_with(
+        text: &str,
+        file: &str,
+        overrides: &[String],
+    ) -> Result<Scenario, ScenarioError> {
+        check::check(&Raw::parse(text, file, overrides)?)
+    }
+
+    /// Reads and checks the file at `path`, with the entries `overrides` replaced.
+    pub fn read(path: &Path, overrides: &[String]) -> Result<Scenario, ScenarioError> {
+        let mut bytes = Vec::new();
+        // Opening a folder succeeds on some systems, and reading it fails.
+        File::open(path)
+            .and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes))
+            .map_err(|reason| match reason.kind() {
+                ErrorKind::IsADirectory => ScenarioError::Folder { path: path.into() },
+                _ => ScenarioError::Unreadable {
+                    path: path.into(),
+                    reason,
+                },
+            })?;
+        if bytes.len() as u64 > MOST_BYTES {
+            return Err(ScenarioError::TooLarge {
+                path: path.into(),
+                limit: MOST_BYTES,
+            });
+        }
+        let file = path.display().to_string();
+        let text = std::str::from_utf8(&bytes).map_err(|error| {
+            let offset = error.valid_up_to();
+            ScenarioError::NotUtf8 {
+                file: file.clone(),
+                line: line_of(&bytes, offset),
+                offset,
+                byte: bytes[offset],
+            }
+        })?;
+        Scenario::from_toml_with(text, &file, overrides)
+    }
+}

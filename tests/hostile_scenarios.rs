@@ -1,0 +1,654 @@
+//! Bad input: every refusal is one message that says where, what was found,
+//! and what to change.
+
+use std::fs;
+use std::path::Path;
+
+use leafdyn::scenario::{Place, Problem, Profile, Scenario, ScenarioError};
+use proptest::prelude::*;
+
+const VALID: &str = r#"# line 1
+name = "leaf"
+[leaf]
+rods = 3
+length = 2.0
+fan = "symmetric"
+joined = true
+[stiffness]
+torsion = 1.0
+bending_2 = [1.0, 1.0, 1.0]
+bending_3 = { at = [0.0, 0.5, 1.0], value = [1.0, 0.5, 0.1] }
+axial = inf
+shear_2 = 100.0
+shear_3 = 100.0
+[rest]
+twist = 0.0
+bend_2 = { at = [0.0, 1.0], value = [[0.0, 1.0], [0.0, 2.0], [0.0, 3.0]] }
+bend_3 = 0.0
+[coupling]
+x = 0.0
+y = 1.0
+z = [1.0, 2.0]
+[load]
+gravity = [0.0, 0.0, -1.0]
+tip_force = [0.0, 0.0, 0.0]
+tip_moment = [0.0, 0.0, 0.0]
+[solve]
+tolerance = 1e-6
+"#;
+
+fn with(overrides: &[&str]) -> Result<Scenario, ScenarioError> {
+    let overrides: Vec<String> = overrides.iter().map(|text| text.to_string()).collect();
+    Scenario::from_toml_with(VALID, "leaf.toml", &overrides)
+}
+
+/// The message for VALID with one line replaced; it must hold all `parts`.
+#[track_caller]
+fn refused(line: &str, by: &str, parts: &[&str]) {
+    assert!(VALID.contains(line), "{line}");
+    let text = VALID.replacen(line, by, 1);
+    let message = match Scenario::from_toml_with(&text, "leaf.toml", &[]) {
+        Ok(_) => panic!("accepted: {by}"),
+        Err(error) => error.to_string(),
+    };
+    for part in parts {
+        assert!(message.contains(part), "no '{part}' in: {message}");
+    }
+}
+
+/// A table of `line of VALID => what replaces it => parts of the message`.
+macro_rules! refused {
+    ($($line:expr => $by:expr => $($part:expr),+;)+) => {
+        $(refused($line, $by, &[$($part),+]);)+
+    };
+}
+
+#[test]
+fn the_valid_one_is_valid() {
+    let scenario = with(&[]).unwrap();
+    assert_eq!(scenario.rods.len(), 3);
+    assert_eq!(scenario.coupling, [[0.0, 1.0, 1.0], [0.0, 1.0, 2.0]]);
+    assert_eq!(scenario.rods[1].rest_curvature[1].at(0.5), 1.0);
+    assert_eq!(scenario.rods[2].couple_stiffness[2].at(0.25), 0.75);
+    assert_eq!(
+        scenario.rods[0].force_stiffness[0],
+        Profile::Constant(f64::INFINITY)
+    );
+    assert_eq!(scenario.rods[0].angle, -scenario.rods[2].angle);
+    assert_eq!(scenario.rods[1].angle, 0.0);
+}
+
+#[test]
+fn what_may_be_left_out() {
+    let text = &VALID[..VALID.find("[rest]").unwrap()].replace("joined = true\n", "");
+    let scenario = Scenario::from_toml(text).unwrap();
+    assert!(scenario.joined);
+    assert_eq!(scenario.tolerance, 1e-6);
+    assert_eq!(scenario.coupling, [[0.0; 3]; 2]);
+    assert_eq!(scenario.gravity, [0.0; 3]);
+}
+
+#[test]
+fn unknown_keys() {
+    refused! {
+        "torsion = 1.0" => "torsoin = 1.0" =>
+            "leaf.toml:9: unknown key stiffness.torsoin (did you mean stiffness.torsion?)",
+            "torsion, bending_2, bending_3, axial, shear_2, shear_3",
+            "9 | torsoin = 1.0\n  | ^^^^^^^";
+        "[stiffness]" => "[stifness]" =>
+            "leaf.toml:8: unknown key stifness",
+            "did you mean stiffness?";
+        "rods = 3" => "gravity = 3" =>
+            "leaf.toml:4: unknown key leaf.gravity",
+            "did you mean load.gravity?";
+        "[solve]" => "[solver.x]" =>
+            "leaf.toml:27: unknown key solver",
+            "did you mean solve?",
+            "leaf, stiffness";
+        "name =" => "colour = 1\nname =" =>
+            "leaf.toml:2: unknown key colour: allowed here: name, leaf";
+    }
+}
+
+#[test]
+fn text_that_is_no_toml() {
+    refused! {
+        "rods = 3" => "rods = " =>
+            "leaf.toml:4: not valid TOML",
+            "4 | rods =";
+        "rods = 3" => "rods = 3\nrods = 4" =>
+            "leaf.toml:5: not valid TOML: duplicate key";
+        "rods = 3" => "rods = 3 4" =>
+            "leaf.toml:4: not valid TOML";
+        "[rest]" => "[leaf]" =>
+            "leaf.toml:15: not valid TOML: duplicate key";
+        "rods = 3" => &format!("rods = {}", "[".repeat(100_000)) =>
+            "leaf.toml:4: not valid TOML";
+    }
+}
+
+#[test]
+fn missing_keys() {
+    refused! {
+        "torsion = 1.0\n" => "" =>
+            "leaf.toml: stiffness.torsion is missing: add a line such as `torsion = 1.0` below [stiffness]";
+        "name = \"leaf\"" => "" =>
+            "leaf.toml: name is missing",
+            "`name = \"my-leaf\"` at the top of the file";
+    }
+    let message = Scenario::from_toml("name = \"leaf\"")
+        .unwrap_err()
+        .to_string();
+    assert_eq!(
+        message,
+        "scenario: leaf.rods is missing: add the table [leaf], and below it a line such as `rods = 5`"
+    );
+}
+
+#[test]
+fn wrong_types() {
+    refused! {
+        "name = \"leaf\"" => "name = 3" =>
+            "leaf.toml:2: name = 3: must be text in quotes";
+        "rods = 3" => "rods = 3.0" =>
+            "leaf.toml:4: leaf.rods = 3.0: must be a whole number from 1 to 100000";
+        "joined = true" => "joined = 1" =>
+            "leaf.toml:7: leaf.joined = 1: must be true or false";
+        "torsion = 1.0" => "torsion = \"stiff\"" =>
+            "leaf.toml:9: stiffness.torsion = \"stiff\": must be a number, a list of 3 (one per rod), or a profile";
+        "torsion = 1.0" => "torsion = 2020-01-01" =>
+            "stiffness.torsion = 2020-01-01: must be a number";
+        "torsion = 1.0" => "torsion = [1.0, true, 1.0]" =>
+            "leaf.toml:9: stiffness.torsion, entry 2 = true: must be a number";
+        "[0.0, 0.0, -1.0]" => "-1.0" =>
+            "leaf.toml:24: load.gravity = -1.0: must be a list of three numbers";
+        "[0.0, 0.0, -1.0]" => "[0.0, -1.0]" =>
+            "leaf.toml:24: load.gravity = [0.0, -1.0]: has 2 entries: must have 3";
+        "fan = \"symmetric\"" => "fan = \"round\"" =>
+            "leaf.toml:6: leaf.fan = \"round\": must be \"paper\" or \"symmetric\", or a list of 3 angles in radians";
+        "fan = \"symmetric\"" => "fan = 0.0" =>
+            "leaf.toml:6: leaf.fan = 0.0: must be \"paper\"";
+        "length = 2.0" => "length = { at = [0, 1], value = [1, 2] }" =>
+            "leaf.toml:5: leaf.length = {",
+            "must be a number or a list of 3 (one per rod)";
+        "y = 1.0" => "y = { at = [0, 1], value = [1, 2] }" =>
+            "coupling.y",
+            "a number or a list of 2 (one per gap";
+    }
+    let scenario = Scenario::from_toml("name = \"leaf\"\nleaf = 3")
+        .unwrap_err()
+        .to_string();
+    assert!(
+        scenario.contains("scenario:2: leaf = 3: must be a table: write [leaf]"),
+        "{scenario}"
+    );
+}
+
+#[test]
+fn the_place_is_the_entrys_own_line() {
+    refused! {
+        "torsion = 1.0" => "torsion = [\n  1.0,\n  -1.0,\n  1.0,\n]" =>
+            "leaf.toml:11: stiffness.torsion, entry 2 = -1.0: must be greater than 0";
+    }
+}
+
+#[test]
+fn list_lengths() {
+    refused! {
+        "torsion = 1.0" => "torsion = [1.0, 1.0]" =>
+            "leaf.toml:9: stiffness.torsion = [1.0, 1.0]: has 2 entries: must have 3, one per rod (leaf.rods)";
+        "rods = 3" => "rods = 4" =>
+            "leaf.toml:10: stiffness.bending_2 = [1.0, 1.0, 1.0]: has 3 entries: must have 4";
+        "fan = \"symmetric\"" => "fan = [0.0]" =>
+            "leaf.toml:6: leaf.fan",
+            "has 1 entries: must have 3";
+        "z = [1.0, 2.0]" => "z = [1.0, 2.0, 3.0]" =>
+            "leaf.toml:22: coupling.z = [1.0, 2.0, 3.0]: has 3 entries: must have 2, one per gap";
+        "[0.0, 2.0], " => "" =>
+            "leaf.toml:17: rest.bend_2, value =",
+            "has 2 entries: must have 3, one per rod";
+        "[0.0, 2.0], " => "[0.0], " =>
+            "leaf.toml:17: rest.bend_2, value, entry 2 = [0.0]: has 1 entries: must have 2, one per entry of at";
+    }
+}
+
+#[test]
+fn numbers_out_of_range() {
+    for (zero, found) in [
+        ("0", "0"),
+        ("-3", "-3"),
+        ("100001", "100001"),
+        ("99999999999999999999", "99999999999999999999"),
+    ] {
+        refused(
+            "rods = 3",
+            &format!("rods = {zero}"),
+            &[
+                &format!("leaf.toml:4: leaf.rods = {found}: "),
+                "must be a whole number from 1 to 100000",
+            ],
+        );
+    }
+    refused! {
+        "length = 2.0" => "length = 0" =>
+            "leaf.toml:5: leaf.length = 0: must be greater than 0";
+        "length = 2.0" => "length = inf" =>
+            "leaf.toml:5: leaf.length = inf: must be a finite number";
+        "length = 2.0" => "length = 1e-300" =>
+            "leaf.length = 1e-300: must lie between 1e-50 and 1e50: choose other units";
+        "torsion = 1.0" => "torsion = -1.0" =>
+            "leaf.toml:9: stiffness.torsion = -1.0: must be greater than 0";
+        "torsion = 1.0" => "torsion = inf" =>
+            "inf (rigid) is allowed for stiffness.axial, shear_2 and shear_3 only";
+        "torsion = 1.0" => "torsion = 1e999" =>
+            "stiffness.torsion = 1e999: is not a number a computer can hold";
+        "axial = inf" => "axial = 1e999" =>
+            "leaf.toml:12: stiffness.axial = 1e999: is not a number";
+        "axial = inf" => "axial = -inf" =>
+            "leaf.toml:12: stiffness.axial = -inf: must be a finite number";
+        "axial = inf" => "axial = { at = [0.0, 1.0], value = [1.0, inf] }" =>
+            "leaf.toml:12: stiffness.axial, value, entry 2 = inf",
+            "not in a profile";
+        "y = 1.0" => "y = -1.0" =>
+            "leaf.toml:21: coupling.y = -1.0: must not be negative";
+        "z = [1.0, 2.0]" => "z = [1.0, inf]" =>
+            "leaf.toml:22: coupling.z, entry 2 = inf: must be a finite number";
+        "fan = \"symmetric\"" => "fan = [0.0, inf, 0.0]" =>
+            "leaf.fan, entry 2 = inf: must be a finite number";
+    }
+    assert!(with(&["stiffness.axial=[inf, 1.0, 10]"]).is_ok());
+}
+
+#[test]
+fn nan_is_refused_wherever_a_number_stands() {
+    for (line, by) in [
+        ("length = 2.0", "length = nan"),
+        ("torsion = 1.0", "torsion = nan"),
+        ("axial = inf", "axial = nan"),
+        ("axial = inf", "axial = [1.0, -nan, 1.0]"),
+        ("[1.0, 0.5, 0.1]", "[1.0, nan, 0.1]"),
+        ("at = [0.0, 0.5, 1.0]", "at = [0.0, nan, 1.0]"),
+        ("twist = 0.0", "twist = nan"),
+        ("y = 1.0", "y = nan"),
+        ("gravity = [0.0,", "gravity = [nan,"),
+        ("tip_force = [0.0,", "tip_force = [nan,"),
+        ("tip_moment = [0.0,", "tip_moment = [nan,"),
+        ("tolerance = 1e-6", "tolerance = nan"),
+        ("fan = \"symmetric\"", "fan = [0.0, nan, 0.0]"),
+    ] {
+        refused(line, by, &["leaf.toml:", "nan: must be a finite number"]);
+    }
+}
+
+#[test]
+fn profiles() {
+    let profile = "{ at = [0.0, 0.5, 1.0], value = [1.0, 0.5, 0.1] }";
+    let with_knots = |at: &str| format!("{{ at = {at}, value = [1.0, 0.5, 0.1] }}");
+    let bending = "leaf.toml:11: stiffness.bending_3, at";
+    refused! {
+        profile => &with_knots("[0.1, 0.5, 1.0]") =>
+            bending,
+            "entry 1 = 0.1: must start at 0";
+        profile => &with_knots("[0.0, 0.5, 0.9]") =>
+            bending,
+            "entry 3 = 0.9: must end at 1";
+        profile => &with_knots("[0.0, 0.0, 1.0]") =>
+            bending,
+            "entry 2 = 0.0: must be greater than the entry before it, 0";
+        profile => &with_knots("[0.0, 2.0, 1.0]") =>
+            bending,
+            "entry 3 = 1.0: must be greater than the entry before it, 2";
+        profile => &with_knots("[0.0]") =>
+            bending,
+            "at least two knots";
+        profile => &with_knots("[]") =>
+            bending,
+            "at least two knots";
+        profile => &with_knots("0.5") =>
+            bending,
+            "must be a list of numbers";
+        profile => "{ at = [0.0, 1.0] }" =>
+            "leaf.toml:11: stiffness.bending_3 = {",
+            "value is missing: a profile is";
+        profile => "{}" =>
+            "stiffness.bending_3 = {}: at is missing";
+        profile => "{ at = [0, 1], values = [1, 1] }" =>
+            "unknown key values: a profile is { at =";
+        profile => "{ at = [0, 1], value = [1, 0] }" =>
+            "bending_3, value, entry 2 = 0: must be greater than 0";
+        profile => "{ at = [0, 1], value = [1, 1, 1] }" =>
+            "has 3 entries: must have 2, one per entry of at";
+        profile => "{ at = [0, 1], value = 1 }" =>
+            "bending_3, value = 1: must be a list of numbers, or a list of 3 such";
+        profile => "{ at = [0, 1], value = [[1, 1], [1, -1], [1, 1]] }" =>
+            "leaf.toml:11: stiffness.bending_3, value, list 2, entry 2 = -1: must be greater than 0";
+        profile => "{ at = [0, 1], value = [[1, 1], 1, [1, 1]] }" =>
+            "value, entry 2 = 1: must be a list of numbers";
+    }
+}
+
+#[test]
+fn names_that_are_no_folder() {
+    for name in [
+        "",
+        "..",
+        ".",
+        "a/b",
+        "a\\\\b",
+        ".hidden",
+        "-o",
+        "a b",
+        "a\\u0000",
+        "C:x",
+        "../../etc",
+        &"x".repeat(101),
+    ] {
+        refused(
+            "\"leaf\"",
+            &format!("\"{name}\""),
+            &["leaf.toml:2: name = \"", "must be usable as a folder name"],
+        );
+    }
+    for name in ["fig04", "Blatt_2", "liść", "a+b-1.5", &"x".repeat(100)] {
+        assert_eq!(with(&[&format!("name=\"{name}\"")]).unwrap().name, name);
+    }
+}
+
+#[test]
+fn tolerances() {
+    let tolerance =
+        |by: &str, parts: &[&str]| refused("tolerance = 1e-6", &format!("tolerance = {by}"), parts);
+    tolerance(
+        "0",
+        &[
+            "leaf.toml:28: solve.tolerance = 0: must be greater than 0 and at most 0.1",
+            "relative to the length",
+        ],
+    );
+    tolerance(
+        "-1e-6",
+        &["solve.tolerance = -1e-6: must be greater than 0"],
+    );
+    tolerance(
+        "0.5",
+        &["solve.tolerance = 0.5: must be greater than 0 and at most 0.1"],
+    );
+    tolerance(
+        "1e-20",
+        &["solve.tolerance = 1e-20: must be at least 1e-12: double precision"],
+    );
+    tolerance("inf", &["solve.tolerance = inf: must be a finite number"]);
+    assert_eq!(with(&["solve.tolerance=1e-12"]).unwrap().tolerance, 1e-12);
+}
+
+#[test]
+fn moments_need_a_single_rod() {
+    refused! {
+        "tip_moment = [0.0, 0.0, 0.0]" => "tip_moment = [0.0, 0.0, 1.0]" =>
+            "leaf.toml:26: load.tip_moment = [0.0, 0.0, 1.0]: a moment at the tip needs leaf.rods = 1 (here 3)";
+    }
+}
+
+/// L = 2 and the smallest bending stiffness is 0.1.
+#[test]
+fn limits_that_values_set_together() {
+    refused! {
+        "tip_force = [0.0, 0.0, 0.0]" => "tip_force = [1e300, 0.0, 0.0]" =>
+            "leaf.toml:25: load.tip_force = [1e300, 0.0, 0.0]: gives |F| L^2/A = 4.000e301, the limit is 1e8",
+            "confined to less than 1e-4 of the length";
+        "tip_force = [0.0, 0.0, 0.0]" => "tip_force = [1.7e308, 1.7e308, 1.7e308]" =>
+            "load.tip_force",
+            "the limit is 1e8";
+        "gravity = [0.0, 0.0, -1.0]" => "gravity = [0, 0, -1e7]" =>
+            "load.gravity",
+            "|g| L^3/A = 8.000e8, the limit is 1e8";
+        "y = 1.0" => "y = 1e12" =>
+            "leaf.toml:21: coupling.y = 1e12: gives kappa L^4/A = 1.600e14, the limit is 1e12";
+        "z = [1.0, 2.0]" => "z = [1, 1e300]" =>
+            "leaf.toml:22: coupling.z, entry 2 = 1e300",
+            "kappa L^4/A";
+        "torsion = 1.0" => "torsion = [1, 1e-13, 1]" =>
+            "leaf.toml:9: stiffness.torsion, entry 2 = 1e-13: gives A_max/A = 1.000e13, the limit is 1e12";
+        "twist = 0.0" => "twist = -501" =>
+            "leaf.toml:16: rest.twist = -501: gives |u0| L = 1.002e3, the limit is 1e3";
+        "shear_3 = 100.0" => "shear_3 = 1e-9" =>
+            "leaf.toml:14: stiffness.shear_3 = 1e-9: gives H L^2/A = 4.000e-8, the limit is 1e-6",
+            "softer in stretch or shear";
+        "length = 2.0" => "length = [2.0, 1.9e-3, 2.0]" =>
+            "leaf.toml:5: leaf.length, entry 2 = 1.9e-3: gives L_max/L = 1.053e3, the limit is 1e3";
+    }
+    let wound = with(&[
+        "leaf.rods=1",
+        "stiffness.bending_2=1",
+        "rest.bend_2=0",
+        "coupling.z=0",
+        "load.tip_moment=[0,0,1e9]",
+    ]);
+    let message = wound.unwrap_err().to_string();
+    assert!(
+        message.contains("load.tip_moment") && message.contains("|M| L/A = 2.000e10"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_single_rod_has_no_gaps() {
+    let single = ["leaf.rods=1", "stiffness.bending_2=1", "rest.bend_2=0"];
+    let with_coupling = |z: &str| with(&[&single[..], &[z]].concat());
+    assert!(with_coupling("coupling.z=1.0").unwrap().coupling.is_empty());
+    assert!(with_coupling("coupling.z=[]").unwrap().coupling.is_empty());
+    assert!(
+        with_coupling("coupling.z=[1.0]")
+            .unwrap_err()
+            .to_string()
+            .contains("has 1 entries: must have 0")
+    );
+    assert!(
+        with_coupling("coupling.z=-1")
+            .unwrap_err()
+            .to_string()
+            .contains("must not be negative")
+    );
+}
+
+#[test]
+fn overrides() {
+    assert_eq!(
+        with(&["load.gravity=[0,0,-0.5]"]).unwrap().gravity,
+        [0.0, 0.0, -0.5]
+    );
+    assert_eq!(with(&["name=other"]).unwrap().name, "other");
+    assert_eq!(with(&["name = 'other'"]).unwrap().name, "other");
+    assert_eq!(
+        with(&["leaf.fan=paper"]).unwrap().rods[2].angle,
+        std::f64::consts::PI / 3.0
+    );
+    assert_eq!(
+        with(&["solve.tolerance=1e-3", "solve.tolerance=1e-4"])
+            .unwrap()
+            .tolerance,
+        1e-4
+    );
+    assert!(!with(&["leaf.joined=false"]).unwrap().joined);
+    let tapered = with(&["stiffness.torsion={at=[0,1],value=[1,3]}"]).unwrap();
+    assert_eq!(tapered.rods[0].couple_stiffness[0].at(0.5), 2.0);
+    // A missing or wrong entry of the file can be made good.
+    let text = VALID
+        .replace("torsion = 1.0", "")
+        .replace("length = 2.0", "length = -2.0");
+    let mended = [
+        "stiffness.torsion=1".to_string(),
+        "leaf.length=2".to_string(),
+    ];
+    assert!(Scenario::from_toml_with(&text, "leaf.toml", &mended).is_ok());
+}
+
+#[test]
+fn refused_overrides_say_that_they_are_overrides() {
+    for (given, part) in [
+        (
+            "leaf.rods=0",
+            "--set leaf.rods=0: leaf.rods = 0: must be a whole number",
+        ),
+        (
+            "leaf.rods=five",
+            "--set leaf.rods=five: leaf.rods = five: must be a whole number",
+        ),
+        (
+            "stiffness.torsion=-1",
+            "--set stiffness.torsion=-1: stiffness.torsion = -1: must be greater than 0",
+        ),
+        (
+            "load.gravity=[0,0",
+            "--set load.gravity=[0,0: not valid TOML",
+        ),
+        ("leaf.fan=", "--set leaf.fan=: not valid TOML"),
+        (
+            "leaf.fan=round",
+            "--set leaf.fan=round: leaf.fan = round: must be \"paper\"",
+        ),
+        (
+            "stifness.torsion=1",
+            "unknown key stifness.torsion (did you mean stiffness.torsion?): allowed here: name, leaf.rods",
+        ),
+        (
+            "gravity=[0,0,1]",
+            "unknown key gravity (did you mean load.gravity?)",
+        ),
+        ("leaf=3", "--set leaf=3: unknown key leaf"),
+        ("=3", "unknown key"),
+        (
+            "leaf.rods",
+            "--set leaf.rods: must be KEY=VALUE, e.g. --set load.gravity=[0,0,-0.5]",
+        ),
+        (
+            "load.tip_force=[0,0,1e300]",
+            "--set load.tip_force=[0,0,1e300]: load.tip_force = [0,0,1e300]: gives |F| L^2/A",
+        ),
+        (
+            "name=a/b",
+            "--set name=a/b: name = a/b: must be usable as a folder name",
+        ),
+        ("leaf.rods=1\nname='x'", "leaf.rods"),
+        // The list in the file is what no longer fits.
+        (
+            "leaf.rods=4",
+            "leaf.toml:10: stiffness.bending_2 = [1.0, 1.0, 1.0]: has 3 entries: must have 4",
+        ),
+    ] {
+        let message = with(&[given]).unwrap_err().to_string();
+        assert!(message.contains(part), "no '{part}' in: {message}");
+    }
+}
+
+#[test]
+fn errors_carry_values() {
+    let Err(ScenarioError::Value { place, problem, .. }) = with(&["leaf.rods=4"]) else {
+        panic!()
+    };
+    assert_eq!(
+        place,
+        Place::Line {
+            file: "leaf.toml".into(),
+            line: 10
+        }
+    );
+    assert!(matches!(
+        *problem,
+        Problem::Entries {
+            found: 3,
+            needed: 4,
+            ..
+        }
+    ));
+}
+
+#[test]
+fn files_that_cannot_be_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |path: &Path| Scenario::read(path, &[]).unwrap_err().to_string();
+    let absent = folder.path().join("absent.toml");
+    assert!(message(&absent).starts_with(&format!("{}: cannot be read: ", absent.display())));
+    assert_eq!(
+        message(folder.path()),
+        format!(
+            "{}: is a folder: give the TOML file itself",
+            folder.path().display()
+        )
+    );
+    let latin = folder.path().join("latin.toml");
+    fs::write(&latin, b"name = \"a\"\n# Bl\xe4tter\n").unwrap();
+    let expected = format!(
+        "{}:2: is not text in UTF-8: byte 15 is 0xe4: save the file as UTF-8",
+        latin.display()
+    );
+    assert_eq!(message(&latin), expected);
+    let empty = folder.path().join("empty.toml");
+    fs::write(&empty, "").unwrap();
+    assert!(message(&empty).contains("name is missing"));
+}
+
+#[test]
+fn ten_thousand_rods_are_read_quickly() {
+    let rods = 10_000;
+    let list = |count: usize| vec!["1.25"; count].join(", ");
+    let text = format!(
+        "name = \"many\"\n[leaf]\nrods = {rods}\nlength = [{0}]\nfan = \"symmetric\"\n[stiffness]\ntorsion = [{0}]\n\
+         bending_2 = [{0}]\nbending_3 = 1.0\naxial = [{0}]\nshear_2 = inf\nshear_3 = inf\n[coupling]\nx = [{1}]\n",
+        list(rods),
+        list(rods - 1)
+    );
+    let start = std::time::Instant::now();
+    assert_eq!(Scenario::from_toml(&text).unwrap().rods.len(), rods);
+    let taken = start.elapsed();
+    println!("{taken:?}");
+    // Well above what it takes (30 ms): a busy machine must not fail this.
+    assert!(taken.as_millis() < 500, "{taken:?}");
+}
+
+/// What a slip of the hand, or ill will, puts into a file.
+const DEBRIS: &str = "| |\n|\r|\t|\0|=|.|,|#|\"|\"\"\"|'|[|]|[[|]]|{|}|-|+|_|0|1|-1|1e999|1e-999|nan|inf|-inf|0x1F|0b|\
+    99999999999999999999999|true|2020-01-01|leaf|[leaf]|rods|length|at|value|[[1]]|{at=[0,1],value=[1,1]}|\u{feff}|\u{1F33F}|ä";
+
+fn debris() -> impl Strategy<Value = String> {
+    let tokens: Vec<String> = DEBRIS.split('|').map(String::from).collect();
+    prop_oneof![
+        proptest::sample::select(tokens),
+        any::<char>().prop_map(String::from)
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(4000) })]
+
+    #[test]
+    fn no_mutation_of_a_file_panics(
+        edits in prop::collection::vec((any::<prop::sample::Index>(), 0..12usize, debris()), 1..4),
+    ) {
+        let mut text: Vec<char> = VALID.chars().collect();
+        for (at, cut, put) in edits {
+            let at = at.index(text.len() + 1);
+            let end = (at + cut).min(text.len());
+            text.splice(at..end, put.chars());
+        }
+        let text: String = text.into_iter().collect();
+        match Scenario::from_toml(&text) {
+            Ok(scenario) => prop_assert!(!scenario.rods.is_empty() && scenario.coupling.len() + 1 == scenario.rods.len()),
+            Err(error) => prop_assert!(error.to_string().starts_with("scenario:")),
+        }
+    }
+
+    #[test]
+    fn no_override_panics(
+        key in prop_oneof![
+            proptest::sample::select(&["leaf.rods", "leaf.fan", "name", "stiffness.axial", "coupling.z", "leaf", "load."][..])
+                .prop_map(String::from),
+            any::<String>(),
+        ],
+        value in prop_oneof![any::<String>(), prop::collection::vec(debris(), 0..6).prop_map(|parts| parts.concat())],
+    ) {
+        if let Err(error) = with(&[&format!("{key}={value}")]) {
+            prop_assert!(!error.to_string().is_empty());
+        }
+    }
+}
