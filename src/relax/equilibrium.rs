@@ -36,7 +36,10 @@ impl Outcome {
 
     /// Whether the leaf is at rest within the tolerance (exit status 0).
     pub fn is_success(self) -> bool {
-        matches!(self, Outcome::Converged | Outcome::ConvergedAfterSaddle | Outcome::Saddle)
+        matches!(
+            self,
+            Outcome::Converged | Outcome::ConvergedAfterSaddle | Outcome::Saddle
+        )
     }
 }
 

@@ -7,6 +7,9 @@ mod profile;
 
 pub use profile::Profile;
 
+// STAND-IN
+pub use crate::stand_in::ScenarioError;
+
 /// A checked scenario. All quantities are in the units the file was written
 /// in, which only have to be consistent with each other.
 #[derive(Clone, Debug, PartialEq)]

@@ -21,7 +21,9 @@ impl Profile {
         match self {
             Profile::Constant(value) => *value,
             Profile::Linear { at, value } => {
-                let right = at.partition_point(|&knot| knot < sigma).clamp(1, at.len() - 1);
+                let right = at
+                    .partition_point(|&knot| knot < sigma)
+                    .clamp(1, at.len() - 1);
                 let t = (sigma - at[right - 1]) / (at[right] - at[right - 1]);
                 value[right - 1] + t.clamp(0.0, 1.0) * (value[right] - value[right - 1])
             }
