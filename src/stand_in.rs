@@ -95,7 +95,7 @@ pub fn relax(
 ) -> Result<Equilibrium, RelaxError> {
     let start = Instant::now();
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-    if !(tolerance > 1e-14) {
+    if tolerance.is_nan() || tolerance < 1e-14 {
         return Err(RelaxError(format!(
             "a tolerance of {tolerance} is below what doubles allow"
         )));

@@ -50,7 +50,6 @@ impl ProgressLine {
             progress.residual,
             self.start.elapsed().as_secs_f64(),
         ));
-        bar.tick();
     }
 }
 

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use leafdyn::output::{FORMATS, Format, power_of_ten, verdict};
+use leafdyn::output::{FORMATS, power_of_ten, verdict};
 use leafdyn::relax::{Equilibrium, Outcome};
 
 /// Digits after the first that a result without an error estimate shows.
@@ -123,7 +123,10 @@ fn decimals(equilibrium: &Equilibrium) -> usize {
 }
 
 fn point(point: [f64; 3], decimals: usize) -> String {
-    let [x, y, z] = point.map(|value| format!("{value:.decimals$}"));
+    let unit = 0.5 * 10f64.powi(-(decimals as i32));
+    // What would be written as -0.000 is zero.
+    let tidy = |value: f64| if value.abs() < unit { 0.0 } else { value };
+    let [x, y, z] = point.map(|value| format!("{:.decimals$}", tidy(value)));
     format!("({x}, {y}, {z})")
 }
 
@@ -148,6 +151,11 @@ mod tests {
         assert_eq!(significant(-0.00123), "-0.001230000000");
         assert_eq!(significant(1.5e-30), "1.500000000e-30");
         assert_eq!(significant(f64::NAN), "NaN");
+    }
+
+    #[test]
+    fn points_have_no_negative_zero() {
+        assert_eq!(point([1.0, -4e-4, -0.25], 3), "(1.000, 0.000, -0.250)");
     }
 
     #[test]

@@ -61,7 +61,7 @@ pub enum OutputError {
     },
     /// Writing one file failed; the file that may have been there before is untouched.
     #[error(
-        "cannot write {}: {reason}; free some space or name another folder with --out DIR",
+        "cannot write {}: {reason}; make room there or name another folder with --out DIR",
         file.display()
     )]
     File {

@@ -59,7 +59,7 @@ pub const SIDE: View = View {
 pub const FRONT: View = View {
     name: "front",
     letter: "(c)",
-    title: "from the tip towards the clamp",
+    title: "from the front",
     across: ETA,
     up: ZETA,
     toward: DVec3::X,

@@ -23,13 +23,14 @@ const HEADER: f64 = 74.0;
 const PANEL_TITLE: f64 = 24.0;
 /// Below a panel, for its axis.
 const PANEL_AXIS: f64 = 48.0;
+const BOTTOM: f64 = 4.0;
 /// Between the columns, for the right one's axis.
 const COLUMN_GAP: f64 = 74.0;
 const COLUMNS: f64 = WIDTH - LEFT - RIGHT - COLUMN_GAP;
 
 /// Panels do not get smaller than this, however flat the leaf.
-const NARROWEST_COLUMN: f64 = 290.0;
-const LOWEST_TOP: f64 = 280.0;
+const NARROWEST_COLUMN: f64 = 340.0;
+const LOWEST_TOP: f64 = 270.0;
 const LOWEST_BOTTOM: f64 = 130.0;
 /// Both rows together do not get higher than this, however tall the leaf.
 const HIGHEST_ROWS: f64 = 800.0;
@@ -138,7 +139,7 @@ impl Layout {
 
     fn height(&self) -> f64 {
         let (start, height) = self.rows[1];
-        (start + height + PANEL_AXIS).ceil()
+        (start + height + PANEL_AXIS + BOTTOM).ceil()
     }
 }
 
@@ -147,7 +148,7 @@ fn header(page: &mut Drawing, equilibrium: &Equilibrium, veins: &Veins) {
     const TITLE_BASE: f64 = 38.0;
     const NOTE_BASE: f64 = 60.0;
     let font = Font::embedded();
-    let key_start = key(page, equilibrium, veins, &font);
+    let key_start = key(page, equilibrium, &font);
     let name = shortened(&equilibrium.scenario, key_start - LEFT - 20.0, &font);
     page.label(
         DVec2::new(LEFT, TITLE_BASE),
@@ -179,9 +180,10 @@ fn note(equilibrium: &Equilibrium, veins: &Veins) -> String {
     }
     parts.push(format!("L = {}", veins.unit));
     if veins.every > 1 {
-        parts.push(format!("every {}th vein drawn", veins.every));
+        parts.push(format!("1 vein in {} drawn", veins.every));
     }
-    parts.join("  ·  ")
+    // Spaces that SVG does not collapse.
+    parts.join("\u{a0}\u{a0}·\u{a0}\u{a0}")
 }
 
 /// The text, or as much of it as fits, with an ellipsis.
@@ -195,13 +197,13 @@ fn shortened(text: &str, width: f64, font: &Font) -> String {
 }
 
 /// Draws the key at the right end of the header; returns where it starts.
-fn key(page: &mut Drawing, equilibrium: &Equilibrium, veins: &Veins, font: &Font) -> f64 {
+fn key(page: &mut Drawing, equilibrium: &Equilibrium, font: &Font) -> f64 {
     const MIDDLE: f64 = 32.0;
     const BAR: DVec2 = DVec2::new(120.0, 9.0);
     const BAR_STEPS: u32 = 60;
     let base = MIDDLE + HALF_CAPITAL * TEXT_SIZE;
     let mut x = WIDTH - RIGHT;
-    let mut text_before = |page: &mut Drawing, x: &mut f64, text: &str| {
+    let text_before = |page: &mut Drawing, x: &mut f64, text: &str| {
         page.label(DVec2::new(*x, base), text, TEXT_SIZE, Anchor::End, NOTE);
         *x -= font.width(text, TEXT_SIZE) + 6.0;
     };
@@ -242,9 +244,9 @@ fn key(page: &mut Drawing, equilibrium: &Equilibrium, veins: &Veins, font: &Font
     x - 10.0
 }
 
-/// Where the rods are clamped.
+/// Where the rods are clamped; larger than the tip's marker, which may cover it.
 pub fn clamp_marker(page: &mut Drawing, at: DVec2) {
-    let half = DVec2::splat(3.6);
+    let half = DVec2::splat(4.2);
     page.shape(
         rectangle(at - half, 2.0 * half),
         INK,
@@ -254,7 +256,7 @@ pub fn clamp_marker(page: &mut Drawing, at: DVec2) {
 
 /// The joint tip, or the tip of a single rod.
 pub fn tip_marker(page: &mut Drawing, at: DVec2) {
-    page.shape(circle(at, 3.6), WHITE, Some(Stroke::new(INK, 1.3)));
+    page.shape(circle(at, 3.3), WHITE, Some(Stroke::new(INK, 1.3)));
 }
 
 /// Marks all tips, small if there are many.

@@ -154,15 +154,17 @@ impl OutlineBuilder for Glyphs {
 
 fn encode(canvas: &Pixmap, out: &mut dyn Write) -> io::Result<()> {
     // The page is opaque: its transparency need not be stored.
-    let rgb: Vec<u8> = canvas
-        .data()
-        .chunks_exact(4)
-        .flat_map(|pixel| [pixel[0], pixel[1], pixel[2]])
-        .collect();
+    let mut rgb = vec![0; 3 * canvas.pixels().len()];
+    for (to, from) in rgb.chunks_exact_mut(3).zip(canvas.data().chunks_exact(4)) {
+        to.copy_from_slice(&from[..3]);
+    }
     let mut encoder = png::Encoder::new(out, canvas.width(), canvas.height());
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
+    // Lines and text on white: a simple filter is four times as fast as
+    // choosing one row by row, for a file half as large again.
     encoder.set_compression(png::Compression::Fast);
+    encoder.set_filter(png::Filter::Up);
     encoder.set_pixel_dims(Some(png::PixelDimensions {
         xppu: DOTS_PER_METRE,
         yppu: DOTS_PER_METRE,
@@ -176,23 +178,17 @@ fn encode(canvas: &Pixmap, out: &mut dyn Write) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Instant;
-
     use super::*;
     use crate::output::sample;
 
     #[test]
-    fn a_picture_of_the_promised_size_in_the_promised_time() {
-        let leaf = sample::fan(21, 32);
+    fn the_picture_is_wide_enough_to_print() {
         let mut bytes = Vec::new();
-        FigurePng.write(&leaf, &mut bytes).unwrap();
-        let start = Instant::now();
-        bytes.clear();
-        FigurePng.write(&leaf, &mut bytes).unwrap();
-        println!("{:?} for {} bytes", start.elapsed(), bytes.len());
+        FigurePng.write(&sample::fan(21, 32), &mut bytes).unwrap();
         let reader = png::Decoder::new(io::Cursor::new(&bytes))
             .read_info()
             .unwrap();
         assert_eq!(reader.info().width, 1800);
+        assert_eq!(reader.info().color_type, png::ColorType::Rgb);
     }
 }

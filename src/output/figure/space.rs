@@ -11,8 +11,8 @@ use super::ticks::{round_step, ticks};
 use super::veins::{Piece, Vein, Veins};
 
 /// Where the viewer stands: degrees from the xi axis, and above the floor.
-const AZIMUTH: f64 = -58.0;
-const ELEVATION: f64 = 26.0;
+const AZIMUTH: f64 = -55.0;
+const ELEVATION: f64 = 28.0;
 
 /// No side of the box is shorter than this part of its longest.
 const SHORTEST_SIDE: f64 = 0.4;
@@ -21,8 +21,9 @@ const SHORTEST_SIDE: f64 = 0.4;
 const AIR: f64 = 0.06;
 
 /// Room around the box for the labels of its axes.
-const LABELS_BESIDE: f64 = 46.0;
-const LABELS_BELOW: f64 = 40.0;
+const LABELS_LEFT: f64 = 56.0;
+const LABELS_RIGHT: f64 = 22.0;
+const LABELS_BELOW: f64 = 36.0;
 
 /// Distance between the ticks of an axis at least.
 const TICK_DISTANCE: f64 = 30.0;
@@ -90,10 +91,11 @@ impl Camera {
             (DVec2::INFINITY, DVec2::NEG_INFINITY),
             |(first, last), corner| (first.min(corner), last.max(corner)),
         );
-        let room = cell.size - DVec2::new(2.0 * LABELS_BESIDE, LABELS_BELOW);
+        let room = cell.size - DVec2::new(LABELS_LEFT + LABELS_RIGHT, LABELS_BELOW);
         camera.scale = (room / (last - first)).min_element();
-        let middle =
-            cell.corner + 0.5 * cell.size + DVec2::new(0.25 * LABELS_BESIDE, -0.5 * LABELS_BELOW);
+        let middle = cell.corner
+            + 0.5 * cell.size
+            + 0.5 * DVec2::new(LABELS_LEFT - LABELS_RIGHT, -LABELS_BELOW);
         camera.origin = middle - camera.scale * 0.5 * (first + last);
         camera
     }
@@ -225,10 +227,10 @@ fn draw_labels(page: &mut Drawing, camera: &Camera, edge: &Edge) {
     for (value, text) in edge.ticks(camera) {
         let foot = camera.place(edge.point(value));
         page.line(foot, foot + 4.0 * out, Stroke::new(FRAME, 0.8));
-        page.centered(foot + away(out, 15.0), &text, TICK_SIZE, NOTE);
+        page.centered(foot + away(out, 17.0), &text, TICK_SIZE, NOTE);
     }
     let middle = camera.place(edge.point(0.5 * (edge.low + edge.high)));
-    page.centered(middle + away(out, 33.0), edge.name, TEXT_SIZE + 1.0, INK);
+    page.centered(middle + away(out, 38.0), edge.name, TEXT_SIZE + 1.0, INK);
 }
 
 /// Labels are wider than high: those beside an axis stand farther away.
