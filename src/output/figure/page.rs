@@ -39,7 +39,7 @@ const HIGHEST_ROWS: f64 = 800.0;
 const AIR: f64 = 0.06;
 
 /// Distance between grid lines at least.
-const TICK_DISTANCE: f64 = 40.0;
+const TICK_DISTANCE: f64 = 36.0;
 
 /// Font sizes.
 pub const TITLE_SIZE: f64 = 19.0;
