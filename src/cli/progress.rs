@@ -1,0 +1,62 @@
+//! One line on standard error that says how far a long run has come.
+
+use std::io::{self, IsTerminal};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use leafdyn::relax::Progress;
+
+/// Shorter runs show no line: it would only flicker.
+const LONG_RUN: Duration = Duration::from_millis(500);
+
+/// Redraws of the line per second at most.
+const REDRAWS_PER_SECOND: u8 = 10;
+
+/// The progress line; it vanishes when dropped.
+pub struct ProgressLine {
+    scenario: String,
+    start: Instant,
+    terminal: bool,
+    bar: Option<ProgressBar>,
+}
+
+impl ProgressLine {
+    pub fn new(scenario: &str) -> Self {
+        let terminal = io::stderr().is_terminal();
+        ProgressLine {
+            scenario: scenario.into(),
+            start: Instant::now(),
+            terminal,
+            bar: None,
+        }
+    }
+
+    pub fn update(&mut self, progress: &Progress) {
+        if !self.terminal || self.start.elapsed() < LONG_RUN {
+            return;
+        }
+        let bar = self.bar.get_or_insert_with(|| {
+            let target = ProgressDrawTarget::stderr_with_hz(REDRAWS_PER_SECOND);
+            let style = ProgressStyle::with_template("{prefix}: {wide_msg}");
+            ProgressBar::with_draw_target(None, target)
+                .with_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()))
+                .with_prefix(self.scenario.clone())
+        });
+        bar.set_message(format!(
+            "{} segments a vein, step {}, residual {:.1e}, {:.0} s",
+            progress.grid,
+            progress.step,
+            progress.residual,
+            self.start.elapsed().as_secs_f64(),
+        ));
+    }
+}
+
+impl Drop for ProgressLine {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! What is written about an equilibrium: one small file per format behind one
+//! small trait. A file is complete or absent, never half written.
+
+mod atomic;
+mod csv;
+mod figure;
+mod json;
+#[cfg(test)]
+mod sample;
+mod words;
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+pub use atomic::{abandon_unfinished, check_writable};
+pub use csv::Centerlines;
+pub use figure::{FigurePng, FigureSvg};
+pub use json::Summary;
+pub use words::{power_of_ten, verdict};
+
+use crate::relax::Equilibrium;
+
+/// One way to write an equilibrium down.
+pub trait Format {
+    /// Name of the file, the same from release to release.
+    fn file_name(&self) -> &'static str;
+
+    /// Writes the whole file. The only errors are those of `out`.
+    fn write(&self, equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()>;
+}
+
+/// Every format, in the order in which the files are written.
+pub const FORMATS: [&dyn Format; 4] = [&Summary, &Centerlines, &FigureSvg, &FigurePng];
+
+/// Why a file could not be written.
+#[derive(Debug, Error)]
+pub enum OutputError {
+    /// The output folder, or a folder above it, is something else.
+    #[error(
+        "cannot write to the folder {}: {} is not a folder; name another with --out DIR",
+        folder.display(), obstacle.display()
+    )]
+    NotAFolder {
+        /// The output folder that was asked for.
+        folder: PathBuf,
+        /// The path that is in the way.
+        obstacle: PathBuf,
+    },
+    /// The output folder cannot be made or written to.
+    #[error(
+        "cannot write to the folder {}: {reason}; make it writable or name another with --out DIR",
+        folder.display()
+    )]
+    Unwritable {
+        /// The output folder that was asked for.
+        folder: PathBuf,
+        /// What the system says.
+        reason: io::Error,
+    },
+    /// Writing one file failed; the file that may have been there before is untouched.
+    #[error(
+        "cannot write {}: {reason}; make room there or name another folder with --out DIR",
+        file.display()
+    )]
+    File {
+        /// The file that was to be written.
+        file: PathBuf,
+        /// What the system says.
+        reason: io::Error,
+    },
+}
+
+/// Writes every format into `folder`, which is made if it is not there, and
+/// returns the paths written.
+pub fn write_all(folder: &Path, equilibrium: &Equilibrium) -> Result<Vec<PathBuf>, OutputError> {
+    atomic::make_folder(folder)?;
+    let write_one = |format: &&dyn Format| {
+        let file = folder.join(format.file_name());
+        atomic::write_file(&file, |out| format.write(equilibrium, out))
+            .map(|()| file.clone())
+            .map_err(|reason| OutputError::File { file, reason })
+    };
+    FORMATS.iter().map(write_one).collect()
+}

@@ -1,0 +1,81 @@
+//! Extrapolation over nested grids, and its error estimate.
+
+/// The largest ratio of successive corrections at which extrapolation is
+/// trusted: the first should be 1/4 on a clean ds^2 series.
+const CLEAN_RATIO: std::ops::Range<f64> = 0.17..0.36;
+
+/// Safety factor of the error estimate.
+const SAFETY: f64 = 3.0;
+
+/// Values on successively halved grids, extrapolated over the series in ds^2.
+#[derive(Clone, Debug, Default)]
+pub struct Richardson {
+    /// Rows of the table, one per grid; column m has the terms up to ds^(2m) removed.
+    table: Vec<Vec<Vec<f64>>>,
+}
+
+impl Richardson {
+    /// Adds the values of the next finer grid.
+    pub fn push(&mut self, values: Vec<f64>) {
+        let mut row = vec![values];
+        if let Some(coarser) = self.table.last() {
+            let mut power = 1.0;
+            for column in coarser {
+                power *= 4.0;
+                let finer = row.last().expect("row has a first column");
+                let next = finer.iter().zip(column).map(|(f, c)| f + (f - c) / (power - 1.0)).collect();
+                row.push(next);
+            }
+        }
+        self.table.push(row);
+    }
+
+    /// Number of grids.
+    pub fn grids(&self) -> usize {
+        self.table.len()
+    }
+
+    /// Best values and the estimate of their largest error, `scale` being the
+    /// size of the solution. `None` before there are two grids.
+    ///
+    /// With D_m the change that column m makes on the finest grid, the error
+    /// of column m - 1, successive D_m of a clean series shrink ever less
+    /// quickly, each by a factor no smaller than the square of the next. So
+    /// the last column's error is estimated as D_m sqrt(D_m / D_{m-1}), with
+    /// `scale` for D_0, times a safety factor. Where the series is not clean
+    /// (the grids do not resolve the solution yet) the finest grid itself is
+    /// returned, with the last change as its error.
+    pub fn best(&self, scale: f64) -> Option<(&[f64], f64)> {
+        let row = self.table.last()?;
+        let grids = self.table.len();
+        let coarser = self.table.get(grids.checked_sub(2)?)?;
+        let change = distance(&row[0], &coarser[0]);
+        let mut best = (row[0].as_slice(), change);
+        if let Some(coarsest) = grids.checked_sub(3).map(|k| &self.table[k]) {
+            let ratio = change / distance(&coarser[0], &coarsest[0]);
+            if !CLEAN_RATIO.contains(&ratio) && change > 1e-13 * scale {
+                return Some(best);
+            }
+        }
+        let mut last = scale;
+        for m in 1..row.len() {
+            let correction = distance(&row[m], &row[m - 1]);
+            let estimate = SAFETY * correction * (correction / last).sqrt().min(1.0);
+            if estimate > best.1 || correction > last {
+                break;
+            }
+            best = (row[m].as_slice(), estimate);
+            last = correction;
+        }
+        Some(best)
+    }
+
+    /// The plain values on the finest grid.
+    pub fn finest(&self) -> Option<&[f64]> {
+        Some(self.table.last()?[0].as_slice())
+    }
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
+}
