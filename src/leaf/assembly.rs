@@ -31,10 +31,8 @@ pub struct DiscreteLeaf<'a> {
 /// What an assembly sums up over all rods.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sums {
-    /// Merit function with the forces of the state itself (see [`Section::merit`]).
-    pub merit: f64,
-    /// Merit function with the forces the state had before the last step.
-    pub merit_before: f64,
+    /// Potential energy: of the strains, the coupling and the loads.
+    pub energy: f64,
     /// Largest rotation between the ends of a segment.
     pub turn: f64,
 }
@@ -50,6 +48,20 @@ impl<'a> DiscreteLeaf<'a> {
         let coupling = (1..leaf.rods()).map(|g| leaf.coupling(g - 1)).collect();
         let weights = (0..=n).map(|i| grid.weight(i)).collect();
         DiscreteLeaf { leaf, grid, sections, coupling, weights }
+    }
+
+    /// The smallest compliance of any segment, in units of L^2/A.
+    pub fn stiffest(&self) -> f64 {
+        self.sections.iter().fold(f64::INFINITY, |m, s| m.min(s.compliance.min_element()))
+    }
+
+    /// The same leaf with no compliance below `floor`.
+    pub fn softened(&self, floor: f64) -> Self {
+        let mut soft = self.clone();
+        for section in &mut soft.sections {
+            section.compliance = section.compliance.max(DVec3::splat(floor));
+        }
+        soft
     }
 
     /// Segments per rod.
@@ -121,22 +133,30 @@ impl<'a> DiscreteLeaf<'a> {
     }
 
     /// Assembles matrix and right-hand side of Newton's equations into
-    /// `system`. `before`: the forces of the state before the last step.
-    pub fn assemble(&self, state: &State, before: &[DVec3], system: &mut System) -> Sums {
+    /// `system`.
+    pub fn assemble(
+        &self,
+        state: &State,
+        system: &mut System,
+    ) -> Sums {
         let parallel = system.parallel();
         each_rod(parallel, &mut system.rods, |j, rod| {
-            rod.sums = self.assemble_rod(j, state, before, rod);
+            rod.sums = self.assemble_rod(j, state, rod);
         });
         let mut total = Sums::default();
         for rod in &system.rods {
-            total.merit += rod.sums.merit;
-            total.merit_before += rod.sums.merit_before;
+            total.energy += rod.sums.energy;
             total.turn = total.turn.max(rod.sums.turn);
         }
         total
     }
 
-    fn assemble_rod(&self, j: usize, state: &State, before: &[DVec3], rod: &mut RodSystem) -> Sums {
+    fn assemble_rod(
+        &self,
+        j: usize,
+        state: &State,
+        rod: &mut RodSystem,
+    ) -> Sums {
         let n = self.segments();
         let mut sums = Sums::default();
         let chain = &mut rod.chain;
@@ -144,8 +164,7 @@ impl<'a> DiscreteLeaf<'a> {
             let force = state.n[j * n + i];
             let section = self.section(j, i);
             let segment = self.segment(state, j, i, force);
-            sums.merit += section.merit(&segment, force);
-            sums.merit_before += section.merit(&segment, before[j * n + i]);
+            sums.energy += section.strain_energy(&segment);
             sums.turn = sums.turn.max(segment.turn());
             let (g_x, g_a, g_b) = segment.condensed_gradient(section);
             let blocks = segment.hessian(section);
@@ -156,8 +175,7 @@ impl<'a> DiscreteLeaf<'a> {
             }
             set_right(&mut chain.diagonal[i], &blocks);
             let (load, potential) = self.load(state, j, i + 1);
-            sums.merit += potential;
-            sums.merit_before += potential;
+            sums.energy += potential;
             rod.rhs[i] = [0.0; 6];
             add(&mut rod.rhs[i], -g_b, load - g_x);
             for g in [j.wrapping_sub(1), j] {

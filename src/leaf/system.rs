@@ -138,6 +138,23 @@ impl System {
         (turn, shift)
     }
 
+    /// Kinetic energy at unit density of the given nodal velocities.
+    pub fn kinetic_energy(&self, velocity: &[Vec<Increment>]) -> f64 {
+        let of = |(v, m): (&Increment, &[f64; 2])| {
+            0.5 * (m[0] * dot(&v[..3], &v[..3]) + m[1] * dot(&v[3..], &v[3..]))
+        };
+        self.rods.iter().zip(velocity).map(|(rod, v)| v.iter().zip(&rod.mass).map(of).sum::<f64>()).sum()
+    }
+
+    /// Writes the velocity that covers `part` of the last solution in `dt`.
+    pub fn velocity(&self, part: f64, dt: f64, velocity: &mut [Vec<Increment>]) {
+        for (rod, velocity) in self.rods.iter().zip(velocity) {
+            for (v, d) in velocity.iter_mut().zip(&rod.solution) {
+                *v = d.map(|d| part * d / dt);
+            }
+        }
+    }
+
     /// Factorises B + shift M; false if it is not positive definite.
     pub fn factorize(&mut self, shift: f64) -> bool {
         each_rod(self.parallel, &mut self.rods, |_, rod| {

@@ -18,7 +18,9 @@ pub fn experiment(scenario: &Scenario, n: usize, grids: usize) {
     for g in 0..grids {
         let t = std::time::Instant::now();
         let mut system = System::new(&d);
-        let end = semi_implicit::settle(&d, &mut state, &mut system, 1e-9, &mut work, &mut |_, _| {});
+        let mut r = semi_implicit::Relaxation { state, accuracy: 1e-9, work: &mut work, progress: &mut |_, _| {} };
+        let end = r.settle(&d, &mut system);
+        state = r.state;
         let stride = 1 << g;
         let m = d.segments();
         let mut vals = vec![];

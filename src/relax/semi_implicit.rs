@@ -12,7 +12,7 @@
 //! the motion decides where the leaf goes, and the step is kept short enough
 //! to follow it.
 
-use crate::leaf::{DiscreteLeaf, Solved, State, System};
+use crate::leaf::{DiscreteLeaf, Increment, Solved, State, System};
 use crate::relax::equilibrium::Work;
 use glam::DVec3;
 
@@ -43,6 +43,12 @@ pub const RESOLVED_TURN: f64 = 1.6;
 /// Steps on one grid before the run is given up.
 const MAX_STEPS: usize = 2000;
 
+/// Growth of the time step from one good step to the next, at most.
+const MAX_GROWTH: f64 = 4.0;
+
+/// Relative growth of the energy that is put down to rounding.
+const ENERGY_SLACK: f64 = 1e-9;
+
 /// How a leaf settled on one grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Settled {
@@ -58,111 +64,224 @@ pub enum Settled {
     Stuck,
 }
 
-/// Lets `state` come to rest on its grid, to the given accuracy of positions
-/// and rotations.
-pub fn settle(
-    leaf: &DiscreteLeaf,
-    state: &mut State,
-    system: &mut System,
-    accuracy: f64,
-    work: &mut Work,
-    progress: &mut dyn FnMut(usize, f64),
-) -> Settled {
-    let n = leaf.segments();
-    let mut trial = state.clone();
-    let mut velocity = vec![vec![[0.0; 6]; n]; leaf.rods()];
-    let mut sums = leaf.assemble(state, &state.n, system);
-    work.force_evaluations += 1;
-    let mut dt = f64::INFINITY;
-    let mut previous = f64::INFINITY;
-    let mut growth_limit = 4.0;
+/// Smallest compliance (units of L^2/A) of a leaf that is moved by its strain
+/// energy. A stiffer one is first settled with this compliance, which also
+/// tells the forces it carries, and then made stiff.
+const MOVING_COMPLIANCE: f64 = 1e-3;
 
-    for step in 0..MAX_STEPS {
-        // A positive definite matrix and its solution, with as long a time
-        // step as it takes.
-        let cg_tolerance = (0.03 * previous).clamp(1e-10, 1e-2);
+/// Accuracy to which a softened leaf is settled.
+const SOFT_ACCURACY: f64 = 1e-2;
+
+/// Newton iterations of a stiff leaf before the way to its stiffness is
+/// halved (logarithmically).
+const STIFF_ITERATIONS: usize = 12;
+
+/// The state of a leaf that is being relaxed on one grid, and what for.
+pub struct Relaxation<'a> {
+    /// The state.
+    pub state: State,
+    /// Wanted accuracy of positions and rotations.
+    pub accuracy: f64,
+    /// Work done so far.
+    pub work: &'a mut Work,
+    /// Told the size of every step.
+    pub progress: &'a mut dyn FnMut(usize, f64),
+}
+
+impl Relaxation<'_> {
+    /// Lets the leaf come to rest.
+    pub fn settle(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Settled {
+        let stiffest = leaf.stiffest();
+        if stiffest >= MOVING_COMPLIANCE {
+            return self.move_to_rest(leaf, system, self.accuracy);
+        }
+        let fresh = self.state.n.iter().all(|&n| n == DVec3::ZERO);
+        if !fresh {
+            let before = self.state.clone();
+            match self.newton(leaf, system) {
+                Settled::Stuck => self.state = before,
+                settled => return settled,
+            }
+        }
+        let mut floor = MOVING_COMPLIANCE;
+        let soft = self.move_to_rest(&leaf.softened(floor), system, SOFT_ACCURACY);
+        if !matches!(soft, Settled::Rest(_)) {
+            return soft;
+        }
+        // From there to the stiffness wanted, at once if that works.
+        let mut target = stiffest;
         loop {
-            let shift = if dt.is_finite() { (1.0 / dt + DAMPING) / dt } else { 0.0 };
-            work.factorizations += 1;
-            if system.factorize(shift) {
-                let inertia = dt.is_finite().then_some((velocity.as_slice(), 1.0 / dt));
-                match system.solve(inertia, cg_tolerance) {
-                    Solved::Yes(iterations) => {
-                        work.cg_iterations += iterations;
-                        break;
-                    }
-                    Solved::Indefinite(iterations) | Solved::TooSlow(iterations) => {
-                        work.cg_iterations += iterations;
-                    }
+            let before = self.state.clone();
+            let stiff = leaf.softened(target);
+            match self.newton(if target > stiffest { &stiff } else { leaf }, system) {
+                Settled::Stuck if floor > 2.0 * target.max(1e-12) => {
+                    self.state = before;
+                    target = (floor * target.max(1e-10)).sqrt();
                 }
+                Settled::Rest(_) if target > stiffest => {
+                    floor = target;
+                    target = stiffest;
+                }
+                settled => return settled,
             }
-            dt = shorter(dt);
-            growth_limit = 2.0;
-            if dt < SHORTEST_STEP {
+        }
+    }
+
+    /// Newton's method in the mixed form, for a leaf that is nearly at rest.
+    fn newton(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Settled {
+        let mut next = self.state.clone();
+        let mut previous = f64::INFINITY;
+        for step in 0..STIFF_ITERATIONS {
+            let turn = leaf.assemble(&self.state, system).turn;
+            self.work.force_evaluations += 1;
+            if turn > RESOLVED_TURN {
+                return Settled::Unresolved;
+            }
+            self.work.factorizations += 1;
+            let cg_tolerance = (0.03 * previous).clamp(1e-10, 1e-2);
+            if !system.factorize(0.0) {
                 return Settled::Stuck;
             }
-        }
-
-        let (turn, shift) = system.largest();
-        let size = turn.max(shift);
-        let part = (MAX_TURN / turn).min(MAX_SHIFT / shift).min(1.0);
-        leaf.advance(state, system, part, &mut trial);
-        let load_work = leaf.moment_work(system, part);
-        let next = leaf.assemble(&trial, &state.n, system);
-        work.force_evaluations += 1;
-        progress(step, size);
-
-        let slack = 1e-9 * (1.0 + sums.merit.abs());
-        let merit = next.merit_before - load_work;
-        if std::env::var("LD").is_ok() {
-            eprintln!("step {step} dt {dt:.2e} size {size:.3e} part {part:.2} merit {:.6e} -> {merit:.6e} cg {} turn {:.2}", sums.merit, work.cg_iterations, next.turn);
-        }
-        if !merit.is_finite() || merit > sums.merit + slack {
-            dt = shorter(dt);
-            if dt < SHORTEST_STEP {
+            match system.solve(None, cg_tolerance) {
+                Solved::Yes(iterations) => self.work.cg_iterations += iterations,
+                _ => return Settled::Stuck,
+            }
+            let (turn, shift) = system.largest();
+            let size = turn.max(shift);
+            if std::env::var("LD").is_ok() {
+                eprintln!("newton {step} size {size:.3e}");
+            }
+            if !size.is_finite() || turn > MAX_TURN || shift > MAX_SHIFT {
                 return Settled::Stuck;
             }
-            leaf.assemble(state, &state.n, system);
-            work.force_evaluations += 1;
-            continue;
-        }
-        if next.turn > RESOLVED_TURN {
-            return Settled::Unresolved;
-        }
-        std::mem::swap(state, &mut trial);
-        sums = next;
-        work.steps += 1;
-
-        if dt.is_finite() {
-            for (j, velocity) in velocity.iter_mut().enumerate() {
-                for (i, velocity) in velocity.iter_mut().enumerate() {
-                    *velocity = system.increment(j, i + 1).map(|d| d / dt);
-                }
-            }
-            if part == 1.0 {
-                dt *= growth_limit;
-                growth_limit = 4.0;
-            }
-            if dt > LONGEST_STEP {
-                dt = f64::INFINITY;
+            leaf.advance(&self.state, system, 1.0, &mut next);
+            std::mem::swap(&mut self.state, &mut next);
+            self.work.steps += 1;
+            (self.progress)(step, size);
+            if let Some(rest) = at_rest(size, previous, cg_tolerance, self.accuracy) {
+                return rest;
             }
             previous = size;
-            continue;
         }
-        if part == 1.0 {
-            // Newton: quadratic at best, and never better than the solution
-            // of its equations.
-            let rate = (size / previous).min(1.0);
-            let remaining = if previous.is_finite() { size * (rate * rate) } else { 10.0 * size * size };
-            let remaining = remaining.max(cg_tolerance * size);
-            let rounding = size < 1e-9 && rate > 0.3;
-            if remaining <= accuracy || rounding {
-                return Settled::Rest(if rounding { size } else { remaining });
+        Settled::Stuck
+    }
+
+    /// Damped motion until rest.
+    fn move_to_rest(&mut self, leaf: &DiscreteLeaf, system: &mut System, accuracy: f64) -> Settled {
+        let n = leaf.segments();
+        let mut trial = self.state.clone();
+        let mut velocity = vec![vec![[0.0; 6]; n]; leaf.rods()];
+        let mut next_velocity = velocity.clone();
+        let mut dt = f64::INFINITY;
+        let mut growth = MAX_GROWTH;
+        let mut previous = f64::INFINITY;
+        let mut sums = leaf.assemble(&self.state, system);
+        self.work.force_evaluations += 1;
+
+        for step in 0..MAX_STEPS {
+            // A positive definite matrix and its solution, with as long a time
+            // step as it takes.
+            let cg_tolerance = (0.03 * previous).clamp(1e-10, 1e-2);
+            while !self.solve(system, dt, &velocity, cg_tolerance) {
+                dt = shorter(dt);
+                growth = 1.0;
+                if dt < SHORTEST_STEP {
+                    return Settled::Stuck;
+                }
+            }
+            let (turn, shift) = system.largest();
+            let size = turn.max(shift);
+            let part = (MAX_TURN / turn).min(MAX_SHIFT / shift).min(1.0);
+            leaf.advance(&self.state, system, part, &mut trial);
+            let mut energy = sums.energy + leaf.moment_work(system, part);
+            let next = leaf.assemble(&trial, system);
+            self.work.force_evaluations += 1;
+            (self.progress)(step, size);
+            let mut next_energy = next.energy;
+            if dt.is_finite() {
+                energy += system.kinetic_energy(&velocity);
+                system.velocity(part, dt, &mut next_velocity);
+                next_energy += system.kinetic_energy(&next_velocity);
+            }
+            if std::env::var("LD").is_ok() {
+                eprintln!("step {step} dt {dt:.2e} size {size:.3e} part {part:.2} energy {energy:.6e} -> {next_energy:.6e} cg {} turn {:.2}", self.work.cg_iterations, next.turn);
+            }
+            let slack = ENERGY_SLACK * (1.0 + energy.abs());
+            if !next_energy.is_finite() || next_energy > energy + slack {
+                dt = shorter(dt);
+                growth = 1.0;
+                if dt < SHORTEST_STEP {
+                    return Settled::Stuck;
+                }
+                sums = leaf.assemble(&self.state, system);
+                self.work.force_evaluations += 1;
+                continue;
+            }
+            if next.turn > RESOLVED_TURN {
+                return Settled::Unresolved;
+            }
+            std::mem::swap(&mut self.state, &mut trial);
+            sums = next;
+            self.work.steps += 1;
+            if dt.is_finite() {
+                std::mem::swap(&mut velocity, &mut next_velocity);
+                if part == 1.0 {
+                    dt *= growth;
+                    growth = (2.0 * growth).min(MAX_GROWTH);
+                }
+                if dt > LONGEST_STEP {
+                    dt = f64::INFINITY;
+                }
+            } else if part == 1.0
+                && let Some(rest) = at_rest(size, previous, cg_tolerance, accuracy)
+            {
+                return rest;
+            }
+            previous = size;
+        }
+        Settled::StepLimit
+    }
+
+    /// Factorises and solves for a time step of `dt`; false if the matrix is
+    /// not positive definite.
+    fn solve(
+        &mut self,
+        system: &mut System,
+        dt: f64,
+        velocity: &[Vec<Increment>],
+        tolerance: f64,
+    ) -> bool {
+        let shift = if dt.is_finite() { (1.0 / dt + DAMPING) / dt } else { 0.0 };
+        self.work.factorizations += 1;
+        if !system.factorize(shift) {
+            return false;
+        }
+        let inertia = dt.is_finite().then_some((velocity, 1.0 / dt));
+        match system.solve(inertia, tolerance) {
+            Solved::Yes(iterations) => {
+                self.work.cg_iterations += iterations;
+                true
+            }
+            Solved::Indefinite(iterations) | Solved::TooSlow(iterations) => {
+                self.work.cg_iterations += iterations;
+                false
             }
         }
-        previous = size;
     }
-    Settled::StepLimit
+}
+
+/// Whether a Newton step of this `size`, after one of size `previous`, ends at
+/// rest: what remains is of second order at best, and never less than what
+/// the solution of its equations left.
+fn at_rest(size: f64, previous: f64, cg_tolerance: f64, accuracy: f64) -> Option<Settled> {
+    let rate = (size / previous).min(1.0);
+    let quadratic = if previous.is_finite() { size * (rate * rate) } else { 10.0 * size * size };
+    let remaining = quadratic.max(cg_tolerance * size);
+    let rounding = size < 1e-9 && rate > 0.3;
+    match rounding {
+        true => Some(Settled::Rest(size)),
+        false => (remaining <= accuracy).then_some(Settled::Rest(remaining)),
+    }
 }
 
 fn shorter(dt: f64) -> f64 {

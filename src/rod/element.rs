@@ -24,15 +24,10 @@ use glam::{DMat3, DQuat, DVec3};
 
 /// Smallest compliance the condensation divides by, in units of L^2/A. Below
 /// it the matrix is that of a rod with this compliance while the residual
-/// stays exact, which costs a contraction of about 1e-6 per iteration and
-/// changes no solution. Pivots then span no more than double precision holds.
-pub const CONDENSATION_COMPLIANCE: f64 = 1e-9;
-
-/// Smallest compliance of the merit function (units of L^2/A). A stiffer
-/// segment is judged by the augmented Lagrangian with this compliance, since
-/// its own energy would call every second-order violation of inextensibility
-/// a catastrophe.
-pub const MERIT_COMPLIANCE: f64 = 1e-3;
+/// stays exact: a proximal step in the force, which costs a contraction of
+/// about 1e-6 an iteration, changes no solution, and keeps the pivots within
+/// what double precision holds.
+const CONDENSATION_COMPLIANCE: f64 = 1e-9;
 
 /// What a segment is made of, taken at its midpoint.
 #[derive(Clone, Copy, Debug)]
@@ -94,23 +89,16 @@ pub struct Blocks {
 
 impl Section {
     #[inline]
-    fn condensation_stiffness(&self) -> DVec3 {
+    fn stiffness(&self) -> DVec3 {
         self.compliance.max(DVec3::splat(CONDENSATION_COMPLIANCE)).recip()
     }
 
-    /// The segment's share of the merit function: bending energy plus, for
-    /// stretch and shear, max over nu of
-    /// nu gamma - c nu^2/2 - eps |nu - nu_k|^2/2 with gamma = v - e1, nu_k the
-    /// force `n` carried so far and c + eps = max(c, [`MERIT_COMPLIANCE`]).
-    /// Where eps = 0 this is the elastic energy.
+    /// Elastic energy of the strains, ds/2 sum_k (H_k (v_k - delta_k1)^2 +
+    /// A_k (u_k - u0_k)^2). Infinite for a strained rigid rod.
     #[inline]
-    pub fn merit(&self, segment: &Segment, n: DVec3) -> f64 {
-        let nu = segment.frame.transpose() * n;
-        let c = self.compliance.max(DVec3::splat(MERIT_COMPLIANCE));
-        let eps = c - self.compliance;
-        let gamma = segment.gap / self.ds + segment.w - DVec3::X;
-        let pull = gamma + eps * nu;
-        self.ds * 0.5 * (pull * pull / c - eps * nu * nu).element_sum() + self.bending_energy(segment)
+    pub fn strain_energy(&self, segment: &Segment) -> f64 {
+        let gamma = segment.v(self) - DVec3::X;
+        0.5 * self.ds * (gamma * gamma / self.compliance).element_sum() + self.bending_energy(segment)
     }
 
     /// ds/2 sum_k A_k (u_k - u0_k)^2.
@@ -119,8 +107,8 @@ impl Section {
         0.5 * self.ds * segment.m.dot(segment.u - self.rest_curvature)
     }
 
-    /// Elastic energy with the constitutive law met: bending plus
-    /// ds/2 sum_k c_k nu_k^2.
+    /// Elastic energy by the force carried, which equals the strain energy where
+    /// the constitutive law is met: bending plus ds/2 sum_k c_k nu_k^2.
     #[inline]
     pub fn elastic_energy(&self, segment: &Segment) -> f64 {
         self.bending_energy(segment)
@@ -171,8 +159,9 @@ impl Segment {
     /// side that belongs to [`Segment::hessian`].
     #[inline]
     pub fn condensed_gradient(&self, section: &Section) -> (DVec3, DVec3, DVec3) {
-        let correction = section.condensation_stiffness() * self.gap;
-        let g_mu = section.ds * self.nu.cross(self.w) - self.law_rate(section).transpose() * correction;
+        let correction = section.stiffness() * self.gap;
+        let g_mu =
+            section.ds * self.nu.cross(self.w) - self.law_rate(section).transpose() * correction;
         self.pull_back(self.nu + correction / section.ds, g_mu)
     }
 
@@ -201,7 +190,7 @@ impl Segment {
     pub fn hessian(&self, section: &Section) -> Blocks {
         let ds = section.ds;
         let (nu, w) = (self.nu, self.w);
-        let stiffness = section.condensation_stiffness();
+        let stiffness = section.stiffness();
         let d = self.law_rate(section);
         let stiff_d = DMat3::from_diagonal(stiffness) * d;
         let cross_nu = cross_matrix(nu);
@@ -247,12 +236,18 @@ impl Segment {
     /// The change of the spatial force that goes with the nodal increments
     /// `dx` = dx1 - dx0 and spatial rotations `a`, `b`.
     #[inline]
-    pub fn force_increment(&self, section: &Section, dx: DVec3, a: DVec3, b: DVec3) -> DVec3 {
+    pub fn force_increment(
+        &self,
+        section: &Section,
+        dx: DVec3,
+        a: DVec3,
+        b: DVec3,
+    ) -> DVec3 {
         let to_directors = self.frame.transpose();
         let (alpha, beta) = (to_directors * a, to_directors * b);
         let mu = 0.5 * (alpha + beta) + 0.5 * (beta - alpha).cross(self.relative.tau);
         let d_mu = section.compliance * self.nu.cross(mu) - self.w.cross(mu);
         let gap = to_directors * dx - section.ds * d_mu + self.gap;
-        self.frame * (section.condensation_stiffness() * gap / section.ds)
+        self.frame * (section.stiffness() * gap / section.ds)
     }
 }
