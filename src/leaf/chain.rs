@@ -14,13 +14,6 @@ pub type Block = [[f64; 6]; 6];
 /// The 3 x 3 matrix of a tip, rows first.
 pub type Tip = [[f64; 3]; 3];
 
-/// Signs of the pivots of a factorisation, all that Sylvester's law needs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Pivots {
-    /// Pivots below zero: negative eigenvalues.
-    pub negative: usize,
-}
-
 /// The matrix of one rod, nodes 1 to n, without the coupling to others.
 #[derive(Clone, Debug)]
 pub struct Chain {

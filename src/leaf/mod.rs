@@ -5,12 +5,13 @@ mod assembly;
 mod chain;
 mod dimensionless;
 mod grid;
+mod sparse;
 mod state;
 mod system;
 
 pub use assembly::{DiscreteLeaf, Sums};
-pub use chain::Pivots;
 pub use dimensionless::{Leaf, Scale};
 pub use grid::Grid;
+pub use sparse::{SparseError, SparseFactor, SparsePattern};
 pub use state::{Increment, State};
 pub use system::{System, Solved};

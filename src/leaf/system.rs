@@ -51,7 +51,7 @@ pub struct System {
     segments: usize,
     tip: Option<TipFactor>,
     /// E: coupling of gap g at nodes 1..n, none where the leaf has none.
-    springs: Vec<Vec<DVec3>>,
+    pub(super) springs: Vec<Vec<DVec3>>,
     /// Spatial dead moment on the tip of a single rod.
     moment: DVec3,
 }
@@ -115,6 +115,77 @@ impl System {
             },
             moment: if rods == 1 { leaf.leaf.tip_moment } else { DVec3::ZERO },
         }
+    }
+
+    pub(super) fn joined(&self) -> bool {
+        self.joined
+    }
+
+    pub(super) fn segments(&self) -> usize {
+        self.segments
+    }
+
+    /// Calls `f` with rod, node (from 0) and right-hand side.
+    pub(super) fn each_rhs(&self, mut f: impl FnMut(usize, usize, &Increment)) {
+        for (j, rod) in self.rods.iter().enumerate() {
+            for (i, rhs) in rod.rhs.iter().enumerate() {
+                f(j, i, rhs);
+            }
+        }
+    }
+
+    /// Calls `f` with rod, node (from 0) and solution.
+    pub(super) fn each_solution(&mut self, mut f: impl FnMut(usize, usize, &mut Increment)) {
+        for (j, rod) in self.rods.iter_mut().enumerate() {
+            for (i, solution) in rod.solution.iter_mut().enumerate() {
+                f(j, i, solution);
+            }
+        }
+    }
+
+    /// Makes the last solution the right-hand side, times the mass matrix and
+    /// scaled to a largest component of one: a step of inverse iteration.
+    pub fn iterate_mode(&mut self) {
+        let (turn, shift) = self.largest();
+        let scale = 1.0 / turn.max(shift);
+        for rod in &mut self.rods {
+            for ((rhs, solution), m) in rod.rhs.iter_mut().zip(&rod.solution).zip(&rod.mass) {
+                for c in 0..6 {
+                    rhs[c] = m[c / 3] * solution[c] * scale;
+                }
+            }
+        }
+    }
+
+    /// A right-hand side without any symmetry, to begin inverse iteration with.
+    pub fn seed_mode(&mut self) {
+        // Multiples of the golden ratio spread evenly: no symmetry, no chance.
+        let mut phase = 0.0_f64;
+        for rod in &mut self.rods {
+            for (rhs, m) in rod.rhs.iter_mut().zip(&rod.mass) {
+                for c in 0..6 {
+                    phase = (phase + 0.618_033_988_749_895).fract();
+                    rhs[c] = m[c / 3] * (phase - 0.5);
+                }
+            }
+        }
+    }
+
+    /// Whether K is positive definite already without the coupling, which can
+    /// only add to it: then no eigenvalue is negative. Overwrites the matrix.
+    pub fn stable_without_coupling(&mut self) -> bool {
+        for (j, rod) in self.rods.iter_mut().enumerate() {
+            for gap in [j.wrapping_sub(1), j] {
+                if let Some(springs) = self.springs.get(gap) {
+                    for (block, spring) in rod.chain.diagonal.iter_mut().zip(springs) {
+                        for c in 0..3 {
+                            block[3 + c][3 + c] -= spring[c];
+                        }
+                    }
+                }
+            }
+        }
+        self.factorize(0.0)
     }
 
     pub(super) fn parallel(&self) -> bool {

@@ -7,6 +7,15 @@ const CLEAN_RATIO: std::ops::Range<f64> = 0.17..0.36;
 /// Safety factor of the error estimate.
 const SAFETY: f64 = 3.0;
 
+/// The column of a table that is believed, and its error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Best {
+    /// Terms of the ds^2 series removed.
+    pub columns: usize,
+    /// Estimate of the largest error of any value.
+    pub error: f64,
+}
+
 /// Values on successively halved grids, extrapolated over the series in ds^2.
 #[derive(Clone, Debug, Default)]
 pub struct Richardson {
@@ -30,13 +39,8 @@ impl Richardson {
         self.table.push(row);
     }
 
-    /// Number of grids.
-    pub fn grids(&self) -> usize {
-        self.table.len()
-    }
-
-    /// Best values and the estimate of their largest error, `scale` being the
-    /// size of the solution. `None` before there are two grids.
+    /// The best column on the finest grid and the estimate of its largest
+    /// error, `scale` being the size of the solution. `None` before there are two grids.
     ///
     /// With D_m the change that column m makes on the finest grid, the error
     /// of column m - 1, successive D_m of a clean series shrink ever less
@@ -45,12 +49,12 @@ impl Richardson {
     /// `scale` for D_0, times a safety factor. Where the series is not clean
     /// (the grids do not resolve the solution yet) the finest grid itself is
     /// returned, with the last change as its error.
-    pub fn best(&self, scale: f64) -> Option<(&[f64], f64)> {
+    pub fn best(&self, scale: f64) -> Option<Best> {
         let row = self.table.last()?;
         let grids = self.table.len();
         let coarser = self.table.get(grids.checked_sub(2)?)?;
         let change = distance(&row[0], &coarser[0]);
-        let mut best = (row[0].as_slice(), change);
+        let mut best = Best { columns: 0, error: change };
         if let Some(coarsest) = grids.checked_sub(3).map(|k| &self.table[k]) {
             let ratio = change / distance(&coarser[0], &coarsest[0]);
             if !CLEAN_RATIO.contains(&ratio) && change > 1e-13 * scale {
@@ -61,18 +65,20 @@ impl Richardson {
         for m in 1..row.len() {
             let correction = distance(&row[m], &row[m - 1]);
             let estimate = SAFETY * correction * (correction / last).sqrt().min(1.0);
-            if estimate > best.1 || correction > last {
+            if estimate > best.error || correction > last {
                 break;
             }
-            best = (row[m].as_slice(), estimate);
+            best = Best { columns: m, error: estimate };
             last = correction;
         }
         Some(best)
     }
 
-    /// The plain values on the finest grid.
-    pub fn finest(&self) -> Option<&[f64]> {
-        Some(self.table.last()?[0].as_slice())
+    /// The finest grid's values with `columns` terms of the series removed;
+    /// zero: the plain ones.
+    pub fn column(&self, columns: usize) -> &[f64] {
+        let row = self.table.last().expect("a table that is asked has a grid");
+        &row[columns.min(row.len() - 1)]
     }
 }
 

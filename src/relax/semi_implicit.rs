@@ -49,6 +49,12 @@ const MAX_GROWTH: f64 = 4.0;
 /// Relative growth of the energy that is put down to rounding.
 const ENERGY_SLACK: f64 = 1e-9;
 
+/// A leaf that moves by less than this in a step (radians, lengths), while its
+/// matrix without inertia is not positive definite, may be at a saddle: it is,
+/// if no force or moment above the second number (A/L^2, A/L) is unbalanced.
+const SADDLE_STEP: f64 = 1e-7;
+const SADDLE_RESIDUAL: f64 = 1e-6;
+
 /// How a leaf settled on one grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Settled {
@@ -67,10 +73,10 @@ pub enum Settled {
 /// Smallest compliance (units of L^2/A) of a leaf that is moved by its strain
 /// energy. A stiffer one is first settled with this compliance, which also
 /// tells the forces it carries, and then made stiff.
-const MOVING_COMPLIANCE: f64 = 1e-3;
+const MOVING_COMPLIANCE: f64 = 2e-3;
 
 /// Accuracy to which a softened leaf is settled.
-const SOFT_ACCURACY: f64 = 1e-2;
+const SOFT_ACCURACY: f64 = 1e-1;
 
 /// Newton iterations of a stiff leaf before the way to its stiffness is
 /// halved (logarithmically).
@@ -86,6 +92,8 @@ pub struct Relaxation<'a> {
     pub work: &'a mut Work,
     /// Told the size of every step.
     pub progress: &'a mut dyn FnMut(usize, f64),
+    /// Whether the leaf had to move: its energy was not convex on the way.
+    pub moved: bool,
 }
 
 impl Relaxation<'_> {
@@ -130,6 +138,7 @@ impl Relaxation<'_> {
     /// Newton's method in the mixed form, for a leaf that is nearly at rest.
     fn newton(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Settled {
         let mut next = self.state.clone();
+        let mut stiffening = 0.0;
         let mut previous = f64::INFINITY;
         for step in 0..STIFF_ITERATIONS {
             let turn = leaf.assemble(&self.state, system).turn;
@@ -137,19 +146,24 @@ impl Relaxation<'_> {
             if turn > RESOLVED_TURN {
                 return Settled::Unresolved;
             }
-            self.work.factorizations += 1;
             let cg_tolerance = (0.03 * previous).clamp(1e-10, 1e-2);
-            if !system.factorize(0.0) {
-                return Settled::Stuck;
-            }
-            match system.solve(None, cg_tolerance) {
-                Solved::Yes(iterations) => self.work.cg_iterations += iterations,
-                _ => return Settled::Stuck,
+            loop {
+                self.work.factorizations += 1;
+                if system.factorize(stiffening)
+                    && let Solved::Yes(iterations) = system.solve(None, cg_tolerance)
+                {
+                    self.work.cg_iterations += iterations;
+                    break;
+                }
+                stiffening = if stiffening == 0.0 { 30.0 } else { 4.0 * stiffening };
+                if stiffening > 1e6 {
+                    return Settled::Stuck;
+                }
             }
             let (turn, shift) = system.largest();
             let size = turn.max(shift);
             if std::env::var("LD").is_ok() {
-                eprintln!("newton {step} size {size:.3e}");
+                eprintln!("newton {step} size {size:.3e} {stiffening}");
             }
             if !size.is_finite() || turn > MAX_TURN || shift > MAX_SHIFT {
                 return Settled::Stuck;
@@ -158,9 +172,10 @@ impl Relaxation<'_> {
             std::mem::swap(&mut self.state, &mut next);
             self.work.steps += 1;
             (self.progress)(step, size);
-            if let Some(rest) = at_rest(size, previous, cg_tolerance, self.accuracy) {
+            if stiffening == 0.0 && let Some(rest) = at_rest(size, previous, cg_tolerance, self.accuracy) {
                 return rest;
             }
+            stiffening = if stiffening > 8.0 { stiffening / 10.0 } else { 0.0 };
             previous = size;
         }
         Settled::Stuck
@@ -174,6 +189,7 @@ impl Relaxation<'_> {
         let mut next_velocity = velocity.clone();
         let mut dt = f64::INFINITY;
         let mut growth = MAX_GROWTH;
+        let mut resting = false;
         let mut previous = f64::INFINITY;
         let mut sums = leaf.assemble(&self.state, system);
         self.work.force_evaluations += 1;
@@ -183,6 +199,10 @@ impl Relaxation<'_> {
             // step as it takes.
             let cg_tolerance = (0.03 * previous).clamp(1e-10, 1e-2);
             while !self.solve(system, dt, &velocity, cg_tolerance) {
+                if resting {
+                    return Settled::Saddle;
+                }
+                self.moved = true;
                 dt = shorter(dt);
                 growth = 1.0;
                 if dt < SHORTEST_STEP {
@@ -225,7 +245,11 @@ impl Relaxation<'_> {
             self.work.steps += 1;
             if dt.is_finite() {
                 std::mem::swap(&mut velocity, &mut next_velocity);
-                if part == 1.0 {
+                if size < SADDLE_STEP && leaf.residual(&self.state) < SADDLE_RESIDUAL {
+                    // With neither inertia nor damping it falls, or it rests.
+                    resting = true;
+                    dt = f64::INFINITY;
+                } else if part == 1.0 {
                     dt *= growth;
                     growth = (2.0 * growth).min(MAX_GROWTH);
                 }

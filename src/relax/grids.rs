@@ -1,0 +1,339 @@
+//! Nested grids: as fine as the tolerance needs, with an error estimate.
+
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
+use crate::relax::equilibrium::{Equilibrium, Outcome, Saddle, Work};
+use crate::relax::options::{
+    LARGEST_TOLERANCE, MAX_NODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
+};
+use crate::relax::prolong::prolong;
+use crate::relax::report;
+use crate::relax::richardson::Richardson;
+use crate::relax::saddle;
+use crate::relax::semi_implicit::{Relaxation, Settled};
+use crate::relax::start::start;
+use crate::scenario::Scenario;
+use std::time::Instant;
+
+/// Segments of the coarsest grid, in two panels or more if profiles have kinks.
+const COARSEST: usize = 8;
+
+/// Rotation per segment (radians) that the coarsest grid must resolve where
+/// rest curvature and tip moment alone tell it.
+const COARSEST_TURN: f64 = 0.8;
+
+/// Segments of the finest grid.
+const FINEST: usize = 4096;
+
+/// Two grids on which the leaf moved far are said to land in the same place
+/// if no station differs by more than this, in lengths.
+const SAME_PLACE: f64 = 0.05;
+
+/// The finest grid on which landing places are compared.
+const FINEST_LANDING: usize = 256;
+
+/// Iteration error allowed, as a part of the tolerance.
+const ITERATION_PART: f64 = 1e-3;
+
+/// Saddles that are left before the run is given up.
+const MAX_SADDLES: usize = 20;
+
+/// A leaf settled on one grid.
+pub(super) struct Level<'a> {
+    pub leaf: DiscreteLeaf<'a>,
+    pub state: State,
+}
+
+/// Brings a scenario's leaf to rest.
+///
+/// # Errors
+/// Requests that cannot be met; everything that happens while solving is an
+/// [`Outcome`] instead.
+pub fn relax(
+    scenario: &Scenario,
+    options: &Options,
+    progress: &mut dyn FnMut(&Progress),
+) -> Result<Equilibrium, RelaxError> {
+    let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
+    if !(SMALLEST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
+        return Err(RelaxError::Tolerance { found: tolerance });
+    }
+    let clock = Instant::now();
+    let leaf = Leaf::new(scenario);
+    let least = leaf.kinks().len() + 1;
+    let first = match options.segments {
+        Some(found) if found < least => return Err(RelaxError::TooFewSegments { found, least }),
+        Some(segments) => segments,
+        None => coarsest(&leaf).max(least),
+    };
+    let nodes = leaf.rods().saturating_mul(first);
+    if nodes > MAX_NODES {
+        return Err(RelaxError::TooManyNodes { rods: leaf.rods(), segments: first, nodes });
+    }
+    let mut run = Run {
+        leaf: &leaf,
+        options,
+        tolerance,
+        progress,
+        work: Work::default(),
+        saddle: None,
+        levels: Vec::new(),
+        table: Richardson::default(),
+        index: None,
+    };
+    let end = run.solve(Grid::new(first, leaf.kinks()));
+    let (outcome, remark) = run.judge(end);
+    let seconds = clock.elapsed().as_secs_f64();
+    Ok(report::equilibrium(run, outcome, remark, seconds))
+}
+
+/// Segments of the coarsest grid.
+fn coarsest(leaf: &Leaf) -> usize {
+    let moment = leaf.tip_moment.length();
+    let turn = (0..leaf.rods())
+        .map(|j| {
+            let section = leaf.section(j, 0.5, 1.0);
+            (section.rest_curvature.length() + moment / section.couple_stiffness.min_element())
+                * leaf.length(j)
+        })
+        .fold(0.0, f64::max);
+    let mut segments = COARSEST;
+    while (segments as f64) * COARSEST_TURN < turn && segments < FINEST {
+        segments *= 2;
+    }
+    segments
+}
+
+/// How a run over the grids ended.
+pub(super) enum End {
+    /// At rest; the finest grid's last increments were below the accuracy.
+    Rest,
+    /// At rest, but not to the tolerance on the finest grid allowed.
+    NotAccurate,
+    /// Not at rest on the finest grid tried.
+    Failed(Settled),
+}
+
+pub(super) struct Run<'a, 'o> {
+    pub leaf: &'a Leaf<'a>,
+    pub options: &'o Options,
+    pub tolerance: f64,
+    progress: &'o mut dyn FnMut(&Progress),
+    pub work: Work,
+    pub saddle: Option<Saddle>,
+    pub levels: Vec<Level<'a>>,
+    pub table: Richardson,
+    pub index: Option<usize>,
+}
+
+impl<'a> Run<'a, '_> {
+    fn solve(&mut self, grid: Grid) -> End {
+        if let Err(settled) = self.land(grid) {
+            return End::Failed(settled);
+        }
+        loop {
+            if self.accurate() {
+                match self.judge_stability() {
+                    Ok(()) => return End::Rest,
+                    Err(None) => {}
+                    Err(Some(settled)) => return End::Failed(settled),
+                }
+            }
+            let level = self.levels.last().expect("the leaf has landed");
+            let finer = level.leaf.grid.refined();
+            let nodes = self.leaf.rods() * finer.segments();
+            if self.options.segments.is_some() || finer.segments() > FINEST || nodes > MAX_NODES {
+                return match self.judge_stability() {
+                    Err(Some(settled)) => End::Failed(settled),
+                    _ => End::NotAccurate,
+                };
+            }
+            let state = prolong(&level.leaf, &level.state);
+            let (level, settled, _) = self.settle(finer, Some(state));
+            self.push(level);
+            if !matches!(settled, Settled::Rest(_)) {
+                return End::Failed(settled);
+            }
+        }
+    }
+
+    /// Whether the tolerance is reached; a fixed grid always is.
+    fn accurate(&self) -> bool {
+        self.options.segments.is_some()
+            || self.table.best(1.0).is_some_and(|best| best.error <= self.tolerance)
+    }
+
+    /// From the start to rest on the first grid that resolves it. A leaf that
+    /// had to move far must land in the same place on two grids.
+    fn land(&mut self, mut grid: Grid) -> Result<(), Settled> {
+        let mut landed: Option<Level> = None;
+        loop {
+            let (level, settled, moved) = self.settle(grid.clone(), None);
+            let finer = grid.refined();
+            let last = self.options.segments.is_some() || finer.segments() > FINEST_LANDING;
+            match settled {
+                Settled::Rest(_) if !moved || last => {
+                    self.push(level);
+                    return Ok(());
+                }
+                Settled::Rest(_) => {
+                    if let Some(coarser) = landed.take()
+                        && distance(&coarser, &level) < SAME_PLACE
+                    {
+                        self.push(coarser);
+                        self.push(level);
+                        return Ok(());
+                    }
+                    landed = Some(level);
+                }
+                _ if last && grid.segments() >= FINEST_LANDING || self.options.segments.is_some() => {
+                    self.push(level);
+                    return Err(settled);
+                }
+                _ => landed = None,
+            }
+            grid = finer;
+        }
+    }
+
+    fn push(&mut self, level: Level<'a>) {
+        let stride = match self.levels.first() {
+            Some(first) => level.leaf.segments() / first.leaf.segments(),
+            None => 1,
+        };
+        self.table.push(report::positions(&level, stride));
+        self.levels.push(level);
+    }
+
+    /// Settles on one grid, from the start or from `state`; leaves saddles
+    /// unless they are wanted. Tells whether the leaf had to move, not only to
+    /// settle in the valley it was in.
+    fn settle(&mut self, grid: Grid, state: Option<State>) -> (Level<'a>, Settled, bool) {
+        let leaf = DiscreteLeaf::new(self.leaf, grid);
+        let mut state = state.unwrap_or_else(|| start(&leaf));
+        let mut system = System::new(&leaf);
+        let accuracy = ITERATION_PART * self.tolerance;
+        let segments = leaf.segments();
+        let progress = &mut *self.progress;
+        let mut tell = |step: usize, residual: f64| {
+            progress(&Progress { grid: segments, step, residual });
+        };
+        if self.options.keep_unstable {
+            let settled = saddle::newton(
+                &leaf, &mut state, &mut system, accuracy, &mut self.work, &mut tell,
+            );
+            return (Level { leaf, state }, settled, false);
+        }
+        let mut moved = false;
+        for _ in 0..MAX_SADDLES {
+            let mut relaxation = Relaxation {
+                state,
+                accuracy,
+                work: &mut self.work,
+                progress: &mut tell,
+                moved: false,
+            };
+            let settled = relaxation.settle(&leaf, &mut system);
+            moved |= relaxation.moved;
+            state = relaxation.state;
+            if settled != Settled::Saddle {
+                return (Level { leaf, state }, settled, moved);
+            }
+            self.saddle = saddle_of(&leaf, &state, &mut system, &mut self.work).or(self.saddle);
+            saddle::push_off(&leaf, &mut state, &mut system, &mut self.work);
+        }
+        (Level { leaf, state }, Settled::StepLimit, moved)
+    }
+
+    /// Counts the negative eigenvalues on the finest grid. At a wanted saddle
+    /// they must be as many as on the grid before. At one that is not wanted,
+    /// the leaf is pushed off and the grids begin anew from where it lands.
+    /// `Err(None)`: go on refining.
+    fn judge_stability(&mut self) -> Result<(), Option<Settled>> {
+        let level = self.levels.last().expect("the leaf has landed");
+        let mut system = System::new(&level.leaf);
+        let before = self.index;
+        self.index = saddle::index(&level.leaf, &level.state, &mut system, &mut self.work);
+        let Some(index) = self.index.filter(|&index| index > 0) else { return Ok(()) };
+        if self.options.keep_unstable {
+            return if before == Some(index) || self.options.segments.is_some() {
+                Ok(())
+            } else {
+                Err(None)
+            };
+        }
+        let level = self.levels.pop().expect("the leaf has landed");
+        self.saddle = saddle_of(&level.leaf, &level.state, &mut system, &mut self.work).or(self.saddle);
+        let mut state = level.state;
+        saddle::push_off(&level.leaf, &mut state, &mut system, &mut self.work);
+        let (level, settled, _) = self.settle(level.leaf.grid.clone(), Some(state));
+        self.levels.clear();
+        self.table = Richardson::default();
+        self.push(level);
+        match settled {
+            Settled::Rest(_) if self.options.segments.is_some() => self.judge_stability(),
+            Settled::Rest(_) => Err(None),
+            _ => Err(Some(settled)),
+        }
+    }
+
+    fn judge(&self, end: End) -> (Outcome, Option<String>) {
+        let finest = self.levels.last().map_or(0, |level| level.leaf.segments());
+        match end {
+            End::Rest => (
+                match (self.index, self.saddle) {
+                    (Some(1..), _) => Outcome::Saddle,
+                    (_, Some(_)) => Outcome::ConvergedAfterSaddle,
+                    _ => Outcome::Converged,
+                },
+                self.index.is_none().then(|| {
+                    "the leaf is too large to count its negative eigenvalues: its stability is not known".into()
+                }),
+            ),
+            End::NotAccurate if self.options.segments.is_some() => unreachable!("a fixed grid is accurate"),
+            End::NotAccurate => (
+                Outcome::ToleranceNotReached,
+                Some(format!(
+                    "{finest} segments a rod, the finest grid allowed, do not reach the tolerance: ask for a larger one"
+                )),
+            ),
+            End::Failed(settled) => (
+                match settled {
+                    Settled::Stuck => Outcome::Diverged,
+                    _ => Outcome::NotAtRest,
+                },
+                Some(match settled {
+                    Settled::Unresolved => format!(
+                        "a vein bends by more than a right angle within one of {finest} segments: use more segments or smaller loads"
+                    ),
+                    Settled::Stuck => format!(
+                        "no step lowers the energy on {finest} segments: use more segments, or raise the softest stiffness or lower the load"
+                    ),
+                    _ => format!(
+                        "the step limit came before rest on {finest} segments: the load may admit no stable equilibrium; lower it"
+                    ),
+                }),
+            ),
+        }
+    }
+}
+
+/// What is said of a saddle.
+fn saddle_of(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    system: &mut System,
+    work: &mut Work,
+) -> Option<Saddle> {
+    let scale = leaf.leaf.scale;
+    Some(Saddle {
+        energy: leaf.energy(state) * scale.moment(),
+        negative_eigenvalues: saddle::index(leaf, state, system, work)?,
+        tip: state.tip(0) * scale.length,
+    })
+}
+
+/// Largest distance between a level and the next finer one at common stations.
+fn distance(coarse: &Level, fine: &Level) -> f64 {
+    let (a, b) = (report::positions(coarse, 1), report::positions(fine, 2));
+    a.iter().zip(&b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
+}

@@ -1,0 +1,90 @@
+//! What is asked of a relaxation, and what cannot be asked.
+
+/// How a leaf is brought to rest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// Linearly implicit damped motion that turns into Newton's method.
+    #[default]
+    SemiImplicit,
+}
+
+impl Method {
+    /// The name used on the command line and in `summary.json`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::SemiImplicit => "semi-implicit",
+        }
+    }
+}
+
+/// What is asked of a relaxation.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// The method.
+    pub method: Method,
+    /// One fixed grid of so many segments a rod, without extrapolation;
+    /// `None`: as fine as the tolerance needs.
+    pub segments: Option<usize>,
+    /// Replaces the scenario's tolerance.
+    pub tolerance: Option<f64>,
+    /// Whether to stop at a saddle instead of leaving it. Newton's method is
+    /// then not steered towards stable equilibria at all.
+    pub keep_unstable: bool,
+}
+
+/// How far a running relaxation has come.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Segments per rod of the present grid.
+    pub grid: usize,
+    /// Step on that grid.
+    pub step: usize,
+    /// Size of that step: largest rotation or displacement, in radians or
+    /// lengths of the leaf. It goes to zero as the leaf comes to rest.
+    pub residual: f64,
+}
+
+/// Smallest tolerance that double precision can keep.
+pub const SMALLEST_TOLERANCE: f64 = 1e-12;
+
+/// Largest tolerance that still means something.
+pub const LARGEST_TOLERANCE: f64 = 0.1;
+
+/// Most nodes of a leaf, all rods together: about 1.5 kB each.
+pub const MAX_NODES: usize = 4_000_000;
+
+/// A request that cannot be met.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum RelaxError {
+    /// The tolerance is out of range.
+    #[error(
+        "tolerance = {found}: allowed are {SMALLEST_TOLERANCE:e} to {LARGEST_TOLERANCE} \
+         (relative to the largest rod length; double precision does not carry more)"
+    )]
+    Tolerance {
+        /// The tolerance asked for.
+        found: f64,
+    },
+    /// Too few segments for the panels of the profiles.
+    #[error(
+        "--segments {found}: at least {least} are needed, one for every piece between the knots of the profiles"
+    )]
+    TooFewSegments {
+        /// Segments asked for.
+        found: usize,
+        /// Least number that can be used.
+        least: usize,
+    },
+    /// Too many nodes.
+    #[error(
+        "{rods} rods of {segments} segments are {nodes} nodes: at most {MAX_NODES} are allowed (about 6 GB); use fewer rods or segments"
+    )]
+    TooManyNodes {
+        /// Number of rods.
+        rods: usize,
+        /// Segments per rod.
+        segments: usize,
+        /// Their product.
+        nodes: usize,
+    },
+}

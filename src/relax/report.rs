@@ -1,0 +1,131 @@
+//! From the settled grids to the result in the units of the scenario.
+
+use crate::leaf::DiscreteLeaf;
+use crate::relax::equilibrium::{Equilibrium, NodeState, Outcome, RodShape};
+use crate::relax::grids::{Level, Run};
+use crate::relax::richardson::Richardson;
+use crate::relax::shape;
+use glam::{DQuat, DVec3};
+
+/// Part of the rounding error that grows with the number of segments.
+const ROUNDING: f64 = 1e-15;
+
+/// Positions of all rods at every `stride`-th node, dimensionless.
+pub fn positions(level: &Level, stride: usize) -> Vec<f64> {
+    let n = level.leaf.segments();
+    (0..level.leaf.rods())
+        .flat_map(|j| (0..=n).step_by(stride).map(move |i| level.state.base(j) + i))
+        .flat_map(|k| level.state.x[k].to_array())
+        .collect()
+}
+
+/// Assembles the result.
+pub fn equilibrium(
+    run: Run,
+    outcome: Outcome,
+    remark: Option<String>,
+    wall_seconds: f64,
+) -> Equilibrium {
+    let (first, finest) = match (run.levels.first(), run.levels.last()) {
+        (Some(first), Some(finest)) => (first, finest),
+        _ => unreachable!("a run leaves at least the grid it failed on"),
+    };
+    let scale = run.leaf.scale;
+    let best = run.table.best(1.0);
+    let columns = best.as_ref().map_or(0, |best| best.columns);
+    let rods = fields(&run.levels, columns);
+    let joined = run.leaf.joined();
+    let tips = rods.iter().take(if joined { 1 } else { rods.len() });
+    let mut energies = Richardson::default();
+    for level in &run.levels {
+        energies.push(vec![level.leaf.energy(&level.state)]);
+    }
+    let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
+    Equilibrium {
+        scenario: run.leaf.scenario().name.clone(),
+        method: run.options.method.name(),
+        outcome,
+        remark,
+        segments: run.levels.iter().map(|level| level.leaf.segments()).collect(),
+        tolerance: run.tolerance,
+        residual: finest.leaf.residual(&finest.state),
+        error_estimate: best
+            .map(|best| (best.error + ROUNDING * finest.leaf.segments() as f64) * scale.length),
+        energy: energies.column(columns)[0] * scale.moment(),
+        joined,
+        tips: tips.filter_map(|rod| rod.nodes.last()).map(|node| node.position).collect(),
+        tip_force_sum: rods.iter().map(tip_force).sum(),
+        negative_eigenvalues: run.index,
+        saddle: run.saddle,
+        work: run.work,
+        wall_seconds,
+        stations: first.leaf.grid.sigma().to_vec(),
+        rods,
+        curves: (0..finest.leaf.rods())
+            .map(|j| {
+                let base = finest.state.base(j);
+                let nodes = &finest.state.x[base..=base + finest.leaf.segments()];
+                nodes.iter().map(|x| *x * scale.length).collect()
+            })
+            .collect(),
+    }
+}
+
+/// Values carried per node through the extrapolation: position, quaternion, n, m.
+const FIELDS: usize = 13;
+
+/// All nodal fields at the stations of the first level, in the scenario's
+/// units, with `columns` extrapolations.
+fn fields(levels: &[Level], columns: usize) -> Vec<RodShape> {
+    let first = &levels[0];
+    let (n, scale) = (first.leaf.segments(), first.leaf.leaf.scale);
+    let used = &levels[levels.len() - 1 - columns..];
+    (0..first.leaf.rods())
+        .map(|j| {
+            let mut table = Richardson::default();
+            let mut reference: Vec<DQuat> = Vec::new();
+            for level in used {
+                let stride = level.leaf.segments() / n;
+                let nodes: Vec<NodeState> =
+                    (0..=n).map(|i| shape::node(&level.leaf, &level.state, j, i * stride)).collect();
+                if reference.is_empty() {
+                    reference = nodes.iter().map(|node| node.rotation).collect();
+                }
+                table.push(nodes.iter().zip(&reference).flat_map(pack).collect());
+            }
+            let values = table.column(columns);
+            let nodes = values
+                .chunks_exact(FIELDS)
+                .enumerate()
+                .map(|(i, values)| unpack(&first.leaf, j, i, values))
+                .collect();
+            RodShape { length: first.leaf.leaf.length(j) * scale.length, nodes }
+        })
+        .collect()
+}
+
+fn pack((node, reference): (&NodeState, &DQuat)) -> [f64; FIELDS] {
+    // A rotation's two quaternions must not be mixed up between grids.
+    let q = if node.rotation.dot(*reference) < 0.0 { -node.rotation } else { node.rotation };
+    let (x, n, m) = (node.position, node.n, node.m);
+    [x.x, x.y, x.z, q.x, q.y, q.z, q.w, n.x, n.y, n.z, m.x, m.y, m.z]
+}
+
+fn unpack(leaf: &DiscreteLeaf, j: usize, i: usize, values: &[f64]) -> NodeState {
+    let vector = |k: usize| DVec3::new(values[k], values[k + 1], values[k + 2]);
+    let mut node = NodeState {
+        position: vector(0),
+        rotation: DQuat::from_xyzw(values[3], values[4], values[5], values[6]).normalize(),
+        v: DVec3::X,
+        u: DVec3::ZERO,
+        n: vector(7),
+        m: vector(10),
+    };
+    shape::strains(leaf, j, leaf.grid.sigma()[i], &mut node);
+    let scale = leaf.leaf.scale;
+    node.position *= scale.length;
+    node.u /= scale.length;
+    node.n *= scale.force();
+    node.m *= scale.moment();
+    node
+}

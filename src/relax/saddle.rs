@@ -1,0 +1,111 @@
+//! Saddles: counting their negative eigenvalues, finding them, leaving them.
+
+use crate::leaf::{DiscreteLeaf, Solved, SparsePattern, State, System};
+use crate::relax::equilibrium::Work;
+use crate::relax::semi_implicit::{RESOLVED_TURN, Settled};
+
+/// Size of the push off a saddle: largest rotation (radians) or displacement
+/// (lengths) along the unstable mode.
+const PUSH: f64 = 0.03;
+
+/// Steps of inverse iteration; the mode need not be accurate, only unstable.
+const MODE_ITERATIONS: usize = 6;
+
+/// Newton iterations towards a saddle.
+const MAX_ITERATIONS: usize = 200;
+
+/// Largest rotation or displacement in one of them.
+const MAX_STEP: f64 = 0.5;
+
+/// Morse index of a state at rest: the number of negative eigenvalues of the
+/// Hessian of its energy (the symmetric part of it, under a dead moment).
+/// `None` if the factorisation does not fit into memory.
+pub fn index(leaf: &DiscreteLeaf, state: &State, system: &mut System, work: &mut Work) -> Option<usize> {
+    leaf.assemble(state, system);
+    work.force_evaluations += 1;
+    // One linear-time factorisation proves most leaves stable.
+    work.factorizations += 1;
+    if system.stable_without_coupling() {
+        return Some(0);
+    }
+    leaf.assemble(state, system);
+    work.force_evaluations += 1;
+    work.factorizations += 1;
+    let pattern = SparsePattern::new(system).ok()?;
+    Some(pattern.factorize(system).ok()?.negative())
+}
+
+/// Newton's method whatever the signs of the pivots, with steps of bounded
+/// size: it goes to the next equilibrium, stable or not, as the solver of a
+/// boundary-value problem would.
+pub fn newton(
+    leaf: &DiscreteLeaf,
+    state: &mut State,
+    system: &mut System,
+    accuracy: f64,
+    work: &mut Work,
+    progress: &mut dyn FnMut(usize, f64),
+) -> Settled {
+    let mut next = state.clone();
+    let mut pattern = None;
+    let mut previous = f64::INFINITY;
+    for step in 0..MAX_ITERATIONS {
+        let turn = leaf.assemble(state, system).turn;
+        work.force_evaluations += 1;
+        if turn > RESOLVED_TURN {
+            return Settled::Unresolved;
+        }
+        if pattern.is_none() {
+            pattern = SparsePattern::new(system).ok();
+        }
+        let Some(Ok(mut factor)) = pattern.as_ref().map(|p| p.factorize(system)) else {
+            return Settled::Stuck;
+        };
+        factor.solve(system);
+        work.factorizations += 1;
+        let (turn, shift) = system.largest();
+        let size = turn.max(shift);
+        if !size.is_finite() {
+            return Settled::Stuck;
+        }
+        leaf.advance(state, system, (MAX_STEP / size).min(1.0), &mut next);
+        std::mem::swap(state, &mut next);
+        work.steps += 1;
+        progress(step, size);
+        let remaining = size * (size / previous).min(1.0).powi(2);
+        if previous.is_finite() && remaining <= accuracy {
+            return Settled::Rest(remaining);
+        }
+        previous = size;
+    }
+    Settled::StepLimit
+}
+
+/// Pushes a state at a saddle along its most unstable mode, by inverse
+/// iteration with the smallest shift that makes the matrix positive definite.
+pub fn push_off(leaf: &DiscreteLeaf, state: &mut State, system: &mut System, work: &mut Work) {
+    leaf.assemble(state, system);
+    work.force_evaluations += 1;
+    system.seed_mode();
+    let mut shift = 1e-4;
+    loop {
+        work.factorizations += 1;
+        if system.factorize(shift) && matches!(system.solve(None, 1e-3), Solved::Yes(_)) {
+            break;
+        }
+        shift *= 2.0;
+        if !shift.is_finite() {
+            return;
+        }
+    }
+    for _ in 0..MODE_ITERATIONS {
+        system.iterate_mode();
+        if !matches!(system.solve(None, 1e-3), Solved::Yes(_)) {
+            break;
+        }
+    }
+    let (turn, displacement) = system.largest();
+    let mut pushed = state.clone();
+    leaf.advance(state, system, PUSH / turn.max(displacement), &mut pushed);
+    *state = pushed;
+}
