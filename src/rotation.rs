@@ -18,7 +18,9 @@ pub fn exp(theta: DVec3) -> DQuat {
         (
             1.0 - half_squared / 6.0 * (1.0 - half_squared / 20.0 * (1.0 - half_squared / 42.0)),
             1.0 - half_squared / 2.0
-                * (1.0 - half_squared / 12.0 * (1.0 - half_squared / 30.0 * (1.0 - half_squared / 56.0))),
+                * (1.0
+                    - half_squared / 12.0
+                        * (1.0 - half_squared / 30.0 * (1.0 - half_squared / 56.0))),
         )
     } else {
         let half = half_squared.sqrt();
@@ -109,7 +111,14 @@ impl Relative {
         } else {
             (1.0 - s) / half_squared
         };
-        Relative { psi: 2.0 * s * v, tau: v / (1.0 + cos), s, sigma, half_squared, cos }
+        Relative {
+            psi: 2.0 * s * v,
+            tau: v / (1.0 + cos),
+            s,
+            sigma,
+            half_squared,
+            cos,
+        }
     }
 
     /// S a.
@@ -165,10 +174,25 @@ mod tests {
 
     #[test]
     fn log_undoes_exp_up_to_half_a_turn() {
-        for angle in [0.0, 1e-9, 1e-3, 0.19, 0.21, 1.0, 3.0, std::f64::consts::PI - 1e-9] {
+        for angle in [
+            0.0,
+            1e-9,
+            1e-3,
+            0.19,
+            0.21,
+            1.0,
+            3.0,
+            std::f64::consts::PI - 1e-9,
+        ] {
             let theta = angle * DVec3::new(0.48, -0.6, 0.64);
-            assert!((log(exp(theta)) - theta).length() < 4e-15 * (1.0 + angle), "at {angle}");
-            assert!((log(-exp(theta)) - theta).length() < 4e-15 * (1.0 + angle), "at {angle}");
+            assert!(
+                (log(exp(theta)) - theta).length() < 4e-15 * (1.0 + angle),
+                "at {angle}"
+            );
+            assert!(
+                (log(-exp(theta)) - theta).length() < 4e-15 * (1.0 + angle),
+                "at {angle}"
+            );
         }
     }
 

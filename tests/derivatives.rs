@@ -10,7 +10,10 @@ use proptest::prelude::*;
 
 type Quaternion<D> = [D; 4]; // w, x, y, z
 
-fn multiply<D: DualNum<Primitive = f64> + Copy>(a: Quaternion<D>, b: Quaternion<D>) -> Quaternion<D> {
+fn multiply<D: DualNum<Primitive = f64> + Copy>(
+    a: Quaternion<D>,
+    b: Quaternion<D>,
+) -> Quaternion<D> {
     [
         a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
         a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
@@ -40,7 +43,11 @@ fn functional<D: DualNum<Primitive = f64> + Copy>(
     n0: DVec3,
 ) -> D {
     let vector = |offset: usize, base: DVec3| -> [D; 3] {
-        [z[offset] + base.x, z[offset + 1] + base.y, z[offset + 2] + base.z]
+        [
+            z[offset] + base.x,
+            z[offset + 1] + base.y,
+            z[offset + 2] + base.z,
+        ]
     };
     let rotated = |offset: usize, q: DQuat| -> Quaternion<D> {
         let t = [z[offset], z[offset + 1], z[offset + 2]];
@@ -65,8 +72,7 @@ fn functional<D: DualNum<Primitive = f64> + Copy>(
     let mut pi = -nu[0] * section.ds;
     for k in 0..3 {
         let strain = factor * p[k + 1] / section.ds - section.rest_curvature[k];
-        pi = pi + nu[k] * xi[k]
-            - nu[k] * nu[k] * (0.5 * section.ds * section.compliance[k])
+        pi = pi + nu[k] * xi[k] - nu[k] * nu[k] * (0.5 * section.ds * section.compliance[k])
             + strain * strain * (0.5 * section.ds * section.couple_stiffness[k]);
     }
     pi

@@ -26,6 +26,8 @@ pub struct DiscreteLeaf<'a> {
     coupling: Vec<DVec3>,
     /// Trapezoidal weights of the nodes as fractions of the length.
     weights: Vec<f64>,
+    /// Part of the loads that acts: one, but on the way to a dead moment.
+    pub load_factor: f64,
 }
 
 /// What an assembly sums up over all rods.
@@ -47,12 +49,21 @@ impl<'a> DiscreteLeaf<'a> {
             .collect();
         let coupling = (1..leaf.rods()).map(|g| leaf.coupling(g - 1)).collect();
         let weights = (0..=n).map(|i| grid.weight(i)).collect();
-        DiscreteLeaf { leaf, grid, sections, coupling, weights }
+        DiscreteLeaf {
+            leaf,
+            grid,
+            sections,
+            coupling,
+            weights,
+            load_factor: 1.0,
+        }
     }
 
     /// The smallest compliance of any segment, in units of L^2/A.
     pub fn stiffest(&self) -> f64 {
-        self.sections.iter().fold(f64::INFINITY, |m, s| m.min(s.compliance.min_element()))
+        self.sections
+            .iter()
+            .fold(f64::INFINITY, |m, s| m.min(s.compliance.min_element()))
     }
 
     /// The same leaf with no compliance below `floor`.
@@ -89,6 +100,15 @@ impl<'a> DiscreteLeaf<'a> {
         }
     }
 
+    /// Dead moment on the tip of a single rod.
+    pub fn tip_moment(&self) -> DVec3 {
+        if self.rods() == 1 {
+            self.leaf.tip_moment * self.load_factor
+        } else {
+            DVec3::ZERO
+        }
+    }
+
     /// Mass of node `i` of rod `j` at unit density: rotary, translational.
     pub(super) fn mass(&self, j: usize, i: usize) -> [f64; 2] {
         let mass = self.weights[i] * self.leaf.length(j);
@@ -98,7 +118,10 @@ impl<'a> DiscreteLeaf<'a> {
     /// Segment `i` of rod `j` in `state`, carrying the force `n`.
     pub fn segment(&self, state: &State, j: usize, i: usize, n: DVec3) -> Segment {
         let k = state.base(j) + i;
-        let ends = Ends { x: [state.x[k], state.x[k + 1]], q: [state.q[k], state.q[k + 1]] };
+        let ends = Ends {
+            x: [state.x[k], state.x[k + 1]],
+            q: [state.q[k], state.q[k + 1]],
+        };
         Segment::new(self.section(j, i), &ends, n)
     }
 
@@ -115,9 +138,10 @@ impl<'a> DiscreteLeaf<'a> {
     pub fn load(&self, state: &State, j: usize, i: usize) -> (DVec3, f64) {
         let k = state.base(j) + i;
         let x = state.x[k];
-        let mut force = self.leaf.gravity * (self.weights[i] * self.leaf.length(j));
+        let weight = self.load_factor * self.weights[i] * self.leaf.length(j);
+        let mut force = self.leaf.gravity * weight;
         if i == self.segments() && (j == 0 || !self.leaf.joined()) {
-            force += self.leaf.tip_force;
+            force += self.load_factor * self.leaf.tip_force;
         }
         let mut energy = -force.dot(x);
         if j > 0 {
@@ -134,12 +158,9 @@ impl<'a> DiscreteLeaf<'a> {
 
     /// Assembles matrix and right-hand side of Newton's equations into
     /// `system`.
-    pub fn assemble(
-        &self,
-        state: &State,
-        system: &mut System,
-    ) -> Sums {
+    pub fn assemble(&self, state: &State, system: &mut System) -> Sums {
         let parallel = system.parallel();
+        system.moment = self.tip_moment();
         each_rod(parallel, &mut system.rods, |j, rod| {
             rod.sums = self.assemble_rod(j, state, rod);
         });
@@ -151,12 +172,7 @@ impl<'a> DiscreteLeaf<'a> {
         total
     }
 
-    fn assemble_rod(
-        &self,
-        j: usize,
-        state: &State,
-        rod: &mut RodSystem,
-    ) -> Sums {
+    fn assemble_rod(&self, j: usize, state: &State, rod: &mut RodSystem) -> Sums {
         let n = self.segments();
         let mut sums = Sums::default();
         let chain = &mut rod.chain;
@@ -187,21 +203,13 @@ impl<'a> DiscreteLeaf<'a> {
                 }
             }
         }
-        if self.rods() == 1 {
-            add(&mut rod.rhs[n - 1], self.leaf.tip_moment, DVec3::ZERO);
-        }
+        add(&mut rod.rhs[n - 1], self.tip_moment(), DVec3::ZERO);
         sums
     }
 
     /// The state after `step` times the increments in `solution` (rod after
     /// rod, nodes 1 to n), written over `next`.
-    pub fn advance(
-        &self,
-        state: &State,
-        solution: &System,
-        step: f64,
-        next: &mut State,
-    ) {
+    pub fn advance(&self, state: &State, solution: &System, step: f64, next: &mut State) {
         let n = self.segments();
         next.clone_from(state);
         for (j, rod) in solution.rods.iter().enumerate() {
@@ -233,22 +241,26 @@ impl<'a> DiscreteLeaf<'a> {
                 let (g_x, g_a, g_b) = segment.gradient(self.section(j, i));
                 if i > 0 {
                     let unbalanced = (force + g_x).abs().max_element();
-                    largest = largest.max(unbalanced).max((moment - g_a).abs().max_element());
+                    largest = largest
+                        .max(unbalanced)
+                        .max((moment - g_a).abs().max_element());
                 }
                 force = self.load(state, j, i + 1).0 - g_x;
                 moment = -g_b;
                 largest = largest.max(segment.gap.abs().max_element());
             }
-            if self.rods() == 1 {
-                moment += self.leaf.tip_moment;
-            }
+            moment += self.tip_moment();
             largest = largest.max(moment.abs().max_element());
             tip += force;
             if !self.leaf.joined() {
                 largest = largest.max(force.abs().max_element());
             }
         }
-        if self.leaf.joined() { largest.max(tip.abs().max_element()) } else { largest }
+        if self.leaf.joined() {
+            largest.max(tip.abs().max_element())
+        } else {
+            largest
+        }
     }
 
     /// Potential energy of a state: elastic, of the coupling, and of the loads.
@@ -259,7 +271,8 @@ impl<'a> DiscreteLeaf<'a> {
         for j in 0..self.rods() {
             for i in 0..n {
                 let segment = self.segment(state, j, i, state.n[j * n + i]);
-                energy += self.section(j, i).elastic_energy(&segment) + self.load(state, j, i + 1).1;
+                energy +=
+                    self.section(j, i).elastic_energy(&segment) + self.load(state, j, i + 1).1;
             }
         }
         energy

@@ -35,20 +35,34 @@ pub struct Factor {
 
 impl Chain {
     pub fn new(segments: usize) -> Self {
-        Chain { diagonal: vec![[[0.0; 6]; 6]; segments], off: vec![[[0.0; 6]; 6]; segments - 1] }
+        Chain {
+            diagonal: vec![[[0.0; 6]; 6]; segments],
+            off: vec![[[0.0; 6]; 6]; segments - 1],
+        }
     }
 }
 
 impl Factor {
     pub fn new(segments: usize, joined: bool) -> Self {
         let chain = Chain::new(segments);
-        Factor { upper: chain.diagonal, w: chain.off, last: if joined { 3 } else { 6 } }
+        Factor {
+            upper: chain.diagonal,
+            w: chain.off,
+            last: if joined { 3 } else { 6 },
+        }
     }
 
     /// Factorises `chain` plus `shift` times the diagonal matrix of the nodal
     /// `mass` (rotary and translational). Returns the rod's contribution to
-    /// the joint tip, or `None` at the first pivot that is not positive.
-    pub fn factorize(&mut self, chain: &Chain, shift: f64, mass: &[[f64; 2]]) -> Option<Tip> {
+    /// the joint tip, or `None` at the first pivot that is not positive, or
+    /// that is zero if `any_sign` lets negative ones pass.
+    pub fn factorize(
+        &mut self,
+        chain: &Chain,
+        shift: f64,
+        mass: &[[f64; 2]],
+        any_sign: bool,
+    ) -> Option<Tip> {
         let n = chain.diagonal.len();
         let mut schur = [[0.0; 6]; 6];
         for i in 0..n {
@@ -60,7 +74,7 @@ impl Factor {
                 block[k][k] += shift * mass[i][k / 3];
             }
             let count = if i + 1 < n { 6 } else { self.last };
-            if !eliminate(&mut block, count) {
+            if !eliminate(&mut block, count, any_sign) {
                 return None;
             }
             self.upper[i] = block;
@@ -74,7 +88,11 @@ impl Factor {
         let mut tip = [[0.0; 3]; 3];
         for r in 0..3 {
             for c in 0..3 {
-                tip[r][c] = if r <= c { block[3 + r][3 + c] } else { block[3 + c][3 + r] };
+                tip[r][c] = if r <= c {
+                    block[3 + r][3 + c]
+                } else {
+                    block[3 + c][3 + r]
+                };
             }
         }
         Some(tip)
@@ -140,12 +158,12 @@ impl Factor {
 }
 
 /// Eliminates the first `count` unknowns of a block: rows above the diagonal
-/// become L^T, the diagonal 1/d. False at the first pivot that is not positive.
+/// become L^T, the diagonal 1/d. False at the first pivot that is not allowed.
 #[inline(always)]
-fn eliminate(block: &mut Block, count: usize) -> bool {
+fn eliminate(block: &mut Block, count: usize, any_sign: bool) -> bool {
     for k in 0..count {
         let d = block[k][k];
-        if d.is_nan() || d <= 0.0 {
+        if d.is_nan() || d == 0.0 || (d < 0.0 && !any_sign) {
             return false;
         }
         let inverse = 1.0 / d;

@@ -46,22 +46,31 @@ pub struct Leaf<'a> {
 impl<'a> Leaf<'a> {
     /// Scales a checked scenario.
     pub fn new(scenario: &'a Scenario) -> Self {
-        let length = scenario.rods.iter().fold(0.0_f64, |m, rod| m.max(rod.length));
+        let length = scenario
+            .rods
+            .iter()
+            .fold(0.0_f64, |m, rod| m.max(rod.length));
         let logs: f64 = scenario
             .rods
             .iter()
             .map(|rod| rod.couple_stiffness[1].at(0.5).ln() + rod.couple_stiffness[2].at(0.5).ln())
             .sum();
-        let scale =
-            Scale { length, stiffness: (logs / (2 * scenario.rods.len()) as f64).exp() };
+        let scale = Scale {
+            length,
+            stiffness: (logs / (2 * scenario.rods.len()) as f64).exp(),
+        };
         let mut kinks: Vec<f64> = scenario
             .rods
             .iter()
             .flat_map(|rod| {
-                [&rod.couple_stiffness, &rod.force_stiffness, &rod.rest_curvature]
-                    .into_iter()
-                    .flatten()
-                    .flat_map(|profile| profile.kinks().iter().copied())
+                [
+                    &rod.couple_stiffness,
+                    &rod.force_stiffness,
+                    &rod.rest_curvature,
+                ]
+                .into_iter()
+                .flatten()
+                .flat_map(|profile| profile.kinks().iter().copied())
             })
             .collect();
         kinks.sort_by(f64::total_cmp);

@@ -15,8 +15,10 @@ impl Grid {
     /// `segments` segments shared out among the panels between `kinks`
     /// (ascending, inside (0, 1)) by their widths, at least one each.
     pub fn new(segments: usize, kinks: &[f64]) -> Self {
-        let edges: Vec<f64> =
-            std::iter::once(0.0).chain(kinks.iter().copied()).chain(std::iter::once(1.0)).collect();
+        let edges: Vec<f64> = std::iter::once(0.0)
+            .chain(kinks.iter().copied())
+            .chain(std::iter::once(1.0))
+            .collect();
         let widths: Vec<f64> = edges.windows(2).map(|w| w[1] - w[0]).collect();
         let mut counts = vec![1_usize; widths.len()];
         for _ in widths.len()..segments {
@@ -69,7 +71,11 @@ impl Grid {
     /// Trapezoidal weight of node `i` as a fraction of the length.
     pub fn weight(&self, i: usize) -> f64 {
         let left = if i > 0 { self.width(i - 1) } else { 0.0 };
-        let right = if i < self.segments() { self.width(i) } else { 0.0 };
+        let right = if i < self.segments() {
+            self.width(i)
+        } else {
+            0.0
+        };
         0.5 * (left + right)
     }
 }

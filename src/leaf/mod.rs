@@ -14,4 +14,4 @@ pub use dimensionless::{Leaf, Scale};
 pub use grid::Grid;
 pub use sparse::{SparseError, SparseFactor, SparsePattern};
 pub use state::{Increment, State};
-pub use system::{System, Solved};
+pub use system::{Solved, System};

@@ -69,7 +69,12 @@ impl SparsePattern {
             params,
         )
         .map_err(|_| SparseError)?;
-        Ok(SparsePattern { symbolic, first, tip, size })
+        Ok(SparsePattern {
+            symbolic,
+            first,
+            tip,
+            size,
+        })
     }
 
     /// Factorises the matrix assembled in `system`, of the same leaf.
@@ -78,12 +83,13 @@ impl SparsePattern {
             return Err(SparseError);
         };
         let matrix = triangle(system, &self.first, self.tip, self.size, Side::Lower)?;
-        let scratch = supernodal::factorize_supernodal_numeric_intranode_lblt_scratch::<usize, f64>(
-            symbolic,
-            Par::Seq,
-            Default::default(),
-        )
-        .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
+        let scratch =
+            supernodal::factorize_supernodal_numeric_intranode_lblt_scratch::<usize, f64>(
+                symbolic,
+                Par::Seq,
+                Default::default(),
+            )
+            .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
         let mut factor = SparseFactor {
             pattern: self,
             values: vec![0.0; symbolic.len_val()],

@@ -36,7 +36,12 @@ impl State {
     /// From nodal positions and rotations, without forces.
     pub fn new(segments: usize, x: Vec<DVec3>, q: Vec<DQuat>) -> Self {
         let rods = x.len() / (segments + 1);
-        State { x, q, n: vec![DVec3::ZERO; rods * segments], segments }
+        State {
+            x,
+            q,
+            n: vec![DVec3::ZERO; rods * segments],
+            segments,
+        }
     }
 
     /// Segments per rod.

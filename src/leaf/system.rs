@@ -52,8 +52,8 @@ pub struct System {
     tip: Option<TipFactor>,
     /// E: coupling of gap g at nodes 1..n, none where the leaf has none.
     pub(super) springs: Vec<Vec<DVec3>>,
-    /// Spatial dead moment on the tip of a single rod.
-    moment: DVec3,
+    /// Spatial dead moment on the tip of a single rod, as of the last assembly.
+    pub(super) moment: DVec3,
 }
 
 /// How a solution went.
@@ -72,7 +72,9 @@ pub enum Solved {
 /// that the result does not depend on the number of threads.
 pub(super) fn each_rod<T: Send>(parallel: bool, rods: &mut [T], f: impl Fn(usize, &mut T) + Sync) {
     if parallel {
-        rods.par_iter_mut().enumerate().for_each(|(j, rod)| f(j, rod));
+        rods.par_iter_mut()
+            .enumerate()
+            .for_each(|(j, rod)| f(j, rod));
     } else {
         rods.iter_mut().enumerate().for_each(|(j, rod)| f(j, rod));
     }
@@ -109,11 +111,13 @@ impl System {
             segments: n,
             tip: None,
             springs: if coupled {
-                (1..rods).map(|g| (1..=n).map(|i| leaf.spring(g - 1, i)).collect()).collect()
+                (1..rods)
+                    .map(|g| (1..=n).map(|i| leaf.spring(g - 1, i)).collect())
+                    .collect()
             } else {
                 Vec::new()
             },
-            moment: if rods == 1 { leaf.leaf.tip_moment } else { DVec3::ZERO },
+            moment: DVec3::ZERO,
         }
     }
 
@@ -214,7 +218,11 @@ impl System {
         let of = |(v, m): (&Increment, &[f64; 2])| {
             0.5 * (m[0] * dot(&v[..3], &v[..3]) + m[1] * dot(&v[3..], &v[3..]))
         };
-        self.rods.iter().zip(velocity).map(|(rod, v)| v.iter().zip(&rod.mass).map(of).sum::<f64>()).sum()
+        self.rods
+            .iter()
+            .zip(velocity)
+            .map(|(rod, v)| v.iter().zip(&rod.mass).map(of).sum::<f64>())
+            .sum()
     }
 
     /// Writes the velocity that covers `part` of the last solution in `dt`.
@@ -228,12 +236,25 @@ impl System {
 
     /// Factorises B + shift M; false if it is not positive definite.
     pub fn factorize(&mut self, shift: f64) -> bool {
+        self.factorize_signed(shift, false)
+    }
+
+    /// Factorises the matrix of a single rod whatever the signs of its pivots;
+    /// false only if one of them is zero.
+    pub fn factorize_indefinite(&mut self) -> bool {
+        debug_assert_eq!(self.rods.len(), 1);
+        self.factorize_signed(0.0, true)
+    }
+
+    fn factorize_signed(&mut self, shift: f64, any_sign: bool) -> bool {
         each_rod(self.parallel, &mut self.rods, |_, rod| {
-            let tip = rod.factor.factorize(&rod.chain, shift, &rod.mass);
+            let tip = rod.factor.factorize(&rod.chain, shift, &rod.mass, any_sign);
             rod.partial = if tip.is_some() { 1.0 } else { -1.0 };
             if let (Some(tip), Some(last)) = (tip, rod.z.last_mut()) {
                 // Carried to the sum below without allocating.
-                *last = [tip[0][0], tip[0][1], tip[0][2], tip[1][1], tip[1][2], tip[2][2]];
+                *last = [
+                    tip[0][0], tip[0][1], tip[0][2], tip[1][1], tip[1][2], tip[2][2],
+                ];
             }
         });
         if self.rods.iter().any(|rod| rod.partial < 0.0) {
@@ -304,7 +325,11 @@ impl System {
         loop {
             let p_k_p = self.multiply() + dot(&tip_p, &tip_b_p);
             if p_k_p.is_nan() || p_k_p <= 0.0 {
-                return if rz == 0.0 { Solved::Yes(iterations) } else { Solved::Indefinite(iterations) };
+                return if rz == 0.0 {
+                    Solved::Yes(iterations)
+                } else {
+                    Solved::Indefinite(iterations)
+                };
             }
             let alpha = rz / p_k_p;
             let p = &self.p;
@@ -391,7 +416,12 @@ impl System {
     /// residual . z over all unknowns.
     fn residual_dot_z(&mut self, tip_residual: &[f64; 3], tip_z: &[f64; 3]) -> f64 {
         each_rod(self.parallel, &mut self.rods, |_, rod| {
-            rod.partial = rod.residual.iter().zip(&rod.z).map(|(a, b)| dot(a, b)).sum();
+            rod.partial = rod
+                .residual
+                .iter()
+                .zip(&rod.z)
+                .map(|(a, b)| dot(a, b))
+                .sum();
         });
         // A joint tip's slots hold no residual, only its displacement.
         self.rods.iter().map(|rod| rod.partial).sum::<f64>() + dot(tip_residual, tip_z)
@@ -445,7 +475,9 @@ impl System {
         }
         let turn = nalgebra::Vector3::from_column_slice(&rod.solution[last][..3]);
         let small = Matrix3::identity() + skew * columns;
-        let Some(inverse) = small.try_inverse() else { return };
+        let Some(inverse) = small.try_inverse() else {
+            return;
+        };
         let moment = inverse * (skew * turn);
         rod.z.fill([0.0; 6]);
         rod.z[last][..3].copy_from_slice(moment.as_slice());

@@ -2,6 +2,7 @@
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
 use crate::relax::equilibrium::{Equilibrium, Outcome, Saddle, Work};
+use crate::relax::moment;
 use crate::relax::options::{
     LARGEST_TOLERANCE, MAX_NODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
 };
@@ -12,6 +13,7 @@ use crate::relax::saddle;
 use crate::relax::semi_implicit::{Relaxation, Settled};
 use crate::relax::start::start;
 use crate::scenario::Scenario;
+use glam::DVec3;
 use std::time::Instant;
 
 /// Segments of the coarsest grid, in two panels or more if profiles have kinks.
@@ -67,7 +69,11 @@ pub fn relax(
     };
     let nodes = leaf.rods().saturating_mul(first);
     if nodes > MAX_NODES {
-        return Err(RelaxError::TooManyNodes { rods: leaf.rods(), segments: first, nodes });
+        return Err(RelaxError::TooManyNodes {
+            rods: leaf.rods(),
+            segments: first,
+            nodes,
+        });
     }
     let mut run = Run {
         leaf: &leaf,
@@ -101,6 +107,15 @@ fn coarsest(leaf: &Leaf) -> usize {
         segments *= 2;
     }
     segments
+}
+
+/// Where settling on a grid begins.
+enum From {
+    Start,
+    /// The equilibrium of the next coarser grid, prolonged.
+    Coarser(State),
+    /// A saddle the leaf was pushed off.
+    Pushed(State),
 }
 
 /// How a run over the grids ended.
@@ -148,7 +163,7 @@ impl<'a> Run<'a, '_> {
                 };
             }
             let state = prolong(&level.leaf, &level.state);
-            let (level, settled, _) = self.settle(finer, Some(state));
+            let (level, settled, _) = self.settle(finer, From::Coarser(state));
             self.push(level);
             if !matches!(settled, Settled::Rest(_)) {
                 return End::Failed(settled);
@@ -159,7 +174,10 @@ impl<'a> Run<'a, '_> {
     /// Whether the tolerance is reached; a fixed grid always is.
     fn accurate(&self) -> bool {
         self.options.segments.is_some()
-            || self.table.best(1.0).is_some_and(|best| best.error <= self.tolerance)
+            || self
+                .table
+                .best(1.0)
+                .is_some_and(|best| best.error <= self.tolerance)
     }
 
     /// From the start to rest on the first grid that resolves it. A leaf that
@@ -167,7 +185,7 @@ impl<'a> Run<'a, '_> {
     fn land(&mut self, mut grid: Grid) -> Result<(), Settled> {
         let mut landed: Option<Level> = None;
         loop {
-            let (level, settled, moved) = self.settle(grid.clone(), None);
+            let (level, settled, moved) = self.settle(grid.clone(), From::Start);
             let finer = grid.refined();
             let last = self.options.segments.is_some() || finer.segments() > FINEST_LANDING;
             match settled {
@@ -185,7 +203,9 @@ impl<'a> Run<'a, '_> {
                     }
                     landed = Some(level);
                 }
-                _ if last && grid.segments() >= FINEST_LANDING || self.options.segments.is_some() => {
+                _ if last && grid.segments() >= FINEST_LANDING
+                    || self.options.segments.is_some() =>
+                {
                     self.push(level);
                     return Err(settled);
                 }
@@ -204,22 +224,48 @@ impl<'a> Run<'a, '_> {
         self.levels.push(level);
     }
 
-    /// Settles on one grid, from the start or from `state`; leaves saddles
+    /// Settles on one grid; leaves saddles
     /// unless they are wanted. Tells whether the leaf had to move, not only to
     /// settle in the valley it was in.
-    fn settle(&mut self, grid: Grid, state: Option<State>) -> (Level<'a>, Settled, bool) {
+    fn settle(&mut self, grid: Grid, from: From) -> (Level<'a>, Settled, bool) {
         let leaf = DiscreteLeaf::new(self.leaf, grid);
-        let mut state = state.unwrap_or_else(|| start(&leaf));
+        let mut near_rest = matches!(from, From::Coarser(_));
+        let mut state = match from {
+            From::Start => start(&leaf),
+            From::Coarser(state) | From::Pushed(state) => state,
+        };
         let mut system = System::new(&leaf);
         let accuracy = ITERATION_PART * self.tolerance;
         let segments = leaf.segments();
         let progress = &mut *self.progress;
         let mut tell = |step: usize, residual: f64| {
-            progress(&Progress { grid: segments, step, residual });
+            progress(&Progress {
+                grid: segments,
+                step,
+                residual,
+            });
         };
+        if leaf.tip_moment() != DVec3::ZERO {
+            let mut leaf = leaf;
+            let settled = moment::settle(
+                &mut leaf,
+                &mut state,
+                &mut system,
+                accuracy,
+                near_rest,
+                &mut self.work,
+                &mut tell,
+            );
+            return (Level { leaf, state }, settled, false);
+        }
         if self.options.keep_unstable {
             let settled = saddle::newton(
-                &leaf, &mut state, &mut system, accuracy, &mut self.work, &mut tell,
+                &leaf,
+                &mut state,
+                &mut system,
+                accuracy,
+                &mut self.work,
+                &mut tell,
             );
             return (Level { leaf, state }, settled, false);
         }
@@ -230,6 +276,7 @@ impl<'a> Run<'a, '_> {
                 accuracy,
                 work: &mut self.work,
                 progress: &mut tell,
+                near_rest,
                 moved: false,
             };
             let settled = relaxation.settle(&leaf, &mut system);
@@ -240,6 +287,7 @@ impl<'a> Run<'a, '_> {
             }
             self.saddle = saddle_of(&leaf, &state, &mut system, &mut self.work).or(self.saddle);
             saddle::push_off(&leaf, &mut state, &mut system, &mut self.work);
+            near_rest = false;
         }
         (Level { leaf, state }, Settled::StepLimit, moved)
     }
@@ -250,10 +298,15 @@ impl<'a> Run<'a, '_> {
     /// `Err(None)`: go on refining.
     fn judge_stability(&mut self) -> Result<(), Option<Settled>> {
         let level = self.levels.last().expect("the leaf has landed");
+        if level.leaf.tip_moment() != DVec3::ZERO {
+            return Ok(());
+        }
         let mut system = System::new(&level.leaf);
         let before = self.index;
         self.index = saddle::index(&level.leaf, &level.state, &mut system, &mut self.work);
-        let Some(index) = self.index.filter(|&index| index > 0) else { return Ok(()) };
+        let Some(index) = self.index.filter(|&index| index > 0) else {
+            return Ok(());
+        };
         if self.options.keep_unstable {
             return if before == Some(index) || self.options.segments.is_some() {
                 Ok(())
@@ -262,10 +315,11 @@ impl<'a> Run<'a, '_> {
             };
         }
         let level = self.levels.pop().expect("the leaf has landed");
-        self.saddle = saddle_of(&level.leaf, &level.state, &mut system, &mut self.work).or(self.saddle);
+        self.saddle =
+            saddle_of(&level.leaf, &level.state, &mut system, &mut self.work).or(self.saddle);
         let mut state = level.state;
         saddle::push_off(&level.leaf, &mut state, &mut system, &mut self.work);
-        let (level, settled, _) = self.settle(level.leaf.grid.clone(), Some(state));
+        let (level, settled, _) = self.settle(level.leaf.grid.clone(), From::Pushed(state));
         self.levels.clear();
         self.table = Richardson::default();
         self.push(level);
@@ -285,8 +339,9 @@ impl<'a> Run<'a, '_> {
                     (_, Some(_)) => Outcome::ConvergedAfterSaddle,
                     _ => Outcome::Converged,
                 },
-                self.index.is_none().then(|| {
-                    "the leaf is too large to count its negative eigenvalues: its stability is not known".into()
+                self.index.is_none().then(|| match self.leaf.tip_moment == DVec3::ZERO {
+                    true => "the leaf is too large to count its negative eigenvalues: its stability is not known".into(),
+                    false => "a dead moment has no potential, so that no count of eigenvalues decides stability: it is not stated".into(),
                 }),
             ),
             End::NotAccurate if self.options.segments.is_some() => unreachable!("a fixed grid is accurate"),

@@ -3,6 +3,7 @@
 
 mod equilibrium;
 mod grids;
+mod moment;
 mod options;
 mod prolong;
 mod report;

@@ -37,8 +37,16 @@ pub fn prolong(leaf: &DiscreteLeaf, state: &State) -> State {
             let turned = ((q0 + q1) * 0.5 + bend).normalize();
             x.extend([state.x[k], middle]);
             q.extend([q0, turned]);
-            let before = if i > 0 { force(i - 1) } else { 2.0 * force(0) - force(1.min(n - 1)) };
-            let after = if i + 1 < n { force(i + 1) } else { 2.0 * force(i) - force(i.saturating_sub(1)) };
+            let before = if i > 0 {
+                force(i - 1)
+            } else {
+                2.0 * force(0) - force(1.min(n - 1))
+            };
+            let after = if i + 1 < n {
+                force(i + 1)
+            } else {
+                2.0 * force(i) - force(i.saturating_sub(1))
+            };
             let eighth = 0.125 * (after - before);
             forces.extend([force(i) - eighth, force(i) + eighth]);
         }

@@ -14,7 +14,11 @@ const ROUNDING: f64 = 1e-15;
 pub fn positions(level: &Level, stride: usize) -> Vec<f64> {
     let n = level.leaf.segments();
     (0..level.leaf.rods())
-        .flat_map(|j| (0..=n).step_by(stride).map(move |i| level.state.base(j) + i))
+        .flat_map(|j| {
+            (0..=n)
+                .step_by(stride)
+                .map(move |i| level.state.base(j) + i)
+        })
         .flat_map(|k| level.state.x[k].to_array())
         .collect()
 }
@@ -46,14 +50,21 @@ pub fn equilibrium(
         method: run.options.method.name(),
         outcome,
         remark,
-        segments: run.levels.iter().map(|level| level.leaf.segments()).collect(),
+        segments: run
+            .levels
+            .iter()
+            .map(|level| level.leaf.segments())
+            .collect(),
         tolerance: run.tolerance,
         residual: finest.leaf.residual(&finest.state),
         error_estimate: best
             .map(|best| (best.error + ROUNDING * finest.leaf.segments() as f64) * scale.length),
         energy: energies.column(columns)[0] * scale.moment(),
         joined,
-        tips: tips.filter_map(|rod| rod.nodes.last()).map(|node| node.position).collect(),
+        tips: tips
+            .filter_map(|rod| rod.nodes.last())
+            .map(|node| node.position)
+            .collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
         negative_eigenvalues: run.index,
         saddle: run.saddle,
@@ -86,8 +97,9 @@ fn fields(levels: &[Level], columns: usize) -> Vec<RodShape> {
             let mut reference: Vec<DQuat> = Vec::new();
             for level in used {
                 let stride = level.leaf.segments() / n;
-                let nodes: Vec<NodeState> =
-                    (0..=n).map(|i| shape::node(&level.leaf, &level.state, j, i * stride)).collect();
+                let nodes: Vec<NodeState> = (0..=n)
+                    .map(|i| shape::node(&level.leaf, &level.state, j, i * stride))
+                    .collect();
                 if reference.is_empty() {
                     reference = nodes.iter().map(|node| node.rotation).collect();
                 }
@@ -99,16 +111,25 @@ fn fields(levels: &[Level], columns: usize) -> Vec<RodShape> {
                 .enumerate()
                 .map(|(i, values)| unpack(&first.leaf, j, i, values))
                 .collect();
-            RodShape { length: first.leaf.leaf.length(j) * scale.length, nodes }
+            RodShape {
+                length: first.leaf.leaf.length(j) * scale.length,
+                nodes,
+            }
         })
         .collect()
 }
 
 fn pack((node, reference): (&NodeState, &DQuat)) -> [f64; FIELDS] {
     // A rotation's two quaternions must not be mixed up between grids.
-    let q = if node.rotation.dot(*reference) < 0.0 { -node.rotation } else { node.rotation };
+    let q = if node.rotation.dot(*reference) < 0.0 {
+        -node.rotation
+    } else {
+        node.rotation
+    };
     let (x, n, m) = (node.position, node.n, node.m);
-    [x.x, x.y, x.z, q.x, q.y, q.z, q.w, n.x, n.y, n.z, m.x, m.y, m.z]
+    [
+        x.x, x.y, x.z, q.x, q.y, q.z, q.w, n.x, n.y, n.z, m.x, m.y, m.z,
+    ]
 }
 
 fn unpack(leaf: &DiscreteLeaf, j: usize, i: usize, values: &[f64]) -> NodeState {

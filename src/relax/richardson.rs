@@ -32,7 +32,11 @@ impl Richardson {
             for column in coarser {
                 power *= 4.0;
                 let finer = row.last().expect("row has a first column");
-                let next = finer.iter().zip(column).map(|(f, c)| f + (f - c) / (power - 1.0)).collect();
+                let next = finer
+                    .iter()
+                    .zip(column)
+                    .map(|(f, c)| f + (f - c) / (power - 1.0))
+                    .collect();
                 row.push(next);
             }
         }
@@ -54,7 +58,10 @@ impl Richardson {
         let grids = self.table.len();
         let coarser = self.table.get(grids.checked_sub(2)?)?;
         let change = distance(&row[0], &coarser[0]);
-        let mut best = Best { columns: 0, error: change };
+        let mut best = Best {
+            columns: 0,
+            error: change,
+        };
         if let Some(coarsest) = grids.checked_sub(3).map(|k| &self.table[k]) {
             let ratio = change / distance(&coarser[0], &coarsest[0]);
             if !CLEAN_RATIO.contains(&ratio) && change > 1e-13 * scale {
@@ -68,7 +75,10 @@ impl Richardson {
             if estimate > best.error || correction > last {
                 break;
             }
-            best = Best { columns: m, error: estimate };
+            best = Best {
+                columns: m,
+                error: estimate,
+            };
             last = correction;
         }
         Some(best)

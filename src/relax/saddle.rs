@@ -20,7 +20,12 @@ const MAX_STEP: f64 = 0.5;
 /// Morse index of a state at rest: the number of negative eigenvalues of the
 /// Hessian of its energy (the symmetric part of it, under a dead moment).
 /// `None` if the factorisation does not fit into memory.
-pub fn index(leaf: &DiscreteLeaf, state: &State, system: &mut System, work: &mut Work) -> Option<usize> {
+pub fn index(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    system: &mut System,
+    work: &mut Work,
+) -> Option<usize> {
     leaf.assemble(state, system);
     work.force_evaluations += 1;
     // One linear-time factorisation proves most leaves stable.

@@ -14,7 +14,6 @@
 
 use crate::leaf::{DiscreteLeaf, Increment, Solved, State, System};
 use crate::relax::equilibrium::Work;
-use glam::DVec3;
 
 /// Damping c: critical for the lowest bending mode of a single rod, whose
 /// frequency is 3.516 (canonical value beta_1^2 of the clamped-free beam).
@@ -92,6 +91,9 @@ pub struct Relaxation<'a> {
     pub work: &'a mut Work,
     /// Told the size of every step.
     pub progress: &'a mut dyn FnMut(usize, f64),
+    /// Whether the state is one that only has to be corrected: a stiff leaf is
+    /// then not softened first.
+    pub near_rest: bool,
     /// Whether the leaf had to move: its energy was not convex on the way.
     pub moved: bool,
 }
@@ -103,8 +105,7 @@ impl Relaxation<'_> {
         if stiffest >= MOVING_COMPLIANCE {
             return self.move_to_rest(leaf, system, self.accuracy);
         }
-        let fresh = self.state.n.iter().all(|&n| n == DVec3::ZERO);
-        if !fresh {
+        if self.near_rest {
             let before = self.state.clone();
             match self.newton(leaf, system) {
                 Settled::Stuck => self.state = before,
@@ -155,7 +156,11 @@ impl Relaxation<'_> {
                     self.work.cg_iterations += iterations;
                     break;
                 }
-                stiffening = if stiffening == 0.0 { 30.0 } else { 4.0 * stiffening };
+                stiffening = if stiffening == 0.0 {
+                    30.0
+                } else {
+                    4.0 * stiffening
+                };
                 if stiffening > 1e6 {
                     return Settled::Stuck;
                 }
@@ -172,10 +177,22 @@ impl Relaxation<'_> {
             std::mem::swap(&mut self.state, &mut next);
             self.work.steps += 1;
             (self.progress)(step, size);
-            if stiffening == 0.0 && let Some(rest) = at_rest(size, previous, cg_tolerance, self.accuracy) {
+            if stiffening == 0.0
+                && let Some(rest) = at_rest(size, previous, cg_tolerance, self.accuracy)
+            {
                 return rest;
             }
-            stiffening = if stiffening > 8.0 { stiffening / 10.0 } else { 0.0 };
+            if stiffening > 0.0
+                && size < SADDLE_STEP
+                && leaf.residual(&self.state) < SADDLE_RESIDUAL
+            {
+                return Settled::Saddle;
+            }
+            stiffening = if stiffening > 8.0 {
+                stiffening / 10.0
+            } else {
+                0.0
+            };
             previous = size;
         }
         Settled::Stuck
@@ -213,7 +230,7 @@ impl Relaxation<'_> {
             let size = turn.max(shift);
             let part = (MAX_TURN / turn).min(MAX_SHIFT / shift).min(1.0);
             leaf.advance(&self.state, system, part, &mut trial);
-            let mut energy = sums.energy + leaf.moment_work(system, part);
+            let mut energy = sums.energy;
             let next = leaf.assemble(&trial, system);
             self.work.force_evaluations += 1;
             (self.progress)(step, size);
@@ -224,7 +241,10 @@ impl Relaxation<'_> {
                 next_energy += system.kinetic_energy(&next_velocity);
             }
             if std::env::var("LD").is_ok() {
-                eprintln!("step {step} dt {dt:.2e} size {size:.3e} part {part:.2} energy {energy:.6e} -> {next_energy:.6e} cg {} turn {:.2}", self.work.cg_iterations, next.turn);
+                eprintln!(
+                    "step {step} dt {dt:.2e} size {size:.3e} part {part:.2} energy {energy:.6e} -> {next_energy:.6e} cg {} turn {:.2}",
+                    self.work.cg_iterations, next.turn
+                );
             }
             let slack = ENERGY_SLACK * (1.0 + energy.abs());
             if !next_energy.is_finite() || next_energy > energy + slack {
@@ -275,7 +295,11 @@ impl Relaxation<'_> {
         velocity: &[Vec<Increment>],
         tolerance: f64,
     ) -> bool {
-        let shift = if dt.is_finite() { (1.0 / dt + DAMPING) / dt } else { 0.0 };
+        let shift = if dt.is_finite() {
+            (1.0 / dt + DAMPING) / dt
+        } else {
+            0.0
+        };
         self.work.factorizations += 1;
         if !system.factorize(shift) {
             return false;
@@ -297,9 +321,13 @@ impl Relaxation<'_> {
 /// Whether a Newton step of this `size`, after one of size `previous`, ends at
 /// rest: what remains is of second order at best, and never less than what
 /// the solution of its equations left.
-fn at_rest(size: f64, previous: f64, cg_tolerance: f64, accuracy: f64) -> Option<Settled> {
+pub fn at_rest(size: f64, previous: f64, cg_tolerance: f64, accuracy: f64) -> Option<Settled> {
     let rate = (size / previous).min(1.0);
-    let quadratic = if previous.is_finite() { size * (rate * rate) } else { 10.0 * size * size };
+    let quadratic = if previous.is_finite() {
+        size * (rate * rate)
+    } else {
+        10.0 * size * size
+    };
     let remaining = quadratic.max(cg_tolerance * size);
     let rounding = size < 1e-9 && rate > 0.3;
     match rounding {
@@ -310,16 +338,4 @@ fn at_rest(size: f64, previous: f64, cg_tolerance: f64, accuracy: f64) -> Option
 
 fn shorter(dt: f64) -> f64 {
     if dt.is_finite() { dt / 4.0 } else { FIRST_STEP }
-}
-
-impl DiscreteLeaf<'_> {
-    /// Work of the dead moment on a single rod's tip over a step.
-    fn moment_work(&self, system: &System, part: f64) -> f64 {
-        if self.rods() > 1 {
-            return 0.0;
-        }
-        let increment = system.increment(0, self.segments());
-        let turn = DVec3::new(increment[0], increment[1], increment[2]);
-        part * self.leaf.tip_moment.dot(turn)
-    }
 }

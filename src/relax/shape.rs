@@ -14,7 +14,10 @@ pub fn node(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> NodeState
     let k = state.base(j) + i;
     let to_directors = state.q[k].conjugate();
     let carried = |i: usize| state.n[j * n + i];
-    let segment = |i: usize| leaf.segment(state, j, i, carried(i)).gradient(leaf.section(j, i));
+    let segment = |i: usize| {
+        leaf.segment(state, j, i, carried(i))
+            .gradient(leaf.section(j, i))
+    };
     let (force, moment) = if i == 0 {
         (carried(0) + leaf.load(state, j, 0).0, -segment(0).1)
     } else {
@@ -25,7 +28,10 @@ pub fn node(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> NodeState
         if i == n && (j == 0 || !leaf.leaf.joined()) {
             load -= leaf.leaf.tip_force;
         }
-        (carried(i - 1) - load * (left / (left + right)), segment(i - 1).2)
+        (
+            carried(i - 1) - load * (left / (left + right)),
+            segment(i - 1).2,
+        )
     };
     let mut node = NodeState {
         position: state.x[k],

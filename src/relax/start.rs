@@ -8,23 +8,37 @@ use std::f64::consts::PI;
 /// The start of a relaxation: circular arcs that leave the base as the fan
 /// says and meet in a common tip; free rods start from their rest shapes.
 pub fn start(leaf: &DiscreteLeaf) -> State {
-    if leaf.leaf.joined() && leaf.rods() > 1 { arcs(leaf) } else { rest_shapes(leaf) }
+    if leaf.leaf.joined() && leaf.rods() > 1 {
+        arcs(leaf)
+    } else {
+        rest_shapes(leaf)
+    }
 }
 
 /// Arcs in the plane of the fan, symmetric about the mean base direction. Their
 /// chords differ: what is missing to the mean chord is made up by stretching.
 fn arcs(leaf: &DiscreteLeaf) -> State {
     let model = leaf.leaf;
-    let angles: Vec<f64> =
-        (0..leaf.rods()).map(|j| model.scenario().rods[j].angle).collect();
-    let sum: DVec3 = angles.iter().map(|phi| DVec3::new(phi.cos(), phi.sin(), 0.0)).sum();
-    let mean = if sum.length() > 1e-9 * angles.len() as f64 { sum.y.atan2(sum.x) } else { angles[0] };
+    let angles: Vec<f64> = (0..leaf.rods())
+        .map(|j| model.scenario().rods[j].angle)
+        .collect();
+    let sum: DVec3 = angles
+        .iter()
+        .map(|phi| DVec3::new(phi.cos(), phi.sin(), 0.0))
+        .sum();
+    let mean = if sum.length() > 1e-9 * angles.len() as f64 {
+        sum.y.atan2(sum.x)
+    } else {
+        angles[0]
+    };
     let opening = |phi: f64| {
         let delta = (phi - mean).rem_euclid(2.0 * PI);
         if delta > PI { delta - 2.0 * PI } else { delta }
     };
     let sinc = |x: f64| if x.abs() < 1e-8 { 1.0 } else { x.sin() / x };
-    let chords: f64 = (0..leaf.rods()).map(|j| model.length(j) * sinc(opening(angles[j]))).sum();
+    let chords: f64 = (0..leaf.rods())
+        .map(|j| model.length(j) * sinc(opening(angles[j])))
+        .sum();
     let direction = DVec3::new(mean.cos(), mean.sin(), 0.0);
     let tip = direction * (chords / leaf.rods() as f64);
     let (mut x, mut q) = (Vec::new(), Vec::new());

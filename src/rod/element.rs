@@ -90,7 +90,9 @@ pub struct Blocks {
 impl Section {
     #[inline]
     fn stiffness(&self) -> DVec3 {
-        self.compliance.max(DVec3::splat(CONDENSATION_COMPLIANCE)).recip()
+        self.compliance
+            .max(DVec3::splat(CONDENSATION_COMPLIANCE))
+            .recip()
     }
 
     /// Elastic energy of the strains, ds/2 sum_k (H_k (v_k - delta_k1)^2 +
@@ -98,7 +100,8 @@ impl Section {
     #[inline]
     pub fn strain_energy(&self, segment: &Segment) -> f64 {
         let gamma = segment.v(self) - DVec3::X;
-        0.5 * self.ds * (gamma * gamma / self.compliance).element_sum() + self.bending_energy(segment)
+        0.5 * self.ds * (gamma * gamma / self.compliance).element_sum()
+            + self.bending_energy(segment)
     }
 
     /// ds/2 sum_k A_k (u_k - u0_k)^2.
@@ -236,13 +239,7 @@ impl Segment {
     /// The change of the spatial force that goes with the nodal increments
     /// `dx` = dx1 - dx0 and spatial rotations `a`, `b`.
     #[inline]
-    pub fn force_increment(
-        &self,
-        section: &Section,
-        dx: DVec3,
-        a: DVec3,
-        b: DVec3,
-    ) -> DVec3 {
+    pub fn force_increment(&self, section: &Section, dx: DVec3, a: DVec3, b: DVec3) -> DVec3 {
         let to_directors = self.frame.transpose();
         let (alpha, beta) = (to_directors * a, to_directors * b);
         let mu = 0.5 * (alpha + beta) + 0.5 * (beta - alpha).cross(self.relative.tau);
