@@ -6,7 +6,7 @@ use crate::relax::moment;
 use crate::relax::options::{
     LARGEST_TOLERANCE, MAX_NODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
 };
-use crate::relax::prolong::prolong;
+use crate::relax::prolong::{predict, prolong};
 use crate::relax::report;
 use crate::relax::richardson::Richardson;
 use crate::relax::saddle;
@@ -33,8 +33,8 @@ const SAME_PLACE: f64 = 0.05;
 /// The finest grid on which landing places are compared.
 const FINEST_LANDING: usize = 256;
 
-/// Iteration error allowed, as a part of the tolerance.
-const ITERATION_PART: f64 = 1e-3;
+/// Iteration error allowed on each grid, as a part of the tolerance.
+const ITERATION_PART: f64 = 1e-2;
 
 /// Saddles that are left before the run is given up.
 const MAX_SADDLES: usize = 20;
@@ -85,6 +85,7 @@ pub fn relax(
         levels: Vec::new(),
         table: Richardson::default(),
         index: None,
+        remaining: 0.0,
     };
     let end = run.solve(Grid::new(first, leaf.kinks()));
     let (outcome, remark) = run.judge(end);
@@ -138,6 +139,8 @@ pub(super) struct Run<'a, 'o> {
     pub levels: Vec<Level<'a>>,
     pub table: Richardson,
     pub index: Option<usize>,
+    /// Largest iteration error left on any grid.
+    pub remaining: f64,
 }
 
 impl<'a> Run<'a, '_> {
@@ -162,7 +165,10 @@ impl<'a> Run<'a, '_> {
                     _ => End::NotAccurate,
                 };
             }
-            let state = prolong(&level.leaf, &level.state);
+            let mut state = prolong(&level.leaf, &level.state);
+            if let [.., coarse, middle] = self.levels.as_slice() {
+                predict(&coarse.state, &middle.state, &mut state);
+            }
             let (level, settled, _) = self.settle(finer, From::Coarser(state));
             self.push(level);
             if !matches!(settled, Settled::Rest(_)) {
@@ -282,6 +288,9 @@ impl<'a> Run<'a, '_> {
             let settled = relaxation.settle(&leaf, &mut system);
             moved |= relaxation.moved;
             state = relaxation.state;
+            if let Settled::Rest(remaining) = settled {
+                self.remaining = self.remaining.max(remaining);
+            }
             if settled != Settled::Saddle {
                 return (Level { leaf, state }, settled, moved);
             }

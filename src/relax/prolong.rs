@@ -1,6 +1,7 @@
 //! From a grid to the one with all segments halved.
 
 use crate::leaf::{DiscreteLeaf, State};
+use crate::rotation;
 use glam::{DQuat, DVec3};
 
 /// The state on the refined grid: nodes in common are kept, new ones lie on
@@ -11,29 +12,35 @@ pub fn prolong(leaf: &DiscreteLeaf, state: &State) -> State {
     let (mut x, mut q, mut forces) = (Vec::new(), Vec::new(), Vec::new());
     for j in 0..leaf.rods() {
         let force = |i: usize| state.n[j * n + i];
-        let segment = |i: usize| leaf.segment(state, j, i, force(i));
-        // Curvature, spatial and averaged over the two segments at a node.
-        let mut curvature = vec![DVec3::ZERO; n + 1];
-        for i in 0..n {
-            let s = segment(i);
-            let u = s.frame * s.u;
-            let weight = |k: usize| if k == 0 || k == n { 1.0 } else { 0.5 };
-            curvature[i] += weight(i) * u;
-            curvature[i + 1] += weight(i + 1) * u;
-        }
+        // Spatial curvature and force at a node: from the segments beside it,
+        // or extrapolated from the two next to an end.
+        let curvatures: Vec<DVec3> = (0..n)
+            .map(|i| {
+                let segment = leaf.segment(state, j, i, force(i));
+                segment.frame * segment.u
+            })
+            .collect();
+        let nodal = |value: &dyn Fn(usize) -> DVec3, i: usize| match i {
+            _ if n == 1 => value(0),
+            0 => 1.5 * value(0) - 0.5 * value(1),
+            _ if i == n => 1.5 * value(n - 1) - 0.5 * value(n - 2),
+            _ => 0.5 * (value(i - 1) + value(i)),
+        };
+        let curvature = |i: usize| nodal(&|i| curvatures[i], i);
         let base = state.base(j);
         for i in 0..n {
             let (section, k) = (leaf.section(j, i), base + i);
-            let tangent = |k: usize| {
-                state.q[k] * (DVec3::X + section.compliance * (state.q[k].conjugate() * force(i)))
+            let tangent = |i: usize| {
+                let q = state.q[base + i];
+                q * (DVec3::X + section.compliance * (q.conjugate() * nodal(&force, i)))
             };
             let middle = 0.5 * (state.x[k] + state.x[k + 1])
-                + section.ds / 8.0 * (tangent(k) - tangent(k + 1));
+                + section.ds / 8.0 * (tangent(i) - tangent(i + 1));
             let (q0, q1) = (state.q[k], state.q[k + 1]);
             let q1 = if q0.dot(q1) < 0.0 { -q1 } else { q1 };
             // q' = u q / 2 with u spatial.
             let slope = |u: DVec3, q: DQuat| DQuat::from_xyzw(u.x, u.y, u.z, 0.0) * q * 0.5;
-            let bend = (slope(curvature[i], q0) - slope(curvature[i + 1], q1)) * (section.ds / 8.0);
+            let bend = (slope(curvature(i), q0) - slope(curvature(i + 1), q1)) * (section.ds / 8.0);
             let turned = ((q0 + q1) * 0.5 + bend).normalize();
             x.extend([state.x[k], middle]);
             q.extend([q0, turned]);
@@ -56,4 +63,39 @@ pub fn prolong(leaf: &DiscreteLeaf, state: &State) -> State {
     let mut fine = State::new(2 * n, x, q);
     fine.n = forces;
     fine
+}
+
+/// Adds to `fine`, prolonged from `middle`, what the error series in ds^2 tells
+/// from the two grids before: if halving `coarse` to `middle` changed the
+/// solution by e, halving once more will change it by e/4. Interpolated
+/// cubically between the nodes of `coarse`.
+pub fn predict(coarse: &State, middle: &State, fine: &mut State) {
+    let n = coarse.segments();
+    for j in 0..coarse.rods() {
+        let changes: Vec<(DVec3, DVec3)> = (0..=n)
+            .map(|i| {
+                let (a, b) = (coarse.base(j) + i, middle.base(j) + 2 * i);
+                let turn = rotation::log(middle.q[b] * coarse.q[a].conjugate());
+                (0.25 * (middle.x[b] - coarse.x[a]), 0.25 * turn)
+            })
+            .collect();
+        for k in 1..=4 * n {
+            // Four neighbouring nodes, shifted inwards at the ends.
+            let first = (k / 4).saturating_sub(1).min(n.saturating_sub(3));
+            let t = k as f64 / 4.0 - first as f64;
+            let (mut shift, mut turn) = (DVec3::ZERO, DVec3::ZERO);
+            let count = 4.min(n + 1);
+            for a in 0..count {
+                let weight: f64 = (0..count)
+                    .filter(|&b| b != a)
+                    .map(|b| (t - b as f64) / (a as f64 - b as f64))
+                    .product();
+                shift += weight * changes[first + a].0;
+                turn += weight * changes[first + a].1;
+            }
+            let node = fine.base(j) + k;
+            fine.x[node] += shift;
+            fine.q[node] = (rotation::exp(turn) * fine.q[node]).normalize();
+        }
+    }
 }

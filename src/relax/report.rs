@@ -10,6 +10,9 @@ use glam::{DQuat, DVec3};
 /// Part of the rounding error that grows with the number of segments.
 const ROUNDING: f64 = 1e-15;
 
+/// Growth of errors of single grids by extrapolation, sum of the weights at most.
+const EXTRAPOLATED: f64 = 2.0;
+
 /// Positions of all rods at every `stride`-th node, dimensionless.
 pub fn positions(level: &Level, stride: usize) -> Vec<f64> {
     let n = level.leaf.segments();
@@ -35,6 +38,7 @@ pub fn equilibrium(
         _ => unreachable!("a run leaves at least the grid it failed on"),
     };
     let scale = run.leaf.scale;
+    let rounding = ROUNDING * finest.leaf.segments() as f64;
     let best = run.table.best(1.0);
     let columns = best.as_ref().map_or(0, |best| best.columns);
     let rods = fields(&run.levels, columns);
@@ -58,7 +62,8 @@ pub fn equilibrium(
         tolerance: run.tolerance,
         residual: finest.leaf.residual(&finest.state),
         error_estimate: best
-            .map(|best| (best.error + ROUNDING * finest.leaf.segments() as f64) * scale.length),
+            .map(|best| best.error + EXTRAPOLATED * run.remaining + rounding)
+            .map(|error| error * scale.length),
         energy: energies.column(columns)[0] * scale.moment(),
         joined,
         tips: tips

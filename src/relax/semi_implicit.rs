@@ -147,11 +147,11 @@ impl Relaxation<'_> {
             if turn > RESOLVED_TURN {
                 return Settled::Unresolved;
             }
-            let cg_tolerance = (0.03 * previous).clamp(1e-10, 1e-2);
+            let tolerance = cg_tolerance(previous, self.near_rest);
             loop {
                 self.work.factorizations += 1;
                 if system.factorize(stiffening)
-                    && let Solved::Yes(iterations) = system.solve(None, cg_tolerance)
+                    && let Solved::Yes(iterations) = system.solve(None, tolerance)
                 {
                     self.work.cg_iterations += iterations;
                     break;
@@ -178,7 +178,7 @@ impl Relaxation<'_> {
             self.work.steps += 1;
             (self.progress)(step, size);
             if stiffening == 0.0
-                && let Some(rest) = at_rest(size, previous, cg_tolerance, self.accuracy)
+                && let Some(rest) = at_rest(size, previous, tolerance, self.accuracy)
             {
                 return rest;
             }
@@ -214,8 +214,8 @@ impl Relaxation<'_> {
         for step in 0..MAX_STEPS {
             // A positive definite matrix and its solution, with as long a time
             // step as it takes.
-            let cg_tolerance = (0.03 * previous).clamp(1e-10, 1e-2);
-            while !self.solve(system, dt, &velocity, cg_tolerance) {
+            let tolerance = cg_tolerance(previous, self.near_rest);
+            while !self.solve(system, dt, &velocity, tolerance) {
                 if resting {
                     return Settled::Saddle;
                 }
@@ -277,7 +277,7 @@ impl Relaxation<'_> {
                     dt = f64::INFINITY;
                 }
             } else if part == 1.0
-                && let Some(rest) = at_rest(size, previous, cg_tolerance, accuracy)
+                && let Some(rest) = at_rest(size, previous, tolerance, accuracy)
             {
                 return rest;
             }
@@ -334,6 +334,14 @@ pub fn at_rest(size: f64, previous: f64, cg_tolerance: f64, accuracy: f64) -> Op
         true => Some(Settled::Rest(size)),
         false => (remaining <= accuracy).then_some(Settled::Rest(remaining)),
     }
+}
+
+/// Relative accuracy of the conjugate gradients after a step of size
+/// `previous`: an iteration is cheap beside a new assembly, so that the next
+/// step is never held up by them.
+fn cg_tolerance(previous: f64, near_rest: bool) -> f64 {
+    let loosest = if near_rest { 1e-4 } else { 1e-2 };
+    (3e-3 * previous).clamp(1e-10, loosest)
 }
 
 fn shorter(dt: f64) -> f64 {
