@@ -5,6 +5,11 @@ use crate::rotation;
 use crate::scenario::{Rod, Scenario};
 use glam::{DQuat, DVec3};
 
+/// Stiffness in stretch and shear beyond which segment forces are condensed
+/// out with this one, in units of A/L^2 with the softest A of the leaf. Larger
+/// ones lose the soft modes to rounding, smaller ones cost iterations.
+const CONDENSING_STIFFNESS: f64 = 1e7;
+
 /// Units in which a [`Leaf`] is dimensionless: lengths in units of `length`,
 /// couple stiffnesses in units of `stiffness`, hence forces in A/L^2, moments
 /// and energies in A/L and A/L.
@@ -41,6 +46,8 @@ pub struct Leaf<'a> {
     /// Dead moment on the tip of a single rod.
     pub tip_moment: DVec3,
     kinks: Vec<f64>,
+    /// The smallest couple stiffness, mid-rod.
+    softest: f64,
 }
 
 impl<'a> Leaf<'a> {
@@ -75,6 +82,11 @@ impl<'a> Leaf<'a> {
             .collect();
         kinks.sort_by(f64::total_cmp);
         kinks.dedup();
+        let softest = scenario
+            .rods
+            .iter()
+            .flat_map(|rod| &rod.couple_stiffness)
+            .fold(f64::INFINITY, |m, profile| m.min(profile.at(0.5)));
         let vector = |a: [f64; 3], unit: f64| DVec3::from_array(a) / unit;
         Leaf {
             scenario,
@@ -83,6 +95,7 @@ impl<'a> Leaf<'a> {
             tip_force: vector(scenario.tip_force, scale.force()),
             tip_moment: vector(scenario.tip_moment, scale.moment()),
             kinks,
+            softest: softest / scale.stiffness,
         }
     }
 
@@ -128,7 +141,9 @@ impl<'a> Leaf<'a> {
             couple_stiffness: at(&rod.couple_stiffness) / self.scale.stiffness,
             rest_curvature: at(&rod.rest_curvature) * self.scale.length,
             compliance: (at(&rod.force_stiffness) / self.scale.force()).recip(),
+            condensing: DVec3::ZERO,
         }
+        .condense(CONDENSING_STIFFNESS * self.softest)
     }
 
     /// Coupling of gap `g` between rods g and g + 1: force per unit

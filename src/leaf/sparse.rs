@@ -57,7 +57,7 @@ impl SparsePattern {
         let tip = system.joined().then_some(size);
         size += if system.joined() { 3 } else { 0 };
         // With its ordering given, faer reads the pattern of the upper triangle.
-        let matrix = triangle(system, &first, tip, size, Side::Upper)?;
+        let matrix = triangle(system, &first, tip, 0.0, Side::Upper)?;
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
@@ -77,12 +77,13 @@ impl SparsePattern {
         })
     }
 
-    /// Factorises the matrix assembled in `system`, of the same leaf.
-    pub fn factorize(&self, system: &System) -> Result<SparseFactor<'_>, SparseError> {
+    /// Factorises the matrix assembled in `system`, of the same leaf, plus
+    /// `shift` times its mass matrix.
+    pub fn factorize(&self, system: &System, shift: f64) -> Result<SparseFactor<'_>, SparseError> {
         let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
             return Err(SparseError);
         };
-        let matrix = triangle(system, &self.first, self.tip, self.size, Side::Lower)?;
+        let matrix = triangle(system, &self.first, self.tip, shift, Side::Lower)?;
         let scratch =
             supernodal::factorize_supernodal_numeric_intranode_lblt_scratch::<usize, f64>(
                 symbolic,
@@ -150,12 +151,12 @@ impl SparseFactor<'_> {
         negative
     }
 
-    /// Solves for the right-hand side assembled in `system`; the solution
-    /// stands in `system` afterwards.
-    pub fn solve(&mut self, system: &mut System) {
+    /// Solves for the right-hand side assembled in `system` plus `inertia`
+    /// (see [`System::solve`]); the solution stands in `system` afterwards.
+    pub fn solve(&mut self, system: &mut System, inertia: Option<(&[Vec<Increment>], f64)>) {
         let (size, n) = (self.pattern.size, system.segments());
         let mut b = vec![0.0; size];
-        system.each_rhs(|j, i, rhs| {
+        system.each_rhs(inertia, |j, i, rhs| {
             let first = self.pattern.first[j * n + i];
             match self.pattern.tip {
                 Some(tip) if i + 1 == n => {
@@ -218,7 +219,7 @@ fn triangle(
     system: &System,
     first: &[usize],
     tip: Option<usize>,
-    size: usize,
+    shift: f64,
     side: Side,
 ) -> Result<SparseColMat<usize, f64>, SparseError> {
     let n = system.segments();
@@ -227,6 +228,7 @@ fn triangle(
         _ => first[j * n + i] + c,
     };
     let mut entries = Vec::new();
+    let mut size = 0;
     let mut add = |a: usize, b: usize, value: f64| {
         let (low, high) = (a.min(b), a.max(b));
         entries.push(match side {
@@ -236,7 +238,13 @@ fn triangle(
     };
     for (j, rod) in system.rods.iter().enumerate() {
         for (i, block) in rod.chain.diagonal.iter().enumerate() {
+            size = size.max(unknown(j, i, 2) + 1).max(unknown(j, i, 5) + 1);
             for r in 0..6 {
+                add(
+                    unknown(j, i, r),
+                    unknown(j, i, r),
+                    shift * rod.mass[i][r / 3],
+                );
                 for c in r..6 {
                     add(unknown(j, i, r), unknown(j, i, c), block[r][c]);
                 }

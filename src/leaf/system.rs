@@ -129,11 +129,21 @@ impl System {
         self.segments
     }
 
-    /// Calls `f` with rod, node (from 0) and right-hand side.
-    pub(super) fn each_rhs(&self, mut f: impl FnMut(usize, usize, &Increment)) {
+    /// Calls `f` with rod, node (from 0) and right-hand side, `inertia` added.
+    pub(super) fn each_rhs(
+        &self,
+        inertia: Option<(&[Vec<Increment>], f64)>,
+        mut f: impl FnMut(usize, usize, &Increment),
+    ) {
         for (j, rod) in self.rods.iter().enumerate() {
             for (i, rhs) in rod.rhs.iter().enumerate() {
-                f(j, i, rhs);
+                let mut rhs = *rhs;
+                if let Some((velocity, per_step)) = inertia {
+                    for c in 0..6 {
+                        rhs[c] += rod.mass[i][c / 3] * velocity[j][i][c] * per_step;
+                    }
+                }
+                f(j, i, &rhs);
             }
         }
     }
@@ -161,23 +171,26 @@ impl System {
         }
     }
 
-    /// A right-hand side without any symmetry, to begin inverse iteration with.
+    /// A right-hand side without any symmetry, the same on all grids, to begin
+    /// inverse iteration with.
     pub fn seed_mode(&mut self) {
         // Multiples of the golden ratio spread evenly: no symmetry, no chance.
-        let mut phase = 0.0_f64;
-        for rod in &mut self.rods {
-            for (rhs, m) in rod.rhs.iter_mut().zip(&rod.mass) {
+        let golden = |k: usize| (k as f64 * 0.618_033_988_749_895).fract() - 0.5;
+        let segments = self.segments as f64;
+        for (j, rod) in self.rods.iter_mut().enumerate() {
+            for (i, (rhs, m)) in rod.rhs.iter_mut().zip(&rod.mass).enumerate() {
                 for c in 0..6 {
-                    phase = (phase + 0.618_033_988_749_895).fract();
-                    rhs[c] = m[c / 3] * (phase - 0.5);
+                    let along = (i + 1) as f64 / segments;
+                    rhs[c] = m[c / 3] * (golden(12 * j + c + 1) + along * golden(12 * j + c + 7));
                 }
             }
         }
     }
 
-    /// Whether K is positive definite already without the coupling, which can
-    /// only add to it: then no eigenvalue is negative. Overwrites the matrix.
-    pub fn stable_without_coupling(&mut self) -> bool {
+    /// Whether K + shift M is positive definite already without the coupling,
+    /// which can only add to it: then no eigenvalue is negative. Overwrites
+    /// the matrix.
+    pub fn stable_without_coupling(&mut self, shift: f64) -> bool {
         for (j, rod) in self.rods.iter_mut().enumerate() {
             for gap in [j.wrapping_sub(1), j] {
                 if let Some(springs) = self.springs.get(gap) {
@@ -189,7 +202,7 @@ impl System {
                 }
             }
         }
-        self.factorize(0.0)
+        self.factorize(shift)
     }
 
     pub(super) fn parallel(&self) -> bool {

@@ -36,8 +36,11 @@ const FINEST_LANDING: usize = 256;
 /// Iteration error allowed on each grid, as a part of the tolerance.
 const ITERATION_PART: f64 = 1e-2;
 
+/// Iteration error allowed on a fixed grid, which is there to be compared.
+const FIXED_ACCURACY: f64 = 1e-12;
+
 /// Saddles that are left before the run is given up.
-const MAX_SADDLES: usize = 20;
+const MAX_SADDLES: i32 = 10;
 
 /// A leaf settled on one grid.
 pub(super) struct Level<'a> {
@@ -241,7 +244,10 @@ impl<'a> Run<'a, '_> {
             From::Coarser(state) | From::Pushed(state) => state,
         };
         let mut system = System::new(&leaf);
-        let accuracy = ITERATION_PART * self.tolerance;
+        let accuracy = match self.options.segments {
+            Some(_) => FIXED_ACCURACY,
+            None => ITERATION_PART * self.tolerance,
+        };
         let segments = leaf.segments();
         let progress = &mut *self.progress;
         let mut tell = |step: usize, residual: f64| {
@@ -270,19 +276,22 @@ impl<'a> Run<'a, '_> {
                 &mut state,
                 &mut system,
                 accuracy,
+                saddle::MAX_ITERATIONS,
                 &mut self.work,
                 &mut tell,
             );
             return (Level { leaf, state }, settled, false);
         }
         let mut moved = false;
-        for _ in 0..MAX_SADDLES {
+        for pushes in 0..MAX_SADDLES {
             let mut relaxation = Relaxation {
                 state,
                 accuracy,
                 work: &mut self.work,
                 progress: &mut tell,
                 near_rest,
+                pushes,
+                direct: None,
                 moved: false,
             };
             let settled = relaxation.settle(&leaf, &mut system);
@@ -294,7 +303,15 @@ impl<'a> Run<'a, '_> {
             if settled != Settled::Saddle {
                 return (Level { leaf, state }, settled, moved);
             }
-            self.saddle = saddle_of(&leaf, &state, &mut system, &mut self.work).or(self.saddle);
+            match saddle::polish(&leaf, &mut state, &mut system, accuracy, &mut self.work) {
+                Some((_, Some(0))) => {
+                    return (Level { leaf, state }, Settled::Rest(accuracy), moved);
+                }
+                Some((remaining, Some(index))) if remaining <= accuracy => {
+                    self.saddle = Some(saddle_of(&leaf, &state, index));
+                }
+                _ => {}
+            }
             saddle::push_off(&leaf, &mut state, &mut system, &mut self.work);
             near_rest = false;
         }
@@ -324,8 +341,7 @@ impl<'a> Run<'a, '_> {
             };
         }
         let level = self.levels.pop().expect("the leaf has landed");
-        self.saddle =
-            saddle_of(&level.leaf, &level.state, &mut system, &mut self.work).or(self.saddle);
+        self.saddle = Some(saddle_of(&level.leaf, &level.state, index));
         let mut state = level.state;
         saddle::push_off(&level.leaf, &mut state, &mut system, &mut self.work);
         let (level, settled, _) = self.settle(level.leaf.grid.clone(), From::Pushed(state));
@@ -382,18 +398,13 @@ impl<'a> Run<'a, '_> {
 }
 
 /// What is said of a saddle.
-fn saddle_of(
-    leaf: &DiscreteLeaf,
-    state: &State,
-    system: &mut System,
-    work: &mut Work,
-) -> Option<Saddle> {
+fn saddle_of(leaf: &DiscreteLeaf, state: &State, index: usize) -> Saddle {
     let scale = leaf.leaf.scale;
-    Some(Saddle {
+    Saddle {
         energy: leaf.energy(state) * scale.moment(),
-        negative_eigenvalues: saddle::index(leaf, state, system, work)?,
+        negative_eigenvalues: index,
         tip: state.tip(0) * scale.length,
-    })
+    }
 }
 
 /// Largest distance between a level and the next finer one at common stations.

@@ -8,7 +8,7 @@ use crate::relax::shape;
 use glam::{DQuat, DVec3};
 
 /// Part of the rounding error that grows with the number of segments.
-const ROUNDING: f64 = 1e-15;
+const ROUNDING: f64 = 4e-15;
 
 /// Growth of errors of single grids by extrapolation, sum of the weights at most.
 const EXTRAPOLATED: f64 = 2.0;

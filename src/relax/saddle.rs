@@ -12,14 +12,15 @@ const PUSH: f64 = 0.03;
 const MODE_ITERATIONS: usize = 6;
 
 /// Newton iterations towards a saddle.
-const MAX_ITERATIONS: usize = 200;
+pub const MAX_ITERATIONS: usize = 200;
 
 /// Largest rotation or displacement in one of them.
 const MAX_STEP: f64 = 0.5;
 
 /// Morse index of a state at rest: the number of negative eigenvalues of the
 /// Hessian of its energy (the symmetric part of it, under a dead moment).
-/// `None` if the factorisation does not fit into memory.
+/// Eigenvalues that cannot be told from zero ([`DiscreteLeaf::neutral_shift`])
+/// do not count. `None` if the factorisation does not fit into memory.
 pub fn index(
     leaf: &DiscreteLeaf,
     state: &State,
@@ -30,14 +31,19 @@ pub fn index(
     work.force_evaluations += 1;
     // One linear-time factorisation proves most leaves stable.
     work.factorizations += 1;
-    if system.stable_without_coupling() {
+    if system.stable_without_coupling(leaf.neutral_shift()) {
         return Some(0);
     }
     leaf.assemble(state, system);
     work.force_evaluations += 1;
     work.factorizations += 1;
     let pattern = SparsePattern::new(system).ok()?;
-    Some(pattern.factorize(system).ok()?.negative())
+    Some(
+        pattern
+            .factorize(system, leaf.neutral_shift())
+            .ok()?
+            .negative(),
+    )
 }
 
 /// Newton's method whatever the signs of the pivots, with steps of bounded
@@ -48,13 +54,14 @@ pub fn newton(
     state: &mut State,
     system: &mut System,
     accuracy: f64,
+    iterations: usize,
     work: &mut Work,
     progress: &mut dyn FnMut(usize, f64),
 ) -> Settled {
     let mut next = state.clone();
     let mut pattern = None;
     let mut previous = f64::INFINITY;
-    for step in 0..MAX_ITERATIONS {
+    for step in 0..iterations {
         let turn = leaf.assemble(state, system).turn;
         work.force_evaluations += 1;
         if turn > RESOLVED_TURN {
@@ -63,10 +70,10 @@ pub fn newton(
         if pattern.is_none() {
             pattern = SparsePattern::new(system).ok();
         }
-        let Some(Ok(mut factor)) = pattern.as_ref().map(|p| p.factorize(system)) else {
+        let Some(Ok(mut factor)) = pattern.as_ref().map(|p| p.factorize(system, 0.0)) else {
             return Settled::Stuck;
         };
-        factor.solve(system);
+        factor.solve(system, None);
         work.factorizations += 1;
         let (turn, shift) = system.largest();
         let size = turn.max(shift);
@@ -84,6 +91,45 @@ pub fn newton(
         previous = size;
     }
     Settled::StepLimit
+}
+
+/// Newton iterations that make a saddle exact.
+const POLISH_ITERATIONS: usize = 20;
+
+/// How far a saddle may be from where it was noticed, in lengths.
+const POLISH_DISTANCE: f64 = 0.1;
+
+/// Makes a state near a saddle exact: what remains of the error, and the Morse
+/// index. `None`, with the state unchanged, if Newton's method leads elsewhere.
+pub fn polish(
+    leaf: &DiscreteLeaf,
+    state: &mut State,
+    system: &mut System,
+    accuracy: f64,
+    work: &mut Work,
+) -> Option<(f64, Option<usize>)> {
+    let mut exact = state.clone();
+    let settled = newton(
+        leaf,
+        &mut exact,
+        system,
+        accuracy,
+        POLISH_ITERATIONS,
+        work,
+        &mut |_, _| {},
+    );
+    let moved = state
+        .x
+        .iter()
+        .zip(&exact.x)
+        .fold(0.0_f64, |m, (a, b)| m.max((*a - *b).length()));
+    match settled {
+        Settled::Rest(remaining) if moved < POLISH_DISTANCE => {
+            *state = exact;
+            Some((remaining, index(leaf, state, system, work)))
+        }
+        _ => None,
+    }
 }
 
 /// Pushes a state at a saddle along its most unstable mode, by inverse

@@ -12,7 +12,7 @@
 //! the motion decides where the leaf goes, and the step is kept short enough
 //! to follow it.
 
-use crate::leaf::{DiscreteLeaf, Increment, Solved, State, System};
+use crate::leaf::{DiscreteLeaf, Increment, Solved, SparsePattern, State, System};
 use crate::relax::equilibrium::Work;
 
 /// Damping c: critical for the lowest bending mode of a single rod, whose
@@ -74,6 +74,9 @@ pub enum Settled {
 /// tells the forces it carries, and then made stiff.
 const MOVING_COMPLIANCE: f64 = 2e-3;
 
+/// The load stretches a softened leaf by no more than about this.
+const MOVING_STRETCH: f64 = 0.05;
+
 /// Accuracy to which a softened leaf is settled.
 const SOFT_ACCURACY: f64 = 1e-1;
 
@@ -94,6 +97,11 @@ pub struct Relaxation<'a> {
     /// Whether the state is one that only has to be corrected: a stiff leaf is
     /// then not softened first.
     pub near_rest: bool,
+    /// How often it was pushed off saddles before: each time it is softened
+    /// less, since a softened leaf may find its way back.
+    pub pushes: i32,
+    /// Pattern of the direct factorisation, once that had to take over.
+    pub direct: Option<SparsePattern>,
     /// Whether the leaf had to move: its energy was not convex on the way.
     pub moved: bool,
 }
@@ -102,7 +110,9 @@ impl Relaxation<'_> {
     /// Lets the leaf come to rest.
     pub fn settle(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Settled {
         let stiffest = leaf.stiffest();
-        if stiffest >= MOVING_COMPLIANCE {
+        let load = leaf.leaf.tip_force.length() + leaf.leaf.gravity.length();
+        let moving = (MOVING_COMPLIANCE * 0.1_f64.powi(self.pushes)).min(MOVING_STRETCH / load);
+        if stiffest >= moving {
             return self.move_to_rest(leaf, system, self.accuracy);
         }
         if self.near_rest {
@@ -112,7 +122,7 @@ impl Relaxation<'_> {
                 settled => return settled,
             }
         }
-        let mut floor = MOVING_COMPLIANCE;
+        let mut floor = moving;
         let soft = self.move_to_rest(&leaf.softened(floor), system, SOFT_ACCURACY);
         if !matches!(soft, Settled::Rest(_)) {
             return soft;
@@ -139,7 +149,7 @@ impl Relaxation<'_> {
     /// Newton's method in the mixed form, for a leaf that is nearly at rest.
     fn newton(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Settled {
         let mut next = self.state.clone();
-        let mut stiffening = 0.0;
+        let (mut stiffening, neutral) = (0.0, leaf.neutral_shift());
         let mut previous = f64::INFINITY;
         for step in 0..STIFF_ITERATIONS {
             let turn = leaf.assemble(&self.state, system).turn;
@@ -149,11 +159,7 @@ impl Relaxation<'_> {
             }
             let tolerance = cg_tolerance(previous, self.near_rest);
             loop {
-                self.work.factorizations += 1;
-                if system.factorize(stiffening)
-                    && let Solved::Yes(iterations) = system.solve(None, tolerance)
-                {
-                    self.work.cg_iterations += iterations;
+                if self.solve_shifted(system, neutral + stiffening, None, tolerance) {
                     break;
                 }
                 stiffening = if stiffening == 0.0 {
@@ -167,9 +173,6 @@ impl Relaxation<'_> {
             }
             let (turn, shift) = system.largest();
             let size = turn.max(shift);
-            if std::env::var("LD").is_ok() {
-                eprintln!("newton {step} size {size:.3e} {stiffening}");
-            }
             if !size.is_finite() || turn > MAX_TURN || shift > MAX_SHIFT {
                 return Settled::Stuck;
             }
@@ -215,7 +218,7 @@ impl Relaxation<'_> {
             // A positive definite matrix and its solution, with as long a time
             // step as it takes.
             let tolerance = cg_tolerance(previous, self.near_rest);
-            while !self.solve(system, dt, &velocity, tolerance) {
+            while !self.solve(leaf, system, dt, &velocity, tolerance) {
                 if resting {
                     return Settled::Saddle;
                 }
@@ -239,12 +242,6 @@ impl Relaxation<'_> {
                 energy += system.kinetic_energy(&velocity);
                 system.velocity(part, dt, &mut next_velocity);
                 next_energy += system.kinetic_energy(&next_velocity);
-            }
-            if std::env::var("LD").is_ok() {
-                eprintln!(
-                    "step {step} dt {dt:.2e} size {size:.3e} part {part:.2} energy {energy:.6e} -> {next_energy:.6e} cg {} turn {:.2}",
-                    self.work.cg_iterations, next.turn
-                );
             }
             let slack = ENERGY_SLACK * (1.0 + energy.abs());
             if !next_energy.is_finite() || next_energy > energy + slack {
@@ -287,34 +284,63 @@ impl Relaxation<'_> {
     }
 
     /// Factorises and solves for a time step of `dt`; false if the matrix is
-    /// not positive definite.
+    /// not positive definite. A mode that is neutral up to rounding is left
+    /// where it is by a shift of that size.
     fn solve(
         &mut self,
+        leaf: &DiscreteLeaf,
         system: &mut System,
         dt: f64,
         velocity: &[Vec<Increment>],
         tolerance: f64,
     ) -> bool {
+        let inertia = dt.is_finite().then_some((velocity, 1.0 / dt));
         let shift = if dt.is_finite() {
             (1.0 / dt + DAMPING) / dt
         } else {
-            0.0
+            leaf.neutral_shift()
         };
+        self.solve_shifted(system, shift, inertia, tolerance)
+    }
+
+    /// Factorises K + `shift` M and solves, rod by rod, or directly from when
+    /// on that proved too slow; false if the matrix is not positive definite.
+    fn solve_shifted(
+        &mut self,
+        system: &mut System,
+        shift: f64,
+        inertia: Option<(&[Vec<Increment>], f64)>,
+        tolerance: f64,
+    ) -> bool {
         self.work.factorizations += 1;
-        if !system.factorize(shift) {
+        if self.direct.is_none() {
+            if !system.factorize(shift) {
+                return false;
+            }
+            match system.solve(inertia, tolerance) {
+                Solved::Yes(iterations) => {
+                    self.work.cg_iterations += iterations;
+                    return true;
+                }
+                Solved::Indefinite(iterations) => {
+                    self.work.cg_iterations += iterations;
+                    return false;
+                }
+                Solved::TooSlow(iterations) => {
+                    self.work.cg_iterations += iterations;
+                    self.work.factorizations += 1;
+                    self.direct = SparsePattern::new(system).ok();
+                }
+            }
+        }
+        let Some(Ok(mut factor)) = self.direct.as_ref().map(|p| p.factorize(system, shift)) else {
             return false;
+        };
+        let positive = factor.negative() == 0;
+        if positive {
+            factor.solve(system, inertia);
         }
-        let inertia = dt.is_finite().then_some((velocity, 1.0 / dt));
-        match system.solve(inertia, tolerance) {
-            Solved::Yes(iterations) => {
-                self.work.cg_iterations += iterations;
-                true
-            }
-            Solved::Indefinite(iterations) | Solved::TooSlow(iterations) => {
-                self.work.cg_iterations += iterations;
-                false
-            }
-        }
+        positive
     }
 }
 

@@ -22,13 +22,6 @@
 use crate::rotation::{self, Relative, cross_matrix, outer};
 use glam::{DMat3, DQuat, DVec3};
 
-/// Smallest compliance the condensation divides by, in units of L^2/A. Below
-/// it the matrix is that of a rod with this compliance while the residual
-/// stays exact: a proximal step in the force, which costs a contraction of
-/// about 1e-6 an iteration, changes no solution, and keeps the pivots within
-/// what double precision holds.
-const CONDENSATION_COMPLIANCE: f64 = 1e-9;
-
 /// What a segment is made of, taken at its midpoint.
 #[derive(Clone, Copy, Debug)]
 pub struct Section {
@@ -40,6 +33,9 @@ pub struct Section {
     pub rest_curvature: DVec3,
     /// Compliance 1/H: axial, shear along d2, along d3; zero if rigid.
     pub compliance: DVec3,
+    /// Stiffness by which the force is condensed out: H, or a large one in its
+    /// place if H is larger still (see [`Section::condense`]).
+    pub condensing: DVec3,
 }
 
 /// The two nodes of a segment.
@@ -88,11 +84,14 @@ pub struct Blocks {
 }
 
 impl Section {
-    #[inline]
-    fn stiffness(&self) -> DVec3 {
-        self.compliance
-            .max(DVec3::splat(CONDENSATION_COMPLIANCE))
-            .recip()
+    /// Sets the stiffness that condenses the force out to at most `largest`.
+    /// Beyond it the matrix is that of a softer rod while the residual stays
+    /// exact: a proximal step in the force, which changes no solution, costs
+    /// a contraction of the order of 1/`largest` an iteration, and keeps the
+    /// pivots within what double precision holds.
+    pub fn condense(mut self, largest: f64) -> Self {
+        self.condensing = self.compliance.recip().min(DVec3::splat(largest));
+        self
     }
 
     /// Elastic energy of the strains, ds/2 sum_k (H_k (v_k - delta_k1)^2 +
@@ -162,7 +161,7 @@ impl Segment {
     /// side that belongs to [`Segment::hessian`].
     #[inline]
     pub fn condensed_gradient(&self, section: &Section) -> (DVec3, DVec3, DVec3) {
-        let correction = section.stiffness() * self.gap;
+        let correction = section.condensing * self.gap;
         let g_mu =
             section.ds * self.nu.cross(self.w) - self.law_rate(section).transpose() * correction;
         self.pull_back(self.nu + correction / section.ds, g_mu)
@@ -193,7 +192,7 @@ impl Segment {
     pub fn hessian(&self, section: &Section) -> Blocks {
         let ds = section.ds;
         let (nu, w) = (self.nu, self.w);
-        let stiffness = section.stiffness();
+        let stiffness = section.condensing;
         let d = self.law_rate(section);
         let stiff_d = DMat3::from_diagonal(stiffness) * d;
         let cross_nu = cross_matrix(nu);
@@ -245,6 +244,6 @@ impl Segment {
         let mu = 0.5 * (alpha + beta) + 0.5 * (beta - alpha).cross(self.relative.tau);
         let d_mu = section.compliance * self.nu.cross(mu) - self.w.cross(mu);
         let gap = to_directors * dx - section.ds * d_mu + self.gap;
-        self.frame * (section.stiffness() * gap / section.ds)
+        self.frame * (section.condensing * gap / section.ds)
     }
 }
