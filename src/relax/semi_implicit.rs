@@ -80,8 +80,12 @@ const MOVING_STRETCH: f64 = 0.05;
 /// Accuracy to which a softened leaf is settled.
 const SOFT_ACCURACY: f64 = 1e-1;
 
-/// Newton iterations of a stiff leaf before the way to its stiffness is
-/// halved (logarithmically).
+/// Factor by which a softened leaf is made stiffer when Newton's method does not
+/// get from it to the stiffness wanted, and where that ends.
+const STIFFER: f64 = 0.1;
+const SMALLEST_MOVING_COMPLIANCE: f64 = 1e-8;
+
+/// Newton iterations of a stiff leaf before it is made stiffer by steps.
 const STIFF_ITERATIONS: usize = 12;
 
 /// The state of a leaf that is being relaxed on one grid, and what for.
@@ -123,25 +127,23 @@ impl Relaxation<'_> {
             }
         }
         let mut floor = moving;
-        let soft = self.move_to_rest(&leaf.softened(floor), system, SOFT_ACCURACY);
-        if !matches!(soft, Settled::Rest(_)) {
-            return soft;
-        }
-        // From there to the stiffness wanted, at once if that works.
-        let mut target = stiffest;
         loop {
+            let soft = self.move_to_rest(&leaf.softened(floor), system, SOFT_ACCURACY);
+            if !matches!(soft, Settled::Rest(_)) {
+                return soft;
+            }
             let before = self.state.clone();
-            let stiff = leaf.softened(target);
-            match self.newton(if target > stiffest { &stiff } else { leaf }, system) {
-                Settled::Stuck if floor > 2.0 * target.max(1e-12) => {
-                    self.state = before;
-                    target = (floor * target.max(1e-10)).sqrt();
-                }
-                Settled::Rest(_) if target > stiffest => {
-                    floor = target;
-                    target = stiffest;
-                }
+            match self.newton(leaf, system) {
+                Settled::Stuck => self.state = before,
                 settled => return settled,
+            }
+            // From here to the stiffness wanted is too far: go on stiffer.
+            floor *= STIFFER;
+            if floor <= stiffest {
+                return self.move_to_rest(leaf, system, self.accuracy);
+            }
+            if floor < SMALLEST_MOVING_COMPLIANCE {
+                return Settled::Stuck;
             }
         }
     }
