@@ -18,7 +18,7 @@ const MAX_ITERATIONS: usize = 200;
 
 /// From this many nodes on, rods are shared out among threads. Measured: below
 /// it waking the threads costs more than they bring.
-const PARALLEL_NODES: usize = 4096;
+const PARALLEL_NODES: usize = 8192;
 
 /// All that belongs to one rod.
 #[derive(Clone, Debug)]

@@ -33,6 +33,9 @@ const SAME_PLACE: f64 = 0.05;
 /// The finest grid on which landing places are compared.
 const FINEST_LANDING: usize = 256;
 
+/// The finest grid that is tried when coarser ones do not resolve the bending.
+const FINEST_RESOLVING: usize = 2048;
+
 /// Iteration error allowed on each grid, as a part of the tolerance.
 const ITERATION_PART: f64 = 1e-2;
 
@@ -196,7 +199,8 @@ impl<'a> Run<'a, '_> {
         loop {
             let (level, settled, moved) = self.settle(grid.clone(), From::Start);
             let finer = grid.refined();
-            let last = self.options.segments.is_some() || finer.segments() > FINEST_LANDING;
+            let fixed = self.options.segments.is_some();
+            let last = fixed || finer.segments() > FINEST_LANDING;
             match settled {
                 Settled::Rest(_) if !moved || last => {
                     self.push(level);
@@ -212,9 +216,10 @@ impl<'a> Run<'a, '_> {
                     }
                     landed = Some(level);
                 }
-                _ if last && grid.segments() >= FINEST_LANDING
-                    || self.options.segments.is_some() =>
-                {
+                Settled::Unresolved if finer.segments() <= FINEST_RESOLVING && !fixed => {
+                    landed = None;
+                }
+                _ if last => {
                     self.push(level);
                     return Err(settled);
                 }
