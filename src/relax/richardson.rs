@@ -92,6 +92,51 @@ impl Richardson {
     }
 }
 
+/// Largest distance between the points of which the values are components,
+/// three by three: a measure that does not depend on the axes.
 fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
+    let square =
+        |(a, b): (&[f64], &[f64])| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+    a.chunks(3)
+        .zip(b.chunks(3))
+        .map(square)
+        .fold(0.0, f64::max)
+        .sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(f: impl Fn(f64) -> f64, grids: usize) -> Richardson {
+        let mut table = Richardson::default();
+        for k in 0..grids {
+            table.push(vec![f(0.5_f64.powi(k as i32 + 2)), 0.0, 0.0]);
+        }
+        table
+    }
+
+    #[test]
+    fn a_series_in_even_powers_is_extrapolated_and_its_error_bounded() {
+        let f = |h: f64| 1.0 + 0.3 * (h * h) / (1.0 + h * h);
+        for grids in 3..6 {
+            let table = table(f, grids);
+            let best = table.best(1.0).unwrap();
+            let error = (table.column(best.columns)[0] - 1.0).abs();
+            assert_eq!(best.columns, grids - 1);
+            assert!(
+                error <= best.error && best.error < 1e3 * error,
+                "{error} {}",
+                best.error
+            );
+        }
+    }
+
+    #[test]
+    fn a_first_order_series_is_not_extrapolated() {
+        let table = table(|h| 1.0 + h, 4);
+        let best = table.best(1.0).unwrap();
+        assert_eq!(best.columns, 0);
+        assert!(best.error >= 0.5_f64.powi(5));
+    }
 }

@@ -88,6 +88,14 @@ const SMALLEST_MOVING_COMPLIANCE: f64 = 1e-8;
 /// Newton iterations of a stiff leaf before it is made stiffer by steps.
 const STIFF_ITERATIONS: usize = 12;
 
+/// Shift of the matrix (times the mass matrix, in squared frequencies; the
+/// lowest of a clamped rod is 12) that carries Newton's method of a stiff leaf
+/// over a region where its energy is not convex: the first tried, the one below
+/// which it is dropped, the one at which the attempt ends.
+const FIRST_STIFFENING: f64 = 30.0;
+const LEAST_STIFFENING: f64 = 1.0;
+const LARGEST_STIFFENING: f64 = 1e6;
+
 /// The state of a leaf that is being relaxed on one grid, and what for.
 pub struct Relaxation<'a> {
     /// The state.
@@ -164,12 +172,8 @@ impl Relaxation<'_> {
                 if self.solve_shifted(system, neutral + stiffening, None, tolerance) {
                     break;
                 }
-                stiffening = if stiffening == 0.0 {
-                    30.0
-                } else {
-                    4.0 * stiffening
-                };
-                if stiffening > 1e6 {
+                stiffening = (4.0 * stiffening).max(FIRST_STIFFENING);
+                if stiffening > LARGEST_STIFFENING {
                     return Settled::Stuck;
                 }
             }
@@ -193,11 +197,10 @@ impl Relaxation<'_> {
             {
                 return Settled::Saddle;
             }
-            stiffening = if stiffening > 8.0 {
-                stiffening / 10.0
-            } else {
-                0.0
-            };
+            stiffening /= 10.0;
+            if stiffening < LEAST_STIFFENING {
+                stiffening = 0.0;
+            }
             previous = size;
         }
         Settled::Stuck
@@ -275,10 +278,13 @@ impl Relaxation<'_> {
                 if dt > LONGEST_STEP {
                     dt = f64::INFINITY;
                 }
-            } else if part == 1.0
-                && let Some(rest) = at_rest(size, previous, tolerance, accuracy)
-            {
-                return rest;
+            } else {
+                resting = false;
+                if part == 1.0
+                    && let Some(rest) = at_rest(size, previous, tolerance, accuracy)
+                {
+                    return rest;
+                }
             }
             previous = size;
         }
