@@ -1,0 +1,175 @@
+//! Small helpers that the tests share: reading a scenario file with some
+//! entries replaced, relaxing it, and comparing with a reference.
+#![allow(dead_code)]
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use leafdyn::relax::{Equilibrium, NodeState, Options, relax};
+use leafdyn::scenario::Scenario;
+
+/// The tolerance at which canonical values are checked: small enough for the
+/// digits they are given with, large enough for double precision.
+pub const TIGHT: f64 = 1e-11;
+
+/// The path of a scenario that comes with the program, such as `classic/rollup`.
+pub fn path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("scenarios")
+        .join(format!("{name}.toml"))
+}
+
+/// A scenario that comes with the program, with entries replaced as by `--set`.
+#[track_caller]
+pub fn scenario(name: &str, overrides: &[String]) -> Scenario {
+    Scenario::read(&path(name), overrides).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A scenario from text.
+#[track_caller]
+pub fn parse(text: &str) -> Scenario {
+    Scenario::from_toml(text).unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+/// Relaxes at a tolerance; the run must succeed and stay within it.
+#[track_caller]
+pub fn settle(scenario: &Scenario, tolerance: f64) -> Equilibrium {
+    let options = Options {
+        tolerance: Some(tolerance),
+        ..Options::default()
+    };
+    let leaf = relax(scenario, &options, &mut |_| {}).unwrap();
+    assert!(
+        leaf.outcome.is_success(),
+        "{}: {:?}, {:?}",
+        scenario.name,
+        leaf.outcome,
+        leaf.remark
+    );
+    leaf
+}
+
+/// Relaxes on one grid.
+#[track_caller]
+pub fn settle_on(scenario: &Scenario, segments: usize, keep_unstable: bool) -> Equilibrium {
+    let options = Options {
+        segments: Some(segments),
+        tolerance: Some(1e-9),
+        keep_unstable,
+        ..Options::default()
+    };
+    let leaf = relax(scenario, &options, &mut |_| {}).unwrap();
+    assert!(
+        leaf.outcome.is_success(),
+        "{} on {segments} segments: {:?}, {:?}",
+        scenario.name,
+        leaf.outcome,
+        leaf.remark
+    );
+    leaf
+}
+
+/// A scenario file with entries replaced, relaxed at the tight tolerance.
+#[track_caller]
+pub fn solve(name: &str, overrides: &[String]) -> Equilibrium {
+    settle(&scenario(name, overrides), TIGHT)
+}
+
+/// The joint tip, or the only rod's.
+pub fn tip(leaf: &Equilibrium) -> DVec3 {
+    leaf.tips[0]
+}
+
+/// The last node of a rod.
+pub fn tip_node(leaf: &Equilibrium, rod: usize) -> NodeState {
+    *leaf.rods[rod].nodes.last().unwrap()
+}
+
+/// The angle by which the tip's tangent is turned from e1 towards `axis`.
+pub fn tip_angle(leaf: &Equilibrium, rod: usize, axis: DVec3) -> f64 {
+    let tangent = tip_node(leaf, rod).rotation * DVec3::X;
+    tangent.dot(axis).atan2(tangent.x)
+}
+
+/// Force and moment of a node along the lab axes.
+pub fn in_lab(node: &NodeState) -> (DVec3, DVec3) {
+    (node.rotation * node.n, node.rotation * node.m)
+}
+
+/// Asserts `found` = `wanted` within `tolerance`.
+#[track_caller]
+pub fn close(what: &str, found: f64, wanted: f64, tolerance: f64) {
+    let error = (found - wanted).abs();
+    assert!(
+        error <= tolerance,
+        "{what}: {found} is {error:.1e} from {wanted}, allowed {tolerance:.1e}"
+    );
+}
+
+/// Asserts that the tip is `wanted`, whose components are known to `digits`,
+/// within `tolerance`, and that the error estimate covers the error.
+#[track_caller]
+pub fn tip_is(what: &str, leaf: &Equilibrium, wanted: DVec3, digits: f64, tolerance: f64) {
+    assert!(digits <= tolerance);
+    let error = (tip(leaf) - wanted).abs().max_element();
+    assert!(
+        error <= tolerance,
+        "{what}: tip {} is {error:.1e} from {wanted}, allowed {tolerance:.1e}",
+        tip(leaf)
+    );
+    let estimate = leaf.error_estimate.unwrap();
+    assert!(
+        error <= estimate + digits,
+        "{what}: the error {error:.1e} is more than its estimate {estimate:.1e}"
+    );
+}
+
+/// `--set KEY=VALUE` for a vector.
+pub fn set_vector(key: &str, v: DVec3) -> String {
+    format!("{key}=[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
+}
+
+/// `--set KEY=VALUE` for the three stretch and shear stiffnesses.
+pub fn set_stiffness(axial: f64, shear: f64) -> [String; 3] {
+    let text = |value: f64| match value.is_infinite() {
+        true => "inf".to_string(),
+        false => format!("{value:?}"),
+    };
+    [
+        format!("stiffness.axial={}", text(axial)),
+        format!("stiffness.shear_2={}", text(shear)),
+        format!("stiffness.shear_3={}", text(shear)),
+    ]
+}
+
+/// The critical value between `low` and `high` of a load that `unstable`
+/// judges on a grid of so many segments: bisected on four nested grids, each
+/// to the last digit, and extrapolated over the series in ds^2.
+#[track_caller]
+pub fn critical(low: f64, high: f64, coarsest: usize, unstable: impl Fn(f64, usize) -> bool) -> f64 {
+    let mut table: Vec<f64> = Vec::new();
+    for grid in 0..4 {
+        let segments = coarsest << grid;
+        let (mut low, mut high) = (low, high);
+        assert!(!unstable(low, segments), "unstable at {low} already");
+        assert!(unstable(high, segments), "stable at {high} still");
+        for _ in 0..45 {
+            let middle = 0.5 * (low + high);
+            if unstable(middle, segments) {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        let mut value = 0.5 * (low + high);
+        let mut power = 1.0;
+        for column in &mut table {
+            power *= 4.0;
+            let next = value + (value - *column) / (power - 1.0);
+            *column = value;
+            value = next;
+        }
+        table.push(value);
+    }
+    *table.last().unwrap()
+}
