@@ -5,7 +5,7 @@ mod common;
 
 use std::f64::consts::PI;
 
-use common::{close, critical, set_stiffness, set_vector, settle_on, tip};
+use common::{close, critical, critical_of_rigid, set_stiffness, set_vector, settle_on, tip};
 use glam::DVec3;
 use leafdyn::scenario::Scenario;
 
@@ -24,9 +24,8 @@ fn column(other: f64, axial: f64, shear: f64, tip_force: f64, gravity: f64) -> S
     Scenario::from_toml_with(text, "column", &overrides).unwrap()
 }
 
-const RIGID: f64 = f64::INFINITY;
-/// Stiff enough that it never bends up and down.
-const STRIP: f64 = 1e6;
+/// A hundred times as stiff up and down: it never buckles that way here.
+const STRIP: f64 = 100.0;
 
 /// The index of the straight column, which is an equilibrium on every grid.
 fn index(column: &Scenario, segments: usize) -> usize {
@@ -35,25 +34,37 @@ fn index(column: &Scenario, segments: usize) -> usize {
     leaf.negative_eigenvalues.unwrap()
 }
 
-#[test]
-fn euler_between_two_critical_loads_the_index_counts_those_below() {
-    for k in 0..6 {
-        // P_k = (2k - 1)^2 pi^2/4 of the clamped-free column; half-way between.
-        let load = (2.0 * k as f64).powi(2) * PI * PI / 4.0 + 0.5;
-        assert_eq!(index(&column(STRIP, RIGID, RIGID, load, 0.0), 64), k, "P = {load}");
-        // A round section buckles both ways at once.
-        assert_eq!(index(&column(1.0, RIGID, RIGID, load, 0.0), 64), 2 * k, "P = {load}");
-    }
+/// P_k = (2k - 1)^2 pi^2/4 EI/L^2 of the clamped-free column.
+fn euler(k: usize) -> f64 {
+    (2.0 * k as f64 - 1.0).powi(2) * PI * PI / 4.0
 }
 
 #[test]
+fn euler_between_two_critical_loads_the_index_counts_those_below() {
+    for stiffness in [1e3, 1e6, f64::INFINITY] {
+        assert_eq!(index(&column(STRIP, stiffness, stiffness, 0.99 * euler(1), 0.0), 64), 0);
+        for k in 1..6 {
+            for load in [1.01 * euler(k), 0.98 * euler(k + 1)] {
+                let strip = column(STRIP, stiffness, stiffness, load, 0.0);
+                assert_eq!(index(&strip, 64), k, "H = {stiffness}, P = {load}");
+                // A round section buckles both ways at once.
+                let round = column(1.0, stiffness, stiffness, load, 0.0);
+                assert_eq!(index(&round, 64), 2 * k, "H = {stiffness}, P = {load}");
+            }
+        }
+    }
+}
+
+/// Equally stiff in stretch and shear, a column buckles at Euler's load all
+/// the same: see the next test.
+#[test]
 fn euler_the_first_three_critical_loads_are_the_closed_form() {
-    for k in 1..4 {
-        let exact = (2.0 * k as f64 - 1.0).powi(2) * PI * PI / 4.0;
-        let found = critical(0.8 * exact, 1.2 * exact, 16, |load, segments| {
-            index(&column(STRIP, RIGID, RIGID, load, 0.0), segments) >= k
+    for (k, coarsest) in [(1, 8), (2, 16), (3, 16)] {
+        let exact = euler(k);
+        let found = critical(0.9 * exact, 1.1 * exact, coarsest, |load, segments| {
+            index(&column(STRIP, 1000.0, 1000.0, load, 0.0), segments) >= k
         });
-        close("P/P_k", found / exact, 1.0, 2e-8 * (k as f64).powi(8) / 100.0 + 1e-10);
+        close(&format!("P/P_{k}"), found / exact, 1.0, 1e-9);
     }
 }
 
@@ -71,11 +82,28 @@ fn reissner_stretch_and_shear_move_the_critical_load() {
     }
 }
 
-/// q L^3/EI = 9/4 j^2, j the first zero of the Bessel function J_(-1/3).
+/// q L^3/EI = 9/4 j^2, j the first zero of the Bessel function J_(-1/3), for
+/// an inextensible column.
 #[test]
 fn greenhill_a_column_buckles_under_its_own_weight() {
-    let found = critical(7.0, 9.0, 8, |weight, segments| {
-        index(&column(STRIP, RIGID, RIGID, 0.0, weight), segments) > 0
+    let exact = 7.837347438943484;
+    let found = critical_of_rigid(7.5, 8.2, 8, |weight, segments, stiffness| {
+        index(&column(STRIP, stiffness, stiffness, 0.0, weight), segments) > 0
     });
-    close("q", found, 7.837347438943484, 1e-9);
+    close("q", found, exact, 1e-8);
+}
+
+/// Rigid in stretch and shear, exactly: the count must not be blurred by it.
+#[test]
+fn the_index_of_an_inextensible_column_changes_at_the_critical_load() {
+    for (other, segments) in [(1.0, 64), (2.0, 64), (STRIP, 64), (1e4, 64), (1.0, 512)] {
+        for part in [0.999, 1.001] {
+            let load = part * euler(1);
+            let rigid = column(other, f64::INFINITY, f64::INFINITY, load, 0.0);
+            let ways = if other == 1.0 { 2 } else { 1 };
+            let wanted = if part > 1.0 { ways } else { 0 };
+            let found = index(&rigid, segments);
+            assert_eq!(found, wanted, "EI = 1 and {other}, {segments} segments, {part} P_1");
+        }
+    }
 }

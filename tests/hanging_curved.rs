@@ -4,18 +4,19 @@ mod common;
 
 use std::f64::consts::PI;
 
-use common::{close, critical, scenario, set_vector, settle, settle_on, tip};
+use common::{close, critical_of_rigid, scenario, set_stiffness, set_vector, settle, settle_on, tip};
 use glam::DVec3;
 use leafdyn::scenario::Scenario;
 
+fn with_stiffness(curvature: f64, weight: f64, stiffness: f64) -> Scenario {
+    let mut overrides = set_stiffness(stiffness, stiffness).to_vec();
+    overrides.push(format!("rest.bend_3={curvature:?}"));
+    overrides.push(set_vector("load.gravity", DVec3::new(weight, 0.0, 0.0)));
+    scenario("classic/hanging_curved", &overrides)
+}
+
 fn hanging(curvature: f64, weight: f64) -> Scenario {
-    scenario(
-        "classic/hanging_curved",
-        &[
-            format!("rest.bend_3={curvature:?}"),
-            set_vector("load.gravity", DVec3::new(weight, 0.0, 0.0)),
-        ],
-    )
+    with_stiffness(curvature, weight, f64::INFINITY)
 }
 
 /// Gamma = w L^3/EI at which the planar state first loses its stability;
@@ -23,8 +24,9 @@ fn hanging(curvature: f64, weight: f64) -> Scenario {
 #[test]
 fn the_planar_state_loses_its_stability_where_the_boundary_value_problem_says() {
     for (curvature, wanted) in [(6.0, 11.868750740620), (2.0 * PI, 12.187078750000)] {
-        let found = critical(0.97 * wanted, 1.03 * wanted, 16, |weight, segments| {
-            let leaf = settle_on(&hanging(curvature, weight), segments, true);
+        let found = critical_of_rigid(0.97 * wanted, 1.03 * wanted, 16, |weight, segments, stiffness| {
+            let rod = with_stiffness(curvature, weight, stiffness);
+            let leaf = settle_on(&rod, segments, true);
             assert_eq!(tip(&leaf).z, 0.0, "it has left its plane");
             leaf.negative_eigenvalues.unwrap() > 0
         });

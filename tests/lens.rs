@@ -8,7 +8,8 @@ use common::{
     tip_angle, tip_is, tip_node,
 };
 use glam::DVec3;
-use leafdyn::relax::Equilibrium;
+use leafdyn::relax::{Equilibrium, Options, relax};
+use leafdyn::scenario::Scenario;
 
 /// Slope of the tip, force along e2 at the tip and moment at the clamp of the
 /// second rod; of the first, the mirror image.
@@ -69,7 +70,7 @@ const MIDRIB: [(f64, f64, f64, f64, f64); 2] = [
     (1e5, 4e4, 0.896631799808, 0.92789056742, 17.5280528927),
 ];
 
-fn with_midrib(axial: f64, shear: f64, length: f64) -> leafdyn::scenario::Scenario {
+fn with_midrib(axial: f64, shear: f64, length: f64) -> Scenario {
     let mut overrides = set_stiffness(axial, shear).to_vec();
     overrides.push(format!("leaf.length=[1.0, {length:?}, 1.0]"));
     scenario("classic/lens_midrib", &overrides)
@@ -96,14 +97,22 @@ fn a_longer_midrib_buckles_out_of_the_plane() {
             leaf.negative_eigenvalues.unwrap() > 0
         });
         close("critical length", found, wanted, 1e-9);
-        // Just below, the leaf is at rest flat, with that thrust in its midrib.
-        let below = 1e-7;
-        let leaf = settle(&with_midrib(axial, shear, wanted - below), 1e-10);
+        // The flat leaf of that length has that thrust in its midrib.
+        let options = Options {
+            tolerance: Some(TIGHT),
+            keep_unstable: true,
+            ..Options::default()
+        };
+        let leaf = relax(&with_midrib(axial, shear, wanted), &options, &mut |_| {}).unwrap();
+        let found = -in_lab(&tip_node(&leaf, 1)).0.x;
+        // The length is known to 5e-12.
+        close("thrust", found, thrust, 5e-12 * axial + 1e-9);
+        // A little below, it rests flat.
+        let leaf = settle(&with_midrib(axial, shear, wanted - 1e-3), 1e-8);
         assert_eq!(leaf.negative_eigenvalues, Some(0));
         assert!(leaf.saddle.is_none());
-        let found = -in_lab(&tip_node(&leaf, 1)).0.x;
-        close("thrust", found, thrust, axial * below);
-        // Just above, it is not.
+        assert!(tip(&leaf).z.abs() < 1e-8);
+        // A little above, it does not.
         let leaf = settle(&with_midrib(axial, shear, wanted + 0.005), 1e-8);
         assert_eq!(leaf.negative_eigenvalues, Some(0));
         assert!(leaf.saddle.is_some_and(|saddle| saddle.negative_eigenvalues == 1));

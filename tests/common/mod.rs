@@ -142,14 +142,30 @@ pub fn set_stiffness(axial: f64, shear: f64) -> [String; 3] {
     ]
 }
 
+/// Removes the leading error from values whose error is a series in a quantity
+/// that falls to `part` from one to the next (1/4: ds^2 on nested grids).
+pub fn extrapolate(values: &[f64], part: f64) -> f64 {
+    let mut column = values.to_vec();
+    let mut power = 1.0;
+    while column.len() > 1 {
+        power *= part;
+        let next = |w: &[f64]| w[1] + (w[1] - w[0]) * power / (1.0 - power);
+        column = column.windows(2).map(next).collect();
+    }
+    column[0]
+}
+
 /// The critical value between `low` and `high` of a load that `unstable`
 /// judges on a grid of so many segments: bisected on four nested grids, each
-/// to the last digit, and extrapolated over the series in ds^2.
+/// to the last digit, and extrapolated.
 #[track_caller]
-pub fn critical(low: f64, high: f64, coarsest: usize, unstable: impl Fn(f64, usize) -> bool) -> f64 {
-    let mut table: Vec<f64> = Vec::new();
-    for grid in 0..4 {
-        let segments = coarsest << grid;
+pub fn critical(
+    low: f64,
+    high: f64,
+    coarsest: usize,
+    unstable: impl Fn(f64, usize) -> bool,
+) -> f64 {
+    let on_grid = |segments| {
         let (mut low, mut high) = (low, high);
         assert!(!unstable(low, segments), "unstable at {low} already");
         assert!(unstable(high, segments), "stable at {high} still");
@@ -161,15 +177,25 @@ pub fn critical(low: f64, high: f64, coarsest: usize, unstable: impl Fn(f64, usi
                 low = middle;
             }
         }
-        let mut value = 0.5 * (low + high);
-        let mut power = 1.0;
-        for column in &mut table {
-            power *= 4.0;
-            let next = value + (value - *column) / (power - 1.0);
-            *column = value;
-            value = next;
-        }
-        table.push(value);
-    }
-    *table.last().unwrap()
+        0.5 * (low + high)
+    };
+    let values = [1, 2, 4, 8].map(|times| on_grid(coarsest * times));
+    extrapolate(&values, 0.25)
+}
+
+/// As [`critical`], for an inextensible and unshearable leaf: the limit of
+/// leaves of ever larger stretch and shear stiffness, which is passed on.
+#[track_caller]
+pub fn critical_of_rigid(
+    low: f64,
+    high: f64,
+    coarsest: usize,
+    unstable: impl Fn(f64, usize, f64) -> bool,
+) -> f64 {
+    let values = [1e4, 2e4, 4e4].map(|stiffness| {
+        critical(low, high, coarsest, |load, segments| {
+            unstable(load, segments, stiffness)
+        })
+    });
+    extrapolate(&values, 0.5)
 }
