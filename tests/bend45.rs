@@ -69,7 +69,11 @@ const ROWS: [Row; 4] = [
 #[test]
 fn every_variant_ends_where_the_boundary_value_problem_does() {
     for row in &ROWS {
-        let axial = if row.shear.is_infinite() { row.shear } else { YOUNG };
+        let axial = if row.shear.is_infinite() {
+            row.shear
+        } else {
+            YOUNG
+        };
         for &(force, wanted) in row.tips {
             let mut overrides = set_stiffness(axial, row.shear * YOUNG / 2.0).to_vec();
             overrides.push(format!("stiffness.torsion={:?}", row.torsion));

@@ -34,7 +34,12 @@ fn the_tips_are_those_of_the_boundary_value_problem() {
     let leaf = solve("classic/fan_3", &[]);
     fan_is("3 rods", &leaf, 0.934244176818460, -0.332744460157685);
     let leaf = solve("classic/fan_5", &strings(&UNCOUPLED));
-    fan_is("5 rods, uncoupled", &leaf, 0.944393353500033, -0.307902124648867);
+    fan_is(
+        "5 rods, uncoupled",
+        &leaf,
+        0.944393353500033,
+        -0.307902124648867,
+    );
     let leaf = solve("classic/fan_5", &[]);
     fan_is("5 rods", &leaf, 0.944560025935573, -0.307809400980400);
     let leaf = solve("classic/fan_5", &set_stiffness(2.5e5, 1e5));

@@ -4,7 +4,9 @@ mod common;
 
 use std::f64::consts::PI;
 
-use common::{close, critical_of_rigid, scenario, set_stiffness, set_vector, settle, settle_on, tip};
+use common::{
+    close, critical_of_rigid, scenario, set_stiffness, set_vector, settle, settle_on, tip,
+};
 use glam::DVec3;
 use leafdyn::scenario::Scenario;
 
@@ -24,12 +26,17 @@ fn hanging(curvature: f64, weight: f64) -> Scenario {
 #[test]
 fn the_planar_state_loses_its_stability_where_the_boundary_value_problem_says() {
     for (curvature, wanted) in [(6.0, 11.868750740620), (2.0 * PI, 12.187078750000)] {
-        let found = critical_of_rigid(0.97 * wanted, 1.03 * wanted, 16, |weight, segments, stiffness| {
-            let rod = with_stiffness(curvature, weight, stiffness);
-            let leaf = settle_on(&rod, segments, true);
-            assert_eq!(tip(&leaf).z, 0.0, "it has left its plane");
-            leaf.negative_eigenvalues.unwrap() > 0
-        });
+        let found = critical_of_rigid(
+            0.97 * wanted,
+            1.03 * wanted,
+            16,
+            |weight, segments, stiffness| {
+                let rod = with_stiffness(curvature, weight, stiffness);
+                let leaf = settle_on(&rod, segments, true);
+                assert_eq!(tip(&leaf).z, 0.0, "it has left its plane");
+                leaf.negative_eigenvalues.unwrap() > 0
+            },
+        );
         close(&format!("kL = {curvature}"), found, wanted, 1e-8);
     }
 }
@@ -39,7 +46,12 @@ fn below_it_the_rod_rests_in_its_plane_and_above_beside_it() {
     for (weight, planar) in [(11.0, true), (11.8, true), (12.0, false), (12.5, false)] {
         let leaf = settle(&hanging(6.0, weight), 1e-8);
         assert_eq!(leaf.negative_eigenvalues, Some(0));
-        assert_eq!(tip(&leaf).z.abs() < 1e-8, planar, "{weight}: {}", tip(&leaf));
+        assert_eq!(
+            tip(&leaf).z.abs() < 1e-8,
+            planar,
+            "{weight}: {}",
+            tip(&leaf)
+        );
     }
 }
 

@@ -37,7 +37,12 @@ fn one_that_stretches_and_shears_follows_the_boundary_value_problem() {
     let leaf = solve("classic/cantilever_heavy_cosserat", &[]);
     let wanted = DVec3::new(0.4438083750994, 0.0, -0.8440537983558);
     tip_is("Gamma = 20", &leaf, wanted, 2e-13, TIGHT);
-    close("slope", tip_angle(&leaf, 0, DVec3::Z), -1.3353720770773, TIGHT);
+    close(
+        "slope",
+        tip_angle(&leaf, 0, DVec3::Z),
+        -1.3353720770773,
+        TIGHT,
+    );
     assert_eq!(leaf.stable(), Some(true));
 }
 
@@ -53,11 +58,20 @@ fn with(gamma: f64, axial: f64, shear: f64) -> Equilibrium {
 #[test]
 fn stretch_and_shear_move_the_tip_in_proportion_to_their_compliance() {
     let rigid = f64::INFINITY;
-    for (gamma, stretch, shear) in [(1.0, 0.050, 0.489), (5.0, 0.216, 0.342), (20.0, 0.366, 0.147)] {
+    for (gamma, stretch, shear) in [
+        (1.0, 0.050, 0.489),
+        (5.0, 0.216, 0.342),
+        (20.0, 0.366, 0.147),
+    ] {
         let eps = 1e-3;
         let inextensible = tip(&with(gamma, rigid, rigid));
         let moved = |leaf: Equilibrium| (tip(&leaf) - inextensible).length() / (gamma * eps);
-        close("stretch", moved(with(gamma, 1.0 / eps, rigid)), stretch, 5e-4);
+        close(
+            "stretch",
+            moved(with(gamma, 1.0 / eps, rigid)),
+            stretch,
+            5e-4,
+        );
         close("shear", moved(with(gamma, rigid, 1.0 / eps)), shear, 5e-4);
     }
 }

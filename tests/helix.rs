@@ -86,7 +86,8 @@ fn a_wrench_about_the_axis_holds_a_straight_rod_in_a_helix() {
                 let exact = helix.at(sigma * length);
                 let error = (node.position - exact).length();
                 assert!(error < 2e-11, "{what}: {error:.1e} at {sigma}");
-                assert!(error <= leaf.error_estimate.unwrap(), "{what}: {error:.1e}");
+                let estimate = leaf.error_estimate.unwrap();
+                assert!(error <= estimate, "{what}: {error:.1e} > {estimate:.1e}");
                 // The material twists as it must, and the bend is kappa.
                 close(&what, node.u.x, twist, 1e-9);
                 close(&what, node.u.y.hypot(node.u.z), curvature, 1e-9);

@@ -65,7 +65,12 @@ fn the_strip_leaves_its_plane_and_comes_to_rest_stable() {
             let load = part * ratio * torsion.sqrt();
             let leaf = common::settle(&strip(strong, torsion, f64::INFINITY, loads, load), 1e-8);
             assert_eq!(leaf.negative_eigenvalues, Some(0));
-            assert_eq!(tip(&leaf).y.abs() < 1e-8, planar, "{part}, tip {}", tip(&leaf));
+            assert_eq!(
+                tip(&leaf).y.abs() < 1e-8,
+                planar,
+                "{part}, tip {}",
+                tip(&leaf)
+            );
         }
     }
 }

@@ -2,11 +2,12 @@
 //! entries replaced, relaxing it, and comparing with a reference.
 #![allow(dead_code)]
 
+use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use leafdyn::relax::{Equilibrium, NodeState, Options, relax};
-use leafdyn::scenario::Scenario;
+use leafdyn::scenario::{Profile, Rod, Scenario};
 
 /// The tolerance at which canonical values are checked: small enough for the
 /// digits they are given with, large enough for double precision.
@@ -198,4 +199,51 @@ pub fn critical_of_rigid(
         })
     });
     extrapolate(&values, 0.5)
+}
+
+/// A leaf of the paper: equal veins of unit length in its fan, couplings
+/// (0, 1, 1), weight along -e3. To be changed at will.
+pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -> Scenario {
+    let constant = |values: [f64; 3]| values.map(Profile::Constant);
+    let angle = |n: usize| PI * (2.0 * n as f64 / rods as f64 - 1.0) / 3.0;
+    Scenario {
+        name: "leaf".into(),
+        rods: (1..=rods)
+            .map(|n| Rod {
+                length: 1.0,
+                angle: angle(n),
+                couple_stiffness: constant(couple),
+                force_stiffness: constant(force),
+                rest_curvature: constant([0.0; 3]),
+            })
+            .collect(),
+        joined: true,
+        coupling: vec![[0.0, 1.0, 1.0]; rods - 1],
+        gravity: [0.0, 0.0, -weight],
+        tip_force: [0.0; 3],
+        tip_moment: [0.0; 3],
+        tolerance: 1e-6,
+    }
+}
+
+/// Fig. 4 of the paper with so many veins.
+pub fn fig04(rods: usize) -> Scenario {
+    paper_leaf(rods, [1.0; 3], [100.0; 3], 1.0)
+}
+
+/// Largest distance between two results at the stations they share.
+pub fn distance(a: &Equilibrium, b: &Equilibrium) -> f64 {
+    let mut largest = 0.0_f64;
+    let mut shared = 0;
+    for (i, sigma) in a.stations.iter().enumerate() {
+        let Some(k) = b.stations.iter().position(|s| (s - sigma).abs() < 1e-12) else {
+            continue;
+        };
+        shared += 1;
+        for (p, q) in a.rods.iter().zip(&b.rods) {
+            largest = largest.max((p.nodes[i].position - q.nodes[k].position).length());
+        }
+    }
+    assert!(shared >= 2, "base and tip at least are shared");
+    largest
 }
