@@ -1,0 +1,249 @@
+//! Small helpers that the tests share: reading a scenario file with some
+//! entries replaced, relaxing it, and comparing with a reference.
+#![allow(dead_code)]
+
+use std::f64::consts::PI;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use leafdyn::relax::{Equilibrium, NodeState, Options, relax};
+use leafdyn::scenario::{Profile, Rod, Scenario};
+
+/// The tolerance at which canonical values are checked: small enough for the
+/// digits they are given with, large enough for double precision.
+pub const TIGHT: f64 = 1e-11;
+
+/// The path of a scenario that comes with the program, such as `classic/rollup`.
+pub fn path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("scenarios")
+        .join(format!("{name}.toml"))
+}
+
+/// A scenario that comes with the program, with entries replaced as by `--set`.
+#[track_caller]
+pub fn scenario(name: &str, overrides: &[String]) -> Scenario {
+    Scenario::read(&path(name), overrides).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A scenario from text.
+#[track_caller]
+pub fn parse(text: &str) -> Scenario {
+    Scenario::from_toml(text).unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+/// Relaxes at a tolerance; the run must succeed and stay within it.
+#[track_caller]
+pub fn settle(scenario: &Scenario, tolerance: f64) -> Equilibrium {
+    let options = Options {
+        tolerance: Some(tolerance),
+        ..Options::default()
+    };
+    let leaf = relax(scenario, &options, &mut |_| {}).unwrap();
+    assert!(
+        leaf.outcome.is_success(),
+        "{}: {:?}, {:?}",
+        scenario.name,
+        leaf.outcome,
+        leaf.remark
+    );
+    leaf
+}
+
+/// Relaxes on one grid.
+#[track_caller]
+pub fn settle_on(scenario: &Scenario, segments: usize, keep_unstable: bool) -> Equilibrium {
+    let options = Options {
+        segments: Some(segments),
+        tolerance: Some(1e-9),
+        keep_unstable,
+        ..Options::default()
+    };
+    let leaf = relax(scenario, &options, &mut |_| {}).unwrap();
+    assert!(
+        leaf.outcome.is_success(),
+        "{} on {segments} segments: {:?}, {:?}",
+        scenario.name,
+        leaf.outcome,
+        leaf.remark
+    );
+    leaf
+}
+
+/// A scenario file with entries replaced, relaxed at the tight tolerance.
+#[track_caller]
+pub fn solve(name: &str, overrides: &[String]) -> Equilibrium {
+    settle(&scenario(name, overrides), TIGHT)
+}
+
+/// The joint tip, or the only rod's.
+pub fn tip(leaf: &Equilibrium) -> DVec3 {
+    leaf.tips[0]
+}
+
+/// The last node of a rod.
+pub fn tip_node(leaf: &Equilibrium, rod: usize) -> NodeState {
+    *leaf.rods[rod].nodes.last().unwrap()
+}
+
+/// The angle by which the tip's tangent is turned from e1 towards `axis`.
+pub fn tip_angle(leaf: &Equilibrium, rod: usize, axis: DVec3) -> f64 {
+    let tangent = tip_node(leaf, rod).rotation * DVec3::X;
+    tangent.dot(axis).atan2(tangent.x)
+}
+
+/// Force and moment of a node along the lab axes.
+pub fn in_lab(node: &NodeState) -> (DVec3, DVec3) {
+    (node.rotation * node.n, node.rotation * node.m)
+}
+
+/// Asserts `found` = `wanted` within `tolerance`.
+#[track_caller]
+pub fn close(what: &str, found: f64, wanted: f64, tolerance: f64) {
+    let error = (found - wanted).abs();
+    assert!(
+        error <= tolerance,
+        "{what}: {found} is {error:.1e} from {wanted}, allowed {tolerance:.1e}"
+    );
+}
+
+/// Asserts that the tip is `wanted`, whose components are known to `digits`,
+/// within `tolerance`, and that the error estimate covers the error.
+#[track_caller]
+pub fn tip_is(what: &str, leaf: &Equilibrium, wanted: DVec3, digits: f64, tolerance: f64) {
+    assert!(digits <= tolerance);
+    let error = (tip(leaf) - wanted).abs().max_element();
+    assert!(
+        error <= tolerance,
+        "{what}: tip {} is {error:.1e} from {wanted}, allowed {tolerance:.1e}",
+        tip(leaf)
+    );
+    let estimate = leaf.error_estimate.unwrap();
+    assert!(
+        error <= estimate + digits,
+        "{what}: the error {error:.1e} is more than its estimate {estimate:.1e}"
+    );
+}
+
+/// `--set KEY=VALUE` for a vector.
+pub fn set_vector(key: &str, v: DVec3) -> String {
+    format!("{key}=[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
+}
+
+/// `--set KEY=VALUE` for the three stretch and shear stiffnesses.
+pub fn set_stiffness(axial: f64, shear: f64) -> [String; 3] {
+    let text = |value: f64| match value.is_infinite() {
+        true => "inf".to_string(),
+        false => format!("{value:?}"),
+    };
+    [
+        format!("stiffness.axial={}", text(axial)),
+        format!("stiffness.shear_2={}", text(shear)),
+        format!("stiffness.shear_3={}", text(shear)),
+    ]
+}
+
+/// Removes the leading error from values whose error is a series in a quantity
+/// that falls to `part` from one to the next (1/4: ds^2 on nested grids).
+pub fn extrapolate(values: &[f64], part: f64) -> f64 {
+    let mut column = values.to_vec();
+    let mut power = 1.0;
+    while column.len() > 1 {
+        power *= part;
+        let next = |w: &[f64]| w[1] + (w[1] - w[0]) * power / (1.0 - power);
+        column = column.windows(2).map(next).collect();
+    }
+    column[0]
+}
+
+/// The critical value between `low` and `high` of a load that `unstable`
+/// judges on a grid of so many segments: bisected on four nested grids, each
+/// to the last digit, and extrapolated.
+#[track_caller]
+pub fn critical(
+    low: f64,
+    high: f64,
+    coarsest: usize,
+    unstable: impl Fn(f64, usize) -> bool,
+) -> f64 {
+    let on_grid = |segments| {
+        let (mut low, mut high) = (low, high);
+        assert!(!unstable(low, segments), "unstable at {low} already");
+        assert!(unstable(high, segments), "stable at {high} still");
+        for _ in 0..45 {
+            let middle = 0.5 * (low + high);
+            if unstable(middle, segments) {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        0.5 * (low + high)
+    };
+    let values = [1, 2, 4, 8].map(|times| on_grid(coarsest * times));
+    extrapolate(&values, 0.25)
+}
+
+/// As [`critical`], for an inextensible and unshearable leaf: the limit of
+/// leaves of ever larger stretch and shear stiffness, which is passed on.
+#[track_caller]
+pub fn critical_of_rigid(
+    low: f64,
+    high: f64,
+    coarsest: usize,
+    unstable: impl Fn(f64, usize, f64) -> bool,
+) -> f64 {
+    let values = [1e4, 2e4, 4e4].map(|stiffness| {
+        critical(low, high, coarsest, |load, segments| {
+            unstable(load, segments, stiffness)
+        })
+    });
+    extrapolate(&values, 0.5)
+}
+
+/// A leaf of the paper: equal veins of unit length in its fan, couplings
+/// (0, 1, 1), weight along -e3. To be changed at will.
+pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -> Scenario {
+    let constant = |values: [f64; 3]| values.map(Profile::Constant);
+    let angle = |n: usize| PI * (2.0 * n as f64 / rods as f64 - 1.0) / 3.0;
+    Scenario {
+        name: "leaf".into(),
+        rods: (1..=rods)
+            .map(|n| Rod {
+                length: 1.0,
+                angle: angle(n),
+                couple_stiffness: constant(couple),
+                force_stiffness: constant(force),
+                rest_curvature: constant([0.0; 3]),
+            })
+            .collect(),
+        joined: true,
+        coupling: vec![[0.0, 1.0, 1.0]; rods - 1],
+        gravity: [0.0, 0.0, -weight],
+        tip_force: [0.0; 3],
+        tip_moment: [0.0; 3],
+        tolerance: 1e-6,
+    }
+}
+
+/// Fig. 4 of the paper with so many veins.
+pub fn fig04(rods: usize) -> Scenario {
+    paper_leaf(rods, [1.0; 3], [100.0; 3], 1.0)
+}
+
+/// Largest distance between two results at the stations they share.
+pub fn distance(a: &Equilibrium, b: &Equilibrium) -> f64 {
+    let mut largest = 0.0_f64;
+    let mut shared = 0;
+    for (i, sigma) in a.stations.iter().enumerate() {
+        let Some(k) = b.stations.iter().position(|s| (s - sigma).abs() < 1e-12) else {
+            continue;
+        };
+        shared += 1;
+        for (p, q) in a.rods.iter().zip(&b.rods) {
+            largest = largest.max((p.nodes[i].position - q.nodes[k].position).length());
+        }
+    }
+    assert!(shared >= 2, "base and tip at least are shared");
+    largest
+}

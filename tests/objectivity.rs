@@ -1,0 +1,260 @@
+//! What a leaf does is independent of where it is looked at from: turned,
+//! mirrored, in other units or numbered backwards it does the same.
+//!
+//! A scenario states turns about e3, along which the fan's plane lies, for any
+//! leaf, and about e1 for a rod clamped along it: a quarter turn for any
+//! section, any turn for a round one.
+
+mod common;
+
+use common::{paper_leaf, settle};
+use glam::{DMat3, DQuat, DVec3};
+use leafdyn::relax::Equilibrium;
+use leafdyn::scenario::{Profile, Scenario};
+use proptest::prelude::*;
+
+/// The iteration error is a thousandth of this.
+const TOLERANCE: f64 = 1e-10;
+const EQUAL: f64 = 1e-12;
+
+prop_compose! {
+    /// Twisted, tapered, unequal veins under a general load; coupled alike
+    /// along x and y.
+    fn leaves()(
+        rods in 1..5_usize,
+        joined in any::<bool>(),
+        coupled in any::<bool>(),
+    )(
+        couple in prop::array::uniform3(0.5..2.0),
+        force in prop::array::uniform3(20.0..200.0),
+        rest in prop::collection::vec(prop::array::uniform3(-1.0..1.0), rods),
+        lengths in prop::collection::vec(0.9..1.1, rods),
+        angles in prop::collection::vec(-0.2..0.2, rods),
+        coupling in prop::collection::vec((0.0..3.0, 0.0..3.0), rods - 1),
+        gravity in prop::array::uniform3(-1.0..1.0),
+        tip_force in prop::array::uniform3(-0.5..0.5),
+        joined in Just(joined),
+        coupled in Just(coupled),
+    ) -> Scenario {
+        let mut leaf = paper_leaf(rest.len(), couple, force, 0.0);
+        leaf.joined = joined;
+        leaf.gravity = gravity;
+        leaf.tip_force = tip_force;
+        for (gap, (xy, z)) in leaf.coupling.iter_mut().zip(coupling) {
+            *gap = if coupled { [xy, xy, z] } else { [0.0; 3] };
+        }
+        for (j, rod) in leaf.rods.iter_mut().enumerate() {
+            rod.length = lengths[j];
+            rod.angle += angles[j];
+            rod.rest_curvature = rest[j].map(Profile::Constant);
+            rod.couple_stiffness[2] = Profile::Linear {
+                at: vec![0.0, 0.4, 1.0],
+                value: vec![couple[2], 0.8 * couple[2], 0.5 * couple[2]],
+            };
+        }
+        leaf
+    }
+}
+
+/// Turned about `axis`, all loads.
+fn turn_loads(scenario: &mut Scenario, turn: DQuat) {
+    for load in [&mut scenario.gravity, &mut scenario.tip_force] {
+        *load = (turn * DVec3::from_array(*load)).to_array();
+    }
+}
+
+/// Positions of `b` are those of `a`, mapped, within `tolerance`; so are
+/// rotations, when the directors are mapped too.
+#[track_caller]
+fn assert_mapped(
+    a: &Equilibrium,
+    b: &Equilibrium,
+    map: DMat3,
+    directors: impl Fn(DMat3) -> DMat3,
+    tolerance: f64,
+) {
+    assert_eq!(a.stations, b.stations);
+    assert_eq!(a.segments, b.segments);
+    let energy = (a.energy - b.energy).abs();
+    assert!(
+        energy <= tolerance * (1.0 + a.energy.abs()),
+        "energy off by {energy:.1e}"
+    );
+    for (a, b) in a.rods.iter().zip(&b.rods) {
+        for (a, b) in a.nodes.iter().zip(&b.nodes) {
+            let error = (map * a.position - b.position).length();
+            assert!(error <= tolerance, "off by {error:.1e}");
+            let error = directors(DMat3::from_quat(a.rotation)) - DMat3::from_quat(b.rotation);
+            let worst = error
+                .to_cols_array()
+                .into_iter()
+                .fold(0.0, |m: f64, e| m.max(e.abs()));
+            assert!(worst <= 10.0 * tolerance, "turned by {worst:.1e}");
+        }
+    }
+}
+
+fn flip(profile: &Profile) -> Profile {
+    match profile {
+        Profile::Constant(value) => Profile::Constant(-value),
+        Profile::Linear { at, value } => Profile::Linear {
+            at: at.clone(),
+            value: value.iter().map(|v| -v).collect(),
+        },
+    }
+}
+
+fn times(profile: &Profile, factor: f64) -> Profile {
+    match profile {
+        Profile::Constant(value) => Profile::Constant(value * factor),
+        Profile::Linear { at, value } => Profile::Linear {
+            at: at.clone(),
+            value: value.iter().map(|v| v * factor).collect(),
+        },
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 48,
+        failure_persistence: None,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(7),
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn turned_about_e3(leaf in leaves(), angle in -3.0..3.0_f64) {
+        let turn = DQuat::from_rotation_z(angle);
+        let mut turned = leaf.clone();
+        turn_loads(&mut turned, turn);
+        for rod in &mut turned.rods {
+            rod.angle += angle;
+        }
+        // Couplings are alike along x and y only as long as they are not turned.
+        let map = DMat3::from_quat(turn);
+        let (a, b) = (settle(&leaf, TOLERANCE), settle(&turned, TOLERANCE));
+        assert_mapped(&a, &b, map, |directors| map * directors, EQUAL);
+    }
+
+    /// A quarter turn about e1 exchanges d2 and d3; with directors R' = Q R Q^T,
+    /// curvatures and stiffnesses turn along.
+    #[test]
+    fn a_rod_turned_about_its_clamp_by_a_quarter(leaf in leaves()) {
+        let mut rod = leaf.clone();
+        rod.rods.truncate(1);
+        rod.coupling.clear();
+        rod.rods[0].angle = 0.0;
+        let quarter = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
+        let mut turned = rod.clone();
+        turn_loads(&mut turned, quarter);
+        let of = &mut turned.rods[0];
+        of.couple_stiffness.swap(1, 2);
+        of.force_stiffness.swap(1, 2);
+        let [twist, bend_2, bend_3] = of.rest_curvature.clone();
+        of.rest_curvature = [twist, flip(&bend_3), bend_2];
+        let map = DMat3::from_quat(quarter);
+        let (a, b) = (settle(&rod, TOLERANCE), settle(&turned, TOLERANCE));
+        assert_mapped(&a, &b, map, |directors| map * directors * map.transpose(), EQUAL);
+    }
+
+    #[test]
+    fn a_round_rod_turned_about_its_clamp(leaf in leaves(), angle in -3.0..3.0_f64) {
+        let mut rod = leaf.clone();
+        rod.rods.truncate(1);
+        rod.coupling.clear();
+        let of = &mut rod.rods[0];
+        of.angle = 0.0;
+        of.couple_stiffness[2] = of.couple_stiffness[1].clone();
+        of.force_stiffness[2] = of.force_stiffness[1].clone();
+        let turn = DQuat::from_rotation_x(angle);
+        let mut turned = rod.clone();
+        turn_loads(&mut turned, turn);
+        let rest = DVec3::from_array(rod.rods[0].rest_curvature.each_ref().map(|u| u.at(0.0)));
+        turned.rods[0].rest_curvature = (turn * rest).to_array().map(Profile::Constant);
+        let map = DMat3::from_quat(turn);
+        let (a, b) = (settle(&rod, TOLERANCE), settle(&turned, TOLERANCE));
+        assert_mapped(&a, &b, map, |directors| map * directors * map.transpose(), EQUAL);
+    }
+
+    /// y -> -y: a mirror keeps the directors d1 and d3 and reverses d2, so that
+    /// twist and the bend about d3 change their signs.
+    #[test]
+    fn mirrored_from_left_to_right(leaf in leaves()) {
+        let mirror = DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0));
+        let mut mirrored = leaf.clone();
+        mirrored.gravity[1] *= -1.0;
+        mirrored.tip_force[1] *= -1.0;
+        for rod in &mut mirrored.rods {
+            rod.angle = -rod.angle;
+            for k in [0, 2] {
+                rod.rest_curvature[k] = flip(&rod.rest_curvature[k]);
+            }
+        }
+        let (a, b) = (settle(&leaf, TOLERANCE), settle(&mirrored, TOLERANCE));
+        assert_mapped(&a, &b, mirror, |directors| mirror * directors * mirror, EQUAL);
+    }
+
+    /// z -> -z: d3 is reversed, twist and the bend about d2 change their signs.
+    #[test]
+    fn mirrored_from_top_to_bottom(leaf in leaves()) {
+        let mirror = DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0));
+        let mut mirrored = leaf.clone();
+        mirrored.gravity[2] *= -1.0;
+        mirrored.tip_force[2] *= -1.0;
+        for rod in &mut mirrored.rods {
+            for k in [0, 1] {
+                rod.rest_curvature[k] = flip(&rod.rest_curvature[k]);
+            }
+        }
+        let (a, b) = (settle(&leaf, TOLERANCE), settle(&mirrored, TOLERANCE));
+        assert_mapped(&a, &b, mirror, |directors| mirror * directors * mirror, EQUAL);
+    }
+
+    /// Lengths times 1000, forces times 1e-5: lengths come out times 1000.
+    #[test]
+    fn in_other_units(leaf in leaves()) {
+        let (length, force) = (1e3, 1e-5);
+        let mut scaled = leaf.clone();
+        for k in 0..3 {
+            scaled.gravity[k] *= force / length;
+            scaled.tip_force[k] *= force;
+            for gap in &mut scaled.coupling {
+                gap[k] *= force / (length * length);
+            }
+        }
+        for rod in &mut scaled.rods {
+            rod.length *= length;
+            for k in 0..3 {
+                rod.couple_stiffness[k] = times(&rod.couple_stiffness[k], force * length * length);
+                rod.force_stiffness[k] = times(&rod.force_stiffness[k], force);
+                rod.rest_curvature[k] = times(&rod.rest_curvature[k], 1.0 / length);
+            }
+        }
+        let a = settle(&leaf, TOLERANCE);
+        let mut b = settle(&scaled, TOLERANCE);
+        let (estimate, wanted) = (b.error_estimate.unwrap() / length, a.error_estimate.unwrap());
+        prop_assert!((estimate / wanted - 1.0).abs() < 0.1, "{estimate} and {wanted}");
+        b.energy /= force * length;
+        for (rod, of) in b.rods.iter_mut().zip(&a.rods) {
+            for (node, of) in rod.nodes.iter_mut().zip(&of.nodes) {
+                node.position /= length;
+                prop_assert!((node.n / force - of.n).length() < 1e-9);
+                prop_assert!((node.m / (force * length) - of.m).length() < 1e-9);
+                prop_assert!((node.u * length - of.u).length() < 1e-9);
+                prop_assert!((node.v - of.v).length() < 1e-9);
+            }
+        }
+        assert_mapped(&a, &b, DMat3::IDENTITY, |directors| directors, 1e-10);
+    }
+
+    #[test]
+    fn numbered_backwards(leaf in leaves()) {
+        let mut reversed = leaf.clone();
+        reversed.rods.reverse();
+        reversed.coupling.reverse();
+        let a = settle(&leaf, TOLERANCE);
+        let mut b = settle(&reversed, TOLERANCE);
+        b.rods.reverse();
+        assert_mapped(&a, &b, DMat3::IDENTITY, |directors| directors, EQUAL);
+    }
+}

@@ -1,0 +1,98 @@
+//! The discretisation is of second order, and its error is a series in ds^2
+//! so clean that every extrapolation gains two orders: 4, 6, 8.
+
+mod common;
+
+use common::{fig04, paper_leaf};
+use glam::DVec3;
+use leafdyn::relax::{Options, relax};
+use leafdyn::scenario::{Profile, Scenario};
+
+/// Positions at the stations of the coarsest grid, solved on one grid.
+fn positions(scenario: &Scenario, coarsest: usize, times: usize) -> Vec<DVec3> {
+    let options = Options {
+        segments: Some(coarsest * times),
+        // Iterated to rounding.
+        tolerance: Some(1e-12),
+        ..Options::default()
+    };
+    let leaf = relax(scenario, &options, &mut |_| {}).unwrap();
+    assert!(leaf.outcome.is_success());
+    // Every grid halves the one before, kinks or not.
+    for (i, sigma) in leaf.stations.iter().step_by(times).enumerate() {
+        assert!((sigma - i as f64 / coarsest as f64).abs() < 1e-15);
+    }
+    let nodes = leaf
+        .rods
+        .iter()
+        .flat_map(|rod| rod.nodes.iter().step_by(times));
+    nodes.map(|node| node.position).collect()
+}
+
+fn distance(a: &[DVec3], b: &[DVec3]) -> f64 {
+    let apart = a.iter().zip(b).map(|(a, b)| (*a - *b).length());
+    apart.fold(0.0, f64::max)
+}
+
+/// Column m of the extrapolation table, on seven grids each half as fine as
+/// the next, changes from one grid to the next by as much less each time as
+/// its order says.
+fn assert_orders(name: &str, scenario: &Scenario, coarsest: usize) {
+    let mut column: Vec<Vec<DVec3>> = [1, 2, 4, 8, 16, 32, 64]
+        .iter()
+        .map(|times| positions(scenario, coarsest, *times))
+        .collect();
+    for (m, (order, slack)) in [(2.0, 0.01), (4.0, 0.05), (6.0, 0.1), (8.0, 0.5)]
+        .into_iter()
+        .enumerate()
+    {
+        let changes: Vec<f64> = column.windows(2).map(|w| distance(&w[0], &w[1])).collect();
+        // Two successive changes well above rounding, as fine as possible.
+        let seen = changes.iter().take_while(|change| **change > 3e-14).count();
+        assert!(seen >= 2, "{name}: column {m} changes by {changes:?}");
+        let observed = (changes[seen - 2] / changes[seen - 1]).log2();
+        println!("{name}: order {observed:.3} for {order}, changes {changes:?}");
+        assert!(
+            (observed - order).abs() < slack,
+            "{name}: order {observed:.3} instead of {order}, changes {changes:?}"
+        );
+        let power = 4f64.powi(m as i32 + 1);
+        let next = |w: &[Vec<DVec3>]| {
+            let pairs = w[0].iter().zip(&w[1]);
+            pairs.map(|(c, f)| *f + (*f - *c) / (power - 1.0)).collect()
+        };
+        column = column.windows(2).map(next).collect();
+    }
+}
+
+#[test]
+fn a_twisted_anisotropic_rod_in_space() {
+    let mut rod = paper_leaf(1, [0.9, 1.2, 0.7], [80.0, 60.0, 40.0], 0.3);
+    rod.rods[0].rest_curvature = [1.0, 2.0, 0.5].map(Profile::Constant);
+    rod.tip_force = [1.5, -2.1, 3.0];
+    assert_orders("rod", &rod, 8);
+}
+
+#[test]
+fn the_leaf_of_fig_4() {
+    assert_orders("fig. 4", &fig04(5), 4);
+}
+
+/// The grid puts a node at the kink, so that the midpoint rule never sees it.
+#[test]
+fn a_leaf_whose_stiffness_has_a_kink() {
+    let mut leaf = fig04(5);
+    for rod in &mut leaf.rods {
+        for k in [1, 2] {
+            rod.couple_stiffness[k] = Profile::Linear {
+                at: vec![0.0, 0.3, 1.0],
+                value: vec![2.0, 0.5, 0.8],
+            };
+        }
+        rod.rest_curvature[2] = Profile::Linear {
+            at: vec![0.0, 0.3, 1.0],
+            value: vec![0.0, 1.0, -0.5],
+        };
+    }
+    assert_orders("kink", &leaf, 10);
+}

@@ -1,0 +1,59 @@
+//! How stiff the veins are in stretch and shear, the solver does not feel, up
+//! to rigid ones.
+
+mod common;
+
+use common::{close, paper_leaf, settle, tip};
+use leafdyn::relax::{Options, relax};
+
+const STIFFNESSES: [f64; 5] = [1e2, 1e4, 1e6, 1e8, f64::INFINITY];
+
+#[test]
+fn at_most_twelve_steps_on_the_first_grid_and_the_work_is_pinned() {
+    let mut work = Vec::new();
+    for stiffness in STIFFNESSES {
+        for rods in [5, 21] {
+            let leaf = paper_leaf(rods, [1.0; 3], [stiffness; 3], 1.0);
+            let options = Options {
+                segments: Some(8),
+                tolerance: Some(1e-6),
+                ..Options::default()
+            };
+            let leaf = relax(&leaf, &options, &mut |_| {}).unwrap();
+            assert!(leaf.outcome.is_success());
+            let steps = leaf.work.steps;
+            assert!(steps <= 12, "h = {stiffness}, N = {rods}: {steps} steps");
+            if rods == 5 {
+                work.push((steps, leaf.work.factorizations, leaf.work.cg_iterations));
+            }
+        }
+    }
+    // Steps, factorisations, iterations of the conjugate gradients.
+    assert_eq!(work, PINNED);
+}
+
+/// A change for the better is welcome here; one for the worse is a slowdown.
+const PINNED: [(usize, usize, usize); 5] = [
+    (4, 5, 9),
+    (8, 12, 15),
+    (8, 12, 12),
+    (8, 12, 11),
+    (8, 12, 10),
+];
+
+/// Leaves that are ever stiffer approach the rigid one in proportion to 1/h.
+#[test]
+fn the_rigid_leaf_is_the_limit_of_stiff_ones() {
+    let at = |stiffness| {
+        tip(&settle(
+            &paper_leaf(5, [1.0; 3], [stiffness; 3], 1.0),
+            1e-11,
+        ))
+    };
+    let rigid = at(f64::INFINITY);
+    let apart = |stiffness| (at(stiffness) - rigid).length() * stiffness;
+    let slope = apart(1e6);
+    assert!(slope > 0.1, "{slope}");
+    close("1e4", apart(1e4) / slope, 1.0, 0.02);
+    close("1e5", apart(1e5) / slope, 1.0, 0.002);
+}
