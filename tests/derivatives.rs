@@ -101,6 +101,8 @@ prop_compose! {
             couple_stiffness: DVec3::from_array(stiffness),
             rest_curvature: u0,
             compliance: DVec3::from_array(compliance),
+            // Exact: the element's own matrix, nothing softened.
+            condensing: DVec3::from_array(compliance).recip(),
         };
         let q0 = rotation::exp(start);
         let q1 = q0 * rotation::exp(angle * (axis + DVec3::splat(1e-3)).normalize());
