@@ -13,10 +13,6 @@ use glam::{DMat3, DVec3};
 /// A thin rod's own is smaller, but a vein turns with its strip of blade.
 const RADIUS_OF_GYRATION: f64 = 0.1;
 
-/// Squared frequencies below this, in units of A/(rho L^4), are zero: the
-/// lowest of a clamped rod is 12.
-const NEUTRAL_SHIFT: f64 = 1e-7;
-
 /// A leaf on a grid.
 #[derive(Clone, Debug)]
 pub struct DiscreteLeaf<'a> {
@@ -80,15 +76,16 @@ impl<'a> DiscreteLeaf<'a> {
         soft
     }
 
-    /// A shift of the matrix (times the mass matrix) below which its
-    /// eigenvalues are not told from zero: far below those of any bending mode,
-    /// far above the rounding in the stiffest entries.
+    /// A shift of the matrix (times the mass matrix) that is far below the
+    /// squared frequency of any bending mode, and above what rounding and
+    /// unfinished iterations make of a neutral mode's zero.
     pub fn neutral_shift(&self) -> f64 {
         let stiffest = self
             .sections
             .iter()
             .fold(0.0_f64, |m, s| m.max(s.condensing.max_element()));
-        NEUTRAL_SHIFT + 4.0 * f64::EPSILON * stiffest * (self.segments() * self.segments()) as f64
+        let rounding = f64::EPSILON * stiffest * (self.segments() * self.segments()) as f64;
+        1e-7 + 4.0 * rounding
     }
 
     /// Segments per rod.

@@ -308,13 +308,11 @@ impl<'a> Run<'a, '_> {
             if settled != Settled::Saddle {
                 return (Level { leaf, state }, settled, moved);
             }
-            match saddle::polish(&leaf, &mut state, &mut system, accuracy, &mut self.work) {
-                Some((_, Some(0))) => {
+            match saddle::polish(&leaf, &mut state, &mut system, &mut self.work) {
+                Some(Some(0)) => {
                     return (Level { leaf, state }, Settled::Rest(accuracy), moved);
                 }
-                Some((remaining, Some(index))) if remaining <= accuracy => {
-                    self.saddle = Some(saddle_of(&leaf, &state, index));
-                }
+                Some(Some(index)) => self.saddle = Some(saddle_of(&leaf, &state, index)),
                 _ => {}
             }
             saddle::push_off(&leaf, &mut state, &mut system, &mut self.work);
@@ -334,18 +332,24 @@ impl<'a> Run<'a, '_> {
         }
         let mut system = System::new(&level.leaf);
         let before = self.index;
-        self.index = saddle::index(&level.leaf, &level.state, &mut system, &mut self.work);
-        let Some(index) = self.index.filter(|&index| index > 0) else {
+        self.index = saddle::index(&level.leaf, &level.state, &mut system, 0.0, &mut self.work);
+        if !matches!(self.index, Some(1..)) {
             return Ok(());
-        };
+        }
         if self.options.keep_unstable {
-            return if before == Some(index) || self.options.segments.is_some() {
+            return if before == self.index || self.options.segments.is_some() {
                 Ok(())
             } else {
                 Err(None)
             };
         }
-        let level = self.levels.pop().expect("the leaf has landed");
+        let mut level = self.levels.pop().expect("the leaf has landed");
+        let exact = saddle::polish(&level.leaf, &mut level.state, &mut system, &mut self.work);
+        self.index = exact.flatten().or(self.index);
+        let Some(index @ 1..) = self.index else {
+            self.levels.push(level);
+            return Ok(());
+        };
         self.saddle = Some(saddle_of(&level.leaf, &level.state, index));
         let mut state = level.state;
         saddle::push_off(&level.leaf, &mut state, &mut system, &mut self.work);

@@ -2,7 +2,7 @@
 
 use crate::leaf::{DiscreteLeaf, Solved, SparsePattern, State, System};
 use crate::relax::equilibrium::Work;
-use crate::relax::semi_implicit::{RESOLVED_TURN, Settled};
+use crate::relax::semi_implicit::{RESOLVED_TURN, Settled, at_rest};
 
 /// Size of the push off a saddle: largest rotation (radians) or displacement
 /// (lengths) along the unstable mode.
@@ -19,31 +19,26 @@ const MAX_STEP: f64 = 0.5;
 
 /// Morse index of a state at rest: the number of negative eigenvalues of the
 /// Hessian of its energy (the symmetric part of it, under a dead moment).
-/// Eigenvalues that cannot be told from zero ([`DiscreteLeaf::neutral_shift`])
-/// do not count. `None` if the factorisation does not fit into memory.
+/// Eigenvalues (over the masses) between -`shift` and zero do not count. `None` if the factorisation does not fit into memory.
 pub fn index(
     leaf: &DiscreteLeaf,
     state: &State,
     system: &mut System,
+    shift: f64,
     work: &mut Work,
 ) -> Option<usize> {
     leaf.assemble(state, system);
     work.force_evaluations += 1;
     // One linear-time factorisation proves most leaves stable.
     work.factorizations += 1;
-    if system.stable_without_coupling(leaf.neutral_shift()) {
+    if system.stable_without_coupling(shift) {
         return Some(0);
     }
     leaf.assemble(state, system);
     work.force_evaluations += 1;
     work.factorizations += 1;
     let pattern = SparsePattern::new(system).ok()?;
-    Some(
-        pattern
-            .factorize(system, leaf.neutral_shift())
-            .ok()?
-            .negative(),
-    )
+    Some(pattern.factorize(system, shift).ok()?.negative())
 }
 
 /// Newton's method whatever the signs of the pivots, with steps of bounded
@@ -70,7 +65,10 @@ pub fn newton(
         if pattern.is_none() {
             pattern = SparsePattern::new(system).ok();
         }
-        let Some(Ok(mut factor)) = pattern.as_ref().map(|p| p.factorize(system, 0.0)) else {
+        let Some(Ok(mut factor)) = pattern
+            .as_ref()
+            .map(|p| p.factorize(system, leaf.neutral_shift()))
+        else {
             return Settled::Stuck;
         };
         factor.solve(system, None);
@@ -84,9 +82,13 @@ pub fn newton(
         std::mem::swap(state, &mut next);
         work.steps += 1;
         progress(step, size);
-        let remaining = size * (size / previous).min(1.0).powi(2);
-        if previous.is_finite() && remaining <= accuracy {
-            return Settled::Rest(remaining);
+        if size < NEUTRAL_STEP && leaf.residual(state) < BALANCED {
+            return Settled::Rest(size.min(accuracy));
+        }
+        if size < MAX_STEP
+            && let Some(rest) = at_rest(size, previous, 0.0, accuracy)
+        {
+            return rest;
         }
         previous = size;
     }
@@ -96,24 +98,31 @@ pub fn newton(
 /// Newton iterations that make a saddle exact.
 const POLISH_ITERATIONS: usize = 20;
 
+/// Steps below this (radians, lengths) may be nothing but rounding that drives
+/// a neutral mode, if no force or moment above the second number (A/L^2, A/L)
+/// is unbalanced.
+const NEUTRAL_STEP: f64 = 1e-5;
+const BALANCED: f64 = 1e-9;
+
+/// Accuracy of a polished state: rounding.
+const POLISH_ACCURACY: f64 = 1e-13;
+
 /// How far a saddle may be from where it was noticed, in lengths.
 const POLISH_DISTANCE: f64 = 0.1;
 
-/// Makes a state near a saddle exact: what remains of the error, and the Morse
-/// index. `None`, with the state unchanged, if Newton's method leads elsewhere.
+/// Makes a state near a saddle exact and counts its Morse index, a neutral mode not counting as negative. `None`, with the state unchanged, if Newton's method leads elsewhere.
 pub fn polish(
     leaf: &DiscreteLeaf,
     state: &mut State,
     system: &mut System,
-    accuracy: f64,
     work: &mut Work,
-) -> Option<(f64, Option<usize>)> {
+) -> Option<Option<usize>> {
     let mut exact = state.clone();
     let settled = newton(
         leaf,
         &mut exact,
         system,
-        accuracy,
+        POLISH_ACCURACY,
         POLISH_ITERATIONS,
         work,
         &mut |_, _| {},
@@ -124,9 +133,10 @@ pub fn polish(
         .zip(&exact.x)
         .fold(0.0_f64, |m, (a, b)| m.max((*a - *b).length()));
     match settled {
-        Settled::Rest(remaining) if moved < POLISH_DISTANCE => {
+        Settled::Rest(_) if moved < POLISH_DISTANCE => {
             *state = exact;
-            Some((remaining, index(leaf, state, system, work)))
+            let index = index(leaf, state, system, leaf.neutral_shift(), work);
+            Some(index)
         }
         _ => None,
     }
