@@ -156,9 +156,15 @@ pub fn extrapolate(values: &[f64], part: f64) -> f64 {
     column[0]
 }
 
+/// By how much, relatively, critical loads may be off: see [`critical`].
+pub const NEUTRAL: f64 = 1e-6;
+
 /// The critical value between `low` and `high` of a load that `unstable`
 /// judges on a grid of so many segments: bisected on four nested grids, each
 /// to the last digit, and extrapolated.
+///
+/// An eigenvalue counts as negative only where it can be told from zero, so
+/// that critical loads come out too high by the part [`NEUTRAL`] at most.
 #[track_caller]
 pub fn critical(
     low: f64,

@@ -1,0 +1,208 @@
+//! The error estimate covers the true error, always, and is not much larger
+//! than it, mostly.
+
+mod common;
+
+use common::{distance, paper_leaf, path};
+use leafdyn::relax::{Equilibrium, Options, relax};
+use leafdyn::scenario::{Profile, Scenario};
+use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::TestRunner;
+
+const TOLERANCES: [f64; 3] = [1e-4, 1e-6, 1e-8];
+
+fn solve(scenario: &Scenario, tolerance: f64) -> Equilibrium {
+    let options = Options {
+        tolerance: Some(tolerance),
+        ..Options::default()
+    };
+    relax(scenario, &options, &mut |_| {}).unwrap()
+}
+
+/// Estimates over true errors of all scenes and tolerances, and what is wrong.
+#[derive(Default)]
+struct Verdict {
+    ratios: Vec<f64>,
+    wrong: Vec<String>,
+}
+
+impl Verdict {
+    /// Judges a scene at all tolerances. The truth is the solution at 1e-11,
+    /// itself uncertain by its own estimate.
+    fn judge(&mut self, name: &str, scenario: &Scenario) {
+        let truth = solve(scenario, 1e-11);
+        if !truth.outcome.is_success() {
+            self.wrong
+                .push(format!("{name} at 1e-11: {:?}", truth.outcome));
+            return;
+        }
+        let lengths = scenario.rods.iter().map(|rod| rod.length);
+        let length = lengths.fold(0.0, f64::max);
+        let uncertain = truth.error_estimate.unwrap();
+        for tolerance in TOLERANCES {
+            let leaf = solve(scenario, tolerance);
+            if !leaf.outcome.is_success() {
+                let outcome = leaf.outcome;
+                self.wrong
+                    .push(format!("{name} at {tolerance:e}: {outcome:?}"));
+                continue;
+            }
+            let estimate = leaf.error_estimate.unwrap();
+            let error = distance(&leaf, &truth);
+            if error > estimate + uncertain || estimate > tolerance * length {
+                self.wrong.push(format!(
+                    "{name} at {tolerance:e}: error {error:.1e}, estimate {estimate:.1e} on {:?}",
+                    leaf.segments
+                ));
+            }
+            if error > 10.0 * uncertain {
+                self.ratios.push(estimate / error);
+            }
+        }
+    }
+
+    /// Nothing is wrong, and at least half of the estimates are within 100
+    /// times the error.
+    fn assert(mut self, what: &str) {
+        self.ratios.sort_by(f64::total_cmp);
+        let count = self.ratios.len();
+        let quantile = |part: f64| self.ratios[(part * (count - 1) as f64) as usize];
+        let sharp = self.ratios.iter().filter(|ratio| **ratio <= 100.0).count();
+        println!(
+            "{what}: {count} estimates / errors: least {:.2}, quartiles {:.1} {:.1} {:.1}, most {:.0}; {sharp} within 100",
+            quantile(0.0),
+            quantile(0.25),
+            quantile(0.5),
+            quantile(0.75),
+            quantile(1.0),
+        );
+        assert!(
+            self.wrong.is_empty(),
+            "{} wrong:\n{}",
+            self.wrong.len(),
+            self.wrong.join("\n")
+        );
+        assert!(count > 10 && 2 * sharp >= count, "{sharp} of {count}");
+    }
+}
+
+#[test]
+fn of_the_papers_leaves_with_five_veins() {
+    let mut verdict = Verdict::default();
+    for figure in [
+        "fig04", "fig05", "fig06", "fig08", "fig09", "fig10", "fig13",
+    ] {
+        let rods = ["leaf.rods=5".to_string()];
+        let scenario = Scenario::read(&path(&format!("paper/{figure}")), &rods).unwrap();
+        verdict.judge(figure, &scenario);
+    }
+    verdict.assert("paper");
+}
+
+#[test]
+fn of_the_classic_problems() {
+    let mut verdict = Verdict::default();
+    let folder = path("classic/rollup").parent().unwrap().to_path_buf();
+    for file in std::fs::read_dir(folder).unwrap() {
+        let file = file.unwrap().path();
+        let scenario = Scenario::read(&file, &[]).unwrap();
+        verdict.judge(&scenario.name, &scenario);
+    }
+    verdict.assert("classic");
+}
+
+/// Strong couplings and strong loads confine the bending to layers near the
+/// base and the tip, down to 0.03 of the length, which coarse grids miss.
+#[test]
+fn of_boundary_layers() {
+    let mut verdict = Verdict::default();
+    for coupling in [1e2, 1e3, 1e4, 1e5, 1e6] {
+        for rods in [2, 5] {
+            let mut leaf = paper_leaf(rods, [1.0; 3], [100.0; 3], 1.0);
+            leaf.coupling = vec![[coupling; 3]; rods - 1];
+            verdict.judge(&format!("coupling {coupling:e}, {rods} rods"), &leaf);
+        }
+    }
+    for load in [10.0, 100.0, 1000.0] {
+        for force in [
+            [load, 0.0, 0.1 * load],
+            [0.0, 0.0, load],
+            [-load, 0.0, 0.5 * load],
+        ] {
+            for rods in [1, 3] {
+                let mut leaf = paper_leaf(rods, [1.0; 3], [f64::INFINITY; 3], 0.0);
+                leaf.tip_force = force;
+                verdict.judge(&format!("tip force {force:?}, {rods} rods"), &leaf);
+            }
+        }
+        let mut leaf = paper_leaf(3, [1.0; 3], [1000.0; 3], load);
+        leaf.tip_force = [0.1, 0.2, 0.3];
+        verdict.judge(&format!("weight {load}"), &leaf);
+    }
+    verdict.assert("layers");
+}
+
+fn log_uniform(decades: std::ops::Range<f64>) -> impl Strategy<Value = f64> {
+    decades.prop_map(|exponent| 10f64.powf(exponent))
+}
+
+fn force_stiffness() -> impl Strategy<Value = f64> {
+    prop_oneof![4 => log_uniform(1.0..3.0), 1 => Just(f64::INFINITY)]
+}
+
+/// A quantity that changes along the rod by up to `most` times, with a kink.
+fn profile(value: f64, (kink, bend): (f64, f64), on: bool) -> Profile {
+    match on {
+        false => Profile::Constant(value),
+        true => Profile::Linear {
+            at: vec![0.0, kink, 1.0],
+            value: vec![value, bend * value, 0.6 * value],
+        },
+    }
+}
+
+prop_compose! {
+    /// One to four veins, alike but for length, angle and rest shape: stiffness
+    /// over two decades, some rigid in stretch or shear; any load, coupling,
+    /// fan, profiles with kinks.
+    fn leaves()(rods in 1..5_usize)(
+        couple in prop::array::uniform3(log_uniform(-1.0..1.0)),
+        force in prop::array::uniform3(force_stiffness()),
+        rest in prop::collection::vec(prop::array::uniform3(-2.0..2.0), rods),
+        lengths in prop::collection::vec(0.8..1.2, rods),
+        angles in prop::collection::vec(-0.3..0.3, rods),
+        coupling in prop::collection::vec(prop::array::uniform3(0.0..5.0), rods - 1),
+        gravity in prop::array::uniform3(-1.0..1.0),
+        tip_force in prop::array::uniform3(-1.0..1.0),
+        kinks in prop::array::uniform3((0.1..0.9, 0.5..2.0)),
+        tapered in prop::array::uniform3(prop::bool::weighted(0.3)),
+        joined in prop::bool::weighted(0.75),
+    ) -> Scenario {
+        let mut leaf = paper_leaf(rest.len(), couple, force, 0.0);
+        leaf.joined = joined;
+        leaf.coupling = coupling;
+        leaf.gravity = gravity;
+        leaf.tip_force = tip_force;
+        for (j, rod) in leaf.rods.iter_mut().enumerate() {
+            rod.length = lengths[j];
+            rod.angle += angles[j];
+            for k in 0..3 {
+                rod.couple_stiffness[k] = profile(couple[k], kinks[k], tapered[k]);
+                rod.rest_curvature[k] = profile(rest[j][k], kinks[2 - k], tapered[2 - k]);
+            }
+        }
+        leaf
+    }
+}
+
+#[test]
+fn of_random_leaves() {
+    let mut runner = TestRunner::deterministic();
+    let mut verdict = Verdict::default();
+    for case in 0..200 {
+        let leaf = leaves().new_tree(&mut runner).unwrap().current();
+        verdict.judge(&format!("leaf {case}"), &leaf);
+    }
+    verdict.assert("random");
+}

@@ -1,0 +1,136 @@
+//! Leaves so soft that they move far, past states that are no equilibria or
+//! unstable ones: Figs 8, 9 and 10 of the paper. Boundary-value solvers fail on
+//! the first two and return an unstable state of the third without a word.
+//!
+//! Several stable equilibria exist; which one a leaf comes to rest in is
+//! recorded here, as the only numbers in the tests that come from the program.
+
+mod common;
+
+use common::{close, path, settle, tip};
+use glam::DVec3;
+use leafdyn::relax::{Options, Outcome, relax};
+use leafdyn::scenario::Scenario;
+
+fn figure(name: &str, rods: usize) -> Scenario {
+    let rods = [format!("leaf.rods={rods}")];
+    Scenario::read(&path(&format!("paper/{name}")), &rods).unwrap()
+}
+
+/// Figure, veins; energy and tip at rest.
+const RECORDED: [(&str, usize, f64, [f64; 3]); 6] = [
+    (
+        "fig08",
+        5,
+        0.012707455,
+        [0.003612691, 0.000733296, 0.893569494],
+    ),
+    (
+        "fig08",
+        21,
+        0.035680228,
+        [0.002525576, 0.000125742, 0.765109292],
+    ),
+    (
+        "fig09",
+        5,
+        0.002784833,
+        [0.064626247, 0.011616756, -0.917988478],
+    ),
+    (
+        "fig09",
+        21,
+        0.000506082,
+        [0.047088561, 0.002319509, -0.851405789],
+    ),
+    (
+        "fig10",
+        5,
+        0.431110115,
+        [0.907237356, 0.193628790, 0.226331454],
+    ),
+    (
+        "fig10",
+        21,
+        1.835160921,
+        [0.923308913, 0.046094922, 0.231500082],
+    ),
+];
+
+#[test]
+fn each_comes_to_rest_in_the_stable_equilibrium_recorded() {
+    let mut wrong = Vec::new();
+    for (name, rods, energy, recorded) in RECORDED {
+        let leaf = settle(&figure(name, rods), 1e-7);
+        let what = format!("{name}, {rods} veins");
+        assert_eq!(leaf.negative_eigenvalues, Some(0), "{what}");
+        assert!(leaf.error_estimate.unwrap() <= 1e-7, "{what}");
+        let off = (tip(&leaf) - DVec3::from_array(recorded)).length();
+        if off > 1e-7 || (leaf.energy - energy).abs() > 1e-7 {
+            wrong.push(format!(
+                "{what}: energy {:.9}, tip {:.9}",
+                leaf.energy,
+                tip(&leaf)
+            ));
+        }
+    }
+    assert!(wrong.is_empty(), "found:\n{}", wrong.join("\n"));
+}
+
+/// The same place at every tolerance: it is not chance that decides.
+#[test]
+fn every_tolerance_ends_in_the_same_equilibrium() {
+    for (name, rods, energy, recorded) in RECORDED {
+        for tolerance in [1e-3, 1e-5] {
+            let leaf = settle(&figure(name, rods), tolerance);
+            let off = (tip(&leaf) - DVec3::from_array(recorded)).length();
+            let what = format!("{name}, {rods} veins at {tolerance:e}");
+            assert!(
+                off <= leaf.error_estimate.unwrap() + 1e-7,
+                "{what}: tip {}",
+                tip(&leaf)
+            );
+            close(&what, leaf.energy, energy, 20.0 * tolerance);
+        }
+    }
+}
+
+/// The flat leaf of Fig. 10, N = 5, which a boundary-value solver returns as
+/// the solution (tip z = -0.0015): unstable in as many ways as a grid can show.
+#[test]
+fn the_flat_leaf_of_fig_10_is_a_saddle_and_kept_only_on_request() {
+    let flat = figure("fig10", 5);
+    for (segments, index) in [(10, 14), (20, 16), (40, 18), (80, 18)] {
+        let options = Options {
+            segments: Some(segments),
+            keep_unstable: true,
+            ..Options::default()
+        };
+        let leaf = relax(&flat, &options, &mut |_| {}).unwrap();
+        assert_eq!(leaf.outcome, Outcome::Saddle, "{segments} segments");
+        assert_eq!(
+            leaf.negative_eigenvalues,
+            Some(index),
+            "{segments} segments"
+        );
+        close("tip z", tip(&leaf).z, -0.001, 1e-3);
+    }
+    let left = settle(&flat, 1e-6);
+    assert!(tip(&left).z.abs() > 0.1);
+}
+
+/// To be kept as the result a saddle must be as accurate as any other: the
+/// count must be that of grids that resolve it.
+#[test]
+fn a_saddle_on_nested_grids_has_the_index_of_the_finest() {
+    let options = Options {
+        tolerance: Some(1e-6),
+        keep_unstable: true,
+        ..Options::default()
+    };
+    let leaf = relax(&figure("fig10", 5), &options, &mut |_| {}).unwrap();
+    assert_eq!(leaf.outcome, Outcome::Saddle);
+    assert_eq!(leaf.negative_eigenvalues, Some(18));
+    assert_eq!(leaf.stable(), Some(false));
+    assert!(leaf.error_estimate.unwrap() <= 1e-6);
+}
