@@ -37,7 +37,7 @@ const FINEST_LANDING: usize = 256;
 const FINEST_RESOLVING: usize = 2048;
 
 /// Iteration error allowed on each grid, as a part of the tolerance.
-const ITERATION_PART: f64 = 1e-2;
+const ITERATION_PART: f64 = 1e-3;
 
 /// Iteration error allowed on a fixed grid, which is there to be compared.
 const FIXED_ACCURACY: f64 = 1e-12;
@@ -188,7 +188,7 @@ impl<'a> Run<'a, '_> {
         self.options.segments.is_some()
             || self
                 .table
-                .best(1.0)
+                .best()
                 .is_some_and(|best| best.error <= self.tolerance)
     }
 

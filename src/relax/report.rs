@@ -39,7 +39,7 @@ pub fn equilibrium(
     };
     let scale = run.leaf.scale;
     let rounding = ROUNDING * finest.leaf.segments() as f64;
-    let best = run.table.best(1.0);
+    let best = run.table.best();
     let columns = best.as_ref().map_or(0, |best| best.columns);
     let rods = fields(&run.levels, columns);
     let joined = run.leaf.joined();
