@@ -15,6 +15,9 @@ const WORTHLESS: f64 = 0.1;
 /// Safety factor where two grids are all there is.
 const UNPROVEN: f64 = 2.0;
 
+/// Safety factor on the last change of a column without a proven order.
+const UNORDERED: f64 = 3.0;
+
 /// Changes below this, relative to the leaf's length, are rounding.
 const ROUNDING: f64 = 1e-13;
 
@@ -104,9 +107,9 @@ impl Richardson {
             columns -= 1;
         }
         if columns < last {
-            // Not proven to have an order of its own: its last change bounds it.
+            // Not proven to have an order of its own: judged by its last change.
             let change = distance(&row[columns], &before[columns]);
-            let error = change.max(SAFETY.1 * correction(columns));
+            let error = (UNORDERED * change).max(SAFETY.1 * correction(columns));
             return Some(Best { columns, error });
         }
         let slope = if last == 2 { SLOPE.0 } else { SLOPE.1 };
