@@ -42,6 +42,16 @@ const ITERATION_PART: f64 = 1e-3;
 /// Iteration error allowed on a fixed grid, which is there to be compared.
 const FIXED_ACCURACY: f64 = 1e-12;
 
+/// Growth of errors of single grids by extrapolation, sum of the weights at most.
+const EXTRAPOLATED: f64 = 2.0;
+
+/// Part of the rounding error that grows with the number of segments.
+const ROUNDING: f64 = 4e-15;
+
+/// Nodes times force evaluations after which a leaf that has not come to rest
+/// is not tried on yet another grid: some ten seconds.
+const BUDGET: usize = 3_000_000;
+
 /// Saddles that are left before the run is given up.
 const MAX_SADDLES: i32 = 10;
 
@@ -92,6 +102,7 @@ pub fn relax(
         table: Richardson::default(),
         index: None,
         remaining: 0.0,
+        spent: 0,
     };
     let end = run.solve(Grid::new(first, leaf.kinks()));
     let (outcome, remark) = run.judge(end);
@@ -147,6 +158,8 @@ pub(super) struct Run<'a, 'o> {
     pub index: Option<usize>,
     /// Largest iteration error left on any grid.
     pub remaining: f64,
+    /// Nodes times force evaluations so far.
+    spent: usize,
 }
 
 impl<'a> Run<'a, '_> {
@@ -185,11 +198,15 @@ impl<'a> Run<'a, '_> {
 
     /// Whether the tolerance is reached; a fixed grid always is.
     fn accurate(&self) -> bool {
-        self.options.segments.is_some()
-            || self
-                .table
-                .best()
-                .is_some_and(|best| best.error <= self.tolerance)
+        self.options.segments.is_some() || self.error().is_some_and(|error| error <= self.tolerance)
+    }
+
+    /// Estimate of the error of the best values, relative to the leaf's length:
+    /// of the extrapolation, of unfinished iterations, and of rounding.
+    pub fn error(&self) -> Option<f64> {
+        let segments = self.levels.last()?.leaf.segments();
+        let best = self.table.best()?;
+        Some(best.error + EXTRAPOLATED * self.remaining + ROUNDING * segments as f64)
     }
 
     /// From the start to rest on the first grid that resolves it. A leaf that
@@ -216,10 +233,12 @@ impl<'a> Run<'a, '_> {
                     }
                     landed = Some(level);
                 }
-                Settled::Unresolved if finer.segments() <= FINEST_RESOLVING && !fixed => {
+                Settled::Unresolved
+                    if finer.segments() <= FINEST_RESOLVING && !fixed && self.spent <= BUDGET =>
+                {
                     landed = None;
                 }
-                _ if last => {
+                _ if last || self.spent > BUDGET => {
                     self.push(level);
                     return Err(settled);
                 }
@@ -299,7 +318,10 @@ impl<'a> Run<'a, '_> {
                 direct: None,
                 moved: false,
             };
+            let before = relaxation.work.force_evaluations;
             let settled = relaxation.settle(&leaf, &mut system);
+            let nodes = leaf.rods() * leaf.segments();
+            self.spent += nodes * (relaxation.work.force_evaluations - before);
             moved |= relaxation.moved;
             state = relaxation.state;
             if let Settled::Rest(remaining) = settled {

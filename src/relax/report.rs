@@ -7,12 +7,6 @@ use crate::relax::richardson::Richardson;
 use crate::relax::shape;
 use glam::{DQuat, DVec3};
 
-/// Part of the rounding error that grows with the number of segments.
-const ROUNDING: f64 = 4e-15;
-
-/// Growth of errors of single grids by extrapolation, sum of the weights at most.
-const EXTRAPOLATED: f64 = 2.0;
-
 /// Positions of all rods at every `stride`-th node, dimensionless.
 pub fn positions(level: &Level, stride: usize) -> Vec<f64> {
     let n = level.leaf.segments();
@@ -38,7 +32,6 @@ pub fn equilibrium(
         _ => unreachable!("a run leaves at least the grid it failed on"),
     };
     let scale = run.leaf.scale;
-    let rounding = ROUNDING * finest.leaf.segments() as f64;
     let best = run.table.best();
     let columns = best.as_ref().map_or(0, |best| best.columns);
     let rods = fields(&run.levels, columns);
@@ -61,9 +54,7 @@ pub fn equilibrium(
             .collect(),
         tolerance: run.tolerance,
         residual: finest.leaf.residual(&finest.state),
-        error_estimate: best
-            .map(|best| best.error + EXTRAPOLATED * run.remaining + rounding)
-            .map(|error| error * scale.length),
+        error_estimate: run.error().map(|error| error * scale.length),
         energy: energies.column(columns)[0] * scale.moment(),
         joined,
         tips: tips
