@@ -114,7 +114,11 @@ fn the_flat_leaf_of_fig_10_is_a_saddle_and_kept_only_on_request() {
             "{segments} segments"
         );
         // So soft a state lies elsewhere on every grid, but nearly flat on all.
-        assert!(tip(&leaf).z.abs() < 0.01, "{segments} segments: {}", tip(&leaf));
+        assert!(
+            tip(&leaf).z.abs() < 0.01,
+            "{segments} segments: {}",
+            tip(&leaf)
+        );
     }
     let left = settle(&flat, 1e-6);
     assert!(tip(&left).z.abs() > 0.1);
