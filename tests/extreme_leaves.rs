@@ -1,0 +1,294 @@
+//! Leaves that nobody would grow, but that a scenario may state: each comes to
+//! rest in a stable equilibrium, and where symmetry or a simpler leaf tells
+//! where, it is there.
+
+mod common;
+
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
+use std::time::{Duration, Instant};
+
+use common::{close, fig04, paper_leaf, settle, tip};
+use glam::DVec3;
+use leafdyn::relax::Equilibrium;
+use leafdyn::scenario::{Profile, Scenario};
+
+const RIGID: [f64; 3] = [f64::INFINITY; 3];
+
+fn fan(angles: &[f64], force_stiffness: [f64; 3], weight: f64) -> Scenario {
+    let mut leaf = paper_leaf(angles.len(), [1.0; 3], force_stiffness, weight);
+    for (rod, angle) in leaf.rods.iter_mut().zip(angles) {
+        rod.angle = *angle;
+    }
+    leaf.coupling = vec![[0.0; 3]; angles.len() - 1];
+    leaf
+}
+
+#[track_caller]
+fn stable(scenario: &Scenario, tolerance: f64) -> Equilibrium {
+    let start = Instant::now();
+    let leaf = settle(scenario, tolerance);
+    assert_eq!(leaf.negative_eigenvalues, Some(0));
+    assert!(
+        start.elapsed() < Duration::from_secs(5),
+        "{:?}",
+        start.elapsed()
+    );
+    leaf
+}
+
+/// Rods that lie in one another share the load: each is a single rod.
+#[test]
+fn a_fan_that_is_closed() {
+    for coupling in [0.0, 1.0, 1e4] {
+        let mut closed = fan(&[0.3; 5], [100.0; 3], 1.0);
+        closed.tip_force = [0.5, 1.0, 2.0];
+        closed.coupling = vec![[coupling; 3]; 4];
+        let mut single = fan(&[0.3], [100.0; 3], 1.0);
+        single.tip_force = [0.1, 0.2, 0.4];
+        let (all, one) = (stable(&closed, 1e-10), stable(&single, 1e-10));
+        assert!((tip(&all) - tip(&one)).length() < 1e-10);
+        close("energy", all.energy, 5.0 * one.energy, 1e-9);
+    }
+}
+
+/// Free and uncoupled, every rod is on its own; coupling changes that.
+#[test]
+fn free_tips() {
+    let angles = [-2.0, -0.5, 0.1, 3.0];
+    let mut free = fan(&angles, [100.0; 3], 3.0);
+    free.joined = false;
+    free.tip_force = [1.0, 0.0, -2.0];
+    let together = stable(&free, 1e-10);
+    assert_eq!(together.tips.len(), 4);
+    for (angle, found) in angles.iter().zip(&together.tips) {
+        let mut single = fan(&[*angle], [100.0; 3], 3.0);
+        single.tip_force = free.tip_force;
+        // Whether the tip of a single rod is joined makes no difference.
+        let alone = stable(&single, 1e-10);
+        single.joined = false;
+        assert_eq!(tip(&stable(&single, 1e-10)), tip(&alone));
+        assert!((*found - tip(&alone)).length() < 1e-10, "{angle}");
+    }
+    free.coupling = vec![[1e4; 3]; 3];
+    let coupled = stable(&free, 1e-6);
+    let apart = coupled
+        .tips
+        .iter()
+        .map(|tip| (*tip - coupled.tips[0]).length());
+    assert!(apart.fold(0.0, f64::max) < 0.1);
+}
+
+/// Two rods that leave the base in opposite directions meet half-way; six in a
+/// star meet straight above or below the base.
+#[test]
+fn opposite_rods_and_stars() {
+    for stiffness in [[100.0; 3], RIGID] {
+        let pair = stable(&fan(&[0.0, PI], stiffness, 0.0), 1e-8);
+        assert!(tip(&pair).x.abs() < 1e-8 && tip(&pair).length() > 0.7);
+        let upright = stable(&fan(&[-FRAC_PI_2, FRAC_PI_2], stiffness, 0.0), 1e-8);
+        assert!(tip(&upright).y.abs() < 1e-8);
+        close(
+            "the same pair",
+            tip(&upright).length(),
+            tip(&pair).length(),
+            1e-7,
+        );
+        close("the same pair", upright.energy, pair.energy, 1e-6);
+
+        let six: Vec<f64> = (0..6).map(|k| k as f64 * FRAC_PI_3).collect();
+        let star = stable(&fan(&six, stiffness, 1.0), 1e-8);
+        assert!(tip(&star).x.hypot(tip(&star).y) < 1e-8 && tip(&star).z.abs() > 0.5);
+        // Rigid rods snap through on the way to rest, to either side.
+        if stiffness != RIGID {
+            let three = fan(&[0.0, 2.0 * FRAC_PI_3, -2.0 * FRAC_PI_3], stiffness, 1.0);
+            close(
+                "half a star",
+                tip(&stable(&three, 1e-8)).z,
+                tip(&star).z,
+                1e-7,
+            );
+        }
+    }
+}
+
+#[test]
+fn angles_that_go_round_more_than_once() {
+    let plain = stable(&fan(&[0.7, -0.2, 0.1], [100.0; 3], 1.0), 1e-9);
+    let wound = [0.7 + 20.0 * PI, -0.2 - 8.0 * PI, 0.1];
+    let wound = stable(&fan(&wound, [100.0; 3], 1.0), 1e-9);
+    assert!((tip(&plain) - tip(&wound)).length() < 1e-9);
+}
+
+/// A round column may buckle to any side, and comes to rest on the same
+/// elastica as a strip that can go only two ways.
+#[test]
+fn round_columns() {
+    for load in [2.5, 3.0, 5.0, 10.0, 50.0, 100.0, 300.0] {
+        let mut round = fan(&[0.0], RIGID, 0.0);
+        round.tip_force = [-load, 0.0, 0.0];
+        let mut strip = round.clone();
+        strip.rods[0].couple_stiffness[1] = Profile::Constant(2.0);
+        let (round, strip) = (stable(&round, 1e-8), stable(&strip, 1e-8));
+        let bulge = |leaf: &Equilibrium| tip(leaf).y.hypot(tip(leaf).z);
+        close(
+            &format!("x, P = {load}"),
+            tip(&round).x,
+            tip(&strip).x,
+            3e-8,
+        );
+        close(
+            &format!("bulge, P = {load}"),
+            bulge(&round),
+            bulge(&strip),
+            3e-8,
+        );
+        // An even number of ways down from the straight state: it is round.
+        let saddle = round.saddle.expect("the straight state was met");
+        assert!(saddle.negative_eigenvalues > 0 && saddle.negative_eigenvalues % 2 == 0);
+        assert!(
+            strip
+                .saddle
+                .expect("the straight state was met")
+                .negative_eigenvalues
+                > 0
+        );
+    }
+    for weight in [7.9, 9.0, 20.0, 50.0, 100.0] {
+        let mut round = fan(&[0.0], RIGID, 0.0);
+        round.gravity = [-weight, 0.0, 0.0];
+        let mut strip = round.clone();
+        strip.rods[0].couple_stiffness[1] = Profile::Constant(2.0);
+        let (round, strip) = (stable(&round, 1e-8), stable(&strip, 1e-8));
+        close(
+            &format!("x, w = {weight}"),
+            tip(&round).x,
+            tip(&strip).x,
+            3e-8,
+        );
+    }
+}
+
+/// As coupling grows the leaf becomes a plate of glued veins: a limit.
+#[test]
+fn coupling_up_to_the_strongest_allowed() {
+    let with = |coupling: f64| {
+        let mut leaf = fig04(5);
+        leaf.coupling = vec![[coupling; 3]; 4];
+        tip(&stable(&leaf, 1e-6))
+    };
+    let glued = with(1e12);
+    for (coupling, apart) in [(1e10, 1e-5), (1e8, 1e-4), (1e6, 1e-3), (1e4, 1e-2)] {
+        let off = (with(coupling) - glued).length();
+        assert!(off < apart, "{coupling:e}: {off:.1e}");
+    }
+}
+
+#[test]
+fn veins_of_different_kinds() {
+    // Rigid in one way each.
+    let mut leaf = fig04(3);
+    for (j, rod) in leaf.rods.iter_mut().enumerate() {
+        rod.force_stiffness[j] = Profile::Constant(f64::INFINITY);
+        rod.force_stiffness[(j + 1) % 3] = Profile::Constant(1.0);
+    }
+    stable(&leaf, 1e-8);
+    // One vein a million times stiffer than the others: it hardly bends.
+    let mut leaf = fig04(3);
+    leaf.rods[1].couple_stiffness = [1e6; 3].map(Profile::Constant);
+    let bent = stable(&leaf, 1e-8);
+    let middle = bent.rods[1].nodes.last().unwrap().rotation * DVec3::X;
+    assert!(middle.angle_between(bent.rods[1].nodes[0].rotation * DVec3::X) < 1e-4);
+    // Ten times longer than its neighbours, and half as long.
+    for lengths in [[1.0, 10.0, 1.0], [0.5, 1.0, 1.0], [1.0, 0.1, 1.0]] {
+        let mut leaf = fig04(3);
+        leaf.gravity = [0.0, 0.0, -0.1];
+        for (rod, length) in leaf.rods.iter_mut().zip(lengths) {
+            rod.length = length;
+        }
+        stable(&leaf, 1e-6);
+    }
+    // Tapered a millionfold; with four kinks, two of them close together.
+    let mut leaf = fig04(5);
+    leaf.gravity = [0.0, 0.0, -1e-6];
+    for rod in &mut leaf.rods {
+        rod.couple_stiffness = [0, 1, 2].map(|_| Profile::Linear {
+            at: vec![0.0, 1.0],
+            value: vec![1.0, 1e-6],
+        });
+    }
+    stable(&leaf, 1e-6);
+    let mut leaf = fig04(5);
+    for rod in &mut leaf.rods {
+        rod.couple_stiffness[0] = Profile::Linear {
+            at: vec![0.0, 0.01, 0.5, 0.501, 1.0],
+            value: vec![1.0, 0.1, 1.0, 0.01, 1.0],
+        };
+    }
+    stable(&leaf, 1e-6);
+}
+
+#[test]
+fn veins_wound_up_at_rest() {
+    for (rest, rods) in [
+        ([0.0, 0.0, 1000.0], 1),
+        ([50.0, 0.0, 200.0], 1),
+        ([0.0, 6.0, 0.0], 5),
+        ([0.0, 20.0, 0.0], 5),
+        ([30.0, 0.0, 0.0], 5),
+        ([6.0, 3.0, 0.0], 5),
+    ] {
+        let mut leaf = fig04(rods);
+        for rod in &mut leaf.rods {
+            rod.rest_curvature = rest.map(Profile::Constant);
+        }
+        stable(&leaf, 1e-6);
+    }
+}
+
+#[test]
+fn loads_from_all_sides() {
+    for gravity in [
+        [0.0, 0.0, 10.0],
+        [-50.0, 0.0, 0.0],
+        [0.0, 0.0, -1000.0],
+        [1000.0, 0.0, 0.0],
+    ] {
+        let mut leaf = fig04(5);
+        leaf.gravity = gravity;
+        stable(&leaf, 1e-6);
+    }
+    for force in [
+        [-100.0, 0.0, 0.0],
+        [-1000.0, 0.0, 0.0],
+        [1e5, 0.0, 1.0],
+        [0.0, 100.0, 0.0],
+    ] {
+        let mut leaf = fig04(5);
+        leaf.gravity = [0.0; 3];
+        leaf.tip_force = force;
+        stable(&leaf, 1e-6);
+    }
+    // Inextensible rods, pulled: they point where the force does.
+    for force in [1e3, 1e4, 1e5] {
+        let mut rod = fan(&[0.0], RIGID, 0.0);
+        rod.tip_force = [0.0, 0.0, -force];
+        if force > 1e4 {
+            // Bent at once at the clamp, that is more than grids resolve; not so from a bit aside.
+            rod.tip_force = [force, 0.0, -1e-3 * force];
+        }
+        let pulled = stable(&rod, 1e-6);
+        let direction = DVec3::from_array(rod.tip_force).normalize();
+        assert!(tip(&pulled).dot(direction) > 1.0 - 1.0 / force.sqrt());
+        assert!(tip(&pulled).length() <= 1.0);
+    }
+}
+
+#[test]
+fn many_veins() {
+    let leaf = stable(&fig04(500), 1e-6);
+    assert_eq!(leaf.rods.len(), 500);
+    // The paper's fan fills its sector ever more evenly: the tip comes to lie
+    // straight ahead, at the height that 100 veins show to three digits.
+    assert!(tip(&leaf).y.abs() < 0.003);
+    close("z", tip(&leaf).z, tip(&stable(&fig04(100), 1e-6)).z, 1e-3);
+}
