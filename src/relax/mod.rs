@@ -16,3 +16,4 @@ mod start;
 pub use equilibrium::{Equilibrium, NodeState, Outcome, RodShape, Saddle, Work};
 pub use grids::relax;
 pub use options::{Method, Options, Progress, RelaxError};
+pub use start::start;
