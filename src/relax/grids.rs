@@ -24,7 +24,7 @@ const COARSEST: usize = 8;
 const COARSEST_TURN: f64 = 0.8;
 
 /// Segments of the finest grid.
-const FINEST: usize = 4096;
+const FINEST: usize = 16_384;
 
 /// Two grids on which the leaf moved far are said to land in the same place
 /// if no station differs by more than this, in lengths.
@@ -49,8 +49,10 @@ const EXTRAPOLATED: f64 = 2.0;
 const ROUNDING: f64 = 4e-15;
 
 /// Nodes times force evaluations after which a leaf that has not come to rest
-/// is not tried on yet another grid: some ten seconds.
+/// is given up: some seconds. But a large one is granted so many evaluations
+/// on every grid.
 const BUDGET: usize = 3_000_000;
+const LEAST_EVALUATIONS: usize = 600;
 
 /// Saddles that are left before the run is given up.
 const MAX_SADDLES: i32 = 10;
@@ -306,6 +308,9 @@ impl<'a> Run<'a, '_> {
             );
             return (Level { leaf, state }, settled, false);
         }
+        let nodes = leaf.rods() * segments;
+        let allowed = (BUDGET.saturating_sub(self.spent) / nodes).max(LEAST_EVALUATIONS);
+        let begun = self.work.force_evaluations;
         let mut moved = false;
         for pushes in 0..MAX_SADDLES {
             let mut relaxation = Relaxation {
@@ -316,11 +321,11 @@ impl<'a> Run<'a, '_> {
                 near_rest,
                 pushes,
                 direct: None,
+                most_evaluations: begun + allowed,
                 moved: false,
             };
             let before = relaxation.work.force_evaluations;
             let settled = relaxation.settle(&leaf, &mut system);
-            let nodes = leaf.rods() * leaf.segments();
             self.spent += nodes * (relaxation.work.force_evaluations - before);
             moved |= relaxation.moved;
             state = relaxation.state;

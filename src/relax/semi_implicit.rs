@@ -114,6 +114,8 @@ pub struct Relaxation<'a> {
     pub pushes: i32,
     /// Pattern of the direct factorisation, once that had to take over.
     pub direct: Option<SparsePattern>,
+    /// Count of force evaluations at which to give up.
+    pub most_evaluations: usize,
     /// Whether the leaf had to move: its energy was not convex on the way.
     pub moved: bool,
 }
@@ -220,6 +222,9 @@ impl Relaxation<'_> {
         self.work.force_evaluations += 1;
 
         for step in 0..MAX_STEPS {
+            if self.work.force_evaluations > self.most_evaluations {
+                break;
+            }
             // A positive definite matrix and its solution, with as long a time
             // step as it takes.
             let tolerance = cg_tolerance(previous, self.near_rest);
