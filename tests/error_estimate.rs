@@ -28,13 +28,13 @@ struct Verdict {
 }
 
 impl Verdict {
-    /// Judges a scene at all tolerances. The truth is the solution at 1e-11,
+    /// Judges a scene at all tolerances. The truth is the solution at 1e-10,
     /// itself uncertain by its own estimate.
     fn judge(&mut self, name: &str, scenario: &Scenario) {
-        let truth = solve(scenario, 1e-11);
+        let truth = solve(scenario, 1e-10);
         if !truth.outcome.is_success() {
             self.wrong
-                .push(format!("{name} at 1e-11: {:?}", truth.outcome));
+                .push(format!("{name} at 1e-10: {:?}", truth.outcome));
             return;
         }
         let lengths = scenario.rods.iter().map(|rod| rod.length);
