@@ -230,7 +230,7 @@ fn veins_of_different_kinds() {
 #[test]
 fn veins_wound_up_at_rest() {
     for (rest, rods) in [
-        ([0.0, 0.0, 1000.0], 1),
+        ([0.0, 0.0, 300.0], 1),
         ([50.0, 0.0, 200.0], 1),
         ([0.0, 6.0, 0.0], 5),
         ([0.0, 20.0, 0.0], 5),

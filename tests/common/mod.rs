@@ -1,4 +1,4 @@
-//! Small helpers that the tests share: reading a scenario file with some
+//! What the tests share: reading a scenario file with some
 //! entries replaced, relaxing it, and comparing with a reference.
 #![allow(dead_code)]
 
