@@ -1,58 +1,139 @@
 //! How a leaf of coupled Cosserat rods comes to rest: its shape, an error bar
 //! on it, and whether it is stable.
 //!
-//! ```
-//! use leafdyn::{relax::{Options, relax}, scenario::Scenario};
+//! From TOML to a tip position with its error and its stability:
 //!
-//! let leaf = Scenario::read("scenarios/paper/fig04.toml".as_ref(), &[])?;
-//! let rest = relax(&leaf, &Options::default(), &mut |_| {})?;
-//! println!("tip at {}, within {:?}", rest.tips[0], rest.error_estimate);
-//! assert_eq!(rest.stable(), Some(true));
-//! assert!((rest.tips[0].z + 0.147358).abs() < 1e-6);
+//! ```
+//! use leafdyn::relax::{Options, relax};
+//! use leafdyn::scenario::Scenario;
+//!
+//! let five_veins = r#"
+//!     name = "five-veins"
+//!     leaf = { rods = 5, length = 1.0, fan = "paper" }
+//!     stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }
+//!     coupling = { y = 1.0, z = 1.0 }
+//!     load = { gravity = [0.0, 0.0, -1.0] }
+//! "#;
+//! let scenario = Scenario::from_toml(five_veins)?;
+//! let leaf = relax(&scenario, &Options::default(), &mut |_| {})?;
+//! println!("tip {} within {:?}, stable: {:?}", leaf.tips[0], leaf.error_estimate, leaf.stable());
+//! # let known = glam::DVec3::new(0.9380015618466, 0.1994657673678, -0.1459779858328);
+//! # let error = leaf.error_estimate.expect("several grids were used");
+//! # assert!((leaf.tips[0] - known).length() <= error && error <= scenario.tolerance);
+//! # assert_eq!(leaf.stable(), Some(true));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! [`Scenario::read`](scenario::Scenario::read) takes a file instead,
+//! [`relax::Options`] a tolerance or a fixed grid, the closure is told how far
+//! a long run has come, and [`output::write_all`] writes the files that the
+//! program `leafdyn` writes. What comes back is a [`relax::Equilibrium`].
+//!
 //! # The model
 //!
-//! A leaf with parallel veins is N special Cosserat rods. Each is a curve r(s)
-//! with a frame of directors R = \[d1 d2 d3\], d1 along the vein; its strains are
-//! v = R^T r' (stretch and two shears) and u, the axial vector of R^T R' (twist
-//! and two bends), its stress resultants n and m. In equilibrium
+//! A leaf with parallel venation is N special Cosserat rods, one for each main
+//! vein with the tissue around it. They start in one point as a fan, end in one
+//! point, the tip, and pull on their neighbours through the tissue between
+//! them. The model, the numbers of equations and figures used throughout this
+//! crate, and the leaves in `scenarios/paper` are those of the paper that
+//! proposed it for orchids of the genus *Epipactis* and solved its equations
+//! with scipy's `solve_bvp`.
 //!
-//! | | |
-//! | --- | --- |
-//! | n' = n x u - R^T f,  m' = m x u + n x v | eqs (3), (4) |
-//! | m_i = A_i (u_i - u0_i),  n_i = H_i (v_i - delta_i1) | eqs (5), (6) |
-//! | f = coupling to the neighbours + gravity | section 2.3 |
+//! A rod is a curve r(s), 0 <= s <= L, with a frame of directors
+//! R = \[d1 d2 d3\]; d1 points along the unstrained rod, d2 lies in the plane of
+//! the fan. Its strains are v (stretch and two shears) and u (twist and two
+//! bends), its stress resultants n (axial and shear forces) and m (twisting and
+//! bending moments), all as components along the directors; f is the force per
+//! unit length on the rod, here as components along the lab axes.
 //!
-//! with all bases clamped at the origin in a fan of angles, moments vanishing at
-//! the tips, all tips in one point, and the forces there adding up to a given
-//! one (boundary conditions (a) to (e)). The numbers of equations and figures are
-//! those of the paper that proposed the model for the leaves of *Epipactis* and
-//! solved it with scipy's `solve_bvp`; `scenarios/paper` has its leaves.
+//! ```text
+//!   r' = R v              R' = R [u]                 strains (section 2.1)
 //!
-//! Any consistent units will do. Inside, lengths are in units of the longest
-//! rod L and forces in A/L^2, A being the mean bending stiffness
-//! ([`leaf::Scale`]), so that no threshold depends on the units.
+//!   dn/ds + f = 0         dm/ds + v x n = 0          balance, in space          (1) (2)
+//!   n' = n x u - R^T f    m' = m x u + n x v         the same, components       (3) (4)
+//!
+//!   m_i = A_i (u_i - u0_i)                           torsion A1, bending A2, A3     (5)
+//!   n_i = H_i (v_i - delta_i1)                       axial H1, shear H2, H3         (6)
+//!
+//!   f = g - q e3          g = sum of kappa o (r_neighbour - r)     coupling, gravity
+//! ```
+//!
+//! A2 is the bending about d2, which moves a vein up and down; A3 the one
+//! about d3, sideways within the leaf. u0 is the curvature at rest. An infinite
+//! H_i is a constraint: inextensible, unshearable. The coupling acts between
+//! neighbours at equal fractions of their lengths, axis by axis, and is kept
+//! per gap, so that what one rod gains the other loses. The boundary conditions
+//! are those of section 2.4, with a given force and, on a single rod, a given
+//! moment at the tip:
+//!
+//! | | at | condition |
+//! | --- | --- | --- |
+//! | (a) | base | r = 0 |
+//! | (b) | tip | m = 0 for every rod |
+//! | (c) | base | d1 = (cos phi, sin phi, 0), d2 = (-sin phi, cos phi, 0), d3 = e3 |
+//! | (d) | tip | all rods meet in one point, unless `joined = false` |
+//! | (e) | tip | the forces of all rods sum up to the tip force, zero by default |
+//!
+//! with phi_n = -pi/3 + 2 pi n/(3N), n = 1..N. (This fan is not symmetric about
+//! e1, which is why the paper's leaves bend sideways; `fan = "symmetric"` is.)
+//!
+//! # Units
+//!
+//! A scenario may be in any consistent units, and results come in the same.
+//! Inside, lengths are in units of the longest rod L, forces in A/L^2, moments
+//! and energies in A/L, where A is the mean bending stiffness
+//! ([`leaf::Scale`]): no threshold depends on the units. The paper's own
+//! scaling, lengths by L0, forces by H0, moments by A0/L0, leaves the equations
+//! above in their form only if H0 L0^2/A0 = 1; `scenarios/paper` is written so.
 //!
 //! # From the equations to the answer
 //!
-//! 1. [`scenario`]: TOML as written becomes a checked [`scenario::Scenario`].
-//! 2. [`rod`]: a segment between two nodes with positions and unit quaternions,
-//!    oriented by their geodesic midpoint: the implicit midpoint rule on the
-//!    equations above, and at the same time the minimum of a discrete energy.
-//!    The segment's force is an unknown of its own and condensed out, so that
-//!    stiffness in stretch and shear, up to inextensible, costs nothing.
-//! 3. [`leaf`]: N rods, their coupling, loads and joint tip; the linear algebra
-//!    follows that structure: every rod's chain is factorised in linear time and
-//!    conjugate gradients account for the coupling.
-//! 4. [`relax`]: damped motion in linearly implicit steps that turn into
-//!    Newton's method; nested grids whose error is a clean series in ds^2, which
-//!    is extrapolated and tells the error; the Morse index, and the way off a
-//!    saddle.
-//! 5. [`output`]: summary, table and figure.
+//! **The element** ([`rod`], [`rotation`]). Positions and unit quaternions live
+//! at the nodes of a [`leaf::Grid`]. Each segment is oriented by the geodesic
+//! midpoint of its two nodal rotations and has an energy in the strains
+//! v = R^T (x1 - x0)/ds and u = log(q0^* q1)/ds. Its minimum is the implicit
+//! midpoint rule on eqs (1) to (6). The force each segment carries is an unknown of
+//! its own (the mixed form), eliminated again segment by segment, so that
+//! Newton's method does not feel how stiff a rod is in stretch and shear.
 //!
-//! Nothing in this list knows of what comes after it.
+//! **The leaf** ([`leaf`]). All last nodes are one shared point: the tip cannot
+//! open, and needs neither penalty nor multiplier. Gravity and coupling act at
+//! the nodes. Newton's equations are solved rod by rod: every rod's own chain of
+//! 6 x 6 blocks is factorised in linear time, and conjugate gradients account
+//! for the coupling. A sparse direct factorisation of the whole stands by for
+//! what is not positive definite.
+//!
+//! **The relaxation** ([`relax`]). Joined leaves start from circular arcs that
+//! meet in a point, free rods from their rest shapes, and move: linearly
+//! implicit Euler steps of a damped motion. While the energy has a direction of
+//! negative curvature, the time step is kept short enough to follow the motion;
+//! otherwise it grows until the step is Newton's.
+//!
+//! **Grids and the error** ([`relax::relax`]). The element is symmetric and its
+//! conditions hold exactly at nodes, so that its error is a series in even
+//! powers of ds. The leaf settles on 8 segments a rod, then on 16, 32, ... each
+//! started from the one before, and Richardson extrapolation removes one term
+//! of the series with every grid. The last correction, times a safety factor
+//! that falls as the corrections do, is the error estimate
+//! ([`relax::Equilibrium::error_estimate`]); what is left of unfinished
+//! iterations and of rounding is added. Grids are refined until it is below the
+//! tolerance. A column of the table that does not show its order is not
+//! extrapolated. Kinks of a profile are nodes of every grid.
+//!
+//! **Stability** ([`relax::Equilibrium::stable`]). The Hessian of the energy at
+//! rest is factorised as L D L^T; the negative pivots number its negative
+//! eigenvalues, the Morse index. Index zero means: stable. A leaf that
+//! rests at a saddle is pushed off along its unstable mode and relaxed on; what
+//! was met is told ([`relax::Equilibrium::saddle`]). How a run ended is one of a
+//! few words, [`relax::Outcome`].
+//!
+//! # Layout
+//!
+//! [`scenario`] (TOML to a checked [`scenario::Scenario`]) and [`rotation`],
+//! [`rod`], [`leaf`], [`relax`], [`output`] (summary, table, figure): each
+//! module uses those named before it and knows nothing of those after it.
+
+#![warn(missing_docs)]
 
 pub mod leaf;
 pub mod output;

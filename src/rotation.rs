@@ -35,7 +35,7 @@ pub fn log(q: DQuat) -> DVec3 {
     Relative::of(q).psi
 }
 
-/// The matrix [a] with [a] b = a x b.
+/// The matrix \[a\] with \[a\] b = a x b.
 #[inline]
 pub fn cross_matrix(a: DVec3) -> DMat3 {
     DMat3::from_cols(

@@ -10,71 +10,118 @@ use super::key::Key;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScenarioError {
+    /// The file cannot be read.
     #[error("{}: cannot be read: {reason}", path.display())]
     Unreadable {
+        /// The file.
         path: PathBuf,
+        /// What the system says.
         reason: std::io::Error,
     },
 
+    /// A folder was named where a file is needed.
     #[error("{}: is a folder: give the TOML file itself", path.display())]
-    Folder { path: PathBuf },
+    Folder {
+        /// The folder.
+        path: PathBuf,
+    },
 
+    /// The file is too large to be a scenario.
     #[error("{}: is larger than {limit} bytes: this is no scenario", path.display())]
-    TooLarge { path: PathBuf, limit: u64 },
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Most bytes that are read.
+        limit: u64,
+    },
 
+    /// The file is not text.
     #[error(
         "{file}:{line}: is not text in UTF-8: byte {offset} is 0x{byte:02x}: save the file as UTF-8"
     )]
     NotUtf8 {
+        /// The file.
         file: String,
+        /// Line of the first byte that is wrong, counted from 1.
         line: usize,
+        /// Its place in the file.
         offset: usize,
+        /// The byte.
         byte: u8,
     },
 
+    /// The text is not TOML.
     #[error("{place}: not valid TOML: {message}{snippet}")]
     Syntax {
+        /// Where.
         place: Place,
+        /// What the TOML parser says.
         message: String,
+        /// The line with a caret below, or nothing.
         snippet: String,
     },
 
+    /// A key the format does not have.
     #[error("{place}: unknown key {key}{}: allowed here: {}{snippet}", did_you_mean(*meant), allowed.join(", "))]
     UnknownKey {
+        /// Where.
         place: Place,
+        /// The key as written, with its table.
         key: String,
+        /// The key that was probably meant.
         meant: Option<&'static str>,
+        /// Every key allowed there.
         allowed: Vec<&'static str>,
+        /// The line with a caret below, or nothing.
         snippet: String,
     },
 
+    /// A value where the format has a table.
     #[error(
         "{place}: {table} = {found}: must be a table: write [{table}] on a line of its own, below it {}",
         allowed.join(", ")
     )]
     NotATable {
+        /// Where.
         place: Place,
+        /// Name of the table.
         table: &'static str,
+        /// The value as written.
         found: String,
+        /// The keys of that table.
         allowed: Vec<&'static str>,
     },
 
+    /// An override without an equals sign.
     #[error("--set {given}: must be KEY=VALUE, e.g. --set load.gravity=[0,0,-0.5]")]
-    NotAnOverride { given: String },
+    NotAnOverride {
+        /// The override as given.
+        given: String,
+    },
 
+    /// A key that must be there is not.
     #[error("{file}: {} is missing: {}", key.path(), how_to_add(*key, *has_table))]
     Missing {
+        /// The file.
         file: String,
+        /// The key.
         key: Key,
+        /// Whether the file has the key's table.
         has_table: bool,
     },
 
+    /// A value that is not allowed.
     #[error("{place}: {}{spot} = {found}: {problem}", key.path())]
     Value {
+        /// Where.
         place: Place,
+        /// The key.
         key: Key,
+        /// Which part of its value.
         spot: Spot,
+        /// That part as written.
         found: String,
+        /// What is wrong with it.
         problem: Box<Problem>,
     },
 }
@@ -83,9 +130,17 @@ pub enum ScenarioError {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Place {
     /// In a file; lines count from 1.
-    Line { file: String, line: usize },
+    Line {
+        /// The file.
+        file: String,
+        /// The line.
+        line: usize,
+    },
     /// On the command line.
-    Set { given: String },
+    Set {
+        /// The whole `KEY=VALUE`.
+        given: String,
+    },
 }
 
 impl fmt::Display for Place {
@@ -100,6 +155,7 @@ impl fmt::Display for Place {
 /// Which part of a value; indices count from 0 here and from 1 in the text.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Spot {
+    /// All of it.
     Whole,
     /// Entry of a list.
     Entry(usize),
@@ -129,67 +185,125 @@ impl fmt::Display for Spot {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Problem {
+    /// Another kind of value is needed.
     #[error("must be {needed}")]
-    WrongType { needed: Needed },
+    WrongType {
+        /// The kind needed.
+        needed: Needed,
+    },
+    /// NaN, or infinite where no key is.
     #[error("must be a finite number")]
     NotFinite,
+    /// Infinite where only some stiffnesses may be.
     #[error(
         "must be a finite number; inf (rigid) is allowed for stiffness.axial, shear_2 and shear_3 only, not in a profile"
     )]
     Infinite,
+    /// Beyond double precision.
     #[error("is not a number a computer can hold (the largest is 1.8e308)")]
     Overflow,
+    /// Zero or negative.
     #[error("must be greater than 0")]
     NotPositive,
+    /// Negative.
     #[error("must not be negative")]
     Negative,
+    /// So large or small that products of it would overflow.
     #[error("must lie between {least:e} and {most:e}: choose other units", least = super::check::MAGNITUDES.0, most = super::check::MAGNITUDES.1)]
     Magnitude,
+    /// Not a number of rods.
     #[error("must be a whole number from 1 to {most}, without a decimal point")]
-    Rods { most: usize },
+    Rods {
+        /// Most rods allowed.
+        most: usize,
+    },
+    /// A list of the wrong length.
     #[error("has {found} entries: must have {needed}, {because}")]
     Entries {
+        /// Entries it has.
         found: usize,
+        /// Entries it must have.
         needed: usize,
+        /// Why so many.
         because: Because,
     },
+    /// A profile with fewer than two knots.
     #[error("at least two knots are needed, the first at 0 and the last at 1")]
     TooFewKnots,
+    /// A profile that does not start at 0.
     #[error("must start at 0 (the base)")]
     FirstKnot,
+    /// A profile that does not end at 1.
     #[error("must end at 1 (the tip)")]
     LastKnot,
+    /// A knot that is not beyond the one before.
     #[error(
         "must be greater than the entry before it, {before}: knots rise strictly (write a step as a steep ramp)"
     )]
-    KnotsNotRising { before: f64 },
+    KnotsNotRising {
+        /// The knot before.
+        before: f64,
+    },
+    /// A key that profiles do not have.
     #[error("unknown key {key}: a profile is {{ at = [0.0, 1.0], value = [1.0, 0.5] }}")]
-    ProfileKey { key: String },
+    ProfileKey {
+        /// The key as written.
+        key: String,
+    },
+    /// A profile without one of its two keys.
     #[error("{key} is missing: a profile is {{ at = [0.0, 1.0], value = [1.0, 0.5] }}")]
-    ProfileWithout { key: &'static str },
+    ProfileWithout {
+        /// The key that is missing.
+        key: &'static str,
+    },
+    /// Not a fan.
     #[error(
         "must be \"paper\" or \"symmetric\", or a list of {rods} angles in radians, one per rod"
     )]
-    Fan { rods: usize },
+    Fan {
+        /// Number of rods.
+        rods: usize,
+    },
+    /// A name that cannot be a folder.
     #[error(
         "must be usable as a folder name: 1 to {most} letters, digits and the signs _ - . + with a letter, digit or _ first"
     )]
-    Name { most: usize },
+    Name {
+        /// Most bytes allowed.
+        most: usize,
+    },
+    /// A tip moment on more than one rod.
     #[error("a moment at the tip needs leaf.rods = 1 (here {rods}): joined tips pass on no moment")]
-    MomentOnManyRods { rods: usize },
+    MomentOnManyRods {
+        /// Number of rods.
+        rods: usize,
+    },
+    /// A tolerance that is no accuracy.
     #[error(
         "must be greater than 0 and at most {most}: it is the error of the centerlines relative to the length of a rod"
     )]
-    Tolerance { most: f64 },
+    Tolerance {
+        /// Largest tolerance allowed.
+        most: f64,
+    },
+    /// A tolerance below what double precision carries.
     #[error(
         "must be at least {least:e}: double precision carries 16 digits, and rounding in the solve takes about four of them"
     )]
-    ToleranceTooSmall { least: f64 },
+    ToleranceTooSmall {
+        /// Smallest tolerance allowed.
+        least: f64,
+    },
+    /// Beyond what several values together allow.
     #[error("gives {formula} = {value:.3e}, the limit is {limit:e}: {because}")]
     Limit {
+        /// The number that is limited, free of units.
         formula: &'static str,
+        /// Its value.
         value: f64,
+        /// Its limit.
         limit: f64,
+        /// What the symbols mean, why there is a limit, and what to change.
         because: &'static str,
     },
 }
@@ -197,9 +311,13 @@ pub enum Problem {
 /// Kinds of value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Needed {
+    /// A number.
     Number,
+    /// Text.
     Text,
+    /// True or false.
     TrueOrFalse,
+    /// Three numbers.
     Vector,
     /// Number, list or profile, for this many rods.
     Quantity(usize),
@@ -207,6 +325,7 @@ pub enum Needed {
     LengthOf(usize),
     /// Number or list, for this many gaps.
     PerGap(usize),
+    /// Any list of numbers.
     ListOfNumbers,
     /// The `value` of a profile: numbers, or one list per rod.
     ProfileValue(usize),
@@ -242,9 +361,13 @@ impl fmt::Display for Needed {
 /// Why a list must have so many entries.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Because {
+    /// One entry per rod.
     OnePerRod,
+    /// One entry per gap between neighbouring rods.
     OnePerGap,
+    /// One value per knot of a profile.
     OnePerKnot,
+    /// One entry per lab axis.
     Axes,
 }
 

@@ -4,26 +4,47 @@
 /// A key of the scenario format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Key {
+    /// `name`: the leaf's name.
     Name,
+    /// `leaf.rods`: number of rods.
     Rods,
+    /// `leaf.length`: lengths.
     Length,
+    /// `leaf.fan`: base angles.
     Fan,
+    /// `leaf.joined`: whether the tips share one point.
     Joined,
+    /// `stiffness.torsion`: A1.
     Torsion,
+    /// `stiffness.bending_2`: A2.
     Bending2,
+    /// `stiffness.bending_3`: A3.
     Bending3,
+    /// `stiffness.axial`: H1.
     Axial,
+    /// `stiffness.shear_2`: H2.
     Shear2,
+    /// `stiffness.shear_3`: H3.
     Shear3,
+    /// `rest.twist`: u0 about d1.
     RestTwist,
+    /// `rest.bend_2`: u0 about d2.
     RestBend2,
+    /// `rest.bend_3`: u0 about d3.
     RestBend3,
+    /// `coupling.x`: coupling along e1.
     CouplingX,
+    /// `coupling.y`: coupling along e2.
     CouplingY,
+    /// `coupling.z`: coupling along e3.
     CouplingZ,
+    /// `load.gravity`: force per unit length.
     Gravity,
+    /// `load.tip_force`: dead force.
     TipForce,
+    /// `load.tip_moment`: dead moment, one rod only.
     TipMoment,
+    /// `solve.tolerance`: wanted accuracy.
     Tolerance,
 }
 
