@@ -10,6 +10,9 @@ use glam::{DQuat, DVec3};
 /// ones lose the soft modes to rounding, smaller ones cost iterations.
 const CONDENSING_STIFFNESS: f64 = 1e7;
 
+/// But never with less than this, in units of the mean A/L^2.
+const LEAST_CONDENSING: f64 = 1e5;
+
 /// Units in which a [`Leaf`] is dimensionless: lengths in units of `length`,
 /// couple stiffnesses in units of `stiffness`, hence forces in A/L^2, moments
 /// and energies in A/L and A/L.
@@ -143,7 +146,7 @@ impl<'a> Leaf<'a> {
             compliance: (at(&rod.force_stiffness) / self.scale.force()).recip(),
             condensing: DVec3::ZERO,
         }
-        .condense(CONDENSING_STIFFNESS * self.softest)
+        .condense((CONDENSING_STIFFNESS * self.softest).max(LEAST_CONDENSING))
     }
 
     /// Coupling of gap `g` between rods g and g + 1: force per unit
