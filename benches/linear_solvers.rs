@@ -130,7 +130,7 @@ fn compare_solvers(rods: usize) {
     }
     let direct = numeric.0 + solve.0;
     println!(
-        "{rods:5} | {:7.0} {:6.0} ({:2}) {:6.0} ({:2}) | {:8.0} {:8.0} {:6.0} | {:6.1} {:6.1}",
+        "| {rods:2} | {:.0} | {:.0} ({}) | {:.0} ({}) | {:.0} | {:.0} | {:.0} | {:.1} | {:.1} |",
         parts.factor.microseconds(),
         parts.loose.microseconds(),
         parts.loose_iterations,
@@ -195,15 +195,19 @@ fn share_out(rods: usize) {
     }
     let rest = total.0 - assembly - factor - solves - advance;
     let percent = |part: f64| 100.0 * part / total.0;
+    let steps: Vec<String> = steps
+        .iter()
+        .map(|(segments, steps)| format!("{steps} on {segments}"))
+        .collect();
     println!(
-        "{rods:5} | {:8.3} | {:7.0}% {:7.0}% {:7.0}% {:7.0}% {:7.0}% | {:?}",
+        "| {rods:2} | {:.2} | {:.0}% | {:.0}% | {:.0}% | {:.0}% | {:.0}% | {} |",
         1e3 * total.0,
         percent(assembly),
         percent(factor),
         percent(solves),
         percent(advance),
         percent(rest),
-        steps,
+        steps.join(", "),
     );
 }
 
@@ -214,11 +218,14 @@ fn main() {
         .expect("no thread pool was built before");
 
     println!("One Newton equation of Fig. 4's leaf on {SEGMENTS} segments a rod; microseconds.");
-    println!("Rod by rod: factorisation; conjugate gradients to 1e-3, to 1e-10 (iterations).");
-    println!("All at once: ordering and symbolic part; numeric part; solution.");
-    println!("Ratio: (numeric part + solution) / (factorisation + gradients), to 1e-3, to 1e-10.");
+    println!("Rod by rod: factorisation, then conjugate gradients (iterations). Direct: order and");
+    println!("symbolic part, numeric factorisation, solution. Ratios: direct without the symbolic");
+    println!("part over rod by rod, each with its factorisation.");
     println!();
-    println!(" rods |  factor   1e-3        1e-10     | symbolic  numeric  solve |  1e-3   1e-10");
+    println!(
+        "| N | rods: factorise | to 1e-3 | to 1e-10 | direct: order | factorise | solve | ratio at 1e-3 | at 1e-10 |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     for rods in RODS {
         compare_solvers(rods);
     }
@@ -229,8 +236,9 @@ fn main() {
     println!("The rest is setting up, prolongation, extrapolation and reporting.");
     println!();
     println!(
-        " rods |  run, ms | assembly   factor   solves   update     rest | steps on each grid"
+        "| N | run, ms | assembly | factorisation | solves | update | the rest | steps on grids of segments |"
     );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
     for rods in RODS {
         share_out(rods);
     }
