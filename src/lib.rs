@@ -37,8 +37,7 @@
 //! them. The model, the numbers of equations and figures used throughout this
 //! crate, and the leaves in `scenarios/paper` are those of the paper that
 //! proposed it for orchids of the genus *Epipactis* and solved its equations
-//! with scipy's `solve_bvp`
-//! ([doi:10.1007/s10441-020-09397-6](https://doi.org/10.1007/s10441-020-09397-6)).
+//! with scipy's `solve_bvp`.
 //!
 //! A rod is a curve r(s), 0 <= s <= L, with a frame of directors
 //! R = \[d1 d2 d3\]; d1 points along the unstrained rod, d2 lies in the plane of
