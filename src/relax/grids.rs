@@ -105,6 +105,7 @@ pub fn relax(
         index: None,
         remaining: 0.0,
         spent: 0,
+        pushes: 0,
     };
     let end = run.solve(Grid::new(first, leaf.kinks()));
     let (outcome, remark) = run.judge(end);
@@ -162,6 +163,8 @@ pub(super) struct Run<'a, 'o> {
     pub remaining: f64,
     /// Nodes times force evaluations so far.
     spent: usize,
+    /// Saddles left that were only noticed by their index.
+    pushes: i32,
 }
 
 impl<'a> Run<'a, '_> {
@@ -378,6 +381,11 @@ impl<'a> Run<'a, '_> {
             return Ok(());
         };
         self.saddle = Some(saddle_of(&level.leaf, &level.state, index));
+        self.pushes += 1;
+        if self.pushes > MAX_SADDLES {
+            self.levels.push(level);
+            return Err(Some(Settled::StepLimit));
+        }
         let mut state = level.state;
         saddle::push_off(&level.leaf, &mut state, &mut system, &mut self.work);
         let (level, settled, _) = self.settle(level.leaf.grid.clone(), From::Pushed(state));
@@ -405,7 +413,6 @@ impl<'a> Run<'a, '_> {
                     false => "a dead moment has no potential, so that no count of eigenvalues decides stability: it is not stated".into(),
                 }),
             ),
-            End::NotAccurate if self.options.segments.is_some() => unreachable!("a fixed grid is accurate"),
             End::NotAccurate => (
                 Outcome::ToleranceNotReached,
                 Some(format!(
