@@ -135,9 +135,11 @@
 
 #![warn(missing_docs)]
 
+pub mod bvp;
 pub mod leaf;
 pub mod output;
 pub mod relax;
 pub mod rod;
 pub mod rotation;
 pub mod scenario;
+pub mod shape;

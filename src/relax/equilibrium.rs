@@ -1,6 +1,7 @@
 //! What a relaxation returns: the shape, and everything that judges it.
 
-use glam::{DQuat, DVec3};
+use crate::shape::RodShape;
+use glam::DVec3;
 
 /// How a run ended: one word per way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,33 +66,6 @@ pub struct Saddle {
     pub negative_eigenvalues: usize,
     /// Position of the joint tip, or of the first rod's.
     pub tip: DVec3,
-}
-
-/// The state of one rod at one station. Strains and stress resultants are
-/// components along the directors (d1, d2, d3).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NodeState {
-    /// Centerline r.
-    pub position: DVec3,
-    /// Directors as a unit quaternion, w >= 0 at the base: R e_i = d_i.
-    pub rotation: DQuat,
-    /// Stretch and shears v = R^T r'.
-    pub v: DVec3,
-    /// Twist and bends u.
-    pub u: DVec3,
-    /// Stress resultant n (axial force, shear forces).
-    pub n: DVec3,
-    /// Stress couple m (twisting moment, bending moments).
-    pub m: DVec3,
-}
-
-/// One rod at rest.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RodShape {
-    /// Reference length.
-    pub length: f64,
-    /// One state per station.
-    pub nodes: Vec<NodeState>,
 }
 
 /// A leaf at rest (or as far as it came), in the units of its scenario.

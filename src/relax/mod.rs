@@ -13,7 +13,8 @@ mod semi_implicit;
 mod shape;
 mod start;
 
-pub use equilibrium::{Equilibrium, NodeState, Outcome, RodShape, Saddle, Work};
+pub use crate::shape::{NodeState, RodShape};
+pub use equilibrium::{Equilibrium, Outcome, Saddle, Work};
 pub use grids::relax;
 pub use options::{Method, Options, Progress, RelaxError};
 pub use start::start;

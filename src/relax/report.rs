@@ -1,10 +1,11 @@
 //! From the settled grids to the result in the units of the scenario.
 
 use crate::leaf::DiscreteLeaf;
-use crate::relax::equilibrium::{Equilibrium, NodeState, Outcome, RodShape};
+use crate::relax::equilibrium::{Equilibrium, Outcome};
 use crate::relax::grids::{Level, Run};
 use crate::relax::richardson::Richardson;
 use crate::relax::shape;
+use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};
 
 /// Positions of all rods at every `stride`-th node, dimensionless.

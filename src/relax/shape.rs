@@ -1,7 +1,7 @@
 //! Strains and stress resultants at the nodes of a state.
 
 use crate::leaf::{DiscreteLeaf, State};
-use crate::relax::equilibrium::NodeState;
+use crate::shape::NodeState;
 use glam::DVec3;
 
 /// The state of node `i` of rod `j`, dimensionless.

@@ -1,0 +1,170 @@
+//! A boundary-value solution without a start from elsewhere: from the leaf
+//! that rests in arcs, whose solution is known, by continuation to the
+//! scenario's.
+
+use super::dop853::Unbounded;
+use super::equations::Equations;
+use super::newton::{Newton, Work};
+use super::solution::Reason;
+use super::trajectory::Trajectory;
+
+/// Accuracy along the way.
+const ROUGH: f64 = 1e-6;
+
+/// Smallest part of the way made at once.
+const LEAST_STEP: f64 = 1e-4;
+
+/// Stations at which a solution is kept for the next one to start from, per
+/// interval.
+const STATIONS: usize = 4;
+
+/// Over many short intervals, Newton's method converges from further away.
+/// Rotation over one of them, in radians, and how many there are.
+const TURN: f64 = 0.3;
+const LEAST_INTERVALS: usize = 8;
+const MOST_INTERVALS: usize = 256;
+
+/// A way that ended before the scenario's leaf was reached.
+pub struct Lost {
+    /// Why.
+    pub reason: Reason,
+    /// How much of the way was made.
+    pub part: f64,
+    /// The last solution on it.
+    pub near: Trajectory,
+}
+
+/// Ways from the arcs' leaf to the scenario's, in the order they are tried.
+/// The last one may come out far from where it began.
+const WAYS: [Way; 3] = [
+    Way {
+        stiff: false,
+        far: false,
+    },
+    Way {
+        stiff: true,
+        far: false,
+    },
+    Way {
+        stiff: false,
+        far: true,
+    },
+];
+
+#[derive(Clone, Copy)]
+struct Way {
+    /// Over rods that are at first as stiff in all directions as in the stiffest.
+    stiff: bool,
+    /// Whether Newton's method may go far in one step.
+    far: bool,
+}
+
+/// Follows the equilibrium from the arcs' leaf to the scenario's. Returns a
+/// trajectory near the solution.
+pub fn from_arcs(
+    equations: &mut Equations,
+    intervals: Option<usize>,
+    work: &mut Work,
+) -> Result<Trajectory, Lost> {
+    let mut first = None;
+    for way in WAYS {
+        match way.follow(equations, intervals, work) {
+            Ok(near) => return Ok(near),
+            Err(failure) => first = first.or(Some(failure)),
+        }
+    }
+    Err(first.expect("there is a way"))
+}
+
+impl Way {
+    fn follow(
+        self,
+        equations: &mut Equations,
+        intervals: Option<usize>,
+        work: &mut Work,
+    ) -> Result<Trajectory, Lost> {
+        equations.part = 0.0;
+        equations.softened = if self.stiff { 0.0 } else { 1.0 };
+        let unstressed = Trajectory::unstressed(equations, ROUGH);
+        let mut near = unstressed.map_err(|error| Lost {
+            reason: unbounded(error),
+            part: 0.0,
+            near: Trajectory::straight(equations),
+        })?;
+        let stages: &[Stage] = match self.stiff {
+            true => &[
+                |equations, part| equations.part = part,
+                |equations, part| {
+                    equations.softened = part;
+                },
+            ],
+            false => &[|equations, part| equations.part = part],
+        };
+        for stage in stages {
+            near = self.go(*stage, equations, near, intervals, work)?;
+        }
+        Ok(near)
+    }
+
+    /// Goes one stage, trying all of it first.
+    fn go(
+        self,
+        stage: Stage,
+        equations: &mut Equations,
+        mut near: Trajectory,
+        intervals: Option<usize>,
+        work: &mut Work,
+    ) -> Result<Trajectory, Lost> {
+        let (mut part, mut step) = (0.0, 1.0);
+        let mut before: Option<(Trajectory, f64)> = None;
+        while part < 1.0 {
+            let next = if step >= 1.0 - part { 1.0 } else { part + step };
+            stage(equations, next);
+            let predicted = match &before {
+                Some((earlier, at)) => near.beyond(equations, earlier, (next - part) / (part - at)),
+                None => near.clone(),
+            };
+            match self.solve_near(equations, &predicted, intervals, work) {
+                Ok(trajectory) => {
+                    before = Some((std::mem::replace(&mut near, trajectory), part));
+                    part = next;
+                    step *= 2.0;
+                }
+                Err(_) if step > LEAST_STEP => step *= 0.5,
+                Err(reason) => {
+                    return Err(Lost { reason, part, near });
+                }
+            }
+        }
+        Ok(near)
+    }
+
+    /// The solution near a trajectory.
+    fn solve_near(
+        self,
+        equations: &Equations,
+        near: &Trajectory,
+        intervals: Option<usize>,
+        work: &mut Work,
+    ) -> Result<Trajectory, Reason> {
+        let count = intervals.unwrap_or_else(|| {
+            let turns = (near.turn(equations) / TURN).ceil() as usize;
+            turns.clamp(LEAST_INTERVALS, MOST_INTERVALS)
+        });
+        let mut newton = Newton::near(equations, near, Some(count));
+        newton.only_near = !self.far;
+        let solved = newton.solve(ROUGH);
+        work.add(newton.work);
+        solved.map_err(|stuck| newton.reason(stuck))?;
+        let stations = STATIONS * count.max(LEAST_INTERVALS);
+        let stations: Vec<f64> = (0..=stations).map(|i| i as f64 / stations as f64).collect();
+        Trajectory::sampled(equations, &newton.nodes, &stations, ROUGH).map_err(unbounded)
+    }
+}
+
+/// What is changed from 0 to 1 along a stage.
+type Stage = fn(&mut Equations, f64);
+
+fn unbounded(Unbounded { sigma }: Unbounded) -> Reason {
+    Reason::Unbounded { sigma }
+}

@@ -1,0 +1,218 @@
+//! Initial-value problems by the method DOP853 with step control.
+
+use super::equations::{Equations, RodState, STATE};
+use super::tableau::{A, B, C, E3, E5, STAGES};
+
+/// Steps of one initial-value problem before it is given up.
+const MAX_STEPS: usize = 20_000;
+
+/// A solution that has grown beyond this is not bounded.
+const MAX_STATE: f64 = 1e9;
+
+/// Longest step, in units of the length over which a perturbation grows or
+/// turns. Where the leaf is straight its own error would allow any step, and
+/// the sensitivities, integrated by the same steps, would suffer.
+const LONGEST_STEP: f64 = 0.4;
+
+/// The solution of an initial-value problem could not be continued beyond
+/// `sigma`: it grows out of all bounds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unbounded {
+    /// How far it went.
+    pub sigma: f64,
+}
+
+/// An initial-value problem on its way from one sigma to the next.
+pub struct Integrator<'e, 'a> {
+    equations: &'e Equations<'a>,
+    tolerance: f64,
+    /// Where it is.
+    pub sigma: f64,
+    /// The state there.
+    pub y: Vec<f64>,
+    /// Size of the next step.
+    step: f64,
+    /// Width of the last step.
+    pub width: f64,
+    /// States at the stages of the last step.
+    pub stages: Vec<Vec<f64>>,
+    slopes: Vec<Vec<f64>>,
+    next: Vec<f64>,
+    steps: usize,
+    /// Slopes evaluated so far.
+    pub evaluations: usize,
+}
+
+impl<'e, 'a> Integrator<'e, 'a> {
+    /// Starts at `sigma` with the state `y`; local errors of the dimensionless
+    /// state are kept below `tolerance` per step.
+    pub fn new(equations: &'e Equations<'a>, sigma: f64, y: Vec<f64>, tolerance: f64) -> Self {
+        let blank = || vec![vec![0.0; y.len()]; STAGES];
+        let mut integrator = Integrator {
+            equations,
+            tolerance,
+            sigma,
+            step: 0.0,
+            width: 0.0,
+            stages: blank(),
+            slopes: blank(),
+            next: y.clone(),
+            y,
+            steps: 0,
+            evaluations: 1,
+        };
+        equations.slopes(sigma, &integrator.y, &mut integrator.slopes[0]);
+        integrator.step = 0.1 * tolerance.powf(0.125) / integrator.slope().max(1e-3);
+        integrator
+    }
+
+    /// Largest slope relative to the size of its unknown.
+    fn slope(&self) -> f64 {
+        norm(self.equations, &self.y, &self.y, |i| self.slopes[0][i])
+    }
+
+    /// Bound on the step by what perturbations do: a rod under the axial force
+    /// T bends with the wavenumber sqrt(T/A).
+    fn longest_step(&self) -> f64 {
+        let rate = (0..self.equations.rods())
+            .map(|j| {
+                let force = RodState::read(&self.y, j).n.length();
+                self.equations.rod_length(j) * (force / self.equations.softest(j)).sqrt()
+            })
+            .fold(1.0, f64::max);
+        LONGEST_STEP / rate
+    }
+
+    /// Whether there is still a way to go to `until`.
+    pub fn before(&self, until: f64) -> bool {
+        self.sigma < until
+    }
+
+    /// One step towards `until`, never beyond it.
+    pub fn step(&mut self, until: f64) -> Result<(), Unbounded> {
+        let failed = Unbounded { sigma: self.sigma };
+        loop {
+            self.steps += 1;
+            let left = until - self.sigma;
+            // A rest too small for a step of its own is joined to this one.
+            let step = self.step.min(self.longest_step());
+            let last = step > 0.99 * left;
+            let h = if last { left } else { step };
+            if self.steps > MAX_STEPS || h < 1e-13 {
+                return Err(failed);
+            }
+            self.attempt(h);
+            let error = self.error(h);
+            let bounded = self.next[..self.next.len() - 1]
+                .iter()
+                .all(|value| value.abs() < MAX_STATE);
+            if !bounded || !error.is_finite() {
+                self.step = 0.1 * h;
+                continue;
+            }
+            let factor = 0.9 * error.max(1e-16).powf(-0.125);
+            if error > 1.0 {
+                self.step = h * factor.clamp(0.1, 0.9);
+                continue;
+            }
+            let proposed = h * factor.clamp(0.2, 5.0);
+            // A step cut short by `until` says little about the next.
+            self.step = if last {
+                self.step.max(proposed)
+            } else {
+                proposed
+            };
+            self.width = h;
+            self.sigma = if last { until } else { self.sigma + h };
+            self.accept();
+            return Ok(());
+        }
+    }
+
+    /// All stages and the result of a step, not yet accepted.
+    fn attempt(&mut self, h: f64) {
+        self.stages[0].copy_from_slice(&self.y);
+        for i in 1..STAGES {
+            let (before, after) = self.slopes.split_at_mut(i);
+            combine(&self.y, h, &A[i][..i], before, &mut self.stages[i]);
+            let sigma = self.sigma + C[i] * h;
+            self.equations.slopes(sigma, &self.stages[i], &mut after[0]);
+        }
+        self.evaluations += STAGES - 1;
+        combine(&self.y, h, &B, &self.slopes, &mut self.next);
+    }
+
+    /// Error of the attempted step over the tolerance.
+    fn error(&self, h: f64) -> f64 {
+        let weighted = |weights: &[f64; STAGES]| {
+            norm(self.equations, &self.y, &self.next, |i| {
+                let sum: f64 = weights
+                    .iter()
+                    .zip(&self.slopes)
+                    .map(|(weight, slopes)| weight * slopes[i])
+                    .sum();
+                h * sum
+            })
+        };
+        let (fifth, third) = (weighted(&E5), weighted(&E3));
+        if fifth == 0.0 {
+            return 0.0;
+        }
+        fifth * fifth / (fifth * fifth + 0.01 * third * third).sqrt() / self.tolerance
+    }
+
+    /// Moves on, with the quaternions at unit length again.
+    fn accept(&mut self) {
+        std::mem::swap(&mut self.y, &mut self.next);
+        for j in 0..self.equations.rods() {
+            RodState::read(&self.y, j).write(&mut self.y, j);
+        }
+        self.equations
+            .slopes(self.sigma, &self.y, &mut self.slopes[0]);
+        self.evaluations += 1;
+    }
+}
+
+/// y + h sum of weights times slopes.
+fn combine(y: &[f64], h: f64, weights: &[f64], slopes: &[Vec<f64>], result: &mut [f64]) {
+    result.copy_from_slice(y);
+    for (weight, slopes) in weights.iter().zip(slopes) {
+        if *weight != 0.0 {
+            for (sum, slope) in result.iter_mut().zip(slopes) {
+                *sum += h * weight * slope;
+            }
+        }
+    }
+}
+
+/// Root mean square of a rod's numbers, the largest of all rods. Positions and
+/// rotations count as they are; moments in units of what bends the softest
+/// direction by one radian, unless they are larger; forces likewise.
+fn norm(equations: &Equations, y: &[f64], next: &[f64], value: impl Fn(usize) -> f64) -> f64 {
+    let mut largest: f64 = 0.0;
+    for j in 0..equations.rods() {
+        let (a, b) = (RodState::read(y, j), RodState::read(next, j));
+        let soft = equations.softest(j);
+        let unit = |a: glam::DVec3, b: glam::DVec3| soft + a.length().max(b.length());
+        let (force, moment) = (unit(a.n, b.n), unit(a.m, b.m));
+        let sum: f64 = (0..STATE)
+            .map(|i| {
+                let scale = match i {
+                    0..7 => 1.0,
+                    7..10 => force,
+                    _ => moment,
+                };
+                (value(STATE * j + i) / scale).powi(2)
+            })
+            .sum();
+        // Not f64::max, which would hide a NaN.
+        let rms = (sum / STATE as f64).sqrt();
+        if rms.is_nan() || rms > largest {
+            largest = rms;
+        }
+        if largest.is_nan() {
+            return largest;
+        }
+    }
+    largest
+}

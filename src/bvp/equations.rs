@@ -1,0 +1,343 @@
+//! The equilibrium equations of the paper as a system of ordinary differential
+//! equations in sigma = s/L, for all rods at once.
+//!
+//! With the orientation as a unit quaternion q instead of nine director
+//! components there are 13 N unknown functions where the paper has 18 N. Force
+//! and moment are carried by their components along the lab axes, in which
+//! eqs (1) and (2) have no derivatives of directors:
+//!
+//! ```text
+//! r' = L R v,   q' = L/2 (R u) q,   n' = -L f,   m' = n x r'
+//! v = e1 + H^-1 R^T n,   u = u0 + A^-1 R^T m                      eqs (5) (6)
+//! ```
+
+use glam::{DMat3, DQuat, DVec3};
+
+use super::arcs::{self, Arc};
+use crate::scenario::{Profile, Scenario};
+
+/// Numbers that describe one rod at one sigma: r, q (x, y, z, w), n, m.
+pub const STATE: usize = 13;
+
+/// Numbers that describe its perturbation: displacement, spatial rotation,
+/// and the changes of n and m.
+pub const TANGENT: usize = 12;
+
+/// The boundary-value problem of a leaf, dimensionless.
+///
+/// A flat state holds [`STATE`] numbers per rod and, last, the potential
+/// energy of everything from the base up to sigma.
+#[derive(Clone, Debug)]
+pub struct Equations<'a> {
+    scenario: &'a Scenario,
+    /// Unit of length: the longest rod.
+    pub length: f64,
+    /// Unit of force, A/L^2, with A the geometric mean of A2 and A3 mid-rod.
+    pub force: f64,
+    lengths: Vec<f64>,
+    coupling: Vec<DVec3>,
+    gravity: DVec3,
+    tip_force: DVec3,
+    tip_moment: DVec3,
+    /// The smallest couple stiffness along each rod.
+    softest: Vec<f64>,
+    arcs: Vec<Arc>,
+    /// Between 0, a leaf without loads that rests in the shape of arcs with a
+    /// common tip, and 1, the leaf of the scenario.
+    pub part: f64,
+    /// Between 0, rods as stiff in every direction as in the stiffest, and 1,
+    /// the rods of the scenario.
+    pub softened: f64,
+}
+
+/// One rod at one sigma.
+#[derive(Clone, Copy, Debug)]
+pub struct RodState {
+    /// Centerline.
+    pub r: DVec3,
+    /// Directors.
+    pub q: DQuat,
+    /// Force along the lab axes.
+    pub n: DVec3,
+    /// Moment along the lab axes.
+    pub m: DVec3,
+}
+
+impl RodState {
+    /// The numbers of rod `j` in a flat state; q of any length but zero.
+    #[inline]
+    pub fn read(y: &[f64], j: usize) -> Self {
+        let y = &y[STATE * j..STATE * (j + 1)];
+        RodState {
+            r: DVec3::from_slice(y),
+            q: DQuat::from_slice(&y[3..]).normalize(),
+            n: DVec3::from_slice(&y[7..]),
+            m: DVec3::from_slice(&y[10..]),
+        }
+    }
+
+    /// Writes them.
+    #[inline]
+    pub fn write(&self, y: &mut [f64], j: usize) {
+        let y = &mut y[STATE * j..STATE * (j + 1)];
+        self.r.write_to_slice(y);
+        self.q.write_to_slice(&mut y[3..]);
+        self.n.write_to_slice(&mut y[7..]);
+        self.m.write_to_slice(&mut y[10..]);
+    }
+}
+
+/// Derivatives of one rod's slopes by its own state, in blocks of three.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Derivatives {
+    /// Of r' by the rotation.
+    pub r_theta: DMat3,
+    /// Of r' by n.
+    pub r_n: DMat3,
+    /// Of the rotation by the rotation.
+    pub theta_theta: DMat3,
+    /// Of the rotation by m.
+    pub theta_m: DMat3,
+    /// Of m' by the rotation.
+    pub m_theta: DMat3,
+    /// Of m' by n.
+    pub m_n: DMat3,
+}
+
+/// Material of a rod at one sigma.
+struct Material {
+    compliance: DVec3,
+    flexibility: DVec3,
+    rest_strain: DVec3,
+    rest_curvature: DVec3,
+}
+
+impl<'a> Equations<'a> {
+    /// Of a checked scenario.
+    pub fn new(scenario: &'a Scenario) -> Self {
+        let rods = &scenario.rods;
+        let length = rods.iter().fold(0.0_f64, |m, rod| m.max(rod.length));
+        let logs: f64 = rods
+            .iter()
+            .flat_map(|rod| &rod.couple_stiffness[1..])
+            .map(|stiffness| stiffness.at(0.5).ln())
+            .sum();
+        let stiffness = (logs / (2 * rods.len()) as f64).exp();
+        let force = stiffness / (length * length);
+        let lengths: Vec<f64> = rods.iter().map(|rod| rod.length / length).collect();
+        let coupling = lengths
+            .windows(2)
+            .zip(&scenario.coupling)
+            .map(|(gap, kappa)| {
+                DVec3::from_array(*kappa) * (0.5 * (gap[0] + gap[1]) * length * length / force)
+            })
+            .collect();
+        let softest = rods
+            .iter()
+            .map(|rod| rod.couple_stiffness.iter().map(Profile::min))
+            .map(|stiffness| stiffness.fold(f64::INFINITY, f64::min) / (force * length * length))
+            .collect();
+        Equations {
+            scenario,
+            length,
+            force,
+            coupling,
+            gravity: DVec3::from_array(scenario.gravity) * (length / force),
+            tip_force: DVec3::from_array(scenario.tip_force) / force,
+            tip_moment: DVec3::from_array(scenario.tip_moment) / (force * length),
+            softest,
+            arcs: arcs::arcs(scenario, &lengths),
+            lengths,
+            part: 1.0,
+            softened: 1.0,
+        }
+    }
+
+    /// Number of rods.
+    pub fn rods(&self) -> usize {
+        self.lengths.len()
+    }
+
+    /// Length of a flat state.
+    pub fn size(&self) -> usize {
+        STATE * self.rods() + 1
+    }
+
+    /// Length of rod `j`.
+    pub fn rod_length(&self, j: usize) -> f64 {
+        self.lengths[j]
+    }
+
+    /// Smallest couple stiffness of rod `j`.
+    pub fn softest(&self, j: usize) -> f64 {
+        self.softest[j]
+    }
+
+    /// Coupling of gap `g`: force per unit displacement and unit of sigma.
+    #[inline]
+    pub fn coupling(&self, g: usize) -> DVec3 {
+        self.part * self.coupling[g]
+    }
+
+    /// Whether a force acts across gap `g`.
+    pub fn coupled(&self, g: usize) -> bool {
+        self.coupling[g] != DVec3::ZERO
+    }
+
+    /// Fractions of the length where a profile has a kink, ascending.
+    pub fn kinks(&self) -> Vec<f64> {
+        let mut kinks: Vec<f64> = (self.scenario.rods.iter())
+            .flat_map(|rod| {
+                let (a, h, u) = (
+                    &rod.couple_stiffness,
+                    &rod.force_stiffness,
+                    &rod.rest_curvature,
+                );
+                a.iter().chain(h).chain(u)
+            })
+            .flat_map(|profile| profile.kinks().iter().copied())
+            .collect();
+        kinks.sort_by(f64::total_cmp);
+        kinks.dedup();
+        kinks
+    }
+
+    /// The state at the base for given forces and moments: conditions (a) and (c).
+    pub fn base(&self, j: usize, n: DVec3, m: DVec3) -> RodState {
+        RodState {
+            r: DVec3::ZERO,
+            q: DQuat::from_rotation_z(self.scenario.rods[j].angle),
+            n,
+            m,
+        }
+    }
+
+    fn material(&self, j: usize, sigma: f64) -> Material {
+        let rod = &self.scenario.rods[j];
+        let at = |p: &[Profile; 3]| DVec3::new(p[0].at(sigma), p[1].at(sigma), p[2].at(sigma));
+        let mut stiffness = at(&rod.couple_stiffness);
+        if self.softened < 1.0 {
+            let stiffest = stiffness.max_element();
+            stiffness = stiffest * (stiffness / stiffest).powf(self.softened);
+        }
+        let flexibility = self.force * self.length * self.length * stiffness.recip();
+        let (arc, part) = (&self.arcs[j], self.part);
+        // Where it is the scenario's, the law is not to be rounded.
+        let (rest_strain, rest_curvature) = match part == 1.0 {
+            true => (DVec3::X, at(&rod.rest_curvature) * self.length),
+            false => (
+                DVec3::X * (part + (1.0 - part) * arc.stretch),
+                at(&rod.rest_curvature) * (part * self.length)
+                    + arc.curvature(self.length * at(&rod.rest_curvature)) * (1.0 - part),
+            ),
+        };
+        Material {
+            compliance: self.force * at(&rod.force_stiffness).recip(),
+            flexibility,
+            rest_strain,
+            rest_curvature,
+        }
+    }
+
+    /// Strains (v, u) of rod `j` under forces and moments along its directors.
+    pub fn strains(&self, j: usize, sigma: f64, n: DVec3, m: DVec3) -> (DVec3, DVec3) {
+        let law = self.material(j, sigma);
+        (
+            law.rest_strain + law.compliance * n,
+            law.rest_curvature + law.flexibility * m,
+        )
+    }
+
+    /// Slopes of the flat state `y` at `sigma`.
+    pub fn slopes(&self, sigma: f64, y: &[f64], slopes: &mut [f64]) {
+        let mut energy = 0.0;
+        let mut pull = DVec3::ZERO;
+        for j in 0..self.rods() {
+            let rod = RodState::read(y, j);
+            let (law, length) = (self.material(j, sigma), self.lengths[j]);
+            let frame = DMat3::from_quat(rod.q);
+            let (n, m) = (frame.transpose() * rod.n, frame.transpose() * rod.m);
+            let tangent = length * (frame * (law.rest_strain + law.compliance * n));
+            let bend = length * (frame * (law.rest_curvature + law.flexibility * m));
+            energy += 0.5 * length * (n.dot(law.compliance * n) + m.dot(law.flexibility * m));
+            energy -= self.part * length * self.gravity.dot(rod.r);
+            let mut load = self.part * length * self.gravity - pull;
+            pull = DVec3::ZERO;
+            if j + 1 < self.rods() {
+                let gap = DVec3::from_slice(&y[STATE * (j + 1)..]) - rod.r;
+                pull = self.coupling(j) * gap;
+                energy += 0.5 * gap.dot(pull);
+                load += pull;
+            }
+            let q = DQuat::from_xyzw(0.5 * bend.x, 0.5 * bend.y, 0.5 * bend.z, 0.0) * rod.q;
+            RodState {
+                r: tangent,
+                q,
+                n: -load,
+                m: rod.n.cross(tangent),
+            }
+            .write(slopes, j);
+        }
+        slopes[STATE * self.rods()] = energy;
+    }
+
+    /// Derivatives of the slopes of rod `j` by its own state: with the frame
+    /// turned by theta, R^T n changes by R^T (dn - theta x n).
+    pub fn derivatives(&self, j: usize, sigma: f64, y: &[f64]) -> Derivatives {
+        let rod = RodState::read(y, j);
+        let (law, length) = (self.material(j, sigma), self.lengths[j]);
+        let frame = DMat3::from_quat(rod.q);
+        let spatial = |c: DVec3| length * (frame * DMat3::from_diagonal(c) * frame.transpose());
+        let (r_n, theta_m) = (spatial(law.compliance), spatial(law.flexibility));
+        let n = frame.transpose() * rod.n;
+        let tangent = cross(length * (frame * (law.rest_strain + law.compliance * n)));
+        let r_theta = r_n * cross(rod.n) - tangent;
+        Derivatives {
+            r_theta,
+            r_n,
+            theta_theta: theta_m * cross(rod.m),
+            theta_m,
+            m_theta: cross(rod.n) * r_theta,
+            m_n: cross(rod.n) * r_n - tangent,
+        }
+    }
+
+    /// What the state at the tip misses of conditions (b), (d) and (e): six
+    /// numbers per rod. Joint tips: the distance of tip j from tip 0, for rod 0
+    /// the force; free tips: the force. Then the moment.
+    pub fn tip_conditions(&self, y: &[f64]) -> Vec<f64> {
+        let rods: Vec<RodState> = (0..self.rods()).map(|j| RodState::read(y, j)).collect();
+        let force: DVec3 = rods.iter().map(|rod| rod.n).sum();
+        rods.iter()
+            .enumerate()
+            .flat_map(|(j, rod)| {
+                let first = match (self.scenario.joined, j) {
+                    (true, 0) => force - self.part * self.tip_force,
+                    (true, _) => rod.r - rods[0].r,
+                    (false, _) => rod.n - self.part * self.tip_force,
+                };
+                let moment = rod.m - self.part * self.tip_moment;
+                [first.to_array(), moment.to_array()].concat()
+            })
+            .collect()
+    }
+
+    /// Whether the tips share one point.
+    pub fn joined(&self) -> bool {
+        self.scenario.joined
+    }
+
+    /// Potential of the dead tip force in the state at the tip.
+    pub fn tip_potential(&self, y: &[f64]) -> f64 {
+        let tips = if self.joined() { 1 } else { self.rods() };
+        let work: f64 = (0..tips)
+            .map(|j| self.tip_force.dot(RodState::read(y, j).r))
+            .sum();
+        -self.part * work
+    }
+}
+
+/// The matrix \[a\] with \[a\] b = a x b.
+fn cross(a: DVec3) -> DMat3 {
+    DMat3::from_cols(a.cross(DVec3::X), a.cross(DVec3::Y), a.cross(DVec3::Z))
+}

@@ -1,0 +1,259 @@
+//! Shooting over intervals: the initial-value problems between the nodes of
+//! multiple shooting, their defects and their sensitivities.
+
+use rayon::prelude::*;
+
+use faer::Mat;
+use glam::DVec3;
+
+use super::dop853::{Integrator, Unbounded};
+use super::equations::{Equations, RodState, TANGENT};
+use super::propagate::{LinearStep, Perturbations, group};
+use super::trajectory::Trajectory;
+
+/// Largest growth of a perturbation over one interval.
+pub const GROWTH: f64 = 1e3;
+
+/// Accuracy to which growth is measured; it need not be.
+const ROUGH: f64 = 1e-4;
+
+/// Where the intervals begin and end: 0 = sigma_0 < ... < sigma_K = 1, the
+/// states at the K beginnings.
+#[derive(Clone, Debug)]
+pub struct Nodes {
+    /// K + 1 fractions of the length.
+    pub sigma: Vec<f64>,
+    /// K flat states.
+    pub states: Vec<Vec<f64>>,
+}
+
+/// Units in which perturbations are measured, so that none outweighs the
+/// others: lengths and angles as they are, forces and moments of a rod in
+/// units of the larger of what it carries and what bends it.
+#[derive(Clone, Debug)]
+pub struct Units {
+    force: Vec<f64>,
+    moment: Vec<f64>,
+}
+
+impl Units {
+    /// For a leaf near a trajectory.
+    pub fn new(equations: &Equations, near: &Trajectory) -> Self {
+        let (force, moment) = (0..equations.rods())
+            .map(|j| {
+                let (n, m) = near.largest(j);
+                (equations.softest(j) + n, equations.softest(j) + m)
+            })
+            .unzip();
+        Units { force, moment }
+    }
+
+    /// The unit of the `k`-th number of a leaf's perturbation.
+    pub fn of(&self, k: usize) -> f64 {
+        match k % TANGENT {
+            0..6 => 1.0,
+            6..9 => self.force[k / TANGENT],
+            _ => self.moment[k / TANGENT],
+        }
+    }
+
+    /// The unit of the sum of all forces at the tip.
+    pub fn total_force(&self) -> f64 {
+        self.force.iter().fold(0.0, |m, f| m.max(*f))
+    }
+
+    /// The difference a - b of two flat states.
+    pub fn difference(&self, a: &[f64], b: &[f64]) -> Vec<f64> {
+        (0..self.force.len())
+            .flat_map(|j| {
+                let (a, b) = (RodState::read(a, j), RodState::read(b, j));
+                let turn = a.q * b.q.conjugate();
+                let sign = if turn.w < 0.0 { -2.0 } else { 2.0 };
+                [
+                    a.r - b.r,
+                    sign * DVec3::new(turn.x, turn.y, turn.z),
+                    (a.n - b.n) / self.force[j],
+                    (a.m - b.m) / self.moment[j],
+                ]
+            })
+            .flat_map(|v| v.to_array())
+            .collect()
+    }
+
+    /// Moves a flat state by `step` times an increment.
+    pub fn advance(&self, y: &mut [f64], increment: &[f64], step: f64) {
+        for j in 0..self.force.len() {
+            let mut rod = RodState::read(y, j);
+            let part = |k: usize| step * DVec3::from_slice(&increment[TANGENT * j + 3 * k..]);
+            rod.r += part(0);
+            rod.q = (glam::DQuat::from_scaled_axis(part(1)) * rod.q).normalize();
+            rod.n += part(2) * self.force[j];
+            rod.m += part(3) * self.moment[j];
+            rod.write(y, j);
+        }
+    }
+}
+
+/// One interval flown through.
+pub struct Flight {
+    /// The state at its end.
+    pub end: Vec<f64>,
+    /// The linearised equations along it, if asked for.
+    steps: Vec<LinearStep>,
+    /// Steps made.
+    pub count: usize,
+    /// Slopes evaluated.
+    pub evaluations: usize,
+}
+
+/// Integrates over all intervals, in parallel.
+pub fn fly(
+    equations: &Equations,
+    nodes: &Nodes,
+    tolerance: f64,
+    linearise: bool,
+) -> Result<Vec<Flight>, Unbounded> {
+    let kinks = equations.kinks();
+    (0..nodes.states.len())
+        .into_par_iter()
+        .map(|k| {
+            let (begin, end) = (nodes.sigma[k], nodes.sigma[k + 1]);
+            let y = nodes.states[k].clone();
+            let mut integrator = Integrator::new(equations, begin, y, tolerance);
+            let (mut steps, mut count) = (Vec::new(), 0);
+            let inside = kinks.iter().copied().filter(|s| *s > begin && *s < end);
+            for stop in inside.chain([end]) {
+                while integrator.before(stop) {
+                    integrator.step(stop)?;
+                    count += 1;
+                    if linearise {
+                        steps.push(LinearStep::of(equations, &integrator));
+                    }
+                }
+            }
+            Ok(Flight {
+                end: integrator.y,
+                steps,
+                count,
+                evaluations: integrator.evaluations,
+            })
+        })
+        .collect()
+}
+
+/// The sensitivities of the ends of all intervals to their beginnings, in the
+/// given units: square, but in the first interval, which begins at the clamp,
+/// only to forces and moments. Every interval and rod in parallel.
+pub fn sensitivities(
+    equations: &Equations,
+    units: &Units,
+    flights: &[Flight],
+    growth: &mut Vec<f64>,
+) -> Vec<Mat<f64>> {
+    let rods = equations.rods();
+    let tasks: Vec<(usize, usize)> = (0..flights.len())
+        .flat_map(|k| (0..rods).map(move |j| (k, j)))
+        .collect();
+    let columns: Vec<Columns> = tasks
+        .into_par_iter()
+        .map(|(k, j)| match k {
+            0 => Columns::of::<6>(equations, &flights[k].steps, j),
+            _ => Columns::of::<TANGENT>(equations, &flights[k].steps, j),
+        })
+        .collect();
+    columns
+        .chunks(rods)
+        .map(|columns| {
+            let kinds = columns[0].kinds;
+            let mut matrix = Mat::zeros(TANGENT * rods, kinds * rods);
+            let mut largest: f64 = 1.0;
+            for (j, column) in columns.iter().enumerate() {
+                for (i, row) in column.rows.chunks(kinds).enumerate() {
+                    let row_index = TANGENT * column.first + i;
+                    for (k, value) in row.iter().enumerate() {
+                        let from = TANGENT * j + TANGENT - kinds + k;
+                        matrix[(row_index, kinds * j + k)] =
+                            value * units.of(from) / units.of(row_index);
+                        if from % TANGENT / 3 == row_index % TANGENT / 3 {
+                            largest = largest.max(value.abs());
+                        }
+                    }
+                }
+            }
+            growth.push(largest);
+            matrix
+        })
+        .collect()
+}
+
+/// Effects of the perturbations of one rod, without units.
+struct Columns {
+    first: usize,
+    kinds: usize,
+    rows: Vec<f64>,
+}
+
+impl Columns {
+    fn of<const W: usize>(equations: &Equations, steps: &[LinearStep], j: usize) -> Self {
+        let mut perturbations = Perturbations::<W>::unit(group(equations, j), j);
+        for step in steps {
+            perturbations.advance(equations, step);
+        }
+        Columns {
+            first: perturbations.rods.start,
+            kinds: W,
+            rows: perturbations.rows.concat(),
+        }
+    }
+}
+
+/// Chooses intervals over which no perturbation grows by more than [`GROWTH`].
+///
+/// Growth is that of positions, rotations, forces, moments each within its own
+/// kind, which depends on no units, for every rod with its neighbours held.
+pub fn choose(equations: &Equations, near: &Trajectory) -> Vec<f64> {
+    let mut sigma = vec![0.0];
+    let kinks = equations.kinks();
+    'intervals: loop {
+        let begin = sigma[sigma.len() - 1];
+        let mut integrator = Integrator::new(equations, begin, near.at(begin), ROUGH);
+        let mut rods: Vec<Perturbations<TANGENT>> = (0..equations.rods())
+            .map(|j| Perturbations::unit(j..j + 1, j))
+            .collect();
+        for stop in kinks.iter().copied().filter(|s| *s > begin).chain([1.0]) {
+            while integrator.before(stop) {
+                let before = integrator.sigma;
+                let failed = integrator.step(stop).is_err();
+                let grown = failed || {
+                    let step = LinearStep::of(equations, &integrator);
+                    rods.iter_mut().any(|rod| {
+                        rod.advance(equations, &step);
+                        own_growth(&rod.rows) > GROWTH
+                    })
+                };
+                if grown {
+                    let end = if before > begin {
+                        before
+                    } else {
+                        integrator.sigma
+                    };
+                    if end <= begin || end >= 1.0 {
+                        break 'intervals;
+                    }
+                    sigma.push(end);
+                    continue 'intervals;
+                }
+            }
+        }
+        break;
+    }
+    sigma.push(1.0);
+    sigma
+}
+
+/// Largest sensitivity within one kind.
+fn own_growth(rows: &[[f64; TANGENT]]) -> f64 {
+    (0..TANGENT)
+        .flat_map(|i| (0..3).map(move |c| (i, i / 3 * 3 + c)))
+        .fold(0.0, |m, (i, c)| m.max(rows[i][c].abs()))
+}

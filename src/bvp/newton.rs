@@ -1,0 +1,271 @@
+//! Newton's method on the unknowns of multiple shooting.
+//!
+//! Steps are damped by the natural monotonicity test: the next correction with
+//! the same linearisation must be smaller than this one (P. Deuflhard, Newton
+//! Methods for Nonlinear Problems, Springer 2004, section 3.3). It compares
+//! corrections with corrections, so that neither the scaling of the equations
+//! nor their conditioning enters.
+
+use super::dop853::Unbounded;
+use super::equations::{Equations, RodState};
+use super::intervals::{Flight, Nodes, Units, choose, fly, sensitivities};
+use super::march::March;
+use super::trajectory::Trajectory;
+
+/// Iterations before a solution is given up.
+const MAX_ITERATIONS: usize = 60;
+
+/// Smallest damping factor.
+const LEAST_FACTOR: f64 = 1e-3;
+
+/// Contraction that tells that a start is near its solution.
+const NEAR: f64 = 0.3;
+
+/// Largest defect of a solution, in its units. Corrections cannot tell where
+/// the linearised equations are singular.
+const LARGEST_DEFECT: f64 = 1e-6;
+
+/// A linearisation is kept while it reduces corrections at least to this part.
+const KEEP: f64 = 0.1;
+
+/// Corrections may stop shrinking at this multiple of the integration's
+/// tolerance, which is where its step control makes noise.
+const NOISE: f64 = 1e3;
+
+/// Work done by the shooting, counted so that tests can pin it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Corrections made.
+    pub iterations: usize,
+    /// Linearisations: sensitivities of all intervals, and their factorisation.
+    pub linearizations: usize,
+    /// Steps of the integrator.
+    pub steps: usize,
+    /// Evaluations of the slopes of the whole leaf.
+    pub slopes: usize,
+}
+
+impl Work {
+    /// Adds what another run did.
+    pub fn add(&mut self, other: Work) {
+        self.iterations += other.iterations;
+        self.linearizations += other.linearizations;
+        self.steps += other.steps;
+        self.slopes += other.slopes;
+    }
+}
+
+/// Why Newton's method did not converge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stuck {
+    /// An initial-value problem has no bounded solution from the start on.
+    Unbounded(Unbounded),
+    /// Corrections do not shrink: the last one, relative.
+    NoProgress(f64),
+}
+
+/// The state of a run: its linearisation is kept from one call to the next.
+pub struct Newton<'e, 'a> {
+    /// The equations.
+    pub equations: &'e Equations<'a>,
+    /// Units of the unknowns.
+    pub units: Units,
+    /// The unknowns.
+    pub nodes: Nodes,
+    /// Whether to solve only if the start is near the solution: without damping.
+    pub only_near: bool,
+    /// The last linearisation.
+    pub march: Option<March>,
+    /// Growth of perturbations over each interval, at that linearisation.
+    pub growth: Vec<f64>,
+    /// Largest defect at the last evaluation, in the units.
+    pub defect: f64,
+    /// Work so far.
+    pub work: Work,
+}
+
+/// What a flight through all intervals misses.
+struct Missed {
+    /// End of each interval minus the beginning of the next.
+    defects: Vec<Vec<f64>>,
+    /// The tip's conditions.
+    conditions: Vec<f64>,
+}
+
+impl<'e, 'a> Newton<'e, 'a> {
+    /// Sets up the unknowns from a trajectory, over so many intervals.
+    pub fn near(equations: &'e Equations<'a>, near: &Trajectory, intervals: Option<usize>) -> Self {
+        let sigma = match intervals {
+            Some(count) => (0..=count).map(|k| k as f64 / count as f64).collect(),
+            None => choose(equations, near),
+        };
+        let begins = &sigma[..sigma.len() - 1];
+        let mut states: Vec<Vec<f64>> = begins.iter().map(|&sigma| near.at(sigma)).collect();
+        for j in 0..equations.rods() {
+            let rod = RodState::read(&states[0], j);
+            equations.base(j, rod.n, rod.m).write(&mut states[0], j);
+        }
+        Newton {
+            equations,
+            units: Units::new(equations, near),
+            nodes: Nodes { sigma, states },
+            only_near: false,
+            march: None,
+            growth: Vec::new(),
+            defect: f64::INFINITY,
+            work: Work::default(),
+        }
+    }
+
+    /// Solves to the accuracy of an integration with `tolerance`.
+    pub fn solve(&mut self, tolerance: f64) -> Result<(), Stuck> {
+        let mut factor: f64 = 1.0;
+        let mut fresh = false;
+        let mut missed = match self.march {
+            Some(_) => self.miss(&self.nodes.clone(), tolerance)?,
+            None => {
+                fresh = true;
+                self.linearize(tolerance)?
+            }
+        };
+        let mut size = f64::INFINITY;
+        'iterations: for _ in 0..MAX_ITERATIONS {
+            let step = self.correction(&missed);
+            size = largest(&step);
+            if !size.is_finite() {
+                break;
+            }
+            if fresh {
+                factor = (2.0 * factor).min(1.0);
+            } else {
+                factor = 1.0;
+            }
+            let (trial, next, ratio) = loop {
+                let trial = self.moved(&step, factor);
+                let attempt = self.miss(&trial, tolerance).ok().map(|next| {
+                    let remaining = largest(&self.correction(&next));
+                    (next, remaining)
+                });
+                match attempt {
+                    Some((next, remaining))
+                        if remaining <= (1.0 - 0.25 * factor) * size || remaining <= tolerance =>
+                    {
+                        break (trial, next, remaining / size);
+                    }
+                    // Too small to shrink: nothing but the integrator's noise.
+                    Some((next, remaining))
+                        if size <= NOISE * tolerance && remaining <= NOISE * tolerance =>
+                    {
+                        break (trial, next, 0.0);
+                    }
+                    _ if !fresh => {
+                        missed = self.linearize(tolerance)?;
+                        fresh = true;
+                        continue 'iterations;
+                    }
+                    _ => factor *= 0.5,
+                }
+                if factor < LEAST_FACTOR || self.only_near {
+                    break 'iterations;
+                }
+            };
+            self.work.iterations += 1;
+            self.nodes = trial;
+            self.defect = next.largest(self.march.as_ref());
+            let remaining = ratio * size;
+            if factor == 1.0 && (remaining <= tolerance || size <= NOISE * tolerance) {
+                let last = self.correction(&next);
+                if largest(&last) <= NOISE * tolerance {
+                    self.nodes = self.moved(&last, 1.0);
+                }
+                return match self.defect <= LARGEST_DEFECT.max(NOISE * tolerance) {
+                    true => Ok(()),
+                    false => Err(Stuck::NoProgress(size)),
+                };
+            }
+            if self.only_near && ratio > NEAR {
+                break;
+            }
+            if factor == 1.0 && ratio <= KEEP {
+                missed = next;
+                fresh = false;
+            } else {
+                missed = self.linearize(tolerance)?;
+                fresh = true;
+            }
+        }
+        Err(Stuck::NoProgress(size))
+    }
+
+    /// Linearises at the present unknowns.
+    fn linearize(&mut self, tolerance: f64) -> Result<Missed, Stuck> {
+        let flights = self.fly(&self.nodes.clone(), tolerance, true)?;
+        let missed = self.missed(&self.nodes, &flights);
+        self.growth.clear();
+        let maps = sensitivities(self.equations, &self.units, &flights, &mut self.growth);
+        self.work.linearizations += 1;
+        self.march = March::new(self.equations, &self.units, maps);
+        match self.march {
+            Some(_) => Ok(missed),
+            None => Err(Stuck::NoProgress(f64::INFINITY)),
+        }
+    }
+
+    fn miss(&mut self, nodes: &Nodes, tolerance: f64) -> Result<Missed, Stuck> {
+        let flights = self.fly(nodes, tolerance, false)?;
+        Ok(self.missed(nodes, &flights))
+    }
+
+    fn fly(&mut self, nodes: &Nodes, tolerance: f64, linear: bool) -> Result<Vec<Flight>, Stuck> {
+        let flights = fly(self.equations, nodes, tolerance, linear).map_err(Stuck::Unbounded)?;
+        self.work.steps += flights.iter().map(|flight| flight.count).sum::<usize>();
+        self.work.slopes += flights
+            .iter()
+            .map(|flight| flight.evaluations)
+            .sum::<usize>();
+        Ok(flights)
+    }
+
+    fn missed(&self, nodes: &Nodes, flights: &[Flight]) -> Missed {
+        let (last, inner) = flights.split_last().expect("there is an interval");
+        Missed {
+            defects: inner
+                .iter()
+                .zip(&nodes.states[1..])
+                .map(|(flight, begin)| self.units.difference(&flight.end, begin))
+                .collect(),
+            conditions: self.equations.tip_conditions(&last.end),
+        }
+    }
+
+    fn correction(&self, missed: &Missed) -> Vec<Vec<f64>> {
+        let march = self.march.as_ref().expect("linearised before");
+        march.solve(&missed.defects, &march.scaled(&missed.conditions))
+    }
+
+    fn moved(&self, step: &[Vec<f64>], factor: f64) -> Nodes {
+        let mut nodes = self.nodes.clone();
+        for (y, increment) in nodes.states.iter_mut().zip(step) {
+            self.units.advance(y, increment, factor);
+        }
+        nodes
+    }
+}
+
+impl Missed {
+    fn largest(&self, march: Option<&March>) -> f64 {
+        let tip = march.map(|march| march.scaled(&self.conditions));
+        let defects = self.defects.iter().chain(&tip).flatten();
+        defects.fold(0.0, |m, value| value.abs().max(m))
+    }
+}
+
+/// The largest number of an increment.
+fn largest(step: &[Vec<f64>]) -> f64 {
+    step.iter()
+        .flatten()
+        .fold(0.0, |m: f64, value| match value.is_nan() {
+            true => f64::INFINITY,
+            false => m.max(value.abs()),
+        })
+}

@@ -1,0 +1,81 @@
+//! From a start to a solution with an error estimate.
+
+use super::continuation::{Lost, from_arcs};
+use super::dop853::Unbounded;
+use super::equations::Equations;
+use super::newton::{Newton, Work};
+use super::solution::{Failure, Options, Reason, Solution, Start};
+use super::trajectory::Trajectory;
+use crate::scenario::Scenario;
+use crate::shape::Difference;
+
+/// The error is estimated by comparing with a solution whose local errors may
+/// be larger by this factor.
+const COARSER: f64 = 100.0;
+
+/// Solves the boundary-value problem of a scenario.
+///
+/// # Errors
+/// If no solution is found: why, and how far it came.
+pub fn solve(scenario: &Scenario, start: Start, options: &Options) -> Result<Solution, Failure> {
+    let mut equations = Equations::new(scenario);
+    let mut work = Work::default();
+    let found = match start {
+        Start::Arcs => from_arcs(&mut equations, options.intervals, &mut work),
+        Start::Leaf { stations, rods } => Ok(Trajectory::of_leaf(&equations, stations, rods)),
+    };
+    let lost = |equations: &Equations, lost: Lost, work: Work| {
+        let states = options.stations.iter().map(|&sigma| lost.near.at(sigma));
+        let near = Trajectory::new(equations, options.stations.clone(), states.collect());
+        Failure {
+            reason: lost.reason,
+            part: lost.part,
+            rods: near.shape(equations),
+            work,
+        }
+    };
+    let near = match found {
+        Ok(near) => near,
+        Err(way) => return Err(lost(&equations, way, work)),
+    };
+    let mut newton = Newton::near(&equations, &near, options.intervals);
+    let settled = settle(&mut newton, options);
+    work.add(newton.work);
+    let (coarse, fine) = match settled {
+        Ok(solutions) => solutions,
+        Err(reason) => {
+            let part = 1.0;
+            return Err(lost(&equations, Lost { reason, part, near }, work));
+        }
+    };
+    let (rods, tip) = (fine.shape(&equations), fine.tip());
+    let energy = tip[tip.len() - 1] + equations.tip_potential(tip);
+    Ok(Solution {
+        stations: options.stations.clone(),
+        error: Difference::between(&coarse.shape(&equations), &rods),
+        rods,
+        energy: energy * equations.force * equations.length,
+        defect: newton.defect,
+        growth: newton.growth.iter().map(|growth| growth.log10()).sum(),
+        condition: newton.condition(),
+        neutral: newton.neutral(&options.stations),
+        intervals: newton.nodes.sigma,
+        work,
+    })
+}
+
+/// Solves at two tolerances.
+fn settle(newton: &mut Newton, options: &Options) -> Result<(Trajectory, Trajectory), Reason> {
+    let mut at = |tolerance: f64| {
+        let solved = newton.solve(tolerance);
+        solved.map_err(|stuck| newton.reason(stuck))?;
+        Trajectory::sampled(
+            newton.equations,
+            &newton.nodes,
+            &options.stations,
+            tolerance,
+        )
+        .map_err(|Unbounded { sigma }| Reason::Unbounded { sigma })
+    };
+    Ok((at(COARSER * options.tolerance)?, at(options.tolerance)?))
+}

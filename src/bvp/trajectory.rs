@@ -1,0 +1,240 @@
+//! A leaf along sigma: where a boundary-value solution starts from, and what
+//! it returns.
+
+use glam::{DQuat, DVec3};
+
+use super::dop853::{Integrator, Unbounded};
+use super::equations::{Equations, RodState};
+use super::intervals::Nodes;
+use crate::shape::{NodeState, RodShape};
+
+/// Flat states at some sigmas, with cubic Hermite interpolation between them.
+#[derive(Clone, Debug)]
+pub struct Trajectory {
+    sigma: Vec<f64>,
+    states: Vec<Vec<f64>>,
+    slopes: Vec<Vec<f64>>,
+}
+
+impl Trajectory {
+    /// From states of the equations as they are now.
+    pub fn new(equations: &Equations, sigma: Vec<f64>, mut states: Vec<Vec<f64>>) -> Self {
+        for i in 1..states.len() {
+            let (before, after) = states.split_at_mut(i);
+            for j in 0..equations.rods() {
+                let (a, mut b) = (
+                    RodState::read(&before[i - 1], j),
+                    RodState::read(&after[0], j),
+                );
+                // Of a rotation's two quaternions the one nearer to the last.
+                if a.q.dot(b.q) < 0.0 {
+                    b.q = -b.q;
+                    b.write(&mut after[0], j);
+                }
+            }
+        }
+        let slopes = sigma
+            .iter()
+            .zip(&states)
+            .map(|(&sigma, y)| {
+                let mut slopes = vec![0.0; y.len()];
+                equations.slopes(sigma, y, &mut slopes);
+                slopes
+            })
+            .collect();
+        Trajectory {
+            sigma,
+            states,
+            slopes,
+        }
+    }
+
+    /// From the shape of a leaf in the units of the scenario.
+    pub fn of_leaf(equations: &Equations, stations: &[f64], rods: &[RodShape]) -> Self {
+        let states = (0..stations.len())
+            .map(|i| {
+                let mut y = vec![0.0; equations.size()];
+                for (j, rod) in rods.iter().enumerate() {
+                    let node = &rod.nodes[i];
+                    RodState {
+                        r: node.position / equations.length,
+                        q: node.rotation,
+                        n: node.rotation * node.n / equations.force,
+                        m: node.rotation * node.m / (equations.force * equations.length),
+                    }
+                    .write(&mut y, j);
+                }
+                y
+            })
+            .collect();
+        Trajectory::new(equations, stations.to_vec(), states)
+    }
+
+    /// The leaf without stress: rods in their rest shapes.
+    pub fn unstressed(equations: &Equations, tolerance: f64) -> Result<Self, Unbounded> {
+        let mut y = vec![0.0; equations.size()];
+        for j in 0..equations.rods() {
+            equations.base(j, DVec3::ZERO, DVec3::ZERO).write(&mut y, j);
+        }
+        let mut integrator = Integrator::new(equations, 0.0, y, tolerance);
+        let (mut sigma, mut states) = (vec![0.0], vec![integrator.y.clone()]);
+        for end in equations.kinks().into_iter().chain([1.0]) {
+            while integrator.before(end) {
+                integrator.step(end)?;
+                sigma.push(integrator.sigma);
+                states.push(integrator.y.clone());
+            }
+        }
+        Ok(Trajectory::new(equations, sigma, states))
+    }
+
+    /// The solution at the stations, integrated from the nodes before them.
+    pub fn sampled(
+        equations: &Equations,
+        nodes: &Nodes,
+        stations: &[f64],
+        tolerance: f64,
+    ) -> Result<Self, Unbounded> {
+        let mut states: Vec<Vec<f64>> = Vec::new();
+        let kinks = equations.kinks();
+        let mut energy = 0.0;
+        let slot = equations.size() - 1;
+        let mut wanted = stations.iter().copied().peekable();
+        for (k, begin) in nodes.states.iter().enumerate() {
+            let (from, to) = (nodes.sigma[k], nodes.sigma[k + 1]);
+            let mut y = begin.clone();
+            y[slot] = energy;
+            let mut integrator = Integrator::new(equations, from, y, tolerance);
+            let mut stops: Vec<f64> = kinks
+                .iter()
+                .copied()
+                .filter(|s| *s > from && *s < to)
+                .collect();
+            stops.push(to);
+            let last = k + 1 == nodes.states.len();
+            while let Some(station) = wanted.next_if(|s| *s < to || last) {
+                stops.push(station.clamp(from, to));
+                stops.sort_by(f64::total_cmp);
+            }
+            stops.dedup();
+            for stop in stops {
+                while integrator.before(stop) {
+                    integrator.step(stop)?;
+                }
+                let here = stations[states.len().min(stations.len() - 1)];
+                if states.len() < stations.len()
+                    && here.clamp(from, to) == stop
+                    && (here < to || last)
+                {
+                    states.push(integrator.y.clone());
+                }
+            }
+            energy = integrator.y[slot];
+        }
+        Ok(Trajectory::new(equations, stations.to_vec(), states))
+    }
+
+    /// Straight, untwisted rods without stress.
+    pub fn straight(equations: &Equations) -> Self {
+        let at = |sigma: f64| {
+            let mut y = vec![0.0; equations.size()];
+            for j in 0..equations.rods() {
+                let mut rod = equations.base(j, DVec3::ZERO, DVec3::ZERO);
+                rod.r = rod.q * DVec3::X * (sigma * equations.rod_length(j));
+                rod.write(&mut y, j);
+            }
+            y
+        };
+        Trajectory::new(equations, vec![0.0, 1.0], vec![at(0.0), at(1.0)])
+    }
+
+    /// The state at the tip.
+    pub fn tip(&self) -> &[f64] {
+        &self.states[self.states.len() - 1]
+    }
+
+    /// The state at `sigma`.
+    pub fn at(&self, sigma: f64) -> Vec<f64> {
+        let last = self.sigma.len() - 1;
+        let i = self.sigma.partition_point(|&s| s <= sigma).clamp(1, last);
+        let h = self.sigma[i] - self.sigma[i - 1];
+        let t = (sigma - self.sigma[i - 1]) / h;
+        let (a, b) = (&self.states[i - 1], &self.states[i]);
+        let (da, db) = (&self.slopes[i - 1], &self.slopes[i]);
+        let rise = t * t * (3.0 - 2.0 * t);
+        let (left, right) = (h * t * (1.0 - t) * (1.0 - t), h * t * t * (t - 1.0));
+        (0..a.len())
+            .map(|k| a[k] + rise * (b[k] - a[k]) + left * da[k] + right * db[k])
+            .collect()
+    }
+
+    /// This trajectory moved on by `step` times its difference to an earlier one.
+    pub fn beyond(&self, equations: &Equations, earlier: &Trajectory, step: f64) -> Self {
+        let states = (self.states())
+            .map(|(sigma, now)| {
+                let before = earlier.at(sigma);
+                let pairs = now.iter().zip(before);
+                pairs
+                    .map(|(now, before)| now + step * (now - before))
+                    .collect()
+            })
+            .collect();
+        Trajectory::new(equations, self.sigma.clone(), states)
+    }
+
+    /// Largest force and moment of rod `j`.
+    pub fn largest(&self, j: usize) -> (f64, f64) {
+        self.states.iter().fold((0.0, 0.0), |(n, m), y| {
+            let rod = RodState::read(y, j);
+            (rod.n.length().max(n), rod.m.length().max(m))
+        })
+    }
+
+    /// Angle by which directors turn along the rod that turns most.
+    pub fn turn(&self, equations: &Equations) -> f64 {
+        (0..equations.rods())
+            .map(|j| {
+                let rotations: Vec<DQuat> = (self.states.iter())
+                    .map(|y| RodState::read(y, j).q)
+                    .collect();
+                let turns = rotations.windows(2).map(|q| q[0].angle_between(q[1]));
+                turns.sum::<f64>()
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// The shape in the units of the scenario, at the sigmas it is known at.
+    pub fn shape(&self, equations: &Equations) -> Vec<RodShape> {
+        (0..equations.rods())
+            .map(|j| RodShape {
+                length: equations.rod_length(j) * equations.length,
+                nodes: (self.sigma.iter().zip(&self.states))
+                    .map(|(&sigma, y)| node(equations, j, sigma, y))
+                    .collect(),
+            })
+            .collect()
+    }
+
+    /// The sigmas and the states there.
+    fn states(&self) -> impl Iterator<Item = (f64, &[f64])> {
+        self.sigma
+            .iter()
+            .copied()
+            .zip(self.states.iter().map(Vec::as_slice))
+    }
+}
+
+fn node(equations: &Equations, j: usize, sigma: f64, y: &[f64]) -> NodeState {
+    let rod = RodState::read(y, j);
+    let directors: DQuat = rod.q.conjugate();
+    let (n, m) = (directors * rod.n, directors * rod.m);
+    let (v, u) = equations.strains(j, sigma, n, m);
+    NodeState {
+        position: rod.r * equations.length,
+        rotation: rod.q,
+        v,
+        u: u / equations.length,
+        n: n * equations.force,
+        m: m * (equations.force * equations.length),
+    }
+}

@@ -1,0 +1,62 @@
+//! The state of rods at stations along them: what every method returns.
+
+use glam::{DQuat, DVec3};
+
+/// The state of one rod at one station. Strains and stress resultants are
+/// components along the directors (d1, d2, d3).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NodeState {
+    /// Centerline r.
+    pub position: DVec3,
+    /// Directors as a unit quaternion, w >= 0 at the base: R e_i = d_i.
+    pub rotation: DQuat,
+    /// Stretch and shears v = R^T r'.
+    pub v: DVec3,
+    /// Twist and bends u.
+    pub u: DVec3,
+    /// Stress resultant n (axial force, shear forces).
+    pub n: DVec3,
+    /// Stress couple m (twisting moment, bending moments).
+    pub m: DVec3,
+}
+
+/// The shape of one rod.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RodShape {
+    /// Reference length.
+    pub length: f64,
+    /// One state per station.
+    pub nodes: Vec<NodeState>,
+}
+
+/// Largest differences between two shapes at common stations, in the units of
+/// the scenario (rotations in radians).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Difference {
+    /// Distance of positions.
+    pub position: f64,
+    /// Angle between the directors.
+    pub rotation: f64,
+    /// Difference of n, along the directors.
+    pub force: f64,
+    /// Difference of m, along the directors.
+    pub moment: f64,
+}
+
+impl Difference {
+    /// Between two shapes at the same stations.
+    pub fn between(a: &[RodShape], b: &[RodShape]) -> Self {
+        let mut largest = Difference::default();
+        for (a, b) in a.iter().zip(b) {
+            for (a, b) in a.nodes.iter().zip(&b.nodes) {
+                let turn = a.rotation * b.rotation.conjugate();
+                let half = DVec3::new(turn.x, turn.y, turn.z).length();
+                largest.position = largest.position.max((a.position - b.position).length());
+                largest.rotation = largest.rotation.max(2.0 * half.atan2(turn.w.abs()));
+                largest.force = largest.force.max((a.n - b.n).length());
+                largest.moment = largest.moment.max((a.m - b.m).length());
+            }
+        }
+        largest
+    }
+}
