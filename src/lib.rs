@@ -143,3 +143,4 @@ pub mod rod;
 pub mod rotation;
 pub mod scenario;
 pub mod shape;
+pub mod study;

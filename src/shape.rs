@@ -46,17 +46,38 @@ pub struct Difference {
 impl Difference {
     /// Between two shapes at the same stations.
     pub fn between(a: &[RodShape], b: &[RodShape]) -> Self {
-        let mut largest = Difference::default();
-        for (a, b) in a.iter().zip(b) {
-            for (a, b) in a.nodes.iter().zip(&b.nodes) {
-                let turn = a.rotation * b.rotation.conjugate();
-                let half = DVec3::new(turn.x, turn.y, turn.z).length();
-                largest.position = largest.position.max((a.position - b.position).length());
-                largest.rotation = largest.rotation.max(2.0 * half.atan2(turn.w.abs()));
-                largest.force = largest.force.max((a.n - b.n).length());
-                largest.moment = largest.moment.max((a.m - b.m).length());
-            }
+        let pairs = a
+            .iter()
+            .zip(b)
+            .flat_map(|(a, b)| a.nodes.iter().zip(&b.nodes));
+        pairs
+            .map(|(a, b)| Difference::of(a, b))
+            .fold(Difference::default(), Difference::max)
+    }
+
+    /// Between two states.
+    pub fn of(a: &NodeState, b: &NodeState) -> Self {
+        let turn = a.rotation * b.rotation.conjugate();
+        let half = DVec3::new(turn.x, turn.y, turn.z).length();
+        Difference {
+            position: (a.position - b.position).length(),
+            rotation: 2.0 * half.atan2(turn.w.abs()),
+            force: (a.n - b.n).length(),
+            moment: (a.m - b.m).length(),
         }
-        largest
+    }
+
+    /// The larger of each. What is not a number is infinite.
+    pub fn max(self, other: Difference) -> Self {
+        let larger = |a: f64, b: f64| match a.is_nan() || b.is_nan() {
+            true => f64::INFINITY,
+            false => a.max(b),
+        };
+        Difference {
+            position: larger(self.position, other.position),
+            rotation: larger(self.rotation, other.rotation),
+            force: larger(self.force, other.force),
+            moment: larger(self.moment, other.moment),
+        }
     }
 }

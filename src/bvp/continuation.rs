@@ -14,6 +14,9 @@ const ROUGH: f64 = 1e-6;
 /// Smallest part of the way made at once.
 const LEAST_STEP: f64 = 1e-4;
 
+/// Slopes of single rods evaluated before a way is given up: some seconds.
+const BUDGET: usize = 4_000_000;
+
 /// Stations at which a solution is kept for the next one to start from, per
 /// interval.
 const STATIONS: usize = 4;
@@ -117,7 +120,9 @@ impl Way {
     ) -> Result<Trajectory, Lost> {
         let (mut part, mut step) = (0.0, 1.0);
         let mut before: Option<(Trajectory, f64)> = None;
+        let (begun, rods) = (work.slopes, equations.rods());
         while part < 1.0 {
+            let spent = |work: &Work| (work.slopes - begun) * rods;
             let next = if step >= 1.0 - part { 1.0 } else { part + step };
             stage(equations, next);
             let predicted = match &before {
@@ -130,7 +135,7 @@ impl Way {
                     part = next;
                     step *= 2.0;
                 }
-                Err(_) if step > LEAST_STEP => step *= 0.5,
+                Err(_) if step > LEAST_STEP && spent(work) < BUDGET => step *= 0.5,
                 Err(reason) => {
                     return Err(Lost { reason, part, near });
                 }

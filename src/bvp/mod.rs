@@ -21,4 +21,4 @@ mod trajectory;
 
 pub use newton::Work;
 pub use solution::{Failure, Neutral, Options, Reason, Solution, Start};
-pub use solve::solve;
+pub use solve::{solve, solve_within};

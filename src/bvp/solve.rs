@@ -13,6 +13,54 @@ use crate::shape::Difference;
 /// be larger by this factor.
 const COARSER: f64 = 100.0;
 
+/// Local error allowed per step of the integration, as a part of the accuracy
+/// wanted, and its bounds: beyond them rounding rules, or step control loses
+/// its ground.
+const LOCAL_PART: f64 = 1e-4;
+const LEAST_LOCAL: f64 = 1e-13;
+const MOST_LOCAL: f64 = 1e-9;
+
+/// Factor between attempts to reach the accuracy.
+const SHARPER: f64 = 1e-2;
+
+/// Solves the boundary-value problem of a scenario with an estimated error of
+/// the positions below `accuracy` (relative to the longest rod), or as far as
+/// double precision carries: [`Solution::error`] tells.
+///
+/// # Errors
+/// If no solution is found: why, and how far it came.
+pub fn solve_within(
+    scenario: &Scenario,
+    start: Start,
+    accuracy: f64,
+    intervals: Option<usize>,
+    stations: &[f64],
+) -> Result<Solution, Failure> {
+    let longest = scenario
+        .rods
+        .iter()
+        .map(|rod| rod.length)
+        .fold(0.0, f64::max);
+    let mut asked = Options {
+        tolerance: (LOCAL_PART * accuracy).clamp(LEAST_LOCAL, MOST_LOCAL),
+        intervals,
+        stations: stations.to_vec(),
+    };
+    let mut solution = solve(scenario, start, &asked)?;
+    while solution.error.position > accuracy * longest && asked.tolerance > LEAST_LOCAL {
+        asked.tolerance = (SHARPER * asked.tolerance).max(LEAST_LOCAL);
+        let from = Start::Leaf {
+            stations,
+            rods: &solution.rods,
+        };
+        let sharper = solve(scenario, from, &asked)?;
+        let mut work = solution.work;
+        work.add(sharper.work);
+        solution = Solution { work, ..sharper };
+    }
+    Ok(solution)
+}
+
 /// Solves the boundary-value problem of a scenario.
 ///
 /// # Errors

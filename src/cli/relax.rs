@@ -33,6 +33,10 @@ pub struct Relax {
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     tolerance: Option<f64>,
 
+    /// Shoot over N intervals; 1 is single shooting; left out: as many as the growth of perturbations needs
+    #[arg(long, value_name = "N")]
+    intervals: Option<usize>,
+
     /// Override one entry of the scenario, as in --set load.gravity=[0,0,-0.5]; may repeat
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
@@ -54,12 +58,14 @@ pub struct Relax {
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum MethodName {
     SemiImplicit,
+    Shooting,
 }
 
 impl From<MethodName> for Method {
     fn from(name: MethodName) -> Self {
         match name {
             MethodName::SemiImplicit => Method::SemiImplicit,
+            MethodName::Shooting => Method::Shooting,
         }
     }
 }
@@ -90,6 +96,7 @@ impl Relax {
             segments: self.segments,
             tolerance: self.tolerance,
             keep_unstable: self.keep_unstable,
+            intervals: self.intervals,
         };
         let mut line = ProgressLine::new(&scenario.name);
         Ok(relax::relax(scenario, &options, &mut |progress| {

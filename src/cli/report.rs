@@ -66,7 +66,7 @@ fn solved(equilibrium: &Equilibrium) -> String {
 fn found(equilibrium: &Equilibrium) -> String {
     let verdict = verdict(equilibrium);
     match (equilibrium.outcome, equilibrium.negative_eigenvalues) {
-        (Outcome::NotAtRest | Outcome::Diverged, _) => {
+        (Outcome::NotAtRest | Outcome::Diverged | Outcome::Singular, _) => {
             format!("{verdict} (residual {:.1e})", equilibrium.residual)
         }
         (_, Some(1)) => format!("{verdict} (1 negative eigenvalue)"),
@@ -76,16 +76,25 @@ fn found(equilibrium: &Equilibrium) -> String {
 }
 
 fn error(equilibrium: &Equilibrium) -> String {
-    let grids: Vec<String> = equilibrium.segments.iter().map(usize::to_string).collect();
-    let grids = grids.join(", ");
+    let source = match equilibrium.intervals {
+        Some(1) => "by shooting over 1 interval".to_string(),
+        Some(count) => format!("by shooting over {count} intervals"),
+        None => {
+            let grids: Vec<String> = equilibrium.segments.iter().map(usize::to_string).collect();
+            format!("from grids of {} segments a vein", grids.join(", "))
+        }
+    };
     let longest = longest_rod(equilibrium);
     let wanted = power_of_ten(equilibrium.tolerance * longest);
     match equilibrium.error_estimate {
         Some(error) => format!(
-            "positions within {} (wanted {wanted}), from grids of {grids} segments a vein",
+            "positions within {} (wanted {wanted}), {source}",
             power_of_ten(error)
         ),
-        None => format!("not estimated on a single grid of {grids} segments a vein"),
+        None => match equilibrium.segments.as_slice() {
+            [segments] => format!("not estimated on a single grid of {segments} segments a vein"),
+            _ => "not known".into(),
+        },
     }
 }
 

@@ -36,6 +36,8 @@ struct Object<'a> {
     remark: Option<&'a str>,
     rods: usize,
     segments: &'a [usize],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    intervals: Option<usize>,
     tolerance: f64,
     residual: f64,
     error_estimate: Option<f64>,
@@ -84,6 +86,7 @@ impl<'a> From<&'a Equilibrium> for Object<'a> {
             remark: equilibrium.remark.as_deref(),
             rods: equilibrium.rods.len(),
             segments: &equilibrium.segments,
+            intervals: equilibrium.intervals,
             tolerance: equilibrium.tolerance,
             residual: equilibrium.residual,
             error_estimate: equilibrium.error_estimate,

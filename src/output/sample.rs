@@ -42,6 +42,7 @@ pub fn fan(rods: usize, segments: usize) -> Equilibrium {
         outcome: Outcome::Converged,
         remark: None,
         segments: vec![segments],
+        intervals: None,
         tolerance: 1e-6,
         residual: 1e-13,
         error_estimate: Some(3e-9),

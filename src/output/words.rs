@@ -19,6 +19,7 @@ pub fn verdict(equilibrium: &Equilibrium) -> String {
             format!("{}, tolerance not reached", at_rest(equilibrium))
         }
         Outcome::NotAtRest => "not at rest".into(),
+        Outcome::Singular => "singular equations".into(),
         Outcome::Diverged => "diverged".into(),
     }
 }

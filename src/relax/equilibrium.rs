@@ -18,6 +18,9 @@ pub enum Outcome {
     ToleranceNotReached,
     /// The step limit came before rest.
     NotAtRest,
+    /// The equations are singular: at a bifurcation, or where the leaf can move
+    /// without resistance.
+    Singular,
     /// Energy grew beyond what the method allows, or a value was not finite.
     Diverged,
 }
@@ -31,6 +34,7 @@ impl Outcome {
             Outcome::Saddle => "saddle",
             Outcome::ToleranceNotReached => "tolerance-not-reached",
             Outcome::NotAtRest => "not-at-rest",
+            Outcome::Singular => "singular",
             Outcome::Diverged => "diverged",
         }
     }
@@ -79,12 +83,15 @@ pub struct Equilibrium {
     pub outcome: Outcome,
     /// What would help, when the run did not succeed: one sentence for the user.
     pub remark: Option<String>,
-    /// Segments per rod of each grid used, coarse to fine.
+    /// Segments per rod of each grid used, coarse to fine; none if shot.
     pub segments: Vec<usize>,
+    /// Intervals of the shooting.
+    pub intervals: Option<usize>,
     /// Wanted accuracy, relative to the largest rod length.
     pub tolerance: f64,
     /// Largest unbalanced nodal force or moment, in units of A/L^2 and A/L
-    /// (A: the leaf's mean bending stiffness, L: largest rod length).
+    /// (A: the leaf's mean bending stiffness, L: largest rod length). Of the
+    /// shooting: the largest defect ([`crate::bvp::Solution::defect`]).
     pub residual: f64,
     /// Bound on the error of the positions, in units of length; `None` on a
     /// single grid, which has nothing to compare with.

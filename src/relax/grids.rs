@@ -4,13 +4,14 @@ use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
 use crate::relax::equilibrium::{Equilibrium, Outcome, Saddle, Work};
 use crate::relax::moment;
 use crate::relax::options::{
-    LARGEST_TOLERANCE, MAX_NODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
+    LARGEST_TOLERANCE, MAX_NODES, Method, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
 };
 use crate::relax::prolong::{predict, prolong};
 use crate::relax::report;
 use crate::relax::richardson::Richardson;
 use crate::relax::saddle;
 use crate::relax::semi_implicit::{Relaxation, Settled};
+use crate::relax::shooting;
 use crate::relax::start::start;
 use crate::scenario::Scenario;
 use glam::DVec3;
@@ -77,6 +78,12 @@ pub fn relax(
     if !(SMALLEST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
         return Err(RelaxError::Tolerance { found: tolerance });
     }
+    if options.method == Method::Shooting {
+        return shooting::relax(scenario, options, tolerance);
+    }
+    if let Some(found) = options.intervals {
+        return Err(RelaxError::NoIntervals { found });
+    }
     let clock = Instant::now();
     let leaf = Leaf::new(scenario);
     let least = leaf.kinks().len() + 1;
@@ -114,7 +121,7 @@ pub fn relax(
 }
 
 /// Segments of the coarsest grid.
-fn coarsest(leaf: &Leaf) -> usize {
+pub(super) fn coarsest(leaf: &Leaf) -> usize {
     let moment = leaf.tip_moment.length();
     let turn = (0..leaf.rods())
         .map(|j| {

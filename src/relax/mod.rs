@@ -3,6 +3,7 @@
 
 mod equilibrium;
 mod grids;
+mod index;
 mod moment;
 mod options;
 mod prolong;
@@ -11,10 +12,13 @@ mod richardson;
 mod saddle;
 mod semi_implicit;
 mod shape;
+mod shooting;
 mod start;
 
 pub use crate::shape::{NodeState, RodShape};
 pub use equilibrium::{Equilibrium, Outcome, Saddle, Work};
 pub use grids::relax;
+pub use index::index_near;
 pub use options::{Method, Options, Progress, RelaxError};
+pub use shooting::check_intervals;
 pub use start::start;

@@ -6,6 +6,9 @@ pub enum Method {
     /// Linearly implicit damped motion that turns into Newton's method.
     #[default]
     SemiImplicit,
+    /// The boundary-value problem by multiple shooting ([`crate::bvp`]), from
+    /// arcs by continuation. Finds equilibria, stable or not.
+    Shooting,
 }
 
 impl Method {
@@ -13,6 +16,7 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Method::SemiImplicit => "semi-implicit",
+            Method::Shooting => "shooting",
         }
     }
 }
@@ -30,6 +34,9 @@ pub struct Options {
     /// Whether to stop at a saddle instead of leaving it. Newton's method is
     /// then not steered towards stable equilibria at all.
     pub keep_unstable: bool,
+    /// Shooting only: over so many intervals; `None`: as many as the growth of
+    /// perturbations needs.
+    pub intervals: Option<usize>,
 }
 
 /// How far a running relaxation has come.
@@ -52,6 +59,9 @@ pub const LARGEST_TOLERANCE: f64 = 0.1;
 
 /// Most nodes of a leaf, all rods together: about 1.5 kB each.
 pub const MAX_NODES: usize = 4_000_000;
+
+/// Most intervals of a shooting.
+pub const MAX_INTERVALS: usize = 4096;
 
 /// A request that cannot be met.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -86,5 +96,25 @@ pub enum RelaxError {
         segments: usize,
         /// Their product.
         nodes: usize,
+    },
+    /// A grid was asked for where there is none.
+    #[error(
+        "--segments {found}: shooting has no grid; leave it out, or set the number of intervals with --intervals"
+    )]
+    NoGrid {
+        /// Segments asked for.
+        found: usize,
+    },
+    /// Intervals were asked for where there are none.
+    #[error("--intervals {found}: only shooting has intervals; add --method shooting")]
+    NoIntervals {
+        /// Intervals asked for.
+        found: usize,
+    },
+    /// The number of intervals is out of range.
+    #[error("--intervals {found}: allowed are 1 to {MAX_INTERVALS}")]
+    Intervals {
+        /// Intervals asked for.
+        found: usize,
     },
 }

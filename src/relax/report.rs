@@ -53,6 +53,7 @@ pub fn equilibrium(
             .iter()
             .map(|level| level.leaf.segments())
             .collect(),
+        intervals: None,
         tolerance: run.tolerance,
         residual: finest.leaf.residual(&finest.state),
         error_estimate: run.error().map(|error| error * scale.length),

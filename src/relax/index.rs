@@ -1,0 +1,61 @@
+//! The Morse index of a shape found by other means.
+
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
+use crate::relax::equilibrium::Work;
+use crate::relax::prolong::prolong;
+use crate::relax::saddle;
+use crate::scenario::Scenario;
+use crate::shape::RodShape;
+use glam::DVec3;
+
+/// The finest grid on which eigenvalues are counted.
+const FINEST: usize = 1024;
+
+/// Number of negative eigenvalues of the energy's Hessian at the equilibrium
+/// near `rods`, given at the nodes of `grid` in the scenario's units. Counted on
+/// finer and finer grids until it does not change any more. `None` under a dead
+/// moment, which has no energy, and if there is no equilibrium nearby or the
+/// count does not settle.
+pub fn index_near(scenario: &Scenario, grid: Grid, rods: &[RodShape]) -> Option<usize> {
+    let leaf = Leaf::new(scenario);
+    if leaf.tip_moment != DVec3::ZERO {
+        return None;
+    }
+    let mut discrete = DiscreteLeaf::new(&leaf, grid);
+    let mut state = project(&leaf, &discrete, rods);
+    let mut before = None;
+    let mut work = Work::default();
+    while discrete.segments() <= FINEST {
+        let mut system = System::new(&discrete);
+        let index = saddle::polish(&discrete, &mut state, &mut system, &mut work).flatten();
+        if index.is_some() && index == before {
+            return index;
+        }
+        before = index;
+        state = prolong(&discrete, &state);
+        let finer = discrete.grid.refined();
+        discrete = DiscreteLeaf::new(&leaf, finer);
+    }
+    None
+}
+
+/// The state of the discrete leaf at the given nodes.
+fn project(leaf: &Leaf, discrete: &DiscreteLeaf, rods: &[RodShape]) -> State {
+    let nodes = || rods.iter().flat_map(|rod| &rod.nodes);
+    let mut state = State::new(
+        discrete.segments(),
+        nodes()
+            .map(|node| node.position / leaf.scale.length)
+            .collect(),
+        nodes().map(|node| node.rotation).collect(),
+    );
+    state.n = rods
+        .iter()
+        .flat_map(|rod| rod.nodes.windows(2))
+        .map(|ends| {
+            let force = |i: usize| ends[i].rotation * ends[i].n;
+            0.5 * (force(0) + force(1)) / leaf.scale.force()
+        })
+        .collect();
+    state
+}

@@ -1,0 +1,5 @@
+//! What is built on the solvers.
+
+mod check;
+
+pub use check::{Check, CheckOptions, Shot, Verdict, check};
