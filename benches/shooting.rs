@@ -1,0 +1,74 @@
+//! How long the boundary-value solution takes from the relaxed leaf, and how
+//! that grows with the number of veins: Fig. 4's leaf to 1e-10.
+//! `cargo bench --bench shooting`.
+
+use leafdyn::bvp::{self, Solution, Start};
+use leafdyn::relax::{Equilibrium, Options, relax};
+use leafdyn::scenario::Scenario;
+use leafdyn::shape::Difference;
+use std::path::Path;
+use std::time::Instant;
+
+const RODS: [usize; 7] = [1, 5, 10, 21, 35, 70, 140];
+
+const ACCURACY: f64 = 1e-10;
+
+/// Each is solved as often as takes about as long as one of this many rods.
+const RODS_IN_ALL: usize = 140;
+
+/// The fastest of several runs on so many threads, in milliseconds.
+fn fastest(leaf: &Scenario, relaxed: &Equilibrium, threads: usize) -> (f64, Solution) {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .expect("threads can be started");
+    let start = Start::Leaf {
+        stations: &relaxed.stations,
+        rods: &relaxed.rods,
+    };
+    (0..2 + RODS_IN_ALL / leaf.rods.len())
+        .map(|_| {
+            let clock = Instant::now();
+            let solution =
+                pool.install(|| bvp::solve_within(leaf, start, ACCURACY, None, &relaxed.stations));
+            let milliseconds = 1e3 * clock.elapsed().as_secs_f64();
+            (milliseconds, solution.expect("the leaf has a solution"))
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .expect("at least one run")
+}
+
+fn main() {
+    let threads = rayon::current_num_threads();
+    println!(
+        "Fig. 4's leaf to 1e-10, from the leaf relaxed to the same; milliseconds, best of several;"
+    );
+    println!("differences in units of L and A/L^2.");
+    println!();
+    println!(
+        "| N | unknowns | relaxed | shot, 1 thread | {threads} threads | linearisations | integration steps | position | force |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    for rods in RODS {
+        let entry = [format!("leaf.rods={rods}")];
+        let leaf = Scenario::read(Path::new("scenarios/paper/fig04.toml"), &entry)
+            .expect("the scenario is valid");
+        let options = Options {
+            tolerance: Some(ACCURACY),
+            ..Options::default()
+        };
+        let relaxed = relax(&leaf, &options, &mut |_| {}).expect("a valid request");
+        let (one, solution) = fastest(&leaf, &relaxed, 1);
+        let (all, _) = fastest(&leaf, &relaxed, threads);
+        let difference = Difference::between(&relaxed.rods, &solution.rods);
+        println!(
+            "| {rods} | {} | {:.1} | {one:.1} | {all:.1} | {} | {} | {:.0e} | {:.0e} |",
+            6 * rods,
+            1e3 * relaxed.wall_seconds,
+            solution.work.linearizations,
+            solution.work.steps,
+            difference.position,
+            difference.force
+        );
+    }
+}
