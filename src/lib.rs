@@ -137,6 +137,7 @@
 
 pub mod bvp;
 pub mod leaf;
+pub mod motion;
 pub mod output;
 pub mod relax;
 pub mod rod;

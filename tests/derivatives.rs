@@ -69,10 +69,10 @@ fn functional<D: DualNum<Primitive = f64> + Copy>(
     let factor = sin.atan2(p[0]) * 2.0 / sin;
     let dx = [x1[0] - x0[0], x1[1] - x0[1], x1[2] - x0[2]];
     let (xi, nu) = (to_directors(middle, dx), to_directors(middle, n));
-    let mut pi = -nu[0] * section.ds;
+    let mut pi = nu[0] * 0.0;
     for k in 0..3 {
         let strain = factor * p[k + 1] / section.ds - section.rest_curvature[k];
-        pi = pi + nu[k] * xi[k] - nu[k] * nu[k] * (0.5 * section.ds * section.compliance[k])
+        pi = pi + nu[k] * (xi[k] - section.ds * section.rest_strain[k]) - nu[k] * nu[k] * (0.5 * section.ds * section.compliance[k])
             + strain * strain * (0.5 * section.ds * section.couple_stiffness[k]);
     }
     pi
@@ -87,6 +87,7 @@ prop_compose! {
         ds in 0.05..0.5_f64,
         stiffness in prop::array::uniform3(0.1..5.0_f64),
         u0 in vector(2.0),
+        v0 in vector(0.3),
         compliance in prop::array::uniform3(0.001..0.5_f64),
         x0 in vector(1.0),
         dx in vector(0.5),
@@ -100,6 +101,7 @@ prop_compose! {
             ds,
             couple_stiffness: DVec3::from_array(stiffness),
             rest_curvature: u0,
+            rest_strain: DVec3::X + v0,
             compliance: DVec3::from_array(compliance),
             // Exact: the element's own matrix, nothing softened.
             condensing: DVec3::from_array(compliance).recip(),

@@ -28,6 +28,19 @@ pub struct DiscreteLeaf<'a> {
     weights: Vec<f64>,
     /// Part of the loads that acts: one, but on the way to a dead moment.
     pub load_factor: f64,
+    /// The loads.
+    pub loads: Loads,
+}
+
+/// Dead loads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Loads {
+    /// Gravity per unit length.
+    pub gravity: DVec3,
+    /// Force on the joint tip, or on every free one.
+    pub tip_force: DVec3,
+    /// Moment on the tip of a single rod.
+    pub tip_moment: DVec3,
 }
 
 /// What an assembly sums up over all rods.
@@ -56,6 +69,11 @@ impl<'a> DiscreteLeaf<'a> {
             coupling,
             weights,
             load_factor: 1.0,
+            loads: Loads {
+                gravity: leaf.gravity,
+                tip_force: leaf.tip_force,
+                tip_moment: leaf.tip_moment,
+            },
         }
     }
 
@@ -116,7 +134,7 @@ impl<'a> DiscreteLeaf<'a> {
     /// Dead moment on the tip of a single rod.
     pub fn tip_moment(&self) -> DVec3 {
         if self.rods() == 1 {
-            self.leaf.tip_moment * self.load_factor
+            self.loads.tip_moment * self.load_factor
         } else {
             DVec3::ZERO
         }
@@ -152,9 +170,9 @@ impl<'a> DiscreteLeaf<'a> {
         let k = state.base(j) + i;
         let x = state.x[k];
         let weight = self.load_factor * self.weights[i] * self.leaf.length(j);
-        let mut force = self.leaf.gravity * weight;
+        let mut force = self.loads.gravity * weight;
         if i == self.segments() && (j == 0 || !self.leaf.joined()) {
-            force += self.load_factor * self.leaf.tip_force;
+            force += self.load_factor * self.loads.tip_force;
         }
         let mut energy = -force.dot(x);
         if j > 0 {
@@ -167,6 +185,34 @@ impl<'a> DiscreteLeaf<'a> {
             energy += 0.5 * pull.dot(stretch);
         }
         (force, energy)
+    }
+
+    /// Potential energy of the dead loads in a state.
+    pub fn potential(&self, state: &State) -> f64 {
+        let nodes = (0..self.rods()).flat_map(|j| (0..=self.segments()).map(move |i| (j, i)));
+        nodes
+            .map(|(j, i)| self.load(state, j, i).1 - self.coupling_energy(state, j, i))
+            .sum()
+    }
+
+    /// Energy of the coupling of node `i` of rod `j` to the next rod.
+    pub fn coupling_energy(&self, state: &State, j: usize, i: usize) -> f64 {
+        if j + 1 == self.rods() {
+            return 0.0;
+        }
+        let k = state.base(j) + i;
+        let stretch = state.x[k + self.segments() + 1] - state.x[k];
+        0.5 * stretch.dot(self.spring(j, i) * stretch)
+    }
+
+    /// Sets all rest curvatures to the leaf's times `factor`.
+    pub fn set_rest(&mut self, factor: f64) {
+        let n = self.segments();
+        for (k, section) in self.sections.iter_mut().enumerate() {
+            let (j, i) = (k / n, k % n);
+            let own = (self.leaf).section(j, self.grid.middle(i), self.grid.width(i));
+            section.rest_curvature = factor * own.rest_curvature;
+        }
     }
 
     /// Assembles matrix and right-hand side of Newton's equations into

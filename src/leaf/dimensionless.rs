@@ -143,6 +143,7 @@ impl<'a> Leaf<'a> {
             ds: self.length(j) * width,
             couple_stiffness: at(&rod.couple_stiffness) / self.scale.stiffness,
             rest_curvature: at(&rod.rest_curvature) * self.scale.length,
+            rest_strain: DVec3::X,
             compliance: (at(&rod.force_stiffness) / self.scale.force()).recip(),
             condensing: DVec3::ZERO,
         }

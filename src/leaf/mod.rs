@@ -9,9 +9,9 @@ mod sparse;
 mod state;
 mod system;
 
-pub use assembly::{DiscreteLeaf, Sums};
+pub use assembly::{DiscreteLeaf, Loads, Sums};
 pub use dimensionless::{Leaf, Scale};
 pub use grid::Grid;
 pub use sparse::{SparseError, SparseFactor, SparsePattern};
-pub use state::{Increment, State};
+pub use state::{Increment, State, shift, turn};
 pub use system::{Solved, System};

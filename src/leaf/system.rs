@@ -9,8 +9,8 @@
 
 use super::assembly::{DiscreteLeaf, Sums};
 use super::chain::{Chain, Factor, TipFactor};
-use super::state::Increment;
-use glam::DVec3;
+use super::state::{Increment, shift, turn};
+use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 /// Iterations after which the rod-wise preconditioner is held to have failed.
@@ -155,6 +155,29 @@ impl System {
                 f(j, i, solution);
             }
         }
+    }
+
+    /// Adds to the equations of node `i` (from 1) of rod `j`: to the matrix a
+    /// rotary and a translational part on its diagonal, to the right-hand side
+    /// a moment and a force. What inertia adds in a time step.
+    pub fn add(&mut self, j: usize, i: usize, matrix: (DMat3, f64), rhs: (DVec3, DVec3)) {
+        let rod = &mut self.rods[j];
+        let (block, increment) = (&mut rod.chain.diagonal[i - 1], &mut rod.rhs[i - 1]);
+        for c in 0..3 {
+            for r in 0..3 {
+                block[r][c] += matrix.0.col(c)[r];
+            }
+            block[3 + c][3 + c] += matrix.1;
+            increment[c] += rhs.0[c];
+            increment[3 + c] += rhs.1[c];
+        }
+    }
+
+    /// The right-hand side of node `i` (from 1) of rod `j`: moment and force
+    /// on it, or on the joint tip the rod's share of it.
+    pub fn unbalanced(&self, j: usize, i: usize) -> (DVec3, DVec3) {
+        let rhs = &self.rods[j].rhs[i - 1];
+        (turn(rhs), shift(rhs))
     }
 
     /// Makes the last solution the right-hand side, times the mass matrix and

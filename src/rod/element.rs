@@ -10,8 +10,10 @@
 //! the segment as a further unknown, nu = R^T n being its components along the
 //! directors and c_k = 1/H_k the compliances of eq. (6):
 //!
-//! Pi = nu . (R^T (x1 - x0) - ds e1) - ds/2 sum_k c_k nu_k^2
-//!      + ds/2 sum_k A_k (u_k - u0_k)^2.
+//! Pi = nu . (R^T (x1 - x0) - ds v0) - ds/2 sum_k c_k nu_k^2
+//!      + ds/2 sum_k A_k (u_k - u0_k)^2,
+//!
+//! the rest strain v0 being e1 but where internal friction acts.
 //!
 //! Stationary in n this is the paper's law; the implicit midpoint rule on eqs
 //! (1) and (2) and the minimum of a discrete energy coincide. The force is
@@ -31,6 +33,8 @@ pub struct Section {
     pub couple_stiffness: DVec3,
     /// Rest curvature u0.
     pub rest_curvature: DVec3,
+    /// Rest strain v0; (1, 0, 0) is unstretched and unsheared.
+    pub rest_strain: DVec3,
     /// Compliance 1/H: axial, shear along d2, along d3; zero if rigid.
     pub compliance: DVec3,
     /// Stiffness by which the force is condensed out: H, or a large one in its
@@ -58,7 +62,7 @@ pub struct Segment {
     pub m: DVec3,
     /// Director components nu of the force the segment carries.
     pub nu: DVec3,
-    /// The strain that goes with that force, e1 + c nu.
+    /// The strain that goes with that force, v0 + c nu.
     pub w: DVec3,
     /// R^T (x1 - x0) - ds w: by how much the constitutive law is not yet met.
     pub gap: DVec3,
@@ -94,11 +98,11 @@ impl Section {
         self
     }
 
-    /// Elastic energy of the strains, ds/2 sum_k (H_k (v_k - delta_k1)^2 +
+    /// Elastic energy of the strains, ds/2 sum_k (H_k (v_k - v0_k)^2 +
     /// A_k (u_k - u0_k)^2). Infinite for a strained rigid rod.
     #[inline]
     pub fn strain_energy(&self, segment: &Segment) -> f64 {
-        let gamma = segment.v(self) - DVec3::X;
+        let gamma = segment.v(self) - self.rest_strain;
         0.5 * self.ds * (gamma * gamma / self.compliance).element_sum()
             + self.bending_energy(segment)
     }
@@ -127,7 +131,7 @@ impl Segment {
         let to_directors = frame.transpose();
         let u = relative.psi / section.ds;
         let nu = to_directors * n;
-        let w = DVec3::X + section.compliance * nu;
+        let w = section.rest_strain + section.compliance * nu;
         Segment {
             frame,
             u,

@@ -1,0 +1,230 @@
+//! Several numbers at once: what one instruction of the processor works on.
+
+use std::ops::{Add, Mul, Neg, Sub};
+
+use pulp::Simd;
+
+/// One number for each of several neighbouring nodes.
+#[derive(Clone, Copy)]
+pub struct Lanes<S: Simd> {
+    simd: S,
+    v: S::f64s,
+}
+
+impl<S: Simd> Lanes<S> {
+    /// The same number everywhere.
+    #[inline(always)]
+    pub fn splat(simd: S, value: f64) -> Self {
+        Lanes {
+            simd,
+            v: simd.splat_f64s(value),
+        }
+    }
+
+    /// Reads `array` from `at` on.
+    #[inline(always)]
+    pub fn load(simd: S, array: &[f64], at: usize) -> Self {
+        let (lanes, _) = S::as_simd_f64s(&array[at..at + S::F64_LANES]);
+        Lanes { simd, v: lanes[0] }
+    }
+
+    /// Writes `array` from `at` on.
+    #[inline(always)]
+    pub fn store(self, array: &mut [f64], at: usize) {
+        let (lanes, _) = S::as_mut_simd_f64s(&mut array[at..at + S::F64_LANES]);
+        lanes[0] = self.v;
+    }
+
+    /// self * factor + term.
+    #[inline(always)]
+    pub fn times(self, factor: Self, term: Self) -> Self {
+        Lanes {
+            simd: self.simd,
+            v: self.simd.mul_add_e_f64s(self.v, factor.v, term.v),
+        }
+    }
+
+    /// term - self * factor.
+    #[inline(always)]
+    pub fn times_from(self, factor: Self, term: Self) -> Self {
+        Lanes {
+            simd: self.simd,
+            v: self.simd.negate_mul_add_e_f64s(self.v, factor.v, term.v),
+        }
+    }
+
+    /// 1 / self.
+    #[inline(always)]
+    pub fn recip(self) -> Self {
+        let one = self.simd.splat_f64s(1.0);
+        Lanes {
+            simd: self.simd,
+            v: self.simd.div_f64s(one, self.v),
+        }
+    }
+
+    /// Sum of all.
+    #[inline(always)]
+    pub fn sum(self) -> f64 {
+        self.simd.reduce_sum_f64s(self.v)
+    }
+
+    /// The polynomial with these coefficients, constant term first.
+    #[inline(always)]
+    pub fn polynomial<const N: usize>(self, coefficients: &[f64; N]) -> Self {
+        let mut sum = Lanes::splat(self.simd, coefficients[N - 1]);
+        for k in (0..N - 1).rev() {
+            sum = sum.times(self, Lanes::splat(self.simd, coefficients[k]));
+        }
+        sum
+    }
+}
+
+impl<S: Simd> Add for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Lanes {
+            simd: self.simd,
+            v: self.simd.add_f64s(self.v, other.v),
+        }
+    }
+}
+
+impl<S: Simd> Sub for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Lanes {
+            simd: self.simd,
+            v: self.simd.sub_f64s(self.v, other.v),
+        }
+    }
+}
+
+impl<S: Simd> Mul for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Lanes {
+            simd: self.simd,
+            v: self.simd.mul_f64s(self.v, other.v),
+        }
+    }
+}
+
+impl<S: Simd> Neg for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Lanes {
+            simd: self.simd,
+            v: self.simd.neg_f64s(self.v),
+        }
+    }
+}
+
+/// A vector for each of several neighbouring nodes.
+#[derive(Clone, Copy)]
+pub struct Vectors<S: Simd> {
+    pub x: Lanes<S>,
+    pub y: Lanes<S>,
+    pub z: Lanes<S>,
+}
+
+impl<S: Simd> Vectors<S> {
+    #[inline(always)]
+    pub fn new(x: Lanes<S>, y: Lanes<S>, z: Lanes<S>) -> Self {
+        Vectors { x, y, z }
+    }
+
+    #[inline(always)]
+    pub fn splat(simd: S, v: [f64; 3]) -> Self {
+        let [x, y, z] = v.map(|v| Lanes::splat(simd, v));
+        Vectors { x, y, z }
+    }
+
+    #[inline(always)]
+    pub fn load(simd: S, arrays: &[Vec<f64>; 3], at: usize) -> Self {
+        Vectors {
+            x: Lanes::load(simd, &arrays[0], at),
+            y: Lanes::load(simd, &arrays[1], at),
+            z: Lanes::load(simd, &arrays[2], at),
+        }
+    }
+
+    #[inline(always)]
+    pub fn store(self, arrays: &mut [Vec<f64>; 3], at: usize) {
+        self.x.store(&mut arrays[0], at);
+        self.y.store(&mut arrays[1], at);
+        self.z.store(&mut arrays[2], at);
+    }
+
+    #[inline(always)]
+    pub fn dot(self, other: Self) -> Lanes<S> {
+        let zz = self.z * other.z;
+        self.x.times(other.x, self.y.times(other.y, zz))
+    }
+
+    #[inline(always)]
+    pub fn cross(self, other: Self) -> Self {
+        Vectors {
+            x: self.z.times_from(other.y, self.y * other.z),
+            y: self.x.times_from(other.z, self.z * other.x),
+            z: self.y.times_from(other.x, self.x * other.y),
+        }
+    }
+
+    #[inline(always)]
+    pub fn scale(self, factor: Lanes<S>) -> Self {
+        Vectors {
+            x: self.x * factor,
+            y: self.y * factor,
+            z: self.z * factor,
+        }
+    }
+
+    /// Component by component.
+    #[inline(always)]
+    pub fn each(self, other: Self) -> Self {
+        Vectors {
+            x: self.x * other.x,
+            y: self.y * other.y,
+            z: self.z * other.z,
+        }
+    }
+
+    /// self * factor + term.
+    #[inline(always)]
+    pub fn times(self, factor: Lanes<S>, term: Self) -> Self {
+        Vectors {
+            x: self.x.times(factor, term.x),
+            y: self.y.times(factor, term.y),
+            z: self.z.times(factor, term.z),
+        }
+    }
+}
+
+impl<S: Simd> Add for Vectors<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Vectors {
+            x: self.x + other.x,
+            y: self.y + other.y,
+            z: self.z + other.z,
+        }
+    }
+}
+
+impl<S: Simd> Sub for Vectors<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Vectors {
+            x: self.x - other.x,
+            y: self.y - other.y,
+            z: self.z - other.z,
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! The energy of a moving leaf, and whether it can be trusted.
+
+use super::method::{Broken, Energy, Snapshot, Velocity};
+use super::physics::{Inertia, Physics};
+use crate::leaf::{DiscreteLeaf, State};
+use glam::DVec3;
+
+/// Part of the energy that ever moved by which its balance may be off. Of a
+/// method at nine tenths of its stable step, energy in the very fastest waves
+/// may seem to change by more, but never lasting; growth without bound passes
+/// any such limit soon.
+const LARGEST_IMBALANCE: f64 = 0.5;
+
+/// Bending of a segment (radians) beyond which its grid does not resolve it.
+const RESOLVED_TURN: f64 = 1.6;
+
+/// Energies at an instant, but what was dissipated and put in before. Leaves
+/// `leaf` with the loads and rest shape of that time.
+pub fn measure(
+    leaf: &mut DiscreteLeaf,
+    physics: &Physics,
+    time: f64,
+    state: &State,
+    velocity: &[Velocity],
+) -> Energy {
+    leaf.loads = physics.loads(time);
+    if physics.rest_changes() {
+        leaf.set_rest(physics.rest(time));
+    }
+    let n = leaf.segments();
+    let mut energy = Energy::default();
+    for j in 0..leaf.rods() {
+        for i in 0..=n {
+            let k = state.base(j) + i;
+            let Inertia { mass, transverse } = physics.inertia(leaf.leaf, &leaf.grid, j, i);
+            let Velocity { angular, linear } = velocity[k];
+            let spin = angular.dot(state.q[k] * DVec3::X);
+            energy.kinetic += 0.5 * mass * linear.length_squared();
+            energy.kinetic += 0.5
+                * transverse
+                * (angular.length_squared() + (Inertia::POLAR - 1.0) * spin * spin);
+            let (_, potential) = leaf.load(state, j, i);
+            let stretch = leaf.coupling_energy(state, j, i);
+            energy.coupling += stretch;
+            energy.potential += potential - stretch;
+            if i < n {
+                // By strains: the force may have a part of friction in it.
+                let (section, force) = (leaf.section(j, i), state.n[j * n + i]);
+                let segment = leaf.segment(state, j, i, force);
+                let strain = segment.v(section) - section.rest_strain;
+                energy.elastic += section.bending_energy(&segment);
+                for c in 0..3 {
+                    if section.compliance[c] > 0.0 {
+                        energy.elastic +=
+                            0.5 * section.ds * strain[c] * strain[c] / section.compliance[c];
+                    }
+                }
+            }
+        }
+    }
+    energy
+}
+
+/// What was taken out and put in, and where it began.
+#[derive(Clone, Debug, Default)]
+pub struct Ledger {
+    pub dissipated: f64,
+    pub work: f64,
+    balance: f64,
+    potential: f64,
+    /// The largest energy that was ever in motion or could have been.
+    largest: f64,
+}
+
+impl Ledger {
+    /// Begins with this.
+    pub fn begin(&mut self, start: &Snapshot) {
+        self.balance = start.energy.balance();
+        self.potential = start.energy.potential;
+        self.look(&start.energy);
+    }
+
+    fn look(&mut self, energy: &Energy) {
+        let moved = energy.kinetic
+            + energy.elastic
+            + energy.coupling
+            + (energy.potential - self.potential).abs()
+            + energy.work.abs();
+        self.largest = self.largest.max(moved);
+    }
+
+    /// Adds what only the ledger knows.
+    pub fn complete(&self, energy: Energy) -> Energy {
+        Energy {
+            dissipated: self.dissipated,
+            work: self.work,
+            ..energy
+        }
+    }
+
+    /// Whether the leaf can be trusted to be where it is.
+    pub fn judge(&mut self, leaf: &DiscreteLeaf, now: &Snapshot) -> Result<(), Broken> {
+        let time = now.time;
+        let before = self.largest;
+        self.look(&now.energy);
+        // What has just appeared is not to be its own measure. Energy may be
+        // lost to the method's own damping, but not gained.
+        let imbalance = (now.energy.balance() - self.balance) / before.max(f64::MIN_POSITIVE);
+        if imbalance.is_nan() || (imbalance > LARGEST_IMBALANCE && before > 0.0) {
+            return Err(Broken::Diverged { time, imbalance });
+        }
+        let n = leaf.segments();
+        let turns = (0..leaf.rods()).flat_map(|j| (0..n).map(move |i| (j, i)));
+        let turn = turns
+            .map(|(j, i)| leaf.segment(&now.state, j, i, DVec3::ZERO).turn())
+            .fold(0.0, f64::max);
+        match turn > RESOLVED_TURN {
+            true => Err(Broken::Unresolved { time, turn }),
+            false => Ok(()),
+        }
+    }
+
+    /// All its numbers.
+    pub fn save(&self) -> [f64; 5] {
+        [self.dissipated, self.work, self.balance, self.potential, self.largest]
+    }
+
+    /// Takes them back.
+    pub fn restore(&mut self, next: &mut impl FnMut() -> f64) {
+        *self = Ledger {
+            dissipated: next(),
+            work: next(),
+            balance: next(),
+            potential: next(),
+            largest: next(),
+        };
+    }
+}

@@ -1,0 +1,15 @@
+//! Motion in time.
+
+mod explicit;
+mod kernel;
+mod lanes;
+mod ledger;
+mod method;
+mod nodes;
+mod physics;
+mod semi_implicit;
+
+pub use explicit::{Explicit, Rigid};
+pub use method::{Broken, Energy, Method, Snapshot, Velocity};
+pub use physics::{Inertia, Physics};
+pub use semi_implicit::{SemiImplicit, Steps};

@@ -1,0 +1,172 @@
+//! From the leaf to the arrays of the explicit method, and back.
+
+use super::kernel::{GROUP, Material, Motion, Past, Positions};
+use super::method::Velocity;
+use super::physics::{Inertia, Physics};
+use crate::leaf::{DiscreteLeaf, State};
+use glam::{DQuat, DVec3};
+
+/// One rod's arrays but its positions, which its neighbours read.
+#[derive(Clone, Debug)]
+pub struct Rod {
+    pub motion: Motion,
+    pub material: Material,
+    pub past: Past,
+    /// What a loop over the rod summed up.
+    pub sum: f64,
+}
+
+fn arrays<const K: usize>(length: usize) -> [Vec<f64>; K] {
+    std::array::from_fn(|_| vec![0.0; length])
+}
+
+/// Number of groups of nodes a rod has.
+pub fn groups(segments: usize) -> usize {
+    (segments + 1).div_ceil(GROUP)
+}
+
+/// Positions of a rod.
+pub fn positions(leaf: &DiscreteLeaf, state: &State, j: usize) -> Positions {
+    let n = leaf.segments();
+    let mut x = arrays::<3>(GROUP * (groups(n) + 2));
+    for i in 0..=n {
+        for c in 0..3 {
+            x[c][GROUP + i] = state.x[state.base(j) + i][c];
+        }
+    }
+    Positions { x }
+}
+
+/// A rod at rest.
+pub fn rod(leaf: &DiscreteLeaf, physics: &Physics, state: &State, j: usize) -> Rod {
+    let n = leaf.segments();
+    let length = GROUP * (groups(n) + 2);
+    let joined = leaf.leaf.joined() && leaf.rods() > 1;
+    let mut motion = Motion {
+        q: arrays(length),
+        v: arrays(length),
+        p: arrays(length),
+        n: arrays(length),
+        left: arrays(length),
+        right: arrays(length),
+    };
+    motion.q[3].fill(1.0);
+    let one = || vec![0.0; length];
+    let mut material = Material {
+        stretch: arrays(length),
+        rest_length: one(),
+        bend: arrays(length),
+        rest_turn: arrays(length),
+        mass: one(),
+        per_mass: one(),
+        per_inertia: one(),
+        per_spin: one(),
+        weight: one(),
+        coupled: one(),
+    };
+    let mut last = DQuat::IDENTITY;
+    for i in 0..=n {
+        let (k, at) = (state.base(j) + i, GROUP + i);
+        // Signs of neighbouring quaternions are aligned once and stay so.
+        let q = if i > 0 && last.dot(state.q[k]) < 0.0 {
+            -state.q[k]
+        } else {
+            state.q[k]
+        };
+        last = q;
+        for (array, value) in motion.q.iter_mut().zip(q.to_array()) {
+            array[at] = value;
+        }
+        let m = &mut material;
+        m.weight[at] = leaf.grid.weight(i) * leaf.leaf.length(j);
+        if i > 0 || !physics.clamped() {
+            let inertia = physics.inertia(leaf.leaf, &leaf.grid, j, i);
+            m.per_inertia[at] = 1.0 / inertia.transverse;
+            m.per_spin[at] = (1.0 / Inertia::POLAR - 1.0) / inertia.transverse;
+            if i < n || !joined {
+                m.mass[at] = inertia.mass;
+                m.per_mass[at] = 1.0 / inertia.mass;
+                m.coupled[at] = leaf.grid.weight(i);
+            }
+        }
+        if i < n {
+            let section = leaf.section(j, i);
+            m.rest_length[at] = section.ds;
+            for c in 0..3 {
+                m.stretch[c][at] = 1.0 / (section.compliance[c] * section.ds);
+                m.bend[c][at] = section.couple_stiffness[c] / section.ds;
+                m.rest_turn[c][at] = section.rest_curvature[c] * section.ds;
+            }
+        }
+    }
+    let past = || [arrays::<3>(length), arrays::<3>(length)];
+    let mut rod = Rod {
+        motion,
+        material,
+        past: Past {
+            one: past(),
+            two: past(),
+        },
+        sum: 0.0,
+    };
+    rod.close(n);
+    rod
+}
+
+impl Rod {
+    /// Lets what stands behind the last node be like it, so that the segment
+    /// that is read there, though it has no stiffness, is a sound one.
+    pub fn close(&mut self, segments: usize) {
+        let last = GROUP + segments;
+        for q in &mut self.motion.q {
+            q[last + 1] = q[last];
+        }
+    }
+
+    /// The arrays that tell the future, but positions.
+    pub fn moving_arrays(&self) -> impl Iterator<Item = &Vec<f64>> {
+        let Motion { q, v, p, .. } = &self.motion;
+        let past = self.past.one.iter().chain(&self.past.two).flatten();
+        q.iter().chain(v).chain(p).chain(past)
+    }
+
+    /// The same, to be written.
+    pub fn moving_arrays_mut(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
+        let Motion { q, v, p, .. } = &mut self.motion;
+        let past = self.past.one.iter_mut().chain(&mut self.past.two).flatten();
+        q.iter_mut().chain(v).chain(p).chain(past)
+    }
+
+    /// Angular velocity of a node with angular momentum `p`.
+    pub fn spin(&self, at: usize, p: DVec3) -> DVec3 {
+        let d1 = self.rotation(at) * DVec3::X;
+        p * self.material.per_inertia[at] + d1 * (d1.dot(p) * self.material.per_spin[at])
+    }
+
+    /// Rotation of a node.
+    pub fn rotation(&self, at: usize) -> DQuat {
+        let [x, y, z, w] = [0, 1, 2, 3].map(|c| self.motion.q[c][at]);
+        DQuat::from_xyzw(x, y, z, w)
+    }
+
+    /// Velocity and angular momentum of a node.
+    pub fn moving(&self, at: usize) -> (DVec3, DVec3) {
+        (vector(&self.motion.v, at), vector(&self.motion.p, at))
+    }
+
+    /// Velocities of all nodes.
+    pub fn velocities(&self, segments: usize) -> impl Iterator<Item = Velocity> + '_ {
+        (GROUP..=GROUP + segments).map(move |at| {
+            let (v, p) = self.moving(at);
+            Velocity {
+                angular: self.spin(at, p),
+                linear: v,
+            }
+        })
+    }
+}
+
+/// The vector at an index.
+pub fn vector(arrays: &[Vec<f64>; 3], at: usize) -> DVec3 {
+    DVec3::new(arrays[0][at], arrays[1][at], arrays[2][at])
+}

@@ -1,0 +1,114 @@
+//! What a leaf needs to move: masses, damping, and loads that change in time.
+//! Dimensionless: time in units of sqrt(rho L^4/A).
+
+use crate::leaf::{Grid, Leaf, Loads, Scale};
+use crate::scenario::Dynamics;
+use glam::DVec3;
+
+/// Inertia of a node: the mass and the moments of inertia of the half-segments
+/// beside it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inertia {
+    /// Mass.
+    pub mass: f64,
+    /// Moment of inertia about d2 and d3; that about d1 is twice it.
+    pub transverse: f64,
+}
+
+impl Inertia {
+    /// Moment of inertia about d1 (of a round section) over the other two.
+    pub const POLAR: f64 = 2.0;
+}
+
+/// Inertia, damping and loads of a leaf.
+#[derive(Clone, Debug)]
+pub struct Physics {
+    dynamics: Dynamics,
+    scale: Scale,
+    /// Unit of time in the scenario's.
+    pub time: f64,
+    /// Unit of mass per length in the scenario's: the mean density.
+    density: f64,
+    /// External damping: every velocity decays at this rate.
+    pub damping: f64,
+    /// Internal damping: retardation time.
+    pub retardation: f64,
+}
+
+impl Physics {
+    /// As a leaf's scenario has them.
+    pub fn new(leaf: &Leaf) -> Self {
+        Physics::of(leaf, leaf.scenario().dynamics.clone())
+    }
+
+    /// As they are where a scenario says nothing of motion, under its loads at
+    /// rest: the damped motion by which a leaf comes to rest.
+    pub fn at_rest(leaf: &Leaf) -> Self {
+        let s = leaf.scenario();
+        let dynamics = Dynamics::default_for(&s.rods);
+        Physics::of(leaf, dynamics.with_loads(s.gravity, s.tip_force, s.tip_moment))
+    }
+
+    fn of(leaf: &Leaf, dynamics: Dynamics) -> Self {
+        let scale = leaf.scale;
+        let densities = dynamics.density.iter().map(|density| density.at(0.5));
+        let density = densities.sum::<f64>() / dynamics.density.len() as f64;
+        let time = scale.length * scale.length * (density / scale.stiffness).sqrt();
+        Physics {
+            scale,
+            time,
+            density,
+            damping: dynamics.external_damping / density * time,
+            retardation: dynamics.internal_damping / time,
+            dynamics,
+        }
+    }
+
+    /// Whether the base is clamped.
+    pub fn clamped(&self) -> bool {
+        self.dynamics.clamped
+    }
+
+    /// Inertia of node `i` of rod `j`.
+    pub fn inertia(&self, leaf: &Leaf, grid: &Grid, j: usize, i: usize) -> Inertia {
+        let (sigma, length) = (grid.sigma()[i], grid.weight(i) * leaf.length(j));
+        let rotary = self.density * self.scale.length * self.scale.length;
+        Inertia {
+            mass: length * self.dynamics.density[j].at(sigma) / self.density,
+            transverse: length * self.dynamics.rotary_inertia[j].at(sigma) / rotary,
+        }
+    }
+
+    /// Duration of the motion and interval of its output.
+    pub fn duration(&self) -> (f64, f64) {
+        let (duration, interval) = (self.dynamics.duration, self.dynamics.output_interval);
+        (duration / self.time, interval / self.time)
+    }
+
+    /// The loads at a time.
+    pub fn loads(&self, time: f64) -> Loads {
+        let (d, at) = (&self.dynamics, time * self.time);
+        let force = self.scale.force();
+        Loads {
+            gravity: DVec3::from_array(d.gravity.at(at)) * (self.scale.length / force),
+            tip_force: DVec3::from_array(d.tip_force.at(at)) / force,
+            tip_moment: DVec3::from_array(d.tip_moment.at(at)) / self.scale.moment(),
+        }
+    }
+
+    /// The factor of all rest curvatures at a time.
+    pub fn rest(&self, time: f64) -> f64 {
+        self.dynamics.rest.at(time * self.time)
+    }
+
+    /// Whether loads change in time.
+    pub fn loads_change(&self) -> bool {
+        let d = &self.dynamics;
+        !(d.gravity.is_constant() && d.tip_force.is_constant() && d.tip_moment.is_constant())
+    }
+
+    /// Whether rest curvatures change in time.
+    pub fn rest_changes(&self) -> bool {
+        !self.dynamics.rest.is_constant()
+    }
+}
