@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use leafdyn::relax::{Equilibrium, NodeState, Options, relax};
-use leafdyn::scenario::{Profile, Rod, Scenario};
+use leafdyn::scenario::{Dynamics, Profile, Rod, Scenario};
 
 /// The tolerance at which canonical values are checked: small enough for the
 /// digits they are given with, large enough for double precision.
@@ -212,20 +212,23 @@ pub fn critical_of_rigid(
 pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -> Scenario {
     let constant = |values: [f64; 3]| values.map(Profile::Constant);
     let angle = |n: usize| PI * (2.0 * n as f64 / rods as f64 - 1.0) / 3.0;
+    let veins: Vec<_> = (1..=rods)
+        .map(|n| Rod {
+            length: 1.0,
+            angle: angle(n),
+            couple_stiffness: constant(couple),
+            force_stiffness: constant(force),
+            rest_curvature: constant([0.0; 3]),
+        })
+        .collect();
+    let gravity = [0.0, 0.0, -weight];
     Scenario {
         name: "leaf".into(),
-        rods: (1..=rods)
-            .map(|n| Rod {
-                length: 1.0,
-                angle: angle(n),
-                couple_stiffness: constant(couple),
-                force_stiffness: constant(force),
-                rest_curvature: constant([0.0; 3]),
-            })
-            .collect(),
+        dynamics: Dynamics::default_for(&veins).with_loads(gravity, [0.0; 3], [0.0; 3]),
+        rods: veins,
         joined: true,
         coupling: vec![[0.0, 1.0, 1.0]; rods - 1],
-        gravity: [0.0, 0.0, -weight],
+        gravity,
         tip_force: [0.0; 3],
         tip_moment: [0.0; 3],
         tolerance: 1e-6,
