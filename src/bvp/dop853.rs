@@ -98,7 +98,8 @@ impl<'e, 'a> Integrator<'e, 'a> {
             let step = self.step.min(self.longest_step());
             let last = step > 0.99 * left;
             let h = if last { left } else { step };
-            if self.steps > MAX_STEPS || h < 1e-13 {
+            // Two stops may lie a rounding error apart: that is no small step.
+            if self.steps > MAX_STEPS || (!last && h < 1e-13) {
                 return Err(failed);
             }
             self.attempt(h);
