@@ -71,13 +71,12 @@ impl<'e, 'a> Integrator<'e, 'a> {
         norm(self.equations, &self.y, &self.y, |i| self.slopes[0][i])
     }
 
-    /// Bound on the step by what perturbations do: a rod under the axial force
-    /// T bends with the wavenumber sqrt(T/A).
+    /// Bound on the step by what perturbations do.
     fn longest_step(&self) -> f64 {
         let rate = (0..self.equations.rods())
             .map(|j| {
                 let force = RodState::read(&self.y, j).n.length();
-                self.equations.rod_length(j) * (force / self.equations.softest(j)).sqrt()
+                self.equations.rate(j, force)
             })
             .fold(1.0, f64::max);
         LONGEST_STEP / rate

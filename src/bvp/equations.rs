@@ -41,6 +41,8 @@ pub struct Equations<'a> {
     tip_moment: DVec3,
     /// The smallest couple stiffness along each rod.
     softest: Vec<f64>,
+    /// Rate per sigma at which the coupling makes perturbations of each rod grow.
+    coupled_rate: Vec<f64>,
     arcs: Vec<Arc>,
     /// Between 0, a leaf without loads that rests in the shape of arcs with a
     /// common tip, and 1, the leaf of the scenario.
@@ -125,23 +127,38 @@ impl<'a> Equations<'a> {
         let stiffness = (logs / (2 * rods.len()) as f64).exp();
         let force = stiffness / (length * length);
         let lengths: Vec<f64> = rods.iter().map(|rod| rod.length / length).collect();
-        let coupling = lengths
+        let coupling: Vec<DVec3> = lengths
             .windows(2)
             .zip(&scenario.coupling)
             .map(|(gap, kappa)| {
                 DVec3::from_array(*kappa) * (0.5 * (gap[0] + gap[1]) * length * length / force)
             })
             .collect();
-        let softest = rods
+        let softest: Vec<f64> = rods
             .iter()
             .map(|rod| rod.couple_stiffness.iter().map(Profile::min))
             .map(|stiffness| stiffness.fold(f64::INFINITY, f64::min) / (force * length * length))
+            .collect();
+        let coupled_rate = (0..rods.len())
+            .map(|j| {
+                let of = |gap: Option<usize>| gap.and_then(|gap| coupling.get(gap).copied());
+                let gaps = [of(j.checked_sub(1)), of(Some(j))];
+                let pull: DVec3 = gaps.into_iter().flatten().sum();
+                // Neighbours that move the other way double the pull; against
+                // it a rod bends, r'''' = -pull r, or stretches, r'' = pull r.
+                let pull = 2.0 * lengths[j] * pull.max_element();
+                let stiffness = rods[j].force_stiffness.iter().map(Profile::min);
+                let stiffness = stiffness.fold(f64::INFINITY, f64::min) / force;
+                let bend = (pull * lengths[j] * lengths[j] / softest[j]).sqrt().sqrt();
+                bend.max((pull / stiffness).sqrt())
+            })
             .collect();
         Equations {
             scenario,
             length,
             force,
             coupling,
+            coupled_rate,
             gravity: DVec3::from_array(scenario.gravity) * (length / force),
             tip_force: DVec3::from_array(scenario.tip_force) / force,
             tip_moment: DVec3::from_array(scenario.tip_moment) / (force * length),
@@ -161,6 +178,13 @@ impl<'a> Equations<'a> {
     /// Length of a flat state.
     pub fn size(&self) -> usize {
         STATE * self.rods() + 1
+    }
+
+    /// Rate per sigma at which perturbations of rod `j` grow or turn: a rod
+    /// under the axial force T bends with the wavenumber sqrt(T/A).
+    pub fn rate(&self, j: usize, force: f64) -> f64 {
+        let tension = self.lengths[j] * (force / self.softest[j]).sqrt();
+        tension.max(self.coupled_rate[j])
     }
 
     /// Length of rod `j`.
