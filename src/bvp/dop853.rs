@@ -9,10 +9,12 @@ const MAX_STEPS: usize = 20_000;
 /// A solution that has grown beyond this is not bounded.
 const MAX_STATE: f64 = 1e9;
 
-/// Longest step, in units of the length over which a perturbation grows or
-/// turns. Where the leaf is straight its own error would allow any step, and
-/// the sensitivities, integrated by the same steps, would suffer.
-const LONGEST_STEP: f64 = 0.4;
+/// Longest step at the tolerance 1e-13, in units of the length over which a
+/// perturbation grows or turns. Where the leaf is straight its own error would
+/// allow any step, and the sensitivities, integrated by the same steps, would
+/// suffer. As all steps do it grows with the tolerance, or else solutions at
+/// two tolerances would share their errors, but not beyond the last number.
+const LONGEST_STEP: [f64; 2] = [0.4, 2.25];
 
 /// The solution of an initial-value problem could not be continued beyond
 /// `sigma`: it grows out of all bounds.
@@ -79,7 +81,8 @@ impl<'e, 'a> Integrator<'e, 'a> {
                 self.equations.rate(j, force)
             })
             .fold(1.0, f64::max);
-        LONGEST_STEP / rate
+        let longest = LONGEST_STEP[0] * (self.tolerance / 1e-13).powf(0.125);
+        longest.min(LONGEST_STEP[1]) / rate
     }
 
     /// Whether there is still a way to go to `until`.

@@ -68,6 +68,11 @@ impl Units {
         self.force.iter().fold(0.0, |m, f| m.max(*f))
     }
 
+    /// The largest unit of moments.
+    pub fn largest_moment(&self) -> f64 {
+        self.moment.iter().fold(0.0, |m, f| m.max(*f))
+    }
+
     /// The difference a - b of two flat states.
     pub fn difference(&self, a: &[f64], b: &[f64]) -> Vec<f64> {
         (0..self.force.len())

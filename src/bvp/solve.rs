@@ -102,9 +102,20 @@ pub fn solve(scenario: &Scenario, start: Start, options: &Options) -> Result<Sol
     };
     let (rods, tip) = (fine.shape(&equations), fine.tip());
     let energy = tip[tip.len() - 1] + equations.tip_potential(tip);
+    // Steps that end at the same stations share their errors, which the
+    // difference then does not show: it is not less than a local error.
+    let difference = Difference::between(&coarse.shape(&equations), &rods);
+    let (force, local) = (equations.force, options.tolerance);
+    let error = Difference {
+        position: difference.position + local * equations.length,
+        rotation: difference.rotation + local,
+        force: difference.force + local * newton.units.total_force() * force,
+        moment: difference.moment
+            + local * newton.units.largest_moment() * force * equations.length,
+    };
     Ok(Solution {
         stations: options.stations.clone(),
-        error: Difference::between(&coarse.shape(&equations), &rods),
+        error,
         rods,
         energy: energy * equations.force * equations.length,
         defect: newton.defect,
