@@ -1,11 +1,12 @@
 //! What scripts rely on: streams, files and exit statuses of the command line.
 
+mod workplace;
+
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
 use serde_json::Value;
-use tempfile::TempDir;
+use workplace::{Workplace, is_whole_png, leaf, text};
 
 const FILES: [&str; 4] = [
     "centerlines.csv",
@@ -13,85 +14,6 @@ const FILES: [&str; 4] = [
     "figure.svg",
     "summary.json",
 ];
-
-/// A folder to run in, with a small leaf in `leaf.toml`.
-struct Workplace {
-    folder: TempDir,
-}
-
-impl Workplace {
-    fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("leaf.toml"), leaf("small", 5)).unwrap();
-        Workplace { folder }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("leafdyn"));
-        command.current_dir(self.folder.path()).args(arguments);
-        command
-    }
-
-    fn run(&self, arguments: &[&str]) -> Output {
-        self.command(arguments).output().unwrap()
-    }
-
-    /// Names in a folder, sorted; hidden ones too.
-    fn names(&self, folder: &str) -> Vec<String> {
-        let entries = fs::read_dir(self.path(folder)).unwrap();
-        let mut names: Vec<String> = entries
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .collect();
-        names.sort();
-        names
-    }
-}
-
-fn leaf(name: &str, rods: usize) -> String {
-    format!(
-        r#"
-name = "{name}"
-
-[leaf]
-rods = {rods}
-length = 1.0
-fan = "paper"
-joined = true
-
-[stiffness]
-torsion = 1.0
-bending_2 = 1.0
-bending_3 = 1.0
-axial = 100.0
-shear_2 = 100.0
-shear_3 = 100.0
-
-[coupling]
-x = 0.0
-y = 1.0
-z = 1.0
-
-[load]
-gravity = [0.0, 0.0, -1.0]
-
-[solve]
-tolerance = 1e-6
-"#
-    )
-}
-
-fn text(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).unwrap()
-}
-
-fn is_whole_png(file: &Path) -> bool {
-    let bytes = fs::read(file).unwrap();
-    bytes.starts_with(b"\x89PNG\r\n\x1a\n") && bytes[..bytes.len() - 4].ends_with(b"IEND")
-}
 
 #[test]
 fn help_names_every_option() {

@@ -2,13 +2,15 @@
 //! than it, mostly.
 
 mod common;
+#[path = "common/random.rs"]
+mod random;
 
 use common::{distance, paper_leaf, path};
 use leafdyn::relax::{Equilibrium, Options, relax};
-use leafdyn::scenario::{Profile, Scenario};
-use proptest::prelude::*;
-use proptest::strategy::ValueTree;
+use leafdyn::scenario::Scenario;
+use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::TestRunner;
+use random::leaves;
 
 const TOLERANCES: [f64; 3] = [1e-4, 1e-6, 1e-8];
 
@@ -141,59 +143,6 @@ fn of_boundary_layers() {
         verdict.judge(&format!("weight {load}"), &leaf);
     }
     verdict.assert("layers", 0);
-}
-
-fn log_uniform(decades: std::ops::Range<f64>) -> impl Strategy<Value = f64> {
-    decades.prop_map(|exponent| 10f64.powf(exponent))
-}
-
-fn force_stiffness() -> impl Strategy<Value = f64> {
-    prop_oneof![4 => log_uniform(1.0..3.0), 1 => Just(f64::INFINITY)]
-}
-
-/// A quantity that changes along the rod by up to `most` times, with a kink.
-fn profile(value: f64, (kink, bend): (f64, f64), on: bool) -> Profile {
-    match on {
-        false => Profile::Constant(value),
-        true => Profile::Linear {
-            at: vec![0.0, kink, 1.0],
-            value: vec![value, bend * value, 0.6 * value],
-        },
-    }
-}
-
-prop_compose! {
-    /// One to four veins, alike but for length, angle and rest shape: stiffness
-    /// over two decades, some rigid in stretch or shear; any load, coupling,
-    /// fan, profiles with kinks.
-    fn leaves()(rods in 1..5_usize)(
-        couple in prop::array::uniform3(log_uniform(-1.0..1.0)),
-        force in prop::array::uniform3(force_stiffness()),
-        rest in prop::collection::vec(prop::array::uniform3(-2.0..2.0), rods),
-        lengths in prop::collection::vec(0.8..1.2, rods),
-        angles in prop::collection::vec(-0.3..0.3, rods),
-        coupling in prop::collection::vec(prop::array::uniform3(0.0..5.0), rods - 1),
-        gravity in prop::array::uniform3(-1.0..1.0),
-        tip_force in prop::array::uniform3(-1.0..1.0),
-        kinks in prop::array::uniform3((0.1..0.9, 0.5..2.0)),
-        tapered in prop::array::uniform3(prop::bool::weighted(0.3)),
-        joined in prop::bool::weighted(0.75),
-    ) -> Scenario {
-        let mut leaf = paper_leaf(rest.len(), couple, force, 0.0);
-        leaf.joined = joined;
-        leaf.coupling = coupling;
-        leaf.gravity = gravity;
-        leaf.tip_force = tip_force;
-        for (j, rod) in leaf.rods.iter_mut().enumerate() {
-            rod.length = lengths[j];
-            rod.angle += angles[j];
-            for k in 0..3 {
-                rod.couple_stiffness[k] = profile(couple[k], kinks[k], tapered[k]);
-                rod.rest_curvature[k] = profile(rest[j][k], kinks[2 - k], tapered[2 - k]);
-            }
-        }
-        leaf
-    }
 }
 
 #[test]

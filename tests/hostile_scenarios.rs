@@ -35,6 +35,14 @@ tip_force = [0.0, 0.0, 0.0]
 tip_moment = [0.0, 0.0, 0.0]
 [solve]
 tolerance = 1e-6
+[dynamics]
+density = { at = [0.0, 1.0], value = [2.0, 1.0] }
+section_radius = 0.1
+external_damping = 0.5
+duration = 5.0
+clamped = true
+gravity = { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -2.0]] }
+rest = { at = [0.0, 1.0], factor = [1.0, 3.0] }
 "#;
 
 fn with(overrides: &[&str]) -> Result<Scenario, ScenarioError> {
@@ -275,6 +283,12 @@ fn nan_is_refused_wherever_a_number_stands() {
         ("tip_moment = [0.0,", "tip_moment = [nan,"),
         ("tolerance = 1e-6", "tolerance = nan"),
         ("fan = \"symmetric\"", "fan = [0.0, nan, 0.0]"),
+        ("value = [2.0, 1.0]", "value = [2.0, nan]"),
+        ("radius = 0.1", "radius = nan"),
+        ("damping = 0.5", "damping = nan"),
+        ("duration = 5.0", "duration = nan"),
+        ("-2.0", "nan"),
+        ("[1.0, 3.0]", "[1.0, nan]"),
     ] {
         refused(line, by, &["leaf.toml:", "nan: must be a finite number"]);
     }
@@ -633,7 +647,12 @@ proptest! {
         }
         let text: String = text.into_iter().collect();
         match Scenario::from_toml(&text) {
-            Ok(scenario) => prop_assert!(!scenario.rods.is_empty() && scenario.coupling.len() + 1 == scenario.rods.len()),
+            Ok(scenario) => {
+                let rods = scenario.rods.len();
+                prop_assert!(rods > 0 && scenario.coupling.len() + 1 == rods);
+                prop_assert_eq!(scenario.dynamics.density.len(), rods);
+                prop_assert_eq!(scenario.dynamics.rotary_inertia.len(), rods);
+            }
             Err(error) => prop_assert!(error.to_string().starts_with("scenario:")),
         }
     }
@@ -641,7 +660,7 @@ proptest! {
     #[test]
     fn no_override_panics(
         key in prop_oneof![
-            proptest::sample::select(&["leaf.rods", "leaf.fan", "name", "stiffness.axial", "coupling.z", "leaf", "load."][..])
+            proptest::sample::select(&["leaf.rods", "leaf.fan", "name", "stiffness.axial", "coupling.z", "leaf", "load.", "dynamics.rest", "dynamics.density"][..])
                 .prop_map(String::from),
             any::<String>(),
         ],

@@ -156,7 +156,7 @@ impl Way {
             let turns = (near.turn(equations) / TURN).ceil() as usize;
             turns.clamp(LEAST_INTERVALS, MOST_INTERVALS)
         });
-        let mut newton = Newton::near(equations, near, Some(count));
+        let mut newton = Newton::near(equations, near, Some(count)).map_err(unbounded)?;
         newton.only_near = !self.far;
         let solved = newton.solve(ROUGH);
         work.add(newton.work);

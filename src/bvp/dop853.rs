@@ -9,10 +9,12 @@ const MAX_STEPS: usize = 20_000;
 /// A solution that has grown beyond this is not bounded.
 const MAX_STATE: f64 = 1e9;
 
-/// Longest step, in units of the length over which a perturbation grows or
-/// turns. Where the leaf is straight its own error would allow any step, and
-/// the sensitivities, integrated by the same steps, would suffer.
-const LONGEST_STEP: f64 = 0.4;
+/// Longest step at the tolerance 1e-13, in units of the length over which a
+/// perturbation grows or turns. Where the leaf is straight its own error would
+/// allow any step, and the sensitivities, integrated by the same steps, would
+/// suffer. As all steps do it grows with the tolerance, or else solutions at
+/// two tolerances would share their errors, but not beyond the last number.
+const LONGEST_STEP: [f64; 2] = [0.4, 2.25];
 
 /// The solution of an initial-value problem could not be continued beyond
 /// `sigma`: it grows out of all bounds.
@@ -71,16 +73,16 @@ impl<'e, 'a> Integrator<'e, 'a> {
         norm(self.equations, &self.y, &self.y, |i| self.slopes[0][i])
     }
 
-    /// Bound on the step by what perturbations do: a rod under the axial force
-    /// T bends with the wavenumber sqrt(T/A).
+    /// Bound on the step by what perturbations do.
     fn longest_step(&self) -> f64 {
         let rate = (0..self.equations.rods())
             .map(|j| {
                 let force = RodState::read(&self.y, j).n.length();
-                self.equations.rod_length(j) * (force / self.equations.softest(j)).sqrt()
+                self.equations.rate(j, force)
             })
             .fold(1.0, f64::max);
-        LONGEST_STEP / rate
+        let longest = LONGEST_STEP[0] * (self.tolerance / 1e-13).powf(0.125);
+        longest.min(LONGEST_STEP[1]) / rate
     }
 
     /// Whether there is still a way to go to `until`.
@@ -98,7 +100,8 @@ impl<'e, 'a> Integrator<'e, 'a> {
             let step = self.step.min(self.longest_step());
             let last = step > 0.99 * left;
             let h = if last { left } else { step };
-            if self.steps > MAX_STEPS || h < 1e-13 {
+            // Two stops may lie a rounding error apart: that is no small step.
+            if self.steps > MAX_STEPS || (!last && h < 1e-13) {
                 return Err(failed);
             }
             self.attempt(h);
@@ -215,4 +218,133 @@ fn norm(equations: &Equations, y: &[f64], next: &[f64], value: impl Fn(usize) ->
         }
     }
     largest
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scenario::Scenario;
+
+    fn pair() -> Scenario {
+        let text = r#"
+            name = "pair"
+            leaf = { rods = 2, length = [1.0, 1.2], fan = [-0.5, 0.4] }
+            stiffness = { torsion = 0.8, bending_2 = 1.0, bending_3 = 1.5, axial = 20.0, shear_2 = inf, shear_3 = 30.0 }
+            rest = { twist = 0.5, bend_2 = [1.0, -0.5], bend_3 = { at = [0.0, 1.0], value = [0.0, 2.0] } }
+            coupling = { x = 1.0, y = 3.0, z = 2.0 }
+            load = { gravity = [0.2, -0.3, -2.0] }
+        "#;
+        Scenario::from_toml(text).unwrap()
+    }
+
+    /// Some state at the clamp, nowhere near an equilibrium.
+    fn clamped(equations: &Equations, strength: f64) -> Vec<f64> {
+        let mut y = vec![0.0; equations.size()];
+        for (j, side) in [1.0, -0.7].into_iter().enumerate() {
+            let (n, m) = (DVec3::new(2.0, side, -1.0), DVec3::new(0.5, -side, 2.0));
+            let base = equations.base(j, strength * n, strength * m);
+            base.write(&mut y, j);
+        }
+        y
+    }
+
+    fn apart(a: &[f64], b: &[f64]) -> f64 {
+        let pairs = a.iter().zip(b);
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    /// The end of so many equal steps.
+    fn in_steps(equations: &Equations, strength: f64, count: usize) -> Vec<f64> {
+        let begin = clamped(equations, strength);
+        let mut integrator = Integrator::new(equations, 0.0, begin, 1e-10);
+        for k in 1..=count {
+            integrator.attempt(1.0 / count as f64);
+            integrator.sigma = k as f64 / count as f64;
+            integrator.accept();
+        }
+        integrator.y
+    }
+
+    fn to(equations: &Equations, end: f64, tolerance: f64) -> (Vec<f64>, usize) {
+        let mut integrator = Integrator::new(equations, 0.0, clamped(equations, 1.0), tolerance);
+        while integrator.before(end) {
+            integrator.step(end).unwrap();
+        }
+        assert_eq!(integrator.sigma, end);
+        (integrator.y, integrator.evaluations)
+    }
+
+    #[test]
+    fn fixed_steps_converge_with_order_8() {
+        let scenario = pair();
+        let equations = Equations::new(&scenario);
+        let exact = in_steps(&equations, 3.0, 512);
+        let errors = [8, 12, 18, 27].map(|count| apart(&in_steps(&equations, 3.0, count), &exact));
+        assert!(errors[0] < 1e-3 && errors[3] > 1e-12, "{errors:?}");
+        let order = (errors[0] / errors[3]).ln() / (27.0_f64 / 8.0).ln();
+        assert!((order - 8.0).abs() < 0.5, "{errors:?}: order {order}");
+    }
+
+    /// Step control keeps the error near the tolerance, for work that grows no
+    /// faster than its power -1/8.
+    #[test]
+    fn the_error_follows_the_tolerance() {
+        let scenario = pair();
+        let equations = Equations::new(&scenario);
+        let exact = in_steps(&equations, 1.0, 512);
+        let mut work = Vec::new();
+        for tolerance in [1e-4, 1e-6, 1e-8, 1e-10, 1e-12] {
+            let (end, evaluations) = to(&equations, 1.0, tolerance);
+            let error = apart(&end, &exact);
+            assert!(error < 30.0 * tolerance, "{tolerance:e}: {error:.1e}");
+            work.push(evaluations as f64);
+        }
+        let growth = (work[4] / work[0]).log10() / 8.0;
+        assert!((0.07..0.14).contains(&growth), "{work:?}");
+    }
+
+    #[test]
+    fn quaternions_stay_at_unit_length() {
+        let scenario = pair();
+        let equations = Equations::new(&scenario);
+        let (y, _) = to(&equations, 1.0, 1e-5);
+        for j in 0..2 {
+            let squares: f64 = y[STATE * j + 3..STATE * j + 7].iter().map(|c| c * c).sum();
+            assert!((squares - 1.0).abs() < 1e-15, "{squares}");
+        }
+    }
+
+    /// A stop a rounding error away is reached by a step as small.
+    #[test]
+    fn stops_may_lie_a_rounding_error_apart() {
+        let scenario = pair();
+        let equations = Equations::new(&scenario);
+        let mut integrator = Integrator::new(&equations, 0.0, clamped(&equations, 1.0), 1e-10);
+        for stop in [0.3, 0.1 + 0.2, 0.3 + 1e-15, 1.0] {
+            while integrator.before(stop) {
+                integrator.step(stop).unwrap();
+            }
+            assert_eq!(integrator.sigma, stop);
+        }
+        let straight = to(&equations, 1.0, 1e-10).0;
+        assert!(apart(&integrator.y, &straight) < 1e-8);
+    }
+
+    /// Strongly coupled rods that begin to part.
+    #[test]
+    fn what_grows_out_of_bounds_is_given_up() {
+        let mut scenario = pair();
+        scenario.coupling = vec![[1e9; 3]];
+        let equations = Equations::new(&scenario);
+        let mut integrator = Integrator::new(&equations, 0.0, clamped(&equations, 1.0), 1e-8);
+        let failed = loop {
+            assert!(integrator.before(1.0), "it was to grow");
+            if let Err(unbounded) = integrator.step(1.0) {
+                break unbounded;
+            }
+        };
+        assert!(failed.sigma > 0.0 && failed.sigma < 0.5, "{failed:?}");
+    }
 }

@@ -14,8 +14,14 @@ use super::trajectory::Trajectory;
 /// Largest growth of a perturbation over one interval.
 pub const GROWTH: f64 = 1e3;
 
+/// Most intervals, all rods together, that are chosen: they take most of a gigabyte.
+const MOST_PIECES: usize = 4096;
+
 /// Accuracy to which growth is measured; it need not be.
 const ROUGH: f64 = 1e-4;
+
+/// Accuracy to which a start is continued beyond the stations it is known at.
+const START: f64 = 1e-8;
 
 /// Where the intervals begin and end: 0 = sigma_0 < ... < sigma_K = 1, the
 /// states at the K beginnings.
@@ -60,6 +66,11 @@ impl Units {
     /// The unit of the sum of all forces at the tip.
     pub fn total_force(&self) -> f64 {
         self.force.iter().fold(0.0, |m, f| m.max(*f))
+    }
+
+    /// The largest unit of moments.
+    pub fn largest_moment(&self) -> f64 {
+        self.moment.iter().fold(0.0, |m, f| m.max(*f))
     }
 
     /// The difference a - b of two flat states.
@@ -211,11 +222,15 @@ impl Columns {
 ///
 /// Growth is that of positions, rotations, forces, moments each within its own
 /// kind, which depends on no units, for every rod with its neighbours held.
-pub fn choose(equations: &Equations, near: &Trajectory) -> Vec<f64> {
+/// Fails where so many intervals would be needed that it is hopeless.
+pub fn choose(equations: &Equations, near: &Trajectory) -> Result<Nodes, Unbounded> {
     let mut sigma = vec![0.0];
     let kinks = equations.kinks();
     'intervals: loop {
         let begin = sigma[sigma.len() - 1];
+        if sigma.len() * equations.rods() > MOST_PIECES.max(equations.rods()) {
+            return Err(Unbounded { sigma: begin });
+        }
         let mut integrator = Integrator::new(equations, begin, near.at(begin), ROUGH);
         let mut rods: Vec<Perturbations<TANGENT>> = (0..equations.rods())
             .map(|j| Perturbations::unit(j..j + 1, j))
@@ -240,7 +255,9 @@ pub fn choose(equations: &Equations, near: &Trajectory) -> Vec<f64> {
                     if end <= begin || end >= 1.0 {
                         break 'intervals;
                     }
-                    sigma.push(end);
+                    // At a station the start is known, elsewhere interpolated.
+                    let known = near.last_station(end).filter(|s| *s > begin);
+                    sigma.push(known.unwrap_or(end));
                     continue 'intervals;
                 }
             }
@@ -248,7 +265,29 @@ pub fn choose(equations: &Equations, near: &Trajectory) -> Vec<f64> {
         break;
     }
     sigma.push(1.0);
-    sigma
+    let states = begin(equations, near, &sigma);
+    Ok(Nodes { sigma, states })
+}
+
+/// States at the beginnings of intervals. What is interpolated far from
+/// stations may start Newton's method towards another solution.
+fn begin(equations: &Equations, near: &Trajectory, sigma: &[f64]) -> Vec<Vec<f64>> {
+    let known = |sigma: f64| near.last_station(sigma) == Some(sigma);
+    let at = |k: usize| {
+        let here = sigma[k];
+        if k == 0 || known(here) || !known(sigma[k - 1]) {
+            return near.at(here);
+        }
+        let before = Nodes {
+            sigma: vec![sigma[k - 1], here],
+            states: vec![near.at(sigma[k - 1])],
+        };
+        match fly(equations, &before, START, false) {
+            Ok(mut flights) => flights.remove(0).end,
+            Err(_) => near.at(here),
+        }
+    };
+    (0..sigma.len() - 1).map(at).collect()
 }
 
 /// Largest sensitivity within one kind.

@@ -180,3 +180,210 @@ fn back_substitute(r: &Mat<f64>, x: &mut Col<f64>) {
         x[i] = sum / r[(i, i)];
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use faer::prelude::Solve;
+
+    use super::*;
+    use crate::bvp::trajectory::Trajectory;
+    use crate::scenario::Scenario;
+
+    fn scenario(joined: bool) -> Scenario {
+        let text = format!(
+            r#"
+            name = "three"
+            leaf = {{ rods = 3, length = 1.0, fan = [-0.5, 0.1, 0.4], joined = {joined} }}
+            stiffness = {{ torsion = [0.8, 3.0, 0.1], bending_2 = 1.0, bending_3 = 1.5, axial = inf, shear_2 = inf, shear_3 = inf }}
+            "#
+        );
+        Scenario::from_toml(&text).unwrap()
+    }
+
+    fn units(equations: &Equations) -> Units {
+        Units::new(equations, &Trajectory::straight(equations))
+    }
+
+    /// Numbers without any pattern in -1..1.
+    fn noise() -> impl FnMut() -> f64 {
+        let mut state = 1_u64;
+        move || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        }
+    }
+
+    /// Sensitivities over intervals: half of the directions grow, half decay.
+    fn maps(intervals: usize, growth: f64) -> Vec<Mat<f64>> {
+        let mut noise = noise();
+        (0..intervals)
+            .map(|k| {
+                let columns = if k == 0 { 18 } else { 36 };
+                Mat::from_fn(36, columns, |_, c| {
+                    0.3 * noise() * growth.powf((c as f64 - 17.5) / 17.5)
+                })
+            })
+            .collect()
+    }
+
+    /// Rows of the tip's conditions, as the module says they are.
+    fn tip(joined: bool, units: &Units) -> Mat<f64> {
+        let mut rows = Mat::zeros(18, 36);
+        for (j, k) in (0..3).flat_map(|j| (0..3).map(move |k| (j, k))) {
+            let row = 6 * j + k;
+            rows[(row + 3, 12 * j + 9 + k)] = 1.0;
+            if !joined {
+                rows[(row, 12 * j + 6 + k)] = 1.0;
+            } else if j > 0 {
+                rows[(row, 12 * j + k)] = 1.0;
+                rows[(row, k)] = -1.0;
+            } else {
+                for rod in 0..3 {
+                    rows[(row, 12 * rod + 6 + k)] = units.of(12 * rod + 6) / units.total_force();
+                }
+            }
+        }
+        rows
+    }
+
+    /// The whole system at once: what each interval hands on is what the next
+    /// begins with, and the tip's conditions.
+    fn dense(
+        maps: &[Mat<f64>],
+        tip: &Mat<f64>,
+        defects: &[Vec<f64>],
+        conditions: &[f64],
+    ) -> Vec<Vec<f64>> {
+        let size = 18 + 36 * (maps.len() - 1);
+        let mut matrix = Mat::zeros(size, size);
+        let mut right = Mat::zeros(size, 1);
+        let column = |k: usize| if k == 0 { 0 } else { 36 * k - 18 };
+        for (k, map) in maps.iter().enumerate() {
+            let last = k + 1 == maps.len();
+            let block = if last { tip * map } else { map.clone() };
+            for r in 0..block.nrows() {
+                for c in 0..block.ncols() {
+                    matrix[(36 * k + r, column(k) + c)] = block[(r, c)];
+                }
+                if last {
+                    right[(36 * k + r, 0)] = -conditions[r];
+                } else {
+                    matrix[(36 * k + r, column(k + 1) + r)] = -1.0;
+                    right[(36 * k + r, 0)] = -defects[k][r];
+                }
+            }
+        }
+        let solution = matrix.full_piv_lu().solve(&right);
+        (0..maps.len())
+            .map(|k| match k {
+                0 => (0..36)
+                    .map(|i| match i % 12 {
+                        0..6 => 0.0,
+                        free => solution[(6 * (i / 12) + free - 6, 0)],
+                    })
+                    .collect(),
+                _ => (0..36).map(|i| solution[(column(k) + i, 0)]).collect(),
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_condensed_solution_is_that_of_the_whole_system() {
+        for joined in [true, false] {
+            let scenario = scenario(joined);
+            let equations = Equations::new(&scenario);
+            let units = units(&equations);
+            for (intervals, growth) in [(1, 1.0), (2, 1.0), (5, 1e2), (12, 1e3), (12, 1e5)] {
+                let maps = maps(intervals, growth);
+                let mut noise = noise();
+                let mut numbers =
+                    |count: usize| -> Vec<f64> { (0..count).map(|_| noise()).collect() };
+                let defects: Vec<Vec<f64>> = (1..intervals).map(|_| numbers(36)).collect();
+                let conditions = numbers(18);
+                let march = March::new(&equations, &units, maps.clone()).unwrap();
+                let found = march.solve(&defects, &conditions);
+                let wanted = dense(&maps, &tip(joined, &units), &defects, &conditions);
+                let what = format!("joined {joined}, {intervals} intervals, {growth:e}");
+                for (found, wanted) in found.iter().zip(&wanted) {
+                    let largest = wanted.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+                    for (found, wanted) in found.iter().zip(wanted) {
+                        let off = (found - wanted).abs() / largest;
+                        assert!(off < 1e-9, "{what}: {found}, {wanted}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// Conditions of a state are scaled as those of perturbations are.
+    #[test]
+    fn conditions_are_in_the_units_of_the_unknowns() {
+        for joined in [true, false] {
+            let scenario = scenario(joined);
+            let equations = Equations::new(&scenario);
+            let units = units(&equations);
+            let march = March::new(&equations, &units, maps(1, 1.0)).unwrap();
+            let mut noise = noise();
+            let step: Vec<f64> = (0..36).map(|_| 0.1 * noise()).collect();
+            let mut y = vec![0.0; equations.size()];
+            for j in 0..3 {
+                let base = equations.base(j, glam::DVec3::ZERO, glam::DVec3::ZERO);
+                base.write(&mut y, j);
+            }
+            units.advance(&mut y, &step, 1.0);
+            let found = march.scaled(&equations.tip_conditions(&y));
+            let step = Col::from_fn(36, |i| step[i]);
+            let wanted = tip(joined, &units) * &step;
+            for (i, found) in found.iter().enumerate() {
+                assert!((found - wanted[i]).abs() < 1e-14, "condition {i}");
+                assert!((march.tip(step.as_ref())[i] - wanted[i]).abs() < 1e-14);
+            }
+        }
+    }
+
+    /// A direction that the last interval does not hand on to the tip is neutral.
+    /// It is found, and left alone by the solution.
+    #[test]
+    fn what_the_tip_does_not_feel_is_found_and_left_alone() {
+        let scenario = scenario(true);
+        let equations = Equations::new(&scenario);
+        let units = units(&equations);
+        let mut maps = maps(3, 10.0);
+        let begin = Col::from_fn(18, |i| (i as f64).cos());
+        let middle = &maps[0] * &begin;
+        let last = &maps[1] * &middle;
+        let lost = &maps[2] * &last;
+        maps[2] -= (1.0 / last.squared_norm_l2()) * &lost * last.transpose();
+        let march = March::new(&equations, &units, maps).unwrap();
+        assert!(march.condition() < 1e-13, "{:.1e}", march.condition());
+
+        let null = march.null();
+        let factor = null[0][6] / begin[0];
+        for (i, value) in begin.iter().enumerate() {
+            let found = null[0][12 * (i / 6) + 6 + i % 6];
+            assert!((found - factor * value).abs() < 1e-12, "{i}: {found}");
+        }
+        for (found, wanted) in [(&null[1], &middle), (&null[2], &last)] {
+            for (found, wanted) in found.iter().zip(wanted.iter()) {
+                assert!((found - factor * wanted).abs() < 1e-12);
+            }
+        }
+
+        let quiet = vec![vec![0.0; 36]; 2];
+        let step = march.solve(&quiet, &[1e-3; 18]);
+        assert!(step.iter().flatten().all(|v| v.abs() < 1.0));
+        let along: f64 = step[2].iter().zip(last.iter()).map(|(a, b)| a * b).sum();
+        assert!(along.abs() < 1e-12, "{along:.1e}");
+    }
+
+    #[test]
+    fn what_is_not_finite_is_refused() {
+        let scenario = scenario(true);
+        let equations = Equations::new(&scenario);
+        let mut maps = maps(2, 1.0);
+        maps[1][(0, 0)] = f64::NAN;
+        assert!(March::new(&equations, &units(&equations), maps).is_none());
+    }
+}

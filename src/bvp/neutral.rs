@@ -10,7 +10,7 @@ use super::trajectory::Trajectory;
 
 /// Singular values of the tip's conditions below this part of the largest are
 /// reported as a bifurcation nearby.
-const NEARLY_SINGULAR: f64 = 1e-8;
+const NEARLY_SINGULAR: f64 = 1e-7;
 
 /// But not where perturbations grow more than this over an interval: that
 /// alone makes the equations nearly singular.

@@ -93,28 +93,36 @@ struct Missed {
 }
 
 impl<'e, 'a> Newton<'e, 'a> {
-    /// Sets up the unknowns from a trajectory, over so many intervals.
-    pub fn near(equations: &'e Equations<'a>, near: &Trajectory, intervals: Option<usize>) -> Self {
-        let sigma = match intervals {
-            Some(count) => (0..=count).map(|k| k as f64 / count as f64).collect(),
-            None => choose(equations, near),
+    /// Sets up the unknowns from a trajectory, over so many intervals; `None`:
+    /// as many as the growth of perturbations needs, if that is possible.
+    pub fn near(
+        equations: &'e Equations<'a>,
+        near: &Trajectory,
+        intervals: Option<usize>,
+    ) -> Result<Self, Unbounded> {
+        let mut nodes = match intervals {
+            Some(count) => {
+                let sigma: Vec<f64> = (0..=count).map(|k| k as f64 / count as f64).collect();
+                let states = sigma[..count].iter().map(|&sigma| near.at(sigma)).collect();
+                Nodes { sigma, states }
+            }
+            None => choose(equations, near)?,
         };
-        let begins = &sigma[..sigma.len() - 1];
-        let mut states: Vec<Vec<f64>> = begins.iter().map(|&sigma| near.at(sigma)).collect();
+        let first = &mut nodes.states[0];
         for j in 0..equations.rods() {
-            let rod = RodState::read(&states[0], j);
-            equations.base(j, rod.n, rod.m).write(&mut states[0], j);
+            let rod = RodState::read(first, j);
+            equations.base(j, rod.n, rod.m).write(first, j);
         }
-        Newton {
+        Ok(Newton {
             equations,
             units: Units::new(equations, near),
-            nodes: Nodes { sigma, states },
+            nodes,
             only_near: false,
             march: None,
             growth: Vec::new(),
             defect: f64::INFINITY,
             work: Work::default(),
-        }
+        })
     }
 
     /// Solves to the accuracy of an integration with `tolerance`.

@@ -175,3 +175,142 @@ pub fn group(equations: &Equations, j: usize) -> Range<usize> {
     }
     group
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{DQuat, DVec3};
+
+    use super::*;
+    use crate::bvp::equations::RodState;
+    use crate::scenario::Scenario;
+
+    const END: f64 = 0.8;
+
+    /// Two veins coupled, a third on its own; everything differs.
+    fn three() -> Scenario {
+        let text = r#"
+            name = "three"
+            leaf = { rods = 3, length = [1.0, 1.2, 0.9], fan = [-0.5, 0.4, 1.0] }
+            stiffness = { torsion = 0.8, bending_2 = { at = [0.0, 1.0], value = [1.0, 2.0] }, bending_3 = [1.5, 0.7, 1.1], axial = 20.0, shear_2 = inf, shear_3 = 10.0 }
+            rest = { twist = 0.5, bend_2 = [1.0, -0.5, 0.3], bend_3 = 0.8 }
+            coupling = { x = [1.0, 0.0], y = [3.0, 0.0], z = [2.0, 0.0] }
+            load = { gravity = [0.2, -0.3, -2.0] }
+        "#;
+        Scenario::from_toml(text).unwrap()
+    }
+
+    /// Some state of all rods, not at the clamp.
+    fn begin(equations: &Equations) -> Vec<f64> {
+        let mut y = vec![0.0; equations.size()];
+        for j in 0..3 {
+            let side = j as f64 - 0.7;
+            RodState {
+                r: DVec3::new(0.1 * side, 0.2, -0.1),
+                q: DQuat::from_scaled_axis(DVec3::new(0.5, side, -1.0)),
+                n: DVec3::new(2.0, side, -1.0),
+                m: DVec3::new(0.5, -side, 2.0),
+            }
+            .write(&mut y, j);
+        }
+        y
+    }
+
+    /// The state with the `k`-th number of rod `j` perturbed.
+    fn perturbed(y: &[f64], j: usize, k: usize, by: f64) -> Vec<f64> {
+        let mut y = y.to_vec();
+        let mut rod = RodState::read(&y, j);
+        let change = by * DVec3::AXES[k % 3];
+        match k / 3 {
+            0 => rod.r += change,
+            1 => rod.q = DQuat::from_scaled_axis(change) * rod.q,
+            2 => rod.n += change,
+            _ => rod.m += change,
+        }
+        rod.write(&mut y, j);
+        y
+    }
+
+    fn end(equations: &Equations, y: Vec<f64>) -> Vec<f64> {
+        let mut integrator = Integrator::new(equations, 0.0, y, 1e-13);
+        while integrator.before(END) {
+            integrator.step(END).unwrap();
+        }
+        integrator.y
+    }
+
+    fn differences(equations: &Equations, a: &[f64], b: &[f64]) -> Vec<f64> {
+        (0..equations.rods())
+            .flat_map(|j| {
+                let (a, b) = (RodState::read(a, j), RodState::read(b, j));
+                let turn = (a.q * b.q.conjugate()).to_scaled_axis();
+                [a.r - b.r, turn, a.n - b.n, a.m - b.m]
+            })
+            .flat_map(|v| v.to_array())
+            .collect()
+    }
+
+    /// Effects of unit perturbations of rod `j` on its group.
+    fn linear<const W: usize>(equations: &Equations, j: usize) -> Perturbations<W> {
+        let mut perturbations = Perturbations::<W>::unit(group(equations, j), j);
+        let mut integrator = Integrator::new(equations, 0.0, begin(equations), 1e-12);
+        while integrator.before(END) {
+            integrator.step(END).unwrap();
+            perturbations.advance(equations, &LinearStep::of(equations, &integrator));
+        }
+        perturbations
+    }
+
+    /// Central differences of order 4.
+    #[test]
+    fn sensitivities_are_the_derivatives_of_the_integration() {
+        let scenario = three();
+        let equations = Equations::new(&scenario);
+        let begin = begin(&equations);
+        for j in 0..3 {
+            let linear = linear::<TANGENT>(&equations, j);
+            assert_eq!(linear.rods, if j < 2 { 0..2 } else { 2..3 });
+            for k in 0..TANGENT {
+                let central = |h: f64| {
+                    let side = |h| end(&equations, perturbed(&begin, j, k, h));
+                    differences(&equations, &side(h), &side(-h))
+                };
+                let (wide, narrow) = (central(2e-3), central(1e-3));
+                for (i, (wide, narrow)) in wide.iter().zip(&narrow).enumerate() {
+                    let slope = (8.0 * narrow - wide) / 12e-3;
+                    let rod = i / TANGENT;
+                    let found = match linear.rods.contains(&rod) {
+                        true => linear.rows[i - TANGENT * linear.rods.start][k],
+                        false => 0.0,
+                    };
+                    assert!(
+                        (found - slope).abs() < 1e-8 * (1.0 + slope.abs()),
+                        "number {i} by {k} of rod {j}: {found}, {slope}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn at_the_clamp_only_forces_and_moments_are_perturbed() {
+        let scenario = three();
+        let equations = Equations::new(&scenario);
+        let (all, some) = (linear::<TANGENT>(&equations, 1), linear::<6>(&equations, 1));
+        for (all, some) in all.rows.iter().zip(&some.rows) {
+            assert_eq!(all[6..], some[..]);
+        }
+    }
+
+    #[test]
+    fn coupled_rods_are_a_group() {
+        let mut scenario = three();
+        assert_eq!(group(&Equations::new(&scenario), 0), 0..2);
+        scenario.coupling[1] = [0.0, 1e-9, 0.0];
+        for j in 0..3 {
+            assert_eq!(group(&Equations::new(&scenario), j), 0..3);
+        }
+        scenario.coupling[0] = [0.0; 3];
+        let groups = [0, 1, 2].map(|j| group(&Equations::new(&scenario), j));
+        assert_eq!(groups, [0..1, 1..3, 1..3]);
+    }
+}

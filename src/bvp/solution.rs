@@ -56,7 +56,7 @@ pub struct Solution {
     /// Total potential energy (that of a dead moment does not exist).
     pub energy: f64,
     /// Estimated global error: the difference to a solution with local errors
-    /// larger by two orders of magnitude.
+    /// larger by two orders of magnitude, plus one local error.
     pub error: Difference,
     /// Largest jump between intervals or violation of a condition at the tip,
     /// relative to lengths, radians, and the forces and moments of each rod.

@@ -86,21 +86,36 @@ pub fn solve(scenario: &Scenario, start: Start, options: &Options) -> Result<Sol
         Ok(near) => near,
         Err(way) => return Err(lost(&equations, way, work)),
     };
-    let mut newton = Newton::near(&equations, &near, options.intervals);
+    let failed = |reason: Reason, near: Trajectory, work: Work| {
+        let part = 1.0;
+        lost(&equations, Lost { reason, part, near }, work)
+    };
+    let mut newton = match Newton::near(&equations, &near, options.intervals) {
+        Ok(newton) => newton,
+        Err(Unbounded { sigma }) => return Err(failed(Reason::Unbounded { sigma }, near, work)),
+    };
     let settled = settle(&mut newton, options);
     work.add(newton.work);
     let (coarse, fine) = match settled {
         Ok(solutions) => solutions,
-        Err(reason) => {
-            let part = 1.0;
-            return Err(lost(&equations, Lost { reason, part, near }, work));
-        }
+        Err(reason) => return Err(failed(reason, near, work)),
     };
     let (rods, tip) = (fine.shape(&equations), fine.tip());
     let energy = tip[tip.len() - 1] + equations.tip_potential(tip);
+    // Steps that end at the same stations share their errors, which the
+    // difference then does not show: it is not less than a local error.
+    let difference = Difference::between(&coarse.shape(&equations), &rods);
+    let (force, local) = (equations.force, options.tolerance);
+    let error = Difference {
+        position: difference.position + local * equations.length,
+        rotation: difference.rotation + local,
+        force: difference.force + local * newton.units.total_force() * force,
+        moment: difference.moment
+            + local * newton.units.largest_moment() * force * equations.length,
+    };
     Ok(Solution {
         stations: options.stations.clone(),
-        error: Difference::between(&coarse.shape(&equations), &rods),
+        error,
         rods,
         energy: energy * equations.force * equations.length,
         defect: newton.defect,

@@ -94,3 +94,61 @@ pub const E3: [f64; STAGES] = [
     1.8915178993145003, -5.801203960010585, -0.42268232132379197,
     -0.1521609496625161, 0.20136540080403034, 0.022651792198360825,
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn close(what: &str, found: f64, wanted: f64) {
+        assert!((found - wanted).abs() < 1e-13, "{what}: {found}, {wanted}");
+    }
+
+    fn sum(weights: &[f64; STAGES], values: impl Fn(usize) -> f64) -> f64 {
+        (0..STAGES).map(|i| weights[i] * values(i)).sum()
+    }
+
+    #[test]
+    fn every_stage_is_explicit_and_at_its_node() {
+        for i in 0..STAGES {
+            close("node", A[i].iter().sum(), C[i]);
+            assert!(A[i][i..].iter().all(|a| *a == 0.0), "stage {i}");
+        }
+    }
+
+    /// Order conditions of quadrature, and of the trees with one branch more.
+    #[test]
+    fn the_result_is_of_order_8() {
+        for k in 0..8 {
+            let power = |i: usize| C[i].powi(k);
+            close("b c^k", sum(&B, power), 1.0 / f64::from(k + 1));
+            let branch = |i: usize| sum(&A[i], power);
+            if k < 7 {
+                let wanted = 1.0 / f64::from((k + 1) * (k + 2));
+                close("b a c^k", sum(&B, branch), wanted);
+            }
+            for l in 1..7 - k {
+                let wanted = 1.0 / f64::from((k + 1) * (k + 2 + l));
+                let found = sum(&B, |i| C[i].powi(l) * branch(i));
+                close("b c^l a c^k", found, wanted);
+            }
+            if k < 6 {
+                let found = sum(&B, |i| sum(&A[i], branch));
+                let wanted = 1.0 / f64::from((k + 1) * (k + 2) * (k + 3));
+                close("b a a c^k", found, wanted);
+            }
+        }
+        assert!((sum(&B, |i| C[i].powi(8)) - 1.0 / 9.0).abs() > 1e-6);
+    }
+
+    /// The error estimates see nothing of what methods of order 5 and 3 get
+    /// right, and something of the next power.
+    #[test]
+    fn the_estimates_are_of_orders_5_and_3() {
+        for (weights, order) in [(&E5, 5), (&E3, 3)] {
+            for k in 0..order {
+                close("e c^k", sum(weights, |i| C[i].powi(k)), 0.0);
+            }
+            assert!(sum(weights, |i| C[i].powi(order)).abs() > 1e-4);
+        }
+    }
+}

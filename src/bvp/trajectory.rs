@@ -153,6 +153,11 @@ impl Trajectory {
         &self.states[self.states.len() - 1]
     }
 
+    /// The last of the sigmas it is known at that is not beyond `sigma`.
+    pub fn last_station(&self, sigma: f64) -> Option<f64> {
+        self.sigma.iter().copied().rfind(|s| *s <= sigma)
+    }
+
     /// The state at `sigma`.
     pub fn at(&self, sigma: f64) -> Vec<f64> {
         let last = self.sigma.len() - 1;

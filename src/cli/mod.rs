@@ -1,8 +1,12 @@
 //! The command line: one file per verb. What is computed is in the library.
 
+mod check;
+mod check_report;
 mod progress;
 mod relax;
 mod report;
+mod request;
+mod text;
 
 use std::error::Error;
 use std::io::{self, Write};
@@ -23,6 +27,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Relax(relax::Relax),
+    Check(check::Check),
 }
 
 impl Cli {
@@ -30,6 +35,7 @@ impl Cli {
     pub fn run(self) -> Result<Status, Refusal> {
         match self.verb {
             Verb::Relax(relax) => relax.run(),
+            Verb::Check(check) => check.run(),
         }
     }
 }
@@ -40,10 +46,12 @@ pub type Refusal = Box<dyn Error>;
 /// What the process tells its caller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// At rest within the tolerance.
-    AtRest = 0,
-    /// The run ended otherwise; what it found is written all the same.
-    NotAtRest = 1,
+    /// At rest within the tolerance; of a check: both methods agree.
+    Success = 0,
+    /// The run ended otherwise: not at rest within the tolerance; of a check:
+    /// the methods differ or could not be compared. What was found is written
+    /// all the same.
+    Failure = 1,
     /// The request was refused, or its result could not be written.
     Refused = 2,
 }

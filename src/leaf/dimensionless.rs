@@ -2,7 +2,7 @@
 
 use crate::rod::Section;
 use crate::rotation;
-use crate::scenario::{Rod, Scenario};
+use crate::scenario::{Rod, Scenario, longest, mean_bending};
 use glam::{DQuat, DVec3};
 
 /// Stiffness in stretch and shear beyond which segment forces are condensed
@@ -56,18 +56,10 @@ pub struct Leaf<'a> {
 impl<'a> Leaf<'a> {
     /// Scales a checked scenario.
     pub fn new(scenario: &'a Scenario) -> Self {
-        let length = scenario
-            .rods
-            .iter()
-            .fold(0.0_f64, |m, rod| m.max(rod.length));
-        let logs: f64 = scenario
-            .rods
-            .iter()
-            .map(|rod| rod.couple_stiffness[1].at(0.5).ln() + rod.couple_stiffness[2].at(0.5).ln())
-            .sum();
+        let length = longest(&scenario.rods);
         let scale = Scale {
             length,
-            stiffness: (logs / (2 * scenario.rods.len()) as f64).exp(),
+            stiffness: mean_bending(&scenario.rods),
         };
         let mut kinks: Vec<f64> = scenario
             .rods

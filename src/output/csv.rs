@@ -15,7 +15,7 @@ const HEADER: [&str; 22] = [
     "n1", "n2", "n3", "m1", "m2", "m3",
 ];
 
-impl Format for Centerlines {
+impl Format<Equilibrium> for Centerlines {
     fn file_name(&self) -> &'static str {
         "centerlines.csv"
     }

@@ -1,5 +1,5 @@
-//! What is written about an equilibrium: one small file per format behind one
-//! small trait. A file is complete or absent, never half written.
+//! What is written about a result: one small file per format behind one small
+//! trait. A file is complete or absent, never half written.
 
 mod atomic;
 mod csv;
@@ -17,22 +17,36 @@ use thiserror::Error;
 pub use atomic::{abandon_unfinished, check_writable};
 pub use csv::Centerlines;
 pub use figure::{FigurePng, FigureSvg};
-pub use json::Summary;
-pub use words::{power_of_ten, verdict};
+pub use json::{CheckSummary, Summary};
+pub use words::{equilibrium_of_index, headline, power_of_ten, shooting, verdict};
 
 use crate::relax::Equilibrium;
+use crate::study::Check;
 
-/// One way to write an equilibrium down.
-pub trait Format {
+/// One way to write a result down.
+pub trait Format<R> {
     /// Name of the file, the same from release to release.
     fn file_name(&self) -> &'static str;
 
     /// Writes the whole file. The only errors are those of `out`.
-    fn write(&self, equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()>;
+    fn write(&self, result: &R, out: &mut dyn Write) -> io::Result<()>;
 }
 
-/// Every format, in the order in which the files are written.
-pub const FORMATS: [&dyn Format; 4] = [&Summary, &Centerlines, &FigureSvg, &FigurePng];
+/// A result that is written to a folder.
+pub trait Written: Sized + 'static {
+    /// Every format, in the order in which the files are written; first the
+    /// JSON that is also shown on request.
+    const FORMATS: &'static [&'static dyn Format<Self>];
+}
+
+impl Written for Equilibrium {
+    const FORMATS: &'static [&'static dyn Format<Self>] =
+        &[&Summary, &Centerlines, &FigureSvg, &FigurePng];
+}
+
+impl Written for Check {
+    const FORMATS: &'static [&'static dyn Format<Self>] = &[&CheckSummary, &FigureSvg, &FigurePng];
+}
 
 /// Why a file could not be written.
 #[derive(Debug, Error)]
@@ -72,15 +86,15 @@ pub enum OutputError {
     },
 }
 
-/// Writes every format into `folder`, which is made if it is not there, and
-/// returns the paths written.
-pub fn write_all(folder: &Path, equilibrium: &Equilibrium) -> Result<Vec<PathBuf>, OutputError> {
+/// Writes every format of a result into `folder`, which is made if it is not
+/// there, and returns the paths written.
+pub fn write_all<R: Written>(folder: &Path, result: &R) -> Result<Vec<PathBuf>, OutputError> {
     atomic::make_folder(folder)?;
-    let write_one = |format: &&dyn Format| {
+    let write_one = |format: &&'static dyn Format<R>| {
         let file = folder.join(format.file_name());
-        atomic::write_file(&file, |out| format.write(equilibrium, out))
+        atomic::write_file(&file, |out| format.write(result, out))
             .map(|()| file.clone())
             .map_err(|reason| OutputError::File { file, reason })
     };
-    FORMATS.iter().map(write_one).collect()
+    R::FORMATS.iter().map(write_one).collect()
 }

@@ -1,10 +1,13 @@
-//! A leaf to test the formats with: arcs that fan out and meet in a tip.
+//! Results to test the formats with: arcs that fan out and meet in a tip.
 
 use std::f64::consts::PI;
 
 use glam::{DQuat, DVec3};
 
+use crate::bvp::{self, Neutral, Solution};
 use crate::relax::{Equilibrium, NodeState, Outcome, RodShape, Work};
+use crate::shape::Difference;
+use crate::study::{Check, Shot, Verdict};
 
 /// A fan of `rods` arcs of length 1, given at `segments` + 1 stations.
 pub fn fan(rods: usize, segments: usize) -> Equilibrium {
@@ -62,5 +65,61 @@ pub fn fan(rods: usize, segments: usize) -> Equilibrium {
         stations,
         rods: shapes,
         curves,
+    }
+}
+
+/// A check of that fan whose boundary-value solution is turned about x by
+/// `angle`.
+pub fn check(rods: usize, segments: usize, angle: f64) -> Check {
+    let relaxed = fan(rods, segments);
+    let turn = DQuat::from_rotation_x(angle);
+    let mut shapes = relaxed.rods.clone();
+    for node in shapes.iter_mut().flat_map(|rod| &mut rod.nodes) {
+        node.position = turn * node.position;
+        node.rotation = turn * node.rotation;
+    }
+    let at = |i: usize| {
+        let pairs = relaxed.rods.iter().zip(&shapes);
+        pairs
+            .map(|(a, b)| Difference::of(&a.nodes[i], &b.nodes[i]))
+            .fold(Difference::default(), Difference::max)
+    };
+    let along: Vec<Difference> = (0..=segments).map(at).collect();
+    let difference = along.iter().copied().reduce(Difference::max);
+    let still = vec![DVec3::ZERO; segments + 1];
+    let solution = Solution {
+        stations: relaxed.stations.clone(),
+        rods: shapes,
+        energy: 11.08,
+        error: Difference {
+            position: 1e-10,
+            rotation: 2e-10,
+            force: 3e-9,
+            moment: 4e-9,
+        },
+        defect: 1e-14,
+        intervals: vec![0.0, 0.5, 1.0],
+        growth: 4.2,
+        condition: 1e-10,
+        neutral: Some(Neutral {
+            ratio: 1e-10,
+            displacement: vec![still; rods],
+        }),
+        work: bvp::Work::default(),
+    };
+    Check {
+        relaxed,
+        shot: Some(Ok(Shot {
+            solution,
+            negative_eigenvalues: Some(2),
+        })),
+        shot_seconds: Some(0.02),
+        along,
+        difference,
+        verdict: if angle == 0.0 {
+            Verdict::Agree
+        } else {
+            Verdict::Differ
+        },
     }
 }

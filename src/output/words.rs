@@ -1,6 +1,7 @@
-//! Sentences about an equilibrium that the figure and the command line share.
+//! Sentences about a result that the figure and the command line share.
 
-use crate::relax::{Equilibrium, Outcome};
+use crate::relax::{Equilibrium, Method, Outcome};
+use crate::study::Verdict;
 
 /// How the run ended and what was found, in one phrase.
 pub fn verdict(equilibrium: &Equilibrium) -> String {
@@ -18,6 +19,9 @@ pub fn verdict(equilibrium: &Equilibrium) -> String {
         Outcome::ToleranceNotReached => {
             format!("{}, tolerance not reached", at_rest(equilibrium))
         }
+        Outcome::NotAtRest if equilibrium.method == Method::Shooting.name() => {
+            "no equilibrium".into()
+        }
         Outcome::NotAtRest => "not at rest".into(),
         Outcome::Singular => "singular equations".into(),
         Outcome::Diverged => "diverged".into(),
@@ -25,10 +29,32 @@ pub fn verdict(equilibrium: &Equilibrium) -> String {
 }
 
 fn at_rest(equilibrium: &Equilibrium) -> String {
-    match equilibrium.negative_eigenvalues {
+    equilibrium_of_index(equilibrium.negative_eigenvalues)
+}
+
+/// What kind of equilibrium has so many negative eigenvalues.
+pub fn equilibrium_of_index(negative_eigenvalues: Option<usize>) -> String {
+    match negative_eigenvalues {
         Some(0) => "stable equilibrium".into(),
         Some(index) => format!("unstable equilibrium of index {index}"),
         None => "equilibrium of unknown stability".into(),
+    }
+}
+
+/// The kind of shooting.
+pub fn shooting(intervals: usize) -> String {
+    match intervals {
+        1 => "single shooting".into(),
+        count => format!("multiple shooting over {count} intervals"),
+    }
+}
+
+/// What a check says, in one phrase.
+pub fn headline(verdict: &Verdict) -> &'static str {
+    match verdict {
+        Verdict::Agree => "both methods agree",
+        Verdict::Differ => "the methods differ",
+        Verdict::NotCompared(_) => "could not be compared",
     }
 }
 
@@ -52,7 +78,8 @@ pub fn power_of_ten(bound: f64) -> String {
     format!("{mantissa:.1}×10{}", superscript(exponent))
 }
 
-fn superscript(exponent: i32) -> String {
+/// A power, as in `⁻⁹`.
+pub fn superscript(exponent: i32) -> String {
     let raised = |c: char| match c {
         '-' => '⁻',
         '1' => '¹',
@@ -75,5 +102,11 @@ mod tests {
         assert_eq!(power_of_ten(3e-9), "3.0×10⁻⁹");
         assert_eq!(power_of_ten(f64::INFINITY), "∞");
         assert_eq!(power_of_ten(0.0), "0");
+    }
+
+    #[test]
+    fn the_number_of_intervals_is_told_where_there_are_several() {
+        assert_eq!(shooting(1), "single shooting");
+        assert_eq!(shooting(12), "multiple shooting over 12 intervals");
     }
 }

@@ -1,15 +1,15 @@
 //! From the scenario as written to a scenario that can be trusted: the type
 //! and the meaning of every value. Limits that several values set together
-//! are in `limits`.
+//! are in `limits`, and what concerns motion is in `dynamics`.
 
 use std::f64::consts::PI;
 
 use toml::de::DeValue;
 
-use super::error::{Because, Needed, Problem, ScenarioError};
+use super::error::{Because, Needed, Problem, ScenarioError, Spot};
 use super::key::Key;
 use super::raw::{Item, Raw};
-use super::{Profile, Rod, Scenario, limits, quantity};
+use super::{Profile, Rod, Scenario, dynamics, limits, quantity};
 
 type Result<T> = std::result::Result<T, ScenarioError>;
 
@@ -39,15 +39,24 @@ pub(super) enum Range {
 pub(super) fn check(raw: &Raw) -> Result<Scenario> {
     let name = name(raw.required(Key::Name)?)?;
     let rods = rods(raw.required(Key::Rods)?)?;
+    let rods = veins(raw, rods)?;
+    let joined = raw.optional(Key::Joined).map_or(Ok(true), truth)?;
+    let coupling = coupling(raw, rods.len() - 1)?;
+    let gravity = vector(raw, Key::Gravity)?;
+    let tip_force = vector(raw, Key::TipForce)?;
+    let tip_moment = tip_moment(raw, rods.len())?;
+    let tolerance = tolerance(raw)?;
+    let dynamics = dynamics::check::read(raw, &rods, [gravity, tip_force, tip_moment])?;
     let scenario = Scenario {
         name,
-        rods: veins(raw, rods)?,
-        joined: raw.optional(Key::Joined).map_or(Ok(true), truth)?,
-        coupling: coupling(raw, rods - 1)?,
-        gravity: vector(raw, Key::Gravity)?,
-        tip_force: vector(raw, Key::TipForce)?,
-        tip_moment: tip_moment(raw, rods)?,
-        tolerance: tolerance(raw)?,
+        rods,
+        joined,
+        coupling,
+        gravity,
+        tip_force,
+        tip_moment,
+        tolerance,
+        dynamics,
     };
     limits::check(raw, &scenario)?;
     Ok(scenario)
@@ -77,7 +86,7 @@ fn rods(item: Item) -> Result<usize> {
     .ok_or_else(|| item.refuse(Problem::Rods { most: MOST_RODS }))
 }
 
-fn truth(item: Item) -> Result<bool> {
+pub(super) fn truth(item: Item) -> Result<bool> {
     match item.value() {
         DeValue::Boolean(value) => Ok(*value),
         _ => Err(item.refuse(Problem::WrongType {
@@ -193,11 +202,16 @@ fn vector(raw: &Raw, key: Key) -> Result<[f64; 3]> {
     let Some(item) = raw.optional(key) else {
         return Ok([0.0; 3]);
     };
+    components(item, Spot::Entry)
+}
+
+/// Three numbers, each at its own spot.
+pub(super) fn components(item: Item, spot: impl Fn(usize) -> Spot) -> Result<[f64; 3]> {
     let array = item.array(Needed::Vector)?;
     entries(item, array.len(), 3, Because::Axes)?;
     let mut vector = [0.0; 3];
     for (axis, component) in vector.iter_mut().enumerate() {
-        *component = number(item.entry(axis), Range::Finite)?;
+        *component = number(item.part(spot(axis), &array[axis]), Range::Finite)?;
     }
     Ok(vector)
 }

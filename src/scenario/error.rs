@@ -165,6 +165,10 @@ pub enum Spot {
     Value(Option<usize>),
     /// Entry of one rod's list inside `value`.
     RodValue(usize, usize),
+    /// Component of one of the vectors inside `value`.
+    Component(usize, usize),
+    /// `factor`, or one of its entries.
+    Factor(Option<usize>),
 }
 
 impl fmt::Display for Spot {
@@ -177,6 +181,11 @@ impl fmt::Display for Spot {
             Spot::Value(None) => write!(f, ", value"),
             Spot::Value(Some(i)) => write!(f, ", value, entry {}", i + 1),
             Spot::RodValue(rod, i) => write!(f, ", value, list {}, entry {}", rod + 1, i + 1),
+            Spot::Component(i, axis) => {
+                write!(f, ", value, entry {}, component {}", i + 1, axis + 1)
+            }
+            Spot::Factor(None) => write!(f, ", factor"),
+            Spot::Factor(Some(i)) => write!(f, ", factor, entry {}", i + 1),
         }
     }
 }
@@ -244,17 +253,32 @@ pub enum Problem {
         /// The knot before.
         before: f64,
     },
-    /// A key that profiles do not have.
-    #[error("unknown key {key}: a profile is {{ at = [0.0, 1.0], value = [1.0, 0.5] }}")]
-    ProfileKey {
+    /// A list of times without any.
+    #[error("at least one time is needed")]
+    NoTimes,
+    /// A time that is not after the one before.
+    #[error(
+        "must be greater than the entry before it, {before}: times rise strictly (write a step as a steep ramp)"
+    )]
+    TimesNotRising {
+        /// The time before.
+        before: f64,
+    },
+    /// A key that profiles, or loads and factors in time, do not have.
+    #[error("unknown key {key}: {form}")]
+    UnknownPart {
         /// The key as written.
         key: String,
+        /// What was read.
+        form: Form,
     },
-    /// A profile without one of its two keys.
-    #[error("{key} is missing: a profile is {{ at = [0.0, 1.0], value = [1.0, 0.5] }}")]
-    ProfileWithout {
+    /// A profile, or a load or factor in time, without one of its two keys.
+    #[error("{key} is missing: {form}")]
+    MissingPart {
         /// The key that is missing.
         key: &'static str,
+        /// What was read.
+        form: Form,
     },
     /// Not a fan.
     #[error(
@@ -277,6 +301,25 @@ pub enum Problem {
     MomentOnManyRods {
         /// Number of rods.
         rods: usize,
+    },
+    /// More than one rod without a clamped base.
+    #[error("a free base needs leaf.rods = 1 (here {rods}): the rods of a leaf grow from one base")]
+    FreeBase {
+        /// Number of rods.
+        rods: usize,
+    },
+    /// Both the radius of the section and its moment of inertia.
+    #[error(
+        "dynamics.rotary_inertia is given, too, and is density section_radius^2/4: leave one of them out"
+    )]
+    TwoSections,
+    /// An output interval beyond the end of the motion.
+    #[error(
+        "must be at most dynamics.duration, {duration} (left out: a hundredth of the duration)"
+    )]
+    IntervalTooLong {
+        /// The duration.
+        duration: f64,
     },
     /// A tolerance that is no accuracy.
     #[error(
@@ -327,6 +370,10 @@ pub enum Needed {
     PerGap(usize),
     /// Any list of numbers.
     ListOfNumbers,
+    /// Any list of triples of numbers.
+    ListOfVectors,
+    /// A table of two lists.
+    Table(Form),
     /// The `value` of a profile: numbers, or one list per rod.
     ProfileValue(usize),
 }
@@ -348,6 +395,8 @@ impl fmt::Display for Needed {
                 "a number or a list of {gaps} (one per gap between neighbouring rods)"
             ),
             Needed::ListOfNumbers => write!(f, "a list of numbers"),
+            Needed::ListOfVectors => write!(f, "a list of lists of three numbers [x, y, z]"),
+            Needed::Table(form) => write!(f, "a table: {form}"),
             Needed::ProfileValue(rods) => {
                 write!(
                     f,
@@ -355,6 +404,29 @@ impl fmt::Display for Needed {
                 )
             }
         }
+    }
+}
+
+/// Tables of two lists that belong together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Form {
+    /// A quantity along the rods.
+    Profile,
+    /// A load in time.
+    LoadInTime,
+    /// A factor in time.
+    FactorInTime,
+}
+
+impl fmt::Display for Form {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Form::Profile => "a profile is { at = [0.0, 1.0], value = [1.0, 0.5] }",
+            Form::LoadInTime => {
+                "a load in time is { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }"
+            }
+            Form::FactorInTime => "a factor in time is { at = [0.0, 1.0], factor = [1.0, 2.0] }",
+        })
     }
 }
 

@@ -46,10 +46,36 @@ pub enum Key {
     TipMoment,
     /// `solve.tolerance`: wanted accuracy.
     Tolerance,
+    /// `dynamics.density`: mass per unit length.
+    Density,
+    /// `dynamics.rotary_inertia`: rho I.
+    RotaryInertia,
+    /// `dynamics.section_radius`: radius of the section, instead of rho I.
+    SectionRadius,
+    /// `dynamics.external_damping`: viscous force per unit length and velocity.
+    ExternalDamping,
+    /// `dynamics.internal_damping`: retardation time of the material.
+    InternalDamping,
+    /// `dynamics.duration`: how long the leaf is followed.
+    Duration,
+    /// `dynamics.output_interval`: time between two outputs.
+    OutputInterval,
+    /// `dynamics.clamped`: whether the base is held.
+    Clamped,
+    /// `dynamics.gravity`: gravity in time.
+    GravityInTime,
+    /// `dynamics.tip_force`: dead force in time.
+    TipForceInTime,
+    /// `dynamics.tip_moment`: dead moment in time, one rod only.
+    TipMomentInTime,
+    /// `dynamics.rest`: factor of the rest curvatures in time.
+    RestInTime,
 }
 
+const LOAD_IN_TIME: &str = "{ at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]] }";
+
 /// Key, full path, and an example of its value; in the order of [`Key`].
-const FORMAT: [(Key, &str, &str); 21] = [
+const FORMAT: [(Key, &str, &str); 33] = [
     (Key::Name, "name", "\"my-leaf\""),
     (Key::Rods, "leaf.rods", "5"),
     (Key::Length, "leaf.length", "1.0"),
@@ -71,10 +97,34 @@ const FORMAT: [(Key, &str, &str); 21] = [
     (Key::TipForce, "load.tip_force", "[0.0, 0.0, 0.0]"),
     (Key::TipMoment, "load.tip_moment", "[0.0, 0.0, 0.0]"),
     (Key::Tolerance, "solve.tolerance", "1e-6"),
+    (Key::Density, "dynamics.density", "1.0"),
+    (Key::RotaryInertia, "dynamics.rotary_inertia", "0.01"),
+    (Key::SectionRadius, "dynamics.section_radius", "0.2"),
+    (Key::ExternalDamping, "dynamics.external_damping", "1.0"),
+    (Key::InternalDamping, "dynamics.internal_damping", "0.0"),
+    (Key::Duration, "dynamics.duration", "10.0"),
+    (Key::OutputInterval, "dynamics.output_interval", "0.1"),
+    (Key::Clamped, "dynamics.clamped", "true"),
+    (Key::GravityInTime, "dynamics.gravity", LOAD_IN_TIME),
+    (Key::TipForceInTime, "dynamics.tip_force", LOAD_IN_TIME),
+    (Key::TipMomentInTime, "dynamics.tip_moment", LOAD_IN_TIME),
+    (
+        Key::RestInTime,
+        "dynamics.rest",
+        "{ at = [0.0, 1.0], factor = [1.0, 2.0] }",
+    ),
 ];
 
 /// The tables of the format.
-pub(super) const TABLES: [&str; 6] = ["leaf", "stiffness", "rest", "coupling", "load", "solve"];
+pub(super) const TABLES: [&str; 7] = [
+    "leaf",
+    "stiffness",
+    "rest",
+    "coupling",
+    "load",
+    "solve",
+    "dynamics",
+];
 
 impl Key {
     pub(super) const COUNT: usize = FORMAT.len();
@@ -173,6 +223,7 @@ mod tests {
         assert_eq!(nearest("stiffness.bending2"), Some("stiffness.bending_2"));
         assert_eq!(nearest("gravity"), Some("load.gravity"));
         assert_eq!(nearest("leaf.gravity"), Some("load.gravity"));
+        assert_eq!(nearest("dynamics.gravty"), Some("dynamics.gravity"));
         assert_eq!(nearest("leaf.rod"), Some("leaf.rods"));
         assert_eq!(nearest("monsoon"), None);
     }

@@ -8,14 +8,14 @@ use super::{Rod, Scenario};
 
 /// |F| L^2/A, |g| L^3/A and |M| L/A. A rod in tension F turns within
 /// sqrt(A/F) of its ends: at this limit, within 1e-4 of its length.
-const MOST_LOAD: f64 = 1e8;
+pub(super) const MOST_LOAD: f64 = 1e8;
 /// kappa L^4/A: two coupled rods join within (A/kappa)^(1/4), here 1e-3 of the length.
 const MOST_COUPLING: f64 = 1e12;
 /// Largest to smallest torsion or bending stiffness: leaves four of the
 /// sixteen digits of double precision.
 const MOST_STIFFNESS_RATIO: f64 = 1e12;
 /// |u0| L, an angle in radians: 160 coils.
-const MOST_REST_ANGLE: f64 = 1e3;
+pub(super) const MOST_REST_ANGLE: f64 = 1e3;
 /// H L^2/A: below, a rod is softer against stretch or shear than against
 /// bending into a curl a thousandth of its length.
 const LEAST_FORCE_STIFFNESS: f64 = 1e-6;
@@ -27,15 +27,16 @@ const FORCE: [Key; 3] = [Key::Axial, Key::Shear2, Key::Shear3];
 const REST: [Key; 3] = [Key::RestTwist, Key::RestBend2, Key::RestBend3];
 const COUPLING: [Key; 3] = [Key::CouplingX, Key::CouplingY, Key::CouplingZ];
 
-const CONFINED: &str = "A is the smallest bending stiffness of a rod and L its length; \
+pub(super) const CONFINED: &str = "A is the smallest bending stiffness of a rod and L its length; \
      beyond the limit bending is confined to less than 1e-4 of the length: lower the load or stiffen the rods";
-const WOUND: &str = "A is the smallest bending stiffness of the rod and L its length; \
+pub(super) const WOUND: &str = "A is the smallest bending stiffness of the rod and L its length; \
      the rod would roll up by this many radians: lower the moment or stiffen the rod";
 const COUPLED: &str = "A is the smallest bending stiffness of the two rods and L the longer length; \
      beyond the limit neighbours act as glued together: lower the coupling";
 const UNEVEN: &str = "the ratio of the largest to this smallest torsion or bending stiffness; \
      double precision does not resolve more: raise this one or lower the largest";
-const CURLED: &str = "an angle in radians: the rod at rest would be wound up more than 150 times";
+pub(super) const CURLED: &str =
+    "an angle in radians: the rod at rest would be wound up more than 150 times";
 const SOFT: &str = "A is the smallest bending stiffness of the rod and L its length; \
      below the limit the rod is softer in stretch or shear than any beam: raise this stiffness";
 const SHORT: &str = "the ratio of the longest rod to this shortest one: \
@@ -52,7 +53,8 @@ pub(super) fn check(raw: &Raw, scenario: &Scenario) -> Result<(), ScenarioError>
     lengths(raw, scenario)?;
     stiffness(raw, scenario)?;
     loads(raw, scenario)?;
-    coupling(raw, scenario)
+    coupling(raw, scenario)?;
+    super::dynamics::limits::check(raw, scenario)
 }
 
 /// An error about `key`, at the entry of one rod or gap where there is one.
@@ -134,19 +136,26 @@ fn loads(raw: &Raw, scenario: &Scenario) -> Result<(), ScenarioError> {
         (Key::TipMoment, scenario.tip_moment, "|M| L/A", 1, WOUND),
     ];
     for (key, load, formula, power, because) in loads {
-        let [x, y, z] = load;
-        // hypot: squares of large components overflow.
-        let norm = x.hypot(y).hypot(z);
-        let worst = scenario
-            .rods
-            .iter()
-            .map(|rod| norm * (rod.length.powi(power) / bending(rod)))
-            .fold(0.0, f64::max);
+        let worst = norm(load) * longest_arm(scenario, power);
         if worst > MOST_LOAD {
             return Err(beyond(raw, key, None, (formula, worst, MOST_LOAD, because)));
         }
     }
     Ok(())
+}
+
+pub(super) fn norm([x, y, z]: [f64; 3]) -> f64 {
+    // hypot: squares of large components overflow.
+    x.hypot(y).hypot(z)
+}
+
+/// The largest L^power/A of a rod: times a load, that load free of units.
+pub(super) fn longest_arm(scenario: &Scenario, power: i32) -> f64 {
+    scenario
+        .rods
+        .iter()
+        .map(|rod| rod.length.powi(power) / bending(rod))
+        .fold(0.0, f64::max)
 }
 
 fn coupling(raw: &Raw, scenario: &Scenario) -> Result<(), ScenarioError> {

@@ -4,17 +4,23 @@
 //! stiffnesses are positive, angles finite.
 
 mod check;
+mod dynamics;
 mod error;
+mod in_time;
 mod key;
 mod limits;
 mod profile;
 mod quantity;
 mod raw;
 mod read;
+mod schedule;
 
-pub use error::{Because, Needed, Place, Problem, ScenarioError, Spot};
+pub use dynamics::Dynamics;
+pub(crate) use dynamics::{longest, mean_bending};
+pub use error::{Because, Form, Needed, Place, Problem, ScenarioError, Spot};
 pub use key::Key;
 pub use profile::Profile;
+pub use schedule::Schedule;
 
 /// A checked scenario. All quantities are in the units the file was written
 /// in, which only have to be consistent with each other.
@@ -38,6 +44,8 @@ pub struct Scenario {
     pub tip_moment: [f64; 3],
     /// Wanted accuracy of the centerlines, relative to the largest rod length.
     pub tolerance: f64,
+    /// How the leaf moves; what is at rest does not depend on it.
+    pub dynamics: Dynamics,
 }
 
 /// One vein as a special Cosserat rod. Index 0 of every triple belongs to the

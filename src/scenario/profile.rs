@@ -25,7 +25,11 @@ impl Profile {
                     .partition_point(|&knot| knot < sigma)
                     .clamp(1, at.len() - 1);
                 let t = (sigma - at[right - 1]) / (at[right] - at[right - 1]);
-                value[right - 1] + t.clamp(0.0, 1.0) * (value[right] - value[right - 1])
+                if t >= 1.0 {
+                    // Next to a large value the sum below would lose a small one.
+                    return value[right];
+                }
+                value[right - 1] + t.max(0.0) * (value[right] - value[right - 1])
             }
         }
     }
@@ -92,6 +96,15 @@ mod tests {
         assert_eq!(tent.kinks(), [0.25]);
         assert_eq!(tent.max_abs(), 6.0);
         assert_eq!(tent.min(), -6.0);
+    }
+
+    #[test]
+    fn a_small_value_at_a_knot_is_not_lost() {
+        let steep = Profile::Linear {
+            at: vec![0.0, 0.5, 1.0],
+            value: vec![1e9, 1e-9, 1e9],
+        };
+        assert_eq!(steep.at(0.5), 1e-9);
     }
 
     #[test]

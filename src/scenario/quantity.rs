@@ -1,10 +1,10 @@
 //! A quantity as written: a number, a list of one per rod, or a profile.
 
-use toml::de::{DeTable, DeValue};
+use toml::de::DeValue;
 
 use super::Profile;
 use super::check::{Range, entries, number};
-use super::error::{Because, Needed, Problem, ScenarioError, Spot};
+use super::error::{Because, Form, Needed, Problem, ScenarioError, Spot};
 use super::raw::Item;
 
 type Result<T> = std::result::Result<T, ScenarioError>;
@@ -15,7 +15,7 @@ pub(super) fn read(item: Item, rods: usize, range: Range) -> Result<Vec<Profile>
         DeValue::Integer(_) | DeValue::Float(_) => {
             Ok(vec![Profile::Constant(number(item, range)?); rods])
         }
-        DeValue::Table(table) => profiles(item, table, rods, range),
+        DeValue::Table(_) => profiles(item, rods, range),
         _ => {
             let array = item.array(Needed::Quantity(rods))?;
             entries(item, array.len(), rods, Because::OnePerRod)?;
@@ -26,27 +26,16 @@ pub(super) fn read(item: Item, rods: usize, range: Range) -> Result<Vec<Profile>
     }
 }
 
-fn profiles(item: Item, table: &DeTable, rods: usize, range: Range) -> Result<Vec<Profile>> {
+fn profiles(item: Item, rods: usize, range: Range) -> Result<Vec<Profile>> {
     // Infinite has no place between knots: it cannot be interpolated.
     let range = if range == Range::PositiveOrInfinite {
         Range::Positive
     } else {
         range
     };
-    if let Some(key) = table
-        .keys()
-        .find(|key| !matches!(key.get_ref().as_ref(), "at" | "value"))
-    {
-        return Err(item.refuse(Problem::ProfileKey {
-            key: super::error::shorten(key.get_ref()),
-        }));
-    }
-    let part = |key: &'static str, spot| match table.get(key) {
-        Some(value) => Ok(item.part(spot, value)),
-        None => Err(item.refuse(Problem::ProfileWithout { key })),
-    };
-    let at = knots(part("at", Spot::At(None))?)?;
-    let value = part("value", Spot::Value(None))?;
+    let names = [("at", Spot::At(None)), ("value", Spot::Value(None))];
+    let [at, value] = item.pair(names, Form::Profile)?;
+    let at = knots(at)?;
     let array = value.array(Needed::ProfileValue(rods))?;
     if array
         .first()

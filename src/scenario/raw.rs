@@ -4,7 +4,7 @@
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{Needed, Place, Problem, ScenarioError, Spot, line_of, shorten, snippet};
+use super::error::{Form, Needed, Place, Problem, ScenarioError, Spot, line_of, shorten, snippet};
 use super::key::{Key, TABLES, nearest};
 
 /// All entries of a scenario, those of `--set` in place of the file's.
@@ -213,6 +213,32 @@ impl<'e> Item<'e> {
             value,
             ..*self
         }
+    }
+
+    /// The two parts of a table that has no others.
+    pub(super) fn pair(
+        &self,
+        names: [(&'static str, Spot); 2],
+        form: Form,
+    ) -> Result<[Item<'e>; 2], ScenarioError> {
+        let DeValue::Table(table) = self.value() else {
+            return Err(self.refuse(Problem::WrongType {
+                needed: Needed::Table(form),
+            }));
+        };
+        if let Some(key) = table
+            .keys()
+            .find(|key| names.iter().all(|(name, _)| name != key.get_ref()))
+        {
+            let key = shorten(key.get_ref());
+            return Err(self.refuse(Problem::UnknownPart { key, form }));
+        }
+        let part = |(key, spot)| match table.get(key) {
+            Some(value) => Ok(self.part(spot, value)),
+            None => Err(self.refuse(Problem::MissingPart { key, form })),
+        };
+        let [first, second] = names;
+        Ok([part(first)?, part(second)?])
     }
 
     /// The part that belongs to one rod or gap, where there is one.

@@ -58,8 +58,65 @@ pub struct Shot {
     pub solution: Solution,
     /// Its Morse index, counted on the energy's Hessian at this shape.
     pub negative_eigenvalues: Option<usize>,
-    /// Time of the solution alone, in seconds.
-    pub wall_seconds: f64,
+}
+
+impl Shot {
+    /// Whether the equilibrium is stable: no negative eigenvalue.
+    pub fn stable(&self) -> Option<bool> {
+        self.negative_eigenvalues.map(|count| count == 0)
+    }
+}
+
+/// The quantities that are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Positions of the centerlines.
+    Position,
+    /// Rotations of the directors.
+    Rotation,
+    /// Stress resultants n.
+    Force,
+    /// Stress couples m.
+    Moment,
+}
+
+impl Quantity {
+    /// All of them.
+    pub const ALL: [Quantity; 4] = [
+        Quantity::Position,
+        Quantity::Rotation,
+        Quantity::Force,
+        Quantity::Moment,
+    ];
+
+    /// Its part of a difference.
+    pub fn of(self, difference: &Difference) -> f64 {
+        match self {
+            Quantity::Position => difference.position,
+            Quantity::Rotation => difference.rotation,
+            Quantity::Force => difference.force,
+            Quantity::Moment => difference.moment,
+        }
+    }
+
+    /// The word used in `check.json`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Quantity::Position => "position",
+            Quantity::Rotation => "rotation",
+            Quantity::Force => "force",
+            Quantity::Moment => "moment",
+        }
+    }
+}
+
+/// Where two shapes differ most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// The rod, counted from 0.
+    pub rod: usize,
+    /// Fraction of its length.
+    pub sigma: f64,
 }
 
 /// Both roads, and how far apart they end.
@@ -70,6 +127,8 @@ pub struct Check {
     /// The boundary-value solution that starts from it; `None` if it is not
     /// at rest.
     pub shot: Option<Result<Shot, Failure>>,
+    /// Time of the shooting alone, in seconds.
+    pub shot_seconds: Option<f64>,
     /// Largest differences at each station of the relaxed leaf.
     pub along: Vec<Difference>,
     /// Largest differences of all.
@@ -89,6 +148,34 @@ impl Check {
     pub fn within_estimates(&self) -> Option<bool> {
         let estimate = self.relaxed.error_estimate? + self.solution()?.solution.error.position;
         Some(self.difference?.position <= estimate)
+    }
+
+    /// Where a quantity differs most.
+    pub fn farthest(&self, quantity: Quantity) -> Option<Place> {
+        let solution = &self.solution()?.solution;
+        let stations = &self.relaxed.stations;
+        let stride = (solution.stations.len() - 1) / (stations.len() - 1);
+        let rods = self.relaxed.rods.iter().zip(&solution.rods).enumerate();
+        let found = rods.flat_map(|(rod, (a, b))| {
+            let nodes = a.nodes.iter().zip(b.nodes.iter().step_by(stride));
+            nodes.zip(stations).map(move |((a, b), &sigma)| {
+                let difference = quantity.of(&Difference::of(a, b));
+                (difference, Place { rod, sigma })
+            })
+        });
+        let farther = |a: (f64, Place), b: (f64, Place)| if b.0 > a.0 { b } else { a };
+        found.reduce(farther).map(|(_, place)| place)
+    }
+
+    /// Distance of positions up to which the shapes are called the same, in
+    /// units of length.
+    pub fn allowed(&self) -> f64 {
+        self.relaxed.tolerance * longest(&self.relaxed)
+    }
+
+    /// Angle between directors up to which the shapes are called the same.
+    pub fn allowed_rotation(&self) -> f64 {
+        ROTATION_PART * self.relaxed.tolerance
     }
 }
 
@@ -116,6 +203,7 @@ pub fn check(
         return Ok(Check {
             relaxed,
             shot: None,
+            shot_seconds: None,
             along: Vec::new(),
             difference: None,
             verdict: Verdict::NotCompared(why),
@@ -138,11 +226,10 @@ pub fn check(
         options.intervals,
         fine.sigma(),
     );
-    let wall_seconds = clock.elapsed().as_secs_f64();
+    let shot_seconds = Some(clock.elapsed().as_secs_f64());
     let shot = found.map(|solution| Shot {
         negative_eigenvalues: index_near(scenario, fine.clone(), &solution.rods),
         solution,
-        wall_seconds,
     });
     let stride = fine.segments() / stations.segments();
     let along = match &shot {
@@ -151,9 +238,10 @@ pub fn check(
     };
     let difference = along.iter().copied().reduce(Difference::max);
     Ok(Check {
-        verdict: judge(scenario, &relaxed, &shot, difference),
+        verdict: judge(&relaxed, &shot, difference),
         relaxed,
         shot: Some(shot),
+        shot_seconds,
         along,
         difference,
     })
@@ -173,18 +261,16 @@ fn differences(coarse: &[RodShape], fine: &[RodShape], stride: usize) -> Vec<Dif
         .collect()
 }
 
+fn longest(leaf: &Equilibrium) -> f64 {
+    leaf.rods.iter().map(|rod| rod.length).fold(0.0, f64::max)
+}
+
 fn judge(
-    scenario: &Scenario,
     relaxed: &Equilibrium,
     shot: &Result<Shot, Failure>,
     difference: Option<Difference>,
 ) -> Verdict {
-    let longest = scenario
-        .rods
-        .iter()
-        .map(|rod| rod.length)
-        .fold(0.0, f64::max);
-    let wanted = relaxed.tolerance * longest;
+    let wanted = relaxed.tolerance * longest(relaxed);
     match (shot, difference) {
         (Err(failure), _) => Verdict::NotCompared(failure.reason.to_string()),
         (Ok(shot), _) if shot.solution.error.position > wanted => Verdict::NotCompared(format!(
@@ -197,5 +283,72 @@ fn judge(
             Verdict::Agree
         }
         _ => Verdict::Differ,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DQuat, DVec3};
+
+    use super::*;
+
+    fn fan() -> Check {
+        let fan = r#"
+            name = "fan"
+            leaf = { rods = 3, length = 2.0, fan = "symmetric" }
+            stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }
+            load = { gravity = [0.0, 0.0, -0.1] }
+        "#;
+        let scenario = Scenario::from_toml(fan).unwrap();
+        check(&scenario, &CheckOptions::default(), &mut |_| {}).unwrap()
+    }
+
+    /// The check with the boundary-value solution changed after the fact.
+    fn changed(mut check: Check, change: impl Fn(&mut Solution)) -> Check {
+        let mut shot = check.shot.take().unwrap().unwrap();
+        change(&mut shot.solution);
+        let stride = (shot.solution.stations.len() - 1) / (check.relaxed.stations.len() - 1);
+        check.along = differences(&check.relaxed.rods, &shot.solution.rods, stride);
+        check.difference = check.along.iter().copied().reduce(Difference::max);
+        let shot = Ok(shot);
+        check.verdict = judge(&check.relaxed, &shot, check.difference);
+        check.shot = Some(shot);
+        check
+    }
+
+    #[test]
+    fn both_roads_end_in_the_same_place() {
+        let check = fan();
+        assert_eq!(check.verdict, Verdict::Agree);
+        assert_eq!(check.within_estimates(), Some(true));
+        assert_eq!(check.allowed(), 2.0 * check.relaxed.tolerance);
+    }
+
+    #[test]
+    fn a_vein_elsewhere_or_twisted_is_a_difference() {
+        let middle = |solution: &Solution| solution.stations.len() / 2;
+        let moved = changed(fan(), |solution| {
+            let middle = middle(solution);
+            solution.rods[1].nodes[middle].position += 3e-6 * DVec3::Z;
+        });
+        assert_eq!(moved.verdict, Verdict::Differ);
+        assert_eq!(moved.within_estimates(), Some(false));
+        let place = Place { rod: 1, sigma: 0.5 };
+        assert_eq!(moved.farthest(Quantity::Position), Some(place));
+
+        let twisted = changed(fan(), |solution| {
+            let middle = middle(solution);
+            let node = &mut solution.rods[2].nodes[middle];
+            node.rotation *= DQuat::from_rotation_x(3e-4);
+        });
+        assert_eq!(twisted.verdict, Verdict::Differ);
+        let place = Place { rod: 2, sigma: 0.5 };
+        assert_eq!(twisted.farthest(Quantity::Rotation), Some(place));
+    }
+
+    #[test]
+    fn a_solution_that_is_not_known_well_enough_decides_nothing() {
+        let vague = changed(fan(), |solution| solution.error.position = 3e-6);
+        assert!(matches!(vague.verdict, Verdict::NotCompared(_)));
     }
 }

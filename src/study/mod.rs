@@ -2,4 +2,4 @@
 
 mod check;
 
-pub use check::{Check, CheckOptions, Shot, Verdict, check};
+pub use check::{Check, CheckOptions, Place, Quantity, Shot, Verdict, check};

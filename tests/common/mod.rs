@@ -6,12 +6,32 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use leafdyn::relax::{Equilibrium, NodeState, Options, relax};
-use leafdyn::scenario::{Profile, Rod, Scenario};
+use leafdyn::bvp::{self, Failure, Solution, Start};
+use leafdyn::leaf::{Leaf, Scale};
+use leafdyn::relax::{Equilibrium, NodeState, Options, RodShape, relax};
+use leafdyn::scenario::{Dynamics, Profile, Rod, Scenario};
+use leafdyn::shape::Difference;
 
 /// The tolerance at which canonical values are checked: small enough for the
 /// digits they are given with, large enough for double precision.
 pub const TIGHT: f64 = 1e-11;
+
+/// Local error of the integration at which boundary-value solutions are
+/// compared with others: as small as rounding allows.
+pub const SHARP: f64 = 1e-13;
+
+/// The files of a folder of scenarios, in order.
+pub fn files(folder: &str) -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("scenarios")
+        .join(folder);
+    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|file| file.unwrap().path())
+        .collect();
+    files.sort();
+    files
+}
 
 /// The path of a scenario that comes with the program, such as `classic/rollup`.
 pub fn path(name: &str) -> PathBuf {
@@ -212,20 +232,23 @@ pub fn critical_of_rigid(
 pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -> Scenario {
     let constant = |values: [f64; 3]| values.map(Profile::Constant);
     let angle = |n: usize| PI * (2.0 * n as f64 / rods as f64 - 1.0) / 3.0;
+    let veins: Vec<_> = (1..=rods)
+        .map(|n| Rod {
+            length: 1.0,
+            angle: angle(n),
+            couple_stiffness: constant(couple),
+            force_stiffness: constant(force),
+            rest_curvature: constant([0.0; 3]),
+        })
+        .collect();
+    let gravity = [0.0, 0.0, -weight];
     Scenario {
         name: "leaf".into(),
-        rods: (1..=rods)
-            .map(|n| Rod {
-                length: 1.0,
-                angle: angle(n),
-                couple_stiffness: constant(couple),
-                force_stiffness: constant(force),
-                rest_curvature: constant([0.0; 3]),
-            })
-            .collect(),
+        dynamics: Dynamics::default_for(&veins).with_loads(gravity, [0.0; 3], [0.0; 3]),
+        rods: veins,
         joined: true,
         coupling: vec![[0.0, 1.0, 1.0]; rods - 1],
-        gravity: [0.0, 0.0, -weight],
+        gravity,
         tip_force: [0.0; 3],
         tip_moment: [0.0; 3],
         tolerance: 1e-6,
@@ -252,4 +275,70 @@ pub fn distance(a: &Equilibrium, b: &Equilibrium) -> f64 {
     }
     assert!(shared >= 2, "base and tip at least are shared");
     largest
+}
+
+/// Solves the boundary-value problem, starting from a relaxed leaf.
+pub fn shoot_near(scenario: &Scenario, leaf: &Equilibrium) -> Result<Solution, Failure> {
+    shoot_over(None, scenario, leaf)
+}
+
+/// As [`shoot_near`], over so many intervals.
+pub fn shoot_over(
+    intervals: Option<usize>,
+    scenario: &Scenario,
+    leaf: &Equilibrium,
+) -> Result<Solution, Failure> {
+    let start = Start::Leaf {
+        stations: &leaf.stations,
+        rods: &leaf.rods,
+    };
+    let options = bvp::Options {
+        tolerance: SHARP,
+        intervals,
+        stations: leaf.stations.clone(),
+    };
+    bvp::solve(scenario, start, &options)
+}
+
+/// Solves the boundary-value problem without any start.
+pub fn shoot_alone(scenario: &Scenario, stations: &[f64]) -> Result<Solution, Failure> {
+    let options = bvp::Options {
+        tolerance: SHARP,
+        intervals: None,
+        stations: stations.to_vec(),
+    };
+    bvp::solve(scenario, Start::Arcs, &options)
+}
+
+/// The units of a scenario.
+pub fn scale(scenario: &Scenario) -> Scale {
+    Leaf::new(scenario).scale
+}
+
+/// Largest differences between two shapes in units of length, A/L^2 and A/L.
+pub fn apart(scenario: &Scenario, a: &[RodShape], b: &[RodShape]) -> Difference {
+    assert_eq!(a.len(), b.len());
+    for (a, b) in a.iter().zip(b) {
+        assert_eq!(a.nodes.len(), b.nodes.len());
+    }
+    let (scale, difference) = (scale(scenario), Difference::between(a, b));
+    Difference {
+        position: difference.position / scale.length,
+        rotation: difference.rotation,
+        force: difference.force / scale.force(),
+        moment: difference.moment / scale.moment(),
+    }
+}
+
+/// Asserts that a relaxed leaf and its boundary-value solution are the same to
+/// `position`, and to ten times that in rotation, force, moment, and energy.
+#[track_caller]
+pub fn agree(what: &str, scenario: &Scenario, leaf: &Equilibrium, shot: &Solution, position: f64) {
+    let found = apart(scenario, &leaf.rods, &shot.rods);
+    let energy = (leaf.energy - shot.energy).abs() / scale(scenario).moment();
+    let others = [found.rotation, found.force, found.moment, energy];
+    assert!(
+        found.position <= position && others.iter().all(|value| *value <= 10.0 * position),
+        "{what}: {found:?}, energy {energy:.1e}"
+    );
 }

@@ -18,6 +18,17 @@ pub const FLOOR: Color = Color(247, 247, 249);
 /// Shadows on that floor.
 pub const SHADOW: Color = Color(212, 213, 220);
 
+/// Points of a second solution.
+pub const DOT: Color = Color(213, 60, 30);
+
+/// Curves that must be told apart, also by the colour-blind (Okabe and Ito).
+pub const CURVES: [Color; 4] = [
+    Color(0, 114, 178),
+    Color(0, 158, 115),
+    Color(213, 94, 0),
+    Color(170, 90, 150),
+];
+
 /// Viridis (Smith and van der Walt, matplotlib) at equal distances.
 const VIRIDIS: [Color; 11] = [
     Color(68, 1, 84),

@@ -4,7 +4,9 @@ use glam::{DVec2, DVec3};
 
 use super::colors::{FRAME, GRID, INK, NOTE};
 use super::drawing::{Anchor, Drawing, HALF_CAPITAL, Path, Step, Stroke, rectangle};
-use super::page::{Cell, TEXT_SIZE, TICK_SIZE, clamp_marker, tip_markers};
+use super::font::Font;
+use super::markers::{clamp_marker, dots, tip_markers};
+use super::page::{Cell, TEXT_SIZE, TICK_SIZE};
 use super::ticks::ticks;
 use super::veins::{Vein, Veins};
 
@@ -100,6 +102,7 @@ pub fn draw(page: &mut Drawing, view: &View, veins: &Veins, cell: Cell, scale: f
     title(page, cell.corner, view.letter, view.title);
     draw_axes(page, view, &frame, step);
     draw_veins(page, view, veins, &frame);
+    dots(page, veins, |point| frame.place(view.flatten(point)));
     clamp_marker(page, frame.place(DVec2::ZERO));
     tip_markers(page, veins, |tip| frame.place(view.flatten(tip)));
 }
@@ -150,7 +153,10 @@ fn draw_axes(page: &mut Drawing, view: &View, frame: &Frame, step: f64) {
     }
     let below = DVec2::new(0.5 * (corner.x + end.x), end.y + 34.0);
     page.label(below, view.across.label, TEXT_SIZE, Anchor::Middle, INK);
-    let beside = DVec2::new(corner.x - 42.0, 0.5 * (corner.y + end.y));
+    let font = Font::embedded();
+    let widths = up.iter().map(|(_, text)| font.width(text, TICK_SIZE));
+    let away = widths.fold(29.0, f64::max) + 13.0;
+    let beside = DVec2::new(corner.x - away, 0.5 * (corner.y + end.y));
     page.upright_label(beside, view.up.label, TEXT_SIZE, INK);
 }
 

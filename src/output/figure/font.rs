@@ -24,6 +24,22 @@ impl Font {
             * self.scale(size)
     }
 
+    /// The text in lines that are no wider than `width`, if no word is.
+    pub fn wrapped(&self, text: &str, size: f64, width: f64) -> Vec<String> {
+        let mut lines: Vec<String> = Vec::new();
+        for word in text.split_whitespace() {
+            if let Some(line) = lines.last_mut() {
+                let longer = format!("{line} {word}");
+                if self.width(&longer, size) <= width {
+                    *line = longer;
+                    continue;
+                }
+            }
+            lines.push(word.into());
+        }
+        lines
+    }
+
     /// Outlines a text that starts at the origin of its base line, y up, in
     /// units of the page.
     pub fn outline(&self, text: &str, size: f64, into: &mut dyn OutlineBuilder) {
@@ -104,9 +120,18 @@ mod tests {
     #[test]
     fn every_sign_of_the_figure_is_in_the_font() {
         let font = Font::embedded();
-        for c in "ξηζ=xyz/L(abcd)0123456789.−×⁻⁰¹²³⁴⁵⁶⁷⁸⁹·≤∞…".chars()
+        for c in "ξηζσ=xyz/L(abcd)0123456789.−×⁻⁰¹²³⁴⁵⁶⁷⁸⁹·≤∞…".chars()
         {
             assert!(font.face.glyph_index(c).is_some(), "{c}");
         }
+    }
+
+    #[test]
+    fn lines_are_as_long_as_they_may_be() {
+        let font = Font::embedded();
+        let width = font.width("use more", 12.0) + 0.1;
+        let lines = font.wrapped("use more intervals or more", 12.0, width);
+        assert_eq!(lines, ["use more", "intervals", "or more"]);
+        assert!(font.wrapped("", 12.0, width).is_empty());
     }
 }

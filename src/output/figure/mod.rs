@@ -1,12 +1,18 @@
-//! The figure: a leaf from above, from the side, from the front and in space.
+//! Figures: a leaf from above, from the side, from the front and in space; of a
+//! check also how far both solutions are apart.
 //!
 //! One drawing code fills a [`drawing::Drawing`]; `svg` writes it down and
 //! `png` paints it, so that both files are the same picture.
 
+mod check;
 mod colors;
+mod differences;
 mod drawing;
 mod flat;
 mod font;
+mod header;
+mod leaf;
+mod markers;
 mod page;
 mod png;
 mod space;
@@ -16,3 +22,14 @@ mod veins;
 
 pub use png::FigurePng;
 pub use svg::FigureSvg;
+
+/// A result with a figure.
+pub trait Pictured {
+    /// Name of the SVG file.
+    const SVG: &'static str;
+    /// Name of the PNG file.
+    const PNG: &'static str;
+
+    /// Draws the whole page.
+    fn draw(&self) -> drawing::Drawing;
+}

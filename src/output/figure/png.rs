@@ -1,4 +1,4 @@
-//! `figure.png`: the drawing painted, twice as fine as a screen of 96 dots per inch.
+//! The drawing painted, twice as fine as a screen of 96 dots per inch.
 
 use std::io::{self, Write};
 
@@ -8,12 +8,11 @@ use tiny_skia::{
 };
 use ttf_parser::OutlineBuilder;
 
+use super::Pictured;
 use super::colors::Color;
 use super::drawing::{Anchor, Drawing, Label, Mark, Path, Step, Stroke};
 use super::font::Font;
-use super::page;
 use crate::output::Format;
-use crate::relax::Equilibrium;
 
 /// Pixels per unit of the page.
 const SCALE: f64 = 2.0;
@@ -21,16 +20,16 @@ const SCALE: f64 = 2.0;
 /// 192 dots per inch, as the file says them: dots per metre.
 const DOTS_PER_METRE: u32 = 7559;
 
-/// `figure.png`: the leaf in four panels.
+/// The figure as PNG: `figure.png` of a leaf, `check.png` of a check.
 pub struct FigurePng;
 
-impl Format for FigurePng {
+impl<R: Pictured> Format<R> for FigurePng {
     fn file_name(&self) -> &'static str {
-        "figure.png"
+        R::PNG
     }
 
-    fn write(&self, equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
-        let canvas = paint(&page::draw(equilibrium));
+    fn write(&self, result: &R, out: &mut dyn Write) -> io::Result<()> {
+        let canvas = paint(&result.draw());
         encode(&canvas, out)
     }
 }

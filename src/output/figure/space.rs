@@ -6,7 +6,8 @@ use glam::{DVec2, DVec3};
 use super::colors::{FLOOR, FRAME, GRID, INK, NOTE, SHADOW};
 use super::drawing::{Drawing, Step, Stroke, polygon};
 use super::flat::{curve, title};
-use super::page::{Cell, TEXT_SIZE, TICK_SIZE, clamp_marker, tip_markers};
+use super::markers::{clamp_marker, dots, tip_markers};
+use super::page::{Cell, TEXT_SIZE, TICK_SIZE};
 use super::ticks::{round_step, ticks};
 use super::veins::{Piece, Vein, Veins};
 
@@ -43,6 +44,7 @@ pub fn draw(page: &mut Drawing, veins: &Veins, cell: Cell) {
         );
     }
     draw_veins(page, &camera, veins);
+    dots(page, veins, |point| camera.place(point));
     clamp_marker(page, camera.place(DVec3::ZERO));
     tip_markers(page, veins, |tip| camera.place(tip));
 }

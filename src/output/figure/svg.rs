@@ -1,25 +1,24 @@
-//! `figure.svg`: the drawing as text that any browser or editor opens.
+//! The drawing as text that any browser or editor opens.
 
 use std::io::{self, Write};
 
 use glam::DVec2;
 
+use super::Pictured;
 use super::colors::Color;
 use super::drawing::{Anchor, Drawing, Label, Mark, Path, Step, Stroke};
-use super::page;
 use crate::output::Format;
-use crate::relax::Equilibrium;
 
-/// `figure.svg`: the leaf in four panels.
+/// The figure as SVG: `figure.svg` of a leaf, `check.svg` of a check.
 pub struct FigureSvg;
 
-impl Format for FigureSvg {
+impl<R: Pictured> Format<R> for FigureSvg {
     fn file_name(&self) -> &'static str {
-        "figure.svg"
+        R::SVG
     }
 
-    fn write(&self, equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
-        write_drawing(&page::draw(equilibrium), out)
+    fn write(&self, result: &R, out: &mut dyn Write) -> io::Result<()> {
+        write_drawing(&result.draw(), out)
     }
 }
 

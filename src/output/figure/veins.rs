@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::colors::{Color, vein_color};
-use crate::relax::Equilibrium;
+use crate::relax::{Equilibrium, RodShape};
 
 /// Of a wider leaf, only some veins are drawn: more would not be told apart.
 const MOST_VEINS: usize = 200;
@@ -18,6 +18,14 @@ const DRAWN_WITHIN: f64 = 3e-4;
 /// No curve is drawn with fewer pieces than this, if it has them.
 const FEWEST_PIECES: usize = 8;
 
+/// Dots of a second solution: on about so many veins at most, about so many in
+/// all, as far apart as this many are on the leaf's extent, and no fewer on a
+/// vein if it has them.
+const MOST_DOTTED: usize = 24;
+const MOST_DOTS: usize = 160;
+const DOTS_PER_EXTENT: f64 = 14.0;
+const FEWEST_DOTS: usize = 8;
+
 /// A cubic Bezier curve in space.
 pub type Piece = [DVec3; 4];
 
@@ -29,8 +37,12 @@ pub struct Vein {
 /// What the figure shows.
 pub struct Veins {
     pub veins: Vec<Vein>,
+    /// How many veins the leaf has.
+    pub count: usize,
     /// Every so many-th vein is drawn.
     pub every: usize,
+    /// Points of a second solution.
+    pub dots: Vec<DVec3>,
     pub tips: Vec<(DVec3, Color)>,
     /// Corners of the box that holds all of it; the clamp is at the origin.
     pub low: DVec3,
@@ -85,12 +97,44 @@ impl Veins {
         });
         Veins {
             veins,
+            count,
             every,
+            dots: Vec::new(),
             tips,
             low,
             high,
             unit,
         }
+    }
+
+    /// Adds a second solution as dots: on as many veins, at as many places as
+    /// can be told apart.
+    pub fn dot(&mut self, rods: &[RodShape]) {
+        let every = self.count.div_ceil(MOST_DOTTED).max(1);
+        let most = (MOST_DOTS / rods.len().div_ceil(every).max(1)).max(FEWEST_DOTS);
+        // A vein that is wound up is longer than the leaf.
+        let lengths = 1.0 / self.extent();
+        let wanted = (DOTS_PER_EXTENT * lengths).ceil() as usize;
+        let dots = wanted.clamp(FEWEST_DOTS, most);
+        for rod in rods.iter().step_by(every) {
+            let stride = (rod.nodes.len() - 1).div_ceil(dots).max(1);
+            // The base is under the clamp's marker.
+            let nodes = rod.nodes.iter().skip(stride).step_by(stride);
+            let points = nodes.map(|node| node.position / self.unit);
+            self.dots.extend(points.filter(|&point| is_near(point)));
+        }
+        for &point in &self.dots {
+            (self.low, self.high) = (self.low.min(point), self.high.max(point));
+        }
+    }
+
+    /// What is to be said about lengths and veins.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = vec![format!("L = {}", self.unit)];
+        if self.every > 1 {
+            notes.push(format!("1 vein in {} drawn", self.every));
+        }
+        notes
     }
 
     /// The largest side of the box, or 1 if it is a point.
@@ -189,6 +233,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
+    use crate::output::sample;
 
     #[test]
     fn a_half_circle_is_drawn_round_with_few_pieces() {
@@ -210,5 +255,26 @@ mod tests {
         assert!(smooth(&[]).is_empty());
         assert!(smooth(&[DVec3::X]).is_empty());
         assert_eq!(smooth(&[DVec3::ZERO, DVec3::X])[0][3], DVec3::X);
+    }
+
+    #[test]
+    fn dots_can_be_told_apart() {
+        for (rods, dots) in [(1, 14), (5, 5 * 14), (21, 21 * 8), (200, 23 * 8)] {
+            let leaf = sample::fan(rods, 64);
+            let mut veins = Veins::of(&leaf);
+            veins.dot(&leaf.rods);
+            assert!(veins.dots.len() <= dots, "{rods}: {}", veins.dots.len());
+            assert!(veins.dots.len() > dots / 2, "{rods}: {}", veins.dots.len());
+        }
+    }
+
+    #[test]
+    fn dots_beside_the_leaf_are_in_the_box() {
+        let leaf = sample::fan(3, 8);
+        let mut veins = Veins::of(&leaf);
+        let mut rods = leaf.rods.clone();
+        rods[1].nodes[8].position.z = 3.0;
+        veins.dot(&rods);
+        assert_eq!(veins.high.z, 3.0);
     }
 }

@@ -3,27 +3,23 @@
 use std::io::{self, Write};
 
 use serde::Serialize;
-use serde_json::ser::Formatter;
 
-use super::Format;
+use super::{Point, points, tips, write};
+use crate::output::Format;
 use crate::relax::Equilibrium;
 
 /// `summary.json`, which is also what `--json` prints.
 pub struct Summary;
 
-impl Format for Summary {
+impl Format<Equilibrium> for Summary {
     fn file_name(&self) -> &'static str {
         "summary.json"
     }
 
     fn write(&self, equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
-        let mut serializer = serde_json::Serializer::with_formatter(&mut *out, Layout::default());
-        Object::from(equilibrium).serialize(&mut serializer)?;
-        out.write_all(b"\n")
+        write(&Object::from(equilibrium), out)
     }
 }
-
-type Point = [f64; 3];
 
 /// The keys, in the order in which they are written. Numbers that are not
 /// finite become null.
@@ -73,11 +69,7 @@ struct Work {
 
 impl<'a> From<&'a Equilibrium> for Object<'a> {
     fn from(equilibrium: &'a Equilibrium) -> Self {
-        let tips: Vec<Point> = equilibrium.tips.iter().map(|tip| tip.to_array()).collect();
-        let (tip, tips) = match tips.as_slice() {
-            [only] => (Some(*only), None),
-            _ => (None, Some(tips)),
-        };
+        let (tip, tips) = tips(&equilibrium.tips);
         let work = equilibrium.work;
         Object {
             scenario: &equilibrium.scenario,
@@ -112,47 +104,9 @@ impl<'a> From<&'a Equilibrium> for Object<'a> {
             positions: equilibrium
                 .rods
                 .iter()
-                .map(|rod| {
-                    rod.nodes
-                        .iter()
-                        .map(|node| node.position.to_array())
-                        .collect()
-                })
+                .map(|rod| points(rod.nodes.iter().map(|node| node.position)))
                 .collect(),
         }
-    }
-}
-
-/// Compact JSON with each key of the outermost object on its own line.
-#[derive(Default)]
-struct Layout {
-    depth: usize,
-}
-
-impl Formatter for Layout {
-    fn begin_object<W: ?Sized + Write>(&mut self, out: &mut W) -> io::Result<()> {
-        self.depth += 1;
-        out.write_all(b"{")
-    }
-
-    fn end_object<W: ?Sized + Write>(&mut self, out: &mut W) -> io::Result<()> {
-        self.depth -= 1;
-        out.write_all(if self.depth == 0 { b"\n}" } else { b"}" })
-    }
-
-    fn begin_object_key<W: ?Sized + Write>(&mut self, out: &mut W, first: bool) -> io::Result<()> {
-        if !first {
-            out.write_all(b",")?;
-        }
-        out.write_all(match (self.depth, first) {
-            (1, _) => b"\n  ",
-            (_, true) => b"",
-            (_, false) => b" ",
-        })
-    }
-
-    fn begin_object_value<W: ?Sized + Write>(&mut self, out: &mut W) -> io::Result<()> {
-        out.write_all(b": ")
     }
 }
 
@@ -160,26 +114,13 @@ impl Formatter for Layout {
 mod tests {
     use serde_json::Value;
 
+    use super::super::tests::{keys, text};
     use super::*;
     use crate::output::sample;
     use crate::relax::Outcome;
 
-    fn text(equilibrium: &Equilibrium) -> String {
-        let mut bytes = Vec::new();
-        Summary.write(equilibrium, &mut bytes).unwrap();
-        String::from_utf8(bytes).unwrap()
-    }
-
     fn value(equilibrium: &Equilibrium) -> Value {
-        serde_json::from_str(&text(equilibrium)).unwrap()
-    }
-
-    /// Keys of the outermost object, in the order written.
-    fn keys(text: &str) -> Vec<&str> {
-        text.lines()
-            .filter_map(|line| line.strip_prefix("  \""))
-            .map(|line| line.split('"').next().unwrap())
-            .collect()
+        serde_json::from_str(&text(&Summary, equilibrium)).unwrap()
     }
 
     #[test]
@@ -203,14 +144,14 @@ mod tests {
             "stations",
             "positions",
         ];
-        assert_eq!(keys(&text(&sample::fan(5, 8))), wanted);
+        assert_eq!(keys(&text(&Summary, &sample::fan(5, 8))), wanted);
     }
 
     #[test]
     fn numbers_survive_the_round_trip() {
         let mut leaf = sample::fan(2, 4);
         leaf.energy = 0.1 + 0.2;
-        let text = text(&leaf);
+        let text = text(&Summary, &leaf);
         assert!(
             text.contains("\n  \"energy\": 0.30000000000000004,\n"),
             "{text}"

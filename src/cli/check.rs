@@ -1,0 +1,68 @@
+//! `leafdyn check`: two independent methods find the same shape, or not.
+
+use clap::Args;
+
+use leafdyn::study::{self, CheckOptions, Verdict};
+
+use super::progress::ProgressLine;
+use super::request::Request;
+use super::{Refusal, Status, check_report, note};
+
+/// Relax a leaf, solve its boundary-value problem by shooting from there, and compare.
+///
+/// Exit status: 0 both methods agree; 1 they differ or could not be compared
+/// (the files are still written and say why); 2 the request was refused.
+#[derive(Debug, Args)]
+pub struct Check {
+    #[command(flatten)]
+    request: Request,
+
+    /// Shoot over N intervals; 1 is single shooting; left out: as many as the growth of perturbations needs
+    #[arg(long, value_name = "N")]
+    intervals: Option<usize>,
+
+    /// Compare at a saddle, if the leaf comes to one, instead of leaving it for a stable equilibrium
+    #[arg(long)]
+    keep_unstable: bool,
+}
+
+impl Check {
+    pub fn run(self) -> Result<Status, Refusal> {
+        let (scenario, folder) = self.request.open()?;
+        let options = CheckOptions {
+            tolerance: self.request.tolerance,
+            keep_unstable: self.keep_unstable,
+            intervals: self.intervals,
+        };
+        let mut line = ProgressLine::new(&scenario.name);
+        let check = study::check(&scenario, &options, &mut |progress| line.update(progress))?;
+        drop(line);
+        if let (true, Verdict::NotCompared(reason)) = (self.request.json, &check.verdict) {
+            note(&format!("{}: {reason}", scenario.name));
+        }
+        self.request.deliver(&check, &folder, |folder| {
+            check_report::report(&check, folder)
+        })?;
+        Ok(status(&check.verdict))
+    }
+}
+
+fn status(verdict: &Verdict) -> Status {
+    match verdict {
+        Verdict::Agree => Status::Success,
+        Verdict::Differ | Verdict::NotCompared(_) => Status::Failure,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_agreement_is_success() {
+        assert_eq!(status(&Verdict::Agree), Status::Success);
+        assert_eq!(status(&Verdict::Differ), Status::Failure);
+        let not_compared = Verdict::NotCompared("why".into());
+        assert_eq!(status(&not_compared), Status::Failure);
+    }
+}

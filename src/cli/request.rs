@@ -1,0 +1,106 @@
+//! What every verb is asked and how it delivers: a scenario, a folder, files
+//! and what is shown.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueHint};
+
+use leafdyn::output::{self, Written};
+use leafdyn::scenario::Scenario;
+
+use super::{Refusal, show};
+
+/// What every verb is asked.
+#[derive(Debug, Args)]
+pub struct Request {
+    /// The leaf, as a TOML file
+    #[arg(value_hint = ValueHint::FilePath)]
+    scenario: PathBuf,
+
+    /// Wanted accuracy of the centerlines, relative to the largest rod length; overrides the scenario's
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    pub tolerance: Option<f64>,
+
+    /// Override one entry of the scenario, as in --set load.gravity=[0,0,-0.5]; may repeat
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+
+    /// Where files go [default: out/<name of the scenario>]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    out: Option<PathBuf>,
+
+    /// Print the result as JSON on standard output and nothing else there
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Request {
+    /// The scenario, and the folder for the files; refused before the run if
+    /// nothing could be written there.
+    pub fn open(&self) -> Result<(Scenario, PathBuf), Refusal> {
+        let scenario = Scenario::read(&self.scenario, &self.overrides)?;
+        let folder = match &self.out {
+            Some(folder) => folder.clone(),
+            None => Path::new("out").join(folder_name(&scenario.name)),
+        };
+        output::check_writable(&folder)?;
+        Ok((scenario, folder))
+    }
+
+    /// Writes the files and shows the result: as JSON, or as a report that is
+    /// told the folder if there are files in it. What was found is shown even
+    /// if the files could not be written.
+    pub fn deliver<R: Written>(
+        &self,
+        result: &R,
+        folder: &Path,
+        report: impl FnOnce(Option<&Path>) -> String,
+    ) -> Result<(), Refusal> {
+        let written = output::write_all(folder, result);
+        if self.json {
+            let mut json = Vec::new();
+            R::FORMATS[0].write(result, &mut json)?;
+            show(&json)?;
+        } else {
+            show(report(written.is_ok().then_some(folder)).as_bytes())?;
+        }
+        written?;
+        Ok(())
+    }
+}
+
+/// The scenario's name as one folder below `out`, whatever is in it.
+fn folder_name(name: &str) -> String {
+    let plain = |c: char| {
+        if c.is_alphanumeric() || "-_.+ ".contains(c) {
+            c
+        } else {
+            '_'
+        }
+    };
+    let folder: String = name.trim().chars().map(plain).collect();
+    match folder.as_str() {
+        "" => "leaf".into(),
+        _ if folder.starts_with('.') => folder.replacen('.', "_", 1),
+        _ => folder,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_stay_below_out() {
+        for (name, folder) in [
+            ("fig04", "fig04"),
+            ("../../etc", "_._.._etc"),
+            ("..", "_."),
+            ("a/b", "a_b"),
+            ("", "leaf"),
+            ("Blatt 3, süß", "Blatt 3_ süß"),
+        ] {
+            assert_eq!(folder_name(name), folder);
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! How a leaf moves: its mass, what damps it, how long it is followed, and
+//! what changes in time.
+
+pub(super) mod check;
+pub(super) mod limits;
+mod section;
+
+use super::{Profile, Rod, Schedule};
+
+/// Radius of the section over the length of the longest rod: the round section
+/// whose axial stiffness is 100 A/L^2, since H/A = 4/r^2.
+const RADIUS: f64 = 0.2;
+/// Frequency of the lowest mode of a clamped rod, in units of sqrt(A/(rho L^4)).
+const LOWEST_FREQUENCY: f64 = 3.516;
+/// Duration, in units of sqrt(rho L^4/A).
+const DURATION: f64 = 10.0;
+const OUTPUTS: f64 = 100.0;
+
+/// How a leaf moves. All quantities are in the units of the scenario, with
+/// its unit of time. L is the longest rod, A the geometric mean of the bending
+/// stiffnesses mid-rod, rho the mean of the densities mid-rod.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dynamics {
+    /// Mass per unit reference length, one per rod; positive.
+    pub density: Vec<Profile>,
+    /// rho I, the moment of inertia per unit reference length about d2 and
+    /// about d3, one per rod; positive. That about d1 is twice it.
+    pub rotary_inertia: Vec<Profile>,
+    /// Viscous force per unit reference length and velocity. Rotation is damped
+    /// at the same rate: by this over the density times the angular momentum.
+    pub external_damping: f64,
+    /// Retardation time of the material (Kelvin-Voigt): the stress is the
+    /// stiffness times the strain and times this time the strain rate.
+    pub internal_damping: f64,
+    /// How long the leaf is followed, a time.
+    pub duration: f64,
+    /// Time between two outputs; at most the duration.
+    pub output_interval: f64,
+    /// Whether the base is clamped; free only on a single rod.
+    pub clamped: bool,
+    /// Gravity, force per unit reference length.
+    pub gravity: Schedule<[f64; 3]>,
+    /// Dead force on the joint tip, or on every tip when the tips are free.
+    pub tip_force: Schedule<[f64; 3]>,
+    /// Dead moment about the lab axes on the tip of a single rod.
+    pub tip_moment: Schedule<[f64; 3]>,
+    /// Factor of all rest curvatures.
+    pub rest: Schedule<f64>,
+}
+
+impl Dynamics {
+    /// What holds for these rods where a scenario says nothing of motion, but
+    /// without loads: see [`Dynamics::with_loads`]. There is at least one rod.
+    ///
+    /// ```
+    /// use leafdyn::scenario::{Dynamics, Profile, Rod};
+    ///
+    /// let rod = Rod {
+    ///     length: 2.0,
+    ///     angle: 0.0,
+    ///     couple_stiffness: [8.0; 3].map(Profile::Constant),
+    ///     force_stiffness: [f64::INFINITY; 3].map(Profile::Constant),
+    ///     rest_curvature: [0.0; 3].map(Profile::Constant),
+    /// };
+    /// let weight = [0.0, 0.0, -1.0];
+    /// let dynamics = Dynamics::default_for(&[rod]).with_loads(weight, [0.0; 3], [0.0; 3]);
+    /// assert!((dynamics.mean_density() - 0.5).abs() < 1e-15);
+    /// assert_eq!(dynamics.duration, 10.0);
+    /// assert_eq!(dynamics.gravity.at(3.0), weight);
+    /// ```
+    pub fn default_for(rods: &[Rod]) -> Self {
+        let density = mean_bending(rods) / longest(rods).powi(4);
+        Dynamics::of_density(rods, vec![Profile::Constant(density); rods.len()])
+    }
+
+    /// The same motion under loads that do not change.
+    pub fn with_loads(
+        self,
+        gravity: [f64; 3],
+        tip_force: [f64; 3],
+        tip_moment: [f64; 3],
+    ) -> Dynamics {
+        Dynamics {
+            gravity: Schedule::constant(gravity),
+            tip_force: Schedule::constant(tip_force),
+            tip_moment: Schedule::constant(tip_moment),
+            ..self
+        }
+    }
+
+    /// rho: mean of the densities of the rods, mid-rod; mass per length.
+    pub fn mean_density(&self) -> f64 {
+        mean_of(&self.density)
+    }
+
+    fn of_density(rods: &[Rod], density: Vec<Profile>) -> Dynamics {
+        let time = time(rods, &density);
+        let duration = DURATION * time;
+        Dynamics {
+            rotary_inertia: round(&density, RADIUS * longest(rods)),
+            external_damping: 2.0 * LOWEST_FREQUENCY * mean_of(&density) / time,
+            density,
+            internal_damping: 0.0,
+            duration,
+            output_interval: duration / OUTPUTS,
+            clamped: true,
+            gravity: Schedule::constant([0.0; 3]),
+            tip_force: Schedule::constant([0.0; 3]),
+            tip_moment: Schedule::constant([0.0; 3]),
+            rest: Schedule::constant(1.0),
+        }
+    }
+}
+
+/// L: the longest rod.
+pub(crate) fn longest(rods: &[Rod]) -> f64 {
+    rods.iter()
+        .fold(0.0, |longest, rod| longest.max(rod.length))
+}
+
+/// A: geometric mean of the bending stiffnesses of all rods, mid-rod.
+pub(crate) fn mean_bending(rods: &[Rod]) -> f64 {
+    let logs: f64 = rods
+        .iter()
+        .map(|rod| rod.couple_stiffness[1].at(0.5).ln() + rod.couple_stiffness[2].at(0.5).ln())
+        .sum();
+    (logs / (2 * rods.len()) as f64).exp()
+}
+
+/// Mean over the rods, mid-rod; exact where all are equal.
+fn mean_of(profiles: &[Profile]) -> f64 {
+    profiles
+        .iter()
+        .zip(1..)
+        .fold(0.0, |mean, (profile, count)| {
+            mean + (profile.at(0.5) - mean) / f64::from(count)
+        })
+}
+
+/// The unit of time sqrt(rho L^4/A); in this order nothing overflows.
+fn time(rods: &[Rod], density: &[Profile]) -> f64 {
+    (mean_of(density) / (mean_bending(rods) / longest(rods).powi(4))).sqrt()
+}
+
+/// rho I of rods with one round section.
+fn round(density: &[Profile], radius: f64) -> Vec<Profile> {
+    let radius = Profile::Constant(radius);
+    density
+        .iter()
+        .map(|density| section::inertia(density, &radius))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rods(lengths: &[f64], bending: f64) -> Vec<Rod> {
+        let constant = |values: [f64; 3]| values.map(Profile::Constant);
+        lengths
+            .iter()
+            .map(|&length| Rod {
+                length,
+                angle: 0.0,
+                couple_stiffness: constant([0.1, bending, bending]),
+                force_stiffness: constant([f64::INFINITY; 3]),
+                rest_curvature: constant([0.0; 3]),
+            })
+            .collect()
+    }
+
+    #[test]
+    fn times_are_in_the_natural_unit_by_default() {
+        for (length, bending) in [(1.0, 1.0), (0.03, 7.1), (1e50, 1e-50), (1e-50, 1e50)] {
+            let rods = rods(&[length, 0.5 * length, 0.1 * length], bending);
+            let dynamics = Dynamics::default_for(&rods);
+            assert_eq!(dynamics.duration, 10.0);
+            assert_eq!(dynamics.output_interval, 0.1);
+            let density = dynamics.mean_density();
+            let close = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-12;
+            assert!(close(density, bending / length.powi(4)));
+            assert!(close(dynamics.external_damping, 2.0 * 3.516 * density));
+            assert!(close(
+                dynamics.rotary_inertia[2].at(0.5),
+                0.01 * density * length * length
+            ));
+        }
+    }
+
+    #[test]
+    fn the_mean_of_equal_densities_is_exact() {
+        assert_eq!(mean_of(&vec![Profile::Constant(0.1); 7]), 0.1);
+        let taper = Profile::Linear {
+            at: vec![0.0, 1.0],
+            value: vec![4.0, 2.0],
+        };
+        assert_eq!(mean_of(&[taper, Profile::Constant(1.0)]), 2.0);
+    }
+}

@@ -1,0 +1,114 @@
+//! A quantity in time.
+
+/// A quantity in time: linear between given times, constant before the first
+/// and after the last.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Schedule<T> {
+    /// Times, at least one, rising strictly.
+    pub at: Vec<f64>,
+    /// Values at these times; same length as `at`.
+    pub value: Vec<T>,
+}
+
+impl<T> Schedule<T> {
+    /// The same value at all times.
+    pub fn constant(value: T) -> Self {
+        Schedule {
+            at: vec![0.0],
+            value: vec![value],
+        }
+    }
+
+    /// Whether the value is the same at all times.
+    pub fn is_constant(&self) -> bool
+    where
+        T: PartialEq,
+    {
+        self.value.windows(2).all(|pair| pair[0] == pair[1])
+    }
+
+    /// The values to both sides of `time`, and how far between them it is.
+    fn around(&self, time: f64) -> (&T, &T, f64) {
+        let last = self.at.len() - 1;
+        match self.at.partition_point(|&known| known <= time) {
+            0 => (&self.value[0], &self.value[0], 0.0),
+            after if after > last => (&self.value[last], &self.value[last], 0.0),
+            after => {
+                let (from, to) = (self.at[after - 1], self.at[after]);
+                let fraction = (time - from) / (to - from);
+                (&self.value[after - 1], &self.value[after], fraction)
+            }
+        }
+    }
+}
+
+impl Schedule<f64> {
+    /// The value at `time`.
+    pub fn at(&self, time: f64) -> f64 {
+        let (from, to, fraction) = self.around(time);
+        between(*from, *to, fraction)
+    }
+}
+
+impl Schedule<[f64; 3]> {
+    /// The value at `time`.
+    pub fn at(&self, time: f64) -> [f64; 3] {
+        let (from, to, fraction) = self.around(time);
+        std::array::from_fn(|axis| between(from[axis], to[axis], fraction))
+    }
+}
+
+fn between(from: f64, to: f64, fraction: f64) -> f64 {
+    from + fraction * (to - from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn factor() -> Schedule<f64> {
+        Schedule {
+            at: vec![-1.0, 0.5, 0.7],
+            value: vec![1.0, 4.0, 0.1],
+        }
+    }
+
+    #[test]
+    fn a_constant_is_the_same_at_all_times() {
+        let gravity = Schedule::constant([0.0, 0.0, -0.3]);
+        assert!(gravity.is_constant());
+        for time in [f64::NEG_INFINITY, -1.0, 0.0, 1e300, f64::INFINITY] {
+            assert_eq!(gravity.at(time), [0.0, 0.0, -0.3], "at {time}");
+        }
+    }
+
+    #[test]
+    fn linear_between_times_and_exact_at_them() {
+        assert_eq!(factor().at(-1.0), 1.0);
+        assert_eq!(factor().at(0.0), 3.0);
+        assert_eq!(factor().at(0.5), 4.0);
+        assert_eq!(factor().at(0.7), 0.1);
+        let force = Schedule {
+            at: vec![0.0, 2.0],
+            value: vec![[0.0, 1.0, 0.0], [4.0, 1.0, -2.0]],
+        };
+        assert_eq!(force.at(0.5), [1.0, 1.0, -0.5]);
+    }
+
+    #[test]
+    fn constant_outside_the_times() {
+        assert_eq!(factor().at(-1e9), 1.0);
+        assert_eq!(factor().at(1e9), 0.1);
+    }
+
+    #[test]
+    fn equal_values_are_constant_however_many() {
+        assert!(!factor().is_constant());
+        let still = Schedule {
+            at: vec![0.0, 1.0],
+            value: vec![0.3, 0.3],
+        };
+        assert!(still.is_constant());
+        assert_eq!(still.at(0.7), 0.3);
+    }
+}

@@ -1,0 +1,118 @@
+//! Random leaves.
+#![allow(dead_code)]
+
+use leafdyn::scenario::{Profile, Scenario};
+use proptest::prelude::*;
+
+use crate::common::paper_leaf;
+
+fn log_uniform(decades: std::ops::Range<f64>) -> impl Strategy<Value = f64> {
+    decades.prop_map(|exponent| 10f64.powf(exponent))
+}
+
+fn force_stiffness() -> impl Strategy<Value = f64> {
+    prop_oneof![4 => log_uniform(1.0..3.0), 1 => Just(f64::INFINITY)]
+}
+
+/// A quantity that changes along the rod by up to `most` times, with a kink.
+fn profile(value: f64, (kink, bend): (f64, f64), on: bool) -> Profile {
+    match on {
+        false => Profile::Constant(value),
+        true => Profile::Linear {
+            at: vec![0.0, kink, 1.0],
+            value: vec![value, bend * value, 0.6 * value],
+        },
+    }
+}
+
+prop_compose! {
+    /// One to four veins, alike but for length, angle and rest shape: stiffness
+    /// over two decades, some rigid in stretch or shear; any load, coupling,
+    /// fan, profiles with kinks.
+    pub fn leaves()(rods in 1..5_usize)(
+        couple in prop::array::uniform3(log_uniform(-1.0..1.0)),
+        force in prop::array::uniform3(force_stiffness()),
+        rest in prop::collection::vec(prop::array::uniform3(-2.0..2.0), rods),
+        lengths in prop::collection::vec(0.8..1.2, rods),
+        angles in prop::collection::vec(-0.3..0.3, rods),
+        coupling in prop::collection::vec(prop::array::uniform3(0.0..5.0), rods - 1),
+        gravity in prop::array::uniform3(-1.0..1.0),
+        tip_force in prop::array::uniform3(-1.0..1.0),
+        kinks in prop::array::uniform3((0.1..0.9, 0.5..2.0)),
+        tapered in prop::array::uniform3(prop::bool::weighted(0.3)),
+        joined in prop::bool::weighted(0.75),
+    ) -> Scenario {
+        let mut leaf = paper_leaf(rest.len(), couple, force, 0.0);
+        leaf.joined = joined;
+        leaf.coupling = coupling;
+        leaf.gravity = gravity;
+        leaf.tip_force = tip_force;
+        for (j, rod) in leaf.rods.iter_mut().enumerate() {
+            rod.length = lengths[j];
+            rod.angle += angles[j];
+            for k in 0..3 {
+                rod.couple_stiffness[k] = profile(couple[k], kinks[k], tapered[k]);
+                rod.rest_curvature[k] = profile(rest[j][k], kinks[2 - k], tapered[2 - k]);
+            }
+        }
+        leaf
+    }
+}
+
+/// A quantity with two kinks.
+fn crooked(most: impl Strategy<Value = f64>) -> impl Strategy<Value = Profile> {
+    let knots = (0.05..0.5, 0.55..0.95, 0.3..3.0, 0.3..2.0, 0.3..2.0);
+    (most, knots, prop::bool::weighted(0.4)).prop_map(|(value, (first, second, a, b, c), on)| {
+        match on && value.is_finite() {
+            false => Profile::Constant(value),
+            true => Profile::Linear {
+                at: vec![0.0, first, second, 1.0],
+                value: vec![value, a * value, b * value, c * value],
+            },
+        }
+    })
+}
+
+prop_compose! {
+    fn rods(count: usize)(
+        couple in prop::collection::vec(prop::array::uniform3(crooked(log_uniform(-1.5..1.5))), count),
+        force in prop::collection::vec(prop::array::uniform3(crooked(force_stiffness())), count),
+        rest in prop::collection::vec(prop::array::uniform3(crooked((-4.0..4.0).boxed())), count),
+        lengths in prop::collection::vec(0.5..1.5, count),
+        turns in prop::collection::vec(-0.5..0.5, count),
+    ) -> Scenario {
+        let mut leaf = paper_leaf(count, [1.0; 3], [1.0; 3], 0.0);
+        for (j, rod) in leaf.rods.iter_mut().enumerate() {
+            rod.length = lengths[j];
+            rod.angle += turns[j];
+            rod.couple_stiffness = couple[j].clone();
+            rod.force_stiffness = force[j].clone();
+            rod.rest_curvature = rest[j].clone();
+        }
+        leaf
+    }
+}
+
+prop_compose! {
+    /// One to five veins, each its own, under loads and couplings over two decades.
+    pub fn wild_leaves()(count in 1..6_usize)(
+        leaf in rods(count),
+        load in log_uniform(-1.0..1.2),
+        coupling in log_uniform(-1.0..3.0),
+        parts in prop::collection::vec(prop::array::uniform3(0.0..1.0), count - 1),
+        gravity in prop::array::uniform3(-1.0..1.0),
+        tip_force in prop::array::uniform3(-1.0..1.0),
+        tip_moment in prop::array::uniform3(-1.0..1.0),
+        joined in prop::bool::weighted(0.8),
+    ) -> Scenario {
+        let mut leaf: Scenario = leaf;
+        leaf.joined = joined;
+        leaf.gravity = gravity.map(|g| load * g);
+        leaf.tip_force = tip_force.map(|f| load * f);
+        leaf.coupling = parts.iter().map(|gap| gap.map(|part: f64| coupling * part)).collect();
+        if leaf.rods.len() == 1 {
+            leaf.tip_moment = tip_moment;
+        }
+        leaf
+    }
+}

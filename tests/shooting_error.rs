@@ -1,0 +1,120 @@
+//! The estimated error of a boundary-value solution bounds its true error: of
+//! positions, rotations, forces and moments, whatever accuracy is asked for.
+
+mod common;
+#[path = "common/random.rs"]
+mod random;
+
+use common::{apart, files, scale, settle, shoot_near};
+use leafdyn::bvp::{Options, Solution, Start, solve, solve_within};
+use leafdyn::relax::Equilibrium;
+use leafdyn::scenario::Scenario;
+use proptest::strategy::{Strategy, ValueTree};
+use proptest::test_runner::TestRunner;
+use random::leaves;
+
+/// All files, the paper's with few veins.
+fn scenes() -> Vec<Scenario> {
+    let paper = files("paper").into_iter().flat_map(|file| {
+        [1, 2, 3, 5].map(|rods| Scenario::read(&file, &[format!("leaf.rods={rods}")]).unwrap())
+    });
+    let classic = files("classic")
+        .into_iter()
+        .map(|file| Scenario::read(&file, &[]).unwrap());
+    paper.chain(classic).collect()
+}
+
+fn start(leaf: &Equilibrium) -> Start<'_> {
+    Start::Leaf {
+        stations: &leaf.stations,
+        rods: &leaf.rods,
+    }
+}
+
+/// Asserts that no error is beyond its estimate, but for what the truth itself
+/// may be off, and returns estimate over error of positions, where that can be told.
+#[track_caller]
+fn covered(what: &str, scenario: &Scenario, rough: &Solution, truth: &Solution) -> Option<f64> {
+    let error = apart(scenario, &truth.rods, &rough.rods);
+    let scale = scale(scenario);
+    let units = [scale.length, 1.0, scale.force(), scale.moment()];
+    let fields = |d: leafdyn::shape::Difference| [d.position, d.rotation, d.force, d.moment];
+    let scaled = |d| std::array::from_fn(|k| fields(d)[k] / units[k]);
+    let (estimate, uncertain): ([f64; 4], [f64; 4]) = (scaled(rough.error), scaled(truth.error));
+    for (k, error) in fields(error).into_iter().enumerate() {
+        let which = ["position", "rotation", "force", "moment"][k];
+        assert!(
+            error <= estimate[k] + uncertain[k],
+            "{what}, {which}: error {error:.1e}, estimate {:.1e}",
+            estimate[k]
+        );
+    }
+    (error.position > 100.0 * uncertain[0]).then(|| estimate[0] / error.position)
+}
+
+fn at_all_tolerances(scenes: &[Scenario], tolerances: &[f64]) -> Vec<f64> {
+    let mut ratios = Vec::new();
+    for scenario in scenes {
+        let relaxed = settle(scenario, 1e-10);
+        let truth = shoot_near(scenario, &relaxed).unwrap();
+        for &tolerance in tolerances {
+            let options = Options {
+                tolerance,
+                intervals: None,
+                stations: relaxed.stations.clone(),
+            };
+            let what = format!("{} at {tolerance:e}", scenario.name);
+            let rough = solve(scenario, start(&relaxed), &options)
+                .unwrap_or_else(|failure| panic!("{what}: {}", failure.reason));
+            ratios.extend(covered(&what, scenario, &rough, &truth));
+        }
+    }
+    ratios.sort_by(f64::total_cmp);
+    println!(
+        "{} estimates / errors: least {:.1}, median {:.1}, most {:.1e}",
+        ratios.len(),
+        ratios[0],
+        ratios[ratios.len() / 2],
+        ratios[ratios.len() - 1]
+    );
+    ratios
+}
+
+#[test]
+fn of_every_scene_at_every_tolerance() {
+    let ratios = at_all_tolerances(&scenes(), &[1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11]);
+    // Of use as well: not larger than it must be by orders of magnitude.
+    assert!(ratios.len() > 100 && ratios[ratios.len() / 2] < 100.0);
+}
+
+#[test]
+fn of_random_leaves() {
+    let mut runner = TestRunner::deterministic();
+    let scenes: Vec<Scenario> = (0..60)
+        .map(|_| leaves().new_tree(&mut runner).unwrap().current())
+        .collect();
+    at_all_tolerances(&scenes, &[1e-7, 1e-8, 1e-9, 1e-10]);
+}
+
+/// Asked for an accuracy, it is kept, and estimates are below it.
+#[test]
+fn within_the_accuracy_asked_for() {
+    for scenario in scenes() {
+        let relaxed = settle(&scenario, 1e-10);
+        let truth = shoot_near(&scenario, &relaxed).unwrap();
+        let length = scale(&scenario).length;
+        for accuracy in [1e-3, 1e-6, 1e-9] {
+            let found = solve_within(
+                &scenario,
+                start(&relaxed),
+                accuracy,
+                None,
+                &relaxed.stations,
+            )
+            .unwrap();
+            let what = format!("{} within {accuracy:e}", scenario.name);
+            assert!(found.error.position <= accuracy * length, "{what}");
+            covered(&what, &scenario, &found, &truth);
+        }
+    }
+}

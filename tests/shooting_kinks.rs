@@ -1,0 +1,202 @@
+//! Profiles with kinks, veins of different lengths, free tips and dead moments:
+//! the boundary-value solution is that of the relaxation there too.
+
+mod common;
+
+use common::{TIGHT, agree, fig04, paper_leaf, parse, settle, shoot_alone, shoot_near, shoot_over};
+use leafdyn::relax::Options;
+use leafdyn::scenario::{Profile, Scenario};
+
+fn linear(at: &[f64], value: &[f64]) -> Profile {
+    Profile::Linear {
+        at: at.to_vec(),
+        value: value.to_vec(),
+    }
+}
+
+/// Relaxed, shot from there, and shot alone.
+#[track_caller]
+fn all_agree(what: &str, leaf: &Scenario) {
+    let relaxed = settle(leaf, TIGHT);
+    let near = shoot_near(leaf, &relaxed).unwrap_or_else(|f| panic!("{what}: {}", f.reason));
+    agree(what, leaf, &relaxed, &near, 1e-9);
+    let alone =
+        shoot_alone(leaf, &relaxed.stations).unwrap_or_else(|f| panic!("{what}: {}", f.reason));
+    agree(what, leaf, &relaxed, &alone, 1e-9);
+}
+
+/// Veins that taper, with a soft joint, and curl at rest from half their length on.
+fn tapered() -> Scenario {
+    let mut leaf = fig04(3);
+    for (j, rod) in leaf.rods.iter_mut().enumerate() {
+        let joint = 0.25 + 0.2 * j as f64;
+        rod.couple_stiffness[1] = linear(&[0.0, joint, 1.0], &[2.0, 0.3, 0.6]);
+        rod.couple_stiffness[0] = linear(&[0.0, 1.0], &[1.0, 0.2]);
+        rod.force_stiffness[0] = linear(&[0.0, 0.7, 1.0], &[100.0, 20.0, 50.0]);
+        rod.rest_curvature[1] = linear(&[0.0, 0.5, 1.0], &[0.0, 0.0, 3.0]);
+        rod.rest_curvature[2] = linear(&[0.0, 0.1, 0.2, 1.0], &[0.0, 1.0, 0.0, 0.0]);
+    }
+    leaf
+}
+
+fn unequal(mut leaf: Scenario) -> Scenario {
+    for (j, rod) in leaf.rods.iter_mut().enumerate() {
+        rod.length = 1.0 + 0.03 * j as f64 * (-1.0_f64).powi(j as i32);
+    }
+    leaf
+}
+
+#[test]
+fn profiles() {
+    all_agree("tapered", &tapered());
+    let mut single = tapered();
+    single.rods.truncate(1);
+    single.coupling.clear();
+    all_agree("one vein", &single);
+}
+
+#[test]
+fn unequal_lengths() {
+    all_agree("Fig. 4", &unequal(fig04(5)));
+    all_agree("tapered", &unequal(tapered()));
+}
+
+#[test]
+fn free_tips() {
+    for mut leaf in [fig04(3), unequal(fig04(3)), unequal(tapered())] {
+        leaf.joined = false;
+        leaf.tip_force = [0.3, -0.2, 0.5];
+        all_agree("coupled", &leaf);
+        leaf.coupling = vec![[0.0; 3]; 2];
+        all_agree("uncoupled", &leaf);
+    }
+}
+
+#[test]
+fn a_dead_moment_on_the_tip() {
+    for moment in [[0.0, 0.0, 1.0], [0.4, 0.5, -0.6], [-1.0, 0.8, 0.3]] {
+        let mut rod = paper_leaf(1, [0.8, 1.0, 1.5], [100.0, 80.0, 60.0], 0.5);
+        rod.tip_force = [0.2, 0.1, -0.3];
+        rod.tip_moment = moment;
+        all_agree("moment", &rod);
+        rod.rods[0].rest_curvature = tapered().rods[0].rest_curvature.clone();
+        rod.rods[0].couple_stiffness = tapered().rods[0].couple_stiffness.clone();
+        all_agree("moment on a tapered rod", &rod);
+    }
+}
+
+/// Angles beyond half a turn: the quaternion at the base is the one with w >= 0,
+/// as it is of the relaxed leaf.
+#[test]
+fn angles_beyond_a_turn() {
+    let mut leaf = fig04(3);
+    for (rod, turns) in leaf.rods.iter_mut().zip([1.0, -2.0, 0.0]) {
+        rod.angle += turns * 2.0 * std::f64::consts::PI;
+    }
+    all_agree("wound", &leaf);
+    let relaxed = settle(&leaf, 1e-8);
+    let shot = shoot_near(&leaf, &relaxed).unwrap();
+    for (a, b) in relaxed.rods.iter().zip(&shot.rods) {
+        for (a, b) in a.nodes.iter().zip(&b.nodes) {
+            assert!(a.rotation.dot(b.rotation) > 0.0);
+        }
+    }
+}
+
+/// One kink, written in two ways: 0.1 + 0.2 is not 0.3 to the last digit. Nor are
+/// stations and ends of intervals that ought to be equal.
+#[test]
+fn kinks_and_stations_a_rounding_error_apart() {
+    let with_kinks = |kinks: [f64; 3]| {
+        let mut leaf = fig04(3);
+        for (rod, at) in leaf.rods.iter_mut().zip(kinks) {
+            rod.couple_stiffness[1] = linear(&[0.0, at, 1.0], &[1.0, 0.5, 2.0]);
+        }
+        leaf
+    };
+    let leaf = with_kinks([0.3; 3]);
+    let relaxed = settle(&leaf, 1e-10);
+    for kinks in [[0.3; 3], [0.3, 0.1 + 0.2, 0.3 - 1e-16]] {
+        let leaf = with_kinks(kinks);
+        let near = shoot_near(&leaf, &relaxed).unwrap_or_else(|f| panic!("{}", f.reason));
+        agree("from rest", &leaf, &relaxed, &near, 1e-9);
+        for intervals in [10, 20, 30] {
+            let over = shoot_over(Some(intervals), &leaf, &relaxed)
+                .unwrap_or_else(|failure| panic!("{intervals}: {}", failure.reason));
+            agree("over intervals", &leaf, &relaxed, &over, 1e-9);
+        }
+        let stations: Vec<f64> = (0..=20).map(|i| 1.0 - 0.05 * (20 - i) as f64).collect();
+        let alone = shoot_alone(&leaf, &stations).unwrap_or_else(|f| panic!("{}", f.reason));
+        assert_eq!(alone.stations, stations);
+        assert!(alone.rods.iter().all(|rod| rod.nodes.len() == 21));
+        let off = alone.rods[0].nodes[20].position - relaxed.tips[0];
+        assert!(off.length() < 1e-9, "{off}");
+    }
+}
+
+/// Relaxed to few digits a leaf is known at few stations, and between them badly
+/// where strong loads confine the bending to layers. From such starts shooting
+/// used to fail, or to end in another equilibrium.
+#[test]
+fn starts_known_at_few_stations() {
+    for (name, sections, loads) in [
+        (
+            "strip",
+            "torsion = 0.17, bending_2 = 0.126, bending_3 = 21.7, axial = { at = [0.0, 0.27, 0.55, 1.0], value = [11000.0, 17000.0, 19000.0, 3800.0] }, shear_2 = 80.0, shear_3 = 9.2",
+            "gravity = [6.9, -24.3, 26.8], tip_force = [-10.4, -2.7, 16.4]",
+        ),
+        (
+            "soft-strip",
+            "torsion = 0.02, bending_2 = 0.01, bending_3 = 1.0, axial = inf, shear_2 = inf, shear_3 = 50.0",
+            "gravity = [3.0, -20.0, 10.0], tip_force = [0.0, 5.0, 5.0]",
+        ),
+        (
+            "round",
+            "torsion = 0.05, bending_2 = 0.05, bending_3 = 0.05, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0",
+            "gravity = [-2.0, 0.5, 20.0]",
+        ),
+    ] {
+        let leaf = parse(&format!(
+            "name = '{name}'\n\
+             leaf = {{ rods = 1, length = 1.26, fan = [1.09] }}\n\
+             stiffness = {{ {sections} }}\n\
+             load = {{ {loads} }}\n"
+        ));
+        for tolerance in [1e-6, 1e-8] {
+            let relaxed = settle(&leaf, tolerance);
+            let shot = shoot_near(&leaf, &relaxed)
+                .unwrap_or_else(|failure| panic!("{name} {tolerance:e}: {}", failure.reason));
+            let off = common::apart(&leaf, &relaxed.rods, &shot.rods).position;
+            let estimate = relaxed.error_estimate.unwrap() / relaxed.rods[0].length;
+            assert!(off <= estimate, "{name}: {off:.1e}, {estimate:.1e}");
+        }
+    }
+}
+
+/// Strong coupling has layers as thin; the strongest is refused in short time
+/// and little memory.
+#[test]
+fn strong_coupling() {
+    for coupling in [1e2, 1e4, 1e5] {
+        let mut leaf = fig04(5);
+        leaf.coupling = vec![[coupling; 3]; 4];
+        let relaxed = settle(&leaf, 1e-8);
+        let shot = shoot_near(&leaf, &relaxed).unwrap();
+        let off = common::apart(&leaf, &relaxed.rods, &shot.rods).position;
+        let estimate = relaxed.error_estimate.unwrap();
+        assert!(off <= estimate, "{coupling:e}: {off:.1e}, {estimate:.1e}");
+        assert!(shot.error.position < 1e-10);
+    }
+    let mut glued = fig04(5);
+    glued.coupling = vec![[1e12; 3]; 4];
+    let options = Options {
+        tolerance: Some(1e-2),
+        ..Options::default()
+    };
+    let relaxed = leafdyn::relax::relax(&glued, &options, &mut |_| {}).unwrap();
+    let failure = shoot_near(&glued, &relaxed).expect_err("tens of thousands of intervals");
+    assert!(matches!(
+        failure.reason,
+        leafdyn::bvp::Reason::Unbounded { .. }
+    ));
+}

@@ -1,0 +1,245 @@
+//! Where a leaf can move without resistance the equations are singular. That is
+//! reported, with the veins that would move and the direction, and does not
+//! keep the solution from being found.
+
+mod common;
+
+use std::f64::consts::PI;
+
+use common::{
+    agree, close, paper_leaf, scenario, set_vector, settle, shoot_alone, shoot_near, tip,
+};
+use glam::DVec3;
+use leafdyn::bvp::{Neutral, Reason, Solution};
+use leafdyn::relax::{Equilibrium, Options, relax};
+use leafdyn::scenario::Scenario;
+
+const STATIONS: [f64; 9] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
+
+/// Directions are measured by a small finite motion, whose square is 1e-10 of
+/// lengths.
+const MOTION: f64 = 1e-4;
+
+/// The column of `classic/elastica_buckled` under a part of Euler's load.
+fn column(part: f64) -> Scenario {
+    let force = DVec3::new(-part * PI * PI / 4.0, 0.0, 0.0);
+    scenario(
+        "classic/elastica_buckled",
+        &[set_vector("load.tip_force", force)],
+    )
+}
+
+#[track_caller]
+fn alone(scenario: &Scenario) -> Solution {
+    shoot_alone(scenario, &STATIONS).unwrap_or_else(|failure| panic!("{}", failure.reason))
+}
+
+#[track_caller]
+fn neutral(solution: Solution) -> Neutral {
+    let neutral = solution.neutral.expect("the equations are singular");
+    assert_eq!(neutral.ratio, solution.condition);
+    assert!(neutral.ratio < 1e-9, "{:.1e}", neutral.ratio);
+    neutral
+}
+
+/// An equilibrium, kept if it is unstable.
+fn kept(scenario: &Scenario) -> Equilibrium {
+    let options = Options {
+        tolerance: Some(1e-10),
+        keep_unstable: true,
+        ..Options::default()
+    };
+    let leaf = relax(scenario, &options, &mut |_| {}).unwrap();
+    assert!(leaf.outcome.is_success());
+    leaf
+}
+
+/// The mode 1 - cos(pi s/2) to either side, within the plane of buckling.
+#[test]
+fn a_column_at_eulers_load_would_move_sideways() {
+    let column = column(1.0);
+    let leaf = kept(&column);
+    for shot in [alone(&column), shoot_near(&column, &leaf).unwrap()] {
+        for node in &shot.rods[0].nodes {
+            assert!(node.position.y.abs() + node.position.z.abs() < 1e-12);
+        }
+        let stations = shot.stations.clone();
+        let neutral = neutral(shot);
+        assert_eq!(
+            neutral.to_string(),
+            "a bifurcation is near, or the leaf can move without resistance; \
+             vein 1 would move, mostly along y"
+        );
+        let [rod] = neutral.displacement.as_slice() else {
+            panic!("one rod");
+        };
+        let side = rod.last().unwrap().y.signum();
+        for (moved, sigma) in rod.iter().zip(stations) {
+            let mode = DVec3::new(0.0, side * (1.0 - (0.5 * PI * sigma).cos()), 0.0);
+            assert!((*moved - mode).length() < MOTION, "{moved} at {sigma}");
+        }
+    }
+}
+
+#[test]
+fn off_eulers_load_nothing_is_reported() {
+    for part in [0.999, 1.001] {
+        let shot = alone(&column(part));
+        assert!(shot.neutral.is_none());
+        assert!(shot.condition > 1e-5, "{:.1e}", shot.condition);
+    }
+    // The equations lose one digit per digit that the load approaches it.
+    let conditions = [1e-2, 1e-4, 1e-6].map(|off| alone(&column(1.0 - off)).condition / off);
+    for condition in conditions {
+        close("condition", condition / conditions[0], 1.0, 0.02);
+    }
+}
+
+/// A buckled round column may buckle to any side: it can turn about e1.
+#[test]
+fn a_round_column_can_turn_about_its_axis() {
+    for load in [2.5, 3.0, 5.0, 10.0] {
+        let mut column = paper_leaf(1, [1.0; 3], [f64::INFINITY; 3], 0.0);
+        column.rods[0].angle = 0.0;
+        column.tip_force = [-load, 0.0, 0.0];
+        let leaf = settle(&column, 1e-9);
+        let bulge = tip(&leaf);
+        assert!(bulge.y.hypot(bulge.z) > 0.1);
+        let shot = shoot_near(&column, &leaf).unwrap();
+        agree(&format!("P = {load}"), &column, &leaf, &shot, 1e-9);
+        let positions: Vec<DVec3> = shot.rods[0].nodes.iter().map(|n| n.position).collect();
+        let neutral = neutral(shot);
+        let turning: Vec<DVec3> = positions.iter().map(|r| DVec3::X.cross(*r)).collect();
+        let largest = turning.iter().fold(0.0, |m: f64, v| m.max(v.length()));
+        let side = turning[1].dot(neutral.displacement[0][1]).signum();
+        for (moved, turning) in neutral.displacement[0].iter().zip(&turning) {
+            let off = *moved - side * *turning / largest;
+            assert!(off.length() < MOTION, "P = {load}: {off}");
+        }
+    }
+}
+
+/// Two veins that meet head on: the pair can turn about the line through both
+/// clamps and up or down alike.
+#[test]
+fn all_veins_of_a_pair_would_move() {
+    let mut pair = paper_leaf(2, [1.0; 3], [100.0; 3], 0.0);
+    pair.coupling = vec![[0.0; 3]];
+    pair.rods[0].angle = 0.0;
+    pair.rods[1].angle = PI;
+    let leaf = settle(&pair, 1e-10);
+    let shot = shoot_near(&pair, &leaf).unwrap();
+    agree("pair", &pair, &leaf, &shot, 1e-9);
+    let text = neutral(shot).to_string();
+    assert!(text.contains("all veins would move"), "{text}");
+}
+
+/// The critical length of `tests/lens.rs` and the critical weight of
+/// `tests/hanging_curved.rs`, without any eigenvalue being counted.
+#[test]
+fn published_bifurcations_are_seen() {
+    let lens = |length: f64| {
+        scenario(
+            "classic/lens_midrib",
+            &[format!("leaf.length=[1.0, {length:?}, 1.0]")],
+        )
+    };
+    let text = neutral(alone(&lens(0.93780575743))).to_string();
+    assert!(
+        text.ends_with("all veins would move, mostly along z"),
+        "{text}"
+    );
+    let hanging = |weight: f64| {
+        let entry = set_vector("load.gravity", DVec3::new(weight, 0.0, 0.0));
+        scenario("classic/hanging_curved", &[entry])
+    };
+    let text = neutral(alone(&hanging(11.868750740620))).to_string();
+    assert!(
+        text.ends_with("vein 1 would move, mostly along z"),
+        "{text}"
+    );
+    for off in [1.0 - 1e-3, 1.0 + 1e-3] {
+        assert!(alone(&lens(off * 0.93780575743)).neutral.is_none());
+        assert!(alone(&hanging(off * 11.868750740620)).neutral.is_none());
+    }
+}
+
+/// The files and the paper's leaves are nowhere near a bifurcation.
+#[test]
+fn nothing_is_reported_of_ordinary_leaves() {
+    for file in common::files("classic") {
+        let leaf = Scenario::read(&file, &[]).unwrap();
+        let shot = shoot_near(&leaf, &settle(&leaf, 1e-8)).unwrap();
+        assert!(shot.neutral.is_none(), "{}", leaf.name);
+    }
+    for file in common::files("paper") {
+        let leaf = Scenario::read(&file, &["leaf.rods=5".into()]).unwrap();
+        let shot = shoot_near(&leaf, &settle(&leaf, 1e-8)).unwrap();
+        assert!(shot.neutral.is_none(), "{}", leaf.name);
+    }
+}
+
+fn moving(displacements: &[[f64; 3]]) -> Neutral {
+    Neutral {
+        ratio: 1.5e-12,
+        displacement: displacements
+            .iter()
+            .map(|d| {
+                vec![
+                    DVec3::ZERO,
+                    0.5 * DVec3::from_array(*d),
+                    DVec3::from_array(*d),
+                ]
+            })
+            .collect(),
+    }
+}
+
+#[test]
+fn what_moves_and_why_it_failed_is_put_into_words() {
+    for (displacements, wanted) in [
+        (vec![[0.0, 0.1, -1.0]], "vein 1 would move, mostly along z"),
+        (
+            vec![[1.0, 0.3, 0.3], [0.9, 0.3, 0.3]],
+            "all veins would move, mostly along x",
+        ),
+        (
+            vec![[0.0, 0.1, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 0.1]],
+            "vein 2 would move, mostly along y",
+        ),
+        (
+            vec![[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, -0.5, 0.4]],
+            "veins 1, 3 would move, mostly along y",
+        ),
+    ] {
+        let neutral = moving(&displacements);
+        let text = neutral.to_string();
+        assert_eq!(
+            text,
+            format!("a bifurcation is near, or the leaf can move without resistance; {wanted}")
+        );
+        assert_eq!(
+            Reason::Singular(neutral).to_string(),
+            format!("the equations are singular (ratio of singular values 1.5e-12): {text}")
+        );
+    }
+    assert_eq!(
+        Reason::Unbounded { sigma: 0.25 }.to_string(),
+        "integrated from the start, the leaf grows out of all bounds at 0.250 of its length: \
+         use more intervals"
+    );
+    let stuck = |growth| Reason::NoConvergence {
+        correction: 2.5e-3,
+        growth,
+    };
+    assert_eq!(
+        stuck(12.2).to_string(),
+        "Newton's method stops at corrections of 2.5e-3; \
+         perturbations grow 10^12 times over an interval: use more intervals"
+    );
+    assert_eq!(
+        stuck(2.0).to_string(),
+        "Newton's method stops at corrections of 2.5e-3: \
+         lower the load, or start from the relaxed leaf"
+    );
+}

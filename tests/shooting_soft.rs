@@ -1,0 +1,109 @@
+//! Soft leaves: perturbations grow from base to tip beyond all digits. Cut into
+//! intervals the boundary-value problem is solved all the same; in one piece it
+//! is not, and that is said.
+
+mod common;
+
+use common::{agree, apart, scenario, settle, shoot_near, shoot_over};
+use leafdyn::bvp::Start;
+use leafdyn::bvp::{Reason, Solution, solve_within};
+use leafdyn::relax::Equilibrium;
+use leafdyn::scenario::Scenario;
+
+/// A figure with five veins that are softer still, under other loads.
+fn soft(figure: &str, load: &[&str]) -> Scenario {
+    let entries = ["leaf.rods=5", "stiffness.bending_2=2e-4"];
+    let entries: Vec<String> = entries.iter().chain(load).map(|s| s.to_string()).collect();
+    scenario(&format!("paper/{figure}"), &entries)
+}
+
+fn both(leaf: &Scenario) -> (Equilibrium, Solution) {
+    let relaxed = settle(leaf, 1e-10);
+    let shot = shoot_near(leaf, &relaxed).unwrap_or_else(|failure| panic!("{}", failure.reason));
+    (relaxed, shot)
+}
+
+#[test]
+fn figs_8_9_and_10() {
+    for figure in ["fig08", "fig09", "fig10"] {
+        let leaf = soft(figure, &[]);
+        let (relaxed, shot) = both(&leaf);
+        agree(figure, &leaf, &relaxed, &shot, 1e-9);
+    }
+}
+
+/// Pulled at the tip, or under five hundred times its weight: veins are straight
+/// but for layers at the clamp and the tip.
+#[test]
+fn under_tension_only_many_intervals_succeed() {
+    for (load, growth) in [
+        ("load.tip_force=[5, 0, 0]", 25.0),
+        ("load.gravity=[0, 0, -1]", 12.0),
+    ] {
+        let leaf = soft("fig08", &[load]);
+        let (relaxed, shot) = both(&leaf);
+        agree(load, &leaf, &relaxed, &shot, 1e-9);
+        assert!(shot.growth > growth, "{load}: 10^{}", shot.growth);
+        assert!(shot.intervals.len() > 5);
+
+        let single = shoot_over(Some(1), &leaf, &relaxed);
+        let failure = single.expect_err("no digit is left at the tip");
+        match failure.reason {
+            Reason::NoConvergence { growth, .. } => assert!(growth > 10.0, "{growth}"),
+            Reason::Unbounded { sigma } => assert!((0.0..1.0).contains(&sigma)),
+            Reason::Singular(_) => panic!("{}", failure.reason),
+        }
+        assert!(failure.reason.to_string().contains("use more intervals"));
+        assert_eq!(failure.part, 1.0);
+        assert_eq!(failure.rods.len(), 5);
+    }
+}
+
+/// Few intervals, or a start that is off: a failure, or the solution.
+#[test]
+fn a_success_is_never_false() {
+    let leaf = soft("fig08", &["load.tip_force=[5, 0, 0]"]);
+    let (relaxed, shot) = both(&leaf);
+    let mut found = 0;
+    for intervals in [1, 2, 4, 6, 8, 16] {
+        for push in [0.0, 1e-5] {
+            let mut start = relaxed.clone();
+            for node in start.rods.iter_mut().flat_map(|rod| &mut rod.nodes) {
+                node.position.z += push;
+                node.m.y += push;
+            }
+            let Ok(other) = shoot_over(Some(intervals), &leaf, &start) else {
+                continue;
+            };
+            found += 1;
+            let off = apart(&leaf, &other.rods, &shot.rods);
+            assert!(off.position < 1e-9, "{intervals} intervals: {off:?}");
+        }
+    }
+    assert!((3..10).contains(&found), "{found}");
+}
+
+/// To any accuracy asked for.
+#[test]
+fn the_accuracy_asked_for_is_reached() {
+    for (figure, load) in [
+        ("fig08", "load.tip_force=[5, 0, 0]"),
+        ("fig09", "load.gravity=[0, 0, -1]"),
+        ("fig10", "load.tip_force=[0, 0, 2]"),
+    ] {
+        let leaf = soft(figure, &[load]);
+        let relaxed = settle(&leaf, 1e-10);
+        for accuracy in [1e-4, 1e-7, 1e-10] {
+            let start = Start::Leaf {
+                stations: &relaxed.stations,
+                rods: &relaxed.rods,
+            };
+            let shot = solve_within(&leaf, start, accuracy, None, &relaxed.stations)
+                .unwrap_or_else(|failure| panic!("{figure}, {load}: {}", failure.reason));
+            assert!(shot.error.position <= accuracy);
+            let off = apart(&leaf, &relaxed.rods, &shot.rods);
+            let both = accuracy + relaxed.error_estimate.unwrap();
+            assert!(off.position <= both, "{figure}, {load}: {off:?}");
+        }
+    }
+}
