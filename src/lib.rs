@@ -144,4 +144,5 @@ pub mod rod;
 pub mod rotation;
 pub mod scenario;
 pub mod shape;
+pub mod simulate;
 pub mod study;

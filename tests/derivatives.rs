@@ -72,7 +72,8 @@ fn functional<D: DualNum<Primitive = f64> + Copy>(
     let mut pi = nu[0] * 0.0;
     for k in 0..3 {
         let strain = factor * p[k + 1] / section.ds - section.rest_curvature[k];
-        pi = pi + nu[k] * (xi[k] - section.ds * section.rest_strain[k]) - nu[k] * nu[k] * (0.5 * section.ds * section.compliance[k])
+        pi = pi + nu[k] * (xi[k] - section.ds * section.rest_strain[k])
+            - nu[k] * nu[k] * (0.5 * section.ds * section.compliance[k])
             + strain * strain * (0.5 * section.ds * section.couple_stiffness[k]);
     }
     pi

@@ -75,6 +75,10 @@ impl<'a> Leaf<'a> {
                 .flat_map(|profile| profile.kinks().iter().copied())
             })
             .collect();
+        // So are those of the masses, which only matter to a leaf that moves.
+        let dynamics = &scenario.dynamics;
+        let masses = dynamics.density.iter().chain(&dynamics.rotary_inertia);
+        kinks.extend(masses.flat_map(|profile| profile.kinks()));
         kinks.sort_by(f64::total_cmp);
         kinks.dedup();
         let softest = scenario

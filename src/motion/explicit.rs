@@ -19,7 +19,7 @@ use super::kernel::{Drift, Forces, GROUP, Kick, Neighbour, Positions};
 use super::ledger::{Ledger, measure};
 use super::method::{Broken, Method, Snapshot, Velocity};
 use super::nodes::{self, Rod, groups, vector};
-use super::physics::Physics;
+use super::physics::{Inertia, Physics};
 use crate::leaf::{DiscreteLeaf, Loads, State};
 
 /// Part of the stable time step that is used.
@@ -55,6 +55,15 @@ pub struct Explicit<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rigid;
 
+/// The longest stable time step, and what limits it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StableStep {
+    /// The step.
+    pub step: f64,
+    /// The fastest motion.
+    pub limit: &'static str,
+}
+
 impl<'a> Explicit<'a> {
     /// A leaf at rest in `state`. Time steps are as long as is stable, or
     /// `longest` if that is given, stable or not.
@@ -72,11 +81,19 @@ impl<'a> Explicit<'a> {
         }
         let rods = leaf.rods();
         let joined = leaf.leaf.joined() && rods > 1;
-        let tip_mass = |j| physics.inertia(leaf.leaf, &leaf.grid, j, leaf.segments()).mass;
+        let tip_mass = |j| {
+            physics
+                .inertia(leaf.leaf, &leaf.grid, j, leaf.segments())
+                .mass
+        };
         let mut explicit = Explicit {
             arch: Arch::new(),
-            positions: (0..rods).map(|j| nodes::positions(&leaf, state, j)).collect(),
-            rods: (0..rods).map(|j| nodes::rod(&leaf, &physics, state, j)).collect(),
+            positions: (0..rods)
+                .map(|j| nodes::positions(&leaf, state, j))
+                .collect(),
+            rods: (0..rods)
+                .map(|j| nodes::rod(&leaf, &physics, state, j))
+                .collect(),
             tip_mass: joined.then(|| (0..rods).map(tip_mass).sum()),
             longest: 0.0,
             time: 0.0,
@@ -89,7 +106,7 @@ impl<'a> Explicit<'a> {
             leaf,
             physics,
         };
-        explicit.longest = longest.unwrap_or_else(|| SAFETY * explicit.stable_step());
+        explicit.longest = longest.unwrap_or_else(|| SAFETY * explicit.stable_step().step);
         explicit.forces(1.0, true);
         for rod in &mut explicit.rods {
             // At rest the past was like the present.
@@ -103,10 +120,9 @@ impl<'a> Explicit<'a> {
     /// The longest stable time step: 2/omega, shortened by internal damping,
     /// with the highest frequency any single segment would have, which bounds
     /// those of the leaf (T. J. R. Hughes, The Finite Element Method, 1987,
-    /// section 9.2): of waves of stretch, of twist, of bending, of shear with
-    /// rotation.
-    pub fn stable_step(&self) -> f64 {
-        let mut largest: f64 = 0.0;
+    /// section 9.2), and what coupling adds to it.
+    pub fn stable_step(&self) -> StableStep {
+        let (mut largest, mut limit) = (0.0, "");
         let grid = &self.leaf.grid;
         for (j, rod) in self.rods.iter().enumerate() {
             let m = &rod.material;
@@ -121,18 +137,35 @@ impl<'a> Explicit<'a> {
                 let at = GROUP + i;
                 let ds = m.rest_length[at];
                 let shear = m.stretch[1][at].max(m.stretch[2][at]);
-                for squared in [
-                    m.stretch[0][at] * per_mass,
-                    m.bend[0][at] * per_inertia / super::Inertia::POLAR,
-                    m.bend[1][at].max(m.bend[2][at]) * per_inertia,
-                    shear * (per_mass + 0.25 * ds * ds * per_inertia),
+                let turning = shear * 0.25 * ds * ds * per_inertia;
+                let bend = m.bend[1][at].max(m.bend[2][at]);
+                for (squared, what) in [
+                    (m.stretch[0][at] * per_mass, "waves of stretch"),
+                    (
+                        m.bend[0][at] * per_inertia / Inertia::POLAR,
+                        "waves of twist",
+                    ),
+                    (bend * per_inertia, "waves of bending"),
+                    (shear * per_mass + turning, "shear with rotation"),
                 ] {
-                    largest = largest.max(squared);
+                    if squared > largest {
+                        (largest, limit) = (squared, what);
+                    }
                 }
             }
         }
-        let (eta, squared) = (self.physics.retardation, largest + self.coupling_bound());
-        2.0 * ((eta * eta + 1.0 / squared).sqrt() - eta)
+        let coupling = self.coupling_bound();
+        if coupling > largest {
+            limit = "coupling";
+        }
+        let (eta, squared) = (self.physics.retardation, largest + coupling);
+        if eta * eta * squared > 1.0 {
+            limit = "internal damping";
+        }
+        StableStep {
+            step: 2.0 * ((eta * eta + 1.0 / squared).sqrt() - eta),
+            limit,
+        }
     }
 
     /// What coupling adds to the squared frequency, at most.
@@ -246,7 +279,11 @@ impl<'a> Explicit<'a> {
         let (all, leaf) = (&self.positions, &self.leaf);
         let tip_mass = self.tip_mass;
         // A free tip feels its force in its own rod, a joint one below.
-        let own_force = if tip_mass.is_some() { DVec3::ZERO } else { loads.tip_force };
+        let own_force = if tip_mass.is_some() {
+            DVec3::ZERO
+        } else {
+            loads.tip_force
+        };
         let one = |(j, rod): (usize, &mut Rod)| {
             let beside = |other: usize, gap: usize| {
                 (other < all.len()).then(|| Neighbour {
@@ -323,10 +360,13 @@ impl<'a> Explicit<'a> {
     /// Positions, rotations and segment forces now.
     fn state(&self) -> State {
         let n = self.leaf.segments();
-        let nodes = || (0..self.rods.len()).flat_map(|j| (GROUP..=GROUP + n).map(move |at| (j, at)));
+        let nodes =
+            || (0..self.rods.len()).flat_map(|j| (GROUP..=GROUP + n).map(move |at| (j, at)));
         let mut state = State::new(
             n,
-            nodes().map(|(j, at)| vector(&self.positions[j].x, at)).collect(),
+            nodes()
+                .map(|(j, at)| vector(&self.positions[j].x, at))
+                .collect(),
             nodes().map(|(j, at)| self.rods[j].rotation(at)).collect(),
         );
         state.n = (self.rods.iter())
@@ -373,7 +413,9 @@ impl Method for Explicit<'_> {
         self.kick(self.behind, &loads);
         let state = self.state();
         let n = self.leaf.segments();
-        let velocity: Vec<Velocity> = (self.rods.iter()).flat_map(|rod| rod.velocities(n)).collect();
+        let velocity: Vec<Velocity> = (self.rods.iter())
+            .flat_map(|rod| rod.velocities(n))
+            .collect();
         self.rods = rods;
         let energy = measure(&mut self.leaf, &self.physics, self.time, &state, &velocity);
         Snapshot {

@@ -23,11 +23,9 @@ use super::lanes::{Lanes, Vectors};
 /// Nodes come in groups of so many; arrays are that much longer at both ends.
 pub const GROUP: usize = 4;
 
-/// |tau|^2 up to which the polynomial below holds: a segment bent by 1.68.
-pub const LARGEST_TAU_SQUARED: f64 = 0.2;
-
 /// (atan(t)/t - 1/(1 + t^2))/t^2 as a polynomial in t^2: Chebyshev
-/// approximation on 0..0.2, largest error 1.5e-16.
+/// approximation on 0..0.2, largest error 1.5e-16. Up to there, a segment bent
+/// by 1.68, a little more than what counts as resolved.
 const ARC: [f64; 12] = [
     0.6666666666666665,
     -0.7999999999997793,
@@ -191,7 +189,8 @@ impl<const DAMPED: bool> pulp::WithSimd for Forces<'_, DAMPED> {
             let d2 = Vectors::new(xy - wz, one - (xx + zz), yz + wx);
             let d3 = Vectors::new(xz + wy, yz - wx, one - (xx + yy));
             // Strains and force.
-            let dx = Vectors::load(simd, &positions.x, at + 1) - Vectors::load(simd, &positions.x, at);
+            let dx =
+                Vectors::load(simd, &positions.x, at + 1) - Vectors::load(simd, &positions.x, at);
             let length = Lanes::load(simd, &material.rest_length, at);
             let v = Vectors::new(d1.dot(dx), d2.dot(dx), d3.dot(dx));
             let mut strain = Vectors::new(v.x - length, v.y, v.z);
@@ -292,8 +291,8 @@ impl pulp::WithSimd for Kick<'_> {
                 let share = Lanes::load(simd, &material.coupled, at);
                 force = gap.each(stiffness).times(share, force);
             }
-            let moment = Vectors::load(simd, &motion.left, at)
-                + Vectors::load(simd, &motion.right, at - 1);
+            let moment =
+                Vectors::load(simd, &motion.left, at) + Vectors::load(simd, &motion.right, at - 1);
             let per_mass = Lanes::load(simd, &material.per_mass, at);
             let before = Vectors::load(simd, &motion.v, at);
             let after = force.times(kick * per_mass, before.scale(keep));
@@ -305,8 +304,12 @@ impl pulp::WithSimd for Kick<'_> {
             let p = before + after;
             let load = |k: usize| Lanes::load(simd, &motion.q[k], at);
             let spin = own_axis(simd, Vectors::new(load(0), load(1), load(2)), load(3)).dot(p);
-            energy = v.dot(v).times(Lanes::load(simd, &material.mass, at), energy);
-            energy = p.dot(p).times(Lanes::load(simd, &material.per_inertia, at), energy);
+            energy = v
+                .dot(v)
+                .times(Lanes::load(simd, &material.mass, at), energy);
+            energy = p
+                .dot(p)
+                .times(Lanes::load(simd, &material.per_inertia, at), energy);
             energy = (spin * spin).times(Lanes::load(simd, &material.per_spin, at), energy);
             at += S::F64_LANES;
         }
@@ -370,7 +373,8 @@ impl pulp::WithSimd for Drift<'_> {
             let turned = a.times(w, turned);
             let turned_w = c * w - a.dot(q);
             // Half angle about the body's own axis d1 of the old rotation.
-            let b = own_axis(simd, q, w).dot(p) * half_step * Lanes::load(simd, &material.per_spin, at);
+            let b =
+                own_axis(simd, q, w).dot(p) * half_step * Lanes::load(simd, &material.per_spin, at);
             let squared = b * b;
             let (c, s) = (squared.polynomial(&COS), b * squared.polynomial(&SINC));
             // q <- q (s, 0, 0, c)

@@ -3,6 +3,7 @@
 use super::method::{Broken, Energy, Snapshot, Velocity};
 use super::physics::{Inertia, Physics};
 use crate::leaf::{DiscreteLeaf, State};
+use crate::rod::RESOLVED_TURN;
 use glam::DVec3;
 
 /// Part of the energy that ever moved by which its balance may be off. Of a
@@ -10,9 +11,6 @@ use glam::DVec3;
 /// may seem to change by more, but never lasting; growth without bound passes
 /// any such limit soon.
 const LARGEST_IMBALANCE: f64 = 0.5;
-
-/// Bending of a segment (radians) beyond which its grid does not resolve it.
-const RESOLVED_TURN: f64 = 1.6;
 
 /// Energies at an instant, but what was dissipated and put in before. Leaves
 /// `leaf` with the loads and rest shape of that time.
@@ -122,7 +120,13 @@ impl Ledger {
 
     /// All its numbers.
     pub fn save(&self) -> [f64; 5] {
-        [self.dissipated, self.work, self.balance, self.potential, self.largest]
+        [
+            self.dissipated,
+            self.work,
+            self.balance,
+            self.potential,
+            self.largest,
+        ]
     }
 
     /// Takes them back.

@@ -171,7 +171,8 @@ impl<'a> SemiImplicit<'a> {
             if !self.solve() {
                 return;
             }
-            self.leaf.advance(&self.state, &self.system, 1.0, &mut self.next);
+            self.leaf
+                .advance(&self.state, &self.system, 1.0, &mut self.next);
             std::mem::swap(&mut self.state, &mut self.next);
             let (turn, shift) = self.system.largest();
             if turn.max(shift) < 1e-14 {
@@ -259,7 +260,8 @@ impl<'a> SemiImplicit<'a> {
         self.dress(self.time + h, h);
         self.predict(h);
         let damping = self.physics.damping;
-        let heavy = (1.0 - ALPHA_M) / ((1.0 - ALPHA_F) * BETA * h * h) + damping * GAMMA / (BETA * h);
+        let heavy =
+            (1.0 - ALPHA_M) / ((1.0 - ALPHA_F) * BETA * h * h) + damping * GAMMA / (BETA * h);
         let last = (LAST_ITERATION * allowed).min(LARGEST_LAST);
         let mut before = f64::INFINITY;
         for _ in 0..ITERATIONS {
@@ -281,7 +283,8 @@ impl<'a> SemiImplicit<'a> {
             if !size.is_finite() || size > before.max(LARGEST_TURN) {
                 return None;
             }
-            self.leaf.advance(&self.trial, &self.system, 1.0, &mut self.next);
+            self.leaf
+                .advance(&self.trial, &self.system, 1.0, &mut self.next);
             std::mem::swap(&mut self.trial, &mut self.next);
             if size <= last || (size < 1e-11 && size > 0.3 * before) {
                 self.arrive(h);
@@ -329,7 +332,13 @@ impl<'a> SemiImplicit<'a> {
             return;
         }
         let [c0, c1, c2] = self.rate(h).map(|c| eta * c);
-        for (i, (section, own)) in self.leaf.sections.iter_mut().zip(&self.sections).enumerate() {
+        for (i, (section, own)) in self
+            .leaf
+            .sections
+            .iter_mut()
+            .zip(&self.sections)
+            .enumerate()
+        {
             *section = *own;
             section.rest_curvature *= rest;
             if c0 > 0.0 {
@@ -363,7 +372,9 @@ impl<'a> SemiImplicit<'a> {
         (0..self.leaf.rods())
             .flat_map(|j| (0..n).map(move |i| (j, i)))
             .map(|(j, i)| {
-                let segment = self.leaf.segment(&self.state, j, i, self.state.n[j * n + i]);
+                let segment = self
+                    .leaf
+                    .segment(&self.state, j, i, self.state.n[j * n + i]);
                 [segment.v(self.leaf.section(j, i)), segment.u]
             })
             .collect()
@@ -371,11 +382,10 @@ impl<'a> SemiImplicit<'a> {
 
     /// Makes the attempted step of `h`, and accounts for it.
     fn accept(&mut self, h: f64) {
-        let (before, loads) = (self.twice_kinetic(), self.physics.loads(self.time));
+        let loads = self.physics.loads(self.time);
         std::mem::swap(&mut self.state, &mut self.trial);
         std::mem::swap(&mut self.moving, &mut self.next_moving);
-        let mean = 0.5 * (before + self.twice_kinetic());
-        self.ledger.dissipated += h * self.physics.damping * mean;
+        self.ledger.dissipated += self.physics.damping * self.dragged();
         if self.physics.retardation > 0.0 {
             self.ledger.dissipated += h * self.rub(h);
             let now = self.strains();
@@ -422,13 +432,20 @@ impl<'a> SemiImplicit<'a> {
         self.physics.retardation * power
     }
 
-    fn twice_kinetic(&self) -> f64 {
-        let energy = |(k, m): (usize, &Moving)| {
-            let inertia = &self.inertia[k];
-            m.v[0].dot(tensor(inertia, &self.state, k) * m.v[0])
-                + inertia.mass * m.v[1].length_squared()
-        };
-        self.moving.iter().enumerate().map(energy).sum()
+    /// The mean momentum of the accepted step times the way it led: work of
+    /// external damping, over its rate. Of what the step does not resolve,
+    /// which alternates, nothing is left in it.
+    fn dragged(&self) -> f64 {
+        let mut sum = 0.0;
+        for (k, inertia) in self.inertia.iter().enumerate() {
+            let (before, after) = (&self.next_moving[k], &self.moving[k]);
+            let mean = |c: usize| 0.5 * (before.v[c] + after.v[c]);
+            let turn = rotation::log(self.state.q[k] * self.trial.q[k].conjugate());
+            let shift = self.state.x[k] - self.trial.x[k];
+            sum += turn.dot(tensor(inertia, &self.state, k) * mean(0));
+            sum += inertia.mass * shift.dot(mean(1));
+        }
+        sum
     }
 }
 
@@ -521,7 +538,13 @@ impl Method for SemiImplicit<'_> {
             })
             .collect();
         self.leaf.sections.clone_from(&self.sections);
-        let energy = measure(&mut self.leaf, &self.physics, self.time, &self.state, &velocity);
+        let energy = measure(
+            &mut self.leaf,
+            &self.physics,
+            self.time,
+            &self.state,
+            &velocity,
+        );
         Snapshot {
             time: self.time,
             energy: self.ledger.complete(energy),

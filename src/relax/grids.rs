@@ -86,20 +86,7 @@ pub fn relax(
     }
     let clock = Instant::now();
     let leaf = Leaf::new(scenario);
-    let least = leaf.kinks().len() + 1;
-    let first = match options.segments {
-        Some(found) if found < least => return Err(RelaxError::TooFewSegments { found, least }),
-        Some(segments) => segments,
-        None => coarsest(&leaf).max(least),
-    };
-    let nodes = leaf.rods().saturating_mul(first);
-    if nodes > MAX_NODES {
-        return Err(RelaxError::TooManyNodes {
-            rods: leaf.rods(),
-            segments: first,
-            nodes,
-        });
-    }
+    let first = check_segments(&leaf, options.segments, COARSEST)?;
     let mut run = Run {
         leaf: &leaf,
         options,
@@ -120,8 +107,40 @@ pub fn relax(
     Ok(report::equilibrium(run, outcome, remark, seconds))
 }
 
+/// Segments of a grid: so many as asked for, or at least `least`, as many as
+/// the kinks of the profiles, the rest shape and the tip moment need.
+///
+/// # Errors
+/// If that is too few or too many.
+pub fn check_segments(
+    leaf: &Leaf,
+    asked: Option<usize>,
+    least: usize,
+) -> Result<usize, RelaxError> {
+    let panels = leaf.kinks().len() + 1;
+    let segments = match asked {
+        Some(found) if found < panels => {
+            return Err(RelaxError::TooFewSegments {
+                found,
+                least: panels,
+            });
+        }
+        Some(segments) => segments,
+        None => coarsest(leaf, least).max(panels),
+    };
+    let nodes = leaf.rods().saturating_mul(segments);
+    if nodes > MAX_NODES {
+        return Err(RelaxError::TooManyNodes {
+            rods: leaf.rods(),
+            segments,
+            nodes,
+        });
+    }
+    Ok(segments)
+}
+
 /// Segments of the coarsest grid.
-pub(super) fn coarsest(leaf: &Leaf) -> usize {
+pub(super) fn coarsest(leaf: &Leaf, least: usize) -> usize {
     let moment = leaf.tip_moment.length();
     let turn = (0..leaf.rods())
         .map(|j| {
@@ -130,7 +149,7 @@ pub(super) fn coarsest(leaf: &Leaf) -> usize {
                 * leaf.length(j)
         })
         .fold(0.0, f64::max);
-    let mut segments = COARSEST;
+    let mut segments = least;
     while (segments as f64) * COARSEST_TURN < turn && segments < FINEST {
         segments *= 2;
     }

@@ -17,7 +17,7 @@ mod start;
 
 pub use crate::shape::{NodeState, RodShape};
 pub use equilibrium::{Equilibrium, Outcome, Saddle, Work};
-pub use grids::relax;
+pub use grids::{check_segments, relax};
 pub use index::index_near;
 pub use options::{Method, Options, Progress, RelaxError};
 pub use shooting::check_intervals;

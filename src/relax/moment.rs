@@ -8,7 +8,8 @@
 
 use crate::leaf::{DiscreteLeaf, State, System};
 use crate::relax::equilibrium::Work;
-use crate::relax::semi_implicit::{RESOLVED_TURN, Settled, at_rest};
+use crate::relax::semi_implicit::{Settled, at_rest};
+use crate::rod::RESOLVED_TURN;
 
 /// Rotation of the tip (radians) that one load step may bring about by bending.
 const TURN_PER_STEP: f64 = 1.0;

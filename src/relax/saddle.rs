@@ -2,7 +2,8 @@
 
 use crate::leaf::{DiscreteLeaf, Solved, SparsePattern, State, System};
 use crate::relax::equilibrium::Work;
-use crate::relax::semi_implicit::{RESOLVED_TURN, Settled, at_rest};
+use crate::relax::semi_implicit::{Settled, at_rest};
+use crate::rod::RESOLVED_TURN;
 
 /// Size of the push off a saddle: largest rotation (radians) or displacement
 /// (lengths) along the unstable mode.

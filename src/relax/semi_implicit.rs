@@ -14,6 +14,7 @@
 
 use crate::leaf::{DiscreteLeaf, Increment, Solved, SparsePattern, State, System};
 use crate::relax::equilibrium::Work;
+use crate::rod::RESOLVED_TURN;
 
 /// Damping c: critical for the lowest bending mode of a single rod, whose
 /// frequency is 3.516 (canonical value beta_1^2 of the clamped-free beam).
@@ -35,9 +36,6 @@ const MAX_TURN: f64 = 1.0;
 
 /// Largest displacement of a node in one step, in units of length.
 const MAX_SHIFT: f64 = 1.0;
-
-/// A segment that is bent by more than this (radians) is not resolved by its grid.
-pub const RESOLVED_TURN: f64 = 1.6;
 
 /// Steps on one grid before the run is given up.
 const MAX_STEPS: usize = 2000;

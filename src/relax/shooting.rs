@@ -17,7 +17,7 @@ const SEGMENTS: usize = 32;
 /// The grid at whose nodes a boundary-value solution is given.
 fn station_grid(scenario: &Scenario) -> Grid {
     let leaf = Leaf::new(scenario);
-    let segments = coarsest(&leaf).max(SEGMENTS).max(leaf.kinks().len() + 1);
+    let segments = coarsest(&leaf, SEGMENTS).max(leaf.kinks().len() + 1);
     Grid::new(segments, leaf.kinks())
 }
 

@@ -3,3 +3,6 @@
 mod element;
 
 pub use element::{Blocks, Ends, Section, Segment};
+
+/// A segment that is bent by more than this (radians) is not resolved by its grid.
+pub const RESOLVED_TURN: f64 = 1.6;

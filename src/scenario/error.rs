@@ -308,6 +308,14 @@ pub enum Problem {
         /// Number of rods.
         rods: usize,
     },
+    /// Not a start of the motion.
+    #[error(
+        "must be \"released\" (from the shape where a relaxation starts) or \"at-rest\" (in equilibrium under the loads at time 0)"
+    )]
+    Start,
+    /// A start at rest of a rod that nothing holds.
+    #[error("a rod with a free base has no equilibrium to start from: use \"released\"")]
+    FreeAtRest,
     /// Both the radius of the section and its moment of inertia.
     #[error(
         "dynamics.rotary_inertia is given, too, and is density section_radius^2/4: leave one of them out"

@@ -62,6 +62,8 @@ pub enum Key {
     OutputInterval,
     /// `dynamics.clamped`: whether the base is held.
     Clamped,
+    /// `dynamics.start`: where the motion begins.
+    Start,
     /// `dynamics.gravity`: gravity in time.
     GravityInTime,
     /// `dynamics.tip_force`: dead force in time.
@@ -75,7 +77,7 @@ pub enum Key {
 const LOAD_IN_TIME: &str = "{ at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]] }";
 
 /// Key, full path, and an example of its value; in the order of [`Key`].
-const FORMAT: [(Key, &str, &str); 33] = [
+const FORMAT: [(Key, &str, &str); 34] = [
     (Key::Name, "name", "\"my-leaf\""),
     (Key::Rods, "leaf.rods", "5"),
     (Key::Length, "leaf.length", "1.0"),
@@ -105,6 +107,7 @@ const FORMAT: [(Key, &str, &str); 33] = [
     (Key::Duration, "dynamics.duration", "10.0"),
     (Key::OutputInterval, "dynamics.output_interval", "0.1"),
     (Key::Clamped, "dynamics.clamped", "true"),
+    (Key::Start, "dynamics.start", "\"at-rest\""),
     (Key::GravityInTime, "dynamics.gravity", LOAD_IN_TIME),
     (Key::TipForceInTime, "dynamics.tip_force", LOAD_IN_TIME),
     (Key::TipMomentInTime, "dynamics.tip_moment", LOAD_IN_TIME),

@@ -15,7 +15,7 @@ mod raw;
 mod read;
 mod schedule;
 
-pub use dynamics::Dynamics;
+pub use dynamics::{Dynamics, Start};
 pub(crate) use dynamics::{longest, mean_bending};
 pub use error::{Because, Form, Needed, Place, Problem, ScenarioError, Spot};
 pub use key::Key;

@@ -52,6 +52,17 @@ impl Profile {
         self.values().iter().fold(f64::INFINITY, |m, v| m.min(*v))
     }
 
+    /// The same profile times a factor.
+    pub fn scaled(&self, factor: f64) -> Profile {
+        match self {
+            Profile::Constant(value) => Profile::Constant(factor * value),
+            Profile::Linear { at, value } => Profile::Linear {
+                at: at.clone(),
+                value: value.iter().map(|v| factor * v).collect(),
+            },
+        }
+    }
+
     fn values(&self) -> &[f64] {
         match self {
             Profile::Constant(value) => std::slice::from_ref(value),

@@ -6,7 +6,8 @@ use super::super::error::{Problem, ScenarioError};
 use super::super::key::Key;
 use super::super::raw::Raw;
 use super::super::{Profile, Rod, Schedule, in_time, quantity};
-use super::{Dynamics, OUTPUTS, section};
+use super::{Dynamics, OUTPUTS, Start, section};
+use toml::de::DeValue;
 
 type Result<T> = std::result::Result<T, ScenarioError>;
 
@@ -33,6 +34,7 @@ pub(in super::super) fn read(raw: &Raw, rods: &[Rod], loads: [[f64; 3]; 3]) -> R
         duration,
         output_interval: output_interval(raw, duration)?,
         clamped: clamped(raw, rods.len())?,
+        start: start(raw)?,
         gravity: load(raw, Key::GravityInTime)?.unwrap_or(preset.gravity),
         tip_force: load(raw, Key::TipForceInTime)?.unwrap_or(preset.tip_force),
         tip_moment: moment(raw, rods.len())?.unwrap_or(preset.tip_moment),
@@ -85,6 +87,19 @@ fn clamped(raw: &Raw, rods: usize) -> Result<bool> {
     match truth(item)? {
         false if rods > 1 => Err(item.refuse(Problem::FreeBase { rods })),
         clamped => Ok(clamped),
+    }
+}
+
+fn start(raw: &Raw) -> Result<Start> {
+    let Some(item) = raw.optional(Key::Start) else {
+        return Ok(Start::Released);
+    };
+    let free = matches!(raw.optional(Key::Clamped).map(truth), Some(Ok(false)));
+    match item.value() {
+        DeValue::String(text) if text == "released" => Ok(Start::Released),
+        DeValue::String(text) if text == "at-rest" && free => Err(item.refuse(Problem::FreeAtRest)),
+        DeValue::String(text) if text == "at-rest" => Ok(Start::AtRest),
+        _ => Err(item.refuse(Problem::Start)),
     }
 }
 

@@ -16,6 +16,16 @@ const LOWEST_FREQUENCY: f64 = 3.516;
 const DURATION: f64 = 10.0;
 const OUTPUTS: f64 = 100.0;
 
+/// Where a motion begins, at time 0 and without velocity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// In the shape from which a relaxation starts: arcs that meet in the tip,
+    /// or the rest shape of free rods.
+    Released,
+    /// In the equilibrium under the loads and with the rest shape of time 0.
+    AtRest,
+}
+
 /// How a leaf moves. All quantities are in the units of the scenario, with
 /// its unit of time. L is the longest rod, A the geometric mean of the bending
 /// stiffnesses mid-rod, rho the mean of the densities mid-rod.
@@ -38,6 +48,8 @@ pub struct Dynamics {
     pub output_interval: f64,
     /// Whether the base is clamped; free only on a single rod.
     pub clamped: bool,
+    /// Where the motion begins.
+    pub start: Start,
     /// Gravity, force per unit reference length.
     pub gravity: Schedule<[f64; 3]>,
     /// Dead force on the joint tip, or on every tip when the tips are free.
@@ -104,6 +116,7 @@ impl Dynamics {
             duration,
             output_interval: duration / OUTPUTS,
             clamped: true,
+            start: Start::Released,
             gravity: Schedule::constant([0.0; 3]),
             tip_force: Schedule::constant([0.0; 3]),
             tip_moment: Schedule::constant([0.0; 3]),

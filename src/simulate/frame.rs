@@ -1,0 +1,67 @@
+//! A leaf at an instant, in the units of its scenario.
+
+use crate::leaf::Leaf;
+use crate::motion::{Energy, Physics, Snapshot, Velocity};
+use glam::{DQuat, DVec3};
+
+/// A leaf at an instant, in the units of its scenario. Nodes are numbered rod
+/// by rod, base to tip.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Time.
+    pub time: f64,
+    /// Time steps made until then.
+    pub steps: usize,
+    /// Number of rods.
+    pub rods: usize,
+    /// Positions of all nodes.
+    pub positions: Vec<DVec3>,
+    /// Rotations of all nodes.
+    pub rotations: Vec<DQuat>,
+    /// Velocities of all nodes, along the lab axes.
+    pub velocities: Vec<Velocity>,
+    /// Energies.
+    pub energy: Energy,
+}
+
+impl Frame {
+    pub(super) fn new(leaf: &Leaf, physics: &Physics, snapshot: &Snapshot, steps: usize) -> Self {
+        let (length, time, energy) = (leaf.scale.length, physics.time, leaf.scale.moment());
+        let e = snapshot.energy;
+        Frame {
+            time: snapshot.time * time,
+            steps,
+            rods: leaf.rods(),
+            positions: snapshot.state.x.iter().map(|x| *x * length).collect(),
+            rotations: snapshot.state.q.clone(),
+            velocities: (snapshot.velocity.iter())
+                .map(|v| Velocity {
+                    angular: v.angular / time,
+                    linear: v.linear * (length / time),
+                })
+                .collect(),
+            energy: Energy {
+                kinetic: e.kinetic * energy,
+                elastic: e.elastic * energy,
+                coupling: e.coupling * energy,
+                potential: e.potential * energy,
+                dissipated: e.dissipated * energy,
+                work: e.work * energy,
+            },
+        }
+    }
+
+    /// Nodes of a rod: positions from base to tip.
+    pub fn centerline(&self, rod: usize) -> &[DVec3] {
+        let nodes = self.positions.len() / self.rods;
+        &self.positions[rod * nodes..(rod + 1) * nodes]
+    }
+
+    /// The joint tip alone, or one tip per rod.
+    pub fn tips(&self, joined: bool) -> Vec<DVec3> {
+        let rods = if joined { 1 } else { self.rods };
+        (0..rods)
+            .map(|rod| self.centerline(rod)[self.positions.len() / self.rods - 1])
+            .collect()
+    }
+}

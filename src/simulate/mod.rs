@@ -1,0 +1,391 @@
+//! A leaf followed in time: start, method, and the outputs on the way.
+//!
+//! ```
+//! use leafdyn::leaf::Leaf;
+//! use leafdyn::scenario::Scenario;
+//! use leafdyn::simulate::{Options, Simulation};
+//!
+//! let cantilever = r#"
+//!     name = "cantilever"
+//!     leaf = { rods = 1, length = 1.0, fan = [0.0] }
+//!     stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }
+//!     load = { gravity = [0.0, 0.0, -1.0] }
+//! "#;
+//! let scenario = Scenario::from_toml(cantilever)?;
+//! let leaf = Leaf::new(&scenario);
+//! let mut simulation = Simulation::new(&leaf, &Options::default())?;
+//! while !simulation.done() {
+//!     let frame = simulation.next_frame()?;
+//!     println!("{} {}", frame.time, frame.tips(true)[0]);
+//! }
+//! # assert!((simulation.frame().time - 10.0).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod frame;
+
+pub use frame::Frame;
+
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use crate::motion::{Broken, Explicit, Method, Physics, Rigid, SemiImplicit, StableStep, Steps};
+use crate::relax::{self, start};
+use crate::scenario::{Scenario, Start};
+
+/// Segments a rod where none are asked for, if its rest shape does not need more.
+const SEGMENTS: usize = 16;
+
+/// Which method moves the leaf.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scheme {
+    /// [`Explicit`]: short steps, each very cheap. Not for rigid rods.
+    Explicit,
+    /// [`SemiImplicit`]: steps as long as the accuracy allows, any stiffness.
+    SemiImplicit,
+}
+
+impl Scheme {
+    /// The name used on the command line and in `summary.json`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Scheme::Explicit => "explicit",
+            Scheme::SemiImplicit => "semi-implicit",
+        }
+    }
+}
+
+/// What is asked of a simulation.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// The method; `None`: explicit, unless a rod is rigid.
+    pub scheme: Option<Scheme>,
+    /// Segments a rod; `None`: 16, or as many as the rest shape needs.
+    pub segments: Option<usize>,
+    /// The longest time step, in the scenario's unit of time. `None`: of the
+    /// explicit method, nine tenths of the stable one; of the semi-implicit
+    /// one, so that the error of a step stays below the scenario's tolerance.
+    pub step: Option<f64>,
+}
+
+/// What cannot be simulated. Times are in the scenario's unit.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Refused {
+    /// The explicit method has no stable time step.
+    #[error(
+        "the explicit method has no stable time step for rigid rods (a stiffness is inf): \
+         use --method semi-implicit, or give a number"
+    )]
+    Rigid,
+    /// The time step is not positive.
+    #[error("--step {found}: must be greater than 0")]
+    NotPositive {
+        /// The step asked for.
+        found: f64,
+    },
+    /// The time step is too long for the explicit method.
+    #[error(
+        "--step {found}: the explicit method is stable up to {stable:.3e}, because of {limit}: \
+         use a shorter step, or --method semi-implicit, or leave --step out"
+    )]
+    Unstable {
+        /// The step asked for.
+        found: f64,
+        /// The longest stable one.
+        stable: f64,
+        /// What limits it.
+        limit: &'static str,
+    },
+    /// The grid is impossible.
+    #[error(transparent)]
+    Grid(#[from] relax::RelaxError),
+    /// The leaf is to start at rest and does not come to rest.
+    #[error(
+        "dynamics.start = \"at-rest\": the leaf does not come to rest under its loads at time 0 ({outcome}): use start = \"released\""
+    )]
+    NoRest {
+        /// How its relaxation ended.
+        outcome: &'static str,
+    },
+}
+
+/// Why a simulation ended before its time, in the scenario's unit of time.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Stopped {
+    /// Energy appeared from nowhere, or a value is not a number.
+    #[error(
+        "diverged at t = {time:.6e}: energy grew from nowhere by {percent:.0} % of all that moved; use a shorter time step, or --method semi-implicit"
+    )]
+    Diverged {
+        /// When.
+        time: f64,
+        /// Energy gained, in percent of the largest that ever moved.
+        percent: f64,
+    },
+    /// The grid is too coarse.
+    #[error(
+        "at t = {time:.6e} a segment is bent by {turn:.2} rad, more than it can resolve; use more segments than {segments}"
+    )]
+    Unresolved {
+        /// When.
+        time: f64,
+        /// Bending of the segment, radians.
+        turn: f64,
+        /// Segments a rod.
+        segments: usize,
+    },
+    /// No time step is short enough.
+    #[error(
+        "at t = {time:.6e} no time step is short enough to go on; use more segments than {segments}, or slower changes of the loads"
+    )]
+    StepTooShort {
+        /// When.
+        time: f64,
+        /// Segments a rod.
+        segments: usize,
+    },
+}
+
+impl Stopped {
+    /// The word used in `summary.json`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Stopped::Diverged { .. } => "diverged",
+            Stopped::Unresolved { .. } => "unresolved",
+            Stopped::StepTooShort { .. } => "step-too-short",
+        }
+    }
+}
+
+/// A leaf that is followed in time.
+pub struct Simulation<'a> {
+    leaf: &'a Leaf<'a>,
+    grid: Grid,
+    physics: Physics,
+    scheme: Scheme,
+    stable: Option<StableStep>,
+    step: Option<f64>,
+    method: Box<dyn Method + Send + 'a>,
+    outputs: usize,
+    made: usize,
+}
+
+impl<'a> Simulation<'a> {
+    /// The leaf at time 0.
+    ///
+    /// # Errors
+    /// If a request cannot be met.
+    pub fn new(leaf: &'a Leaf<'a>, options: &Options) -> Result<Self, Refused> {
+        if let Some(found) = options
+            .step
+            .filter(|step| !(step.is_finite() && *step > 0.0))
+        {
+            return Err(Refused::NotPositive { found });
+        }
+        let scenario = leaf.scenario();
+        let segments = relax::check_segments(leaf, options.segments, SEGMENTS)?;
+        let grid = Grid::new(segments, leaf.kinks());
+        let physics = Physics::new(leaf);
+        let state = match scenario.dynamics.start {
+            Start::Released => start(&DiscreteLeaf::new(leaf, grid.clone())),
+            Start::AtRest => at_rest(leaf, &physics, &grid)?,
+        };
+        let discrete = || DiscreteLeaf::new(leaf, grid.clone());
+        let rigid = discrete().stiffest() == 0.0;
+        let scheme = options.scheme.unwrap_or(match rigid {
+            true => Scheme::SemiImplicit,
+            false => Scheme::Explicit,
+        });
+        let step = options.step.map(|step| step / physics.time);
+        let (mut stable, mut made) = (None, step);
+        let method: Box<dyn Method + Send + 'a> = match scheme {
+            Scheme::Explicit => {
+                let explicit = Explicit::new(discrete(), physics.clone(), &state, step)
+                    .map_err(|Rigid| Refused::Rigid)?;
+                let bound = explicit.stable_step();
+                if let Some(found) = options.step
+                    && found > bound.step * physics.time
+                {
+                    return Err(Refused::Unstable {
+                        found,
+                        stable: bound.step * physics.time,
+                        limit: bound.limit,
+                    });
+                }
+                made = Some(explicit.longest_step());
+                stable = Some(StableStep {
+                    step: bound.step * physics.time,
+                    ..bound
+                });
+                Box::new(explicit)
+            }
+            Scheme::SemiImplicit => {
+                let steps = step.map_or(Steps::Error(scenario.tolerance), Steps::Fixed);
+                Box::new(SemiImplicit::new(
+                    discrete(),
+                    physics.clone(),
+                    &state,
+                    steps,
+                ))
+            }
+        };
+        let (duration, interval) = physics.duration();
+        Ok(Simulation {
+            leaf,
+            scheme,
+            stable,
+            step: made.map(|step| step * physics.time),
+            method,
+            // A duration that is a whole number of intervals but for rounding
+            // has no short one at its end.
+            outputs: (duration / interval * (1.0 - 1e-12)).ceil().max(1.0) as usize,
+            made: 0,
+            grid,
+            physics,
+        })
+    }
+
+    /// Which method moves the leaf.
+    pub fn scheme(&self) -> Scheme {
+        self.scheme
+    }
+
+    /// Segments a rod.
+    pub fn segments(&self) -> usize {
+        self.grid.segments()
+    }
+
+    /// Fractions of the length at which frames have nodes.
+    pub fn stations(&self) -> &[f64] {
+        self.grid.sigma()
+    }
+
+    /// The longest time step, in the scenario's unit; `None` where the error
+    /// of the steps decides.
+    pub fn longest_step(&self) -> Option<f64> {
+        self.step
+    }
+
+    /// The longest stable time step of the explicit method, in the scenario's
+    /// unit, and what limits it.
+    pub fn stable_step(&self) -> Option<StableStep> {
+        self.stable
+    }
+
+    /// Time steps made.
+    pub fn steps(&self) -> usize {
+        self.method.steps()
+    }
+
+    /// Frames to come after the first, and how many there have been.
+    pub fn frames(&self) -> (usize, usize) {
+        (self.outputs, self.made)
+    }
+
+    /// The time now, in the scenario's unit.
+    pub fn time(&self) -> f64 {
+        self.method.time() * self.physics.time
+    }
+
+    /// Whether the duration is over.
+    pub fn done(&self) -> bool {
+        self.made == self.outputs
+    }
+
+    /// The leaf now.
+    pub fn frame(&mut self) -> Frame {
+        let snapshot = self.method.snapshot();
+        Frame::new(self.leaf, &self.physics, &snapshot, self.method.steps())
+    }
+
+    /// Moves on to the time of the next output.
+    ///
+    /// # Errors
+    /// If the motion cannot be trusted any more; [`Simulation::frame`] then
+    /// shows it as it is.
+    pub fn next_frame(&mut self) -> Result<Frame, Stopped> {
+        let (duration, interval) = self.physics.duration();
+        let until = match self.made + 1 >= self.outputs {
+            true => duration,
+            false => interval * (self.made + 1) as f64,
+        };
+        let (unit, segments) = (self.physics.time, self.segments());
+        self.method.advance(until).map_err(|broken| match broken {
+            Broken::Diverged { time, imbalance } => Stopped::Diverged {
+                time: time * unit,
+                percent: 100.0 * imbalance,
+            },
+            Broken::Unresolved { time, turn } => Stopped::Unresolved {
+                time: time * unit,
+                turn,
+                segments,
+            },
+            Broken::StepTooShort { time } => Stopped::StepTooShort {
+                time: time * unit,
+                segments,
+            },
+        })?;
+        self.made += 1;
+        Ok(self.frame())
+    }
+
+    /// All numbers on which the motion depends from here, to go on bit for bit
+    /// with a simulation of the same leaf and options.
+    pub fn save(&self) -> Vec<f64> {
+        let mut numbers = vec![self.made as f64];
+        numbers.extend(self.method.save());
+        numbers
+    }
+
+    /// Goes back to where [`Simulation::save`] was called; false if the
+    /// numbers do not fit.
+    pub fn restore(&mut self, numbers: &[f64]) -> bool {
+        let Some((made, numbers)) = numbers.split_first() else {
+            return false;
+        };
+        let fits = *made >= 0.0 && *made <= self.outputs as f64 && self.method.restore(numbers);
+        if fits {
+            self.made = *made as usize;
+        }
+        fits
+    }
+}
+
+/// The equilibrium under the loads and with the rest shape of time 0.
+fn at_rest(leaf: &Leaf, physics: &Physics, grid: &Grid) -> Result<State, Refused> {
+    let scenario = at_beginning(leaf.scenario());
+    let options = relax::Options {
+        segments: Some(grid.segments()),
+        ..relax::Options::default()
+    };
+    let found = relax::relax(&scenario, &options, &mut |_| {})?;
+    if !found.outcome.is_success() || !physics.clamped() {
+        return Err(Refused::NoRest {
+            outcome: found.outcome.word(),
+        });
+    }
+    let nodes = || found.rods.iter().flat_map(|rod| &rod.nodes);
+    Ok(State::new(
+        grid.segments(),
+        nodes()
+            .map(|node| node.position / leaf.scale.length)
+            .collect(),
+        nodes().map(|node| node.rotation).collect(),
+    ))
+}
+
+/// The scenario with the loads and the rest shape of time 0.
+fn at_beginning(scenario: &Scenario) -> Scenario {
+    let mut scenario = scenario.clone();
+    let dynamics = &scenario.dynamics;
+    scenario.gravity = dynamics.gravity.at(0.0);
+    scenario.tip_force = dynamics.tip_force.at(0.0);
+    scenario.tip_moment = dynamics.tip_moment.at(0.0);
+    let factor = dynamics.rest.at(0.0);
+    for curvature in scenario
+        .rods
+        .iter_mut()
+        .flat_map(|rod| &mut rod.rest_curvature)
+    {
+        *curvature = curvature.scaled(factor);
+    }
+    scenario
+}
