@@ -2,9 +2,12 @@
 //!
 //! A leapfrog step h is stable while h omega < 2 for every frequency omega of
 //! the leaf. Its squared frequencies are at most the largest that any one
-//! segment would have with its share of the masses at its ends (T. J. R.
-//! Hughes, The Finite Element Method, 1987, section 9.2), plus what coupling
-//! adds. With the rate of internal friction from three strains (see
+//! segment would have with its share of the masses at its ends, plus what
+//! coupling adds (T. J. R. Hughes, The Finite Element Method, 1987, section
+//! 9.2). Any shares will do; here they are in proportion to what each segment
+//! holds the node with, so that a short or stiff segment has most of a mass
+//! that it alone moves fast. With the rate of internal friction from three
+//! strains (see
 //! [`super::friction::rates`]) a mode with the part K of its squared frequency
 //! from strains and C from coupling goes like
 //!
@@ -15,11 +18,12 @@
 //! whose roots are inside the unit circle while a + 4 b < 4; external damping
 //! leaves that as it is.
 
+use std::array::from_fn;
+
 use nalgebra::SMatrix;
 
 use super::physics::{Inertia, Physics};
 use crate::leaf::{DiscreteLeaf, State};
-use crate::rod::{Section, Segment};
 use glam::{DMat3, DQuat, DVec3};
 
 /// The longest stable time step, and what limits it.
@@ -50,88 +54,126 @@ impl StableStep {
     }
 }
 
+/// Stiffness of a segment: between the shift of its left end, that of its
+/// right, and the turns of both.
+type Stiffness = [[DMat3; 4]; 4];
+
+/// How hard a node is held: as it moves along its directors, and as it turns
+/// about them.
+type Hold = [DVec3; 2];
+
+/// The least part of its largest component that a hold has in any direction.
+const LEAST_HOLD: f64 = 0.01;
+
 /// Largest squared frequency of any segment alone, and of what motion.
 fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f64, &'static str) {
-    let (mut largest, mut limit) = (0.0, "");
-    let grid = &leaf.grid;
-    for j in 0..leaf.rods() {
-        for i in 0..leaf.segments() {
-            // A node shares its mass between the segments beside it.
-            let share = |node: usize| {
-                let part = grid.width(i) / (2.0 * grid.weight(node));
-                let Inertia { mass, transverse } = physics.inertia(leaf.leaf, grid, j, node);
-                Inertia {
-                    mass: part * mass,
-                    transverse: part * transverse,
-                }
-            };
-            let ends = [share(i), share(i + 1)];
-            let k = state.base(j) + i;
-            let section = leaf.section(j, i).condense(f64::INFINITY);
-            let idle = leaf.segment(state, j, i, DVec3::ZERO);
-            let strain = idle.v(&section) - section.rest_strain;
-            let segment = leaf.segment(state, j, i, idle.frame * (strain / section.compliance));
-            let squared = squared_frequency(&section, &segment, ends, [state.q[k], state.q[k + 1]]);
-            if squared > largest {
-                (largest, limit) = (squared, name(&section, ends));
+    let (rods, n) = (leaf.rods(), leaf.segments());
+    let joined = leaf.leaf.joined() && rods > 1;
+    let all = || (0..rods).flat_map(|j| (0..n).map(move |i| (j, i)));
+    let mut held: Vec<Hold> = vec![[DVec3::ZERO; 2]; state.x.len()];
+    for (j, i) in all() {
+        let stiffness = stiffness(leaf, state, j, i);
+        for end in 0..2 {
+            let node = state.base(j) + i + end;
+            let hold = hold(&stiffness, end, state.q[node]);
+            for c in 0..2 {
+                held[node][c] += hold[c];
             }
         }
     }
-    (largest, limit)
+    // All rods hold a joint tip, along directors of their own: as one number.
+    let tips = || (0..rods).map(|j| state.base(j) + n);
+    let tip = tips().map(|node| held[node][0].max_element()).sum::<f64>();
+    let tip_mass = (0..rods).map(|j| physics.inertia(leaf.leaf, &leaf.grid, j, n).mass);
+    let tip_mass: f64 = tip_mass.sum();
+
+    let (mut largest, mut fastest) = (0.0, None);
+    for (j, i) in all() {
+        let stiffness = stiffness(leaf, state, j, i);
+        // One over the root of the masses of an end, along the lab axes.
+        let root = |end: usize| {
+            if i + end == 0 && physics.clamped() {
+                return [DMat3::ZERO; 2];
+            }
+            let node = state.base(j) + i + end;
+            let Inertia { mass, transverse } = physics.inertia(leaf.leaf, &leaf.grid, j, i + end);
+            let [shift, turn] = hold(&stiffness, end, state.q[node]);
+            let moving = match joined && i + end == n {
+                true => DVec3::splat(tip_mass * shift.max_element() / tip),
+                false => mass * shift / held[node][0],
+            };
+            let turning = transverse * DVec3::new(Inertia::POLAR, 1.0, 1.0) * turn / held[node][1];
+            let frame = DMat3::from_quat(state.q[node]);
+            [moving, turning].map(|mass| {
+                let root = DMat3::from_diagonal(mass.map(f64::sqrt).recip());
+                frame * root * frame.transpose()
+            })
+        };
+        let (left, right) = (root(0), root(1));
+        let roots = [left[0], right[0], left[1], right[1]];
+        let scaled: Stiffness = from_fn(|r| from_fn(|c| roots[r] * stiffness[r][c] * roots[c]));
+        let matrix = SMatrix::<f64, 12, 12>::from_fn(|r, c| scaled[r / 3][c / 3].col(c % 3)[r % 3]);
+        let squared = matrix.symmetric_eigenvalues().max();
+        if squared > largest {
+            (largest, fastest) = (squared, Some((j, i, roots, matrix)));
+        }
+    }
+    let Some((j, i, roots, matrix)) = fastest else {
+        return (0.0, "");
+    };
+    let eigen = matrix.symmetric_eigen();
+    let mode = eigen.eigenvectors.column(eigen.eigenvalues.imax());
+    let motion = from_fn(|k| roots[k] * DVec3::from_slice(&mode.as_slice()[3 * k..3 * k + 3]));
+    (largest, name(leaf, state, (j, i), motion))
 }
 
-/// Largest squared frequency of a free segment with these masses at its ends.
-fn squared_frequency(
-    section: &Section,
-    segment: &Segment,
-    ends: [Inertia; 2],
-    q: [DQuat; 2],
-) -> f64 {
-    let k = segment.hessian(section);
-    let turning = |inertia: Inertia, q: DQuat| {
-        let d1 = q * DVec3::X;
-        let per_root = inertia.transverse.sqrt().recip();
-        let own = Inertia::POLAR.sqrt().recip() - 1.0;
-        (DMat3::IDENTITY + crate::rotation::outer(d1, d1) * own) * per_root
-    };
-    let moving = |inertia: Inertia| DMat3::IDENTITY * inertia.mass.sqrt().recip();
-    // In the order x0, x1, a, b.
-    let roots = [
-        moving(ends[0]),
-        moving(ends[1]),
-        turning(ends[0], q[0]),
-        turning(ends[1], q[1]),
-    ];
-    let stiffness = [
+/// Stiffness of a segment that carries the force of its strain.
+fn stiffness(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> Stiffness {
+    let section = leaf.section(j, i).condense(f64::INFINITY);
+    let idle = leaf.segment(state, j, i, DVec3::ZERO);
+    let strain = idle.v(&section) - section.rest_strain;
+    let segment = leaf.segment(state, j, i, idle.frame * (strain / section.compliance));
+    let k = segment.hessian(&section);
+    [
         [k.xx, -k.xx, -k.xa, -k.xb],
         [-k.xx, k.xx, k.xa, k.xb],
         [-k.xa.transpose(), k.xa.transpose(), k.aa, k.ab],
         [-k.xb.transpose(), k.xb.transpose(), k.ab.transpose(), k.bb],
-    ];
-    let scaled: [[DMat3; 4]; 4] =
-        std::array::from_fn(|r| std::array::from_fn(|c| roots[r] * stiffness[r][c] * roots[c]));
-    SMatrix::<f64, 12, 12>::from_fn(|r, c| scaled[r / 3][c / 3].col(c % 3)[r % 3])
-        .symmetric_eigenvalues()
-        .max()
+    ]
 }
 
-/// The fastest motion of a segment, were it straight.
-fn name(section: &Section, ends: [Inertia; 2]) -> &'static str {
-    let sum = |of: fn(&Inertia) -> f64| 1.0 / of(&ends[0]) + 1.0 / of(&ends[1]);
-    let (per_mass, per_inertia) = (sum(|end| end.mass), sum(|end| end.transverse));
-    let (stretch, bend) = (section.compliance.recip(), section.couple_stiffness);
-    let (ds, shear) = (section.ds, stretch.y.max(stretch.z));
+/// How hard a segment holds the node of rotation `q` at its left or right end.
+fn hold(stiffness: &Stiffness, end: usize, q: DQuat) -> Hold {
+    let frame = DMat3::from_quat(q);
+    [end, 2 + end].map(|c| {
+        let seen = frame.transpose() * stiffness[c][c] * frame;
+        let hold = DVec3::new(seen.x_axis.x, seen.y_axis.y, seen.z_axis.z);
+        hold.max(DVec3::splat(LEAST_HOLD * hold.max_element()))
+    })
+}
+
+/// What a motion of a segment, shifts of its ends and turns, is mostly.
+fn name(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    (j, i): (usize, usize),
+    [x0, x1, a, b]: [DVec3; 4],
+) -> &'static str {
+    let (section, node) = (leaf.section(j, i), state.base(j) + i);
+    let frame = leaf.segment(state, j, i, DVec3::ZERO).frame.transpose();
+    let along = frame * (state.x[node + 1] - state.x[node]);
+    let strain = frame * (x1 - x0) + along.cross(frame * (0.5 * (a + b)));
+    let stretch = strain * strain / section.compliance;
+    let turn = frame * (b - a);
+    let bend = turn * turn * section.couple_stiffness;
     let motions = [
-        (stretch.x / ds * per_mass, "waves of stretch"),
-        (bend.x / ds * per_inertia / Inertia::POLAR, "waves of twist"),
-        (bend.y.max(bend.z) / ds * per_inertia, "waves of bending"),
-        (
-            shear / ds * per_mass + shear * 0.25 * ds * per_inertia,
-            "shear with rotation",
-        ),
+        (stretch.x, "waves of stretch"),
+        (bend.x, "waves of twist"),
+        (bend.y + bend.z, "waves of bending"),
+        (stretch.y + stretch.z, "shear with rotation"),
     ];
-    let fastest = motions.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
-    fastest.map_or("", |(_, name)| name)
+    let most = motions.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+    most.map_or("", |(_, name)| name)
 }
 
 /// What coupling adds to the squared frequency, at most: of all pairs of

@@ -1,0 +1,198 @@
+//! The explicit method is stable up to the step it says, which is hardly
+//! shorter than it must be; beyond, it says that it diverged: it never returns
+//! a motion that is none.
+
+mod common;
+#[path = "common/linear.rs"]
+mod linear;
+#[path = "common/motion.rs"]
+mod motion;
+#[path = "common/movers.rs"]
+mod movers;
+
+use common::{paper_leaf, settle_on};
+use leafdyn::leaf::{Leaf, State};
+use leafdyn::motion::{Broken, Energy, Explicit, Method, Physics};
+use leafdyn::scenario::{Scenario, Schedule};
+use leafdyn::simulate::{Options, Refused, Simulation};
+use linear::Linear;
+use motion::{discrete, ramp, released};
+use movers::movers;
+use proptest::prelude::*;
+
+/// The longest stable step of the linearised leaf.
+fn true_limit(leaf: &Leaf, state: &State) -> f64 {
+    let grid = discrete(leaf, state.segments());
+    let physics = Physics::new(leaf);
+    let linear = Linear::new(&grid, &physics, state);
+    let [strains, coupling] = [&linear.strains, &linear.coupling].map(|k| linear.scaled(k));
+    // Strains count by h^2 + 4 eta h, coupling by h^2.
+    let eta = physics.retardation;
+    let largest = |h: f64| {
+        let all = (h * h + 4.0 * eta * h) * &strains + h * h * &coupling;
+        all.symmetric_eigenvalues().max()
+    };
+    let undamped = 2.0 / (strains.clone() + &coupling).symmetric_eigenvalues().max().sqrt();
+    let (mut low, mut high) = (0.0, undamped);
+    while eta > 0.0 && high - low > 1e-4 * high {
+        let middle = 0.5 * (low + high);
+        *(if largest(middle) < 4.0 { &mut low } else { &mut high }) = middle;
+    }
+    high
+}
+
+/// No damping, external damping, or both.
+fn damped(mut leaf: Scenario, kind: usize, external: f64, internal: f64) -> Scenario {
+    if kind > 0 {
+        leaf.dynamics.external_damping = external;
+    }
+    if kind > 1 {
+        leaf.dynamics.internal_damping = internal;
+    }
+    leaf
+}
+
+fn total(e: &Energy) -> f64 {
+    e.kinetic + e.elastic + e.coupling + e.potential
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 32,
+        failure_persistence: None,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(7),
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn of_random_leaves(
+        leaf in movers(),
+        segments in 4..8_usize,
+        (kind, external, internal) in (0..3_usize, 0.5..5.0_f64, -4.0..-1.0_f64),
+    ) {
+        let leaf = damped(leaf, kind, external, 10f64.powf(internal));
+        let model = Leaf::new(&leaf);
+        let state = released(&model, segments);
+        let method = |h: f64| {
+            Explicit::new(discrete(&model, segments), Physics::new(&model), &state, Some(h)).unwrap()
+        };
+        let stable = method(1.0).stable_step();
+        let (said, truth) = (stable.step, true_limit(&model, &state));
+        println!("{}: {:.3} times longer is stable, too", stable.limit, truth / said);
+        prop_assert!((0.999..1.5).contains(&(truth / said)), "{stable:?}, in truth {truth}");
+
+        let h = 0.99 * said;
+        let mut steady = method(h);
+        let before = total(&steady.snapshot().energy);
+        steady.advance(2e4 * h).unwrap();
+        let after = steady.snapshot().energy;
+        prop_assert!(kind == 0 || (total(&after) < before && after.dissipated > 0.0));
+
+        for over in [1.05, 1.5, 3.0] {
+            let h = over * truth;
+            let mut lost = method(h);
+            let found = lost.advance(2000.0 * h);
+            let told = matches!(found, Err(Broken::Diverged { .. } | Broken::Unresolved { .. }));
+            prop_assert!(told, "{over} times the limit: {found:?} {:?}", lost.snapshot().energy);
+        }
+    }
+}
+
+/// A thick, soft rod under a strong load, which shakes itself without end when
+/// its forces are not those of an energy.
+fn thick_rod() -> Scenario {
+    let mut rod = paper_leaf(1, [1.0; 3], [100.0; 3], 0.0);
+    rod.rods[0].angle = 0.0;
+    rod.tip_force = [0.0, 3.0, -20.0];
+    rod.dynamics.tip_force = Schedule::constant(rod.tip_force);
+    rod
+}
+
+#[test]
+fn a_thick_rod_comes_to_rest() {
+    for damping in [0.3, 7.0] {
+        let mut rod = thick_rod();
+        rod.dynamics.external_damping = damping;
+        let leaf = Leaf::new(&rod);
+        let state = released(&leaf, 20);
+        let mut method =
+            Explicit::new(discrete(&leaf, 20), Physics::new(&leaf), &state, None).unwrap();
+        let mut before = total(&method.snapshot().energy);
+        // Energy falls all the time, and at last there is no motion.
+        for k in 1..=60 {
+            method.advance(k as f64 * 60.0 / damping / 60.0).unwrap();
+            let energy = method.snapshot().energy;
+            assert!(total(&energy) < before + 1e-9, "damping {damping}, {k}: {energy:?}");
+            before = total(&energy);
+        }
+        let now = method.snapshot();
+        let rest = settle_on(&rod, 20, false);
+        let off = now.state.tip(0).distance(rest.tips[0]);
+        println!("damping {damping}: kinetic {:.1e}, tip off by {off:.1e}", now.energy.kinetic);
+        assert!(now.energy.kinetic < 1e-20 && off < 1e-8);
+    }
+}
+
+#[test]
+fn a_thick_rod_keeps_its_energy() {
+    let mut rod = thick_rod();
+    rod.dynamics.external_damping = 0.0;
+    let leaf = Leaf::new(&rod);
+    let state = released(&leaf, 20);
+    let mut method = Explicit::new(discrete(&leaf, 20), Physics::new(&leaf), &state, None).unwrap();
+    let start = method.snapshot().energy.balance();
+    let (mut most, mut off) = (0.0_f64, 0.0_f64);
+    for k in 1..=1000 {
+        method.advance(k as f64 * 0.2).unwrap();
+        let energy = method.snapshot().energy;
+        most = most.max(energy.kinetic);
+        off = off.max((energy.balance() - start).abs());
+    }
+    println!("{} steps, kinetic energy up to {most:.2}, balance off by {off:.1e}", method.steps());
+    assert!(most > 5.0 && off < 0.1 * most);
+}
+
+/// What has no energy yet and what is loaded within a step is not taken for
+/// a motion that diverged, however soon one looks.
+#[test]
+fn what_begins_gently_or_suddenly_goes_on() {
+    for until in [3.0, 1e-5] {
+        let mut rod = paper_leaf(1, [1.0; 3], [100.0; 3], 0.0);
+        rod.rods[0].angle = 0.0;
+        rod.dynamics.tip_force = ramp(until, [0.0, 0.3, 0.1]);
+        rod.dynamics.gravity = ramp(until, [0.0, 0.0, -0.2]);
+        let leaf = Leaf::new(&rod);
+        for segments in [1, 2, 16] {
+            let state = released(&leaf, segments);
+            let mut method = Explicit::new(
+                discrete(&leaf, segments),
+                Physics::new(&leaf),
+                &state,
+                None,
+            )
+            .unwrap();
+            let h = method.longest_step();
+            for k in 1..=1000 {
+                let found = method.advance(h * k as f64);
+                assert_eq!(found, Ok(()), "{until}, {segments} segments, step {k}");
+            }
+        }
+    }
+}
+
+#[test]
+fn steps_beyond_the_limit_are_refused() {
+    let rod = thick_rod();
+    let leaf = Leaf::new(&rod);
+    let of = |step| {
+        let options = Options {
+            step,
+            ..Options::default()
+        };
+        Simulation::new(&leaf, &options).map(|s| s.stable_step().unwrap().step)
+    };
+    let stable = of(None).unwrap();
+    assert_eq!(of(Some(0.999 * stable)), Ok(stable));
+    let refused = of(Some(1.001 * stable));
+    assert!(matches!(refused, Err(Refused::Unstable { .. })), "{refused:?}");
+}
