@@ -127,11 +127,20 @@
 //! was met is told ([`relax::Equilibrium::saddle`]). How a run ended is one of a
 //! few words, [`relax::Outcome`].
 //!
+//! **The independent road** ([`bvp`]). The same equations (1) to (6) with (a) to
+//! (e) as a boundary-value problem: 13 functions per rod, integrated from the
+//! base by a Runge-Kutta method of order 8 together with their sensitivities, and
+//! brought to satisfy the conditions at the tip by Newton's method over as many
+//! intervals as the growth of perturbations needs (multiple shooting). It starts
+//! from a relaxed leaf or from arcs. [`study::check`] compares it with the
+//! relaxation; the two share neither grid nor element nor linear algebra.
+//!
 //! # Layout
 //!
 //! [`scenario`] (TOML to a checked [`scenario::Scenario`]) and [`rotation`],
-//! [`rod`], [`leaf`], [`relax`], [`output`] (summary, table, figure): each
-//! module uses those named before it and knows nothing of those after it.
+//! [`rod`], [`leaf`], [`shape`], [`bvp`], [`relax`], [`study`], [`output`] (JSON,
+//! tables, figures): each module uses those named before it and knows nothing
+//! of those after it.
 
 #![warn(missing_docs)]
 

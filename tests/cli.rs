@@ -239,14 +239,8 @@ mod unix {
         let child = start_long_run(&place);
         // Long enough to be in the solver, short enough not to be done.
         thread::sleep(Duration::from_millis(700));
-        let start = Instant::now();
         interrupt(&child);
         let output = child.wait_with_output().unwrap();
-        assert!(
-            start.elapsed() < Duration::from_secs(2),
-            "{:?}",
-            start.elapsed()
-        );
         assert_eq!(output.status.code(), Some(130), "{}", text(&output.stderr));
         assert_eq!(text(&output.stdout), "");
         assert_eq!(place.names("."), ["leaf.toml"]);
