@@ -39,6 +39,7 @@ pub struct Relax {
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum MethodName {
     SemiImplicit,
+    Explicit,
     Shooting,
 }
 
@@ -46,6 +47,7 @@ impl From<MethodName> for Method {
     fn from(name: MethodName) -> Self {
         match name {
             MethodName::SemiImplicit => Method::SemiImplicit,
+            MethodName::Explicit => Method::Explicit,
             MethodName::Shooting => Method::Shooting,
         }
     }

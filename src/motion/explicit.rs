@@ -15,11 +15,12 @@ use glam::DVec3;
 use pulp::Arch;
 use rayon::prelude::*;
 
+use super::fictitious;
 use super::kernel::{Drift, Forces, GROUP, Kick, Neighbour, Positions};
 use super::ledger::{Ledger, measure};
 use super::method::{Broken, Method, Snapshot, Velocity};
 use super::nodes::{self, Rod, groups, vector};
-use super::physics::{Inertia, Physics};
+use super::physics::Physics;
 use crate::leaf::{DiscreteLeaf, Loads, State};
 
 /// Part of the stable time step that is used.
@@ -134,6 +135,7 @@ impl<'a> Explicit<'a> {
                 let (left, right) = (inertia(i), inertia(i + 1));
                 let per_mass = 1.0 / (a * left.mass) + 1.0 / (b * right.mass);
                 let per_inertia = 1.0 / (a * left.transverse) + 1.0 / (b * right.transverse);
+                let per_polar = 1.0 / (a * left.polar()) + 1.0 / (b * right.polar());
                 let at = GROUP + i;
                 let ds = m.rest_length[at];
                 let shear = m.stretch[1][at].max(m.stretch[2][at]);
@@ -142,7 +144,7 @@ impl<'a> Explicit<'a> {
                 for (squared, what) in [
                     (m.stretch[0][at] * per_mass, "waves of stretch"),
                     (
-                        m.bend[0][at] * per_inertia / Inertia::POLAR,
+                        m.bend[0][at] * per_polar,
                         "waves of twist",
                     ),
                     (bend * per_inertia, "waves of bending"),
@@ -190,13 +192,32 @@ impl<'a> Explicit<'a> {
         self.longest
     }
 
+    /// Gives the nodes masses that serve to come to rest, not to move: see
+    /// [`fictitious`]. Time steps may be as long as one then, and the leaf is
+    /// stopped.
+    pub fn disguise(&mut self) {
+        let tip = fictitious::masses(&self.leaf, &mut self.rods);
+        self.tip_mass = self.tip_mass.map(|_| tip);
+        self.stop();
+    }
+
+    /// Takes all velocities away.
+    pub fn stop(&mut self) {
+        for rod in &mut self.rods {
+            for array in rod.motion.v.iter_mut().chain(&mut rod.motion.p) {
+                array.fill(0.0);
+            }
+        }
+        self.behind = 0.0;
+    }
+
     /// Lets every velocity decay at this rate from now on.
     pub fn damp(&mut self, rate: f64) {
         self.physics.damping = rate;
     }
 
-    /// One time step.
-    fn step(&mut self, h: f64) {
+    /// One time step; returns twice the kinetic energy at its beginning.
+    pub fn step(&mut self, h: f64) -> f64 {
         let loads = self.physics.loads(self.time);
         let power = self.forces(1.0 / h, true);
         let length = self.behind + 0.5 * h;
@@ -207,6 +228,7 @@ impl<'a> Explicit<'a> {
         self.time += h;
         self.steps += 1;
         self.account(&loads);
+        moving
     }
 
     /// Work of what changed during the last step.
@@ -358,6 +380,12 @@ impl<'a> Explicit<'a> {
     }
 
     /// Positions, rotations and segment forces now.
+    pub fn now(&mut self) -> State {
+        self.forces(1.0 / self.longest, false);
+        self.state()
+    }
+
+    /// The same, but the forces as they were computed last.
     fn state(&self) -> State {
         let n = self.leaf.segments();
         let nodes =

@@ -2,6 +2,7 @@
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
 use crate::relax::equilibrium::{Equilibrium, Outcome, Saddle, Work};
+use crate::relax::explicit;
 use crate::relax::moment;
 use crate::relax::options::{
     LARGEST_TOLERANCE, MAX_NODES, Method, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
@@ -86,6 +87,9 @@ pub fn relax(
     }
     let clock = Instant::now();
     let leaf = Leaf::new(scenario);
+    if options.method == Method::Explicit {
+        explicit::check(&leaf, options)?;
+    }
     let first = check_segments(&leaf, options.segments, COARSEST)?;
     let mut run = Run {
         leaf: &leaf,
@@ -312,6 +316,20 @@ impl<'a> Run<'a, '_> {
                 residual,
             });
         };
+        if self.options.method == Method::Explicit {
+            let mut request = explicit::Request {
+                accuracy,
+                near_rest,
+                work: &mut self.work,
+                progress: &mut tell,
+                moved: false,
+            };
+            let settled = explicit::settle(&leaf, &mut state, &mut system, &mut request);
+            if let Settled::Rest(remaining) = settled {
+                self.remaining = self.remaining.max(remaining);
+            }
+            return (Level { leaf, state }, settled, request.moved);
+        }
         if leaf.tip_moment() != DVec3::ZERO {
             let mut leaf = leaf;
             let settled = moment::settle(

@@ -2,6 +2,7 @@
 //! the nested grids with their extrapolation, saddles, and the result.
 
 mod equilibrium;
+mod explicit;
 mod grids;
 mod index;
 mod moment;
