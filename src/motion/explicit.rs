@@ -143,10 +143,7 @@ impl<'a> Explicit<'a> {
                 let bend = m.bend[1][at].max(m.bend[2][at]);
                 for (squared, what) in [
                     (m.stretch[0][at] * per_mass, "waves of stretch"),
-                    (
-                        m.bend[0][at] * per_polar,
-                        "waves of twist",
-                    ),
+                    (m.bend[0][at] * per_polar, "waves of twist"),
                     (bend * per_inertia, "waves of bending"),
                     (shear * per_mass + turning, "shear with rotation"),
                 ] {
@@ -221,7 +218,11 @@ impl<'a> Explicit<'a> {
         let loads = self.physics.loads(self.time);
         let power = self.forces(1.0 / h, true);
         let length = self.behind + 0.5 * h;
+        let before = self.tip_spin();
         let moving = self.kick(length, &loads);
+        // A dead moment has no potential: its work is all that tells of it.
+        let spin = 0.5 * (before + self.tip_spin());
+        self.ledger.work += length * loads.tip_moment.dot(spin);
         self.ledger.dissipated += length * self.physics.damping * moving + h * power;
         self.drift(h);
         self.behind = 0.5 * h;
@@ -229,6 +230,12 @@ impl<'a> Explicit<'a> {
         self.steps += 1;
         self.account(&loads);
         moving
+    }
+
+    /// Angular velocity of the first rod's tip.
+    fn tip_spin(&self) -> DVec3 {
+        let last = GROUP + self.leaf.segments();
+        self.rods[0].spin(last, vector(&self.rods[0].motion.p, last))
     }
 
     /// Work of what changed during the last step.

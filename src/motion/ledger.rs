@@ -30,13 +30,15 @@ pub fn measure(
     for j in 0..leaf.rods() {
         for i in 0..=n {
             let k = state.base(j) + i;
-            let Inertia { mass, transverse, excess } = physics.inertia(leaf.leaf, &leaf.grid, j, i);
+            let Inertia {
+                mass,
+                transverse,
+                excess,
+            } = physics.inertia(leaf.leaf, &leaf.grid, j, i);
             let Velocity { angular, linear } = velocity[k];
             let spin = angular.dot(state.q[k] * DVec3::X);
             energy.kinetic += 0.5 * mass * linear.length_squared();
-            energy.kinetic += 0.5
-                * transverse
-                * (angular.length_squared() + excess * spin * spin);
+            energy.kinetic += 0.5 * transverse * (angular.length_squared() + excess * spin * spin);
             let (_, potential) = leaf.load(state, j, i);
             let stretch = leaf.coupling_energy(state, j, i);
             energy.coupling += stretch;

@@ -386,6 +386,13 @@ impl<'a> SemiImplicit<'a> {
         std::mem::swap(&mut self.state, &mut self.trial);
         std::mem::swap(&mut self.moving, &mut self.next_moving);
         self.ledger.dissipated += self.physics.damping * self.dragged();
+        // A dead moment has no potential: its work is all that tells of it.
+        let moment = 0.5 * (loads.tip_moment + self.leaf.loads.tip_moment);
+        if moment != DVec3::ZERO {
+            let last = self.leaf.segments();
+            let turn = self.state.q[last] * self.trial.q[last].conjugate();
+            self.ledger.work += moment.dot(rotation::log(turn));
+        }
         if self.physics.retardation > 0.0 {
             self.ledger.dissipated += h * self.rub(h);
             let now = self.strains();

@@ -72,10 +72,15 @@ pub struct Request<'a> {
 pub fn check(leaf: &Leaf, options: &Options) -> Result<(), RelaxError> {
     let rigid = |rod: &Rod| {
         let stiffness = rod.force_stiffness.iter();
-        stiffness.fold(0.0_f64, |m, h| m.max(h.max_abs())).is_infinite()
+        stiffness
+            .fold(0.0_f64, |m, h| m.max(h.max_abs()))
+            .is_infinite()
     };
     if leaf.scenario().rods.iter().any(rigid) {
         return Err(RelaxError::Rigid);
+    }
+    if leaf.tip_moment != DVec3::ZERO {
+        return Err(RelaxError::Follows);
     }
     if options.keep_unstable {
         return Err(RelaxError::Leaves);
@@ -128,13 +133,8 @@ fn find_valley(
         let now = motion.snapshot();
         fastest = fastest.max(now.energy.kinetic);
         let slow = now.energy.kinetic <= SLOW * fastest;
-        let valley = match leaf.tip_moment() == DVec3::ZERO {
-            true => {
-                let shift = leaf.neutral_shift();
-                saddle::index(leaf, &now.state, system, shift, request.work) == Some(0)
-            }
-            false => true,
-        };
+        let shift = leaf.neutral_shift();
+        let valley = saddle::index(leaf, &now.state, system, shift, request.work) == Some(0);
         convex = if valley { convex + 1 } else { 0 };
         request.moved |= !valley;
         if slow && convex >= CONVEX {
@@ -176,11 +176,15 @@ fn descend(
         }
         let state = motion.now();
         let residual = leaf.residual(&state);
-        if !residual.is_finite() {
+        if !(residual.is_finite() && state.x.iter().all(|x| x.is_finite())) {
             return Err(Settled::Stuck);
         }
         (request.progress)(motion.steps(), residual);
-        looks_since_best = if residual < 0.5 * best { 0 } else { looks_since_best + 1 };
+        looks_since_best = if residual < 0.5 * best {
+            0
+        } else {
+            looks_since_best + 1
+        };
         if looks_since_best == 0 {
             best = residual;
         }
@@ -208,20 +212,13 @@ fn remaining(leaf: &DiscreteLeaf, state: &State, system: &mut System, work: &mut
     leaf.assemble(state, system);
     work.force_evaluations += 1;
     work.factorizations += 1;
-    if leaf.tip_moment() != DVec3::ZERO {
-        if !system.factorize_indefinite() {
-            return f64::INFINITY;
-        }
-        system.solve(None, 0.0);
-    } else {
-        let Ok(pattern) = SparsePattern::new(system) else {
-            return f64::INFINITY;
-        };
-        let Ok(mut factor) = pattern.factorize(system, leaf.neutral_shift()) else {
-            return f64::INFINITY;
-        };
-        factor.solve(system, None);
-    }
+    let Ok(pattern) = SparsePattern::new(system) else {
+        return f64::INFINITY;
+    };
+    let Ok(mut factor) = pattern.factorize(system, leaf.neutral_shift()) else {
+        return f64::INFINITY;
+    };
+    factor.solve(system, None);
     let (turn, shift) = system.largest();
     turn.max(shift)
 }

@@ -1,7 +1,7 @@
 //! Nested grids: as fine as the tolerance needs, with an error estimate.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
-use crate::relax::equilibrium::{Equilibrium, Outcome, Saddle, Work};
+use crate::relax::equilibrium::{Equilibrium, Saddle, Work};
 use crate::relax::explicit;
 use crate::relax::moment;
 use crate::relax::options::{
@@ -106,7 +106,7 @@ pub fn relax(
         pushes: 0,
     };
     let end = run.solve(Grid::new(first, leaf.kinks()));
-    let (outcome, remark) = run.judge(end);
+    let (outcome, remark) = report::outcome(&run, end);
     let seconds = clock.elapsed().as_secs_f64();
     Ok(report::equilibrium(run, outcome, remark, seconds))
 }
@@ -440,46 +440,6 @@ impl<'a> Run<'a, '_> {
             Settled::Rest(_) if self.options.segments.is_some() => self.judge_stability(),
             Settled::Rest(_) => Err(None),
             _ => Err(Some(settled)),
-        }
-    }
-
-    fn judge(&self, end: End) -> (Outcome, Option<String>) {
-        let finest = self.levels.last().map_or(0, |level| level.leaf.segments());
-        match end {
-            End::Rest => (
-                match (self.index, self.saddle) {
-                    (Some(1..), _) => Outcome::Saddle,
-                    (_, Some(_)) => Outcome::ConvergedAfterSaddle,
-                    _ => Outcome::Converged,
-                },
-                self.index.is_none().then(|| match self.leaf.tip_moment == DVec3::ZERO {
-                    true => "the leaf is too large to count its negative eigenvalues: its stability is not known".into(),
-                    false => "a dead moment has no potential, so that no count of eigenvalues decides stability: it is not stated".into(),
-                }),
-            ),
-            End::NotAccurate => (
-                Outcome::ToleranceNotReached,
-                Some(format!(
-                    "{finest} segments a rod, the finest grid allowed, do not reach the tolerance: ask for a larger one"
-                )),
-            ),
-            End::Failed(settled) => (
-                match settled {
-                    Settled::Stuck => Outcome::Diverged,
-                    _ => Outcome::NotAtRest,
-                },
-                Some(match settled {
-                    Settled::Unresolved => format!(
-                        "a vein bends by more than a right angle within one of {finest} segments: use more segments or smaller loads"
-                    ),
-                    Settled::Stuck => format!(
-                        "no step lowers the energy on {finest} segments: use more segments, or raise the softest stiffness or lower the load"
-                    ),
-                    _ => format!(
-                        "the step limit came before rest on {finest} segments: the load may admit no stable equilibrium; lower it"
-                    ),
-                }),
-            ),
         }
     }
 }

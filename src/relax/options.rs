@@ -106,8 +106,16 @@ pub enum RelaxError {
         "--method explicit: a stiffness is inf, and no time step is short enough for rigid rods; give a number, or use semi-implicit"
     )]
     Rigid,
+    /// The explicit method follows forces, and a dead moment may feed a motion
+    /// without end.
+    #[error(
+        "--method explicit: under load.tip_moment, which has no potential, motion need not come to rest; use semi-implicit, or shooting"
+    )]
+    Follows,
     /// Unstable equilibria were asked of a method that leaves them.
-    #[error("--keep-unstable: explicit motion leaves unstable equilibria; use --method semi-implicit or shooting")]
+    #[error(
+        "--keep-unstable: explicit motion leaves unstable equilibria; use --method semi-implicit or shooting"
+    )]
     Leaves,
     /// A grid was asked for where there is none.
     #[error(
