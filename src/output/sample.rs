@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::{DQuat, DVec3};
 
 use crate::bvp::{self, Neutral, Solution};
-use crate::relax::{Equilibrium, NodeState, Outcome, RodShape, Work};
+use crate::relax::{Equilibrium, Model, NodeState, Outcome, RodShape, Work};
 use crate::shape::Difference;
 use crate::study::{Check, Shot, Verdict};
 
@@ -44,6 +44,7 @@ pub fn fan(rods: usize, segments: usize) -> Equilibrium {
         method: "semi-implicit",
         outcome: Outcome::Converged,
         remark: None,
+        model: Model::default(),
         segments: vec![segments],
         intervals: None,
         tolerance: 1e-6,
