@@ -109,7 +109,11 @@ impl<'a> Leaf<'a> {
     /// Number of rods: all, or those of the half.
     pub fn rods(&self) -> usize {
         let rods = self.scenario.rods.len();
-        if self.mirrored { rods.div_ceil(2) } else { rods }
+        if self.mirrored {
+            rods.div_ceil(2)
+        } else {
+            rods
+        }
     }
 
     /// Whether all tips share one point.

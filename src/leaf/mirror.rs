@@ -101,7 +101,11 @@ pub fn whole_of(half: &Leaf, state: &State) -> State {
             false => q,
         }));
         let own_forces = &state.n[own * n..(own + 1) * n];
-        forces.extend(own_forces.iter().map(|&f| reflect(f / half.share(own), image)));
+        forces.extend(
+            own_forces
+                .iter()
+                .map(|&f| reflect(f / half.share(own), image)),
+        );
     }
     let mut whole = State::new(n, x, q);
     whole.n = forces;

@@ -18,7 +18,7 @@ pub use atomic::{abandon_unfinished, check_writable};
 pub use csv::Centerlines;
 pub use figure::{FigurePng, FigureSvg};
 pub use json::{CheckSummary, Summary};
-pub use words::{equilibrium_of_index, headline, power_of_ten, shooting, verdict};
+pub use words::{equilibrium_of_index, headline, model, power_of_ten, shooting, verdict};
 
 use crate::relax::Equilibrium;
 use crate::study::Check;
