@@ -91,7 +91,8 @@ fn the_paper_s_firm_leaves_are_found_by_half() {
             assert_eq!(half.rods.len(), rods);
             let whole = rest(&leaf, true, None);
             let apart = Difference::between(&half.rods, &whole.rods);
-            assert!(apart.position < 1e-10, "{figure}, {rods}: {apart:?}");
+            // Both end their iterations a thousandth of the tolerance away.
+            assert!(apart.position < 2e-9, "{figure}, {rods}: {apart:?}");
             assert_eq!(
                 half.error_estimate.is_some(),
                 whole.error_estimate.is_some()

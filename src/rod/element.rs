@@ -176,7 +176,7 @@ impl Segment {
     pub fn stiffening_gradient(&self, section: &Section, dropped: DVec3) -> (DVec3, DVec3, DVec3) {
         let gap = section.ds * dropped * section.compliance * self.nu;
         let correction = section.condensing * gap;
-        let g_mu = -self.law_rate(section).transpose() * correction;
+        let g_mu = -self.nu.cross(gap) - self.law_rate(section).transpose() * correction;
         let g_delta = 0.5 * self.relative.tau.cross(g_mu);
         (
             self.frame * (correction / section.ds),
