@@ -138,9 +138,19 @@
 //! # Layout
 //!
 //! [`scenario`] (TOML to a checked [`scenario::Scenario`]) and [`rotation`],
-//! [`rod`], [`leaf`], [`shape`], [`bvp`], [`relax`], [`study`], [`output`] (JSON,
-//! tables, figures): each module uses those named before it and knows nothing
-//! of those after it.
+//! [`rod`], [`leaf`], [`shape`], [`bvp`], [`motion`], [`relax`], [`simulate`],
+//! [`study`], [`output`] (JSON, tables, figures): each module uses those named
+//! before it and knows nothing of those after it.
+//!
+//! [`motion`] moves a leaf on the same grid in time, without units: by an
+//! explicit method with short, cheap steps, or by a semi-implicit one that
+//! takes any stiffness. Both behind one trait, [`motion::Method`], keep the
+//! balance of energy, and can be saved and restored to the last bit.
+//!
+//! [`simulate`] follows the leaf of a scenario for its duration, from where
+//! the scenario says, and hands out a [`simulate::Frame`] at every output. An
+//! [`output::Recording`] writes these to files as they come, and can stop and
+//! resume.
 
 #![warn(missing_docs)]
 

@@ -20,6 +20,6 @@ pub use crate::shape::{NodeState, RodShape};
 pub use equilibrium::{Equilibrium, Model, Outcome, Saddle, Work};
 pub use grids::{check_segments, relax};
 pub use index::index_near;
-pub use options::{Method, Options, Progress, RelaxError};
+pub use options::{LARGEST_TOLERANCE, Method, Options, Progress, RelaxError, SMALLEST_TOLERANCE};
 pub use shooting::check_intervals;
 pub use start::start;
