@@ -247,7 +247,9 @@ class Motion:
 
 def simulate(options, rods, n, duration):
     """What leafdyn reports of its explicit motion of the same leaf."""
-    entries = [*options.set, f"leaf.rods={rods}", f"dynamics.duration={float(duration)}"]
+    # One output, at the end: what is measured are steps.
+    times = [f"dynamics.{key}={float(duration)}" for key in ("duration", "output_interval")]
+    entries = [*options.set, f"leaf.rods={rods}", *times]
     sets = [word for entry in entries for word in ("--set", entry)]
     with tempfile.TemporaryDirectory() as folder:
         command = [options.leafdyn, "simulate", options.scenario, "--method", "explicit", "--segments", str(n)]
