@@ -32,9 +32,7 @@ pub fn measure(
         for i in 0..=n {
             let k = state.base(j) + i;
             let Inertia {
-                mass,
-                transverse,
-                excess,
+                mass, transverse, ..
             } = physics.inertia(leaf.leaf, &leaf.grid, j, i);
             let Velocity { angular, linear } = velocity[k];
             let spin = angular.dot(state.q[k] * DVec3::X);
