@@ -32,7 +32,9 @@ pub fn measure(
         for i in 0..=n {
             let k = state.base(j) + i;
             let Inertia {
-                mass, transverse, ..
+                mass,
+                transverse,
+                excess,
             } = physics.inertia(leaf.leaf, &leaf.grid, j, i);
             let Velocity { angular, linear } = velocity[k];
             let spin = angular.dot(state.q[k] * DVec3::X);
@@ -70,9 +72,7 @@ fn kick(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) -> f64 {
     for j in 0..leaf.rods() {
         for i in 0..=n {
             let Inertia {
-                mass,
-                transverse,
-                excess,
+                mass, transverse, ..
             } = physics.inertia(leaf.leaf, &leaf.grid, j, i);
             let weight = leaf.grid.weight(i) * leaf.leaf.length(j);
             energy += (weight * loads.gravity).length_squared() / mass;
