@@ -107,7 +107,10 @@
 //! meet in a point, free rods from their rest shapes, and move: linearly
 //! implicit Euler steps of a damped motion. While the energy has a direction of
 //! negative curvature, the time step is kept short enough to follow the motion;
-//! otherwise it grows until the step is Newton's.
+//! otherwise it grows until the step is Newton's. A leaf that is its own mirror
+//! image is solved by half. The explicit method ([`relax::Method::Explicit`])
+//! follows the same motion in steps short enough for the fastest waves into the
+//! valley, and then descends with masses and damping that serve nothing else.
 //!
 //! **Grids and the error** ([`relax::relax`]). The element is symmetric and its
 //! conditions hold exactly at nodes, so that its error is a series in even
@@ -127,11 +130,30 @@
 //! was met is told ([`relax::Equilibrium::saddle`]). How a run ended is one of a
 //! few words, [`relax::Outcome`].
 //!
+//! **The independent road** ([`bvp`]). The same equations (1) to (6) with (a) to
+//! (e) as a boundary-value problem: 13 functions per rod, integrated from the
+//! base by a Runge-Kutta method of order 8 together with their sensitivities, and
+//! brought to satisfy the conditions at the tip by Newton's method over as many
+//! intervals as the growth of perturbations needs (multiple shooting). It starts
+//! from a relaxed leaf or from arcs. [`study::check`] compares it with the
+//! relaxation; the two share neither grid nor element nor linear algebra.
+//!
 //! # Layout
 //!
 //! [`scenario`] (TOML to a checked [`scenario::Scenario`]) and [`rotation`],
-//! [`rod`], [`leaf`], [`relax`], [`output`] (summary, table, figure): each
-//! module uses those named before it and knows nothing of those after it.
+//! [`rod`], [`leaf`], [`shape`], [`bvp`], [`motion`], [`relax`], [`simulate`],
+//! [`study`], [`output`] (JSON, tables, figures): each module uses those named
+//! before it and knows nothing of those after it.
+//!
+//! [`motion`] moves a leaf on the same grid in time, without units: by an
+//! explicit method with short, cheap steps, or by a semi-implicit one that
+//! takes any stiffness. Both behind one trait, [`motion::Method`], keep the
+//! balance of energy, and can be saved and restored to the last bit.
+//!
+//! [`simulate`] follows the leaf of a scenario for its duration, from where
+//! the scenario says, and hands out a [`simulate::Frame`] at every output. An
+//! [`output::Recording`] writes these to files as they come, and can stop and
+//! resume.
 
 #![warn(missing_docs)]
 

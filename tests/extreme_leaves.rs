@@ -5,7 +5,6 @@
 mod common;
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
-use std::time::{Duration, Instant};
 
 use common::{close, fig04, paper_leaf, settle, tip};
 use glam::DVec3;
@@ -25,14 +24,11 @@ fn fan(angles: &[f64], force_stiffness: [f64; 3], weight: f64) -> Scenario {
 
 #[track_caller]
 fn stable(scenario: &Scenario, tolerance: f64) -> Equilibrium {
-    let start = Instant::now();
     let leaf = settle(scenario, tolerance);
     assert_eq!(leaf.negative_eigenvalues, Some(0));
-    assert!(
-        start.elapsed() < Duration::from_secs(5),
-        "{:?}",
-        start.elapsed()
-    );
+    // Most need some tens; nobody waits for ten times the most.
+    let work = leaf.work;
+    assert!(work.force_evaluations < 1000, "{work:?}");
     leaf
 }
 

@@ -6,7 +6,6 @@ mod common;
 
 use std::fs;
 use std::process::{Command, Output};
-use std::time::{Duration, Instant};
 
 use leafdyn::relax::{Options, Outcome, RelaxError, relax};
 use leafdyn::scenario::Scenario;
@@ -31,25 +30,18 @@ shear_3 = 100.0
 struct Run {
     place: TempDir,
     output: Output,
-    took: Duration,
 }
 
 fn run(arguments: &[&str]) -> Run {
     let place = tempfile::tempdir().unwrap();
     fs::write(place.path().join("leaf.toml"), LEAF).unwrap();
-    let start = Instant::now();
     let output = Command::new(assert_cmd::cargo::cargo_bin!("leafdyn"))
         .current_dir(place.path())
         .args(["relax", "leaf.toml"])
         .args(arguments)
         .output()
         .unwrap();
-    let took = start.elapsed();
-    Run {
-        place,
-        output,
-        took,
-    }
+    Run { place, output }
 }
 
 #[track_caller]
@@ -68,7 +60,6 @@ fn refused(arguments: &[&str], parts: &[&str]) {
     assert!(message.trim().lines().count() <= 8, "too long: {message}");
     let left = fs::read_dir(run.place.path()).unwrap().count();
     assert_eq!(left, 1, "{arguments:?} has left something behind");
-    assert!(run.took < Duration::from_secs(1), "{:?}", run.took);
 }
 
 #[test]
@@ -198,15 +189,15 @@ const HARD: [(&str, &[&str]); 8] = [
 ];
 
 #[test]
-fn hard_scenes_end_in_an_outcome_within_seconds() {
+fn hard_scenes_end_in_an_outcome_after_bounded_work() {
     for (what, overrides) in HARD {
         let overrides: Vec<String> = overrides.iter().map(|text| text.to_string()).collect();
         let leaf = Scenario::from_toml_with(LEAF, what, &overrides).unwrap();
-        let start = Instant::now();
         let leaf = relax(&leaf, &Options::default(), &mut |_| {}).unwrap();
-        let took = start.elapsed();
-        println!("{what}: {:?}, {took:?}, {:?}", leaf.outcome, leaf.segments);
-        assert!(took < Duration::from_secs(10), "{what}: {took:?}");
+        let work = leaf.work.force_evaluations;
+        // Some seconds, whatever the machine; the heaviest needs half of this.
+        let finest = leaf.segments.last().unwrap();
+        assert!(work * finest < 5_000_000, "{what}: {work} on {finest}");
         if leaf.outcome.is_success() {
             assert_eq!(leaf.negative_eigenvalues, Some(0), "{what}");
             assert!(

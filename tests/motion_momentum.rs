@@ -54,8 +54,8 @@ fn momentum(leaf: &Leaf, grid: &Grid, physics: &Physics, now: &Snapshot) -> [DVe
         let (velocity, x) = (now.velocity[i], now.state.x[i]);
         let linear = inertia.mass * velocity.linear;
         let d1 = now.state.q[i] * DVec3::X;
-        // The moment of inertia about d1 is twice the other two.
-        let spin = inertia.transverse * (velocity.angular + velocity.angular.dot(d1) * d1);
+        let about_d1 = inertia.excess * velocity.angular.dot(d1) * d1;
+        let spin = inertia.transverse * (velocity.angular + about_d1);
         sum[0] += linear;
         sum[1] += x.cross(linear) + spin;
     }

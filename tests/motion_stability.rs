@@ -32,11 +32,19 @@ fn true_limit(leaf: &Leaf, state: &State) -> f64 {
         let all = (h * h + 4.0 * eta * h) * &strains + h * h * &coupling;
         all.symmetric_eigenvalues().max()
     };
-    let undamped = 2.0 / (strains.clone() + &coupling).symmetric_eigenvalues().max().sqrt();
+    let undamped = 2.0
+        / (strains.clone() + &coupling)
+            .symmetric_eigenvalues()
+            .max()
+            .sqrt();
     let (mut low, mut high) = (0.0, undamped);
     while eta > 0.0 && high - low > 1e-4 * high {
         let middle = 0.5 * (low + high);
-        *(if largest(middle) < 4.0 { &mut low } else { &mut high }) = middle;
+        *(if largest(middle) < 4.0 {
+            &mut low
+        } else {
+            &mut high
+        }) = middle;
     }
     high
 }
@@ -122,13 +130,19 @@ fn a_thick_rod_comes_to_rest() {
         for k in 1..=60 {
             method.advance(k as f64 * 60.0 / damping / 60.0).unwrap();
             let energy = method.snapshot().energy;
-            assert!(total(&energy) < before + 1e-9, "damping {damping}, {k}: {energy:?}");
+            assert!(
+                total(&energy) < before + 1e-9,
+                "damping {damping}, {k}: {energy:?}"
+            );
             before = total(&energy);
         }
         let now = method.snapshot();
         let rest = settle_on(&rod, 20, false);
         let off = now.state.tip(0).distance(rest.tips[0]);
-        println!("damping {damping}: kinetic {:.1e}, tip off by {off:.1e}", now.energy.kinetic);
+        println!(
+            "damping {damping}: kinetic {:.1e}, tip off by {off:.1e}",
+            now.energy.kinetic
+        );
         assert!(now.energy.kinetic < 1e-20 && off < 1e-8);
     }
 }
@@ -148,7 +162,10 @@ fn a_thick_rod_keeps_its_energy() {
         most = most.max(energy.kinetic);
         off = off.max((energy.balance() - start).abs());
     }
-    println!("{} steps, kinetic energy up to {most:.2}, balance off by {off:.1e}", method.steps());
+    println!(
+        "{} steps, kinetic energy up to {most:.2}, balance off by {off:.1e}",
+        method.steps()
+    );
     assert!(most > 5.0 && off < 0.1 * most);
 }
 
@@ -164,13 +181,9 @@ fn what_begins_gently_or_suddenly_goes_on() {
         let leaf = Leaf::new(&rod);
         for segments in [1, 2, 16] {
             let state = released(&leaf, segments);
-            let mut method = Explicit::new(
-                discrete(&leaf, segments),
-                Physics::new(&leaf),
-                &state,
-                None,
-            )
-            .unwrap();
+            let mut method =
+                Explicit::new(discrete(&leaf, segments), Physics::new(&leaf), &state, None)
+                    .unwrap();
             let h = method.longest_step();
             for k in 1..=1000 {
                 let found = method.advance(h * k as f64);
@@ -194,5 +207,8 @@ fn steps_beyond_the_limit_are_refused() {
     let stable = of(None).unwrap();
     assert_eq!(of(Some(0.999 * stable)), Ok(stable));
     let refused = of(Some(1.001 * stable));
-    assert!(matches!(refused, Err(Refused::Unstable { .. })), "{refused:?}");
+    assert!(
+        matches!(refused, Err(Refused::Unstable { .. })),
+        "{refused:?}"
+    );
 }

@@ -6,7 +6,6 @@ mod common;
 use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
-use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
@@ -30,7 +29,6 @@ fn every_scenario_file_ends_at_rest_within_its_tolerance() {
     assert!(files.len() >= 24);
     for file in files {
         let name = file.file_stem().unwrap().to_str().unwrap();
-        let start = Instant::now();
         let output = Command::new(assert_cmd::cargo::cargo_bin!("leafdyn"))
             .current_dir(place.path())
             .arg("relax")
@@ -38,7 +36,6 @@ fn every_scenario_file_ends_at_rest_within_its_tolerance() {
             .arg("--json")
             .output()
             .unwrap();
-        let took = start.elapsed();
         let stderr = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(0), "{name}: {stderr}");
         let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -61,7 +58,11 @@ fn every_scenario_file_ends_at_rest_within_its_tolerance() {
             "{name}"
         );
         assert!(number("residual") < 1e-5, "{name}: {}", number("residual"));
-        assert!(took < Duration::from_secs(5), "{name}: {took:?}");
+        let work = &summary["work"];
+        assert!(
+            work["force_evaluations"].as_u64().unwrap() < 1000,
+            "{name}: {work}"
+        );
         for file in [
             "summary.json",
             "centerlines.csv",

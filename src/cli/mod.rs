@@ -6,17 +6,20 @@ mod progress;
 mod relax;
 mod report;
 mod request;
+mod simulate;
+mod simulate_report;
 mod text;
 
 use std::error::Error;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::process::{self, ExitCode};
+use std::sync::OnceLock;
 
 use clap::{Parser, Subcommand};
 
-use leafdyn::output;
+use leafdyn::output::{self, Keeper, OutputError};
 
-/// How a leaf of coupled elastic veins comes to rest: its shape, with an error bar and a statement of stability.
+/// How a leaf of coupled elastic veins comes to rest, with an error bar and a statement of stability, and how it moves.
 #[derive(Debug, Parser)]
 #[command(name = "leafdyn", version, about, arg_required_else_help = true)]
 pub struct Cli {
@@ -28,6 +31,7 @@ pub struct Cli {
 enum Verb {
     Relax(relax::Relax),
     Check(check::Check),
+    Simulate(simulate::Simulate),
 }
 
 impl Cli {
@@ -36,6 +40,7 @@ impl Cli {
         match self.verb {
             Verb::Relax(relax) => relax.run(),
             Verb::Check(check) => check.run(),
+            Verb::Simulate(simulate) => simulate.run(),
         }
     }
 }
@@ -46,11 +51,12 @@ pub type Refusal = Box<dyn Error>;
 /// What the process tells its caller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// At rest within the tolerance; of a check: both methods agree.
+    /// At rest within the tolerance; of a check: both methods agree; of a
+    /// simulation: followed to its end.
     Success = 0,
     /// The run ended otherwise: not at rest within the tolerance; of a check:
-    /// the methods differ or could not be compared. What was found is written
-    /// all the same.
+    /// the methods differ or could not be compared; of a simulation: it ended
+    /// early. What was found is written all the same.
     Failure = 1,
     /// The request was refused, or its result could not be written.
     Refused = 2,
@@ -65,13 +71,47 @@ impl From<Status> for ExitCode {
     }
 }
 
-/// Lets Ctrl-C end the process at once, with no file half written.
+/// What keeps a simulation when the process is stopped, if there is one.
+static KEEPER: OnceLock<Keeper> = OnceLock::new();
+
+/// Lets Ctrl-C end the process at once, with no file half written, and a
+/// simulation kept.
 pub fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     ctrlc::set_handler(|| {
+        let kept = KEEPER.get().and_then(Keeper::keep_for_good);
         output::abandon_unfinished();
-        process::exit(INTERRUPTED);
+        if io::stderr().is_terminal() {
+            // The progress line may be there.
+            let _ = write!(io::stderr(), "\r\x1b[2K");
+        }
+        let status = match kept.map(|kept| tell_kept(&kept)) {
+            Some(Status::Refused) => Status::Refused as i32,
+            _ => INTERRUPTED,
+        };
+        process::exit(status);
     })?;
     Ok(())
+}
+
+/// Lets Ctrl-C keep what this keeper keeps, from now on.
+fn keep_on_interrupt(keeper: Keeper) {
+    // A process has one simulation.
+    let _ = KEEPER.set(keeper);
+}
+
+/// Says where a simulation that was kept can go on, or why it cannot.
+fn tell_kept(kept: &Result<f64, OutputError>) -> Status {
+    match kept {
+        Ok(time) => {
+            let time = text::brief(*time);
+            note(&format!("stopped at t = {time}; go on with --resume"));
+            Status::Success
+        }
+        Err(error) => {
+            note(&format!("error: {error}"));
+            Status::Refused
+        }
+    }
 }
 
 /// A line on standard error; if nobody can read it, nothing is lost.

@@ -32,8 +32,23 @@ impl ProgressLine {
         }
     }
 
+    /// How far a relaxation has come.
     pub fn update(&mut self, progress: &Progress) {
-        if !self.terminal || self.start.elapsed() < LONG_RUN {
+        self.say(|elapsed| {
+            format!(
+                "{} segments a vein, step {}, residual {:.1e}, {:.0} s",
+                progress.grid,
+                progress.step,
+                progress.residual,
+                elapsed.as_secs_f64(),
+            )
+        });
+    }
+
+    /// Shows a message, which is told how long the run has taken.
+    pub fn say(&mut self, message: impl FnOnce(Duration) -> String) {
+        let elapsed = self.start.elapsed();
+        if !self.terminal || elapsed < LONG_RUN {
             return;
         }
         let bar = self.bar.get_or_insert_with(|| {
@@ -43,13 +58,7 @@ impl ProgressLine {
                 .with_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()))
                 .with_prefix(self.scenario.clone())
         });
-        bar.set_message(format!(
-            "{} segments a vein, step {}, residual {:.1e}, {:.0} s",
-            progress.grid,
-            progress.step,
-            progress.residual,
-            self.start.elapsed().as_secs_f64(),
-        ));
+        bar.set_message(message(elapsed));
     }
 }
 

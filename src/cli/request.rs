@@ -17,7 +17,7 @@ pub struct Request {
     #[arg(value_hint = ValueHint::FilePath)]
     scenario: PathBuf,
 
-    /// Wanted accuracy of the centerlines, relative to the largest rod length; overrides the scenario's
+    /// Wanted accuracy of the centerlines, relative to the largest rod length; in time, of a semi-implicit step; overrides the scenario's
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     pub tolerance: Option<f64>,
 
@@ -57,15 +57,25 @@ impl Request {
         report: impl FnOnce(Option<&Path>) -> String,
     ) -> Result<(), Refusal> {
         let written = output::write_all(folder, result);
-        if self.json {
-            let mut json = Vec::new();
-            R::FORMATS[0].write(result, &mut json)?;
-            show(&json)?;
-        } else {
-            show(report(written.is_ok().then_some(folder)).as_bytes())?;
-        }
+        self.show(result, || report(written.is_ok().then_some(folder)))?;
         written?;
         Ok(())
+    }
+
+    /// Shows a result: as JSON, or as a report.
+    pub fn show<R: Written>(
+        &self,
+        result: &R,
+        report: impl FnOnce() -> String,
+    ) -> Result<(), Refusal> {
+        match self.json {
+            true => {
+                let mut json = Vec::new();
+                R::FORMATS[0].write(result, &mut json)?;
+                show(&json)
+            }
+            false => show(report().as_bytes()),
+        }
     }
 }
 

@@ -21,15 +21,25 @@ pub fn lay_out(heading: &str, lines: &[(&str, String)]) -> String {
 
 /// The files of a result in their folder.
 pub fn written<R: Written>(folder: &Path) -> String {
-    let names: Vec<&str> = R::FORMATS.iter().map(|format| format.file_name()).collect();
+    named(folder, R::FORMATS.iter().map(|format| format.file_name()))
+}
+
+/// Files in a folder.
+pub fn named<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> String {
+    let names: Vec<&str> = names.collect();
     format!("{}: {}", folder.display(), names.join(", "))
 }
 
 /// How many veins, and how their tips are.
 pub fn veins(equilibrium: &Equilibrium) -> String {
-    match equilibrium.rods.len() {
+    veins_of(equilibrium.rods.len(), equilibrium.joined)
+}
+
+/// The same, of any leaf.
+pub fn veins_of(count: usize, joined: bool) -> String {
+    match count {
         1 => "1 vein".to_string(),
-        count if equilibrium.joined => format!("{count} veins joined at the tip"),
+        count if joined => format!("{count} veins joined at the tip"),
         count => format!("{count} veins with free tips"),
     }
 }
@@ -98,6 +108,28 @@ pub fn significant(value: f64) -> String {
     format!("{value:.*}", (DIGITS - exponent) as usize)
 }
 
+/// Five digits at most.
+pub fn brief(value: f64) -> String {
+    match value.abs() {
+        0.0 => "0".into(),
+        size if (1e-3..1e5).contains(&size) => {
+            let decimals = (4 - size.log10().floor() as i32).max(0) as usize;
+            without_idle_zeros(&format!("{value:.decimals$}")).into()
+        }
+        _ => match format!("{value:.4e}").split_once('e') {
+            Some((digits, power)) => format!("{}e{power}", without_idle_zeros(digits)),
+            None => value.to_string(),
+        },
+    }
+}
+
+fn without_idle_zeros(digits: &str) -> &str {
+    match digits.contains('.') {
+        true => digits.trim_end_matches('0').trim_end_matches('.'),
+        false => digits,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -108,6 +140,18 @@ mod tests {
         assert_eq!(significant(-0.00123), "-0.001230000000");
         assert_eq!(significant(1.5e-30), "1.500000000e-30");
         assert_eq!(significant(f64::NAN), "NaN");
+    }
+
+    #[test]
+    fn brief_numbers_have_five() {
+        assert_eq!(brief(0.6000000000000001), "0.6");
+        assert_eq!(brief(-1234.567), "-1234.6");
+        assert_eq!(brief(12.0), "12");
+        assert_eq!(brief(3e-9 / 7.0), "4.2857e-10");
+        assert_eq!(brief(3e-5), "3e-5");
+        assert_eq!(brief(20000.0), "20000");
+        assert_eq!(brief(f64::NAN), "NaN");
+        assert_eq!(brief(0.0), "0");
     }
 
     #[test]

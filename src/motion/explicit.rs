@@ -15,6 +15,7 @@ use glam::DVec3;
 use pulp::Arch;
 use rayon::prelude::*;
 
+use super::fictitious;
 use super::friction::rates;
 use super::kernel::{Drift, Forces, GROUP, Kick, Neighbour, Positions, Powers};
 use super::ledger::{Exchange, Ledger, measure};
@@ -131,19 +132,39 @@ impl<'a> Explicit<'a> {
         self.longest
     }
 
+    /// Gives the nodes masses that serve to come to rest, not to move: see
+    /// [`fictitious`]. Time steps may be as long as one then, and the leaf is
+    /// stopped.
+    pub fn disguise(&mut self) {
+        let tip = fictitious::masses(&self.leaf, &mut self.rods);
+        self.tip_mass = self.tip_mass.map(|_| tip);
+        self.stop();
+    }
+
+    /// Takes all velocities away.
+    pub fn stop(&mut self) {
+        for rod in &mut self.rods {
+            for array in rod.motion.v.iter_mut().chain(&mut rod.motion.p) {
+                array.fill(0.0);
+            }
+        }
+        self.widths = [0.0; 2];
+    }
+
     /// Lets every velocity decay at this rate from now on.
     pub fn damp(&mut self, rate: f64) {
         self.physics.damping = rate;
     }
 
-    /// One time step.
-    fn step(&mut self, h: f64) {
-        let exchange = self.kick_until(0.5 * h, true);
+    /// One time step; returns twice the kinetic energy at its beginning.
+    pub fn step(&mut self, h: f64) -> f64 {
+        let (exchange, energy) = self.kick_until(0.5 * h, true);
         self.ledger.add(exchange);
         self.drift(h);
         self.widths = [h, self.widths[0]];
         self.time += h;
         self.steps += 1;
+        energy
     }
 
     /// By how much time velocities lag behind positions: half a step, but not
@@ -154,8 +175,9 @@ impl<'a> Explicit<'a> {
 
     /// Kicks velocities, by the forces at the present positions, to where they
     /// are `ahead` of these. Strains become the last step's if they are to be
-    /// remembered.
-    fn kick_until(&mut self, ahead: f64, remember: bool) -> Exchange {
+    /// remembered. Returns twice the kinetic energy in the middle of the kick,
+    /// too.
+    fn kick_until(&mut self, ahead: f64, remember: bool) -> (Exchange, f64) {
         let length = self.behind() + ahead;
         let [from, to] = [self.time - self.behind(), self.time + ahead];
         let loads = self.physics.loads(self.time);
@@ -168,10 +190,11 @@ impl<'a> Explicit<'a> {
         if self.physics.rest_changes() {
             work -= powers.rest * (self.physics.rest(to) - self.physics.rest(from));
         }
-        Exchange {
+        let exchange = Exchange {
             dissipated: length * (self.physics.damping * energy + powers.friction),
             work,
-        }
+        };
+        (exchange, energy)
     }
 
     /// What is between the potentials of two loads, the leaf standing still.
@@ -335,6 +358,12 @@ impl<'a> Explicit<'a> {
     }
 
     /// Positions, rotations and segment forces now.
+    pub fn now(&mut self) -> State {
+        self.forces(false);
+        self.state()
+    }
+
+    /// The same, but the forces as they were computed last.
     fn state(&self) -> State {
         let n = self.leaf.segments();
         let nodes =
@@ -386,7 +415,7 @@ impl Method for Explicit<'_> {
 
     fn snapshot(&mut self) -> Snapshot {
         let rods = self.rods.clone();
-        let exchange = self.kick_until(0.0, false);
+        let (exchange, _) = self.kick_until(0.0, false);
         let state = self.state();
         let n = self.leaf.segments();
         let velocity: Vec<Velocity> = (self.rods.iter())

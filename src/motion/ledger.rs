@@ -31,13 +31,15 @@ pub fn measure(
     for j in 0..leaf.rods() {
         for i in 0..=n {
             let k = state.base(j) + i;
-            let Inertia { mass, transverse } = physics.inertia(leaf.leaf, &leaf.grid, j, i);
+            let Inertia {
+                mass,
+                transverse,
+                excess,
+            } = physics.inertia(leaf.leaf, &leaf.grid, j, i);
             let Velocity { angular, linear } = velocity[k];
             let spin = angular.dot(state.q[k] * DVec3::X);
             energy.kinetic += 0.5 * mass * linear.length_squared();
-            energy.kinetic += 0.5
-                * transverse
-                * (angular.length_squared() + (Inertia::POLAR - 1.0) * spin * spin);
+            energy.kinetic += 0.5 * transverse * (angular.length_squared() + excess * spin * spin);
             let (_, potential) = leaf.load(state, j, i);
             let stretch = leaf.coupling_energy(state, j, i);
             energy.coupling += stretch;
@@ -69,7 +71,9 @@ fn kick(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) -> f64 {
     let mut energy = 0.0;
     for j in 0..leaf.rods() {
         for i in 0..=n {
-            let Inertia { mass, transverse } = physics.inertia(leaf.leaf, &leaf.grid, j, i);
+            let Inertia {
+                mass, transverse, ..
+            } = physics.inertia(leaf.leaf, &leaf.grid, j, i);
             let weight = leaf.grid.weight(i) * leaf.leaf.length(j);
             energy += (weight * loads.gravity).length_squared() / mass;
             if i == n {

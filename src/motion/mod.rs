@@ -1,6 +1,7 @@
 //! Motion in time.
 
 mod explicit;
+mod fictitious;
 mod friction;
 mod kernel;
 mod lanes;

@@ -2,7 +2,7 @@
 
 use super::kernel::{GROUP, Material, Motion, Past, Positions, Powers};
 use super::method::Velocity;
-use super::physics::{Inertia, Physics};
+use super::physics::Physics;
 use crate::leaf::{DiscreteLeaf, State};
 use glam::{DQuat, DVec3};
 
@@ -83,7 +83,7 @@ pub fn rod(leaf: &DiscreteLeaf, physics: &Physics, state: &State, j: usize) -> R
         if i > 0 || !physics.clamped() {
             let inertia = physics.inertia(leaf.leaf, &leaf.grid, j, i);
             m.per_inertia[at] = 1.0 / inertia.transverse;
-            m.per_spin[at] = (1.0 / Inertia::POLAR - 1.0) / inertia.transverse;
+            m.per_spin[at] = 1.0 / inertia.polar() - 1.0 / inertia.transverse;
             if i < n || !joined {
                 m.mass[at] = inertia.mass;
                 m.per_mass[at] = 1.0 / inertia.mass;

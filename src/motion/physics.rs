@@ -11,13 +11,17 @@ use glam::DVec3;
 pub struct Inertia {
     /// Mass.
     pub mass: f64,
-    /// Moment of inertia about d2 and d3; that about d1 is twice it.
+    /// Moment of inertia about d2 and d3.
     pub transverse: f64,
+    /// By what part of this that about d1 is larger.
+    pub excess: f64,
 }
 
 impl Inertia {
-    /// Moment of inertia about d1 (of a round section) over the other two.
-    pub const POLAR: f64 = 2.0;
+    /// Moment of inertia about d1.
+    pub fn polar(&self) -> f64 {
+        self.transverse * (1.0 + self.excess)
+    }
 }
 
 /// Inertia, damping and loads of a leaf.
@@ -90,6 +94,7 @@ impl Physics {
         Inertia {
             mass: length * self.dynamics.density[j].at(sigma) / self.density,
             transverse: length * self.dynamics.rotary_inertia[j].at(sigma) / rotary,
+            excess: self.dynamics.polar_excess,
         }
     }
 

@@ -499,7 +499,7 @@ fn add_inertia(
 /// Tensor of inertia of a node.
 fn tensor(inertia: &Inertia, state: &State, k: usize) -> DMat3 {
     let d1 = state.q[k] * DVec3::X;
-    let excess = (Inertia::POLAR - 1.0) * inertia.transverse;
+    let excess = inertia.excess * inertia.transverse;
     DMat3::from_diagonal(DVec3::splat(inertia.transverse)) + rotation::outer(d1, d1) * excess
 }
 

@@ -22,7 +22,7 @@ use std::array::from_fn;
 
 use nalgebra::SMatrix;
 
-use super::physics::{Inertia, Physics};
+use super::physics::Physics;
 use crate::leaf::{DiscreteLeaf, State};
 use glam::{DMat3, DQuat, DVec3};
 
@@ -96,13 +96,15 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
                 return [DMat3::ZERO; 2];
             }
             let node = state.base(j) + i + end;
-            let Inertia { mass, transverse } = physics.inertia(leaf.leaf, &leaf.grid, j, i + end);
+            let inertia = physics.inertia(leaf.leaf, &leaf.grid, j, i + end);
             let [shift, turn] = hold(&stiffness, end, state.q[node]);
             let moving = match joined && i + end == n {
                 true => DVec3::splat(tip_mass * shift.max_element() / tip),
-                false => mass * shift / held[node][0],
+                false => inertia.mass * shift / held[node][0],
             };
-            let turning = transverse * DVec3::new(Inertia::POLAR, 1.0, 1.0) * turn / held[node][1];
+            let turning = DVec3::new(inertia.polar(), inertia.transverse, inertia.transverse)
+                * turn
+                / held[node][1];
             let frame = DMat3::from_quat(state.q[node]);
             [moving, turning].map(|mass| {
                 let root = DMat3::from_diagonal(mass.map(f64::sqrt).recip());

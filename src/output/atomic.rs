@@ -37,23 +37,41 @@ pub(super) fn write_file(
     file: &Path,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
-    let draft = draft_path(file);
-    let mut out = {
-        let mut paths = unfinished();
-        let created = File::create(&draft)?;
-        paths.push(draft.clone());
-        BufWriter::with_capacity(BUFFER_BYTES, created)
-    };
+    let (draft, created) = begin(file)?;
+    let mut out = BufWriter::with_capacity(BUFFER_BYTES, created);
     let filled = fill(&mut out).and_then(|()| out.flush());
     drop(out);
-
-    let mut paths = unfinished();
-    let finished = filled.and_then(|()| fs::rename(&draft, file));
+    let finished = filled.and_then(|()| finish(&draft, file));
     if finished.is_err() {
-        let _ = fs::remove_file(&draft);
+        discard(&draft);
     }
-    paths.retain(|path| *path != draft);
     finished
+}
+
+/// Begins a file under another name, to be finished or discarded.
+pub(super) fn begin(file: &Path) -> io::Result<(PathBuf, File)> {
+    let draft = draft_path(file);
+    let mut paths = unfinished();
+    let created = File::create(&draft)?;
+    paths.push(draft.clone());
+    Ok((draft, created))
+}
+
+/// Gives a draft the name of a finished file.
+pub(super) fn finish(draft: &Path, file: &Path) -> io::Result<()> {
+    let mut paths = unfinished();
+    fs::rename(draft, file)?;
+    paths.retain(|path| path != draft);
+    Ok(())
+}
+
+/// Removes a draft, if it still is one.
+pub(super) fn discard(draft: &Path) {
+    let mut paths = unfinished();
+    if paths.iter().any(|path| path == draft) {
+        let _ = fs::remove_file(draft);
+        paths.retain(|path| path != draft);
+    }
 }
 
 /// A hidden name beside `file` that no other process uses.

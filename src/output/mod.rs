@@ -2,9 +2,12 @@
 //! trait. A file is complete or absent, never half written.
 
 mod atomic;
+mod checksum;
 mod csv;
 mod figure;
 mod json;
+mod part;
+mod recording;
 #[cfg(test)]
 mod sample;
 mod words;
@@ -16,11 +19,13 @@ use thiserror::Error;
 
 pub use atomic::{abandon_unfinished, check_writable};
 pub use csv::Centerlines;
-pub use figure::{FigurePng, FigureSvg};
-pub use json::{CheckSummary, Summary};
-pub use words::{equilibrium_of_index, headline, power_of_ten, shooting, verdict};
+pub use figure::{FigurePng, FigureSvg, MotionFigure};
+pub use json::{CheckSummary, MotionSummary, Summary};
+pub use recording::{CannotResume, Keeper, Recording};
+pub use words::{equilibrium_of_index, headline, model, power_of_ten, shooting, verdict};
 
 use crate::relax::Equilibrium;
+use crate::simulate::Record;
 use crate::study::Check;
 
 /// One way to write a result down.
@@ -46,6 +51,16 @@ impl Written for Equilibrium {
 
 impl Written for Check {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[&CheckSummary, &FigureSvg, &FigurePng];
+}
+
+impl Written for Record {
+    const FORMATS: &'static [&'static dyn Format<Self>] = &[
+        &MotionSummary,
+        &MotionFigure::ENERGY_SVG,
+        &MotionFigure::ENERGY_PNG,
+        &MotionFigure::FILMSTRIP_SVG,
+        &MotionFigure::FILMSTRIP_PNG,
+    ];
 }
 
 /// Why a file could not be written.

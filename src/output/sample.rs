@@ -5,8 +5,10 @@ use std::f64::consts::PI;
 use glam::{DQuat, DVec3};
 
 use crate::bvp::{self, Neutral, Solution};
-use crate::relax::{Equilibrium, NodeState, Outcome, RodShape, Work};
+use crate::motion::{Energy, StableStep, Velocity};
+use crate::relax::{Equilibrium, Model, NodeState, Outcome, RodShape, Work};
 use crate::shape::Difference;
+use crate::simulate::{Frame, Moment, Record, Scheme, Still};
 use crate::study::{Check, Shot, Verdict};
 
 /// A fan of `rods` arcs of length 1, given at `segments` + 1 stations.
@@ -44,6 +46,7 @@ pub fn fan(rods: usize, segments: usize) -> Equilibrium {
         method: "semi-implicit",
         outcome: Outcome::Converged,
         remark: None,
+        model: Model::default(),
         segments: vec![segments],
         intervals: None,
         tolerance: 1e-6,
@@ -121,5 +124,80 @@ pub fn check(rods: usize, segments: usize, angle: f64) -> Check {
         } else {
             Verdict::Differ
         },
+    }
+}
+
+/// That fan at a time, swinging up and down.
+pub fn frame(rods: usize, segments: usize, time: f64) -> Frame {
+    let leaf = fan(rods, segments);
+    let nodes = || leaf.rods.iter().flat_map(|rod| &rod.nodes);
+    let swing = DVec3::new(1.0, 1.0, 2.0 * time.cos());
+    let turn = DQuat::from_rotation_y(0.1 * time.sin());
+    let positions: Vec<DVec3> = nodes().map(|node| node.position * swing).collect();
+    let moving = |x: &DVec3| Velocity {
+        angular: DVec3::new(0.1, -0.2, 0.3 * time.sin()),
+        linear: DVec3::new(0.0, 0.0, -x.z * time.sin() / 3.0),
+    };
+    Frame {
+        time,
+        steps: (100.0 * time) as usize,
+        rods,
+        velocities: positions.iter().map(moving).collect(),
+        positions,
+        rotations: nodes().map(|node| turn * node.rotation).collect(),
+        energy: moment(time).energy,
+    }
+}
+
+/// The energies of a damped swing at a time.
+pub fn moment(time: f64) -> Moment {
+    let left = (-0.1 * time).exp();
+    let (fast, high) = (time.sin().powi(2), time.cos().powi(2));
+    Moment {
+        time,
+        steps: (100.0 * time) as usize,
+        energy: Energy {
+            kinetic: left * fast,
+            elastic: 0.7 * left * high,
+            coupling: 0.1 * left * high,
+            potential: 0.2 * left * high - 3.0,
+            dissipated: 1.0 - left + 1e-5 * time.sin(),
+            work: 0.0,
+        },
+        tip: DVec3::new(0.95, 0.0, -0.3 * time.cos()),
+    }
+}
+
+/// A swing followed for 10 units of time.
+pub fn record(rods: usize, segments: usize) -> Record {
+    let moments: Vec<Moment> = (0..=100).map(|i| moment(0.1 * f64::from(i))).collect();
+    let still = |moment: usize| Still {
+        moment,
+        curves: frame(rods, segments, moments[moment].time)
+            .positions
+            .chunks(segments + 1)
+            .map(<[DVec3]>::to_vec)
+            .collect(),
+    };
+    Record {
+        scenario: "swing".into(),
+        scheme: Scheme::Explicit,
+        stopped: None,
+        rods,
+        joined: true,
+        length: 1.0,
+        segments,
+        tolerance: 1e-6,
+        duration: 10.0,
+        longest_step: Some(9e-3),
+        stable_step: Some(StableStep {
+            step: 1e-2,
+            limit: "shear with rotation",
+        }),
+        steps: 1000,
+        stills: [0, 10, 25, 40, 55, 70, 85, 100].map(still).into(),
+        tips: vec![moments[100].tip],
+        moments,
+        wall_seconds: 0.1,
     }
 }

@@ -2,6 +2,7 @@
 //! the nested grids with their extrapolation, saddles, and the result.
 
 mod equilibrium;
+mod explicit;
 mod grids;
 mod index;
 mod moment;
@@ -16,9 +17,9 @@ mod shooting;
 mod start;
 
 pub use crate::shape::{NodeState, RodShape};
-pub use equilibrium::{Equilibrium, Outcome, Saddle, Work};
+pub use equilibrium::{Equilibrium, Model, Outcome, Saddle, Work};
 pub use grids::{check_segments, relax};
 pub use index::index_near;
-pub use options::{Method, Options, Progress, RelaxError};
+pub use options::{LARGEST_TOLERANCE, Method, Options, Progress, RelaxError, SMALLEST_TOLERANCE};
 pub use shooting::check_intervals;
 pub use start::start;

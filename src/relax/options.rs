@@ -6,6 +6,9 @@ pub enum Method {
     /// Linearly implicit damped motion that turns into Newton's method.
     #[default]
     SemiImplicit,
+    /// Explicit damped motion, then with masses and damping chosen for speed.
+    /// Not for rigid rods.
+    Explicit,
     /// The boundary-value problem by multiple shooting ([`crate::bvp`]), from
     /// arcs by continuation. Finds equilibria, stable or not.
     Shooting,
@@ -16,6 +19,7 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Method::SemiImplicit => "semi-implicit",
+            Method::Explicit => "explicit",
             Method::Shooting => "shooting",
         }
     }
@@ -34,6 +38,8 @@ pub struct Options {
     /// Whether to stop at a saddle instead of leaving it. Newton's method is
     /// then not steered towards stable equilibria at all.
     pub keep_unstable: bool,
+    /// Whether to solve for the whole leaf where half would do.
+    pub full_model: bool,
     /// Shooting only: over so many intervals; `None`: as many as the growth of
     /// perturbations needs.
     pub intervals: Option<usize>,
@@ -97,6 +103,22 @@ pub enum RelaxError {
         /// Their product.
         nodes: usize,
     },
+    /// The explicit method has no stable time step for rigid rods.
+    #[error(
+        "--method explicit: a stiffness is inf, and no time step is short enough for rigid rods; give a number, or use semi-implicit"
+    )]
+    Rigid,
+    /// The explicit method follows forces, and a dead moment may feed a motion
+    /// without end.
+    #[error(
+        "--method explicit: under load.tip_moment, which has no potential, motion need not come to rest; use semi-implicit, or shooting"
+    )]
+    Follows,
+    /// Unstable equilibria were asked of a method that leaves them.
+    #[error(
+        "--keep-unstable: explicit motion leaves unstable equilibria; use --method semi-implicit or shooting"
+    )]
+    Leaves,
     /// A grid was asked for where there is none.
     #[error(
         "--segments {found}: shooting has no grid; leave it out, or set the number of intervals with --intervals"

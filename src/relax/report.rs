@@ -1,9 +1,10 @@
 //! From the settled grids to the result in the units of the scenario.
 
 use crate::leaf::DiscreteLeaf;
-use crate::relax::equilibrium::{Equilibrium, Outcome};
-use crate::relax::grids::{Level, Run};
+use crate::relax::equilibrium::{Equilibrium, Model, Outcome};
+use crate::relax::grids::{End, Level, Run};
 use crate::relax::richardson::Richardson;
+use crate::relax::semi_implicit::Settled;
 use crate::relax::shape;
 use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};
@@ -66,6 +67,11 @@ pub fn equilibrium(
         tip_force_sum: rods.iter().map(tip_force).sum(),
         negative_eigenvalues: run.index,
         saddle: run.saddle,
+        model: Model {
+            rods: run.solved,
+            shear: run.effects[0].map(|effect| effect * scale.length),
+            stretch: run.effects[1].map(|effect| effect * scale.length),
+        },
         work: run.work,
         wall_seconds,
         stations: first.leaf.grid.sigma().to_vec(),
@@ -147,4 +153,45 @@ fn unpack(leaf: &DiscreteLeaf, j: usize, i: usize, values: &[f64]) -> NodeState 
     node.n *= scale.force();
     node.m *= scale.moment();
     node
+}
+
+/// How a run ended: a word, and a sentence where one helps.
+pub fn outcome(run: &Run, end: End) -> (Outcome, Option<String>) {
+    let finest = run.levels.last().map_or(0, |level| level.leaf.segments());
+    match end {
+        End::Rest => (
+            match (run.index, run.saddle) {
+                (Some(1..), _) => Outcome::Saddle,
+                (_, Some(_)) => Outcome::ConvergedAfterSaddle,
+                _ => Outcome::Converged,
+            },
+            run.index.is_none().then(|| match run.leaf.tip_moment == DVec3::ZERO {
+                true => "the leaf is too large to count its negative eigenvalues: its stability is not known".into(),
+                false => "a dead moment has no potential, so that no count of eigenvalues decides stability: it is not stated".into(),
+            }),
+        ),
+        End::NotAccurate => (
+            Outcome::ToleranceNotReached,
+            Some(format!(
+                "{finest} segments a rod, the finest grid allowed, do not reach the tolerance: ask for a larger one"
+            )),
+        ),
+        End::Failed(settled) => (
+            match settled {
+                Settled::Stuck => Outcome::Diverged,
+                _ => Outcome::NotAtRest,
+            },
+            Some(match settled {
+                Settled::Unresolved => format!(
+                    "a vein bends by more than a right angle within one of {finest} segments: use more segments or smaller loads"
+                ),
+                Settled::Stuck => format!(
+                    "no step lowers the energy on {finest} segments: use more segments, or raise the softest stiffness or lower the load"
+                ),
+                _ => format!(
+                    "the step limit came before rest on {finest} segments: the load may admit no stable equilibrium; lower it"
+                ),
+            }),
+        ),
+    }
 }

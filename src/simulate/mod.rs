@@ -22,13 +22,21 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod error;
 mod frame;
+mod record;
+mod stills;
 
+pub use error::{Refused, Stopped};
 pub use frame::Frame;
+pub use record::{Moment, Record, Still};
+pub use stills::stills;
+
+use std::time::{Duration, Instant};
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::motion::{Broken, Explicit, Method, Physics, Rigid, SemiImplicit, StableStep, Steps};
-use crate::relax::{self, start};
+use crate::relax::{self, LARGEST_TOLERANCE, RelaxError, SMALLEST_TOLERANCE, start};
 use crate::scenario::{Scenario, Start};
 
 /// Segments a rod where none are asked for, if its rest shape does not need more.
@@ -64,104 +72,9 @@ pub struct Options {
     /// explicit method, nine tenths of the stable one; of the semi-implicit
     /// one, so that the error of a step stays below the scenario's tolerance.
     pub step: Option<f64>,
-}
-
-/// What cannot be simulated. Times are in the scenario's unit.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Refused {
-    /// The explicit method has no stable time step.
-    #[error(
-        "the explicit method has no stable time step for rigid rods (a stiffness is inf): \
-         use --method semi-implicit, or give a number"
-    )]
-    Rigid,
-    /// The base is to fly free, and the semi-implicit method holds it.
-    #[error(
-        "dynamics.clamped = false: the semi-implicit method holds the base: use --method explicit{}",
-        if *.rigid { ", and a number for every stiffness that is inf" } else { "" }
-    )]
-    Held {
-        /// Whether a rod is rigid, which the explicit method cannot move.
-        rigid: bool,
-    },
-    /// The time step is not positive.
-    #[error("--step {found}: must be greater than 0")]
-    NotPositive {
-        /// The step asked for.
-        found: f64,
-    },
-    /// The time step is too long for the explicit method.
-    #[error(
-        "--step {found}: the explicit method is stable up to {stable:.3e}, because of {limit}: \
-         use a shorter step, or --method semi-implicit, or leave --step out"
-    )]
-    Unstable {
-        /// The step asked for.
-        found: f64,
-        /// The longest stable one.
-        stable: f64,
-        /// What limits it.
-        limit: &'static str,
-    },
-    /// The grid is impossible.
-    #[error(transparent)]
-    Grid(#[from] relax::RelaxError),
-    /// The leaf is to start at rest and does not come to rest.
-    #[error(
-        "dynamics.start = \"at-rest\": the leaf does not come to rest under its loads at time 0 ({outcome}): use start = \"released\""
-    )]
-    NoRest {
-        /// How its relaxation ended.
-        outcome: &'static str,
-    },
-}
-
-/// Why a simulation ended before its time, in the scenario's unit of time.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum Stopped {
-    /// Energy appeared from nowhere, or a value is not a number.
-    #[error(
-        "diverged at t = {time:.6e}: energy grew from nowhere by {percent:.0} % of all that moved; use a shorter time step, or --method semi-implicit"
-    )]
-    Diverged {
-        /// When.
-        time: f64,
-        /// Energy gained, in percent of the largest that ever moved.
-        percent: f64,
-    },
-    /// The grid is too coarse.
-    #[error(
-        "at t = {time:.6e} a segment is bent by {turn:.2} rad, more than it can resolve; use more segments than {segments}"
-    )]
-    Unresolved {
-        /// When.
-        time: f64,
-        /// Bending of the segment, radians.
-        turn: f64,
-        /// Segments a rod.
-        segments: usize,
-    },
-    /// No time step is short enough.
-    #[error(
-        "at t = {time:.6e} no time step is short enough to go on; use more segments than {segments}, or slower changes of the loads"
-    )]
-    StepTooShort {
-        /// When.
-        time: f64,
-        /// Segments a rod.
-        segments: usize,
-    },
-}
-
-impl Stopped {
-    /// The word used in `summary.json`.
-    pub fn word(self) -> &'static str {
-        match self {
-            Stopped::Diverged { .. } => "diverged",
-            Stopped::Unresolved { .. } => "unresolved",
-            Stopped::StepTooShort { .. } => "step-too-short",
-        }
-    }
+    /// Replaces the scenario's tolerance: of the semi-implicit method, the
+    /// local error of a step relative to the longest rod.
+    pub tolerance: Option<f64>,
 }
 
 /// A leaf that is followed in time.
@@ -173,8 +86,10 @@ pub struct Simulation<'a> {
     stable: Option<StableStep>,
     step: Option<f64>,
     method: Box<dyn Method + Send + 'a>,
+    tolerance: f64,
     outputs: usize,
     made: usize,
+    moving: Duration,
 }
 
 impl<'a> Simulation<'a> {
@@ -190,12 +105,16 @@ impl<'a> Simulation<'a> {
             return Err(Refused::NotPositive { found });
         }
         let scenario = leaf.scenario();
+        let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
+        if !(SMALLEST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
+            return Err(RelaxError::Tolerance { found: tolerance }.into());
+        }
         let segments = relax::check_segments(leaf, options.segments, SEGMENTS)?;
         let grid = Grid::new(segments, leaf.kinks());
         let physics = Physics::new(leaf);
         let state = match scenario.dynamics.start {
             Start::Released => start(&DiscreteLeaf::new(leaf, grid.clone())),
-            Start::AtRest => at_rest(leaf, &physics, &grid)?,
+            Start::AtRest => at_rest(leaf, &physics, &grid, tolerance)?,
         };
         let discrete = || DiscreteLeaf::new(leaf, grid.clone());
         let rigid = discrete().stiffest() == 0.0;
@@ -230,7 +149,7 @@ impl<'a> Simulation<'a> {
                 Box::new(explicit)
             }
             Scheme::SemiImplicit => {
-                let steps = step.map_or(Steps::Error(scenario.tolerance), Steps::Fixed);
+                let steps = step.map_or(Steps::Error(tolerance), Steps::Fixed);
                 Box::new(SemiImplicit::new(
                     discrete(),
                     physics.clone(),
@@ -250,9 +169,16 @@ impl<'a> Simulation<'a> {
             // has no short one at its end.
             outputs: (duration / interval * (1.0 - 1e-12)).ceil().max(1.0) as usize,
             made: 0,
+            moving: Duration::ZERO,
+            tolerance,
             grid,
             physics,
         })
+    }
+
+    /// The leaf that moves.
+    pub fn leaf(&self) -> &'a Leaf<'a> {
+        self.leaf
     }
 
     /// Which method moves the leaf.
@@ -280,6 +206,17 @@ impl<'a> Simulation<'a> {
     /// unit, and what limits it.
     pub fn stable_step(&self) -> Option<StableStep> {
         self.stable
+    }
+
+    /// The local error a step of the semi-implicit method may have, relative
+    /// to the longest rod.
+    pub fn tolerance(&self) -> f64 {
+        self.tolerance
+    }
+
+    /// The time on the clock that the motion has taken since this was made.
+    pub fn wall_time(&self) -> Duration {
+        self.moving
     }
 
     /// Time steps made.
@@ -314,6 +251,13 @@ impl<'a> Simulation<'a> {
     /// If the motion cannot be trusted any more; [`Simulation::frame`] then
     /// shows it as it is.
     pub fn next_frame(&mut self) -> Result<Frame, Stopped> {
+        let clock = Instant::now();
+        let frame = self.advance();
+        self.moving += clock.elapsed();
+        frame
+    }
+
+    fn advance(&mut self) -> Result<Frame, Stopped> {
         let (duration, interval) = self.physics.duration();
         let until = match self.made + 1 >= self.outputs {
             true => duration,
@@ -362,10 +306,11 @@ impl<'a> Simulation<'a> {
 }
 
 /// The equilibrium under the loads and with the rest shape of time 0.
-fn at_rest(leaf: &Leaf, physics: &Physics, grid: &Grid) -> Result<State, Refused> {
+fn at_rest(leaf: &Leaf, physics: &Physics, grid: &Grid, tolerance: f64) -> Result<State, Refused> {
     let scenario = at_beginning(leaf.scenario());
     let options = relax::Options {
         segments: Some(grid.segments()),
+        tolerance: Some(tolerance),
         ..relax::Options::default()
     };
     let found = relax::relax(&scenario, &options, &mut |_| {})?;

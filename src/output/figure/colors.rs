@@ -22,11 +22,12 @@ pub const SHADOW: Color = Color(212, 213, 220);
 pub const DOT: Color = Color(213, 60, 30);
 
 /// Curves that must be told apart, also by the colour-blind (Okabe and Ito).
-pub const CURVES: [Color; 4] = [
+pub const CURVES: [Color; 5] = [
     Color(0, 114, 178),
     Color(0, 158, 115),
     Color(213, 94, 0),
     Color(170, 90, 150),
+    Color(225, 160, 20),
 ];
 
 /// Viridis (Smith and van der Walt, matplotlib) at equal distances.

@@ -17,15 +17,29 @@ pub const NOTE_BASE: f64 = 60.0;
 
 /// Draws the title, as much of it as fits, the notes, and the key.
 pub fn draw(page: &mut Drawing, title: &str, notes: &[String], veins: &Veins) {
-    const TITLE_BASE: f64 = 38.0;
+    draw_from(LEFT, page, title, notes, veins);
+}
+
+/// The same, with the text beginning at `left`.
+pub fn draw_from(left: f64, page: &mut Drawing, title: &str, notes: &[String], veins: &Veins) {
     let font = Font::embedded();
     let key_start = key(page, veins, &font);
-    let shown = shortened(title, key_start - LEFT - 20.0, &font);
-    let base = DVec2::new(LEFT, TITLE_BASE);
+    text(page, title, notes, (left, key_start - 20.0), &font);
+}
+
+/// Draws the title, as much of it as fits, and the notes.
+pub fn draw_without_key(page: &mut Drawing, title: &str, notes: &[String]) {
+    text(page, title, notes, (LEFT, WIDTH - RIGHT), &Font::embedded());
+}
+
+fn text(page: &mut Drawing, title: &str, notes: &[String], (left, right): (f64, f64), font: &Font) {
+    const TITLE_BASE: f64 = 38.0;
+    let shown = shortened(title, right - left, font);
+    let base = DVec2::new(left, TITLE_BASE);
     page.label(base, &shown, TITLE_SIZE, Anchor::Start, INK);
     // Spaces that SVG does not collapse.
     let notes = notes.join("\u{a0}\u{a0}·\u{a0}\u{a0}");
-    let base = DVec2::new(LEFT, NOTE_BASE);
+    let base = DVec2::new(left, NOTE_BASE);
     page.label(base, &notes, TEXT_SIZE, Anchor::Start, NOTE);
 }
 

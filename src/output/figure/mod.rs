@@ -1,18 +1,23 @@
 //! Figures: a leaf from above, from the side, from the front and in space; of a
-//! check also how far both solutions are apart.
+//! check also how far both solutions are apart; of a motion the energies in
+//! time, and the leaf at some instants.
 //!
 //! One drawing code fills a [`drawing::Drawing`]; `svg` writes it down and
 //! `png` paints it, so that both files are the same picture.
 
 mod check;
 mod colors;
+mod curves;
 mod differences;
 mod drawing;
+mod energy;
+mod filmstrip;
 mod flat;
 mod font;
 mod header;
 mod leaf;
 mod markers;
+mod motion;
 mod page;
 mod png;
 mod space;
@@ -20,6 +25,7 @@ mod svg;
 mod ticks;
 mod veins;
 
+pub use motion::MotionFigure;
 pub use png::FigurePng;
 pub use svg::FigureSvg;
 

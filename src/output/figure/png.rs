@@ -29,9 +29,13 @@ impl<R: Pictured> Format<R> for FigurePng {
     }
 
     fn write(&self, result: &R, out: &mut dyn Write) -> io::Result<()> {
-        let canvas = paint(&result.draw());
-        encode(&canvas, out)
+        write_drawing(&result.draw(), out)
     }
+}
+
+/// Writes the whole file.
+pub fn write_drawing(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
+    encode(&paint(drawing), out)
 }
 
 fn paint(drawing: &Drawing) -> Pixmap {

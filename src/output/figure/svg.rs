@@ -22,7 +22,8 @@ impl<R: Pictured> Format<R> for FigureSvg {
     }
 }
 
-fn write_drawing(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
+/// Writes the whole file.
+pub fn write_drawing(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
     let Drawing { width, height, .. } = drawing;
     writeln!(
         out,

@@ -53,17 +53,19 @@ pub struct Veins {
 
 impl Veins {
     pub fn of(equilibrium: &Equilibrium) -> Self {
-        let unit = equilibrium
-            .rods
-            .iter()
-            .map(|rod| rod.length)
-            .fold(0.0, f64::max);
-        let unit = if unit.is_finite() && unit > 0.0 {
-            unit
+        let lengths = equilibrium.rods.iter().map(|rod| rod.length);
+        let longest = lengths.fold(0.0, f64::max);
+        Veins::through(&equilibrium.curves, &equilibrium.tips, longest)
+    }
+
+    /// Veins through these points, with the longest rod as the unit.
+    pub fn through(curves: &[Vec<DVec3>], tips: &[DVec3], longest: f64) -> Self {
+        let unit = if longest.is_finite() && longest > 0.0 {
+            longest
         } else {
             1.0
         };
-        let count = equilibrium.curves.len();
+        let count = curves.len();
         let every = count.div_ceil(MOST_VEINS).max(1);
         let color = |index: usize| match count {
             0 | 1 => vein_color(0.3),
@@ -74,17 +76,17 @@ impl Veins {
         let veins: Vec<Vein> = (0..count)
             .filter(|&index| chosen(index))
             .map(|index| {
-                let points = drawable(&equilibrium.curves[index], unit);
+                let points = drawable(&curves[index], unit);
                 Vein {
                     pieces: smooth(&points),
                     color: color(index),
                 }
             })
             .collect();
-        let joined = equilibrium.tips.len() == 1;
-        let tips = (0..equilibrium.tips.len())
+        let joined = tips.len() == 1;
+        let tips = (0..tips.len())
             .filter(|&index| joined || chosen(index))
-            .map(|index| (equilibrium.tips[index] / unit, color(index)))
+            .map(|index| (tips[index] / unit, color(index)))
             .filter(|(tip, _)| is_near(*tip))
             .collect();
 
@@ -156,7 +158,8 @@ impl Veins {
     }
 }
 
-fn is_near(point: DVec3) -> bool {
+/// Whether a point, in lengths, can be drawn.
+pub fn is_near(point: DVec3) -> bool {
     point.is_finite() && point.abs().max_element() < FARTHEST
 }
 

@@ -53,6 +53,8 @@ struct Differences {
 #[derive(Serialize)]
 struct Relaxation<'a> {
     outcome: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    remark: Option<&'a str>,
     segments: &'a [usize],
     error_estimate: Option<f64>,
     residual: f64,
@@ -154,6 +156,7 @@ impl<'a> From<&'a Equilibrium> for Relaxation<'a> {
         let (tip, tips) = tips(&relaxed.tips);
         Relaxation {
             outcome: relaxed.outcome.word(),
+            remark: relaxed.remark.as_deref(),
             segments: &relaxed.segments,
             error_estimate: relaxed.error_estimate,
             residual: relaxed.residual,

@@ -1,6 +1,7 @@
 //! JSON, for scripts: compact, numbers that are not finite as null.
 
 mod check;
+mod motion;
 mod summary;
 
 use std::io::{self, Write};
@@ -10,6 +11,7 @@ use serde::Serialize;
 use serde_json::ser::Formatter;
 
 pub use check::CheckSummary;
+pub use motion::MotionSummary;
 pub use summary::Summary;
 
 type Point = [f64; 3];
@@ -27,7 +29,7 @@ fn tips(tips: &[DVec3]) -> (Option<Point>, Option<Vec<Point>>) {
 }
 
 /// Writes the whole file.
-fn write(object: &impl Serialize, out: &mut dyn Write) -> io::Result<()> {
+pub(super) fn write(object: &impl Serialize, out: &mut dyn Write) -> io::Result<()> {
     let mut serializer = serde_json::Serializer::with_formatter(&mut *out, Layout::default());
     object.serialize(&mut serializer)?;
     out.write_all(b"\n")

@@ -25,8 +25,10 @@ pub(in super::super) fn read(raw: &Raw, rods: &[Rod], loads: [[f64; 3]; 3]) -> R
             .transpose()
     };
     let duration = value(Key::Duration, Range::Positive)?.unwrap_or(preset.duration);
+    let section = rotary_inertia(raw, &preset.density)?;
     Ok(Dynamics {
-        rotary_inertia: rotary_inertia(raw, &preset.density)?.unwrap_or(preset.rotary_inertia),
+        polar_excess: if section.is_some() { 1.0 } else { 0.0 },
+        rotary_inertia: section.unwrap_or(preset.rotary_inertia),
         external_damping: value(Key::ExternalDamping, Range::NotNegative)?
             .unwrap_or(preset.external_damping),
         internal_damping: value(Key::InternalDamping, Range::NotNegative)?

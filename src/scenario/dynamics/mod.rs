@@ -7,8 +7,8 @@ mod section;
 
 use super::{Profile, Rod, Schedule};
 
-/// Radius of the section over the length of the longest rod: the round section
-/// whose axial stiffness is 100 A/L^2, since H/A = 4/r^2.
+/// Radius of the section over the length of the longest rod: its radius of
+/// gyration, half of this, is the relaxation's.
 const RADIUS: f64 = 0.2;
 /// Frequency of the lowest mode of a clamped rod, in units of sqrt(A/(rho L^4)).
 const LOWEST_FREQUENCY: f64 = 3.516;
@@ -34,8 +34,13 @@ pub struct Dynamics {
     /// Mass per unit reference length, one per rod; positive.
     pub density: Vec<Profile>,
     /// rho I, the moment of inertia per unit reference length about d2 and
-    /// about d3, one per rod; positive. That about d1 is twice it.
+    /// about d3, one per rod; positive.
     pub rotary_inertia: Vec<Profile>,
+    /// By what part of it that about d1 is larger: 1 of a section that is
+    /// given, as for every round one; 0 where none is given and a vein turns
+    /// with its strip of blade as it does on its way to rest
+    /// ([`crate::relax`]), about all axes alike.
+    pub polar_excess: f64,
     /// Viscous force per unit reference length and velocity. Rotation is damped
     /// at the same rate: by this over the density times the angular momentum.
     pub external_damping: f64,
@@ -110,6 +115,7 @@ impl Dynamics {
         let duration = DURATION * time;
         Dynamics {
             rotary_inertia: round(&density, RADIUS * longest(rods)),
+            polar_excess: 0.0,
             external_damping: 2.0 * LOWEST_FREQUENCY * mean_of(&density) / time,
             density,
             internal_damping: 0.0,

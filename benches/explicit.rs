@@ -1,0 +1,112 @@
+//! How fast the explicit method steps, and how the explicit relaxation compares
+//! with the semi-implicit one. `cargo bench --bench explicit`.
+
+use leafdyn::leaf::{DiscreteLeaf, Grid, Leaf};
+use leafdyn::motion::{Explicit, Method, Physics};
+use leafdyn::relax::{self, Options, relax, start};
+use leafdyn::scenario::Scenario;
+use std::path::Path;
+use std::time::Instant;
+
+/// Veins and segments a vein.
+const LEAVES: [(usize, usize); 8] = [
+    (1, 50),
+    (1, 100),
+    (1, 1000),
+    (5, 50),
+    (35, 50),
+    (35, 100),
+    (35, 200),
+    (35, 400),
+];
+
+/// Segments times steps of one measurement: some tens of milliseconds.
+const WORK: usize = 1_000_000;
+
+const REPEATS: usize = 15;
+
+fn read(figure: &str, rods: usize) -> Scenario {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/paper/{figure}.toml"));
+    Scenario::read(&file, &[format!("leaf.rods={rods}")]).expect("the scenario is sound")
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Nanoseconds per segment and step; threads take turns, so that a busy machine
+/// treats them alike.
+fn rates(rods: usize, segments: usize, pools: &[rayon::ThreadPool]) -> Vec<f64> {
+    let scenario = read("fig04", rods);
+    let leaf = Leaf::new(&scenario);
+    let discrete = DiscreteLeaf::new(&leaf, Grid::new(segments, &[]));
+    let physics = Physics::new(&leaf);
+    let state = start(&discrete);
+    let steps = (WORK / (rods * segments)).max(20);
+    let mut found = vec![Vec::new(); pools.len()];
+    for _ in 0..REPEATS {
+        for (pool, found) in pools.iter().zip(&mut found) {
+            let seconds = pool.install(|| {
+                let motion = Explicit::new(discrete.clone(), physics.clone(), &state, None);
+                let mut motion = motion.expect("no rod is rigid");
+                let until = motion.longest_step() * steps as f64;
+                let clock = Instant::now();
+                motion.advance(until).expect("the motion is stable");
+                clock.elapsed().as_secs_f64()
+            });
+            found.push(1e9 * seconds / (rods * segments * steps) as f64);
+        }
+    }
+    found.into_iter().map(median).collect()
+}
+
+fn milliseconds(scenario: &Scenario, method: relax::Method) -> (f64, usize) {
+    let options = Options {
+        method,
+        ..Options::default()
+    };
+    let mut steps = 0;
+    let runs = (0..5).map(|_| {
+        let leaf = relax(scenario, &options, &mut |_| {}).expect("the request is sound");
+        assert!(leaf.outcome.is_success());
+        steps = leaf.work.steps;
+        1e3 * leaf.wall_seconds
+    });
+    (median(runs.collect()), steps)
+}
+
+fn main() {
+    let threads = rayon::current_num_threads();
+    let pools: Vec<rayon::ThreadPool> = [1, threads]
+        .map(|count| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(count);
+            pool.build().expect("threads can be started")
+        })
+        .into();
+    println!("Fig. 4's leaf, explicit: nanoseconds per segment and step, looks at the energy");
+    println!("included, median of {REPEATS}.");
+    println!();
+    println!("| N | segments a vein | 1 thread | {threads} threads |");
+    println!("| --- | --- | --- | --- |");
+    for (rods, segments) in LEAVES {
+        let found = rates(rods, segments, &pools);
+        println!(
+            "| {rods} | {segments} | {:.1} | {:.1} |",
+            found[0], found[1]
+        );
+    }
+    println!();
+    println!("Relaxation to 1e-6 with error estimate and index, N = 5: milliseconds, median of 5.");
+    println!();
+    println!("| figure | semi-implicit | steps | explicit | steps |");
+    println!("| --- | --- | --- | --- | --- |");
+    for figure in [
+        "fig04", "fig05", "fig06", "fig08", "fig09", "fig10", "fig13",
+    ] {
+        let scenario = read(figure, 5);
+        let (semi_implicit, few) = milliseconds(&scenario, relax::Method::SemiImplicit);
+        let (explicit, many) = milliseconds(&scenario, relax::Method::Explicit);
+        println!("| {figure} | {semi_implicit:.1} | {few} | {explicit:.0} | {many} |");
+    }
+}

@@ -1,0 +1,167 @@
+//! `leafdyn simulate`: a leaf moves.
+
+use std::path::Path;
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+
+use leafdyn::leaf::Leaf;
+use leafdyn::output::{OutputError, Recording};
+use leafdyn::simulate::{Options, Scheme, Simulation, Stopped};
+
+use super::progress::ProgressLine;
+use super::request::Request;
+use super::text::brief;
+use super::{Refusal, Status, keep_on_interrupt, note, simulate_report, tell_kept};
+
+/// Follow a leaf as it moves: its shape, velocities and energies in time.
+///
+/// Exit status: 0 followed to its end; 1 ended early, as the motion could not
+/// be trusted any more (the files are still written and say how far it came);
+/// 2 the request was refused; 130 stopped by Ctrl-C (--resume goes on).
+#[derive(Debug, Args)]
+pub struct Simulate {
+    #[command(flatten)]
+    request: Request,
+
+    /// How the leaf is moved; left out: explicit, unless a rod is rigid
+    #[arg(long, value_name = "NAME", value_enum)]
+    method: Option<MethodName>,
+
+    /// N segments a rod; left out: 16, or as many as the rest shape needs
+    #[arg(long, value_name = "N")]
+    segments: Option<usize>,
+
+    /// The longest time step; left out: explicit: nine tenths of the longest stable one; semi-implicit: as the tolerance, the local error of a step, allows
+    #[arg(long, value_name = "H", allow_negative_numbers = true)]
+    step: Option<f64>,
+
+    /// Go on where the same run was stopped by Ctrl-C
+    #[arg(long)]
+    resume: bool,
+}
+
+/// The methods by the names users type.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum MethodName {
+    Explicit,
+    SemiImplicit,
+}
+
+impl From<MethodName> for Scheme {
+    fn from(name: MethodName) -> Self {
+        match name {
+            MethodName::Explicit => Scheme::Explicit,
+            MethodName::SemiImplicit => Scheme::SemiImplicit,
+        }
+    }
+}
+
+impl Simulate {
+    pub fn run(self) -> Result<Status, Refusal> {
+        let (scenario, folder) = self.request.open()?;
+        let leaf = Leaf::new(&scenario);
+        let options = Options {
+            scheme: self.method.map(Scheme::from),
+            segments: self.segments,
+            step: self.step,
+            tolerance: self.request.tolerance,
+        };
+        let mut simulation = Simulation::new(&leaf, &options)?;
+        let mut recording = match self.resume {
+            true => Recording::resume(&folder, &mut simulation)?,
+            false => Recording::begin(&folder, &mut simulation)?,
+        };
+        keep_on_interrupt(recording.keeper());
+        let ended = self.follow(&mut simulation, &mut recording, &folder);
+        if ended.is_err()
+            && let Some(kept) = recording.keeper().keep()
+        {
+            // What was found so far need not be lost with the files.
+            tell_kept(&kept);
+        }
+        ended
+    }
+
+    fn follow(
+        &self,
+        simulation: &mut Simulation,
+        recording: &mut Recording,
+        folder: &Path,
+    ) -> Result<Status, Refusal> {
+        let stopped = record(simulation, recording)?;
+        let record = recording.record(simulation, stopped)?;
+        if let (true, Some(stopped)) = (self.request.json, stopped) {
+            note(&format!("{}: {stopped}", record.scenario));
+        }
+        let written = recording.finish(&record);
+        self.request.show(&record, || {
+            let files = written.as_ref().ok().map(|files| (folder, &files[..]));
+            simulate_report::report(&record, files)
+        })?;
+        written?;
+        Ok(match stopped {
+            None => Status::Success,
+            Some(_) => Status::Failure,
+        })
+    }
+}
+
+/// Moves the leaf to the end, or as far as it goes, and records it.
+fn record(
+    simulation: &mut Simulation,
+    recording: &mut Recording,
+) -> Result<Option<Stopped>, OutputError> {
+    let scenario = simulation.leaf().scenario();
+    let duration = scenario.dynamics.duration;
+    let mut line = ProgressLine::new(&scenario.name);
+    let (clock, begin) = (Instant::now(), simulation.time());
+    while !simulation.done() {
+        let frame = match simulation.next_frame() {
+            Ok(frame) => frame,
+            Err(stopped) => return Ok(Some(stopped)),
+        };
+        recording.add(simulation, &frame)?;
+        line.say(|_| {
+            let speed = (frame.time - begin) / clock.elapsed().as_secs_f64();
+            progress(frame.time, duration, speed)
+        });
+    }
+    Ok(None)
+}
+
+/// How far a simulation has come, at so many units of time per second.
+fn progress(time: f64, duration: f64, speed: f64) -> String {
+    let left = ((duration - time) / speed).ceil();
+    let left = match left as u64 {
+        _ if !left.is_finite() => "?".into(),
+        seconds @ 0..120 => format!("{seconds} s"),
+        seconds @ 120..7200 => format!("{} min", seconds.div_ceil(60)),
+        seconds => format!("{} h", seconds.div_ceil(3600)),
+    };
+    format!(
+        "t = {} of {}, {} a second, {left} left",
+        brief(time),
+        brief(duration),
+        brief(speed)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_left_are_readable() {
+        for (speed, left) in [
+            (1.0, "10 s left"),
+            (0.01, "17 min left"),
+            (1e-4, "28 h left"),
+            (0.0, "? left"),
+        ] {
+            let said = progress(2.0, 12.0, speed);
+            assert!(said.starts_with("t = 2 of 12, "), "{said}");
+            assert!(said.ends_with(left), "{said}");
+        }
+    }
+}

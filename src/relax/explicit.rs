@@ -1,0 +1,224 @@
+//! Rest by explicit motion.
+//!
+//! First the leaf moves as the relaxation's leaf does, with true masses and
+//! damping and every motion resolved, until it is in a valley of its energy:
+//! that decides which equilibrium it finds. Then only the way to the bottom
+//! matters, and masses and damping are chosen for speed: masses that make the
+//! fastest motions of all segments alike ([`crate::motion`]), and damping at the
+//! rate 3/t, begun anew whenever the leaf moves uphill. (So damped, motion comes
+//! to rest as an accelerated descent does, without its lowest frequency being
+//! known: Su, Boyd and Candes, J. Mach. Learn. Res. 17, 2016; O'Donoghue and
+//! Candes, Found. Comput. Math. 15, 2015.) Measured on the paper's leaves it takes
+//! fewer steps than kinetic damping, up to six times fewer, and as many as
+//! constant damping when that was chosen best.
+
+use crate::leaf::{DiscreteLeaf, Leaf, SparsePattern, State, System};
+use crate::motion::{Broken, Explicit, Method, Physics};
+use crate::relax::equilibrium::Work;
+use crate::relax::options::{Options, RelaxError};
+use crate::relax::saddle;
+use crate::relax::semi_implicit::Settled;
+use crate::scenario::Rod;
+use glam::DVec3;
+
+/// Time between looks at the moving leaf, in units of sqrt(rho L^4/A).
+const LOOK: f64 = 0.25;
+
+/// It is in a valley if its energy is convex at so many looks in a row, and
+/// no more of its motion than this part is left.
+const CONVEX: usize = 3;
+const SLOW: f64 = 1e-2;
+
+/// Time after which it need not be: soft modes take longer to decide.
+const LONGEST_MOTION: f64 = 100.0;
+
+/// Time step with the masses chosen for speed; the stable one is one.
+const STEP: f64 = 0.95;
+
+/// Steps between looks at what is unbalanced.
+const STEPS_PER_LOOK: usize = 200;
+
+/// Accuracy that rounding allows.
+const LEAST_ACCURACY: f64 = 1e-10;
+
+/// Unbalanced forces at which the remaining way is first measured, over the
+/// accuracy wanted.
+const FIRST_BALANCE: f64 = 0.1;
+
+/// Looks without progress after which only rounding is left, if the remaining
+/// way is no longer than this.
+const STAGNATION: usize = 50;
+const LONGEST_REMAINING: f64 = 1e-6;
+
+/// Nodes times steps after which a leaf that has not come to rest is given up:
+/// some ten seconds.
+const BUDGET: usize = 600_000_000;
+
+/// What is asked and counted.
+pub struct Request<'a> {
+    /// Wanted accuracy of positions and rotations.
+    pub accuracy: f64,
+    /// Whether the state only has to be corrected.
+    pub near_rest: bool,
+    /// Work done so far.
+    pub work: &'a mut Work,
+    /// Told steps and the largest unbalanced force or moment.
+    pub progress: &'a mut dyn FnMut(usize, f64),
+    /// Whether the leaf's energy was not convex on its way.
+    pub moved: bool,
+}
+
+/// Refuses what explicit motion cannot do.
+pub fn check(leaf: &Leaf, options: &Options) -> Result<(), RelaxError> {
+    let rigid = |rod: &Rod| {
+        let stiffness = rod.force_stiffness.iter();
+        stiffness
+            .fold(0.0_f64, |m, h| m.max(h.max_abs()))
+            .is_infinite()
+    };
+    if leaf.scenario().rods.iter().any(rigid) {
+        return Err(RelaxError::Rigid);
+    }
+    if leaf.tip_moment != DVec3::ZERO {
+        return Err(RelaxError::Follows);
+    }
+    if options.keep_unstable {
+        return Err(RelaxError::Leaves);
+    }
+    Ok(())
+}
+
+/// Lets the leaf come to rest.
+pub fn settle(
+    leaf: &DiscreteLeaf,
+    state: &mut State,
+    system: &mut System,
+    request: &mut Request,
+) -> Settled {
+    let Ok(mut motion) = Explicit::new(leaf.clone(), Physics::at_rest(leaf.leaf), state, None)
+    else {
+        return Settled::Stuck;
+    };
+    let most_steps = BUDGET / (leaf.rods() * leaf.segments());
+    let settled = match request.near_rest {
+        true => Ok(()),
+        false => find_valley(leaf, &mut motion, system, most_steps, request),
+    };
+    let settled = settled.and_then(|()| descend(leaf, &mut motion, system, most_steps, request));
+    request.work.steps += motion.steps();
+    request.work.force_evaluations += motion.steps();
+    *state = motion.now();
+    match settled {
+        Ok(remaining) => Settled::Rest(remaining),
+        Err(settled) => settled,
+    }
+}
+
+/// Damped motion into the valley in which the leaf will come to rest.
+fn find_valley(
+    leaf: &DiscreteLeaf,
+    motion: &mut Explicit,
+    system: &mut System,
+    most_steps: usize,
+    request: &mut Request,
+) -> Result<(), Settled> {
+    let (mut fastest, mut convex) = (0.0_f64, 0);
+    while motion.time() < LONGEST_MOTION {
+        motion
+            .advance(motion.time() + LOOK)
+            .map_err(|broken| match broken {
+                Broken::Unresolved { .. } => Settled::Unresolved,
+                _ => Settled::Stuck,
+            })?;
+        let now = motion.snapshot();
+        fastest = fastest.max(now.energy.kinetic);
+        let slow = now.energy.kinetic <= SLOW * fastest;
+        let shift = leaf.neutral_shift();
+        let valley = saddle::index(leaf, &now.state, system, shift, request.work) == Some(0);
+        convex = if valley { convex + 1 } else { 0 };
+        request.moved |= !valley;
+        if slow && convex >= CONVEX {
+            break;
+        }
+        if motion.steps() > most_steps {
+            return Err(Settled::StepLimit);
+        }
+        (request.progress)(motion.steps(), leaf.residual(&now.state));
+    }
+    Ok(())
+}
+
+/// To the bottom of the valley; returns what is left of the way.
+fn descend(
+    leaf: &DiscreteLeaf,
+    motion: &mut Explicit,
+    system: &mut System,
+    most_steps: usize,
+    request: &mut Request,
+) -> Result<f64, Settled> {
+    let accuracy = request.accuracy.max(LEAST_ACCURACY);
+    motion.disguise();
+    let mut balanced = FIRST_BALANCE * accuracy;
+    let (mut since, mut before) = (0, 0.0);
+    let (mut best, mut looks_since_best) = (f64::INFINITY, 0);
+    loop {
+        for _ in 0..STEPS_PER_LOOK {
+            let rate = 3.0 / (STEP * (since + 2) as f64);
+            motion.damp(rate);
+            let moving = motion.step(STEP);
+            // What the forces do: kinetic energy gained, and lost to damping.
+            let downhill = 0.5 * (moving - before) / STEP + rate * moving;
+            (since, before) = (since + 1, moving);
+            if downhill < 0.0 && since > 3 {
+                motion.stop();
+                (since, before) = (0, 0.0);
+            }
+        }
+        let state = motion.now();
+        let residual = leaf.residual(&state);
+        if !(residual.is_finite() && state.x.iter().all(|x| x.is_finite())) {
+            return Err(Settled::Stuck);
+        }
+        (request.progress)(motion.steps(), residual);
+        looks_since_best = if residual < 0.5 * best {
+            0
+        } else {
+            looks_since_best + 1
+        };
+        if looks_since_best == 0 {
+            best = residual;
+        }
+        if residual <= balanced || looks_since_best > STAGNATION {
+            let remaining = remaining(leaf, &state, system, request.work);
+            if remaining <= accuracy {
+                return Ok(remaining);
+            }
+            if looks_since_best > STAGNATION {
+                return match remaining <= LONGEST_REMAINING {
+                    true => Ok(remaining),
+                    false => Err(Settled::StepLimit),
+                };
+            }
+            balanced *= (0.5 * accuracy / remaining).max(1e-3);
+        }
+        if motion.steps() > most_steps {
+            return Err(Settled::StepLimit);
+        }
+    }
+}
+
+/// How far it is to rest: the size of a Newton step, which is not made.
+fn remaining(leaf: &DiscreteLeaf, state: &State, system: &mut System, work: &mut Work) -> f64 {
+    leaf.assemble(state, system);
+    work.force_evaluations += 1;
+    work.factorizations += 1;
+    let Ok(pattern) = SparsePattern::new(system) else {
+        return f64::INFINITY;
+    };
+    let Ok(mut factor) = pattern.factorize(system, leaf.neutral_shift()) else {
+        return f64::INFINITY;
+    };
+    factor.solve(system, None);
+    let (turn, shift) = system.largest();
+    turn.max(shift)
+}

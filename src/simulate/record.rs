@@ -1,0 +1,123 @@
+//! What is known of a simulation that has ended.
+
+use super::{Frame, Scheme, Simulation, Stopped};
+use crate::motion::{Energy, StableStep};
+use crate::scenario;
+use glam::DVec3;
+
+/// What is kept of every output, in the units of the scenario.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// Time.
+    pub time: f64,
+    /// Time steps made until then.
+    pub steps: usize,
+    /// Energies.
+    pub energy: Energy,
+    /// The joint tip, or the mean of free ones.
+    pub tip: DVec3,
+}
+
+impl Moment {
+    /// What is kept of a frame. Negative zeros become zeros, as in the files,
+    /// so that a moment read back is the same.
+    pub fn of(frame: &Frame, joined: bool) -> Self {
+        let tips = frame.tips(joined);
+        let e = &frame.energy;
+        Moment {
+            time: frame.time + 0.0,
+            steps: frame.steps,
+            energy: Energy {
+                kinetic: e.kinetic + 0.0,
+                elastic: e.elastic + 0.0,
+                coupling: e.coupling + 0.0,
+                potential: e.potential + 0.0,
+                dissipated: e.dissipated + 0.0,
+                work: e.work + 0.0,
+            },
+            tip: tips.iter().sum::<DVec3>() / tips.len() as f64 + DVec3::ZERO,
+        }
+    }
+}
+
+/// The shape of a leaf at an instant, for pictures.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Still {
+    /// Which of the moments it is.
+    pub moment: usize,
+    /// Positions of the nodes of every rod, base to tip.
+    pub curves: Vec<Vec<DVec3>>,
+}
+
+/// A simulation that has ended: how, and what was seen of it. In the units of
+/// the scenario.
+#[derive(Clone, Debug)]
+pub struct Record {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// The method.
+    pub scheme: Scheme,
+    /// Why it ended before its time, if it did.
+    pub stopped: Option<Stopped>,
+    /// Number of rods.
+    pub rods: usize,
+    /// Whether their tips are one.
+    pub joined: bool,
+    /// The longest rod.
+    pub length: f64,
+    /// Segments a rod.
+    pub segments: usize,
+    /// Local error that a step of the semi-implicit method was allowed.
+    pub tolerance: f64,
+    /// How long the leaf was to be followed.
+    pub duration: f64,
+    /// The longest time step, if it was not the error that decided.
+    pub longest_step: Option<f64>,
+    /// The longest stable time step of the explicit method.
+    pub stable_step: Option<StableStep>,
+    /// Time steps made.
+    pub steps: usize,
+    /// All outputs; the first at time 0.
+    pub moments: Vec<Moment>,
+    /// The joint tip at the last output, or the tips of all rods.
+    pub tips: Vec<DVec3>,
+    /// Shapes at some of the outputs.
+    pub stills: Vec<Still>,
+    /// Time on the clock for the motion alone.
+    pub wall_seconds: f64,
+}
+
+impl Record {
+    /// The record of a simulation so far, without what was seen.
+    pub fn of(simulation: &Simulation, stopped: Option<Stopped>) -> Self {
+        let scenario = simulation.leaf().scenario();
+        Record {
+            scenario: scenario.name.clone(),
+            scheme: simulation.scheme(),
+            stopped,
+            rods: scenario.rods.len(),
+            joined: scenario.joined,
+            length: scenario::longest(&scenario.rods),
+            segments: simulation.segments(),
+            tolerance: simulation.tolerance(),
+            duration: scenario.dynamics.duration,
+            longest_step: simulation.longest_step(),
+            stable_step: simulation.stable_step(),
+            steps: simulation.steps(),
+            moments: Vec::new(),
+            tips: Vec::new(),
+            stills: Vec::new(),
+            wall_seconds: simulation.wall_time().as_secs_f64(),
+        }
+    }
+
+    /// How it ended, in one word: `completed`, or [`Stopped::word`].
+    pub fn outcome(&self) -> &'static str {
+        self.stopped.map_or("completed", Stopped::word)
+    }
+
+    /// The time of the last output.
+    pub fn time(&self) -> f64 {
+        self.moments.last().map_or(0.0, |moment| moment.time)
+    }
+}

@@ -1,0 +1,166 @@
+//! Explicit motion comes to rest where the semi-implicit relaxation does, and
+//! where the damped motion of which both are short cuts ends.
+
+mod common;
+#[path = "common/random.rs"]
+mod random;
+
+use common::{files, scenario};
+use leafdyn::leaf::Leaf;
+use leafdyn::relax::{Equilibrium, Method, Options, Outcome, RelaxError, relax};
+use leafdyn::scenario::Scenario;
+use leafdyn::simulate::{self, Scheme, Simulation};
+use proptest::strategy::{Strategy, ValueTree};
+use proptest::test_runner::TestRunner;
+
+/// Of positions, in lengths of the leaf.
+const CLOSE: f64 = 1e-8;
+
+fn rest(scenario: &Scenario, method: Method, segments: Option<usize>) -> Equilibrium {
+    let options = Options {
+        method,
+        segments,
+        ..Options::default()
+    };
+    let leaf = relax(scenario, &options, &mut |_| {}).unwrap();
+    assert!(leaf.outcome.is_success(), "{}: {:?}", scenario.name, leaf);
+    leaf
+}
+
+#[track_caller]
+fn agree_on(scenario: &Scenario, segments: usize) {
+    let explicit = rest(scenario, Method::Explicit, Some(segments));
+    let semi_implicit = rest(scenario, Method::SemiImplicit, Some(segments));
+    let apart = common::apart(scenario, &explicit.rods, &semi_implicit.rods).position;
+    assert!(apart < CLOSE, "{}: {apart:.1e}", scenario.name);
+    assert_eq!(
+        explicit.negative_eigenvalues,
+        semi_implicit.negative_eigenvalues
+    );
+    let energies = explicit.energy - semi_implicit.energy;
+    assert!(energies.abs() < 1e-9 * semi_implicit.energy.abs().max(1.0));
+}
+
+#[test]
+fn on_every_figure_of_the_paper() {
+    for file in files("paper") {
+        // The paper's soft leaves bend too much for fewer.
+        agree_on(&Scenario::read(&file, &["leaf.rods=5".into()]).unwrap(), 32);
+    }
+}
+
+#[test]
+fn on_fig_4_with_as_many_veins_as_the_paper() {
+    agree_on(&scenario("paper/fig04", &[]), 16);
+}
+
+#[test]
+fn on_the_classic_problems_it_can_do() {
+    let mut done = 0;
+    for file in files("classic") {
+        let scenario = Scenario::read(&file, &[]).unwrap();
+        let options = Options {
+            method: Method::Explicit,
+            ..Options::default()
+        };
+        match relax(&scenario, &options, &mut |_| {}) {
+            Ok(explicit) => {
+                done += 1;
+                assert_eq!(explicit.outcome, Outcome::Converged, "{}", scenario.name);
+                let other = rest(&scenario, Method::SemiImplicit, None);
+                let both = explicit.error_estimate.unwrap() + other.error_estimate.unwrap();
+                for (a, b) in explicit.tips.iter().zip(&other.tips) {
+                    assert!((*a - *b).length() <= both, "{}", scenario.name);
+                }
+            }
+            Err(RelaxError::Rigid | RelaxError::Follows) => {}
+            Err(refused) => panic!("{}: {refused}", scenario.name),
+        }
+    }
+    assert!(done >= 9, "{done}");
+}
+
+#[test]
+fn on_leaves_nobody_has_thought_of() {
+    let mut runner = TestRunner::deterministic();
+    let mut agreed = 0;
+    for case in 0..25 {
+        let scenario = random::leaves().new_tree(&mut runner).unwrap().current();
+        let options = Options {
+            method: Method::Explicit,
+            tolerance: Some(1e-5),
+            ..Options::default()
+        };
+        let Ok(explicit) = relax(&scenario, &options, &mut |_| {}) else {
+            continue;
+        };
+        assert!(explicit.outcome.is_success(), "leaf {case}: {explicit:?}");
+        let other = common::settle(&scenario, 1e-8);
+        let apart = common::tip(&explicit) - common::tip(&other);
+        let length = common::scale(&scenario).length;
+        assert!(apart.length() < 2e-5 * length, "leaf {case}: {apart}");
+        agreed += 1;
+    }
+    assert!(agreed >= 15, "{agreed}");
+}
+
+/// Of several equilibria, the one in which the damped motion ends, resolved by
+/// steps a hundredth as long as the relaxation's.
+#[test]
+fn the_damped_motion_ends_there() {
+    for (figure, duration) in [("fig08", 10.0), ("fig09", 5.0), ("fig10", 10.0)] {
+        let entries = [
+            "leaf.rods=5".into(),
+            format!("dynamics.duration={duration}"),
+        ];
+        let leaf_scenario = scenario(&format!("paper/{figure}"), &entries);
+        let leaf = Leaf::new(&leaf_scenario);
+        let options = simulate::Options {
+            scheme: Some(Scheme::Explicit),
+            segments: Some(64),
+            ..simulate::Options::default()
+        };
+        let mut simulation = Simulation::new(&leaf, &options).unwrap();
+        while !simulation.done() {
+            simulation.next_frame().unwrap();
+        }
+        let end = simulation.frame().tips(true)[0];
+        for method in [Method::Explicit, Method::SemiImplicit] {
+            let tip = rest(&leaf_scenario, method, Some(64)).tips[0];
+            assert!((tip - end).length() < 0.01, "{figure}: {tip} or {end}");
+        }
+    }
+}
+
+/// What it takes, which does not depend on the machine.
+#[test]
+fn its_work_is_known() {
+    for (figure, most) in [("fig04", 4000), ("fig06", 3000), ("fig10", 25_000)] {
+        let scenario = scenario(&format!("paper/{figure}"), &["leaf.rods=5".into()]);
+        let leaf = rest(&scenario, Method::Explicit, Some(32));
+        assert!(leaf.work.steps < most, "{figure}: {:?}", leaf.work);
+        assert!(leaf.work.steps > most / 2, "{figure}: {:?}", leaf.work);
+        assert!(leaf.work.factorizations < 60);
+    }
+}
+
+#[test]
+fn what_it_cannot_do_is_refused() {
+    let explicit = |name: &str, keep_unstable| {
+        let options = Options {
+            method: Method::Explicit,
+            keep_unstable,
+            ..Options::default()
+        };
+        relax(&scenario(name, &[]), &options, &mut |_| {}).unwrap_err()
+    };
+    for (name, keep, part) in [
+        ("classic/lens_30", false, "a stiffness is inf"),
+        ("classic/rollup", false, "load.tip_moment"),
+        ("paper/fig04", true, "--keep-unstable"),
+    ] {
+        let message = explicit(name, keep).to_string();
+        assert!(message.contains(part), "{message}");
+        assert!(message.contains("semi-implicit"), "{message}");
+    }
+}

@@ -1,0 +1,273 @@
+//! A simulation that is stopped and resumed writes the same files, to the last
+//! bit, as one that is not.
+#![cfg(unix)]
+
+mod workplace;
+
+use std::fs;
+use std::process::{Child, Command, Output, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use workplace::{Workplace, leaf, text};
+
+/// So many outputs are waited for before a run is stopped.
+const OUTPUTS: usize = 20;
+
+const LEFT: [&str; 3] = ["checkpoint.json", "energy.csv.part", "motion.csv.part"];
+
+/// A run that takes about a second by the explicit method.
+const EXPLICIT: [&str; 4] = ["long.toml", "--method", "explicit", "--json"];
+
+const LONG: &str = "
+[dynamics]
+duration = 90
+output_interval = 0.5
+internal_damping = 0.002
+";
+
+/// And one by the semi-implicit method whose motion is an array.
+const SEMI_IMPLICIT: [&str; 6] = [
+    "fine.toml",
+    "--method",
+    "semi-implicit",
+    "--tolerance",
+    "1e-5",
+    "--json",
+];
+
+const FINE: &str = "
+[dynamics]
+start = \"at-rest\"
+duration = 6
+output_interval = 0.0025
+internal_damping = 0.01
+tip_force = { at = [1, 3, 4], value = [[0, 0, 0], [0, 0.5, 1], [0, 0, 0]] }
+";
+
+/// A folder with both leaves.
+fn workplace() -> Workplace {
+    let place = Workplace::new();
+    for (file, dynamics) in [("long.toml", LONG), ("fine.toml", FINE)] {
+        fs::write(place.path(file), leaf("small", 5) + dynamics).unwrap();
+    }
+    place
+}
+
+/// Lines of the energies that are on the disk.
+fn outputs(place: &Workplace, folder: &str) -> usize {
+    let Ok(entries) = fs::read_dir(place.path(folder)) else {
+        return 0;
+    };
+    let names = entries.map(|entry| entry.unwrap().path());
+    let energy = |path: &std::path::PathBuf| {
+        let name = path.file_name().unwrap().to_string_lossy();
+        name.contains("energy.csv") && name.ends_with(".part")
+    };
+    let bytes = names
+        .filter(energy)
+        .map(|path| fs::read(path).unwrap_or_default());
+    let lines = |bytes: Vec<u8>| bytes.iter().filter(|&&byte| byte == b'\n').count();
+    bytes.map(lines).sum()
+}
+
+/// Waits until there are so many outputs, and stops the run.
+#[track_caller]
+fn stop(place: &Workplace, folder: &str, child: Child, after: usize) -> Output {
+    let start = Instant::now();
+    while outputs(place, folder) <= after {
+        assert!(start.elapsed() < Duration::from_secs(60), "nothing happens");
+        thread::sleep(Duration::from_millis(1));
+    }
+    let killed = Command::new("kill")
+        .arg("-INT")
+        .arg(child.id().to_string())
+        .status();
+    assert!(killed.unwrap().success());
+    child.wait_with_output().unwrap()
+}
+
+fn start(place: &Workplace, arguments: &[&str]) -> Child {
+    place
+        .command(&[&["simulate"], arguments].concat())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+/// Stops a run in the folder `out`, and checks what it leaves.
+#[track_caller]
+fn stopped(place: &Workplace, arguments: &[&str]) {
+    let arguments = [arguments, &["--out", "out"]].concat();
+    let output = stop(place, "out", start(place, &arguments), OUTPUTS);
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{said}");
+    assert_eq!(text(&output.stdout), "");
+    assert!(said.starts_with("stopped at t = "), "{said}");
+    assert!(said.ends_with("; go on with --resume\n"), "{said}");
+}
+
+/// A run that is stopped twice on the way ends like one that is not.
+#[track_caller]
+fn ends_the_same(arguments: &[&str]) {
+    let place = workplace();
+    let whole = place.run(&[&["simulate"], arguments, &["--out", "whole"]].concat());
+    assert_eq!(whole.status.code(), Some(0), "{}", text(&whole.stderr));
+
+    stopped(&place, arguments);
+    let left = place.names("out");
+    assert_eq!(left.len(), LEFT.len(), "{left:?}");
+    let resume = [arguments, &["--resume"]].concat();
+    let before = outputs(&place, "out");
+    let again = start(&place, &[&resume[..], &["--out", "out"]].concat());
+    let again = stop(&place, "out", again, before + OUTPUTS);
+    assert_eq!(again.status.code(), Some(130), "{}", text(&again.stderr));
+    assert_eq!(place.names("out"), left);
+    let resumed = place.run(&[&["simulate"], &resume[..], &["--out", "out"]].concat());
+    assert_eq!(resumed.status.code(), Some(0), "{}", text(&resumed.stderr));
+    assert_eq!(text(&resumed.stderr), "");
+
+    let names = place.names("whole");
+    assert_eq!(place.names("out"), names);
+    assert_eq!(names.len(), 7);
+    for name in names {
+        let [a, b] = ["whole", "out"].map(|folder| {
+            let bytes = fs::read(place.path(folder).join(&name)).unwrap();
+            match name.as_str() {
+                "summary.json" => without_wall_seconds(&bytes),
+                _ => bytes,
+            }
+        });
+        assert!(a == b, "{name} differs");
+    }
+    assert_eq!(
+        without_wall_seconds(&whole.stdout),
+        without_wall_seconds(&resumed.stdout)
+    );
+}
+
+fn without_wall_seconds(summary: &[u8]) -> Vec<u8> {
+    let lines = text(summary).lines();
+    let kept: Vec<&str> = lines
+        .filter(|line| !line.contains("wall_seconds"))
+        .collect();
+    kept.join("\n").into_bytes()
+}
+
+#[test]
+fn a_stopped_explicit_run_goes_on() {
+    ends_the_same(&EXPLICIT);
+}
+
+#[test]
+fn a_stopped_semi_implicit_run_goes_on() {
+    ends_the_same(&SEMI_IMPLICIT);
+}
+
+/// Resuming something else is refused, and changes nothing.
+#[test]
+fn only_the_same_run_is_resumed() {
+    let place = workplace();
+    stopped(&place, &EXPLICIT);
+    assert_eq!(place.names("out"), LEFT);
+    let read = |name: &str| fs::read(place.path("out").join(name)).unwrap();
+    let kept = LEFT.map(read);
+
+    let refused = |arguments: &[&str], messages: &[&str]| {
+        let output = place.run(&[&["simulate", "--resume", "--out", "out"], arguments].concat());
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        for message in messages {
+            assert!(said.contains(message), "{message} in {said}");
+        }
+        assert_eq!(place.names("out"), LEFT, "{arguments:?}");
+    };
+    let with = |more: &[&'static str]| [&EXPLICIT[..], more].concat();
+    for (arguments, message) in [
+        (with(&["--segments", "8"]), "segments 16, now 8"),
+        (with(&["--step", "1e-3"]), "time step "),
+        (
+            with(&["--tolerance", "1e-5"]),
+            "tolerance 0.000001, now 0.00001",
+        ),
+        (
+            with(&["--set", "leaf.rods=6"]),
+            "an override of it, has changed",
+        ),
+        (with(&["--set", "name=other"]), "scenario small, now other"),
+        (vec!["leaf.toml"], "an override of it, has changed"),
+        (
+            vec!["long.toml", "--method", "semi-implicit"],
+            "method explicit, now semi-implicit",
+        ),
+    ] {
+        refused(
+            &arguments,
+            &["out/checkpoint.json is of another run", message, "--resume"],
+        );
+    }
+    assert_eq!(LEFT.map(read), kept);
+
+    // Damage to any of the three files is noticed.
+    for (name, bytes) in LEFT.iter().zip(&kept) {
+        let file = place.path("out").join(name);
+        let mut changed = bytes.clone();
+        let half = changed.len() / 2;
+        changed[half] = if changed[half] == b'1' { b'2' } else { b'1' };
+        for damaged in [&changed[..], &bytes[..half], &[]] {
+            fs::write(&file, damaged).unwrap();
+            let message = format!("out/{name} is damaged");
+            refused(&EXPLICIT, &["cannot resume", &message, "to begin anew"]);
+            assert_eq!(fs::read(&file).unwrap(), damaged);
+        }
+        fs::write(&file, bytes).unwrap();
+    }
+    for name in &LEFT[1..] {
+        let file = place.path("out").join(name);
+        let aside = place.path("aside");
+        fs::rename(&file, &aside).unwrap();
+        let arguments = ["simulate", "--resume", "--out", "out"];
+        let output = place.run(&[&arguments[..], &EXPLICIT].concat());
+        assert_eq!(output.status.code(), Some(2));
+        assert!(text(&output.stderr).contains(name));
+        fs::rename(&aside, &file).unwrap();
+    }
+
+    // A run that begins anew leaves nothing of the one that was kept.
+    let short = ["leaf.toml", "--set", "dynamics.duration=0.1"];
+    let arguments = [&["simulate", "--out", "out"], &short[..]].concat();
+    assert_eq!(place.run(&arguments).status.code(), Some(0));
+    let left = place.names("out");
+    assert!(left.iter().all(|name| !LEFT.contains(&name.as_str())));
+}
+
+/// What was found before a file could not be written is not lost with it.
+#[test]
+fn a_run_goes_on_when_there_is_room_on_the_disk_again() {
+    let place = Workplace::new();
+    let program = assert_cmd::cargo::cargo_bin!("leafdyn");
+    let run = |limit: &str, more: &str| -> Output {
+        // A file that grows beyond the limit is an error, not a signal.
+        let script = format!(
+            "trap '' XFSZ; {limit} exec \"$0\" simulate leaf.toml --out out \
+             --set dynamics.duration=5 --json {more}"
+        );
+        let mut shell = Command::new("sh");
+        let shell = shell.current_dir(place.path(".")).args(["-c", &script]);
+        shell.arg(program).output().unwrap()
+    };
+    // Blocks are of 512 or of 1024 bytes.
+    let output = run("ulimit -f 600;", "");
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("cannot write out/motion.csv"), "{said}");
+    assert!(said.contains("go on with --resume"), "{said}");
+    assert_eq!(place.names("out"), LEFT);
+
+    let resumed = run("", "--resume");
+    assert_eq!(resumed.status.code(), Some(0), "{}", text(&resumed.stderr));
+    let resumed = fs::read(place.path("out/motion.csv")).unwrap();
+    assert_eq!(run("", "").status.code(), Some(0));
+    assert!(resumed == fs::read(place.path("out/motion.csv")).unwrap());
+}
