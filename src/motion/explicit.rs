@@ -33,7 +33,12 @@ const WATCHED: usize = 200;
 
 /// From this many nodes on, rods are shared out among threads. Measured: below
 /// it waking the threads costs more than they bring.
-const PARALLEL_NODES: usize = 1500;
+const PARALLEL_NODES: usize = 8192;
+
+/// Rods that one thread takes: a loop over them is too short for finer shares.
+fn share(rods: usize) -> usize {
+    rods.div_ceil(rayon::current_num_threads())
+}
 
 /// A leaf on the move.
 pub struct Explicit<'a> {
@@ -251,7 +256,9 @@ impl<'a> Explicit<'a> {
             };
         };
         match self.parallel {
-            true => (self.rods.par_iter_mut().zip(&self.positions)).for_each(force),
+            true => (self.rods.par_iter_mut().zip(&self.positions))
+                .with_min_len(share(self.positions.len()))
+                .for_each(force),
             false => self.rods.iter_mut().zip(&self.positions).for_each(force),
         }
         let mut sum = Powers::default();
@@ -307,7 +314,9 @@ impl<'a> Explicit<'a> {
             }
         };
         match self.parallel {
-            true => self.rods.par_iter_mut().enumerate().for_each(one),
+            true => (self.rods.par_iter_mut().enumerate())
+                .with_min_len(share(all.len()))
+                .for_each(one),
             false => self.rods.iter_mut().enumerate().for_each(one),
         }
         let mut energy: f64 = self.rods.iter().map(|rod| rod.twice_kinetic).sum();
@@ -347,7 +356,12 @@ impl<'a> Explicit<'a> {
             rod.close(segments);
         };
         match self.parallel {
-            true => (self.rods.par_iter_mut().zip(&mut self.positions)).for_each(fly),
+            true => {
+                let share = share(self.rods.len());
+                (self.rods.par_iter_mut().zip(&mut self.positions))
+                    .with_min_len(share)
+                    .for_each(fly)
+            }
             false => self.rods.iter_mut().zip(&mut self.positions).for_each(fly),
         }
     }
