@@ -107,7 +107,10 @@
 //! meet in a point, free rods from their rest shapes, and move: linearly
 //! implicit Euler steps of a damped motion. While the energy has a direction of
 //! negative curvature, the time step is kept short enough to follow the motion;
-//! otherwise it grows until the step is Newton's.
+//! otherwise it grows until the step is Newton's. A leaf that is its own mirror
+//! image is solved by half. The explicit method ([`relax::Method::Explicit`])
+//! follows the same motion in steps short enough for the fastest waves into the
+//! valley, and then descends with masses and damping that serve nothing else.
 //!
 //! **Grids and the error** ([`relax::relax`]). The element is symmetric and its
 //! conditions hold exactly at nodes, so that its error is a series in even

@@ -139,7 +139,7 @@ fn assert_refused(arguments: &[&str], message: &[&str]) {
 
 #[test]
 fn unknown_methods_are_refused_with_the_list_of_methods() {
-    for name in ["newton", "explicit"] {
+    for name in ["newton", "implicit"] {
         assert_refused(
             &["relax", "leaf.toml", "--method", name],
             &[name, "semi-implicit"],

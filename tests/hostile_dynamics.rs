@@ -196,7 +196,7 @@ fn unknown_keys() {
         "denisty = 1.0" =>
             "leaf.toml:20: unknown key dynamics.denisty (did you mean dynamics.density?)",
             "density, rotary_inertia, section_radius, external_damping, internal_damping, duration, \
-             output_interval, clamped, gravity, tip_force, tip_moment, rest";
+             output_interval, clamped, start, gravity, tip_force, tip_moment, rest";
         "[dynamics.load]" => "unknown key dynamics.load";
     }
     let text = format!("dynamics = 3\n{STILL}");

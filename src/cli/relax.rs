@@ -33,6 +33,10 @@ pub struct Relax {
     /// Stop at a saddle instead of leaving it for a stable equilibrium
     #[arg(long)]
     keep_unstable: bool,
+
+    /// Solve for the whole leaf even if half of it would do
+    #[arg(long)]
+    full_model: bool,
 }
 
 /// The methods by the names users type.
@@ -75,6 +79,7 @@ impl Relax {
             segments: self.segments,
             tolerance: self.request.tolerance,
             keep_unstable: self.keep_unstable,
+            full_model: self.full_model,
             intervals: self.intervals,
         };
         let mut line = ProgressLine::new(&scenario.name);

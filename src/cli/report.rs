@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use leafdyn::output::{shooting, verdict};
+use leafdyn::output::{model, shooting, verdict};
 use leafdyn::relax::{Equilibrium, Method, Outcome};
 
 use super::text::{
@@ -33,6 +33,9 @@ pub fn report(equilibrium: &Equilibrium, folder: Option<&Path>) -> String {
         lines.push(("energy", significant(equilibrium.energy)));
     }
     lines.push(("error", error(equilibrium)));
+    if !equilibrium.segments.is_empty() {
+        lines.push(("model", model(equilibrium)));
+    }
     lines.push(("work", work(equilibrium)));
     if let Some(folder) = folder {
         lines.push(("written", written::<Equilibrium>(folder)));

@@ -3,6 +3,7 @@
 use super::chain::Block;
 use super::dimensionless::Leaf;
 use super::grid::Grid;
+use super::mirror::{ACROSS, FORBIDDEN};
 use super::state::{State, shift, turn};
 use super::system::{RodSystem, System, each_rod};
 use crate::rod::{Blocks, Ends, Section, Segment};
@@ -22,7 +23,8 @@ pub struct DiscreteLeaf<'a> {
     pub grid: Grid,
     /// Sections of all segments, rod after rod.
     pub sections: Vec<Section>,
-    /// Coupling of each gap, per unit of sigma.
+    /// Coupling of each gap, per unit of sigma; the last may be the one between
+    /// a rod and its image.
     coupling: Vec<DVec3>,
     /// Trapezoidal weights of the nodes as fractions of the length.
     weights: Vec<f64>,
@@ -30,6 +32,8 @@ pub struct DiscreteLeaf<'a> {
     pub load_factor: f64,
     /// The loads.
     pub loads: Loads,
+    /// Whether this is half of a leaf that is its own mirror image.
+    pub(super) mirrored: bool,
 }
 
 /// Dead loads.
@@ -60,7 +64,8 @@ impl<'a> DiscreteLeaf<'a> {
             .flat_map(|j| (0..n).map(move |i| (j, i)))
             .map(|(j, i)| leaf.section(j, grid.middle(i), grid.width(i)))
             .collect();
-        let coupling = (1..leaf.rods()).map(|g| leaf.coupling(g - 1)).collect();
+        let gaps = leaf.rods() - usize::from(!leaf.beside_image(leaf.rods() - 1));
+        let coupling = (0..gaps).map(|g| leaf.coupling(g)).collect();
         let weights = (0..=n).map(|i| grid.weight(i)).collect();
         DiscreteLeaf {
             leaf,
@@ -74,6 +79,7 @@ impl<'a> DiscreteLeaf<'a> {
                 tip_force: leaf.tip_force,
                 tip_moment: leaf.tip_moment,
             },
+            mirrored: leaf.mirrored,
         }
     }
 
@@ -87,7 +93,9 @@ impl<'a> DiscreteLeaf<'a> {
     /// The same leaf with no compliance below `floor`.
     pub fn softened(&self, floor: f64) -> Self {
         let mut soft = self.clone();
-        for section in &mut soft.sections {
+        let n = self.segments();
+        for (k, section) in soft.sections.iter_mut().enumerate() {
+            let floor = floor / self.leaf.share(k / n);
             section.compliance = section.compliance.max(DVec3::splat(floor));
             section.condensing = section.condensing.min(DVec3::splat(1.0 / floor));
         }
@@ -118,7 +126,8 @@ impl<'a> DiscreteLeaf<'a> {
 
     /// Whether the rods feel each other other than through the tip.
     pub fn coupled(&self) -> bool {
-        self.coupling.iter().any(|&k| k != DVec3::ZERO)
+        let between = self.coupling.iter().take(self.rods() - 1);
+        between.into_iter().any(|&k| k != DVec3::ZERO)
     }
 
     /// Coupling of gap `g` at node `i`, force per displacement; none at a
@@ -142,7 +151,7 @@ impl<'a> DiscreteLeaf<'a> {
 
     /// Mass of node `i` of rod `j` at unit density: rotary, translational.
     pub(super) fn mass(&self, j: usize, i: usize) -> [f64; 2] {
-        let mass = self.weights[i] * self.leaf.length(j);
+        let mass = self.weights[i] * self.leaf.length(j) * self.leaf.share(j);
         [RADIUS_OF_GYRATION * RADIUS_OF_GYRATION * mass, mass]
     }
 
@@ -169,12 +178,22 @@ impl<'a> DiscreteLeaf<'a> {
     pub fn load(&self, state: &State, j: usize, i: usize) -> (DVec3, f64) {
         let k = state.base(j) + i;
         let x = state.x[k];
-        let weight = self.load_factor * self.weights[i] * self.leaf.length(j);
+        let share = self.leaf.share(j);
+        let weight = self.load_factor * self.weights[i] * self.leaf.length(j) * share;
         let mut force = self.loads.gravity * weight;
         if i == self.segments() && (j == 0 || !self.leaf.joined()) {
-            force += self.load_factor * self.loads.tip_force;
+            let share = match self.leaf.joined() && self.mirrored {
+                true => 0.5,
+                false => share,
+            };
+            force += share * self.load_factor * self.loads.tip_force;
         }
         let mut energy = -force.dot(x);
+        if self.leaf.beside_image(j) {
+            let pull = -2.0 * self.spring(j, i).y * x.y;
+            force.y += pull;
+            energy -= 0.5 * pull * x.y;
+        }
         if j > 0 {
             force += self.spring(j - 1, i) * (state.x[k - self.segments() - 1] - x);
         }
@@ -254,16 +273,82 @@ impl<'a> DiscreteLeaf<'a> {
             rod.rhs[i] = [0.0; 6];
             add(&mut rod.rhs[i], -g_b, load - g_x);
             for g in [j.wrapping_sub(1), j] {
-                if g < self.coupling.len() {
+                if g < self.rods() - 1 {
                     let spring = self.spring(g, i + 1);
                     for c in 0..3 {
                         chain.diagonal[i][3 + c][3 + c] += spring[c];
                     }
                 }
             }
+            if self.leaf.beside_image(j) {
+                chain.diagonal[i][ACROSS][ACROSS] += 2.0 * self.spring(j, i + 1).y;
+            }
         }
         add(&mut rod.rhs[n - 1], self.tip_moment(), DVec3::ZERO);
+        if self.mirrored {
+            self.confine(j, rod);
+        }
         sums
+    }
+
+    /// Writes the right-hand side of the change, to first order, if the rods
+    /// had no compliance in the components `dropped` (ones and zeros).
+    pub fn assemble_stiffening(&self, state: &State, dropped: DVec3, system: &mut System) {
+        let n = self.segments();
+        for (j, rod) in system.rods.iter_mut().enumerate() {
+            rod.rhs.fill([0.0; 6]);
+            for i in 0..n {
+                let segment = self.segment(state, j, i, state.n[j * n + i]);
+                let (g_x, g_a, g_b) = segment.stiffening_gradient(self.section(j, i), dropped);
+                if i > 0 {
+                    add(&mut rod.rhs[i - 1], -g_a, g_x);
+                }
+                add(&mut rod.rhs[i], -g_b, -g_x);
+            }
+            if self.mirrored {
+                for i in 0..n {
+                    for &c in self.forbidden(j, i + 1) {
+                        rod.rhs[i][c] = 0.0;
+                    }
+                }
+            }
+        }
+    }
+
+    /// What the increments of node `i` (from 1) of rod `j` of half a leaf must
+    /// not have.
+    fn forbidden(&self, j: usize, i: usize) -> &'static [usize] {
+        if self.leaf.in_plane(j) {
+            &FORBIDDEN
+        } else if self.leaf.joined() && i == self.segments() {
+            &FORBIDDEN[2..]
+        } else {
+            &[]
+        }
+    }
+
+    /// Keeps what lies in the plane of the mirror there: the increments that
+    /// would leave it have equations of their own, which make them zero.
+    fn confine(&self, j: usize, rod: &mut RodSystem) {
+        for i in 0..self.segments() {
+            for &c in self.forbidden(j, i + 1) {
+                let block = &mut rod.chain.diagonal[i];
+                for k in 0..6 {
+                    block[c][k] = 0.0;
+                    block[k][c] = 0.0;
+                }
+                block[c][c] = 1.0;
+                if i > 0 {
+                    for row in &mut rod.chain.off[i - 1] {
+                        row[c] = 0.0;
+                    }
+                }
+                if let Some(off) = rod.chain.off.get_mut(i) {
+                    off[c] = [0.0; 6];
+                }
+                rod.rhs[i][c] = 0.0;
+            }
+        }
     }
 
     /// The state after `step` times the increments in `solution` (rod after
@@ -299,26 +384,37 @@ impl<'a> DiscreteLeaf<'a> {
                 let segment = self.segment(state, j, i, state.n[j * n + i]);
                 let (g_x, g_a, g_b) = segment.gradient(self.section(j, i));
                 if i > 0 {
-                    let unbalanced = (force + g_x).abs().max_element();
-                    largest = largest
-                        .max(unbalanced)
-                        .max((moment - g_a).abs().max_element());
+                    let (forces, moments) = self.felt(j, force + g_x, moment - g_a);
+                    largest = largest.max(forces).max(moments);
                 }
                 force = self.load(state, j, i + 1).0 - g_x;
                 moment = -g_b;
                 largest = largest.max(segment.gap.abs().max_element());
             }
             moment += self.tip_moment();
-            largest = largest.max(moment.abs().max_element());
+            let (force_felt, moment_felt) = self.felt(j, force, moment);
+            largest = largest.max(moment_felt);
             tip += force;
             if !self.leaf.joined() {
-                largest = largest.max(force.abs().max_element());
+                largest = largest.max(force_felt);
             }
         }
         if self.leaf.joined() {
+            if self.mirrored {
+                tip.y = 0.0;
+            }
             largest.max(tip.abs().max_element())
         } else {
             largest
+        }
+    }
+
+    /// The largest components of an unbalanced force and moment on a node of
+    /// rod `j` that the mirror does not balance.
+    fn felt(&self, j: usize, force: DVec3, moment: DVec3) -> (f64, f64) {
+        match self.leaf.in_plane(j) {
+            true => (force.x.abs().max(force.z.abs()), moment.y.abs()),
+            false => (force.abs().max_element(), moment.abs().max_element()),
         }
     }
 

@@ -40,6 +40,8 @@ impl Scale {
 #[derive(Clone, Debug)]
 pub struct Leaf<'a> {
     scenario: &'a Scenario,
+    /// Whether this is half of a leaf that is its own mirror image.
+    pub(super) mirrored: bool,
     /// The units.
     pub scale: Scale,
     /// Gravity per unit length.
@@ -89,6 +91,7 @@ impl<'a> Leaf<'a> {
         let vector = |a: [f64; 3], unit: f64| DVec3::from_array(a) / unit;
         Leaf {
             scenario,
+            mirrored: false,
             scale,
             gravity: vector(scenario.gravity, scale.force() / length),
             tip_force: vector(scenario.tip_force, scale.force()),
@@ -103,9 +106,14 @@ impl<'a> Leaf<'a> {
         self.scenario
     }
 
-    /// Number of rods.
+    /// Number of rods: all, or those of the half.
     pub fn rods(&self) -> usize {
-        self.scenario.rods.len()
+        let rods = self.scenario.rods.len();
+        if self.mirrored {
+            rods.div_ceil(2)
+        } else {
+            rods
+        }
     }
 
     /// Whether all tips share one point.
@@ -135,15 +143,16 @@ impl<'a> Leaf<'a> {
         let at = |p: &[crate::scenario::Profile; 3]| {
             DVec3::new(p[0].at(sigma), p[1].at(sigma), p[2].at(sigma))
         };
+        let share = self.share(j);
         Section {
             ds: self.length(j) * width,
-            couple_stiffness: at(&rod.couple_stiffness) / self.scale.stiffness,
+            couple_stiffness: share * at(&rod.couple_stiffness) / self.scale.stiffness,
             rest_curvature: at(&rod.rest_curvature) * self.scale.length,
             rest_strain: DVec3::X,
-            compliance: (at(&rod.force_stiffness) / self.scale.force()).recip(),
+            compliance: (share * at(&rod.force_stiffness) / self.scale.force()).recip(),
             condensing: DVec3::ZERO,
         }
-        .condense((CONDENSING_STIFFNESS * self.softest).max(LEAST_CONDENSING))
+        .condense(share * (CONDENSING_STIFFNESS * self.softest).max(LEAST_CONDENSING))
     }
 
     /// Coupling of gap `g` between rods g and g + 1: force per unit

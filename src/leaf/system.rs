@@ -112,7 +112,15 @@ impl System {
             tip: None,
             springs: if coupled {
                 (1..rods)
-                    .map(|g| (1..=n).map(|i| leaf.spring(g - 1, i)).collect())
+                    .map(|g| {
+                        // A node in the plane of the mirror does not answer a
+                        // pull across it.
+                        let answer = match leaf.leaf.in_plane(g) {
+                            true => DVec3::new(1.0, 0.0, 1.0),
+                            false => DVec3::ONE,
+                        };
+                        (1..=n).map(|i| answer * leaf.spring(g - 1, i)).collect()
+                    })
                     .collect()
             } else {
                 Vec::new()

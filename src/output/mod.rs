@@ -22,7 +22,7 @@ pub use csv::Centerlines;
 pub use figure::{FigurePng, FigureSvg, MotionFigure};
 pub use json::{CheckSummary, MotionSummary, Summary};
 pub use recording::{CannotResume, Keeper, Recording};
-pub use words::{equilibrium_of_index, headline, power_of_ten, shooting, verdict};
+pub use words::{equilibrium_of_index, headline, model, power_of_ten, shooting, verdict};
 
 use crate::relax::Equilibrium;
 use crate::simulate::Record;

@@ -6,7 +6,7 @@ use glam::{DQuat, DVec3};
 
 use crate::bvp::{self, Neutral, Solution};
 use crate::motion::{Energy, StableStep, Velocity};
-use crate::relax::{Equilibrium, NodeState, Outcome, RodShape, Work};
+use crate::relax::{Equilibrium, Model, NodeState, Outcome, RodShape, Work};
 use crate::shape::Difference;
 use crate::simulate::{Frame, Moment, Record, Scheme, Still};
 use crate::study::{Check, Shot, Verdict};
@@ -46,6 +46,7 @@ pub fn fan(rods: usize, segments: usize) -> Equilibrium {
         method: "semi-implicit",
         outcome: Outcome::Converged,
         remark: None,
+        model: Model::default(),
         segments: vec![segments],
         intervals: None,
         tolerance: 1e-6,

@@ -41,6 +41,32 @@ pub fn equilibrium_of_index(negative_eigenvalues: Option<usize>) -> String {
     }
 }
 
+/// What was solved, and what of it matters: in one phrase.
+pub fn model(equilibrium: &Equilibrium) -> String {
+    let (model, veins) = (&equilibrium.model, equilibrium.rods.len());
+    let mut phrases = vec![match model.rods < veins {
+        true => format!(
+            "{} of {veins} veins, the others are their mirror images",
+            model.rods
+        ),
+        false if veins == 1 => "1 vein".into(),
+        false => format!("all {veins} veins"),
+    }];
+    if !equilibrium.segments.is_empty() {
+        let grids: Vec<String> = equilibrium.segments.iter().map(usize::to_string).collect();
+        phrases.push(format!("{} segments", grids.join("+")));
+    }
+    if model.rods < veins {
+        phrases.push("stable against breaking the mirror".into());
+    }
+    for (effect, what) in [(model.shear, "shear"), (model.stretch, "stretch")] {
+        if let Some(effect) = effect {
+            phrases.push(format!("{what} matters by {}", power_of_ten(effect)));
+        }
+    }
+    phrases.join("; ")
+}
+
 /// The kind of shooting.
 pub fn shooting(intervals: usize) -> String {
     match intervals {

@@ -72,6 +72,18 @@ pub struct Saddle {
     pub tip: DVec3,
 }
 
+/// What was solved, and what it shows to be dispensable.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Model {
+    /// Rods solved for; the others are their mirror images.
+    pub rods: usize,
+    /// Largest displacement, in units of length, that would follow from
+    /// neglecting shear, to first order, on the coarsest grid.
+    pub shear: Option<f64>,
+    /// The same of stretch.
+    pub stretch: Option<f64>,
+}
+
 /// A leaf at rest (or as far as it came), in the units of its scenario.
 #[derive(Clone, Debug)]
 pub struct Equilibrium {
@@ -109,6 +121,8 @@ pub struct Equilibrium {
     pub negative_eigenvalues: Option<usize>,
     /// A saddle that was met and left.
     pub saddle: Option<Saddle>,
+    /// What was solved.
+    pub model: Model,
     /// Work done.
     pub work: Work,
     /// Time of the solve alone, in seconds.

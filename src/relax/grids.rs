@@ -1,6 +1,6 @@
 //! Nested grids: as fine as the tolerance needs, with an error estimate.
 
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, Solved, State, System, half_of, whole_of};
 use crate::relax::equilibrium::{Equilibrium, Saddle, Work};
 use crate::relax::explicit;
 use crate::relax::moment;
@@ -56,6 +56,10 @@ const ROUNDING: f64 = 4e-15;
 const BUDGET: usize = 3_000_000;
 const LEAST_EVALUATIONS: usize = 600;
 
+/// Accuracy, in the energy norm, of the effects of shear and stretch: most of
+/// that norm is stretch itself, and displacements are a small part of it.
+const EFFECT_ACCURACY: f64 = 1e-5;
+
 /// Saddles that are left before the run is given up.
 const MAX_SADDLES: i32 = 10;
 
@@ -91,24 +95,38 @@ pub fn relax(
         explicit::check(&leaf, options)?;
     }
     let first = check_segments(&leaf, options.segments, COARSEST)?;
-    let mut run = Run {
-        leaf: &leaf,
-        options,
-        tolerance,
-        progress,
-        work: Work::default(),
-        saddle: None,
-        levels: Vec::new(),
-        table: Richardson::default(),
-        index: None,
-        remaining: 0.0,
-        spent: 0,
-        pushes: 0,
+    let half = match reducible(options) {
+        true => leaf.half(),
+        false => None,
     };
-    let end = run.solve(Grid::new(first, leaf.kinks()));
+    let grid = Grid::new(first, leaf.kinks());
+    let mut work = Work::default();
+    if let Some(half) = &half {
+        let mut run = Run::new(half, options, tolerance, progress);
+        run.whole = Some(&leaf);
+        let end = run.solve(grid.clone());
+        if matches!(end, End::Rest | End::NotAccurate) && run.index == Some(0) {
+            let run = run.completed(&leaf);
+            let (outcome, remark) = report::outcome(&run, end);
+            let seconds = clock.elapsed().as_secs_f64();
+            return Ok(report::equilibrium(run, outcome, remark, seconds));
+        }
+        // The whole leaf has something to say: it moves out of its valley, or
+        // breaks the mirror.
+        work = run.work;
+    }
+    let mut run = Run::new(&leaf, options, tolerance, progress);
+    run.work = work;
+    let end = run.solve(grid);
     let (outcome, remark) = report::outcome(&run, end);
     let seconds = clock.elapsed().as_secs_f64();
     Ok(report::equilibrium(run, outcome, remark, seconds))
+}
+
+/// Whether half of a leaf may be solved for the whole: where the way to rest
+/// is Newton's, which knows no other way than the shape it starts from.
+fn reducible(options: &Options) -> bool {
+    options.method == Method::SemiImplicit && !options.keep_unstable && !options.full_model
 }
 
 /// Segments of a grid: so many as asked for, or at least `least`, as many as
@@ -181,6 +199,12 @@ pub(super) enum End {
 
 pub(super) struct Run<'a, 'o> {
     pub leaf: &'a Leaf<'a>,
+    /// The whole leaf, if `leaf` is half of it.
+    whole: Option<&'a Leaf<'a>>,
+    /// Rods solved for.
+    pub solved: usize,
+    /// What neglecting shear, and stretch, would change.
+    pub effects: [Option<f64>; 2],
     pub options: &'o Options,
     pub tolerance: f64,
     progress: &'o mut dyn FnMut(&Progress),
@@ -197,7 +221,42 @@ pub(super) struct Run<'a, 'o> {
     pushes: i32,
 }
 
-impl<'a> Run<'a, '_> {
+impl<'a, 'o> Run<'a, 'o> {
+    fn new(
+        leaf: &'a Leaf<'a>,
+        options: &'o Options,
+        tolerance: f64,
+        progress: &'o mut dyn FnMut(&Progress),
+    ) -> Self {
+        Run {
+            leaf,
+            whole: None,
+            solved: leaf.rods(),
+            effects: [None; 2],
+            options,
+            tolerance,
+            progress,
+            work: Work::default(),
+            saddle: None,
+            levels: Vec::new(),
+            table: Richardson::default(),
+            index: None,
+            remaining: 0.0,
+            spent: 0,
+            pushes: 0,
+        }
+    }
+
+    /// The run as if it had been one of the whole leaf.
+    fn completed(mut self, whole: &'a Leaf<'a>) -> Self {
+        self.table = Richardson::default();
+        for level in std::mem::take(&mut self.levels) {
+            self.push(complete(self.leaf, whole, &level));
+        }
+        self.leaf = whole;
+        self
+    }
+
     fn solve(&mut self, grid: Grid) -> End {
         if let Err(settled) = self.land(grid) {
             return End::Failed(settled);
@@ -254,6 +313,10 @@ impl<'a> Run<'a, '_> {
             let fixed = self.options.segments.is_some();
             let last = fixed || finer.segments() > FINEST_LANDING;
             match settled {
+                _ if self.whole.is_some() && !matches!(settled, Settled::Rest(_)) => {
+                    self.push(level);
+                    return Err(settled);
+                }
                 Settled::Rest(_) if !moved || last => {
                     self.push(level);
                     return Ok(());
@@ -299,7 +362,13 @@ impl<'a> Run<'a, '_> {
         let leaf = DiscreteLeaf::new(self.leaf, grid);
         let mut near_rest = matches!(from, From::Coarser(_));
         let mut state = match from {
-            From::Start => start(&leaf),
+            From::Start => match self.whole {
+                None => start(&leaf),
+                Some(whole) => {
+                    let whole = DiscreteLeaf::new(whole, leaf.grid.clone());
+                    half_of(self.leaf, &start(&whole))
+                }
+            },
             From::Coarser(state) | From::Pushed(state) => state,
         };
         let mut system = System::new(&leaf);
@@ -369,15 +438,23 @@ impl<'a> Run<'a, '_> {
                 pushes,
                 direct: None,
                 most_evaluations: begun + allowed,
+                convex_only: self.whole.is_some(),
                 moved: false,
             };
             let before = relaxation.work.force_evaluations;
             let settled = relaxation.settle(&leaf, &mut system);
             self.spent += nodes * (relaxation.work.force_evaluations - before);
             moved |= relaxation.moved;
+            let direct = relaxation.direct.is_some();
             state = relaxation.state;
             if let Settled::Rest(remaining) = settled {
                 self.remaining = self.remaining.max(remaining);
+                if self.levels.is_empty() && !direct {
+                    self.effects = effects(&leaf, &state, &mut system);
+                }
+            }
+            if self.whole.is_some() && !matches!(settled, Settled::Rest(_)) {
+                return (Level { leaf, state }, settled, moved);
             }
             if settled != Settled::Saddle {
                 return (Level { leaf, state }, settled, moved);
@@ -403,6 +480,15 @@ impl<'a> Run<'a, '_> {
         let level = self.levels.last().expect("the leaf has landed");
         if level.leaf.tip_moment() != DVec3::ZERO {
             return Ok(());
+        }
+        if let Some(whole) = self.whole {
+            let Level { leaf, state } = complete(self.leaf, whole, level);
+            let mut system = System::new(&leaf);
+            self.index = saddle::index(&leaf, &state, &mut system, 0.0, &mut self.work);
+            return match self.index {
+                Some(0) => Ok(()),
+                _ => Err(Some(Settled::Saddle)),
+            };
         }
         let mut system = System::new(&level.leaf);
         let before = self.index;
@@ -442,6 +528,26 @@ impl<'a> Run<'a, '_> {
             _ => Err(Some(settled)),
         }
     }
+}
+
+/// The whole leaf of which half is settled.
+fn complete<'a>(half: &Leaf, whole: &'a Leaf<'a>, level: &Level) -> Level<'a> {
+    Level {
+        leaf: DiscreteLeaf::new(whole, level.leaf.grid.clone()),
+        state: whole_of(half, &level.state),
+    }
+}
+
+/// Largest displacements if the leaf neither sheared, or did not stretch, to
+/// first order; with the factorisation that the last iteration left.
+fn effects(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> [Option<f64>; 2] {
+    [DVec3::new(0.0, 1.0, 1.0), DVec3::X].map(|dropped| {
+        leaf.assemble_stiffening(state, dropped, system);
+        match system.solve(None, EFFECT_ACCURACY) {
+            Solved::Yes(_) => Some(system.largest().1),
+            _ => None,
+        }
+    })
 }
 
 /// What is said of a saddle.

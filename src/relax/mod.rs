@@ -17,7 +17,7 @@ mod shooting;
 mod start;
 
 pub use crate::shape::{NodeState, RodShape};
-pub use equilibrium::{Equilibrium, Outcome, Saddle, Work};
+pub use equilibrium::{Equilibrium, Model, Outcome, Saddle, Work};
 pub use grids::{check_segments, relax};
 pub use index::index_near;
 pub use options::{LARGEST_TOLERANCE, Method, Options, Progress, RelaxError, SMALLEST_TOLERANCE};

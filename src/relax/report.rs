@@ -1,7 +1,7 @@
 //! From the settled grids to the result in the units of the scenario.
 
 use crate::leaf::DiscreteLeaf;
-use crate::relax::equilibrium::{Equilibrium, Outcome};
+use crate::relax::equilibrium::{Equilibrium, Model, Outcome};
 use crate::relax::grids::{End, Level, Run};
 use crate::relax::richardson::Richardson;
 use crate::relax::semi_implicit::Settled;
@@ -67,6 +67,11 @@ pub fn equilibrium(
         tip_force_sum: rods.iter().map(tip_force).sum(),
         negative_eigenvalues: run.index,
         saddle: run.saddle,
+        model: Model {
+            rods: run.solved,
+            shear: run.effects[0].map(|effect| effect * scale.length),
+            stretch: run.effects[1].map(|effect| effect * scale.length),
+        },
         work: run.work,
         wall_seconds,
         stations: first.leaf.grid.sigma().to_vec(),

@@ -114,6 +114,8 @@ pub struct Relaxation<'a> {
     pub direct: Option<SparsePattern>,
     /// Count of force evaluations at which to give up.
     pub most_evaluations: usize,
+    /// Whether to give up at once if the leaf has to move.
+    pub convex_only: bool,
     /// Whether the leaf had to move: its energy was not convex on the way.
     pub moved: bool,
 }
@@ -231,6 +233,9 @@ impl Relaxation<'_> {
                     return Settled::Saddle;
                 }
                 self.moved = true;
+                if self.convex_only {
+                    return Settled::Stuck;
+                }
                 dt = shorter(dt);
                 growth = 1.0;
                 if dt < SHORTEST_STEP {

@@ -2,7 +2,7 @@
 
 use crate::bvp::{self, Reason, Solution, Start};
 use crate::leaf::{Grid, Leaf};
-use crate::relax::equilibrium::{Equilibrium, Outcome, Work};
+use crate::relax::equilibrium::{Equilibrium, Model, Outcome, Work};
 use crate::relax::grids::coarsest;
 use crate::relax::index::index_near;
 use crate::relax::options::{MAX_INTERVALS, Options, RelaxError};
@@ -147,6 +147,10 @@ fn blank(scenario: &Scenario, rods: Vec<RodShape>) -> Equilibrium {
             .sum::<DVec3>(),
         negative_eigenvalues: None,
         saddle: None,
+        model: Model {
+            rods: scenario.rods.len(),
+            ..Model::default()
+        },
         work: Work::default(),
         wall_seconds: 0.0,
         stations: Vec::new(),

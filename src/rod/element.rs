@@ -171,6 +171,20 @@ impl Segment {
         self.pull_back(self.nu + correction / section.ds, g_mu)
     }
 
+    /// What the condensed gradient gains, to first order, if the compliance of
+    /// the components in `dropped` (ones and zeros) is taken away.
+    pub fn stiffening_gradient(&self, section: &Section, dropped: DVec3) -> (DVec3, DVec3, DVec3) {
+        let gap = section.ds * dropped * section.compliance * self.nu;
+        let correction = section.condensing * gap;
+        let g_mu = -self.nu.cross(gap) - self.law_rate(section).transpose() * correction;
+        let g_delta = 0.5 * self.relative.tau.cross(g_mu);
+        (
+            self.frame * (correction / section.ds),
+            self.frame * (0.5 * g_mu - g_delta),
+            self.frame * (0.5 * g_mu + g_delta),
+        )
+    }
+
     /// From the derivatives with respect to R^T dx and to the turn mu of the
     /// midpoint to nodal derivatives, adding the bending moment.
     #[inline]

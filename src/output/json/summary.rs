@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use serde::Serialize;
 
 use super::{Point, points, tips, write};
-use crate::output::Format;
+use crate::output::{Format, words};
 use crate::relax::Equilibrium;
 
 /// `summary.json`, which is also what `--json` prints.
@@ -46,6 +46,9 @@ struct Object<'a> {
     negative_eigenvalues: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     saddle: Option<Saddle>,
+    model: String,
+    shear_effect: Option<f64>,
+    stretch_effect: Option<f64>,
     work: Work,
     wall_seconds: f64,
     stations: &'a [f64],
@@ -93,6 +96,9 @@ impl<'a> From<&'a Equilibrium> for Object<'a> {
                 negative_eigenvalues: saddle.negative_eigenvalues,
                 tip: saddle.tip.to_array(),
             }),
+            model: words::model(equilibrium),
+            shear_effect: equilibrium.model.shear,
+            stretch_effect: equilibrium.model.stretch,
             work: Work {
                 steps: work.steps,
                 factorizations: work.factorizations,
@@ -139,6 +145,9 @@ mod tests {
             "tip_force_sum",
             "stable",
             "negative_eigenvalues",
+            "model",
+            "shear_effect",
+            "stretch_effect",
             "work",
             "wall_seconds",
             "stations",

@@ -1,0 +1,164 @@
+#!/usr/bin/env python3
+"""A leaf at rest by exudyn's static solver, with its geometrically exact beam.
+
+Every rod is a chain of n elements ObjectBeamGeometricallyExact between nodes with Euler parameters, of
+second order in the element's length. Its undeformed shape (straight, or of the scenario's rest curvature)
+is the nodes' reference. Joined rods start from circular arcs that meet in a common tip, free ones from
+the reference. The base is clamped by a generic joint, joined tips by spherical joints; coupling is
+Cartesian spring-dampers between the nodes of neighbours, weight is forces on the nodes. An element's
+stiffness is that in its middle.
+
+Newton's method with exudyn's analytical Jacobian and its sparse factorisation; load steps only where
+Newton's method fails, unless --load-steps wants more. The time is that of SolveStatic alone; building the
+model is measured apart.
+
+Needs python 3.11 and exudyn (here 1.13.6). One thread, exudyn's default.
+"""
+import sys
+import time
+
+import numpy as np
+
+from leaf import Leaf, Refused, append, arguments, at_stations, distance, load, read_summary, sample
+
+# This file has the name of the package: look for that elsewhere.
+sys.path.pop(0)
+import exudyn
+from exudyn import itemInterface as items
+from exudyn.lieGroupBasics import ExpSE3
+from exudyn.rigidBodyUtilities import RotationMatrix2EulerParameters
+
+
+class Model:
+    """A leaf in exudyn, with n elements a rod."""
+
+    def __init__(self, leaf, n):
+        middles = (np.arange(n) + 0.5) / n
+        self.couple, self.force, self.rest = (sample(part, middles) for part in (leaf.couple, leaf.force, leaf.rest))
+        if np.isinf(self.force).any():
+            raise Refused("stiffness: inf is not possible here")
+        self.leaf, self.n = leaf, n
+        self.system = exudyn.SystemContainer().AddSystem()
+        self.ground = self.system.AddNode(items.NodePointGround())
+        self.weights = np.ones(n + 1)
+        self.weights[[0, -1]] = 0.5
+        places, directors = leaf.arcs(np.linspace(0.0, 1.0, n + 1))
+        rods = [self.rod(j, places[j], directors[j]) for j in range(leaf.rods)]
+        self.nodes = np.array([nodes for nodes, _ in rods])
+        markers = [markers for _, markers in rods]
+        for j, stiffness in enumerate((leaf.coupling * leaf.gap).T / n):
+            for pair in zip(markers[j][1:-1], markers[j + 1][1:-1]):
+                self.system.AddObject(items.CartesianSpringDamper(markerNumbers=list(pair), stiffness=stiffness))
+        if leaf.joined:
+            for other in markers[1:]:
+                self.system.AddObject(items.SphericalJoint(markerNumbers=[markers[0][-1], other[-1]]))
+        for tip in markers[: 1 if leaf.joined else None]:
+            self.system.AddLoad(items.Force(markerNumber=tip[-1], loadVector=leaf.tip_force))
+        self.system.AddLoad(items.Torque(markerNumber=markers[0][-1], loadVector=leaf.tip_moment))
+        self.system.Assemble()
+
+    def rod(self, j, places, directors):
+        """Adds rod j; its nodes and a marker on each."""
+        system, leaf = self.system, self.leaf
+        element = leaf.length[j] / self.n
+        frame = np.eye(4)  # of the undeformed rod
+        frame[:3, :3] = leaf.base[j].T
+        base = exudyn.HT().Set(rotation=frame[:3, :3])
+        nodes, markers = [], []
+        for i in range(self.n + 1):
+            reference = coordinates(frame[:3, 3], frame[:3, :3])
+            start = reference
+            if leaf.joined and leaf.rods > 1:
+                start = coordinates(places[:, i], directors[:, :, i].T)
+            node = items.NodeRigidBodyEP(referenceCoordinates=reference, initialCoordinates=start - reference)
+            nodes.append(system.AddNode(node))
+            markers.append(system.AddMarker(items.MarkerNodeRigid(nodeNumber=nodes[i])))
+            weight = leaf.gravity * element * self.weights[i]
+            system.AddLoad(items.Force(markerNumber=markers[i], loadVector=weight))
+            if i < self.n:
+                frame = frame @ ExpSE3(element * np.array([1.0, 0.0, 0.0, *self.rest[j, :, i]]))
+        for i, pair in enumerate(zip(nodes, nodes[1:])):
+            section = exudyn.BeamSection()
+            section.stiffnessMatrix = np.diag([*self.force[j, :, i], *self.couple[j, :, i]])
+            system.AddObject(items.Beam3D(nodeNumbers=list(pair), length=element, sectionData=section))
+        clamp = system.AddMarker(items.MarkerNodeRigid(nodeNumber=self.ground, localHT=base))
+        system.AddObject(items.GenericJoint(markerNumbers=[clamp, markers[0]]))
+        return nodes, markers
+
+    def solve(self, load_steps, max_seconds):
+        """The outcome and a word about it."""
+        settings = exudyn.SimulationSettings()
+        settings.solution.file.write = False
+        settings.linearSolver.solverType = exudyn.LinearSolverType.EigenSparse
+        settings.linearSolver.reuseAnalyzedPattern = True
+        settings.staticSolver.numberOfLoadSteps = load_steps
+        settings.staticSolver.verboseMode = 0
+        exudyn.config.printToConsole = False
+        exudyn.special.solver.timeout = max_seconds if max_seconds < np.inf else -1
+        try:
+            converged = self.system.SolveStatic(settings)
+        except (RuntimeError, ValueError) as error:
+            return "not-converged newton", str(error).strip().splitlines()[0]
+        solver = self.system.sys["staticSolver"]
+        remark = f"{solver.it.newtonStepsCount} steps of Newton"
+        if solver.output.simulationTimeout:  # which it calls a success
+            return "not-converged max-seconds", remark
+        return ("converged" if converged else "not-converged newton"), remark
+
+    def positions(self):
+        def place(node):
+            return self.system.GetNodeOutput(int(node), exudyn.OutputVariableType.Position)
+
+        return np.array([[place(node) for node in nodes] for nodes in self.nodes]).swapaxes(1, 2)
+
+
+def coordinates(place, rotation):
+    return np.concatenate([place, RotationMatrix2EulerParameters(rotation)])
+
+
+def solve(options):
+    """Builds and solves, prints what came of it; true if it converged."""
+    leaf = Leaf(load(options.scenario, options.set))
+    summary = read_summary(options.compare, leaf) if options.compare else None
+    began = time.perf_counter()
+    model = Model(leaf, options.segments)
+    built = time.perf_counter()
+    outcome, remark = model.solve(options.load_steps, options.max_seconds)
+    seconds = time.perf_counter() - built
+    knob = f"n={options.segments}" + (f" load-steps={options.load_steps}" if options.load_steps > 1 else "")
+
+    print(f"{leaf.name}: {leaf.rods} rods, {knob}")
+    print(f"  outcome    {outcome} ({remark})")
+    print(f"  time       {seconds:.4f} s, after {built - began:.4f} s for building the model")
+    error = ""
+    if outcome == "converged":
+        nodes = model.positions()
+        for tip in nodes[: 1 if leaf.joined else None, :, -1]:
+            print(f"  tip        ({', '.join(f'{x:.10g}' for x in tip)})")
+        if summary:
+            away, other = distance(summary, at_stations(summary, nodes)), summary["wall_seconds"]
+            print(f"  leafdyn    {away:.2e} away at most (its own error estimate: {summary['error_estimate']})")
+            print(f"             {other:.4g} s; exudyn took {seconds / other:.3g} times as long")
+            error = f"{away:.3e}"
+    if options.csv:
+        append(options.csv, ["exudyn", leaf.name, leaf.rods, knob, f"{seconds:.4g}", error, outcome])
+    return outcome == "converged"
+
+
+def main():
+    parser = arguments("Solve a leaf at rest with exudyn's static solver.")
+    parser.add_argument("--segments", type=int, default=50, metavar="N", help="elements a rod (default: 50)")
+    parser.add_argument("--load-steps", type=int, default=1, metavar="N", help="load steps (default: 1)")
+    options = parser.parse_args()
+    if options.segments < 3 or options.load_steps < 1:
+        parser.error("--segments: at least 3; --load-steps: at least 1")
+    try:
+        converged = solve(options)
+    except Refused as refused:
+        print(f"error: {refused}", file=sys.stderr)
+        return 2
+    return 0 if converged else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

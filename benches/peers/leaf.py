@@ -1,0 +1,207 @@
+"""What the scripts beside this file share: the scenario, what leafdyn found, and the table of results."""
+import argparse
+import csv
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+KEYS = {
+    "leaf": ["rods", "length", "fan", "joined"],
+    "stiffness": ["torsion", "bending_2", "bending_3", "axial", "shear_2", "shear_3"],
+    "rest": ["twist", "bend_2", "bend_3"],
+    "coupling": ["x", "y", "z"],
+    "load": ["gravity", "tip_force", "tip_moment"],
+    "solve": ["tolerance"],
+}
+COLUMNS = ["program", "scenario", "rods", "knob", "seconds", "error", "outcome"]
+
+
+class Refused(Exception):
+    """The scenario or the request cannot be run; says why."""
+
+
+def load(path, overrides):
+    """The scenario as written, with the KEY=VALUE of --set laid over it."""
+    document, source = {}, path
+    try:
+        document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        for source in overrides:
+            for table, value in tomllib.loads(source).items():
+                old = document.get(table)
+                both = isinstance(value, dict) and isinstance(old, dict)
+                document[table] = {**old, **value} if both else value
+    except (OSError, ValueError) as error:
+        raise Refused(f"{source}: {error}") from None
+    if not isinstance(document.get("name"), str):
+        raise Refused("name: missing, or not a text")
+    for table, entries in document.items():
+        if table == "name":
+            continue
+        if table not in KEYS or not isinstance(entries, dict):
+            raise Refused(f"{table}: unknown, or not a table; allowed: name, {', '.join(KEYS)}")
+        for key in entries:
+            if key not in KEYS[table]:
+                raise Refused(f"{table}.{key}: unknown key; allowed: {', '.join(KEYS[table])}")
+    return document
+
+
+class Leaf:
+    """A checked scenario, in its own units."""
+
+    def __init__(self, document):
+        self.document = document
+        self.name = document["name"]
+        self.rods = rods = self.entry("leaf.rods")
+        if type(rods) is not int or rods < 1:
+            raise Refused(f"leaf.rods = {rods!r}: must be a whole number, at least 1")
+        self.joined = self.entry("leaf.joined", True)
+        if type(self.joined) is not bool:
+            raise Refused(f"leaf.joined = {self.joined!r}: must be true or false")
+        self.length = self.numbers("leaf.length", rods, above=0.0)
+        self.angle = self.fan()
+        # (at, value) of every rod: [component][rod], in the order of the directors.
+        self.couple = [self.quantity(f"stiffness.{key}", above=0.0) for key in KEYS["stiffness"][:3]]
+        self.force = [self.quantity(f"stiffness.{key}", above=0.0, rigid=True) for key in KEYS["stiffness"][3:]]
+        self.rest = [self.quantity(f"rest.{key}", default=0.0) for key in KEYS["rest"]]
+        self.coupling = np.array([self.numbers(f"coupling.{axis}", rods - 1, default=0.0) for axis in "xyz"])
+        if (self.coupling < 0.0).any():
+            raise Refused("coupling: must not be negative")
+        # A gap is as long as its two rods on average.
+        self.gap = 0.5 * (self.length[1:] + self.length[:-1])
+        self.gravity = self.vector("load.gravity")
+        self.tip_force = self.vector("load.tip_force")
+        self.tip_moment = self.vector("load.tip_moment")
+        if rods > 1 and self.tip_moment.any():
+            raise Refused("load.tip_moment: only with leaf.rods = 1")
+        self.base = np.zeros((rods, 3, 3))  # [rod][director][axis], condition (c)
+        self.base[:, 0, 0] = self.base[:, 1, 1] = np.cos(self.angle)
+        self.base[:, 0, 1], self.base[:, 1, 0] = np.sin(self.angle), -np.sin(self.angle)
+        self.base[:, 2, 2] = 1.0
+
+    def entry(self, key, default=None):
+        table, name = key.split(".")
+        value = self.document.get(table, {}).get(name, default)
+        if value is None:
+            raise Refused(f"{key}: missing")
+        return value
+
+    def numbers(self, key, count, default=None, above=-np.inf, value=None, rigid=False):
+        """A number for all, or a list of `count`."""
+        value = self.entry(key, default) if value is None else value
+        given = value if isinstance(value, list) else [value] * count
+        for number in given:
+            if type(number) not in (int, float):
+                raise Refused(f"{key}: {number!r} is not a number here")
+            if not (above < number < np.inf or rigid and number == np.inf):
+                raise Refused(f"{key} = {number}: out of range")
+        if len(given) != count:
+            raise Refused(f"{key}: {len(given)} numbers, {count} wanted")
+        return np.array(given, dtype=float)
+
+    def quantity(self, key, default=None, above=-np.inf, rigid=False):
+        """Knots and values of every rod; a single knot where the quantity is constant."""
+        value = self.entry(key, default)
+        if not isinstance(value, dict):
+            return [([0.0], [number]) for number in self.numbers(key, self.rods, default, above, rigid=rigid)]
+        if set(value) != {"at", "value"} or not all(isinstance(part, list) for part in value.values()):
+            raise Refused(f"{key}: a profile is {{ at = [...], value = [...] }}")
+        at = self.numbers(key, len(value["at"]), value=value["at"])
+        if len(at) < 2 or at[0] != 0.0 or at[-1] != 1.0 or (np.diff(at) <= 0.0).any():
+            raise Refused(f"{key}: at must rise from 0 to 1")
+        lists = value["value"]
+        if not any(isinstance(item, list) for item in lists):
+            lists = [lists] * self.rods
+        if len(lists) != self.rods or not all(isinstance(item, list) for item in lists):
+            raise Refused(f"{key}: value must be one list, or {self.rods} lists, one per rod")
+        return [(at, self.numbers(key, len(at), above=above, value=item)) for item in lists]
+
+    def vector(self, key):
+        if not isinstance(self.entry(key, [0.0] * 3), list):
+            raise Refused(f"{key}: must be a list of 3 numbers")
+        return self.numbers(key, 3, [0.0] * 3)
+
+    def fan(self):
+        fan = self.entry("leaf.fan")
+        if fan in ("paper", "symmetric"):
+            n = np.arange(1, self.rods + 1) - (0.5 if fan == "symmetric" else 0.0)
+            return -np.pi / 3 + 2 * np.pi * n / (3 * self.rods)
+        if not isinstance(fan, list):
+            raise Refused(f'leaf.fan = {fan!r}: must be "paper", "symmetric" or a list of {self.rods} angles')
+        return self.numbers("leaf.fan", self.rods)
+
+    def arcs(self, sigma):
+        """Positions [rod][axis][node] and directors [rod][director][axis][node] to start from: circular
+        arcs in the plane of the fan that meet in a common tip, free of force and moment. What an arc's
+        chord lacks of the mean chord is made up by stretching. Free rods are straight."""
+        mean = np.angle(np.exp(1j * self.angle).sum())
+        opening = np.angle(np.exp(1j * (self.angle - mean)))[:, None]
+        if not self.joined or self.rods == 1:
+            opening[:] = 0.0
+        phi, length = self.angle[:, None], self.length[:, None]
+
+        def chord(at):
+            # It leaves half-way between the tangents at its ends.
+            return length * at * np.sinc(opening * at / np.pi) * np.exp(1j * (phi - opening * at))
+
+        r = chord(sigma)
+        if self.joined:
+            r = r + sigma * (chord(1.0).mean() - chord(1.0))
+        turned = phi - 2 * opening * sigma
+        zero, one = np.zeros_like(turned), np.ones_like(turned)
+        d = [np.cos(turned), np.sin(turned), zero, -np.sin(turned), np.cos(turned), zero, zero, zero, one]
+        return np.stack([r.real, r.imag, zero], axis=1), np.stack(d, axis=1).reshape(self.rods, 3, 3, -1)
+
+
+def sample(quantity, sigma):
+    """Values of a quantity at fractions of the length: [rod][component][node]."""
+    return np.array([[np.interp(sigma, *rod) for rod in rods] for rods in quantity]).swapaxes(0, 1)
+
+
+def read_summary(folder, leaf):
+    """What leafdyn wrote for this scenario."""
+    try:
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise Refused(f"{folder}: {error}") from None
+    if (summary["scenario"], summary["rods"]) != (leaf.name, leaf.rods):
+        raise Refused(f"{folder}: holds {summary['scenario']} with {summary['rods']} rods, not this scenario")
+    return summary
+
+
+def distance(summary, positions):
+    """Largest distance of these positions [rod][axis][station] from leafdyn's."""
+    return np.linalg.norm(positions.swapaxes(1, 2) - summary["positions"], axis=2).max()
+
+
+def at_stations(summary, nodes):
+    """Positions [rod][axis][node] of evenly spaced nodes, at leafdyn's stations: cubics through four nodes."""
+    last = nodes.shape[2] - 1
+    at = np.array(summary["stations"]) * last
+    first = np.clip(np.floor(at).astype(int) - 1, 0, last - 3)
+    result = 0.0
+    for i in range(4):
+        others = [k for k in range(4) if k != i]
+        result += np.prod([(at - first - k) / (i - k) for k in others], axis=0) * nodes[:, :, first + i]
+    return result
+
+
+def append(path, row):
+    """One row more; the header goes first where the file is new. The error is in units of length."""
+    with open(path, "a", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        if file.tell() == 0:
+            table.writerow(COLUMNS)
+        table.writerow(row)
+
+
+def arguments(description):
+    """The options all scripts have."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("scenario", help="TOML file")
+    parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="overrides one entry")
+    parser.add_argument("--max-seconds", type=float, default=np.inf, help="stops a longer run (default: never)")
+    parser.add_argument("--compare", type=Path, metavar="DIR", help="what leafdyn wrote for the same leaf")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="appends one row to this table")
+    return parser

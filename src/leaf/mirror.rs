@@ -1,0 +1,156 @@
+//! Leaves that are their own mirror image in the plane y = 0.
+//!
+//! Such a leaf is found by half of its rods: rod j and rod N - 1 - j are each
+//! other's image. The midrib, if N is odd, lies in the plane: it counts half
+//! (stiffness, mass, loads), and its nodes neither leave the plane nor turn but
+//! about the plane's normal. A joint tip stays in the plane, too. Of the gap
+//! across the plane, if N is even, only the coupling along y is ever stretched.
+
+use super::dimensionless::Leaf;
+use super::state::State;
+use crate::scenario::{Profile, Rod, Scenario};
+use glam::{DQuat, DVec3};
+
+/// Components of a node's increment (turn, shift) that the mirror forbids a
+/// node in its plane: turns about x and z, the shift along y.
+pub const FORBIDDEN: [usize; 3] = [0, 2, 4];
+
+/// The shift along y alone: what it forbids a joint tip.
+pub const ACROSS: usize = 4;
+
+impl<'a> Leaf<'a> {
+    /// Half of the leaf, if it is its own mirror image.
+    pub fn half(&self) -> Option<Leaf<'a>> {
+        let mut half = self.clone();
+        half.mirrored = is_mirrored(self.scenario());
+        half.mirrored.then_some(half)
+    }
+
+    /// Part of rod `j` that belongs to the leaf, or to its half.
+    pub fn share(&self, j: usize) -> f64 {
+        if self.in_plane(j) { 0.5 } else { 1.0 }
+    }
+
+    /// Whether rod `j` is the midrib of half a leaf.
+    pub fn in_plane(&self, j: usize) -> bool {
+        let count = self.scenario().rods.len();
+        self.mirrored && count % 2 == 1 && 2 * j + 1 == count
+    }
+
+    /// Whether rod `j` of half a leaf has its image for a neighbour.
+    pub fn beside_image(&self, j: usize) -> bool {
+        self.mirrored && 2 * (j + 1) == self.scenario().rods.len()
+    }
+}
+
+/// Whether every rod, coupling and load is its own mirror image.
+fn is_mirrored(scenario: &Scenario) -> bool {
+    let Scenario {
+        rods,
+        coupling,
+        gravity,
+        tip_force,
+        ..
+    } = scenario;
+    let pairs = |count: usize| (0..count.div_ceil(2)).map(move |j| (j, count - 1 - j));
+    rods.len() > 1
+        && gravity[1] == 0.0
+        && tip_force[1] == 0.0
+        && pairs(rods.len()).all(|(a, b)| are_images(&rods[a], &rods[b]))
+        && pairs(coupling.len()).all(|(a, b)| coupling[a] == coupling[b])
+}
+
+/// Whether two rods are each other's image: twist and sideways bend at rest
+/// change sign in the mirror.
+fn are_images(a: &Rod, b: &Rod) -> bool {
+    let opposite = |a: &Profile, b: &Profile| *a == b.scaled(-1.0);
+    a.length == b.length
+        && a.angle == -b.angle
+        && a.couple_stiffness == b.couple_stiffness
+        && a.force_stiffness == b.force_stiffness
+        && opposite(&a.rest_curvature[0], &b.rest_curvature[0])
+        && a.rest_curvature[1] == b.rest_curvature[1]
+        && opposite(&a.rest_curvature[2], &b.rest_curvature[2])
+}
+
+/// The state of the half of a leaf in the state `whole`.
+pub fn half_of(half: &Leaf, whole: &State) -> State {
+    let (rods, n) = (half.rods(), whole.segments());
+    let nodes = rods * (n + 1);
+    let mut state = State::new(n, whole.x[..nodes].to_vec(), whole.q[..nodes].to_vec());
+    for j in 0..rods {
+        for k in j * n..(j + 1) * n {
+            state.n[k] = half.share(j) * whole.n[k];
+        }
+    }
+    state
+}
+
+/// The state of the whole leaf of which a half is in the state `state`.
+pub fn whole_of(half: &Leaf, state: &State) -> State {
+    let (rods, n) = (half.scenario().rods.len(), state.segments());
+    let (mut x, mut q, mut forces) = (Vec::new(), Vec::new(), Vec::new());
+    for j in 0..rods {
+        let own = j.min(rods - 1 - j);
+        let image = own != j;
+        let base = state.base(own);
+        x.extend(state.x[base..=base + n].iter().map(|&x| reflect(x, image)));
+        q.extend(state.q[base..=base + n].iter().map(|&q| match image {
+            // An axis of rotation changes sign in the mirror, but for its normal.
+            true => DQuat::from_xyzw(-q.x, q.y, -q.z, q.w),
+            false => q,
+        }));
+        let own_forces = &state.n[own * n..(own + 1) * n];
+        forces.extend(
+            own_forces
+                .iter()
+                .map(|&f| reflect(f / half.share(own), image)),
+        );
+    }
+    let mut whole = State::new(n, x, q);
+    whole.n = forces;
+    whole
+}
+
+fn reflect(v: DVec3, image: bool) -> DVec3 {
+    if image { DVec3::new(v.x, -v.y, v.z) } else { v }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LEAF: &str = r#"
+        name = "leaf"
+        leaf = { rods = 5, length = [0.9, 1.0, 1.1, 1.0, 0.9], fan = "symmetric" }
+        stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }
+        rest = { twist = [0.1, 0.2, 0.0, -0.2, -0.1], bend_2 = 0.3 }
+        coupling = { y = [1.0, 2.0, 2.0, 1.0] }
+        load = { gravity = [0.1, 0.0, -1.0] }
+    "#;
+
+    fn half(entry: &str) -> bool {
+        let scenario = Scenario::from_toml_with(LEAF, "leaf", &[entry.into()]).unwrap();
+        Leaf::new(&scenario).half().is_some()
+    }
+
+    #[test]
+    fn mirrored_leaves_are_known() {
+        for entry in ["name='same'", "rest.bend_3=[1.0, 0.0, 0.0, 0.0, -1.0]"] {
+            assert!(half(entry), "{entry}");
+        }
+        for entry in [
+            "leaf.fan='paper'",
+            "leaf.length=[0.9, 1.0, 1.1, 1.0, 0.8]",
+            "stiffness.axial=[1, 2, 3, 2, 2]",
+            "rest.twist=0.1",
+            "rest.bend_3=[1.0, 0.0, 0.0, 0.0, 1.0]",
+            "rest.bend_3=[1.0, 0.0, 0.5, 0.0, -1.0]",
+            "coupling.z=[1.0, 2.0, 2.0, 3.0]",
+            "load.gravity=[0.0, 1e-9, -1.0]",
+            "load.tip_force=[0.0, 1.0, 0.0]",
+        ] {
+            assert!(!half(entry), "{entry}");
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! A leaf that is its own mirror image is solved by half of its veins, with the
+//! result of the whole; where it breaks the mirror, or moves out of its valley,
+//! the whole leaf takes over.
+
+mod common;
+#[path = "common/random.rs"]
+mod random;
+
+use common::scenario;
+use leafdyn::relax::{Equilibrium, Options, Outcome, relax};
+use leafdyn::scenario::{Profile, Scenario};
+use leafdyn::shape::Difference;
+use proptest::prelude::*;
+
+fn rest(scenario: &Scenario, full_model: bool, segments: Option<usize>) -> Equilibrium {
+    let options = Options {
+        full_model,
+        segments,
+        ..Options::default()
+    };
+    relax(scenario, &options, &mut |_| {}).unwrap()
+}
+
+/// A leaf made of the upper half of another and its mirror image.
+fn mirrored(mut leaf: Scenario, odd: bool) -> Scenario {
+    let half = leaf.rods.len();
+    for (j, rod) in leaf.rods.iter_mut().enumerate() {
+        rod.angle = -0.9 + 0.8 * (j as f64 + 0.5) / half as f64;
+    }
+    let images: Vec<_> = leaf.rods.iter().rev().cloned().collect();
+    let gaps: Vec<_> = leaf.coupling.iter().rev().copied().collect();
+    let middle = [0.3, 1.0, 0.7];
+    leaf.coupling.push(middle);
+    if odd {
+        let mut midrib = leaf.rods[0].clone();
+        midrib.angle = 0.0;
+        midrib.rest_curvature[0] = Profile::Constant(0.0);
+        midrib.rest_curvature[2] = Profile::Constant(0.0);
+        leaf.rods.push(midrib);
+        leaf.coupling.push(middle);
+    }
+    leaf.coupling.extend(gaps);
+    for mut image in images {
+        image.angle = -image.angle;
+        for k in [0, 2] {
+            image.rest_curvature[k] = image.rest_curvature[k].scaled(-1.0);
+        }
+        leaf.rods.push(image);
+    }
+    leaf.gravity[1] = 0.0;
+    leaf.tip_force[1] = 0.0;
+    leaf
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn half_a_leaf_is_the_leaf(leaf in random::leaves(), odd in prop::bool::ANY) {
+        let leaf = mirrored(leaf, odd);
+        let segments = Some(20);
+        let (half, whole) = (rest(&leaf, false, segments), rest(&leaf, true, segments));
+        prop_assert_eq!(half.outcome, whole.outcome);
+        prop_assert_eq!(whole.model.rods, leaf.rods.len());
+        prop_assert_eq!(half.negative_eigenvalues, whole.negative_eigenvalues);
+        prop_assume!(whole.outcome == Outcome::Converged);
+        let scale = common::scale(&leaf);
+        let apart = Difference::between(&half.rods, &whole.rods);
+        prop_assert!(apart.position < 1e-10 * scale.length, "{:?}", apart);
+        prop_assert!(apart.rotation < 1e-10, "{:?}", apart);
+        prop_assert!(apart.force < 1e-8 * scale.force(), "{:?}", apart);
+        prop_assert!(apart.moment < 1e-8 * scale.moment(), "{:?}", apart);
+        let energy = half.energy - whole.energy;
+        prop_assert!(energy.abs() < 1e-10 * scale.moment() * (1.0 + whole.energy.abs()));
+        let force = half.tip_force_sum - whole.tip_force_sum;
+        prop_assert!(force.length() < 1e-8 * scale.force());
+    }
+}
+
+/// Most such leaves are found by half: the saving is real.
+#[test]
+fn the_paper_s_firm_leaves_are_found_by_half() {
+    for figure in ["fig04", "fig05", "fig06", "fig13"] {
+        for (rods, solved) in [(2, 1), (4, 2), (5, 3), (21, 11)] {
+            let entries = [format!("leaf.rods={rods}"), "leaf.fan='symmetric'".into()];
+            let leaf = scenario(&format!("paper/{figure}"), &entries);
+            let half = rest(&leaf, false, None);
+            assert_eq!(half.model.rods, solved, "{figure}, {rods}");
+            assert_eq!(half.outcome, Outcome::Converged);
+            assert_eq!(half.negative_eigenvalues, Some(0));
+            assert_eq!(half.rods.len(), rods);
+            let whole = rest(&leaf, true, None);
+            let apart = Difference::between(&half.rods, &whole.rods);
+            // Both end their iterations a thousandth of the tolerance away.
+            assert!(apart.position < 2e-9, "{figure}, {rods}: {apart:?}");
+            assert_eq!(
+                half.error_estimate.is_some(),
+                whole.error_estimate.is_some()
+            );
+            // The fan of the paper is not symmetric: nothing is left out there.
+            let own = scenario(&format!("paper/{figure}"), &entries[..1]);
+            assert_eq!(rest(&own, false, None).model.rods, rods);
+        }
+    }
+}
+
+/// Pushed back at its tip, a leaf of veins that bend sideways most easily leaves
+/// the mirror's plane sideways, though its symmetric shape is an equilibrium.
+#[test]
+fn a_leaf_that_breaks_its_mirror_is_followed() {
+    for rods in [2, 3, 4] {
+        let entries = [
+            format!("leaf.rods={rods}"),
+            "leaf.fan='symmetric'".into(),
+            "stiffness.bending_3=0.05".into(),
+            "load.tip_force=[-2.0, 0, 0]".into(),
+        ];
+        let leaf = scenario("paper/fig04", &entries);
+        let (found, whole) = (rest(&leaf, false, None), rest(&leaf, true, None));
+        assert!(found.outcome.is_success(), "{rods}: {:?}", found.outcome);
+        assert_eq!(found.negative_eigenvalues, Some(0), "{rods}");
+        assert_eq!(found.model.rods, rods);
+        assert!(found.tips[0].y.abs() > 0.1, "{rods}: {}", found.tips[0]);
+        // To one side or to the other.
+        assert!((found.energy - whole.energy).abs() < 1e-6, "{rods}");
+    }
+}
+
+/// The effects of shear and stretch are derivatives: they tell what a leaf four
+/// times as stiff does differently.
+#[test]
+fn what_shear_and_stretch_matter_is_told() {
+    for figure in ["fig04", "fig06"] {
+        let with = |axial: f64, shear: f64| {
+            let entries = [
+                "leaf.rods=5".into(),
+                format!("stiffness.axial={axial}"),
+                format!("stiffness.shear_2={shear}"),
+                format!("stiffness.shear_3={shear}"),
+            ];
+            rest(
+                &scenario(&format!("paper/{figure}"), &entries),
+                false,
+                Some(16),
+            )
+        };
+        // Compliances small enough for their effects to be linear.
+        let leaf = with(1e4, 1e4);
+        for (effect, other) in [
+            (leaf.model.shear, with(1e4, f64::INFINITY)),
+            (leaf.model.stretch, with(f64::INFINITY, 1e4)),
+        ] {
+            let effect = effect.unwrap();
+            let apart = (leaf.rods.iter().zip(&other.rods))
+                .flat_map(|(a, b)| a.nodes.iter().zip(&b.nodes))
+                .map(|(a, b)| (a.position - b.position).abs().max_element())
+                .fold(0.0, f64::max);
+            assert!(
+                (effect / apart - 1.0).abs() < 0.03,
+                "{figure}: {effect} {apart}"
+            );
+        }
+    }
+}
