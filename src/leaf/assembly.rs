@@ -132,7 +132,7 @@ impl<'a> DiscreteLeaf<'a> {
 
     /// Coupling of gap `g` at node `i`, force per displacement; none at a
     /// joint tip, which all rods share.
-    pub(super) fn spring(&self, g: usize, i: usize) -> DVec3 {
+    pub(crate) fn spring(&self, g: usize, i: usize) -> DVec3 {
         if self.leaf.joined() && i == self.segments() {
             DVec3::ZERO
         } else {

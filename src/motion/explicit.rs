@@ -16,11 +16,13 @@ use pulp::Arch;
 use rayon::prelude::*;
 
 use super::fictitious;
-use super::kernel::{Drift, Forces, GROUP, Kick, Neighbour, Positions};
-use super::ledger::{Ledger, measure};
+use super::friction::rates;
+use super::kernel::{Drift, Forces, GROUP, Kick, Neighbour, Positions, Powers};
+use super::ledger::{Exchange, Ledger, measure};
 use super::method::{Broken, Method, Snapshot, Velocity};
 use super::nodes::{self, Rod, groups, vector};
 use super::physics::Physics;
+use super::stable::StableStep;
 use crate::leaf::{DiscreteLeaf, Loads, State};
 
 /// Part of the stable time step that is used.
@@ -46,24 +48,22 @@ pub struct Explicit<'a> {
     longest: f64,
     time: f64,
     steps: usize,
-    /// By how much time velocities lag behind positions.
-    behind: f64,
+    /// Widths of the last step and of the one before; zero if there was none.
+    widths: [f64; 2],
     ledger: Ledger,
     parallel: bool,
+}
+
+/// What a kick did: twice the kinetic energy in its middle, and the power of
+/// the moment on the tip.
+struct Kicked {
+    energy: f64,
+    moment: f64,
 }
 
 /// A stiffness the method cannot handle: that of a rigid rod.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rigid;
-
-/// The longest stable time step, and what limits it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StableStep {
-    /// The step.
-    pub step: f64,
-    /// The fastest motion.
-    pub limit: &'static str,
-}
 
 impl<'a> Explicit<'a> {
     /// A leaf at rest in `state`. Time steps are as long as is stable, or
@@ -99,7 +99,7 @@ impl<'a> Explicit<'a> {
             longest: 0.0,
             time: 0.0,
             steps: 0,
-            behind: 0.0,
+            widths: [0.0; 2],
             ledger: Ledger::default(),
             parallel: rods > 1
                 && rods * leaf.segments() >= PARALLEL_NODES
@@ -108,7 +108,7 @@ impl<'a> Explicit<'a> {
             physics,
         };
         explicit.longest = longest.unwrap_or_else(|| SAFETY * explicit.stable_step().step);
-        explicit.forces(1.0, true);
+        explicit.forces(true);
         for rod in &mut explicit.rods {
             // At rest the past was like the present.
             rod.past.two = rod.past.one.clone();
@@ -118,70 +118,13 @@ impl<'a> Explicit<'a> {
         Ok(explicit)
     }
 
-    /// The longest stable time step: 2/omega, shortened by internal damping,
-    /// with the highest frequency any single segment would have, which bounds
-    /// those of the leaf (T. J. R. Hughes, The Finite Element Method, 1987,
-    /// section 9.2), and what coupling adds to it.
+    /// The longest stable time step of the leaf as it stands.
     pub fn stable_step(&self) -> StableStep {
-        let (mut largest, mut limit) = (0.0, "");
-        let grid = &self.leaf.grid;
-        for (j, rod) in self.rods.iter().enumerate() {
-            let m = &rod.material;
-            let inertia = |i: usize| self.physics.inertia(self.leaf.leaf, grid, j, i);
-            for i in 0..self.leaf.segments() {
-                // A node shares its mass between the segments beside it.
-                let share = |node: usize| grid.width(i) / (2.0 * grid.weight(node));
-                let (a, b) = (share(i), share(i + 1));
-                let (left, right) = (inertia(i), inertia(i + 1));
-                let per_mass = 1.0 / (a * left.mass) + 1.0 / (b * right.mass);
-                let per_inertia = 1.0 / (a * left.transverse) + 1.0 / (b * right.transverse);
-                let per_polar = 1.0 / (a * left.polar()) + 1.0 / (b * right.polar());
-                let at = GROUP + i;
-                let ds = m.rest_length[at];
-                let shear = m.stretch[1][at].max(m.stretch[2][at]);
-                let turning = shear * 0.25 * ds * ds * per_inertia;
-                let bend = m.bend[1][at].max(m.bend[2][at]);
-                for (squared, what) in [
-                    (m.stretch[0][at] * per_mass, "waves of stretch"),
-                    (m.bend[0][at] * per_polar, "waves of twist"),
-                    (bend * per_inertia, "waves of bending"),
-                    (shear * per_mass + turning, "shear with rotation"),
-                ] {
-                    if squared > largest {
-                        (largest, limit) = (squared, what);
-                    }
-                }
-            }
+        let mut leaf = self.leaf.clone();
+        if self.physics.rest_differs() {
+            leaf.set_rest(self.physics.rest(self.time));
         }
-        let coupling = self.coupling_bound();
-        if coupling > largest {
-            limit = "coupling";
-        }
-        let (eta, squared) = (self.physics.retardation, largest + coupling);
-        if eta * eta * squared > 1.0 {
-            limit = "internal damping";
-        }
-        StableStep {
-            step: 2.0 * ((eta * eta + 1.0 / squared).sqrt() - eta),
-            limit,
-        }
-    }
-
-    /// What coupling adds to the squared frequency, at most.
-    fn coupling_bound(&self) -> f64 {
-        let gaps: Vec<f64> = (1..self.leaf.rods())
-            .map(|g| self.leaf.leaf.coupling(g - 1).max_element())
-            .collect();
-        let mut largest: f64 = 0.0;
-        for (j, rod) in self.rods.iter().enumerate() {
-            let m = &rod.material;
-            let beside = [j.wrapping_sub(1), j];
-            let sum: f64 = beside.iter().filter_map(|&g| gaps.get(g)).sum();
-            for at in GROUP..=GROUP + self.leaf.segments() {
-                largest = largest.max(2.0 * sum * m.coupled[at] * m.per_mass[at]);
-            }
-        }
-        largest
+        StableStep::of(&leaf, &self.physics, &self.state())
     }
 
     /// The longest time step that is made.
@@ -205,7 +148,7 @@ impl<'a> Explicit<'a> {
                 array.fill(0.0);
             }
         }
-        self.behind = 0.0;
+        self.widths = [0.0; 2];
     }
 
     /// Lets every velocity decay at this rate from now on.
@@ -215,66 +158,79 @@ impl<'a> Explicit<'a> {
 
     /// One time step; returns twice the kinetic energy at its beginning.
     pub fn step(&mut self, h: f64) -> f64 {
-        let loads = self.physics.loads(self.time);
-        let power = self.forces(1.0 / h, true);
-        let length = self.behind + 0.5 * h;
-        let before = self.tip_spin();
-        let moving = self.kick(length, &loads);
-        // A dead moment has no potential: its work is all that tells of it.
-        let spin = 0.5 * (before + self.tip_spin());
-        self.ledger.work += length * loads.tip_moment.dot(spin);
-        self.ledger.dissipated += length * self.physics.damping * moving + h * power;
+        let (exchange, energy) = self.kick_until(0.5 * h, true);
+        self.ledger.add(exchange);
         self.drift(h);
-        self.behind = 0.5 * h;
+        self.widths = [h, self.widths[0]];
         self.time += h;
         self.steps += 1;
-        self.account(&loads);
-        moving
+        energy
     }
 
-    /// Angular velocity of the first rod's tip.
-    fn tip_spin(&self) -> DVec3 {
-        let last = GROUP + self.leaf.segments();
-        self.rods[0].spin(last, vector(&self.rods[0].motion.p, last))
+    /// By how much time velocities lag behind positions: half a step, but not
+    /// at the start.
+    fn behind(&self) -> f64 {
+        0.5 * self.widths[0]
     }
 
-    /// Work of what changed during the last step.
-    fn account(&mut self, before: &Loads) {
+    /// Kicks velocities, by the forces at the present positions, to where they
+    /// are `ahead` of these. Strains become the last step's if they are to be
+    /// remembered. Returns twice the kinetic energy in the middle of the kick,
+    /// too.
+    fn kick_until(&mut self, ahead: f64, remember: bool) -> (Exchange, f64) {
+        let length = self.behind() + ahead;
+        let [from, to] = [self.time - self.behind(), self.time + ahead];
+        let loads = self.physics.loads(self.time);
+        let powers = self.forces(remember);
+        let Kicked { energy, moment } = self.kick(length, &loads);
+        let mut work = length * moment;
         if self.physics.loads_change() {
-            let after = self.physics.loads(self.time);
-            let change = |load: DVec3, x: DVec3| -load.dot(x);
-            let mut work = 0.0;
-            for (j, (rod, positions)) in self.rods.iter().zip(&self.positions).enumerate() {
-                for at in GROUP..=GROUP + self.leaf.segments() {
-                    let weight = rod.material.weight[at];
-                    let x = vector(&positions.x, at);
-                    work += weight * change(after.gravity - before.gravity, x);
-                }
-                if j == 0 || !self.leaf.leaf.joined() {
-                    let x = vector(&positions.x, GROUP + self.leaf.segments());
-                    work += change(after.tip_force - before.tip_force, x);
-                }
-            }
-            self.ledger.work += work;
+            work -= self.potential_of(&self.physics.loads(from), &self.physics.loads(to));
         }
+        if self.physics.rest_changes() {
+            work -= powers.rest * (self.physics.rest(to) - self.physics.rest(from));
+        }
+        let exchange = Exchange {
+            dissipated: length * (self.physics.damping * energy + powers.friction),
+            work,
+        };
+        (exchange, energy)
     }
 
-    /// Internal forces at the present positions; returns the power of internal
-    /// friction. Does `remember` strains as the last step's.
-    fn forces(&mut self, per_step: f64, remember: bool) -> f64 {
+    /// What is between the potentials of two loads, the leaf standing still.
+    fn potential_of(&self, before: &Loads, after: &Loads) -> f64 {
+        let last = GROUP + self.leaf.segments();
+        let gravity = after.gravity - before.gravity;
+        let tip_force = after.tip_force - before.tip_force;
+        let mut lower = 0.0;
+        for (j, (rod, positions)) in self.rods.iter().zip(&self.positions).enumerate() {
+            for at in GROUP..=last {
+                lower += rod.material.weight[at] * gravity.dot(vector(&positions.x, at));
+            }
+            if j == 0 || !self.leaf.leaf.joined() {
+                lower += tip_force.dot(vector(&positions.x, last));
+            }
+        }
+        lower
+    }
+
+    /// Internal forces at the present positions.
+    fn forces(&mut self, remember: bool) -> Powers {
         let (arch, groups) = (self.arch, groups(self.leaf.segments()));
         let rest = self.physics.rest(self.time);
-        let retardation = self.physics.retardation;
+        let (retardation, changes) = (self.physics.retardation, self.physics.rest_changes());
+        let rates = rates(self.widths[0], self.widths[1]);
         let force = |(rod, positions): (&mut Rod, &Positions)| {
             let Rod {
                 motion,
                 material,
                 past,
-                sum,
+                powers,
+                ..
             } = rod;
             macro_rules! forces {
-                ($damped:literal) => {
-                    arch.dispatch(Forces::<$damped> {
+                ($damped:literal, $changes:literal) => {
+                    arch.dispatch(Forces::<$damped, $changes> {
                         groups,
                         positions,
                         motion,
@@ -282,27 +238,35 @@ impl<'a> Explicit<'a> {
                         rest,
                         past,
                         retardation,
-                        per_step,
+                        rates,
                         remember,
                     })
                 };
             }
-            *sum = match retardation > 0.0 {
-                true => retardation * forces!(true),
-                false => forces!(false),
+            *powers = match (retardation > 0.0, changes) {
+                (true, true) => forces!(true, true),
+                (true, false) => forces!(true, false),
+                (false, true) => forces!(false, true),
+                (false, false) => forces!(false, false),
             };
         };
         match self.parallel {
             true => (self.rods.par_iter_mut().zip(&self.positions)).for_each(force),
             false => self.rods.iter_mut().zip(&self.positions).for_each(force),
         }
-        self.rods.iter().map(|rod| rod.sum).sum()
+        let mut sum = Powers::default();
+        for rod in &self.rods {
+            sum.friction += retardation * rod.powers.friction;
+            sum.rest += rod.powers.rest;
+        }
+        sum
     }
 
-    /// Kicks all velocities; returns twice the kinetic energy in the middle.
-    fn kick(&mut self, length: f64, loads: &Loads) -> f64 {
+    /// Kicks all velocities.
+    fn kick(&mut self, length: f64, loads: &Loads) -> Kicked {
         let (arch, segments) = (self.arch, self.leaf.segments());
         let (groups, last) = (groups(segments), GROUP + segments);
+        let before = self.rods[0].moving(last);
         let decay = 0.5 * self.physics.damping * length;
         let (keep, kick) = ((1.0 - decay) / (1.0 + decay), length / (1.0 + decay));
         let (all, leaf) = (&self.positions, &self.leaf);
@@ -324,7 +288,7 @@ impl<'a> Explicit<'a> {
                 rod.motion.n[c][last] += own_force[c];
                 rod.motion.left[c][last] += loads.tip_moment[c];
             }
-            rod.sum = arch.dispatch(Kick {
+            rod.twice_kinetic = arch.dispatch(Kick {
                 groups,
                 positions: &all[j],
                 neighbours: [
@@ -346,25 +310,27 @@ impl<'a> Explicit<'a> {
             true => self.rods.par_iter_mut().enumerate().for_each(one),
             false => self.rods.iter_mut().enumerate().for_each(one),
         }
-        let mut energy: f64 = self.rods.iter().map(|rod| rod.sum).sum();
+        let mut energy: f64 = self.rods.iter().map(|rod| rod.twice_kinetic).sum();
         if let Some(mass) = tip_mass {
             let mut force = loads.tip_force;
             for rod in &self.rods {
                 force += rod.material.weight[last] * loads.gravity;
                 force -= vector(&rod.motion.n, last - 1);
             }
-            // Without mass of its own the tip's velocity has only decayed.
-            let kept = vector(&self.rods[0].motion.v, last);
-            let after = kept + force * (kick / mass);
-            let before = kept / keep;
-            energy += mass * (0.5 * (before + after)).length_squared();
+            let after = keep * before.0 + force * (kick / mass);
+            energy += mass * (0.5 * (before.0 + after)).length_squared();
             for rod in &mut self.rods {
                 for c in 0..3 {
                     rod.motion.v[c][last] = after[c];
                 }
             }
         }
-        energy
+        let mut moment = 0.0;
+        if loads.tip_moment != DVec3::ZERO {
+            let momentum = 0.5 * (before.1 + self.rods[0].moving(last).1);
+            moment = loads.tip_moment.dot(self.rods[0].spin(last, momentum));
+        }
+        Kicked { energy, moment }
     }
 
     /// Free flight.
@@ -386,9 +352,14 @@ impl<'a> Explicit<'a> {
         }
     }
 
+    fn judge(&mut self) -> Result<(), Broken> {
+        let now = self.snapshot();
+        (self.ledger).judge(&self.leaf, &self.physics, &now, self.widths[0])
+    }
+
     /// Positions, rotations and segment forces now.
     pub fn now(&mut self) -> State {
-        self.forces(1.0 / self.longest, false);
+        self.forces(false);
         self.state()
     }
 
@@ -425,6 +396,9 @@ impl Method for Explicit<'_> {
     }
 
     fn advance(&mut self, until: f64) -> Result<(), Broken> {
+        if until <= self.time {
+            return Ok(());
+        }
         let count = ((until - self.time) / self.longest).ceil().max(1.0);
         let (begin, h) = (self.time, (until - self.time) / count);
         let count = count as usize;
@@ -432,20 +406,16 @@ impl Method for Explicit<'_> {
             self.step(h);
             self.time = begin + h * (i + 1) as f64;
             if self.steps.is_multiple_of(WATCHED) {
-                let now = self.snapshot();
-                self.ledger.judge(&self.leaf, &now)?;
+                self.judge()?;
             }
         }
         self.time = until;
-        let now = self.snapshot();
-        self.ledger.judge(&self.leaf, &now)
+        self.judge()
     }
 
     fn snapshot(&mut self) -> Snapshot {
         let rods = self.rods.clone();
-        let loads = self.physics.loads(self.time);
-        self.forces(1.0 / self.longest, false);
-        self.kick(self.behind, &loads);
+        let (exchange, _) = self.kick_until(0.0, false);
         let state = self.state();
         let n = self.leaf.segments();
         let velocity: Vec<Velocity> = (self.rods.iter())
@@ -455,14 +425,14 @@ impl Method for Explicit<'_> {
         let energy = measure(&mut self.leaf, &self.physics, self.time, &state, &velocity);
         Snapshot {
             time: self.time,
-            energy: self.ledger.complete(energy),
+            energy: self.ledger.complete(energy, exchange),
             state,
             velocity,
         }
     }
 
     fn save(&self) -> Vec<f64> {
-        let mut numbers = vec![self.time, self.steps as f64, self.behind];
+        let mut numbers = vec![self.time, self.steps as f64, self.widths[0], self.widths[1]];
         numbers.extend(self.ledger.save());
         for (rod, positions) in self.rods.iter().zip(&self.positions) {
             let moving = positions.x.iter().chain(rod.moving_arrays());
@@ -479,7 +449,7 @@ impl Method for Explicit<'_> {
         let mut next = || numbers.next().unwrap_or_default();
         self.time = next();
         self.steps = next() as usize;
-        self.behind = next();
+        self.widths = [next(), next()];
         self.ledger.restore(&mut next);
         for (rod, positions) in self.rods.iter_mut().zip(&mut self.positions) {
             let moving = positions.x.iter_mut().chain(rod.moving_arrays_mut());

@@ -117,9 +117,9 @@ pub struct Material {
     pub coupled: Vec<f64>,
 }
 
-/// Internal forces of all segments. If `DAMPED`, with internal friction;
-/// returns the power it takes, over the retardation time.
-pub struct Forces<'a, const DAMPED: bool> {
+/// Internal forces of all segments. If `DAMPED`, with internal friction; if
+/// `CHANGES`, with what a change of the rest curvature does.
+pub struct Forces<'a, const DAMPED: bool, const CHANGES: bool> {
     pub groups: usize,
     pub positions: &'a Positions,
     pub motion: &'a mut Motion,
@@ -127,18 +127,58 @@ pub struct Forces<'a, const DAMPED: bool> {
     /// Factor of the rest curvature.
     pub rest: f64,
     pub past: &'a mut Past,
-    /// Retardation time, and one over the time step.
+    /// Retardation time.
     pub retardation: f64,
-    pub per_step: f64,
+    /// Weights of the present and the past strains in their rate.
+    pub rates: [f64; 3],
     /// Whether the present becomes the past.
     pub remember: bool,
 }
 
-impl<const DAMPED: bool> pulp::WithSimd for Forces<'_, DAMPED> {
-    type Output = f64;
+/// What the internal forces of a rod sum up to.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Powers {
+    /// Power of internal friction, over the retardation time.
+    pub friction: f64,
+    /// Elastic energy taken by a rise of the factor of the rest curvature,
+    /// over that rise.
+    pub rest: f64,
+}
+
+/// The rate of a strain, from the last two.
+#[inline(always)]
+fn rate<S: Simd>(
+    simd: S,
+    (one, two): (&mut [Vec<f64>; 3], &mut [Vec<f64>; 3]),
+    (now, at): (Vectors<S>, usize),
+    rates: [Lanes<S>; 3],
+    remember: bool,
+) -> Vectors<S> {
+    let last = Vectors::load(simd, one, at);
+    let before = Vectors::load(simd, two, at);
+    if remember {
+        last.store(two, at);
+        now.store(one, at);
+    }
+    before.times(rates[2], last.times(rates[1], now.scale(rates[0])))
+}
+
+/// Vector and scalar parts of unit quaternions.
+#[inline(always)]
+fn quaternion<S: Simd>(simd: S, q: &[Vec<f64>; 4], at: usize) -> (Vectors<S>, Lanes<S>) {
+    let vector = Vectors::new(
+        Lanes::load(simd, &q[0], at),
+        Lanes::load(simd, &q[1], at),
+        Lanes::load(simd, &q[2], at),
+    );
+    (vector, Lanes::load(simd, &q[3], at))
+}
+
+impl<const DAMPED: bool, const CHANGES: bool> pulp::WithSimd for Forces<'_, DAMPED, CHANGES> {
+    type Output = Powers;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> f64 {
+    fn with_simd<S: Simd>(self, simd: S) -> Powers {
         let Forces {
             groups,
             positions,
@@ -147,35 +187,30 @@ impl<const DAMPED: bool> pulp::WithSimd for Forces<'_, DAMPED> {
             rest,
             past,
             retardation,
-            per_step,
+            rates,
             remember,
         } = self;
-        // Rate of a strain from three steps, of second order.
-        let rates = [1.5, -2.0, 0.5].map(|c| Lanes::splat(simd, c * per_step));
+        let rates = [
+            Lanes::splat(simd, rates[0]),
+            Lanes::splat(simd, rates[1]),
+            Lanes::splat(simd, rates[2]),
+        ];
         let retardation = Lanes::splat(simd, retardation);
         let mut power = Lanes::splat(simd, 0.0);
-        let mut rate = |kind: usize, now: Vectors<S>, at: usize| {
-            let one = Vectors::load(simd, &past.one[kind], at);
-            let two = Vectors::load(simd, &past.two[kind], at);
-            let rate = two.times(rates[2], one.times(rates[1], now.scale(rates[0])));
-            if remember {
-                one.store(&mut past.two[kind], at);
-                now.store(&mut past.one[kind], at);
-            }
-            rate
-        };
+        let mut lost = Lanes::splat(simd, 0.0);
+        let Past {
+            one: past_one,
+            two: past_two,
+        } = past;
+        let ([one_v, one_psi], [two_v, two_psi]) = (past_one, past_two);
         let one = Lanes::splat(simd, 1.0);
         let two = Lanes::splat(simd, 2.0);
         let half = Lanes::splat(simd, 0.5);
         let rest = Lanes::splat(simd, rest);
         let mut at = GROUP;
         while at < GROUP * (groups + 1) {
-            let quaternion = |at: usize| {
-                let q = &motion.q;
-                let v = |k: usize| Lanes::load(simd, &q[k], at);
-                (Vectors::new(v(0), v(1), v(2)), v(3))
-            };
-            let ((a, aw), (b, bw)) = (quaternion(at), quaternion(at + 1));
+            let (a, aw) = quaternion(simd, &motion.q, at);
+            let (b, bw) = quaternion(simd, &motion.q, at + 1);
             // Midpoint frame: the rotation matrix of s without its length.
             let (s, sw) = (a + b, aw + bw);
             let squared = s.dot(s) + sw * sw;
@@ -196,7 +231,7 @@ impl<const DAMPED: bool> pulp::WithSimd for Forces<'_, DAMPED> {
             let mut strain = Vectors::new(v.x - length, v.y, v.z);
             let stiffness = Vectors::load(simd, &material.stretch, at);
             if DAMPED {
-                let rate = rate(0, v, at);
+                let rate = rate(simd, (one_v, two_v), (v, at), rates, remember);
                 strain = rate.times(retardation, strain);
                 power = power + rate.dot(rate.each(stiffness));
             }
@@ -214,10 +249,14 @@ impl<const DAMPED: bool> pulp::WithSimd for Forces<'_, DAMPED> {
             // 4/|s|^2 (K) with K = 1/(1 + z) + z arc, and 1 + z = 4/|s|^2.
             let sigma = (arc * z).times(one_z, one);
             let psi = w.scale(two * sigma);
-            let mut turn = psi - Vectors::load(simd, &material.rest_turn, at).scale(rest);
+            let rest_turn = Vectors::load(simd, &material.rest_turn, at);
+            let mut turn = psi - rest_turn.scale(rest);
             let stiffness = Vectors::load(simd, &material.bend, at);
+            if CHANGES {
+                lost = lost + rest_turn.dot(turn.each(stiffness));
+            }
             if DAMPED {
-                let rate = rate(1, psi, at);
+                let rate = rate(simd, (one_psi, two_psi), (psi, at), rates, remember);
                 turn = rate.times(retardation, turn);
                 power = power + rate.dot(rate.each(stiffness));
             }
@@ -236,7 +275,10 @@ impl<const DAMPED: bool> pulp::WithSimd for Forces<'_, DAMPED> {
             (g - twist).store(&mut motion.right, at);
             at += S::F64_LANES;
         }
-        power.sum()
+        Powers {
+            friction: power.sum(),
+            rest: lost.sum(),
+        }
     }
 }
 
@@ -302,8 +344,8 @@ impl pulp::WithSimd for Kick<'_> {
             let after = moment.times(kick, before.scale(keep));
             after.store(&mut motion.p, at);
             let p = before + after;
-            let load = |k: usize| Lanes::load(simd, &motion.q[k], at);
-            let spin = own_axis(simd, Vectors::new(load(0), load(1), load(2)), load(3)).dot(p);
+            let (q, w) = quaternion(simd, &motion.q, at);
+            let spin = own_axis(simd, q, w).dot(p);
             energy = v
                 .dot(v)
                 .times(Lanes::load(simd, &material.mass, at), energy);
@@ -360,8 +402,7 @@ impl pulp::WithSimd for Drift<'_> {
             let v = Vectors::load(simd, &motion.v, at);
             v.times(step, Vectors::load(simd, &positions.x, at))
                 .store(&mut positions.x, at);
-            let load = |k: usize| Lanes::load(simd, &motion.q[k], at);
-            let (q, w) = (Vectors::new(load(0), load(1), load(2)), load(3));
+            let (q, w) = quaternion(simd, &motion.q, at);
             let p = Vectors::load(simd, &motion.p, at);
             // Half angle about the angular momentum.
             let a = p.scale(half_step * Lanes::load(simd, &material.per_inertia, at));

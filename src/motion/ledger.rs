@@ -6,11 +6,12 @@ use crate::leaf::{DiscreteLeaf, State};
 use crate::rod::RESOLVED_TURN;
 use glam::DVec3;
 
-/// Part of the energy that ever moved by which its balance may be off. Of a
-/// method at nine tenths of its stable step, energy in the very fastest waves
-/// may seem to change by more, but never lasting; growth without bound passes
-/// any such limit soon.
+/// Part of the energy that ever moved by which it may have grown from nowhere.
+/// Growth without bound passes any such limit soon.
 const LARGEST_IMBALANCE: f64 = 0.5;
+
+/// Energy, in units of A/L, that rounding may make of nothing.
+const NOTHING: f64 = 1e-12;
 
 /// Energies at an instant, but what was dissipated and put in before. Leaves
 /// `leaf` with the loads and rest shape of that time.
@@ -22,7 +23,7 @@ pub fn measure(
     velocity: &[Velocity],
 ) -> Energy {
     leaf.loads = physics.loads(time);
-    if physics.rest_changes() {
+    if physics.rest_differs() {
         leaf.set_rest(physics.rest(time));
     }
     let n = leaf.segments();
@@ -61,14 +62,46 @@ pub fn measure(
     energy
 }
 
+/// The energy that the loads, had they come all at once, would give a leaf at
+/// rest in a step of `h`: what comes faster than steps can follow is not known
+/// better than this.
+fn kick(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) -> f64 {
+    let loads = physics.loads(time);
+    let n = leaf.segments();
+    let mut energy = 0.0;
+    for j in 0..leaf.rods() {
+        for i in 0..=n {
+            let Inertia {
+                mass,
+                transverse,
+                excess,
+            } = physics.inertia(leaf.leaf, &leaf.grid, j, i);
+            let weight = leaf.grid.weight(i) * leaf.leaf.length(j);
+            energy += (weight * loads.gravity).length_squared() / mass;
+            if i == n {
+                energy += loads.tip_force.length_squared() / mass;
+                energy += loads.tip_moment.length_squared() / transverse;
+            }
+        }
+    }
+    0.5 * h * h * energy
+}
+
+/// What was taken out and put in.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Exchange {
+    pub dissipated: f64,
+    pub work: f64,
+}
+
 /// What was taken out and put in, and where it began.
 #[derive(Clone, Debug, Default)]
 pub struct Ledger {
-    pub dissipated: f64,
-    pub work: f64,
+    dissipated: f64,
+    work: f64,
     balance: f64,
     potential: f64,
-    /// The largest energy that was ever in motion or could have been.
+    /// The largest energy that ever moved.
     largest: f64,
 }
 
@@ -80,33 +113,45 @@ impl Ledger {
         self.look(&start.energy);
     }
 
+    /// What has moved until now: energy that is there or was taken out, or that
+    /// loads gave.
     fn look(&mut self, energy: &Energy) {
-        let moved = energy.kinetic
-            + energy.elastic
-            + energy.coupling
-            + (energy.potential - self.potential).abs()
-            + energy.work.abs();
-        self.largest = self.largest.max(moved);
+        let there = energy.kinetic + energy.elastic + energy.coupling + energy.dissipated;
+        let given = (energy.potential - self.potential - energy.work).abs();
+        self.largest = self.largest.max(there).max(given);
     }
 
-    /// Adds what only the ledger knows.
-    pub fn complete(&self, energy: Energy) -> Energy {
+    /// Takes down what was exchanged in a step.
+    pub fn add(&mut self, exchange: Exchange) {
+        self.dissipated += exchange.dissipated;
+        self.work += exchange.work;
+    }
+
+    /// Adds what only the ledger knows, and what was exchanged since.
+    pub fn complete(&self, energy: Energy, since: Exchange) -> Energy {
         Energy {
-            dissipated: self.dissipated,
-            work: self.work,
+            dissipated: self.dissipated + since.dissipated,
+            work: self.work + since.work,
             ..energy
         }
     }
 
-    /// Whether the leaf can be trusted to be where it is.
-    pub fn judge(&mut self, leaf: &DiscreteLeaf, now: &Snapshot) -> Result<(), Broken> {
+    /// Whether the leaf, which was moved by steps of `h`, can be trusted to be
+    /// where it is.
+    pub fn judge(
+        &mut self,
+        leaf: &DiscreteLeaf,
+        physics: &Physics,
+        now: &Snapshot,
+        h: f64,
+    ) -> Result<(), Broken> {
         let time = now.time;
-        let before = self.largest;
         self.look(&now.energy);
-        // What has just appeared is not to be its own measure. Energy may be
-        // lost to the method's own damping, but not gained.
-        let imbalance = (now.energy.balance() - self.balance) / before.max(f64::MIN_POSITIVE);
-        if imbalance.is_nan() || (imbalance > LARGEST_IMBALANCE && before > 0.0) {
+        // Energy may be lost to the method's own damping, but not gained.
+        let gain = now.energy.balance() - self.balance;
+        let unresolved = kick(leaf, physics, time, h);
+        let imbalance = gain / (self.largest + unresolved + NOTHING);
+        if !imbalance.is_finite() || imbalance > LARGEST_IMBALANCE {
             return Err(Broken::Diverged { time, imbalance });
         }
         let n = leaf.segments();

@@ -25,7 +25,8 @@ pub struct Energy {
     pub potential: f64,
     /// Taken by damping since the beginning.
     pub dissipated: f64,
-    /// Put in since the beginning by loads and rest shapes that change.
+    /// Put in since the beginning by loads and rest shapes that change, and by
+    /// the moment on a tip, which has no potential.
     pub work: f64,
 }
 

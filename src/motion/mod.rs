@@ -2,6 +2,7 @@
 
 mod explicit;
 mod fictitious;
+mod friction;
 mod kernel;
 mod lanes;
 mod ledger;
@@ -9,8 +10,10 @@ mod method;
 mod nodes;
 mod physics;
 mod semi_implicit;
+mod stable;
 
-pub use explicit::{Explicit, Rigid, StableStep};
+pub use explicit::{Explicit, Rigid};
 pub use method::{Broken, Energy, Method, Snapshot, Velocity};
 pub use physics::{Inertia, Physics};
 pub use semi_implicit::{SemiImplicit, Steps};
+pub use stable::StableStep;

@@ -1,6 +1,6 @@
 //! From the leaf to the arrays of the explicit method, and back.
 
-use super::kernel::{GROUP, Material, Motion, Past, Positions};
+use super::kernel::{GROUP, Material, Motion, Past, Positions, Powers};
 use super::method::Velocity;
 use super::physics::Physics;
 use crate::leaf::{DiscreteLeaf, State};
@@ -12,8 +12,9 @@ pub struct Rod {
     pub motion: Motion,
     pub material: Material,
     pub past: Past,
-    /// What a loop over the rod summed up.
-    pub sum: f64,
+    /// What the last loops over the rod summed up.
+    pub powers: Powers,
+    pub twice_kinetic: f64,
 }
 
 fn arrays<const K: usize>(length: usize) -> [Vec<f64>; K] {
@@ -107,19 +108,21 @@ pub fn rod(leaf: &DiscreteLeaf, physics: &Physics, state: &State, j: usize) -> R
             one: past(),
             two: past(),
         },
-        sum: 0.0,
+        powers: Powers::default(),
+        twice_kinetic: 0.0,
     };
     rod.close(n);
     rod
 }
 
 impl Rod {
-    /// Lets what stands behind the last node be like it, so that the segment
-    /// that is read there, though it has no stiffness, is a sound one.
+    /// Lets what stands behind the last node be like it, so that the segments
+    /// that are read there, though they have no stiffness, are sound ones.
     pub fn close(&mut self, segments: usize) {
         let last = GROUP + segments;
         for q in &mut self.motion.q {
-            q[last + 1] = q[last];
+            let value = q[last];
+            q[last + 1..].fill(value);
         }
     }
 

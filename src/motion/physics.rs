@@ -37,6 +37,10 @@ pub struct Physics {
     pub damping: f64,
     /// Internal damping: retardation time.
     pub retardation: f64,
+    /// The loads, if they do not change.
+    constant_loads: Option<Loads>,
+    /// The factor of the rest curvatures, if it does not change.
+    constant_rest: Option<f64>,
 }
 
 impl Physics {
@@ -61,14 +65,21 @@ impl Physics {
         let densities = dynamics.density.iter().map(|density| density.at(0.5));
         let density = densities.sum::<f64>() / dynamics.density.len() as f64;
         let time = scale.length * scale.length * (density / scale.stiffness).sqrt();
-        Physics {
+        let still = dynamics.gravity.is_constant()
+            && dynamics.tip_force.is_constant()
+            && dynamics.tip_moment.is_constant();
+        let mut physics = Physics {
+            constant_loads: None,
+            constant_rest: dynamics.rest.is_constant().then(|| dynamics.rest.at(0.0)),
             scale,
             time,
             density,
             damping: dynamics.external_damping / density * time,
             retardation: dynamics.internal_damping / time,
             dynamics,
-        }
+        };
+        physics.constant_loads = still.then(|| physics.loads(0.0));
+        physics
     }
 
     /// Whether the base is clamped.
@@ -95,6 +106,9 @@ impl Physics {
 
     /// The loads at a time.
     pub fn loads(&self, time: f64) -> Loads {
+        if let Some(loads) = self.constant_loads {
+            return loads;
+        }
         let (d, at) = (&self.dynamics, time * self.time);
         let force = self.scale.force();
         Loads {
@@ -106,17 +120,24 @@ impl Physics {
 
     /// The factor of all rest curvatures at a time.
     pub fn rest(&self, time: f64) -> f64 {
-        self.dynamics.rest.at(time * self.time)
+        match self.constant_rest {
+            Some(rest) => rest,
+            None => self.dynamics.rest.at(time * self.time),
+        }
     }
 
     /// Whether loads change in time.
     pub fn loads_change(&self) -> bool {
-        let d = &self.dynamics;
-        !(d.gravity.is_constant() && d.tip_force.is_constant() && d.tip_moment.is_constant())
+        self.constant_loads.is_none()
     }
 
     /// Whether rest curvatures change in time.
     pub fn rest_changes(&self) -> bool {
-        !self.dynamics.rest.is_constant()
+        self.constant_rest.is_none()
+    }
+
+    /// Whether rest curvatures are ever other than the leaf's own.
+    pub fn rest_differs(&self) -> bool {
+        self.constant_rest != Some(1.0)
     }
 }

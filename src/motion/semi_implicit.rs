@@ -18,10 +18,11 @@
 
 use glam::{DMat3, DVec3};
 
-use super::ledger::{Ledger, measure};
+use super::friction::rates;
+use super::ledger::{Exchange, Ledger, measure};
 use super::method::{Broken, Method, Snapshot, Velocity};
 use super::physics::{Inertia, Physics};
-use crate::leaf::{DiscreteLeaf, Solved, SparsePattern, State, System};
+use crate::leaf::{DiscreteLeaf, Loads, Solved, SparsePattern, State, System};
 use crate::rod::Section;
 use crate::rotation;
 
@@ -90,6 +91,8 @@ pub struct SemiImplicit<'a> {
     /// the width of the step between.
     past: [Vec<[DVec3; 2]>; 2],
     past_step: f64,
+    /// Power of internal friction at the last step.
+    rubbing: f64,
     system: System,
     direct: Option<SparsePattern>,
     state: State,
@@ -120,6 +123,7 @@ impl<'a> SemiImplicit<'a> {
             sections: leaf.sections.clone(),
             past: [Vec::new(), Vec::new()],
             past_step: 0.0,
+            rubbing: 0.0,
             system,
             direct: None,
             state: state.clone(),
@@ -240,7 +244,12 @@ impl<'a> SemiImplicit<'a> {
 
     /// Motion at the end of a step of h that leads from the state to the trial.
     fn arrive(&mut self, h: f64) {
+        let nodes = self.leaf.segments() + 1;
         for k in 0..self.state.x.len() {
+            // Bases are held; rounding must not move them.
+            if k.is_multiple_of(nodes) {
+                continue;
+            }
             let m = self.moving[k];
             let turn = self.trial.q[k] * self.state.q[k].conjugate();
             let d = [rotation::log(turn), self.trial.x[k] - self.state.x[k]];
@@ -331,7 +340,7 @@ impl<'a> SemiImplicit<'a> {
         if rest == 1.0 && eta == 0.0 && !self.physics.rest_changes() {
             return;
         }
-        let [c0, c1, c2] = self.rate(h).map(|c| eta * c);
+        let [c0, c1, c2] = rates(h, self.past_step).map(|c| eta * c);
         for (i, (section, own)) in self
             .leaf
             .sections
@@ -353,19 +362,6 @@ impl<'a> SemiImplicit<'a> {
         }
     }
 
-    /// Weights of this and the last two strains in the rate at the end of a
-    /// step of `h`, of second order; none without a step.
-    fn rate(&self, h: f64) -> [f64; 3] {
-        if h == 0.0 {
-            return [0.0; 3];
-        }
-        if self.past_step == 0.0 {
-            return [1.0 / h, -1.0 / h, 0.0];
-        }
-        let r = h / self.past_step;
-        [(1.0 + 2.0 * r) / (1.0 + r), -(1.0 + r), r * r / (1.0 + r)].map(|c| c / h)
-    }
-
     /// Strains (v, u) of all segments.
     fn strains(&self) -> Vec<[DVec3; 2]> {
         let n = self.leaf.segments();
@@ -382,46 +378,70 @@ impl<'a> SemiImplicit<'a> {
 
     /// Makes the attempted step of `h`, and accounts for it.
     fn accept(&mut self, h: f64) {
-        let loads = self.physics.loads(self.time);
         std::mem::swap(&mut self.state, &mut self.trial);
         std::mem::swap(&mut self.moving, &mut self.next_moving);
-        self.ledger.dissipated += self.physics.damping * self.dragged();
-        // A dead moment has no potential: its work is all that tells of it.
-        let moment = 0.5 * (loads.tip_moment + self.leaf.loads.tip_moment);
-        if moment != DVec3::ZERO {
-            let last = self.leaf.segments();
-            let turn = self.state.q[last] * self.trial.q[last].conjugate();
-            self.ledger.work += moment.dot(rotation::log(turn));
-        }
+        let mut exchange = Exchange {
+            dissipated: self.physics.damping * self.dragged(),
+            work: self.changed(h),
+        };
         if self.physics.retardation > 0.0 {
-            self.ledger.dissipated += h * self.rub(h);
+            let rubbing = self.rub(h);
+            exchange.dissipated += 0.5 * h * (self.rubbing + rubbing);
+            self.rubbing = rubbing;
             let now = self.strains();
             let last = std::mem::replace(&mut self.past[0], now);
             self.past[1] = last;
             self.past_step = h;
         }
-        if self.physics.loads_change() {
-            // The trial holds the state before; the change acts at the mean.
-            let after = self.leaf.loads;
-            let potential = |leaf: &mut DiscreteLeaf, state: &State| {
-                leaf.loads = loads;
-                let then = leaf.potential(state);
-                leaf.loads = after;
-                leaf.potential(state) - then
-            };
-            let (a, b) = (
-                potential(&mut self.leaf, &self.trial),
-                potential(&mut self.leaf, &self.state),
-            );
-            self.ledger.work += 0.5 * (a + b);
-        }
+        self.ledger.add(exchange);
         self.time += h;
         self.count += 1;
     }
 
+    /// Work of what changed in the accepted step of `h`: as much as it would
+    /// be on the mean of the states before (the trial) and after.
+    fn changed(&mut self, h: f64) -> f64 {
+        let (from, to) = (self.time, self.time + h);
+        let mut work = 0.0;
+        if self.physics.loads_change() {
+            let mut potential = |loads: Loads| {
+                self.leaf.loads = loads;
+                self.leaf.potential(&self.trial) + self.leaf.potential(&self.state)
+            };
+            let before = potential(self.physics.loads(from));
+            work += 0.5 * (potential(self.physics.loads(to)) - before);
+        }
+        if self.physics.rest_changes() {
+            let bending =
+                |rest: f64| self.bending(&self.trial, rest) + self.bending(&self.state, rest);
+            work += 0.5 * (bending(self.physics.rest(to)) - bending(self.physics.rest(from)));
+        }
+        let moments = [from, to].map(|time| self.physics.loads(time).tip_moment);
+        if self.leaf.rods() == 1 && moments != [DVec3::ZERO; 2] {
+            let tip = self.state.x.len() - 1;
+            let turn = rotation::log(self.state.q[tip] * self.trial.q[tip].conjugate());
+            work += 0.5 * (moments[0] + moments[1]).dot(turn);
+        }
+        work
+    }
+
+    /// Energy of bending in a state with the rest curvatures times `rest`.
+    fn bending(&self, state: &State, rest: f64) -> f64 {
+        let n = self.leaf.segments();
+        let nodes = (0..self.leaf.rods()).flat_map(|j| (0..n).map(move |i| (j, i)));
+        nodes
+            .zip(&self.sections)
+            .map(|((j, i), own)| {
+                let u = self.leaf.segment(state, j, i, DVec3::ZERO).u;
+                let bent = u - rest * own.rest_curvature;
+                0.5 * own.ds * bent.dot(own.couple_stiffness * bent)
+            })
+            .sum()
+    }
+
     /// Power of internal friction at the end of a step of `h`.
     fn rub(&self, h: f64) -> f64 {
-        let [c0, c1, c2] = self.rate(h);
+        let [c0, c1, c2] = rates(h, self.past_step);
         let mut power = 0.0;
         for (i, now) in self.strains().iter().enumerate() {
             let section = &self.sections[i];
@@ -534,7 +554,7 @@ impl Method for SemiImplicit<'_> {
             }
         }
         let now = self.snapshot();
-        self.ledger.judge(&self.leaf, &now)
+        (self.ledger).judge(&self.leaf, &self.physics, &now, self.step)
     }
 
     fn snapshot(&mut self) -> Snapshot {
@@ -554,14 +574,20 @@ impl Method for SemiImplicit<'_> {
         );
         Snapshot {
             time: self.time,
-            energy: self.ledger.complete(energy),
+            energy: self.ledger.complete(energy, Exchange::default()),
             state: self.state.clone(),
             velocity,
         }
     }
 
     fn save(&self) -> Vec<f64> {
-        let mut numbers = vec![self.time, self.count as f64, self.step, self.past_step];
+        let mut numbers = vec![
+            self.time,
+            self.count as f64,
+            self.step,
+            self.past_step,
+            self.rubbing,
+        ];
         numbers.extend(self.ledger.save());
         numbers.extend(self.state.x.iter().flat_map(|x| x.to_array()));
         numbers.extend(self.state.q.iter().flat_map(|q| q.to_array()));
@@ -584,6 +610,7 @@ impl Method for SemiImplicit<'_> {
         self.count = next() as usize;
         self.step = next();
         self.past_step = next();
+        self.rubbing = next();
         self.ledger.restore(&mut next);
         let vector = |next: &mut dyn FnMut() -> f64| DVec3::new(next(), next(), next());
         for x in &mut self.state.x {

@@ -11,6 +11,15 @@ pub enum Refused {
          use --method semi-implicit, or give a number"
     )]
     Rigid,
+    /// The base is to fly free, and the semi-implicit method holds it.
+    #[error(
+        "dynamics.clamped = false: the semi-implicit method holds the base: use --method explicit{}",
+        if *.rigid { ", and a number for every stiffness that is inf" } else { "" }
+    )]
+    Held {
+        /// Whether a rod is rigid, which the explicit method cannot move.
+        rigid: bool,
+    },
     /// The time step is not positive.
     #[error("--step {found}: must be greater than 0")]
     NotPositive {

@@ -122,6 +122,9 @@ impl<'a> Simulation<'a> {
             true => Scheme::SemiImplicit,
             false => Scheme::Explicit,
         });
+        if scheme == Scheme::SemiImplicit && !physics.clamped() {
+            return Err(Refused::Held { rigid });
+        }
         let step = options.step.map(|step| step / physics.time);
         let (mut stable, mut made) = (None, step);
         let method: Box<dyn Method + Send + 'a> = match scheme {

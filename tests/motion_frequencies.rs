@@ -1,0 +1,234 @@
+//! Leaves vibrate at the right frequencies. Those of the semi-discrete
+//! equations converge to the known ones of beams and chains with the square
+//! of the segment length, and leapfrog vibrates at them but for its known
+//! dispersion.
+
+mod common;
+#[path = "common/linear.rs"]
+mod linear;
+#[path = "common/motion.rs"]
+mod motion;
+
+use common::{extrapolate, paper_leaf};
+use glam::{DQuat, DVec3};
+use leafdyn::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use leafdyn::motion::Physics;
+use leafdyn::scenario::{Profile, Scenario, Schedule};
+use linear::Linear;
+use motion::{Scheme, discrete, method, released, rest, three_veins};
+
+/// A beam with the slenderness r2 = I/(A L^2) and s2 = EI/(k G A L^2), of unit
+/// length, bending stiffness and mass.
+fn beam(r2: f64, s2: f64) -> Scenario {
+    let mut beam = paper_leaf(1, [1.0; 3], [1.0 / r2, 1.0 / s2, 1.0 / s2], 0.0);
+    beam.rods[0].angle = 0.0;
+    beam.dynamics.rotary_inertia = vec![Profile::Constant(r2)];
+    beam.dynamics.external_damping = 0.0;
+    beam
+}
+
+/// Frequencies of bending up and down of a straight rod along e1, in the
+/// scenario's units.
+fn bending(leaf: &DiscreteLeaf, state: &State) -> Vec<f64> {
+    let physics = Physics::new(leaf.leaf);
+    let linear = Linear::new(leaf, &physics, state).only(&[1, 5]);
+    let all = linear.lowest(4).into_iter();
+    all.map(|frequency| frequency / physics.time).collect()
+}
+
+/// What the lowest frequencies on nested grids extrapolate to. The order of
+/// convergence is two.
+fn extrapolated<const K: usize>(name: &str, grids: &[Vec<f64>]) -> [f64; K] {
+    std::array::from_fn(|k| {
+        let values: Vec<f64> = grids.iter().map(|grid| grid[k]).collect();
+        let [.., a, b, c] = values[..] else {
+            panic!("three grids at least");
+        };
+        let order = ((a - b) / (b - c)).log2();
+        println!("{name}, mode {}: order {order:.3}, {values:?}", k + 1);
+        assert!((order - 2.0).abs() < 0.1, "{name}, mode {}: {order}", k + 1);
+        extrapolate(&values, 0.25)
+    })
+}
+
+/// As [`extrapolated`], of a beam that nothing loads.
+fn of_beam<const K: usize>(name: &str, scenario: &Scenario) -> [f64; K] {
+    let leaf = Leaf::new(scenario);
+    let on = |segments| bending(&discrete(&leaf, segments), &released(&leaf, segments));
+    extrapolated(name, &[16, 32, 64, 128].map(on))
+}
+
+#[track_caller]
+fn assert_near(name: &str, found: &[f64], known: &[f64], within: f64) {
+    for (mode, (found, known)) in found.iter().zip(known).enumerate() {
+        let error = (found / known - 1.0).abs();
+        println!("{name}, mode {}: {found:.10}, error {error:.1e}", mode + 1);
+        assert!(
+            error < within,
+            "{name}, mode {}: {found} for {known}",
+            mode + 1
+        );
+    }
+}
+
+/// Roots of the frequency equation of the clamped Timoshenko beam, to 16
+/// digits, from its closed form.
+#[test]
+fn clamped_timoshenko_beams() {
+    for (r2, s2, known) in [
+        (
+            1e-4,
+            2.6e-4,
+            [
+                3.513078252179,
+                21.90711479483,
+                60.85906859261,
+                117.9269574473,
+            ],
+        ),
+        (
+            0.0016,
+            0.00416,
+            [
+                3.470067483695,
+                20.23985098215,
+                51.63550442718,
+                90.90518380084,
+            ],
+        ),
+        (
+            0.01,
+            0.026,
+            [
+                3.259779790893,
+                15.02362640182,
+                33.03084600553,
+                50.83238503823,
+            ],
+        ),
+    ] {
+        let name = format!("r2 = {r2}, s2 = {s2}");
+        let found = of_beam::<4>(&name, &beam(r2, s2));
+        assert_near(&name, &found, &known, 1e-8);
+    }
+}
+
+/// Squares of the roots of cos b cosh b = -1.
+#[test]
+fn clamped_beams_so_slender_that_only_bending_counts() {
+    let known = [1.875104068711961_f64, 4.694091132974175, 7.854757438237613].map(|b| b * b);
+    let slender =
+        [2e-4, 1e-4, 5e-5, 2.5e-5].map(|part| of_beam::<3>(&format!("{part}"), &beam(part, part)));
+    let found: [f64; 3] =
+        std::array::from_fn(|k| extrapolate(&slender.map(|frequencies| frequencies[k]), 0.5));
+    assert_near("Euler-Bernoulli", &found, &known, 1e-6);
+}
+
+/// A hanging rod of length, mass and gravity one that hardly bends, by the
+/// stiffness `part`^2, on nested grids that are fine at its clamp.
+fn hanging(part: f64) -> Vec<Vec<f64>> {
+    let [soft, stiff] = [part * part, 1.0 / (part * part)];
+    let mut rod = paper_leaf(1, [soft; 3], [stiff; 3], 0.0);
+    rod.rods[0].angle = 0.0;
+    rod.dynamics.density = vec![Profile::Constant(1.0)];
+    rod.dynamics.rotary_inertia = vec![Profile::Constant(soft)];
+    rod.gravity = [1.0, 0.0, 0.0];
+    rod.dynamics.gravity = Schedule::constant(rod.gravity);
+    let leaf = Leaf::new(&rod);
+    // A layer at the clamp, `part` thick, bends: most segments are there.
+    let growth = 4.2_f64;
+    let nodes: Vec<f64> = (1..48)
+        .map(|i| (growth * i as f64 / 48.0).exp_m1() / growth.exp_m1())
+        .collect();
+    let mut grid = Grid::new(1, &nodes);
+    let mut found = Vec::new();
+    for _ in 0..4 {
+        let leaf = DiscreteLeaf::new(&leaf, grid.clone());
+        found.push(bending(&leaf, &hanging_straight(&leaf)));
+        grid = grid.refined();
+    }
+    found
+}
+
+/// A rod along e1, each segment stretched by what hangs on it.
+fn hanging_straight(leaf: &DiscreteLeaf) -> State {
+    let n = leaf.segments();
+    let mut x = vec![DVec3::ZERO; n + 1];
+    let below = |i: usize| (i + 1..=n).map(|node| leaf.grid.weight(node)).sum::<f64>();
+    let forces: Vec<DVec3> = (0..n).map(|i| below(i) * leaf.loads.gravity).collect();
+    for i in 0..n {
+        let section = leaf.section(0, i);
+        x[i + 1] = x[i] + section.ds * (DVec3::X + section.compliance * forces[i]);
+    }
+    let mut state = State::new(n, x, vec![DQuat::IDENTITY; n + 1]);
+    state.n = forces;
+    assert!(leaf.residual(&state) < 1e-9 * leaf.loads.gravity.x);
+    state
+}
+
+/// (j/2)^2 with the zeros j of the Bessel function J0.
+#[test]
+fn a_hanging_chain() {
+    let known = [1.445796490736696_f64, 7.617815585915522].map(f64::sqrt);
+    let ever_softer = [0.02, 0.01, 0.005, 0.0025, 0.00125]
+        .map(|part| extrapolated::<2>(&format!("bending {part}"), &hanging(part)));
+    let found: [f64; 2] =
+        std::array::from_fn(|k| extrapolate(&ever_softer.map(|frequencies| frequencies[k]), 0.5));
+    assert_near("chain", &found[..1], &known[..1], 1e-6);
+    // The second feels bending more.
+    assert_near("chain", &found, &known, 2e-5);
+}
+
+/// Leapfrog with steps of `h` vibrates at 2/h asin(omega h/2) where the
+/// semi-discrete equations have the frequency omega: let go in the shape of a
+/// mode, every number follows the cosine of that frequency.
+fn assert_vibrates(name: &str, scenario: &Scenario, state: &State, wanted: &[usize]) {
+    const SIZE: f64 = 1e-6;
+    let leaf = Leaf::new(scenario);
+    let grid = discrete(&leaf, state.segments());
+    let linear = Linear::new(&grid, &Physics::new(&leaf), state);
+    let modes = linear.modes();
+    let fastest = modes.frequencies[modes.frequencies.len() - 1];
+    for &mode in wanted {
+        let omega = modes.frequencies[mode];
+        let h = 1.5 / fastest;
+        let seen = 2.0 / h * (0.5 * omega * h).asin();
+        let start = linear.displaced(state, modes.modes.column(mode).into(), SIZE);
+        let mut leapfrog = method(Scheme::Explicit, &leaf, &start, h);
+        let positions =
+            |state: &State| -> Vec<f64> { state.x.iter().flat_map(|x| x.to_array()).collect() };
+        let (rest, amplitude) = (positions(state), positions(&start));
+        let mut worst = 0.0_f64;
+        for k in 1..=100 {
+            let until = h * (100 * k) as f64;
+            leapfrog.advance(until).unwrap();
+            assert_eq!(leapfrog.steps(), 100 * k);
+            let now = positions(&leapfrog.snapshot().state);
+            let cosine = (seen * until).cos();
+            for ((now, rest), start) in now.iter().zip(&rest).zip(&amplitude) {
+                worst = worst.max((now - rest - cosine * (start - rest)).abs() / SIZE);
+            }
+        }
+        // What the phase would be off without dispersion.
+        let (phase, without) = (seen * 1e4 * h, (omega - seen).abs() * 1e4 * h);
+        println!(
+            "{name}, mode {mode}: omega {omega:.3}, phase {phase:.0} within {worst:.1e}, dispersion {without:.1e}"
+        );
+        assert!(worst < 1e-5, "{name}, mode {mode}: {worst:.1e}");
+    }
+}
+
+#[test]
+fn a_beam_in_motion() {
+    let beam = beam(0.0016, 0.00416);
+    let leaf = Leaf::new(&beam);
+    assert_vibrates("beam", &beam, &released(&leaf, 12), &[0, 3, 20, 40]);
+}
+
+/// Bent, twisted, coupled and joined, under a load.
+#[test]
+fn a_leaf_in_motion() {
+    let mut leaf = three_veins();
+    leaf.dynamics.gravity = Schedule::constant([1.0, -2.0, -3.0]);
+    assert_vibrates("leaf", &leaf, &rest(&leaf, 6), &[0, 5, 30, 60, 90]);
+}

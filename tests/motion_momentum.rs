@@ -1,0 +1,221 @@
+//! In free flight linear momentum is the impulse of the loads and angular
+//! momentum that of their moments, to rounding: on the "flying spaghetti" of
+//! Simo and Vu-Quoc (Comput. Methods Appl. Mech. Eng. 58, 1986), a flexible
+//! beam thrown by a force and a moment at one end. Internal damping changes
+//! neither; external damping lets both decay alike. Only the explicit method
+//! lets go of the base.
+
+mod common;
+#[path = "common/motion.rs"]
+mod motion;
+
+use common::parse;
+use glam::DVec3;
+use leafdyn::leaf::{Grid, Leaf};
+use leafdyn::motion::{Explicit, Method, Physics, Snapshot};
+use leafdyn::scenario::Scenario;
+use leafdyn::simulate::{Options, Refused, Scheme, Simulation};
+use motion::{discrete, released};
+
+/// L = 10, EA = GA = 1e4, EI = GJ = 500, rho A = 1, rho I = 10; loads rise
+/// until t = 2.5 and fall until t = 5. The loaded end is the tip.
+const SPAGHETTI: &str = r#"
+    name = "flying-spaghetti"
+    [leaf]
+    rods = 1
+    length = 10.0
+    fan = [-0.9272952180016123]
+    [stiffness]
+    torsion = 500.0
+    bending_2 = 500.0
+    bending_3 = 500.0
+    axial = 1e4
+    shear_2 = 1e4
+    shear_3 = 1e4
+    [dynamics]
+    density = 1.0
+    rotary_inertia = 10.0
+    external_damping = 0.0
+    clamped = false
+    duration = 15.0
+    tip_force = { at = [0.0, 2.5, 5.0], value = [[0.0, 0.0, 0.0], [20.0, 0.0, 0.0], [0.0, 0.0, 0.0]] }
+    tip_moment = { at = [0.0, 2.5, 5.0], value = [[0.0, 0.0, 0.0], [0.0, 100.0, 200.0], [0.0, 0.0, 0.0]] }
+"#;
+const SEGMENTS: usize = 10;
+/// Steps until t = 5, and until t = 15.
+const LOADED: usize = 2000;
+const ALL: usize = 6000;
+
+/// Linear and angular momentum about the origin.
+fn momentum(leaf: &Leaf, grid: &Grid, physics: &Physics, now: &Snapshot) -> [DVec3; 2] {
+    let mut sum = [DVec3::ZERO; 2];
+    for i in 0..=grid.segments() {
+        let inertia = physics.inertia(leaf, grid, 0, i);
+        let (velocity, x) = (now.velocity[i], now.state.x[i]);
+        let linear = inertia.mass * velocity.linear;
+        let d1 = now.state.q[i] * DVec3::X;
+        // The moment of inertia about d1 is twice the other two.
+        let spin = inertia.transverse * (velocity.angular + velocity.angular.dot(d1) * d1);
+        sum[0] += linear;
+        sum[1] += x.cross(linear) + spin;
+    }
+    sum
+}
+
+/// A flight and its momenta, one a step. Dimensionless.
+struct Flight {
+    /// Width of a step, and the rate of external damping.
+    step: f64,
+    damping: f64,
+    snapshots: Vec<Snapshot>,
+    momenta: Vec<[DVec3; 2]>,
+    /// Force and moment about the origin, at every step.
+    loads: Vec<[DVec3; 2]>,
+}
+
+fn fly(scenario: &Scenario, steps: usize) -> Flight {
+    let leaf = Leaf::new(scenario);
+    let (grid, physics) = (discrete(&leaf, SEGMENTS), Physics::new(&leaf));
+    let h = 5.0 / LOADED as f64 / physics.time;
+    let state = released(&leaf, SEGMENTS);
+    // A little more, so that rounding makes no further step.
+    let longest = Some(h * (1.0 + 1e-6));
+    let mut method = Explicit::new(grid.clone(), physics.clone(), &state, longest).unwrap();
+    let mut flight = Flight {
+        step: h,
+        damping: physics.damping,
+        snapshots: vec![method.snapshot()],
+        momenta: Vec::new(),
+        loads: Vec::new(),
+    };
+    for k in 1..=steps {
+        method.advance(h * k as f64).unwrap();
+        flight.snapshots.push(method.snapshot());
+    }
+    assert_eq!(method.steps(), steps);
+    for now in &flight.snapshots {
+        flight
+            .momenta
+            .push(momentum(&leaf, &grid.grid, &physics, now));
+        let loads = physics.loads(now.time);
+        let moment = now.state.tip(0).cross(loads.tip_force) + loads.tip_moment;
+        flight.loads.push([loads.tip_force, moment]);
+    }
+    flight
+}
+
+/// Largest distance between momenta, over the largest momentum.
+fn worst<'a>(pairs: impl Iterator<Item = (&'a [DVec3; 2], [DVec3; 2])>) -> [f64; 2] {
+    let (mut error, mut size) = ([0.0_f64; 2], [0.0_f64; 2]);
+    for (found, wanted) in pairs {
+        for k in 0..2 {
+            error[k] = error[k].max((found[k] - wanted[k]).length());
+            size[k] = size[k].max(wanted[k].length());
+        }
+    }
+    [error[0] / size[0], error[1] / size[1]]
+}
+
+/// The impulse of the loads, by the rule that is exact for what is linear
+/// between steps, as the force is.
+fn impulses(flight: &Flight) -> Vec<[DVec3; 2]> {
+    let mut sum = [DVec3::ZERO; 2];
+    let mut all = vec![sum];
+    for pair in flight.loads.windows(2) {
+        for k in 0..2 {
+            sum[k] += 0.5 * flight.step * (pair[0][k] + pair[1][k]);
+        }
+        all.push(sum);
+    }
+    all
+}
+
+#[test]
+fn momenta_are_the_impulses_of_the_loads() {
+    for internal in [0.0, 0.01] {
+        let mut scenario = parse(SPAGHETTI);
+        scenario.dynamics.internal_damping = internal;
+        let flight = fly(&scenario, ALL);
+        let all = flight.momenta.iter().zip(impulses(&flight));
+        let [linear, angular] = worst(all);
+        // It has flown far, bent, and left the plane.
+        let chord = |s: &Snapshot| s.state.x[0].distance(s.state.tip(0));
+        let shortest = flight.snapshots.iter().map(chord).fold(1.0, f64::min);
+        let tip = flight.snapshots[ALL].state.tip(0);
+        println!(
+            "{internal}: linear {linear:.1e}, angular {angular:.1e}; chord {shortest:.2} at least, tip at {tip:.2}"
+        );
+        assert!(linear < 1e-12 && angular < 1e-12);
+        assert!(shortest < 0.85 && tip.x > 5.0 && tip.z < -0.2);
+
+        // Half of 20 times 5, in the scenario's units.
+        let leaf = Leaf::new(&scenario);
+        let unit = leaf.scale.force() * Physics::new(&leaf).time;
+        let impulse = flight.momenta[LOADED][0] * unit;
+        assert!((impulse - DVec3::new(50.0, 0.0, 0.0)).length() < 50.0 * 1e-12);
+
+        // Free of loads both stay, and so does energy without damping.
+        let free = &flight.momenta[LOADED..];
+        let still = free.iter().map(|now| (now, free[0]));
+        let [linear, angular] = worst(still);
+        assert!(
+            linear < 1e-12 && angular < 1e-12,
+            "{linear:.1e} {angular:.1e}"
+        );
+        let energies = flight.snapshots[LOADED..].iter().map(|s| s.energy);
+        let balance: Vec<f64> = energies.map(|e| e.balance()).collect();
+        let off = balance
+            .iter()
+            .map(|b| (b - balance[0]).abs())
+            .fold(0.0, f64::max);
+        let kinetic = flight.snapshots[LOADED].energy.kinetic;
+        println!("balance within {off:.1e} of {kinetic:.2}");
+        assert!(off < 1e-4 * kinetic);
+    }
+}
+
+/// External damping takes from both by the same factor a step.
+#[test]
+fn damped_from_outside_both_decay_alike() {
+    let mut scenario = parse(SPAGHETTI);
+    scenario.dynamics.external_damping = 0.4;
+    let flight = fly(&scenario, ALL);
+    let free = &flight.momenta[LOADED..];
+    let half = 0.5 * flight.damping * flight.step;
+    let part = (1.0 - half) / (1.0 + half);
+    let decayed = free
+        .iter()
+        .enumerate()
+        .skip(1)
+        .map(|(k, now)| (now, free[0].map(|start| start * part.powi(k as i32))));
+    let [linear, angular] = worst(decayed);
+    println!("decay: linear {linear:.1e}, angular {angular:.1e}");
+    assert!(linear < 1e-12 && angular < 1e-12);
+    let all: f64 = (ALL - LOADED) as f64 * flight.step * flight.damping;
+    let left = free[free.len() - 1][0].length() / free[0][0].length();
+    assert!((left.ln() + all).abs() < 1e-6, "{left} of {}", (-all).exp());
+}
+
+/// The semi-implicit method holds the base: it says so.
+#[test]
+fn the_semi_implicit_method_does_not_fly() {
+    let scenario = parse(SPAGHETTI);
+    let leaf = Leaf::new(&scenario);
+    let of = |scheme| {
+        let options = Options {
+            scheme,
+            ..Options::default()
+        };
+        Simulation::new(&leaf, &options).map(|s| s.scheme())
+    };
+    assert_eq!(of(None), Ok(Scheme::Explicit));
+    assert_eq!(
+        of(Some(Scheme::SemiImplicit)),
+        Err(Refused::Held { rigid: false })
+    );
+    let mut rigid = scenario.clone();
+    rigid.rods[0].force_stiffness[0] = leafdyn::scenario::Profile::Constant(f64::INFINITY);
+    let leaf = Leaf::new(&rigid);
+    let refused = Simulation::new(&leaf, &Options::default()).map(|_| ());
+    assert_eq!(refused, Err(Refused::Held { rigid: true }));
+}
