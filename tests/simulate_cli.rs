@@ -386,7 +386,7 @@ fn bad_requests_are_refused_before_anything_is_written() {
         (&["leaf.toml", "--step", "nan"], "--step NaN"),
         (
             &["leaf.toml", "--step", "0.1"],
-            ", because of shear with rotation: use a shorter step",
+            "stable up to 5.964e-3, because of shear with rotation: use a shorter step",
         ),
         (
             &[

@@ -72,9 +72,7 @@ fn kick(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) -> f64 {
     for j in 0..leaf.rods() {
         for i in 0..=n {
             let Inertia {
-                mass,
-                transverse,
-                excess,
+                mass, transverse, ..
             } = physics.inertia(leaf.leaf, &leaf.grid, j, i);
             let weight = leaf.grid.weight(i) * leaf.leaf.length(j);
             energy += (weight * loads.gravity).length_squared() / mass;

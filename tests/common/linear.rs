@@ -126,9 +126,12 @@ impl Linear {
             for i in 1..=leaf.segments() {
                 let node = state.base(j) + i;
                 let [turn, shift] = self.freedoms[node].unwrap();
-                let Inertia { mass, transverse } = physics.inertia(leaf.leaf, &leaf.grid, j, i);
+                let inertia = physics.inertia(leaf.leaf, &leaf.grid, j, i);
+                let Inertia {
+                    mass, transverse, ..
+                } = inertia;
                 let d1 = state.q[node] * DVec3::X;
-                let own = Inertia::POLAR.sqrt().recip() - 1.0;
+                let own = (transverse / inertia.polar()).sqrt() - 1.0;
                 let root = (DMat3::IDENTITY + own * outer(d1, d1)) * transverse.sqrt().recip();
                 add(&mut self.per_root_mass, (turn, turn), &root);
                 masses[shift] += mass;
