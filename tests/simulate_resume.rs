@@ -9,6 +9,10 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use leafdyn::leaf::Leaf;
+use leafdyn::output::Recording;
+use leafdyn::scenario::Scenario;
+use leafdyn::simulate::{Options, Scheme, Simulation};
 use workplace::{Workplace, leaf, text};
 
 /// So many outputs are waited for before a run is stopped.
@@ -128,6 +132,16 @@ fn ends_the_same(arguments: &[&str]) {
     assert_eq!(resumed.status.code(), Some(0), "{}", text(&resumed.stderr));
     assert_eq!(text(&resumed.stderr), "");
 
+    same_files(&place);
+    assert_eq!(
+        without_wall_seconds(&whole.stdout),
+        without_wall_seconds(&resumed.stdout)
+    );
+}
+
+/// The folders `whole` and `out` hold the same.
+#[track_caller]
+fn same_files(place: &Workplace) {
     let names = place.names("whole");
     assert_eq!(place.names("out"), names);
     assert_eq!(names.len(), 7);
@@ -141,10 +155,6 @@ fn ends_the_same(arguments: &[&str]) {
         });
         assert!(a == b, "{name} differs");
     }
-    assert_eq!(
-        without_wall_seconds(&whole.stdout),
-        without_wall_seconds(&resumed.stdout)
-    );
 }
 
 fn without_wall_seconds(summary: &[u8]) -> Vec<u8> {
@@ -163,6 +173,69 @@ fn a_stopped_explicit_run_goes_on() {
 #[test]
 fn a_stopped_semi_implicit_run_goes_on() {
     ends_the_same(&SEMI_IMPLICIT);
+}
+
+/// Wherever a run is kept: before its first step, and after its last.
+#[test]
+fn a_run_goes_on_from_any_output() {
+    let text = leaf("small", 3)
+        + "
+[rest]
+bend_2 = 1.0
+twist = 0.5
+[dynamics]
+duration = 0.6
+output_interval = 0.1
+internal_damping = 0.01
+rest = { at = [0.1, 0.4], factor = [0.5, 1.0] }
+gravity = { at = [0.0, 1.0], value = [[0, 0, -1], [0, 1, -1]] }
+";
+    for set in ["leaf.joined=true", "leaf.joined=false"] {
+        let scenario = Scenario::from_toml_with(&text, "leaf", &[set.into()]).unwrap();
+        for scheme in [Scheme::Explicit, Scheme::SemiImplicit] {
+            let place = Workplace::new();
+            let leaf = Leaf::new(&scenario);
+            let options = Options {
+                scheme: Some(scheme),
+                tolerance: Some(1e-4),
+                ..Options::default()
+            };
+            // Runs to the end, or is kept after so many outputs.
+            let run = |folder: &str, resume: bool, outputs: Option<usize>| {
+                let folder = place.path(folder);
+                let mut simulation = Simulation::new(&leaf, &options).unwrap();
+                let mut recording = match resume {
+                    true => Recording::resume(&folder, &mut simulation).unwrap(),
+                    false => Recording::begin(&folder, &mut simulation).unwrap(),
+                };
+                while !simulation.done() && Some(simulation.frames().1) != outputs {
+                    let frame = simulation.next_frame().unwrap();
+                    recording.add(&simulation, &frame).unwrap();
+                }
+                if outputs.is_some() {
+                    let time = recording.keeper().keep().unwrap().unwrap();
+                    assert_eq!(time, simulation.time());
+                    return;
+                }
+                let record = recording.record(&simulation, None).unwrap();
+                recording.finish(&record).unwrap();
+                assert!(
+                    recording.keeper().keep().is_none(),
+                    "nothing is left to keep"
+                );
+            };
+            run("whole", false, None);
+            for outputs in [0, 1, 4, 6] {
+                run("out", false, Some(outputs));
+                assert!(
+                    LEFT.iter()
+                        .all(|name| place.path("out").join(name).exists())
+                );
+                run("out", true, None);
+                same_files(&place);
+            }
+        }
+    }
 }
 
 /// Resuming something else is refused, and changes nothing.

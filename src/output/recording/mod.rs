@@ -31,6 +31,34 @@ use motion::{Form, Size};
 const STILLS: usize = 8;
 
 /// The files of a simulation that is under way.
+///
+/// ```
+/// use leafdyn::leaf::Leaf;
+/// use leafdyn::output::Recording;
+/// use leafdyn::scenario::Scenario;
+/// use leafdyn::simulate::{Options, Simulation};
+///
+/// let cantilever = r#"
+///     name = "cantilever"
+///     leaf = { rods = 1, length = 1.0, fan = [0.0] }
+///     stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }
+///     load = { gravity = [0.0, 0.0, -1.0] }
+/// "#;
+/// # let folder = tempfile::tempdir()?;
+/// # let folder = folder.path();
+/// let scenario = Scenario::from_toml(cantilever)?;
+/// let leaf = Leaf::new(&scenario);
+/// let mut simulation = Simulation::new(&leaf, &Options::default())?;
+/// let mut recording = Recording::begin(folder, &mut simulation)?;
+/// while !simulation.done() {
+///     let frame = simulation.next_frame()?;
+///     recording.add(&simulation, &frame)?;
+/// }
+/// let record = recording.record(&simulation, None)?;
+/// let files = recording.finish(&record)?;
+/// assert_eq!(files.len(), 7);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Recording {
     folder: PathBuf,
     run: Identity,
@@ -76,7 +104,8 @@ impl Recording {
     /// `folder`: the simulation is brought there, too.
     ///
     /// # Errors
-    /// If there is no checkpoint, or it does not fit. Nothing is changed then.
+    /// If there is no checkpoint, or it does not fit. Nothing that was kept is
+    /// lost then.
     pub fn resume(folder: &Path, simulation: &mut Simulation) -> Result<Self, CannotResume> {
         let run = Identity::of(simulation);
         let found = Checkpoint::read(folder, &run)?;
