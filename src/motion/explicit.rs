@@ -137,8 +137,8 @@ impl<'a> Explicit<'a> {
         self.longest
     }
 
-    /// Gives the nodes masses that serve to come to rest, not to move: see
-    /// [`fictitious`]. Time steps may be as long as one then, and the leaf is
+    /// Gives the nodes masses that serve to come to rest, not to move: the
+    /// fastest motions of all segments become alike. Time steps may be as long as one then, and the leaf is
     /// stopped.
     pub fn disguise(&mut self) {
         let tip = fictitious::masses(&self.leaf, &mut self.rods);

@@ -73,7 +73,7 @@ pub(super) struct Level<'a> {
 ///
 /// # Errors
 /// Requests that cannot be met; everything that happens while solving is an
-/// [`Outcome`] instead.
+/// [`Outcome`](crate::relax::Outcome) instead.
 pub fn relax(
     scenario: &Scenario,
     options: &Options,
