@@ -189,6 +189,7 @@ mod tests {
     fn an_early_end() {
         let mut record = swing(Scheme::Explicit);
         record.stopped = Some(Stopped::Diverged {
+            otherwise: "--method semi-implicit",
             time: 0.4,
             percent: 70.0,
         });

@@ -587,6 +587,7 @@ impl Method for SemiImplicit<'_> {
             self.step,
             self.past_step,
             self.rubbing,
+            f64::from(u8::from(self.direct.is_some())),
         ];
         numbers.extend(self.ledger.save());
         numbers.extend(self.state.x.iter().flat_map(|x| x.to_array()));
@@ -611,6 +612,7 @@ impl Method for SemiImplicit<'_> {
         self.step = next();
         self.past_step = next();
         self.rubbing = next();
+        let direct = next() == 1.0;
         self.ledger.restore(&mut next);
         let vector = |next: &mut dyn FnMut() -> f64| DVec3::new(next(), next(), next());
         for x in &mut self.state.x {
@@ -630,6 +632,12 @@ impl Method for SemiImplicit<'_> {
         for v in self.past.iter_mut().flatten().flatten() {
             *v = vector(&mut next);
         }
+        // The solver in use decides the last digits, too.
+        self.leaf.assemble(&self.state, &mut self.system);
+        self.direct = match direct {
+            true => SparsePattern::new(&self.system).ok(),
+            false => None,
+        };
         true
     }
 }

@@ -57,13 +57,15 @@ pub enum Refused {
 pub enum Stopped {
     /// Energy appeared from nowhere, or a value is not a number.
     #[error(
-        "diverged at t = {time:.6e}: energy grew from nowhere by {percent:.0} % of all that moved; use a shorter time step, or --method semi-implicit"
+        "diverged at t = {time:.6e}: energy grew from nowhere by {percent:.0} % of all that moved; use a shorter --step, or {otherwise}"
     )]
     Diverged {
         /// When.
         time: f64,
         /// Energy gained, in percent of the largest that ever moved.
         percent: f64,
+        /// What else may help.
+        otherwise: &'static str,
     },
     /// The grid is too coarse.
     #[error(

@@ -266,6 +266,10 @@ impl<'a> Simulation<'a> {
         let (unit, segments) = (self.physics.time, self.segments());
         self.method.advance(until).map_err(|broken| match broken {
             Broken::Diverged { time, imbalance } => Stopped::Diverged {
+                otherwise: match self.scheme {
+                    Scheme::Explicit => "--method semi-implicit",
+                    Scheme::SemiImplicit => "dynamics.start = \"at-rest\"",
+                },
                 time: time * unit,
                 percent: 100.0 * imbalance,
             },

@@ -102,6 +102,7 @@ mod tests {
     fn an_early_end_is_told() {
         let mut record = sample::record(5, 8);
         record.stopped = Some(Stopped::Diverged {
+            otherwise: "--method semi-implicit",
             time: 10.1,
             percent: 70.0,
         });
