@@ -69,14 +69,23 @@ impl<S: Simd> Lanes<S> {
         self.simd.reduce_sum_f64s(self.v)
     }
 
-    /// The polynomial with these coefficients, constant term first.
+    /// The polynomial with these coefficients, constant term first. In thirds,
+    /// which do not wait for each other.
     #[inline(always)]
     pub fn polynomial<const N: usize>(self, coefficients: &[f64; N]) -> Self {
-        let mut sum = Lanes::splat(self.simd, coefficients[N - 1]);
-        for k in (0..N - 1).rev() {
-            sum = sum.times(self, Lanes::splat(self.simd, coefficients[k]));
-        }
-        sum
+        let coefficient = |k: usize| Lanes::splat(self.simd, coefficients[k]);
+        let cube = self * self * self;
+        let third = |first: usize| {
+            let last = first + (N - 1 - first) / 3 * 3;
+            let mut sum = coefficient(last);
+            let mut k = last;
+            while k >= 3 {
+                k -= 3;
+                sum = sum.times(cube, coefficient(k));
+            }
+            sum
+        };
+        third(2).times(self, third(1)).times(self, third(0))
     }
 }
 
