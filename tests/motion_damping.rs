@@ -102,6 +102,7 @@ fn assert_decays(name: &str, external: f64, internal: f64, modes: &[usize]) {
             };
             let few = match scheme {
                 Scheme::Explicit => 50 * f64::max(20.0, until / stable / 25.0).ceil() as usize,
+                Scheme::SemiImplicit if drag > 4.0 * omega => 2000,
                 Scheme::SemiImplicit => 500,
             };
             let errors = [of(few), of(2 * few)];

@@ -9,7 +9,12 @@
 //! changes, do. External damping enters by its mean over the kick.
 //!
 //! It is stable up to a time step of 2/omega for the highest frequency omega,
-//! which is at most that of a single segment ([`Explicit::stable_step`]).
+//! which is at most that of a single segment ([`Explicit::stable_step`]), as
+//! long as the step stays the same: steps that alternate between one length
+//! and half of it are unstable from less than 0.9 of that bound on. So all
+//! steps are of one length, and what is asked for at a time between two of
+//! them is reached by a shorter step from the one before, off the path, to
+//! which the motion returns. It does not depend on the times asked for.
 
 use glam::DVec3;
 use pulp::Arch;
@@ -27,6 +32,9 @@ use crate::leaf::{DiscreteLeaf, Loads, State};
 
 /// Part of the stable time step that is used.
 const SAFETY: f64 = 0.9;
+
+/// Part of a step that is rounding.
+const NO_TIME: f64 = 1e-9;
 
 /// Steps between looks at the energy.
 const WATCHED: usize = 200;
@@ -49,10 +57,14 @@ pub struct Explicit<'a> {
     rods: Vec<Rod>,
     /// Mass of the joint tip, if there is one.
     tip_mass: Option<f64>,
-    /// Longest time step.
-    longest: f64,
+    /// Time step.
+    step: f64,
+    /// Time of the last step, and that asked for, less than a step later.
     time: f64,
+    asked: f64,
     steps: usize,
+    /// Time and steps when the first of the present length began.
+    begin: (f64, usize),
     /// Widths of the last step and of the one before; zero if there was none.
     widths: [f64; 2],
     ledger: Ledger,
@@ -71,8 +83,8 @@ struct Kicked {
 pub struct Rigid;
 
 impl<'a> Explicit<'a> {
-    /// A leaf at rest in `state`. Time steps are as long as is stable, or
-    /// `longest` if that is given, stable or not.
+    /// A leaf at rest in `state`. Time steps are nine tenths of what is stable,
+    /// or `step` if that is given, stable or not.
     ///
     /// # Errors
     /// If a rod is rigid: its waves are infinitely fast.
@@ -80,7 +92,7 @@ impl<'a> Explicit<'a> {
         leaf: DiscreteLeaf<'a>,
         physics: Physics,
         state: &State,
-        longest: Option<f64>,
+        step: Option<f64>,
     ) -> Result<Self, Rigid> {
         if leaf.stiffest() == 0.0 {
             return Err(Rigid);
@@ -101,9 +113,11 @@ impl<'a> Explicit<'a> {
                 .map(|j| nodes::rod(&leaf, &physics, state, j))
                 .collect(),
             tip_mass: joined.then(|| (0..rods).map(tip_mass).sum()),
-            longest: 0.0,
+            step: 0.0,
             time: 0.0,
+            asked: 0.0,
             steps: 0,
+            begin: (0.0, 0),
             widths: [0.0; 2],
             ledger: Ledger::default(),
             parallel: rods > 1
@@ -112,7 +126,7 @@ impl<'a> Explicit<'a> {
             leaf,
             physics,
         };
-        explicit.longest = longest.unwrap_or_else(|| SAFETY * explicit.stable_step().step);
+        explicit.step = step.unwrap_or_else(|| SAFETY * explicit.stable_step().step);
         explicit.forces(true);
         for rod in &mut explicit.rods {
             // At rest the past was like the present.
@@ -132,9 +146,9 @@ impl<'a> Explicit<'a> {
         StableStep::of(&leaf, &self.physics, &self.state())
     }
 
-    /// The longest time step that is made.
+    /// The length of time steps.
     pub fn longest_step(&self) -> f64 {
-        self.longest
+        self.step
     }
 
     /// Gives the nodes masses that serve to come to rest, not to move: the
@@ -161,15 +175,24 @@ impl<'a> Explicit<'a> {
         self.physics.damping = rate;
     }
 
-    /// One time step; returns twice the kinetic energy at its beginning.
+    /// One time step of any length; returns twice the kinetic energy at its
+    /// beginning.
     pub fn step(&mut self, h: f64) -> f64 {
-        let (exchange, energy) = self.kick_until(0.5 * h, true);
+        let (exchange, energy) = self.go(h);
         self.ledger.add(exchange);
+        self.steps += 1;
+        self.begin = (self.time, self.steps);
+        self.asked = self.time;
+        energy
+    }
+
+    /// Kicks, and flies on for `h`.
+    fn go(&mut self, h: f64) -> (Exchange, f64) {
+        let done = self.kick_until(0.5 * h, true);
         self.drift(h);
         self.widths = [h, self.widths[0]];
         self.time += h;
-        self.steps += 1;
-        energy
+        done
     }
 
     /// By how much time velocities lag behind positions: half a step, but not
@@ -368,7 +391,7 @@ impl<'a> Explicit<'a> {
 
     fn judge(&mut self) -> Result<(), Broken> {
         let now = self.snapshot();
-        (self.ledger).judge(&self.leaf, &self.physics, &now, self.widths[0])
+        (self.ledger).judge(&self.leaf, &self.physics, &now, self.step)
     }
 
     /// Positions, rotations and segment forces now.
@@ -402,7 +425,7 @@ impl Method for Explicit<'_> {
     }
 
     fn time(&self) -> f64 {
-        self.time
+        self.asked
     }
 
     fn steps(&self) -> usize {
@@ -410,35 +433,49 @@ impl Method for Explicit<'_> {
     }
 
     fn advance(&mut self, until: f64) -> Result<(), Broken> {
-        if until <= self.time {
-            return Ok(());
-        }
-        let count = ((until - self.time) / self.longest).ceil().max(1.0);
-        let (begin, h) = (self.time, (until - self.time) / count);
-        let count = count as usize;
-        for i in 0..count {
-            self.step(h);
-            self.time = begin + h * (i + 1) as f64;
+        let h = self.step;
+        loop {
+            // Times are not summed up, and neither is rounding.
+            let next = self.begin.0 + h * (self.steps + 1 - self.begin.1) as f64;
+            if next > until + NO_TIME * h {
+                break;
+            }
+            let (exchange, _) = self.go(h);
+            self.ledger.add(exchange);
+            self.steps += 1;
+            (self.time, self.asked) = (next, next);
             if self.steps.is_multiple_of(WATCHED) {
                 self.judge()?;
             }
         }
-        self.time = until;
+        self.asked = until.max(self.asked);
         self.judge()
     }
 
     fn snapshot(&mut self) -> Snapshot {
-        let rods = self.rods.clone();
-        let (exchange, _) = self.kick_until(0.0, false);
+        let path: Vec<_> = (self.rods.iter().zip(&self.positions))
+            .map(|(rod, x)| (x.clone(), rod.motion.clone(), rod.past.clone()))
+            .collect();
+        let (time, widths) = (self.time, self.widths);
+        let mut exchange = Exchange::default();
+        let left = self.asked - self.time;
+        if left > NO_TIME * self.step {
+            exchange += self.go(left).0;
+        }
+        self.time = self.asked;
+        exchange += self.kick_until(0.0, false).0;
         let state = self.state();
         let n = self.leaf.segments();
         let velocity: Vec<Velocity> = (self.rods.iter())
             .flat_map(|rod| rod.velocities(n))
             .collect();
-        self.rods = rods;
-        let energy = measure(&mut self.leaf, &self.physics, self.time, &state, &velocity);
+        for ((rod, x), path) in self.rods.iter_mut().zip(&mut self.positions).zip(path) {
+            (*x, rod.motion, rod.past) = path;
+        }
+        (self.time, self.widths) = (time, widths);
+        let energy = measure(&mut self.leaf, &self.physics, self.asked, &state, &velocity);
         Snapshot {
-            time: self.time,
+            time: self.asked,
             energy: self.ledger.complete(energy, exchange),
             state,
             velocity,
@@ -446,7 +483,15 @@ impl Method for Explicit<'_> {
     }
 
     fn save(&self) -> Vec<f64> {
-        let mut numbers = vec![self.time, self.steps as f64, self.widths[0], self.widths[1]];
+        let mut numbers = vec![
+            self.time,
+            self.asked,
+            self.steps as f64,
+            self.begin.0,
+            self.begin.1 as f64,
+            self.widths[0],
+            self.widths[1],
+        ];
         numbers.extend(self.ledger.save());
         for (rod, positions) in self.rods.iter().zip(&self.positions) {
             let moving = positions.x.iter().chain(rod.moving_arrays());
@@ -462,7 +507,9 @@ impl Method for Explicit<'_> {
         let mut numbers = numbers.iter().copied();
         let mut next = || numbers.next().unwrap_or_default();
         self.time = next();
+        self.asked = next();
         self.steps = next() as usize;
+        self.begin = (next(), next() as usize);
         self.widths = [next(), next()];
         self.ledger.restore(&mut next);
         for (rod, positions) in self.rods.iter_mut().zip(&mut self.positions) {

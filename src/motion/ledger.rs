@@ -92,11 +92,17 @@ pub struct Exchange {
     pub work: f64,
 }
 
+impl std::ops::AddAssign for Exchange {
+    fn add_assign(&mut self, other: Exchange) {
+        self.dissipated += other.dissipated;
+        self.work += other.work;
+    }
+}
+
 /// What was taken out and put in, and where it began.
 #[derive(Clone, Debug, Default)]
 pub struct Ledger {
-    dissipated: f64,
-    work: f64,
+    exchanged: Exchange,
     balance: f64,
     potential: f64,
     /// The largest energy that ever moved.
@@ -121,15 +127,14 @@ impl Ledger {
 
     /// Takes down what was exchanged in a step.
     pub fn add(&mut self, exchange: Exchange) {
-        self.dissipated += exchange.dissipated;
-        self.work += exchange.work;
+        self.exchanged += exchange;
     }
 
     /// Adds what only the ledger knows, and what was exchanged since.
     pub fn complete(&self, energy: Energy, since: Exchange) -> Energy {
         Energy {
-            dissipated: self.dissipated + since.dissipated,
-            work: self.work + since.work,
+            dissipated: self.exchanged.dissipated + since.dissipated,
+            work: self.exchanged.work + since.work,
             ..energy
         }
     }
@@ -166,8 +171,8 @@ impl Ledger {
     /// All its numbers.
     pub fn save(&self) -> [f64; 5] {
         [
-            self.dissipated,
-            self.work,
+            self.exchanged.dissipated,
+            self.exchanged.work,
             self.balance,
             self.potential,
             self.largest,
@@ -177,8 +182,10 @@ impl Ledger {
     /// Takes them back.
     pub fn restore(&mut self, next: &mut impl FnMut() -> f64) {
         *self = Ledger {
-            dissipated: next(),
-            work: next(),
+            exchanged: Exchange {
+                dissipated: next(),
+                work: next(),
+            },
             balance: next(),
             potential: next(),
             largest: next(),

@@ -121,8 +121,6 @@ pub fn method<'a>(
     h: f64,
 ) -> Box<dyn Method + 'a> {
     let (physics, grid) = (Physics::new(leaf), discrete(leaf, state.segments()));
-    // Rounding makes no further step.
-    let h = h * (1.0 + 1e-9);
     match scheme {
         Scheme::Explicit => Box::new(Explicit::new(grid, physics, state, Some(h)).unwrap()),
         Scheme::SemiImplicit => Box::new(SemiImplicit::new(grid, physics, state, Steps::Fixed(h))),

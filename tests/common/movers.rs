@@ -10,9 +10,11 @@ fn log_uniform(decades: std::ops::Range<f64>) -> impl Strategy<Value = f64> {
     decades.prop_map(|exponent| 10f64.powf(exponent))
 }
 
-/// Constant, or with two kinks that make its values up to thrice as large.
+/// Constant, or with two of four kinks, some close together, that make its
+/// values up to thrice as large.
 fn profile(decades: std::ops::Range<f64>) -> impl Strategy<Value = Profile> {
-    let knots = (0.1..0.45, 0.55..0.9, 0.4..2.5, 0.4..2.5, 0.4..2.5);
+    let [first, second] = [[0.2, 0.22], [0.6, 0.85]].map(|of| prop::sample::select(of.to_vec()));
+    let knots = (first, second, 0.4..2.5, 0.4..2.5, 0.4..2.5);
     (log_uniform(decades), knots, prop::bool::weighted(0.5)).prop_map(
         |(value, (first, second, a, b, c), crooked)| match crooked {
             false => Profile::Constant(value),
