@@ -60,8 +60,8 @@ pub struct Explicit<'a> {
     /// Time step.
     step: f64,
     /// Time of the last step, and that asked for, less than a step later.
+    stepped: f64,
     time: f64,
-    asked: f64,
     steps: usize,
     /// Time and steps when the first of the present length began.
     begin: (f64, usize),
@@ -114,8 +114,8 @@ impl<'a> Explicit<'a> {
                 .collect(),
             tip_mass: joined.then(|| (0..rods).map(tip_mass).sum()),
             step: 0.0,
+            stepped: 0.0,
             time: 0.0,
-            asked: 0.0,
             steps: 0,
             begin: (0.0, 0),
             widths: [0.0; 2],
@@ -141,7 +141,7 @@ impl<'a> Explicit<'a> {
     pub fn stable_step(&self) -> StableStep {
         let mut leaf = self.leaf.clone();
         if self.physics.rest_differs() {
-            leaf.set_rest(self.physics.rest(self.time));
+            leaf.set_rest(self.physics.rest(self.stepped));
         }
         StableStep::of(&leaf, &self.physics, &self.state())
     }
@@ -181,8 +181,8 @@ impl<'a> Explicit<'a> {
         let (exchange, energy) = self.go(h);
         self.ledger.add(exchange);
         self.steps += 1;
-        self.begin = (self.time, self.steps);
-        self.asked = self.time;
+        self.begin = (self.stepped, self.steps);
+        self.time = self.stepped;
         energy
     }
 
@@ -191,7 +191,7 @@ impl<'a> Explicit<'a> {
         let done = self.kick_until(0.5 * h, true);
         self.drift(h);
         self.widths = [h, self.widths[0]];
-        self.time += h;
+        self.stepped += h;
         done
     }
 
@@ -207,8 +207,8 @@ impl<'a> Explicit<'a> {
     /// too.
     fn kick_until(&mut self, ahead: f64, remember: bool) -> (Exchange, f64) {
         let length = self.behind() + ahead;
-        let [from, to] = [self.time - self.behind(), self.time + ahead];
-        let loads = self.physics.loads(self.time);
+        let [from, to] = [self.stepped - self.behind(), self.stepped + ahead];
+        let loads = self.physics.loads(self.stepped);
         let powers = self.forces(remember);
         let Kicked { energy, moment } = self.kick(length, &loads);
         let mut work = length * moment;
@@ -245,7 +245,7 @@ impl<'a> Explicit<'a> {
     /// Internal forces at the present positions.
     fn forces(&mut self, remember: bool) -> Powers {
         let (arch, groups) = (self.arch, groups(self.leaf.segments()));
-        let rest = self.physics.rest(self.time);
+        let rest = self.physics.rest(self.stepped);
         let (retardation, changes) = (self.physics.retardation, self.physics.rest_changes());
         let rates = rates(self.widths[0], self.widths[1]);
         let force = |(rod, positions): (&mut Rod, &Positions)| {
@@ -425,7 +425,7 @@ impl Method for Explicit<'_> {
     }
 
     fn time(&self) -> f64 {
-        self.asked
+        self.time
     }
 
     fn steps(&self) -> usize {
@@ -443,12 +443,12 @@ impl Method for Explicit<'_> {
             let (exchange, _) = self.go(h);
             self.ledger.add(exchange);
             self.steps += 1;
-            (self.time, self.asked) = (next, next);
+            (self.stepped, self.time) = (next, next);
             if self.steps.is_multiple_of(WATCHED) {
                 self.judge()?;
             }
         }
-        self.asked = until.max(self.asked);
+        self.time = until.max(self.time);
         self.judge()
     }
 
@@ -456,13 +456,13 @@ impl Method for Explicit<'_> {
         let path: Vec<_> = (self.rods.iter().zip(&self.positions))
             .map(|(rod, x)| (x.clone(), rod.motion.clone(), rod.past.clone()))
             .collect();
-        let (time, widths) = (self.time, self.widths);
+        let (time, widths) = (self.stepped, self.widths);
         let mut exchange = Exchange::default();
-        let left = self.asked - self.time;
+        let left = self.time - self.stepped;
         if left > NO_TIME * self.step {
             exchange += self.go(left).0;
         }
-        self.time = self.asked;
+        self.stepped = self.time;
         exchange += self.kick_until(0.0, false).0;
         let state = self.state();
         let n = self.leaf.segments();
@@ -472,10 +472,10 @@ impl Method for Explicit<'_> {
         for ((rod, x), path) in self.rods.iter_mut().zip(&mut self.positions).zip(path) {
             (*x, rod.motion, rod.past) = path;
         }
-        (self.time, self.widths) = (time, widths);
-        let energy = measure(&mut self.leaf, &self.physics, self.asked, &state, &velocity);
+        (self.stepped, self.widths) = (time, widths);
+        let energy = measure(&mut self.leaf, &self.physics, self.time, &state, &velocity);
         Snapshot {
-            time: self.asked,
+            time: self.time,
             energy: self.ledger.complete(energy, exchange),
             state,
             velocity,
@@ -484,8 +484,8 @@ impl Method for Explicit<'_> {
 
     fn save(&self) -> Vec<f64> {
         let mut numbers = vec![
+            self.stepped,
             self.time,
-            self.asked,
             self.steps as f64,
             self.begin.0,
             self.begin.1 as f64,
@@ -506,8 +506,8 @@ impl Method for Explicit<'_> {
         }
         let mut numbers = numbers.iter().copied();
         let mut next = || numbers.next().unwrap_or_default();
+        self.stepped = next();
         self.time = next();
-        self.asked = next();
         self.steps = next() as usize;
         self.begin = (next(), next() as usize);
         self.widths = [next(), next()];
