@@ -138,6 +138,11 @@
 //! from a relaxed leaf or from arcs. [`study::check`] compares it with the
 //! relaxation; the two share neither grid nor element nor linear algebra.
 //!
+//! **Where methods fail** ([`study::map()`]). Numbers of a scenario vary
+//! ([`study::Vary`]), and in each cell every method's answer is judged against
+//! the relaxed leaf confirmed by shooting: right, another equilibrium, a saddle,
+//! not as accurate as it says, or none.
+//!
 //! # Layout
 //!
 //! [`scenario`] (TOML to a checked [`scenario::Scenario`]) and [`rotation`],

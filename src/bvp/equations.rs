@@ -15,6 +15,7 @@ use glam::{DMat3, DQuat, DVec3};
 
 use super::arcs::{self, Arc};
 use crate::scenario::{Profile, Scenario};
+use std::time::Instant;
 
 /// Numbers that describe one rod at one sigma: r, q (x, y, z, w), n, m.
 pub const STATE: usize = 13;
@@ -50,6 +51,8 @@ pub struct Equations<'a> {
     /// Between 0, rods as stiff in every direction as in the stiffest, and 1,
     /// the rods of the scenario.
     pub softened: f64,
+    /// When to give up solving them.
+    pub deadline: Option<Instant>,
 }
 
 /// One rod at one sigma.
@@ -167,6 +170,7 @@ impl<'a> Equations<'a> {
             lengths,
             part: 1.0,
             softened: 1.0,
+            deadline: None,
         }
     }
 

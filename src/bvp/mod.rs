@@ -53,4 +53,4 @@ mod trajectory;
 
 pub use newton::Work;
 pub use solution::{Failure, Neutral, Options, Reason, Solution, Start};
-pub use solve::{solve, solve_within};
+pub use solve::{solve, solve_before, solve_within};

@@ -11,6 +11,7 @@ use super::equations::{Equations, RodState};
 use super::intervals::{Flight, Nodes, Units, choose, fly, sensitivities};
 use super::march::March;
 use super::trajectory::Trajectory;
+use std::time::Instant;
 
 /// Iterations before a solution is given up.
 const MAX_ITERATIONS: usize = 60;
@@ -225,6 +226,9 @@ impl<'e, 'a> Newton<'e, 'a> {
     }
 
     fn fly(&mut self, nodes: &Nodes, tolerance: f64, linear: bool) -> Result<Vec<Flight>, Stuck> {
+        if (self.equations.deadline).is_some_and(|deadline| Instant::now() >= deadline) {
+            return Err(Stuck::NoProgress(f64::INFINITY));
+        }
         let flights = fly(self.equations, nodes, tolerance, linear).map_err(Stuck::Unbounded)?;
         self.work.steps += flights.iter().map(|flight| flight.count).sum::<usize>();
         self.work.slopes += flights

@@ -8,6 +8,7 @@ use super::solution::{Failure, Options, Reason, Solution, Start};
 use super::trajectory::Trajectory;
 use crate::scenario::Scenario;
 use crate::shape::Difference;
+use std::time::Instant;
 
 /// The error is estimated by comparing with a solution whose local errors may
 /// be larger by this factor.
@@ -36,6 +37,21 @@ pub fn solve_within(
     intervals: Option<usize>,
     stations: &[f64],
 ) -> Result<Solution, Failure> {
+    solve_before(scenario, start, accuracy, intervals, stations, None)
+}
+
+/// As [`solve_within`], but Newton's method converges no more after a deadline.
+///
+/// # Errors
+/// If no solution is found: why, and how far it came.
+pub fn solve_before(
+    scenario: &Scenario,
+    start: Start,
+    accuracy: f64,
+    intervals: Option<usize>,
+    stations: &[f64],
+    deadline: Option<Instant>,
+) -> Result<Solution, Failure> {
     let longest = scenario
         .rods
         .iter()
@@ -46,14 +62,14 @@ pub fn solve_within(
         intervals,
         stations: stations.to_vec(),
     };
-    let mut solution = solve(scenario, start, &asked)?;
+    let mut solution = solve_once(scenario, start, &asked, deadline)?;
     while solution.error.position > accuracy * longest && asked.tolerance > LEAST_LOCAL {
         asked.tolerance = (SHARPER * asked.tolerance).max(LEAST_LOCAL);
         let from = Start::Leaf {
             stations,
             rods: &solution.rods,
         };
-        let sharper = solve(scenario, from, &asked)?;
+        let sharper = solve_once(scenario, from, &asked, deadline)?;
         let mut work = solution.work;
         work.add(sharper.work);
         solution = Solution { work, ..sharper };
@@ -66,7 +82,17 @@ pub fn solve_within(
 /// # Errors
 /// If no solution is found: why, and how far it came.
 pub fn solve(scenario: &Scenario, start: Start, options: &Options) -> Result<Solution, Failure> {
+    solve_once(scenario, start, options, None)
+}
+
+fn solve_once(
+    scenario: &Scenario,
+    start: Start,
+    options: &Options,
+    deadline: Option<Instant>,
+) -> Result<Solution, Failure> {
     let mut equations = Equations::new(scenario);
+    equations.deadline = deadline;
     let mut work = Work::default();
     let found = match start {
         Start::Arcs => from_arcs(&mut equations, options.intervals, &mut work),

@@ -2,6 +2,8 @@
 
 mod check;
 mod check_report;
+mod map;
+mod map_report;
 mod progress;
 mod relax;
 mod report;
@@ -31,6 +33,7 @@ pub struct Cli {
 enum Verb {
     Relax(relax::Relax),
     Check(check::Check),
+    Map(map::Map),
     Simulate(simulate::Simulate),
 }
 
@@ -40,6 +43,7 @@ impl Cli {
         match self.verb {
             Verb::Relax(relax) => relax.run(),
             Verb::Check(check) => check.run(),
+            Verb::Map(map) => map.run(),
             Verb::Simulate(simulate) => simulate.run(),
         }
     }

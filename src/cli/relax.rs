@@ -81,6 +81,7 @@ impl Relax {
             keep_unstable: self.keep_unstable,
             full_model: self.full_model,
             intervals: self.intervals,
+            deadline: None,
         };
         let mut line = ProgressLine::new(&scenario.name);
         Ok(relax::relax(scenario, &options, &mut |progress| {

@@ -7,6 +7,7 @@ use clap::{Args, ValueHint};
 
 use leafdyn::output::{self, Written};
 use leafdyn::scenario::Scenario;
+use leafdyn::study::Base;
 
 use super::{Refusal, show};
 
@@ -39,12 +40,24 @@ impl Request {
     /// nothing could be written there.
     pub fn open(&self) -> Result<(Scenario, PathBuf), Refusal> {
         let scenario = Scenario::read(&self.scenario, &self.overrides)?;
+        let folder = self.folder(&scenario.name)?;
+        Ok((scenario, folder))
+    }
+
+    /// The same, but a scenario into which varying numbers can be put.
+    pub fn open_base(&self) -> Result<(Base, PathBuf), Refusal> {
+        let base = Base::read(&self.scenario, &self.overrides)?;
+        let folder = self.folder(&base.scenario().name)?;
+        Ok((base, folder))
+    }
+
+    fn folder(&self, name: &str) -> Result<PathBuf, Refusal> {
         let folder = match &self.out {
             Some(folder) => folder.clone(),
-            None => Path::new("out").join(folder_name(&scenario.name)),
+            None => Path::new("out").join(folder_name(name)),
         };
         output::check_writable(&folder)?;
-        Ok((scenario, folder))
+        Ok(folder)
     }
 
     /// Writes the files and shows the result: as JSON, or as a report that is

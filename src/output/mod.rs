@@ -6,6 +6,7 @@ mod checksum;
 mod csv;
 mod figure;
 mod json;
+mod map;
 mod part;
 mod recording;
 #[cfg(test)]
@@ -20,13 +21,14 @@ use thiserror::Error;
 pub use atomic::{abandon_unfinished, check_writable};
 pub use csv::Centerlines;
 pub use figure::{FigurePng, FigureSvg, MotionFigure};
-pub use json::{CheckSummary, MotionSummary, Summary};
+pub use json::{CheckSummary, MapSummary, MotionSummary, Summary};
+pub use map::{Journal, MapFileError, MapTable, belongs, claim, read_rows, write_rows};
 pub use recording::{CannotResume, Keeper, Recording};
 pub use words::{equilibrium_of_index, headline, model, power_of_ten, shooting, verdict};
 
 use crate::relax::Equilibrium;
 use crate::simulate::Record;
-use crate::study::Check;
+use crate::study::{Check, Map};
 
 /// One way to write a result down.
 pub trait Format<R> {
@@ -51,6 +53,11 @@ impl Written for Equilibrium {
 
 impl Written for Check {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[&CheckSummary, &FigureSvg, &FigurePng];
+}
+
+impl Written for Map {
+    const FORMATS: &'static [&'static dyn Format<Self>] =
+        &[&MapSummary, &MapTable, &FigureSvg, &FigurePng];
 }
 
 impl Written for Record {

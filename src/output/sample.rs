@@ -9,7 +9,9 @@ use crate::motion::{Energy, StableStep, Velocity};
 use crate::relax::{Equilibrium, Model, NodeState, Outcome, RodShape, Work};
 use crate::shape::Difference;
 use crate::simulate::{Frame, Moment, Record, Scheme, Still};
-use crate::study::{Check, Shot, Verdict};
+use crate::study::{
+    Base, Check, Confidence, Map, MapMethod, MapOutcome, MapRequest, MapRow, Shot, Verdict,
+};
 
 /// A fan of `rods` arcs of length 1, given at `segments` + 1 stations.
 pub fn fan(rods: usize, segments: usize) -> Equilibrium {
@@ -125,6 +127,64 @@ pub fn check(rods: usize, segments: usize, angle: f64) -> Check {
             Verdict::Differ
         },
     }
+}
+
+/// A map of 2 x 4 cells in which every outcome and reference occurs.
+pub fn map() -> Map {
+    let text = r#"
+        name = "vein"
+        leaf = { rods = 1, length = 1.0, fan = [0.0] }
+        stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }
+    "#;
+    let base = Base::of_text(
+        text.into(),
+        "vein.toml".into(),
+        &["method.step=0.01".into()],
+    );
+    let axes = [
+        "stiffness.bending_2=1..0.1:2log",
+        "load.gravity[2]=-0.1..-100:4log",
+    ];
+    let request = MapRequest::new(
+        base.unwrap(),
+        axes.iter().map(|axis| axis.parse().unwrap()).collect(),
+        None,
+        None,
+        20.0,
+    )
+    .unwrap();
+    let row = |cell: usize, method: MapMethod| {
+        let outcome = match method {
+            MapMethod::SemiImplicit if cell < 5 => MapOutcome::Right,
+            _ => MapOutcome::ALL[cell],
+        };
+        let rests = !matches!(
+            outcome,
+            MapOutcome::NotConverged
+                | MapOutcome::Diverged
+                | MapOutcome::Refused
+                | MapOutcome::OutOfTime
+        );
+        MapRow {
+            cell,
+            method,
+            outcome,
+            detail: format!("said of cell {cell}, \"quoted\""),
+            index: rests.then_some(if outcome == MapOutcome::Saddle { 3 } else { 0 }),
+            tip: rests.then_some([0.9, 0.1 * cell as f64, -1.0 / 3.0]),
+            energy: rests.then_some(-1.5e-7),
+            error: rests.then_some(1e-9),
+            error_estimate: rests.then_some(2e-9),
+            seconds: 0.012345,
+            reference: match cell {
+                6 => Confidence::Unconfirmed,
+                7 => Confidence::None,
+                _ => Confidence::Confirmed,
+            },
+        }
+    };
+    let rows = (0..8).flat_map(|cell| MapMethod::ALL.map(|method| row(cell, method)));
+    Map::new(request, rows.collect())
 }
 
 /// That fan at a time, swinging up and down.

@@ -15,11 +15,12 @@
 use crate::leaf::{DiscreteLeaf, Leaf, SparsePattern, State, System};
 use crate::motion::{Broken, Explicit, Method, Physics};
 use crate::relax::equilibrium::Work;
-use crate::relax::options::{Options, RelaxError};
+use crate::relax::options::{Options, RelaxError, past};
 use crate::relax::saddle;
 use crate::relax::semi_implicit::Settled;
 use crate::scenario::Rod;
 use glam::DVec3;
+use std::time::Instant;
 
 /// Time between looks at the moving leaf, in units of sqrt(rho L^4/A).
 const LOOK: f64 = 0.25;
@@ -37,6 +38,9 @@ const STEP: f64 = 0.95;
 
 /// Steps between looks at what is unbalanced.
 const STEPS_PER_LOOK: usize = 200;
+
+/// Steps of the motion into the valley between looks at the clock.
+const STEPS_PER_PIECE: f64 = 2000.0;
 
 /// Accuracy that rounding allows.
 const LEAST_ACCURACY: f64 = 1e-10;
@@ -66,6 +70,8 @@ pub struct Request<'a> {
     pub progress: &'a mut dyn FnMut(usize, f64),
     /// Whether the leaf's energy was not convex on its way.
     pub moved: bool,
+    /// When to give up.
+    pub deadline: Option<Instant>,
 }
 
 /// Refuses what explicit motion cannot do.
@@ -124,12 +130,7 @@ fn find_valley(
 ) -> Result<(), Settled> {
     let (mut fastest, mut convex) = (0.0_f64, 0);
     while motion.time() < LONGEST_MOTION {
-        motion
-            .advance(motion.time() + LOOK)
-            .map_err(|broken| match broken {
-                Broken::Unresolved { .. } => Settled::Unresolved,
-                _ => Settled::Stuck,
-            })?;
+        look_ahead(motion, request.deadline)?;
         let now = motion.snapshot();
         fastest = fastest.max(now.energy.kinetic);
         let slow = now.energy.kinetic <= SLOW * fastest;
@@ -140,10 +141,32 @@ fn find_valley(
         if slow && convex >= CONVEX {
             break;
         }
-        if motion.steps() > most_steps {
+        if motion.steps() > most_steps || past(request.deadline) {
             return Err(Settled::StepLimit);
         }
         (request.progress)(motion.steps(), leaf.residual(&now.state));
+    }
+    Ok(())
+}
+
+/// Moves on to the next look. On fine grids of stiff rods that takes long: with
+/// a deadline the way is made in pieces.
+fn look_ahead(motion: &mut Explicit, deadline: Option<Instant>) -> Result<(), Settled> {
+    let begin = motion.time();
+    let pieces = match deadline {
+        Some(_) => (LOOK / (STEPS_PER_PIECE * motion.longest_step())).ceil(),
+        None => 1.0,
+    };
+    for piece in 1..=pieces as usize {
+        motion
+            .advance(begin + LOOK * (piece as f64 / pieces))
+            .map_err(|broken| match broken {
+                Broken::Unresolved { .. } => Settled::Unresolved,
+                _ => Settled::Stuck,
+            })?;
+        if past(deadline) {
+            return Err(Settled::StepLimit);
+        }
     }
     Ok(())
 }
@@ -201,7 +224,7 @@ fn descend(
             }
             balanced *= (0.5 * accuracy / remaining).max(1e-3);
         }
-        if motion.steps() > most_steps {
+        if motion.steps() > most_steps || past(request.deadline) {
             return Err(Settled::StepLimit);
         }
     }

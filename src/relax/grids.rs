@@ -5,7 +5,7 @@ use crate::relax::equilibrium::{Equilibrium, Saddle, Work};
 use crate::relax::explicit;
 use crate::relax::moment;
 use crate::relax::options::{
-    LARGEST_TOLERANCE, MAX_NODES, Method, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
+    LARGEST_TOLERANCE, MAX_NODES, Method, Options, Progress, RelaxError, SMALLEST_TOLERANCE, past,
 };
 use crate::relax::prolong::{predict, prolong};
 use crate::relax::report;
@@ -269,6 +269,9 @@ impl<'a, 'o> Run<'a, 'o> {
                     Err(Some(settled)) => return End::Failed(settled),
                 }
             }
+            if self.late() {
+                return End::Failed(Settled::StepLimit);
+            }
             let level = self.levels.last().expect("the leaf has landed");
             let finer = level.leaf.grid.refined();
             let nodes = self.leaf.rods() * finer.segments();
@@ -288,6 +291,11 @@ impl<'a, 'o> Run<'a, 'o> {
                 return End::Failed(settled);
             }
         }
+    }
+
+    /// Whether the time allowed is over.
+    pub fn late(&self) -> bool {
+        past(self.options.deadline)
     }
 
     /// Whether the tolerance is reached; a fixed grid always is.
@@ -311,7 +319,7 @@ impl<'a, 'o> Run<'a, 'o> {
             let (level, settled, moved) = self.settle(grid.clone(), From::Start);
             let finer = grid.refined();
             let fixed = self.options.segments.is_some();
-            let last = fixed || finer.segments() > FINEST_LANDING;
+            let last = fixed || finer.segments() > FINEST_LANDING || self.late();
             match settled {
                 _ if self.whole.is_some() && !matches!(settled, Settled::Rest(_)) => {
                     self.push(level);
@@ -332,7 +340,10 @@ impl<'a, 'o> Run<'a, 'o> {
                     landed = Some(level);
                 }
                 Settled::Unresolved
-                    if finer.segments() <= FINEST_RESOLVING && !fixed && self.spent <= BUDGET =>
+                    if finer.segments() <= FINEST_RESOLVING
+                        && !fixed
+                        && self.spent <= BUDGET
+                        && !self.late() =>
                 {
                     landed = None;
                 }
@@ -392,6 +403,7 @@ impl<'a, 'o> Run<'a, 'o> {
                 work: &mut self.work,
                 progress: &mut tell,
                 moved: false,
+                deadline: self.options.deadline,
             };
             let settled = explicit::settle(&leaf, &mut state, &mut system, &mut request);
             if let Settled::Rest(remaining) = settled {
@@ -438,6 +450,7 @@ impl<'a, 'o> Run<'a, 'o> {
                 pushes,
                 direct: None,
                 most_evaluations: begun + allowed,
+                deadline: self.options.deadline,
                 convex_only: self.whole.is_some(),
                 moved: false,
             };

@@ -21,5 +21,6 @@ pub use equilibrium::{Equilibrium, Model, Outcome, Saddle, Work};
 pub use grids::{check_segments, relax};
 pub use index::index_near;
 pub use options::{LARGEST_TOLERANCE, Method, Options, Progress, RelaxError, SMALLEST_TOLERANCE};
+pub(crate) use shape::node as node_state;
 pub use shooting::check_intervals;
 pub use start::start;

@@ -1,5 +1,7 @@
 //! What is asked of a relaxation, and what cannot be asked.
 
+use std::time::Instant;
+
 /// How a leaf is brought to rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
@@ -43,6 +45,15 @@ pub struct Options {
     /// Shooting only: over so many intervals; `None`: as many as the growth of
     /// perturbations needs.
     pub intervals: Option<usize>,
+    /// When to give up, at rest or not: the leaf is then not at rest. Looked at
+    /// where progress is told and between grids, so that a run may end a little
+    /// later.
+    pub deadline: Option<Instant>,
+}
+
+/// Whether it is too late to go on.
+pub(crate) fn past(deadline: Option<Instant>) -> bool {
+    deadline.is_some_and(|deadline| Instant::now() >= deadline)
 }
 
 /// How far a running relaxation has come.

@@ -182,6 +182,9 @@ pub fn outcome(run: &Run, end: End) -> (Outcome, Option<String>) {
                 _ => Outcome::NotAtRest,
             },
             Some(match settled {
+                Settled::StepLimit if run.late() => format!(
+                    "the time allowed was over before rest on {finest} segments: allow more"
+                ),
                 Settled::Unresolved => format!(
                     "a vein bends by more than a right angle within one of {finest} segments: use more segments or smaller loads"
                 ),

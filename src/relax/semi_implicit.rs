@@ -14,7 +14,9 @@
 
 use crate::leaf::{DiscreteLeaf, Increment, Solved, SparsePattern, State, System};
 use crate::relax::equilibrium::Work;
+use crate::relax::options::past;
 use crate::rod::RESOLVED_TURN;
+use std::time::Instant;
 
 /// Damping c: critical for the lowest bending mode of a single rod, whose
 /// frequency is 3.516 (canonical value beta_1^2 of the clamped-free beam).
@@ -114,6 +116,8 @@ pub struct Relaxation<'a> {
     pub direct: Option<SparsePattern>,
     /// Count of force evaluations at which to give up.
     pub most_evaluations: usize,
+    /// When to give up.
+    pub deadline: Option<Instant>,
     /// Whether to give up at once if the leaf has to move.
     pub convex_only: bool,
     /// Whether the leaf had to move: its energy was not convex on the way.
@@ -222,7 +226,7 @@ impl Relaxation<'_> {
         self.work.force_evaluations += 1;
 
         for step in 0..MAX_STEPS {
-            if self.work.force_evaluations > self.most_evaluations {
+            if self.work.force_evaluations > self.most_evaluations || past(self.deadline) {
                 break;
             }
             // A positive definite matrix and its solution, with as long a time

@@ -48,12 +48,13 @@ pub fn relax(
         .iter()
         .map(|rod| rod.length)
         .fold(0.0, f64::max);
-    let found = bvp::solve_within(
+    let found = bvp::solve_before(
         scenario,
         Start::Arcs,
         tolerance,
         options.intervals,
         grid.sigma(),
+        options.deadline,
     );
     let work = match &found {
         Ok(solution) => solution.work,

@@ -154,11 +154,11 @@ impl Key {
         FORMAT[self as usize].2
     }
 
-    pub(super) fn all() -> impl Iterator<Item = Key> {
+    pub(crate) fn all() -> impl Iterator<Item = Key> {
         FORMAT.iter().map(|row| row.0)
     }
 
-    pub(super) fn from_path(path: &str) -> Option<Key> {
+    pub(crate) fn from_path(path: &str) -> Option<Key> {
         Key::all().find(|key| key.path() == path)
     }
 
@@ -175,7 +175,7 @@ impl Key {
 
 /// The key or table that was probably meant by `path`: the same name in
 /// another table, or the nearest spelling.
-pub(super) fn nearest(path: &str) -> Option<&'static str> {
+pub(crate) fn nearest(path: &str) -> Option<&'static str> {
     let name = path.rsplit('.').next().unwrap_or(path);
     if let Some(key) = Key::all().find(|key| key.short_name() == name) {
         return Some(key.path());

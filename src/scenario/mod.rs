@@ -19,7 +19,9 @@ pub use dynamics::{Dynamics, Start};
 pub(crate) use dynamics::{longest, mean_bending};
 pub use error::{Because, Form, Needed, Place, Problem, ScenarioError, Spot};
 pub use key::Key;
+pub(crate) use key::nearest;
 pub use profile::Profile;
+pub(crate) use read::text;
 pub use schedule::Schedule;
 
 /// A checked scenario. All quantities are in the units the file was written

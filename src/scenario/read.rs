@@ -43,33 +43,37 @@ impl Scenario {
 
     /// Reads and checks the file at `path`, with the entries `overrides` replaced.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Scenario, ScenarioError> {
-        let mut bytes = Vec::new();
-        // Opening a folder succeeds on some systems, and reading it fails.
-        File::open(path)
-            .and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes))
-            .map_err(|reason| match reason.kind() {
-                ErrorKind::IsADirectory => ScenarioError::Folder { path: path.into() },
-                _ => ScenarioError::Unreadable {
-                    path: path.into(),
-                    reason,
-                },
-            })?;
-        if bytes.len() as u64 > MOST_BYTES {
-            return Err(ScenarioError::TooLarge {
-                path: path.into(),
-                limit: MOST_BYTES,
-            });
-        }
-        let file = path.display().to_string();
-        let text = std::str::from_utf8(&bytes).map_err(|error| {
-            let offset = error.valid_up_to();
-            ScenarioError::NotUtf8 {
-                file: file.clone(),
-                line: line_of(&bytes, offset),
-                offset,
-                byte: bytes[offset],
-            }
-        })?;
-        Scenario::from_toml_with(text, &file, overrides)
+        Scenario::from_toml_with(&text(path)?, &path.display().to_string(), overrides)
     }
+}
+
+/// The text of a scenario's file.
+pub(crate) fn text(path: &Path) -> Result<String, ScenarioError> {
+    let mut bytes = Vec::new();
+    // Opening a folder succeeds on some systems, and reading it fails.
+    File::open(path)
+        .and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes))
+        .map_err(|reason| match reason.kind() {
+            ErrorKind::IsADirectory => ScenarioError::Folder { path: path.into() },
+            _ => ScenarioError::Unreadable {
+                path: path.into(),
+                reason,
+            },
+        })?;
+    if bytes.len() as u64 > MOST_BYTES {
+        return Err(ScenarioError::TooLarge {
+            path: path.into(),
+            limit: MOST_BYTES,
+        });
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let offset = error.utf8_error().valid_up_to();
+        let bytes = error.as_bytes();
+        ScenarioError::NotUtf8 {
+            file: path.display().to_string(),
+            line: line_of(bytes, offset),
+            offset,
+            byte: bytes[offset],
+        }
+    })
 }

@@ -16,6 +16,7 @@ mod flat;
 mod font;
 mod header;
 mod leaf;
+mod map;
 mod markers;
 mod motion;
 mod page;

@@ -20,7 +20,8 @@ const SCALE: f64 = 2.0;
 /// 192 dots per inch, as the file says them: dots per metre.
 const DOTS_PER_METRE: u32 = 7559;
 
-/// The figure as PNG: `figure.png` of a leaf, `check.png` of a check.
+/// The figure as PNG: `figure.png` of a leaf, `check.png` of a check, `map.png` of a
+/// map.
 pub struct FigurePng;
 
 impl<R: Pictured> Format<R> for FigurePng {

@@ -9,7 +9,8 @@ use super::colors::Color;
 use super::drawing::{Anchor, Drawing, Label, Mark, Path, Step, Stroke};
 use crate::output::Format;
 
-/// The figure as SVG: `figure.svg` of a leaf, `check.svg` of a check.
+/// The figure as SVG: `figure.svg` of a leaf, `check.svg` of a check, `map.svg` of a
+/// map.
 pub struct FigureSvg;
 
 impl<R: Pictured> Format<R> for FigureSvg {

@@ -1,6 +1,7 @@
 //! JSON, for scripts: compact, numbers that are not finite as null.
 
 mod check;
+mod map;
 mod motion;
 mod summary;
 
@@ -11,6 +12,7 @@ use serde::Serialize;
 use serde_json::ser::Formatter;
 
 pub use check::CheckSummary;
+pub use map::MapSummary;
 pub use motion::MotionSummary;
 pub use summary::Summary;
 

@@ -1,0 +1,241 @@
+//! `leafdyn map`: where each method fails.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::time::Instant;
+
+use clap::{Args, ValueHint};
+
+use leafdyn::output::{self, Journal, OutputError};
+use leafdyn::study::{self, CELL_SECONDS, Map as Cells, MapMethod, MapRequest, MapRow, Vary};
+
+use super::progress::ProgressLine;
+use super::request::Request;
+use super::{Refusal, Status, map_report, show};
+
+/// Solve a leaf by several methods over one or two varying numbers, and map where each method fails.
+///
+/// Exit status: 0 the map is made, whatever the methods did; 2 the request was
+/// refused. Cells that are already in the folder are not solved again.
+#[derive(Debug, Args)]
+pub struct Map {
+    #[command(flatten)]
+    request: Request,
+
+    /// What varies, once or twice: numbers of the scenario as in --set, entries of lists counted from 0 (load.gravity[2]), method.step, method.segments; several keys that vary together are joined by +
+    #[arg(long, value_name = "KEY=FROM..TO[:COUNT][log]", required = true)]
+    vary: Vec<Vary>,
+
+    /// The methods: semi-implicit, explicit, explicit-motion, single-shooting, shooting, shooting-from-rest [default: all; explicit-motion if method.step is set or varies]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    methods: Option<Vec<MapMethod>>,
+
+    /// Time allowed for each method in each cell
+    #[arg(long, value_name = "S", default_value_t = CELL_SECONDS, allow_negative_numbers = true)]
+    cell_seconds: f64,
+
+    /// Solve every K-th cell from the I-th on, into map-I-of-K.csv: for jobs that share a map
+    #[arg(long, value_name = "I/K", conflicts_with = "draw")]
+    shard: Option<Shard>,
+
+    /// Solve nothing: take the rows of these files, and draw
+    #[arg(long, value_name = "FILE.csv", num_args = 1.., value_hint = ValueHint::FilePath)]
+    draw: Vec<PathBuf>,
+}
+
+/// One of several parts of a map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Shard {
+    /// From 1.
+    part: usize,
+    of: usize,
+}
+
+impl Shard {
+    fn file_name(self) -> String {
+        format!("map-{}-of-{}.csv", self.part, self.of)
+    }
+
+    fn has(self, cell: usize) -> bool {
+        cell % self.of == self.part - 1
+    }
+}
+
+impl FromStr for Shard {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let parsed = text.split_once('/').and_then(|(part, of)| {
+            let (part, of) = (part.trim().parse().ok()?, of.trim().parse().ok()?);
+            (1..=of).contains(&part).then_some(Shard { part, of })
+        });
+        parsed.ok_or("must be I/K with I from 1 to K, as in 1/4")
+    }
+}
+
+const WHOLE: Shard = Shard { part: 1, of: 1 };
+
+impl Map {
+    pub fn run(self) -> Result<Status, Refusal> {
+        let (base, folder) = self.request.open_base()?;
+        let request = MapRequest::new(
+            base,
+            self.vary.clone(),
+            self.methods.clone(),
+            self.request.tolerance,
+            self.cell_seconds,
+        )?;
+        output::belongs(&folder, &request)?;
+        let clock = Instant::now();
+        let known = self.known(&folder, &request)?;
+        output::claim(&folder, &Cells::new(request.clone(), known.clone()))?;
+        let computed = match self.draw.is_empty() {
+            true => self.solve(&folder, &request, &known)?,
+            false => Vec::new(),
+        };
+        let before = known.len();
+        let count = computed.len();
+        let map = Cells::new(request, [known, computed].concat());
+        let told = map_report::Told {
+            known: before,
+            computed: count,
+            seconds: clock.elapsed().as_secs_f64(),
+        };
+        match self.shard {
+            Some(shard) => {
+                let name = shard.file_name();
+                output::write_rows(&folder, &name, &map.request, &map.rows)?;
+                let report =
+                    map_report::report(&map, told, &folder.join(name).display().to_string());
+                show(report.as_bytes())?;
+            }
+            None => self.request.deliver(&map, &folder, |folder| {
+                let files = folder.map(super::text::written::<Cells>);
+                map_report::report(&map, told, &files.unwrap_or_default())
+            })?,
+        }
+        Ok(Status::Success)
+    }
+
+    /// The rows that need not be computed: a shard's own, or of a whole map
+    /// all that are in the folder.
+    fn known(&self, folder: &Path, request: &MapRequest) -> Result<Vec<MapRow>, Refusal> {
+        let mut files = match self.shard {
+            Some(shard) => vec![folder.join(shard.file_name())],
+            None => vec![folder.join("map.csv")],
+        };
+        if self.shard.is_none() {
+            files.extend(shards(folder));
+        }
+        files.retain(|file| file.exists());
+        files.extend(self.draw.iter().cloned());
+        let mut rows = Vec::new();
+        for file in files {
+            rows.extend(output::read_rows(&file, request)?);
+        }
+        rows.sort_by_key(|row| (row.cell, row.method));
+        rows.dedup_by_key(|row| (row.cell, row.method));
+        Ok(rows)
+    }
+
+    /// Solves what is not known; rows are in the file as soon as they are found.
+    fn solve(
+        &self,
+        folder: &Path,
+        request: &MapRequest,
+        known: &[MapRow],
+    ) -> Result<Vec<MapRow>, Refusal> {
+        let shard = self.shard.unwrap_or(WHOLE);
+        let there = |cell: usize, method: MapMethod| {
+            let found = known.binary_search_by_key(&(cell, method), |row| (row.cell, row.method));
+            found.is_ok()
+        };
+        let todo: Vec<(usize, Vec<MapMethod>)> = (0..request.cells())
+            .filter(|&cell| shard.has(cell))
+            .map(|cell| {
+                let methods = request.methods.iter().copied();
+                (
+                    cell,
+                    methods.filter(|&method| !there(cell, method)).collect(),
+                )
+            })
+            .filter(|(_, methods): &(usize, Vec<_>)| !methods.is_empty())
+            .collect();
+        if todo.is_empty() {
+            return Ok(Vec::new());
+        }
+        let name = self.shard.map_or("map.csv".into(), Shard::file_name);
+        let mut journal = Journal::open(folder, &name, request, known)?;
+        let mut line = ProgressLine::new(&request.base.scenario().name);
+        let (mut rows, mut finished) = (Vec::new(), 0);
+        let mut failed: Option<OutputError> = None;
+        study::map(request, &todo, &mut |new| {
+            failed = journal.append(request, &new).err();
+            rows.extend(new);
+            finished += 1;
+            let cells = todo.len();
+            line.say(|time| format!("{finished} of {cells} cells, {:.0} s", time.as_secs_f64()));
+            failed.is_none()
+        });
+        match failed {
+            Some(error) => Err(error.into()),
+            None => Ok(rows),
+        }
+    }
+}
+
+/// Files of shards in a folder, in order of their names.
+fn shards(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = fs::read_dir(folder) else {
+        return Vec::new();
+    };
+    let mut files: Vec<PathBuf> = entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|file| {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            let middle = name
+                .strip_prefix("map-")
+                .and_then(|n| n.strip_suffix(".csv"));
+            let shard = middle.and_then(|middle| middle.replace("-of-", "/").parse::<Shard>().ok());
+            shard.is_some_and(|shard| name == shard.file_name())
+        })
+        .collect();
+    files.sort();
+    files
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_share_all_cells() {
+        let parts: Vec<Shard> = (1..=3).map(|i| format!("{i}/3").parse().unwrap()).collect();
+        for cell in 0..10 {
+            assert_eq!(parts.iter().filter(|part| part.has(cell)).count(), 1);
+        }
+        assert_eq!(parts[1].file_name(), "map-2-of-3.csv");
+        for bad in ["0/3", "4/3", "3", "a/b", "1/0", "-1/2"] {
+            assert!(bad.parse::<Shard>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn only_files_of_shards_are_taken_for_them() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in [
+            "map-2-of-3.csv",
+            "map-4-of-3.csv",
+            "map.csv",
+            "map-x.csv",
+            "map-1-of-2.csv",
+        ] {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        let found: Vec<_> = (shards(folder.path()).iter())
+            .map(|file| file.file_name().unwrap().to_str().unwrap().to_string())
+            .collect();
+        assert_eq!(found, ["map-1-of-2.csv", "map-2-of-3.csv"]);
+    }
+}

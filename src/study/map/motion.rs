@@ -1,0 +1,148 @@
+//! Explicit motion with one time step, whether that is stable or not: what a
+//! plain simulation of the damped leaf would answer.
+
+use std::time::Instant;
+
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use crate::motion::{Broken, Explicit, Method, Physics};
+use crate::relax::{self, Options, index_near, node_state, start};
+use crate::scenario::Scenario;
+use crate::shape::RodShape;
+
+use super::answer::{Answer, Found, SAME_PLACE, fine_grid, grid_error};
+use super::row::MapOutcome;
+use crate::study::vary::{Knobs, Varied};
+
+/// Segments a rod where none are asked for: as in a simulation.
+const SEGMENTS: usize = 16;
+
+/// Steps between looks at the clock.
+const LOOK: f64 = 1000.0;
+
+/// Released from where a relaxation starts, the leaf moves for the scenario's
+/// duration under the loads of its dynamics, in steps of `method.step`.
+pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, deadline: Instant) -> Found {
+    let refused = |why: String| Found::Failed(MapOutcome::Refused, why);
+    let Some(step) = knobs.step else {
+        return refused("explicit motion needs method.step".into());
+    };
+    let leaf = Leaf::new(scenario);
+    let segments = match relax::check_segments(&leaf, knobs.segments, SEGMENTS) {
+        Ok(segments) => segments,
+        Err(error) => return refused(error.to_string()),
+    };
+    let grid = Grid::new(segments, leaf.kinks());
+    let physics = Physics::new(&leaf);
+    if !physics.clamped() {
+        return refused("a free leaf has no place to rest in".into());
+    }
+    let discrete = DiscreteLeaf::new(&leaf, grid.clone());
+    let state = start(&discrete);
+    let h = step / physics.time;
+    let Ok(mut motion) = Explicit::new(discrete, physics.clone(), &state, Some(h)) else {
+        return refused("no time step is stable for rigid rods (a stiffness is inf)".into());
+    };
+    let stable = motion.stable_step();
+    let note = format!(
+        "step {:.3e}, stable up to {:.3e} because of {}",
+        step,
+        stable.step * physics.time,
+        stable.limit
+    );
+    let failed = |outcome, what: String| Found::Failed(outcome, format!("{what}; {note}"));
+    let (duration, _) = physics.duration();
+    while motion.time() < duration {
+        let until = motion.time() + LOOK * h;
+        if let Err(broken) = motion.advance(until.min(duration)) {
+            return match broken {
+                Broken::Unresolved { time, turn } => failed(
+                    MapOutcome::NotConverged,
+                    format!(
+                        "at t = {:.3e} a segment bends by {turn:.2} rad, more than it resolves",
+                        time * physics.time
+                    ),
+                ),
+                Broken::Diverged { time, .. } | Broken::StepTooShort { time } => failed(
+                    MapOutcome::Diverged,
+                    format!("energy from nowhere at t = {:.3e}", time * physics.time),
+                ),
+            };
+        }
+        if Instant::now() >= deadline {
+            // What is late is out of time, whatever is said here.
+            return failed(MapOutcome::OutOfTime, "still moving".into());
+        }
+    }
+    let end = motion.snapshot();
+    let fastest = (end.velocity.iter())
+        .map(|v| v.linear.length().max(v.angular.length()))
+        .fold(0.0, f64::max);
+    if fastest.is_nan() || fastest > tolerance {
+        let moves = format!("still moves by {fastest:.1e} lengths in a unit of time");
+        return failed(MapOutcome::NotConverged, moves);
+    }
+    let rods = shape(&DiscreteLeaf::new(&leaf, grid.clone()), &end.state);
+    let index = match index_near(scenario, grid.clone(), &rods) {
+        None if leaf.tip_moment == glam::DVec3::ZERO => {
+            return failed(MapOutcome::NotConverged, "slow, but not at rest".into());
+        }
+        index => index,
+    };
+    let options = Options {
+        segments: Some(segments),
+        tolerance: Some(tolerance),
+        deadline: Some(deadline),
+        ..Options::default()
+    };
+    let length = leaf.scale.length;
+    let error = grid_error(scenario, &options).unwrap_or(SAME_PLACE * length);
+    Found::Rest(Box::new(Answer {
+        stations: grid.sigma().to_vec(),
+        rods,
+        energy: (end.energy.elastic + end.energy.coupling + end.energy.potential)
+            * leaf.scale.moment(),
+        index,
+        estimate: error + tolerance * length,
+        note,
+    }))
+}
+
+/// The longest step that is known to be stable.
+pub fn stable_step(varied: &Varied) -> Option<f64> {
+    let leaf = Leaf::new(&varied.scenario);
+    let segments = relax::check_segments(&leaf, varied.knobs.segments, SEGMENTS).ok()?;
+    let physics = Physics::new(&leaf);
+    let discrete = DiscreteLeaf::new(&leaf, Grid::new(segments, leaf.kinks()));
+    let state = start(&discrete);
+    let time = physics.time;
+    let motion = Explicit::new(discrete, physics, &state, Some(1.0)).ok()?;
+    Some(motion.stable_step().step * time)
+}
+
+/// The state in the scenario's units.
+fn shape(leaf: &DiscreteLeaf, state: &State) -> Vec<RodShape> {
+    let scale = leaf.leaf.scale;
+    (0..leaf.rods())
+        .map(|j| RodShape {
+            length: leaf.leaf.length(j) * scale.length,
+            nodes: (0..=leaf.segments())
+                .map(|i| {
+                    let mut node = node_state(leaf, state, j, i);
+                    node.position *= scale.length;
+                    node.u /= scale.length;
+                    node.n *= scale.force();
+                    node.m *= scale.moment();
+                    node
+                })
+                .collect(),
+        })
+        .collect()
+}
+
+/// Stations that a reference should have beside its own.
+pub fn stations(scenario: &Scenario, knobs: Knobs) -> Vec<f64> {
+    match knobs.segments {
+        Some(segments) => fine_grid(scenario, segments).sigma().to_vec(),
+        None => vec![0.0, 1.0],
+    }
+}

@@ -1,0 +1,187 @@
+//! What is said of one method in one cell: a closed set of words, and numbers.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// The methods that are compared, in the order of the rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum MapMethod {
+    /// The relaxation by linearly implicit motion, the program's default.
+    SemiImplicit,
+    /// The relaxation by explicit motion.
+    Explicit,
+    /// Explicit motion with one time step for the scenario's duration.
+    ExplicitMotion,
+    /// The boundary-value problem in one piece, from arcs.
+    SingleShooting,
+    /// The boundary-value problem over as many intervals as it needs, from arcs.
+    Shooting,
+    /// The same from the relaxed leaf.
+    ShootingFromRest,
+}
+
+impl MapMethod {
+    /// All of them.
+    pub const ALL: [MapMethod; 6] = [
+        MapMethod::SemiImplicit,
+        MapMethod::Explicit,
+        MapMethod::ExplicitMotion,
+        MapMethod::SingleShooting,
+        MapMethod::Shooting,
+        MapMethod::ShootingFromRest,
+    ];
+
+    /// The word used on the command line and in `map.csv`.
+    pub fn word(self) -> &'static str {
+        match self {
+            MapMethod::SemiImplicit => "semi-implicit",
+            MapMethod::Explicit => "explicit",
+            MapMethod::ExplicitMotion => "explicit-motion",
+            MapMethod::SingleShooting => "single-shooting",
+            MapMethod::Shooting => "shooting",
+            MapMethod::ShootingFromRest => "shooting-from-rest",
+        }
+    }
+}
+
+/// How a method fared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum MapOutcome {
+    /// At rest where the reference is, as closely as both say they know.
+    Right,
+    /// At rest in another equilibrium, not known to be unstable.
+    OtherEquilibrium,
+    /// At rest in an unstable equilibrium.
+    Saddle,
+    /// In the same equilibrium, but further from the reference than both
+    /// error estimates allow.
+    Inaccurate,
+    /// Not at rest, or not to the tolerance.
+    NotConverged,
+    /// Values grew out of all bounds, or no step lowered the energy.
+    Diverged,
+    /// The method or the format refuses such a leaf.
+    Refused,
+    /// The time allowed was over.
+    OutOfTime,
+}
+
+impl MapOutcome {
+    /// All of them.
+    pub const ALL: [MapOutcome; 8] = [
+        MapOutcome::Right,
+        MapOutcome::OtherEquilibrium,
+        MapOutcome::Saddle,
+        MapOutcome::Inaccurate,
+        MapOutcome::NotConverged,
+        MapOutcome::Diverged,
+        MapOutcome::Refused,
+        MapOutcome::OutOfTime,
+    ];
+
+    /// The word used in `map.csv`.
+    pub fn word(self) -> &'static str {
+        match self {
+            MapOutcome::Right => "right",
+            MapOutcome::OtherEquilibrium => "other-equilibrium",
+            MapOutcome::Saddle => "saddle",
+            MapOutcome::Inaccurate => "inaccurate",
+            MapOutcome::NotConverged => "not-converged",
+            MapOutcome::Diverged => "diverged",
+            MapOutcome::Refused => "refused",
+            MapOutcome::OutOfTime => "out-of-time",
+        }
+    }
+}
+
+/// What there is to compare with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Confidence {
+    /// Relaxation and shooting from there agree within both error estimates,
+    /// and so do their numbers of negative eigenvalues.
+    Confirmed,
+    /// They do not: the shooting is the reference if it found a stable
+    /// equilibrium, otherwise the relaxation.
+    Unconfirmed,
+    /// The relaxation did not come to rest.
+    None,
+}
+
+impl Confidence {
+    /// All of them.
+    pub const ALL: [Confidence; 3] = [
+        Confidence::Confirmed,
+        Confidence::Unconfirmed,
+        Confidence::None,
+    ];
+
+    /// The word used in `map.csv`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Confidence::Confirmed => "confirmed",
+            Confidence::Unconfirmed => "unconfirmed",
+            Confidence::None => "none",
+        }
+    }
+}
+
+/// A word that is none of those allowed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{found}: must be one of {}", allowed.join(", "))]
+pub struct UnknownWord {
+    /// The word.
+    pub found: String,
+    /// The words there are.
+    pub allowed: Vec<&'static str>,
+}
+
+macro_rules! words {
+    ($($type:ty),*) => {$(
+        impl fmt::Display for $type {
+            fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str(self.word())
+            }
+        }
+
+        impl FromStr for $type {
+            type Err = UnknownWord;
+
+            fn from_str(text: &str) -> Result<Self, UnknownWord> {
+                let found = Self::ALL.into_iter().find(|it| it.word() == text);
+                found.ok_or_else(|| UnknownWord {
+                    found: text.into(),
+                    allowed: Self::ALL.map(|it| it.word()).to_vec(),
+                })
+            }
+        }
+    )*};
+}
+
+words!(MapMethod, MapOutcome, Confidence);
+
+/// One method in one cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapRow {
+    /// The cell, counted along the last axis first.
+    pub cell: usize,
+    /// The method.
+    pub method: MapMethod,
+    /// How it fared.
+    pub outcome: MapOutcome,
+    /// What else there is to say, on one line.
+    pub detail: String,
+    /// Negative eigenvalues of the equilibrium found.
+    pub index: Option<usize>,
+    /// The joint tip, or the first rod's.
+    pub tip: Option<[f64; 3]>,
+    /// Energy of the equilibrium found.
+    pub energy: Option<f64>,
+    /// Largest distance from the reference, relative to the longest rod.
+    pub error: Option<f64>,
+    /// What the method says of its error, likewise.
+    pub error_estimate: Option<f64>,
+    /// Time taken, by one thread.
+    pub seconds: f64,
+    /// What it was compared with.
+    pub reference: Confidence,
+}

@@ -1,0 +1,365 @@
+//! Numbers of a scenario that vary: `KEY=FROM..TO[:COUNT][log]`.
+//!
+//! A key is any number of the scenario by its path as in `--set`, one entry of
+//! a list by an index that counts from 0 (`load.gravity[2]`), or a setting of a
+//! method (`method.step`). Several keys joined by `+` take the same value. The
+//! values go into a scenario through the same text as `--set`, so that every
+//! limit of the format holds for them ([`Base::at`]).
+//!
+//! ```
+//! use leafdyn::study::{Base, Vary};
+//!
+//! let text = r#"
+//!     name = "vein"
+//!     leaf = { rods = 1, length = 1.0, fan = [0.0] }
+//!     stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = inf, shear_2 = inf, shear_3 = inf }
+//!     load = { gravity = [0.0, 0.0, -1.0] }
+//! "#;
+//! let base = Base::of_text(text.into(), "vein.toml".into(), &[])?;
+//! let weight: Vary = "load.gravity[2]=-0.01..-100:5log".parse()?;
+//! assert_eq!(weight.values, [-0.01, -0.1, -1.0, -10.0, -100.0]);
+//! let heavy = base.at(&[(&weight.keys, -100.0)])?;
+//! assert_eq!(heavy.scenario.gravity, [0.0, 0.0, -100.0]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod base;
+
+pub use base::{Base, Varied};
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::scenario::{Key, ScenarioError, nearest};
+
+/// Values where no count is given.
+const COUNT: usize = 11;
+
+/// Most values along one axis.
+const MOST: usize = 10_000;
+
+/// Decimal digits that values between the ends keep: 0.001, not
+/// 0.0010000000000000002.
+const DIGITS: usize = 12;
+
+/// A setting of a method, not of the leaf.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Knob {
+    /// `method.step`: the time step of explicit motion, in the scenario's unit.
+    Step,
+    /// `method.segments`: one fixed grid of so many segments a rod.
+    Segments,
+}
+
+impl Knob {
+    const ALL: [Knob; 2] = [Knob::Step, Knob::Segments];
+
+    /// Its path.
+    pub fn path(self) -> &'static str {
+        match self {
+            Knob::Step => "method.step",
+            Knob::Segments => "method.segments",
+        }
+    }
+}
+
+/// The settings of methods; `None`: as the method chooses.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Knobs {
+    /// `method.step`.
+    pub step: Option<f64>,
+    /// `method.segments`.
+    pub segments: Option<usize>,
+}
+
+/// One number that can be set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// Of the scenario.
+    Entry {
+        /// The key.
+        key: Key,
+        /// One entry of its list, counted from 0.
+        index: Option<usize>,
+    },
+    /// Of a method.
+    Knob(Knob),
+}
+
+/// What a key takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Whole,
+    Number,
+    /// A number for all rods, or a list with one for each.
+    PerRod,
+    /// A number for all gaps, or a list.
+    PerGap,
+    /// x, y, z.
+    Vector,
+    /// Base angles: a list, or a word.
+    Angles,
+    NoNumber,
+}
+
+fn kind(key: Key) -> Kind {
+    match key {
+        Key::Rods => Kind::Whole,
+        Key::Tolerance
+        | Key::ExternalDamping
+        | Key::InternalDamping
+        | Key::Duration
+        | Key::OutputInterval => Kind::Number,
+        Key::Length
+        | Key::Torsion
+        | Key::Bending2
+        | Key::Bending3
+        | Key::Axial
+        | Key::Shear2
+        | Key::Shear3
+        | Key::RestTwist
+        | Key::RestBend2
+        | Key::RestBend3
+        | Key::Density
+        | Key::RotaryInertia
+        | Key::SectionRadius => Kind::PerRod,
+        Key::CouplingX | Key::CouplingY | Key::CouplingZ => Kind::PerGap,
+        Key::Gravity | Key::TipForce | Key::TipMoment => Kind::Vector,
+        Key::Fan => Kind::Angles,
+        // Texts, switches, and what is given in time.
+        _ => Kind::NoNumber,
+    }
+}
+
+impl Target {
+    fn is_whole(self) -> bool {
+        match self {
+            Target::Entry { key, .. } => kind(key) == Kind::Whole,
+            Target::Knob(knob) => knob == Knob::Segments,
+        }
+    }
+}
+
+impl FromStr for Target {
+    type Err = VaryError;
+
+    fn from_str(text: &str) -> Result<Self, VaryError> {
+        let text = text.trim();
+        if let Some(knob) = Knob::ALL.into_iter().find(|knob| knob.path() == text) {
+            return Ok(Target::Knob(knob));
+        }
+        let refuse = |why: String| VaryError::Key {
+            key: text.into(),
+            why,
+        };
+        let (path, index) = match text.strip_suffix(']').and_then(|rest| rest.split_once('[')) {
+            Some((path, index)) => {
+                let index = index.trim().parse();
+                let index = index.map_err(|_| {
+                    refuse("an index is a whole number from 0, as in load.gravity[2]".into())
+                })?;
+                (path.trim(), Some(index))
+            }
+            None => (text, None),
+        };
+        let Some(key) = Key::from_path(path) else {
+            return Err(refuse(match nearest(path) {
+                Some(meant) => format!("unknown key; did you mean {meant}?"),
+                None => {
+                    let numbers = Key::all().filter(|&key| kind(key) != Kind::NoNumber);
+                    let paths = numbers.map(Key::path).chain(Knob::ALL.map(Knob::path));
+                    format!("unknown key: {}", paths.collect::<Vec<_>>().join(", "))
+                }
+            }));
+        };
+        match (kind(key), index) {
+            (Kind::NoNumber, _) => Err(refuse("takes no number that could vary".into())),
+            (Kind::Whole | Kind::Number, Some(_)) => {
+                Err(refuse("is one number: leave the index out".into()))
+            }
+            (Kind::Vector, Some(3..)) => Err(refuse("x, y, z have the indices 0, 1, 2".into())),
+            (Kind::Vector | Kind::Angles, None) => {
+                Err(refuse(format!("is a list: give an index, as in {path}[0]")))
+            }
+            _ => Ok(Target::Entry { key, index }),
+        }
+    }
+}
+
+impl fmt::Display for Target {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Target::Entry { key, index: None } => write!(f, "{}", key.path()),
+            Target::Entry {
+                key,
+                index: Some(index),
+            } => write!(f, "{}[{index}]", key.path()),
+            Target::Knob(knob) => write!(f, "{}", knob.path()),
+        }
+    }
+}
+
+/// Numbers that take the same value.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Keys(Vec<Target>);
+
+impl Keys {
+    /// Each of them; at least one.
+    pub fn targets(&self) -> &[Target] {
+        &self.0
+    }
+
+    /// Whether only whole numbers make sense.
+    pub fn is_whole(&self) -> bool {
+        self.0.iter().any(|target| target.is_whole())
+    }
+
+    /// Whether it is, alone or among others, this setting of a method.
+    pub fn sets(&self, knob: Knob) -> bool {
+        self.0.contains(&Target::Knob(knob))
+    }
+
+    /// A value of these keys as it is written into the scenario and into tables.
+    pub fn text(&self, value: f64) -> String {
+        match self.is_whole() {
+            true => format!("{value:.0}"),
+            false => format!("{value:?}"),
+        }
+    }
+}
+
+impl FromStr for Keys {
+    type Err = VaryError;
+
+    fn from_str(text: &str) -> Result<Self, VaryError> {
+        let targets = text.split('+').map(Target::from_str);
+        Ok(Keys(targets.collect::<Result<_, _>>()?))
+    }
+}
+
+/// As written: `stiffness.axial+stiffness.shear_2`.
+impl fmt::Display for Keys {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        for (i, target) in self.0.iter().enumerate() {
+            let plus = if i > 0 { "+" } else { "" };
+            write!(f, "{plus}{target}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Keys and the values they take, one after the other.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Vary {
+    /// The keys.
+    pub keys: Keys,
+    /// The values, from FROM to TO; at least one, none twice.
+    pub values: Vec<f64>,
+    /// Whether quotients of neighbours are equal, and not differences.
+    pub log: bool,
+}
+
+impl FromStr for Vary {
+    type Err = VaryError;
+
+    fn from_str(given: &str) -> Result<Self, VaryError> {
+        let refuse = |why: &'static str| VaryError::Form {
+            given: given.into(),
+            why,
+        };
+        let (keys, range) = given.split_once('=').ok_or_else(|| refuse("has no ="))?;
+        let keys: Keys = keys.parse()?;
+        let range = range.trim();
+        let (range, log) = match range.strip_suffix("log") {
+            Some(rest) => (
+                rest.trim_end().trim_end_matches([':', ',']).trim_end(),
+                true,
+            ),
+            None => (range, false),
+        };
+        let (range, count) = match range.split_once(':') {
+            Some((range, count)) => {
+                let count = count.trim().parse().ok();
+                let count = count.filter(|count| (1..=MOST).contains(count));
+                let why = "COUNT must be a whole number from 1 to 10000";
+                (range, count.ok_or_else(|| refuse(why))?)
+            }
+            None => (range, COUNT),
+        };
+        let (from, to) = (range.split_once("..")).ok_or_else(|| refuse("has no .."))?;
+        let number = |text: &str| {
+            let value = text.trim().parse().ok();
+            let finite = value.filter(|value: &f64| value.is_finite());
+            finite.ok_or_else(|| refuse("FROM and TO must be numbers"))
+        };
+        let (from, to) = (number(from)?, number(to)?);
+        if log && from * to <= 0.0 {
+            return Err(refuse(
+                "log needs FROM and TO of one sign: it never reaches zero",
+            ));
+        }
+        let mut values: Vec<f64> = (0..count)
+            .map(|i| between(from, to, i, count - 1, log))
+            .collect();
+        if keys.is_whole() {
+            for value in &mut values {
+                *value = value.round();
+            }
+        }
+        values.dedup();
+        Ok(Vary { keys, values, log })
+    }
+}
+
+/// The `i`-th of `last` + 1 values; the ends as they are.
+fn between(from: f64, to: f64, i: usize, last: usize, log: bool) -> f64 {
+    if i == 0 || i == last {
+        return if i == 0 { from } else { to };
+    }
+    let part = i as f64 / last as f64;
+    let value = match log {
+        true => from * (to / from).powf(part),
+        false => from + (to - from) * part,
+    };
+    let rounded = format!("{value:.*e}", DIGITS - 1);
+    rounded.parse().unwrap_or(value)
+}
+
+/// Why numbers cannot vary as asked.
+#[derive(Debug, thiserror::Error)]
+pub enum VaryError {
+    /// Not of the form.
+    #[error(
+        "--vary {given}: {why}; write KEY=FROM..TO[:COUNT][log], as in stiffness.bending_2=1..1e-5:12log"
+    )]
+    Form {
+        /// What was given.
+        given: String,
+        /// What is wrong.
+        why: &'static str,
+    },
+    /// A key that cannot vary.
+    #[error("{key}: {why}")]
+    Key {
+        /// The key as given.
+        key: String,
+        /// What is wrong.
+        why: String,
+    },
+    /// The setting of a method cannot be this.
+    #[error("{} = {found}: must be {needed}", knob.path())]
+    Knob {
+        /// The setting.
+        knob: Knob,
+        /// The value.
+        found: String,
+        /// What it must be.
+        needed: &'static str,
+    },
+    /// The scenario with these values is refused.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,206 @@
+use super::*;
+
+fn vary(given: &str) -> Vary {
+    given
+        .parse()
+        .unwrap_or_else(|error| panic!("{given}: {error}"))
+}
+
+fn refused(given: &str) -> String {
+    given.parse::<Vary>().unwrap_err().to_string()
+}
+
+#[test]
+fn spacing_and_counts() {
+    let linear = vary("stiffness.torsion=0..1");
+    assert_eq!(linear.values.len(), 11);
+    assert_eq!(linear.values[3], 0.3, "not 0.30000000000000004");
+    let decades = vary("stiffness.bending_2=1..1e-5:6log");
+    assert_eq!(decades.values, [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5]);
+    assert!(decades.log);
+    assert_eq!(vary("rest.twist=-2 .. 2 : 3").values, [-2.0, 0.0, 2.0]);
+    assert_eq!(vary("rest.twist=5..7:1").values, [5.0]);
+    assert_eq!(vary("rest.twist=5..5").values, [5.0]);
+    assert_eq!(vary("method.step=1e-5..1e-1log").values.len(), 11);
+    assert_eq!(
+        vary("method.step=1e-5..1e-1:5log"),
+        vary("method.step=1e-5..1e-1:5:log")
+    );
+}
+
+#[test]
+fn a_log_keeps_the_sign() {
+    let load = vary("load.gravity[2]=-1e-3..-10:5log");
+    assert_eq!(load.values, [-1e-3, -1e-2, -0.1, -1.0, -10.0]);
+    for through_zero in ["-1..1", "0..1", "1..0", "1..-1"] {
+        let message = refused(&format!("load.gravity[2]={through_zero}log"));
+        assert!(message.contains("one sign"), "{message}");
+    }
+}
+
+#[test]
+fn whole_numbers_are_rounded_and_told_once() {
+    assert_eq!(vary("leaf.rods=1..5:9").values, [1.0, 2.0, 3.0, 4.0, 5.0]);
+    let counts = vary("leaf.rods=1..100:7log");
+    assert_eq!(counts.values, [1.0, 2.0, 5.0, 10.0, 22.0, 46.0, 100.0]);
+    assert_eq!(counts.keys.text(22.0), "22");
+    assert_eq!(vary("method.segments=8..10").values, [8.0, 9.0, 10.0]);
+}
+
+#[test]
+fn values_are_written_shortly() {
+    let keys = vary("stiffness.torsion=0..1").keys;
+    assert_eq!(keys.text(1e-5), "1e-5");
+    assert_eq!(keys.text(-0.25), "-0.25");
+    assert_eq!(keys.text(1e10), "10000000000.0");
+}
+
+#[test]
+fn keys_are_told_as_they_were_given() {
+    for keys in [
+        "stiffness.axial+stiffness.shear_2+stiffness.shear_3",
+        "load.gravity[2]",
+        "method.step",
+        "leaf.fan[0]",
+        "coupling.y[1]",
+        "dynamics.duration",
+    ] {
+        assert_eq!(vary(&format!("{keys}=1..2")).keys.to_string(), keys);
+    }
+}
+
+#[test]
+fn slips_are_explained() {
+    for (given, part) in [
+        ("stiffness.torsion", "has no ="),
+        ("stiffness.torsion=1", "has no .."),
+        ("stiffness.torsion=1..x", "must be numbers"),
+        ("stiffness.torsion=1..inf", "must be numbers"),
+        ("stiffness.torsion=1..2:0", "COUNT"),
+        ("stiffness.torsion=1..2:1e3", "COUNT"),
+        ("stiffness.torsion=1..2:20000", "COUNT"),
+        (
+            "stiffness.bending2=1..2",
+            "did you mean stiffness.bending_2?",
+        ),
+        ("method.steps=1..2", "unknown key"),
+        ("load.gravity=1..2", "give an index, as in load.gravity[0]"),
+        ("load.gravity[3]=1..2", "0, 1, 2"),
+        ("load.gravity[z]=1..2", "whole number from 0"),
+        ("leaf.rods[0]=1..2", "leave the index out"),
+        ("leaf.fan=1..2", "give an index"),
+        ("leaf.joined=0..1", "no number"),
+        ("dynamics.gravity=0..1", "no number"),
+        ("name=0..1", "no number"),
+        ("=0..1", "unknown key"),
+        ("stiffness.axial+=0..1", "unknown key"),
+    ] {
+        let message = refused(given);
+        assert!(message.contains(part), "{given}: {message}");
+    }
+}
+
+const TEXT: &str = r#"
+name = "three"
+leaf = { rods = 3, length = 1.0, fan = [-0.5, 0.0, 0.5] }
+coupling = { y = 1 }
+load = { gravity = [0, 0.5, -1] }
+
+[stiffness]
+torsion = 1.0
+bending_2 = [1.0, 2, 3.0]
+bending_3 = { at = [0.0, 1.0], value = [1.0, 0.5] }
+axial = inf
+shear_2 = 100.0
+shear_3 = 100.0
+"#;
+
+fn base(overrides: &[&str]) -> Result<Base, VaryError> {
+    let overrides: Vec<String> = overrides.iter().map(|given| given.to_string()).collect();
+    Base::of_text(TEXT.into(), "three.toml".into(), &overrides)
+}
+
+fn at(base: &Base, values: &[(&str, f64)]) -> Result<Varied, VaryError> {
+    let keys: Vec<(Keys, f64)> = values
+        .iter()
+        .map(|(keys, value)| (keys.parse().unwrap(), *value))
+        .collect();
+    let values: Vec<(&Keys, f64)> = keys.iter().map(|(keys, value)| (keys, *value)).collect();
+    base.at(&values)
+}
+
+#[test]
+fn one_entry_of_a_list_changes_and_the_others_stay() {
+    let base = base(&[]).unwrap();
+    let varied = at(
+        &base,
+        &[("load.gravity[2]", -7.0), ("load.gravity[0]", 2.0)],
+    );
+    assert_eq!(varied.unwrap().scenario.gravity, [2.0, 0.5, -7.0]);
+    let varied = at(&base, &[("stiffness.bending_2[1]", 9.0)]).unwrap();
+    let bending = |rod: usize| varied.scenario.rods[rod].couple_stiffness[1].at(0.5);
+    assert_eq!([0, 1, 2].map(bending), [1.0, 9.0, 3.0]);
+    let varied = at(&base, &[("stiffness.torsion[2]", 9.0)]).unwrap();
+    let torsion = |rod: usize| varied.scenario.rods[rod].couple_stiffness[0].at(0.5);
+    assert_eq!([0, 1, 2].map(torsion), [1.0, 1.0, 9.0]);
+    let varied = at(&base, &[("coupling.y[1]", 4.0), ("coupling.z[0]", 3.0)]).unwrap();
+    assert_eq!(varied.scenario.coupling, [[0.0, 1.0, 3.0], [0.0, 4.0, 0.0]]);
+    let varied = at(&base, &[("leaf.fan[1]", 0.1)]).unwrap();
+    assert_eq!(varied.scenario.rods[1].angle, 0.1);
+}
+
+#[test]
+fn a_whole_key_changes_for_all_rods_and_keys_can_change_together() {
+    let base = base(&[]).unwrap();
+    let h = "stiffness.axial+stiffness.shear_2+stiffness.shear_3";
+    let varied = at(&base, &[(h, 1e5), ("stiffness.bending_3", 0.25)]).unwrap();
+    for rod in &varied.scenario.rods {
+        assert_eq!(rod.force_stiffness.each_ref().map(|h| h.at(0.3)), [1e5; 3]);
+        assert_eq!(rod.couple_stiffness[2].at(0.9), 0.25);
+    }
+}
+
+#[test]
+fn settings_of_methods_are_not_the_scenarios() {
+    let set = base(&["method.segments=16", "load.gravity=[0,0,-2]"]).unwrap();
+    assert_eq!(set.knobs().segments, Some(16));
+    assert_eq!(set.overrides(), ["load.gravity=[0,0,-2]"]);
+    let varied = at(&set, &[("method.step", 1e-3), ("load.gravity[0]", 1.0)]).unwrap();
+    assert_eq!(varied.knobs.step, Some(1e-3));
+    assert_eq!(varied.knobs.segments, Some(16));
+    assert_eq!(varied.scenario.gravity, [1.0, 0.0, -2.0]);
+}
+
+#[test]
+fn refusals_name_key_and_reason() {
+    for (overrides, part) in [
+        (
+            ["method.step=-1"],
+            "method.step = -1.0: must be greater than 0",
+        ),
+        (["method.step=fast"], "must be a number"),
+        (["method.segments=2.5"], "whole number"),
+        (
+            ["method.grid=5"],
+            "methods have method.step and method.segments",
+        ),
+        (["leaf.rods=0"], "leaf.rods"),
+    ] {
+        let message = base(&overrides).unwrap_err().to_string();
+        assert!(message.contains(part), "{message}");
+    }
+    let base = base(&[]).unwrap();
+    for (values, part) in [
+        (("stiffness.torsion", -1.0), "stiffness.torsion"),
+        (("stiffness.bending_2", 1e-30), "limit"),
+        (("stiffness.bending_2[3]", 1.0), "3 entries"),
+        (("stiffness.bending_3[0]", 1.0), "no list"),
+        (("coupling.z[2]", 1.0), "2 entries"),
+        (("dynamics.density[0]", 1.0), "write its list first"),
+        (("leaf.rods", 4.0), "leaf.fan"),
+        (("method.step", 0.0), "greater than 0"),
+    ] {
+        let message = at(&base, &[values]).unwrap_err().to_string();
+        assert!(message.contains(part), "{values:?}: {message}");
+    }
+}
