@@ -80,14 +80,12 @@ pub enum Stopped {
         segments: usize,
     },
     /// No time step is short enough.
-    #[error(
-        "at t = {time:.6e} no time step is short enough to go on; use more segments than {segments}, or slower changes of the loads"
-    )]
+    #[error("at t = {time:.6e} no time step is short enough to go on; {advice}")]
     StepTooShort {
         /// When.
         time: f64,
-        /// Segments a rod.
-        segments: usize,
+        /// What may help.
+        advice: &'static str,
     },
 }
 

@@ -280,7 +280,12 @@ impl<'a> Simulation<'a> {
             },
             Broken::StepTooShort { time } => Stopped::StepTooShort {
                 time: time * unit,
-                segments,
+                advice: match time > 0.0 {
+                    true => "use more segments a rod, or slower changes of the loads",
+                    false => {
+                        "the arcs it is released from strain rods that are rigid: use dynamics.start = \"at-rest\", or a stiffness less than inf"
+                    }
+                },
             },
         })?;
         self.made += 1;

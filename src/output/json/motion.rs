@@ -145,7 +145,7 @@ mod tests {
         wanted.insert(3, "remark");
         record.stopped = Some(Stopped::StepTooShort {
             time: 3.0,
-            segments: 8,
+            advice: "use more segments a rod",
         });
         assert_eq!(keys(&text(&MotionSummary, &record)), wanted);
     }

@@ -1,0 +1,122 @@
+//! The start: forces and accelerations of a leaf at rest.
+
+use glam::{DMat3, DVec3};
+
+use super::step::{add_inertia, tensor};
+use super::{Moving, SemiImplicit};
+
+/// A first step from rest, of implicit Euler, so short that the leaf hardly
+/// moves: one over the square of its length. It tells the forces that rigid
+/// segments carry, which no strain does.
+const HEAVY: f64 = 1e6;
+
+/// Its iterations, and the size of the last.
+const ITERATIONS: usize = 30;
+const LAST: f64 = 1e-15;
+
+/// A length by which rounding may strain a rigid segment.
+const VIOLATION: f64 = 1e-12;
+
+impl SemiImplicit<'_> {
+    /// Gives the segments their forces and the nodes their accelerations.
+    pub(super) fn begin(&mut self) {
+        self.dress(0.0, 0.0, HEAVY);
+        let violation = self.carry();
+        if self.leaf.stiffest() > 0.0 {
+            return self.accelerate();
+        }
+        if violation > VIOLATION && self.first_step() {
+            // To where rigid segments are not strained.
+            std::mem::swap(&mut self.state, &mut self.trial);
+        }
+        match self.first_step() {
+            true => {
+                std::mem::swap(&mut self.state.n, &mut self.trial.n);
+                for k in 0..self.state.x.len() {
+                    let w = self.way(k).map(|way| HEAVY * way);
+                    let v = [DVec3::ZERO; 2];
+                    self.moving[k] = Moving { v, a: w, w };
+                }
+            }
+            false => self.accelerate(),
+        }
+    }
+
+    /// Lets every segment carry the force its strain tells, and a rigid one
+    /// none. Returns by what length the strain of these is off.
+    fn carry(&mut self) -> f64 {
+        let (n, mut violation) = (self.leaf.segments(), 0.0_f64);
+        for j in 0..self.leaf.rods() {
+            for i in 0..n {
+                let section = *self.leaf.section(j, i);
+                let idle = self.leaf.segment(&self.state, j, i, DVec3::ZERO);
+                let strain = idle.v(&section) - section.rest_strain;
+                let rigid = section.compliance.cmpeq(DVec3::ZERO);
+                let force = DVec3::select(rigid, DVec3::ZERO, strain / section.compliance);
+                self.state.n[j * n + i] = idle.frame * force;
+                let off = DVec3::select(rigid, section.ds * strain, DVec3::ZERO);
+                violation = violation.max(off.abs().max_element());
+            }
+        }
+        violation
+    }
+
+    /// A first step, into the trial; false if it failed.
+    fn first_step(&mut self) -> bool {
+        self.trial.clone_from(&self.state);
+        for _ in 0..ITERATIONS {
+            self.leaf.assemble(&self.trial, &mut self.system);
+            let ways: Vec<_> = (0..self.state.x.len()).map(|k| self.way(k)).collect();
+            let inertia = &self.inertia;
+            let inertial = |k: usize, tensor: &DMat3| {
+                let [turn, shift] = ways[k];
+                (-HEAVY * (*tensor * turn), -HEAVY * inertia[k].mass * shift)
+            };
+            add_inertia(&mut self.system, &self.trial, inertia, HEAVY, inertial);
+            if !self.solve() {
+                return false;
+            }
+            self.leaf
+                .advance(&self.trial, &self.system, 1.0, &mut self.next);
+            std::mem::swap(&mut self.trial, &mut self.next);
+            let (turn, shift) = self.system.largest();
+            if turn.max(shift) < LAST {
+                break;
+            }
+        }
+        self.trial.x.iter().all(|x| x.is_finite())
+    }
+
+    /// Accelerations of a leaf at rest.
+    fn accelerate(&mut self) {
+        self.leaf.assemble(&self.state, &mut self.system);
+        let n = self.leaf.segments();
+        let joined = self.leaf.leaf.joined() && self.leaf.rods() > 1;
+        let (mut tip_force, mut tip_mass) = (DVec3::ZERO, 0.0);
+        for j in 0..self.leaf.rods() {
+            for i in 1..=n {
+                let k = self.state.base(j) + i;
+                let (moment, force) = self.system.unbalanced(j, i);
+                let inertia = self.inertia[k];
+                let tensor = tensor(&inertia, &self.state, k);
+                let w = [tensor.inverse() * moment, force / inertia.mass];
+                if i == n {
+                    tip_force += force;
+                    tip_mass += inertia.mass;
+                }
+                self.moving[k] = Moving {
+                    w,
+                    a: w,
+                    ..Moving::default()
+                };
+            }
+        }
+        if joined {
+            for j in 0..self.leaf.rods() {
+                let k = self.state.base(j) + n;
+                self.moving[k].w[1] = tip_force / tip_mass;
+                self.moving[k].a[1] = tip_force / tip_mass;
+            }
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! What a step put in and took out.
+
+use glam::DVec3;
+
+use super::super::friction::rates;
+use super::super::ledger::Exchange;
+use super::SemiImplicit;
+use super::step::tensor;
+use crate::leaf::{Loads, State};
+use crate::rotation;
+
+impl SemiImplicit<'_> {
+    /// Strains (v, u) of all segments.
+    pub(super) fn strains(&self) -> Vec<[DVec3; 2]> {
+        let n = self.leaf.segments();
+        (0..self.leaf.rods())
+            .flat_map(|j| (0..n).map(move |i| (j, i)))
+            .map(|(j, i)| {
+                let segment = self
+                    .leaf
+                    .segment(&self.state, j, i, self.state.n[j * n + i]);
+                [segment.v(self.leaf.section(j, i)), segment.u]
+            })
+            .collect()
+    }
+
+    /// Makes the attempted step of `h`, and accounts for it.
+    pub(super) fn accept(&mut self, h: f64) {
+        std::mem::swap(&mut self.state, &mut self.trial);
+        std::mem::swap(&mut self.moving, &mut self.next_moving);
+        let mut exchange = Exchange {
+            dissipated: self.physics.damping * self.dragged(),
+            work: self.changed(h),
+        };
+        if self.physics.retardation > 0.0 {
+            let rubbing = self.rub(h);
+            exchange.dissipated += 0.5 * h * (self.rubbing + rubbing);
+            self.rubbing = rubbing;
+            let now = self.strains();
+            let last = std::mem::replace(&mut self.past[0], now);
+            self.past[1] = last;
+            self.past_step = h;
+        }
+        self.ledger.add(exchange);
+        self.time += h;
+        self.count += 1;
+    }
+
+    /// Work of what changed in the accepted step of `h`: as much as it would
+    /// be on the mean of the states before (the trial) and after.
+    fn changed(&mut self, h: f64) -> f64 {
+        let (from, to) = (self.time, self.time + h);
+        let mut work = 0.0;
+        if self.physics.loads_change() {
+            let mut potential = |loads: Loads| {
+                self.leaf.loads = loads;
+                self.leaf.potential(&self.trial) + self.leaf.potential(&self.state)
+            };
+            let before = potential(self.physics.loads(from));
+            work += 0.5 * (potential(self.physics.loads(to)) - before);
+        }
+        if self.physics.rest_changes() {
+            let bending =
+                |rest: f64| self.bending(&self.trial, rest) + self.bending(&self.state, rest);
+            work += 0.5 * (bending(self.physics.rest(to)) - bending(self.physics.rest(from)));
+        }
+        let moments = [from, to].map(|time| self.physics.loads(time).tip_moment);
+        if self.leaf.rods() == 1 && moments != [DVec3::ZERO; 2] {
+            let tip = self.state.x.len() - 1;
+            let turn = rotation::log(self.state.q[tip] * self.trial.q[tip].conjugate());
+            work += 0.5 * (moments[0] + moments[1]).dot(turn);
+        }
+        work
+    }
+
+    /// Energy of bending in a state with the rest curvatures times `rest`.
+    fn bending(&self, state: &State, rest: f64) -> f64 {
+        let n = self.leaf.segments();
+        let nodes = (0..self.leaf.rods()).flat_map(|j| (0..n).map(move |i| (j, i)));
+        nodes
+            .zip(&self.sections)
+            .map(|((j, i), own)| {
+                let u = self.leaf.segment(state, j, i, DVec3::ZERO).u;
+                let bent = u - rest * own.rest_curvature;
+                0.5 * own.ds * bent.dot(own.couple_stiffness * bent)
+            })
+            .sum()
+    }
+
+    /// Power of internal friction at the end of a step of `h`.
+    fn rub(&self, h: f64) -> f64 {
+        let [c0, c1, c2] = rates(h, self.past_step);
+        let mut power = 0.0;
+        for (i, now) in self.strains().iter().enumerate() {
+            let section = &self.sections[i];
+            let rate = |kind: usize| {
+                c0 * now[kind] + c1 * self.past[0][i][kind] + c2 * self.past[1][i][kind]
+            };
+            let (v, u) = (rate(0), rate(1));
+            for c in 0..3 {
+                if section.compliance[c] > 0.0 {
+                    power += section.ds * v[c] * v[c] / section.compliance[c];
+                }
+                power += section.ds * u[c] * u[c] * section.couple_stiffness[c];
+            }
+        }
+        self.physics.retardation * power
+    }
+
+    /// The mean momentum of the accepted step times the way it led: work of
+    /// external damping, over its rate. Of what the step does not resolve,
+    /// which alternates, nothing is left in it.
+    fn dragged(&self) -> f64 {
+        let mut sum = 0.0;
+        for (k, inertia) in self.inertia.iter().enumerate() {
+            let (before, after) = (&self.next_moving[k], &self.moving[k]);
+            let mean = |c: usize| 0.5 * (before.v[c] + after.v[c]);
+            let turn = rotation::log(self.state.q[k] * self.trial.q[k].conjugate());
+            let shift = self.state.x[k] - self.trial.x[k];
+            sum += turn.dot(tensor(inertia, &self.state, k) * mean(0));
+            sum += inertia.mass * shift.dot(mean(1));
+        }
+        sum
+    }
+}

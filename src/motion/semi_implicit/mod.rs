@@ -1,0 +1,279 @@
+//! The semi-implicit method: the generalised-alpha method of Chung and Hulbert
+//! (J. Appl. Mech. 60, 1993) on rotations (Bruls, Cardona, Arnold, Mech. Mach.
+//! Theory 48, 2012).
+//!
+//! It is of second order, stable at any time step for any stiffness, and damps
+//! only what the step does not resolve. Every step solves the balance of
+//! momentum at its end by Newton's method, with the matrices and the mixed
+//! form of the relaxation: rigid rods are allowed. Spatial increments turn
+//! the nodes, as everywhere.
+//!
+//! With d the increment over a step h, v the velocity, a an auxiliary
+//! acceleration and w the true one,
+//!
+//! ```text
+//! d = h v0 + h^2 ((1/2 - beta) a0 + beta a1),   v1 = v0 + h ((1 - gamma) a0 + gamma a1)
+//! (1 - alpha_m) a1 + alpha_m a0 = (1 - alpha_f) w1 + alpha_f w0
+//! ```
+
+mod begin;
+mod books;
+mod step;
+
+use glam::DVec3;
+
+use super::ledger::{Exchange, Ledger, measure};
+use super::method::{Broken, Method, Snapshot, Velocity};
+use super::physics::{Inertia, Physics};
+use crate::leaf::{DiscreteLeaf, SparsePattern, State, System};
+use crate::rod::Section;
+
+/// Spectral radius at infinite frequency: what remains in a step of what it
+/// cannot resolve. Smaller values damp more of what it can.
+const REMAINING: f64 = 0.8;
+
+const ALPHA_M: f64 = (2.0 * REMAINING - 1.0) / (REMAINING + 1.0);
+const ALPHA_F: f64 = REMAINING / (REMAINING + 1.0);
+const GAMMA: f64 = 0.5 + ALPHA_F - ALPHA_M;
+const BETA: f64 = 0.25 * (GAMMA + 0.5) * (GAMMA + 0.5);
+
+/// Shortest step, and the part of a step that is rounding.
+const SHORTEST_STEP: f64 = 1e-10;
+const NO_TIME: f64 = 1e-9;
+
+/// Bounds of the change of the step.
+const GROWTH: (f64, f64) = (0.2, 2.0);
+
+/// How long time steps are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Steps {
+    /// All of this length, but those that hit the times asked for.
+    Fixed(f64),
+    /// So that the local error of positions (lengths) and rotations (radians)
+    /// stays below this.
+    Error(f64),
+}
+
+/// Motion of a node.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moving {
+    /// Velocity: angular, linear.
+    v: [DVec3; 2],
+    /// Auxiliary acceleration.
+    a: [DVec3; 2],
+    /// Acceleration.
+    w: [DVec3; 2],
+}
+
+/// A leaf on the move.
+pub struct SemiImplicit<'a> {
+    leaf: DiscreteLeaf<'a>,
+    physics: Physics,
+    inertia: Vec<Inertia>,
+    /// The rods' own sections, where internal damping changes them.
+    sections: Vec<Section>,
+    /// Strains (v, u) of all segments at the last step and the one before, and
+    /// the width of the step between.
+    past: [Vec<[DVec3; 2]>; 2],
+    past_step: f64,
+    /// Power of internal friction at the last step.
+    rubbing: f64,
+    system: System,
+    direct: Option<SparsePattern>,
+    state: State,
+    trial: State,
+    next: State,
+    moving: Vec<Moving>,
+    next_moving: Vec<Moving>,
+    steps: Steps,
+    step: f64,
+    time: f64,
+    count: usize,
+    /// Factorisations so far.
+    pub factorizations: usize,
+    ledger: Ledger,
+}
+
+impl<'a> SemiImplicit<'a> {
+    /// A leaf at rest in `state`.
+    pub fn new(leaf: DiscreteLeaf<'a>, physics: Physics, state: &State, steps: Steps) -> Self {
+        let n = leaf.segments();
+        let nodes = (0..leaf.rods()).flat_map(|j| (0..=n).map(move |i| (j, i)));
+        let inertia = nodes
+            .map(|(j, i)| physics.inertia(leaf.leaf, &leaf.grid, j, i))
+            .collect();
+        let system = System::new(&leaf);
+        let mut motion = SemiImplicit {
+            inertia,
+            sections: leaf.sections.clone(),
+            past: [Vec::new(), Vec::new()],
+            past_step: 0.0,
+            rubbing: 0.0,
+            system,
+            direct: None,
+            state: state.clone(),
+            trial: state.clone(),
+            next: state.clone(),
+            moving: vec![Moving::default(); state.x.len()],
+            next_moving: vec![Moving::default(); state.x.len()],
+            step: match steps {
+                Steps::Fixed(h) => h,
+                Steps::Error(error) => 0.1 * error.cbrt(),
+            },
+            steps,
+            time: 0.0,
+            count: 0,
+            factorizations: 0,
+            ledger: Ledger::default(),
+            leaf,
+            physics,
+        };
+        motion.begin();
+        motion.past = [motion.strains(), motion.strains()];
+        let start = motion.snapshot();
+        motion.ledger.begin(&start);
+        motion
+    }
+}
+
+impl Method for SemiImplicit<'_> {
+    fn name(&self) -> &'static str {
+        "semi-implicit"
+    }
+
+    fn time(&self) -> f64 {
+        self.time
+    }
+
+    fn steps(&self) -> usize {
+        self.count
+    }
+
+    fn advance(&mut self, until: f64) -> Result<(), Broken> {
+        while self.time < until {
+            let left = until - self.time;
+            if left < NO_TIME * self.step {
+                self.time = until;
+                break;
+            }
+            let count = (left / self.step * (1.0 - 1e-12)).ceil().max(1.0);
+            // The last two steps share what is left.
+            let last = count == 1.0;
+            let h = match self.steps {
+                Steps::Fixed(_) => left / count,
+                Steps::Error(_) if count <= 2.0 => left / count,
+                Steps::Error(_) => self.step,
+            };
+            let error = self.attempt(h);
+            if let (Steps::Error(allowed), Some(error)) = (self.steps, error) {
+                let factor = 0.9 * (allowed / error.max(1e-300)).cbrt();
+                let next = h * factor.clamp(GROWTH.0, GROWTH.1);
+                if error > allowed {
+                    self.step = next;
+                    continue;
+                }
+                // A step cut short by `until` says little about the next.
+                self.step = if last { next.max(self.step) } else { next };
+            }
+            match error {
+                Some(_) => self.accept(h),
+                None => self.step = 0.25 * h,
+            }
+            if let (Steps::Fixed(longest), Some(_)) = (self.steps, error) {
+                self.step = longest.min(GROWTH.1 * self.step);
+            }
+            if self.step < SHORTEST_STEP {
+                return Err(Broken::StepTooShort { time: self.time });
+            }
+            if error.is_some() && last {
+                self.time = until;
+            }
+        }
+        let now = self.snapshot();
+        (self.ledger).judge(&self.leaf, &self.physics, &now, self.step)
+    }
+
+    fn snapshot(&mut self) -> Snapshot {
+        let velocity: Vec<Velocity> = (self.moving.iter())
+            .map(|m| Velocity {
+                angular: m.v[0],
+                linear: m.v[1],
+            })
+            .collect();
+        self.leaf.sections.clone_from(&self.sections);
+        let energy = measure(
+            &mut self.leaf,
+            &self.physics,
+            self.time,
+            &self.state,
+            &velocity,
+        );
+        Snapshot {
+            time: self.time,
+            energy: self.ledger.complete(energy, Exchange::default()),
+            state: self.state.clone(),
+            velocity,
+        }
+    }
+
+    fn save(&self) -> Vec<f64> {
+        let mut numbers = vec![
+            self.time,
+            self.count as f64,
+            self.step,
+            self.past_step,
+            self.rubbing,
+            f64::from(u8::from(self.direct.is_some())),
+        ];
+        numbers.extend(self.ledger.save());
+        numbers.extend(self.state.x.iter().flat_map(|x| x.to_array()));
+        numbers.extend(self.state.q.iter().flat_map(|q| q.to_array()));
+        numbers.extend(self.state.n.iter().flat_map(|n| n.to_array()));
+        for m in &self.moving {
+            numbers.extend([m.v, m.a, m.w].iter().flatten().flat_map(|v| v.to_array()));
+        }
+        let past = self.past.iter().flatten().flatten();
+        numbers.extend(past.flat_map(|v| v.to_array()));
+        numbers
+    }
+
+    fn restore(&mut self, numbers: &[f64]) -> bool {
+        if numbers.len() != self.save().len() {
+            return false;
+        }
+        let mut numbers = numbers.iter().copied();
+        let mut next = || numbers.next().unwrap_or_default();
+        self.time = next();
+        self.count = next() as usize;
+        self.step = next();
+        self.past_step = next();
+        self.rubbing = next();
+        let direct = next() == 1.0;
+        self.ledger.restore(&mut next);
+        let vector = |next: &mut dyn FnMut() -> f64| DVec3::new(next(), next(), next());
+        for x in &mut self.state.x {
+            *x = vector(&mut next);
+        }
+        for q in &mut self.state.q {
+            *q = glam::DQuat::from_xyzw(next(), next(), next(), next());
+        }
+        for n in &mut self.state.n {
+            *n = vector(&mut next);
+        }
+        for m in &mut self.moving {
+            for v in [&mut m.v, &mut m.a, &mut m.w].into_iter().flatten() {
+                *v = vector(&mut next);
+            }
+        }
+        for v in self.past.iter_mut().flatten().flatten() {
+            *v = vector(&mut next);
+        }
+        // The solver in use decides the last digits, too.
+        self.leaf.assemble(&self.state, &mut self.system);
+        self.direct = match direct {
+            true => SparsePattern::new(&self.system).ok(),
+            false => None,
+        };
+        true
+    }
+}

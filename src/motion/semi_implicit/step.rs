@@ -1,0 +1,208 @@
+//! A time step.
+
+use glam::{DMat3, DVec3};
+
+use super::super::friction::rates;
+use super::super::physics::Inertia;
+use super::{ALPHA_F, ALPHA_M, BETA, GAMMA, SemiImplicit, Steps};
+use crate::leaf::{Solved, SparsePattern, State, System};
+use crate::rotation;
+
+/// Newton iterations in a step, and the size of the last (radians, lengths),
+/// as a part of the error allowed and at most; of steps of given length.
+const ITERATIONS: usize = 12;
+const LAST_ITERATION: f64 = 1e-3;
+const LARGEST_LAST: f64 = 1e-9;
+const FIXED_LAST: f64 = 1e-12;
+
+/// Relative accuracy of the conjugate gradients.
+const CG_TOLERANCE: f64 = 1e-10;
+
+/// Largest rotation of a node in a step, radians.
+const LARGEST_TURN: f64 = 0.5;
+
+/// Local error of a step: this times h^2 times the change of acceleration.
+const ERROR: f64 = BETA - 1.0 / 6.0;
+
+/// The stiffness with which the forces of rigid segments are condensed out is
+/// so many times what inertia puts against it, at least: iterations gain as
+/// much, however short the step.
+const STIFFER: f64 = 1e3;
+
+impl SemiImplicit<'_> {
+    /// Factorises and solves; false if the matrix is not positive definite.
+    pub(super) fn solve(&mut self) -> bool {
+        self.factorizations += 1;
+        if self.direct.is_none() {
+            if !self.system.factorize(0.0) {
+                return false;
+            }
+            match self.system.solve(None, CG_TOLERANCE) {
+                Solved::Yes(_) => return true,
+                Solved::Indefinite(_) => return false,
+                Solved::TooSlow(_) => self.direct = SparsePattern::new(&self.system).ok(),
+            }
+        }
+        let Some(Ok(mut factor)) = (self.direct.as_ref()).map(|p| p.factorize(&self.system, 0.0))
+        else {
+            return false;
+        };
+        let positive = factor.negative() == 0;
+        if positive {
+            factor.solve(&mut self.system, None);
+        }
+        positive
+    }
+
+    /// Turn and shift of a node from the state to the trial; none of a base,
+    /// which is held and not even rounding may move.
+    pub(super) fn way(&self, k: usize) -> [DVec3; 2] {
+        if k.is_multiple_of(self.leaf.segments() + 1) {
+            return [DVec3::ZERO; 2];
+        }
+        let turn = rotation::log(self.trial.q[k] * self.state.q[k].conjugate());
+        [turn, self.trial.x[k] - self.state.x[k]]
+    }
+
+    /// Motion at the end of a step of h that leads from the state to the trial.
+    fn arrive(&mut self, h: f64) {
+        let nodes = self.leaf.segments() + 1;
+        for k in (0..self.state.x.len()).filter(|k| !k.is_multiple_of(nodes)) {
+            let (m, d) = (self.moving[k], self.way(k));
+            let next = &mut self.next_moving[k];
+            for c in 0..2 {
+                let a1 = (d[c] - h * m.v[c] - h * h * (0.5 - BETA) * m.a[c]) / (BETA * h * h);
+                next.a[c] = a1;
+                next.v[c] = m.v[c] + h * ((1.0 - GAMMA) * m.a[c] + GAMMA * a1);
+                next.w[c] =
+                    ((1.0 - ALPHA_M) * a1 + ALPHA_M * m.a[c] - ALPHA_F * m.w[c]) / (1.0 - ALPHA_F);
+            }
+        }
+    }
+
+    /// One step of h; returns its local error, or `None` if it was too long.
+    pub(super) fn attempt(&mut self, h: f64) -> Option<f64> {
+        let damping = self.physics.damping;
+        let heavy =
+            (1.0 - ALPHA_M) / ((1.0 - ALPHA_F) * BETA * h * h) + damping * GAMMA / (BETA * h);
+        self.dress(self.time + h, h, heavy);
+        self.predict(h);
+        let last = match self.steps {
+            Steps::Fixed(_) => FIXED_LAST,
+            Steps::Error(allowed) => (LAST_ITERATION * allowed).min(LARGEST_LAST),
+        };
+        let mut before = f64::INFINITY;
+        for _ in 0..ITERATIONS {
+            self.arrive(h);
+            self.leaf.assemble(&self.trial, &mut self.system);
+            let (moving, inertia) = (&self.next_moving, &self.inertia);
+            let inertial = |k: usize, tensor: &DMat3| {
+                let m = &moving[k];
+                let momentum = *tensor * m.v[0];
+                let moment = *tensor * m.w[0] + m.v[0].cross(momentum) + damping * momentum;
+                (-moment, -inertia[k].mass * (m.w[1] + damping * m.v[1]))
+            };
+            add_inertia(&mut self.system, &self.trial, inertia, heavy, inertial);
+            if !self.solve() {
+                return None;
+            }
+            let (turn, shift) = self.system.largest();
+            let size = turn.max(shift);
+            if !size.is_finite() || size > before.max(LARGEST_TURN) {
+                return None;
+            }
+            self.leaf
+                .advance(&self.trial, &self.system, 1.0, &mut self.next);
+            std::mem::swap(&mut self.trial, &mut self.next);
+            if size <= last || (size < 1e-11 && size > 0.3 * before) {
+                self.arrive(h);
+                return Some(self.local_error(h));
+            }
+            before = size;
+        }
+        None
+    }
+
+    /// Local error of a step, and whether it turned too far.
+    fn local_error(&self, h: f64) -> f64 {
+        let mut error: f64 = 0.0;
+        for (next, now) in self.next_moving.iter().zip(&self.moving) {
+            for c in 0..2 {
+                error = error.max((next.a[c] - now.a[c]).length());
+            }
+        }
+        error * ERROR.abs() * h * h
+    }
+
+    /// Where the leaf would be at the end of a step if its acceleration did
+    /// not change.
+    fn predict(&mut self, h: f64) {
+        self.trial.clone_from(&self.state);
+        for (k, m) in self.moving.iter().enumerate() {
+            let d = |c: usize| h * m.v[c] + 0.5 * h * h * m.a[c];
+            // Far from the present the present is the better guess.
+            let turn = d(0);
+            if turn.length() < LARGEST_TURN {
+                self.trial.q[k] = (rotation::exp(turn) * self.trial.q[k]).normalize();
+                self.trial.x[k] += d(1);
+            }
+        }
+    }
+
+    /// Gives the leaf its loads and rest shapes at a time, and to its sections
+    /// the internal friction of a step of `h` that ends then: with the strain
+    /// rate c0 v + c1 v1 + c2 v2 from this and the last two strains, a rod is
+    /// stiffer by 1 + eta c0 and rests elsewhere. Inertia enters the matrix by
+    /// `heavy` times the masses.
+    pub(super) fn dress(&mut self, time: f64, h: f64, heavy: f64) {
+        self.leaf.loads = self.physics.loads(time);
+        let (rest, eta) = (self.physics.rest(time), self.physics.retardation);
+        let [c0, c1, c2] = rates(h, self.past_step).map(|c| eta * c);
+        let n = self.leaf.segments();
+        let both = self.leaf.sections.iter_mut().zip(&self.sections);
+        for (i, (section, own)) in both.enumerate() {
+            *section = *own;
+            section.rest_curvature *= rest;
+            let stiffer = 1.0 + c0;
+            if c0 > 0.0 {
+                let before = |kind: usize| c1 * self.past[0][i][kind] + c2 * self.past[1][i][kind];
+                section.rest_strain = (section.rest_strain - before(0)) / stiffer;
+                section.rest_curvature = (section.rest_curvature - before(1)) / stiffer;
+                section.compliance /= stiffer;
+                section.couple_stiffness *= stiffer;
+            }
+            let node = i / n * (n + 1) + i % n;
+            let mass = 0.5 * (self.inertia[node].mass + self.inertia[node + 1].mass);
+            let inertial = DVec3::splat(STIFFER * heavy * mass * section.ds);
+            let condensing = (stiffer * own.condensing).max(inertial);
+            section.condensing = condensing.min(section.compliance.recip());
+        }
+    }
+}
+
+/// Adds mass times `heavy` to the matrix, and a moment and a force to the
+/// right-hand side, at all nodes but the bases.
+pub(super) fn add_inertia(
+    system: &mut System,
+    state: &State,
+    inertia: &[Inertia],
+    heavy: f64,
+    load: impl Fn(usize, &DMat3) -> (DVec3, DVec3),
+) {
+    let n = state.segments();
+    for j in 0..state.rods() {
+        for i in 1..=n {
+            let k = state.base(j) + i;
+            let tensor = tensor(&inertia[k], state, k);
+            let matrix = (tensor * heavy, inertia[k].mass * heavy);
+            system.add(j, i, matrix, load(k, &tensor));
+        }
+    }
+}
+
+/// Tensor of inertia of a node.
+pub(super) fn tensor(inertia: &Inertia, state: &State, k: usize) -> DMat3 {
+    let d1 = state.q[k] * DVec3::X;
+    let excess = inertia.excess * inertia.transverse;
+    DMat3::from_diagonal(DVec3::splat(inertia.transverse)) + rotation::outer(d1, d1) * excess
+}

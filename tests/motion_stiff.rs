@@ -1,0 +1,184 @@
+//! The semi-implicit method takes any stiffness, infinite too, at any step:
+//! far beyond what the explicit method is stable at it neither diverges nor
+//! loses its order, and what it damps vanishes with the step.
+
+mod common;
+#[path = "common/motion.rs"]
+mod motion;
+
+use common::{fig04, settle_on};
+use leafdyn::leaf::{Leaf, State};
+use leafdyn::motion::{Explicit, Method, Physics, SemiImplicit, Snapshot, Steps};
+use leafdyn::relax::start;
+use leafdyn::scenario::{Profile, Scenario, Schedule};
+use motion::{discrete, distance, numbers, ramp, rest, three_veins, twisted_rod};
+
+fn stiff(mut leaf: Scenario, stiffness: f64) -> Scenario {
+    for rod in &mut leaf.rods {
+        rod.force_stiffness = [stiffness; 3].map(Profile::Constant);
+    }
+    leaf
+}
+
+/// Pulled and blown about, from rest.
+fn pulled(mut leaf: Scenario) -> Scenario {
+    leaf.dynamics.tip_force = ramp(4.0, [-6.0, 8.0, 10.0]);
+    leaf.dynamics.gravity = ramp(4.0, [2.0, -6.0, 4.0]);
+    leaf
+}
+
+fn moved(scenario: &Scenario, state: &State, steps: Steps, until: f64) -> (Snapshot, usize) {
+    let leaf = Leaf::new(scenario);
+    let grid = discrete(&leaf, state.segments());
+    let mut method = SemiImplicit::new(grid, Physics::new(&leaf), state, steps);
+    if let Err(broken) = method.advance(until) {
+        panic!("{steps:?}: {broken:?}");
+    }
+    (method.snapshot(), method.steps())
+}
+
+/// The largest distance between positions.
+fn apart(a: &State, b: &State) -> f64 {
+    let pairs = a.x.iter().zip(&b.x);
+    pairs.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
+}
+
+/// As rods get stiffer their motion becomes that of rigid ones, by as much as
+/// they are stiffer, at one and the same step.
+#[test]
+fn stiffer_and_stiffer_is_rigid_in_the_end() {
+    for leaf in [pulled(twisted_rod()), pulled(three_veins())] {
+        let of = |stiffness: f64| {
+            let leaf = stiff(leaf.clone(), stiffness);
+            moved(&leaf, &rest(&leaf, 8), Steps::Fixed(0.05), 2.0)
+                .0
+                .state
+        };
+        let rigid = of(f64::INFINITY);
+        let differences = [1e4, 1e6, 1e8].map(|stiffness| apart(&of(stiffness), &rigid));
+        println!("{differences:?}, at 1e10 {:.1e}", apart(&of(1e10), &rigid));
+        assert!(differences[0] > 1e-5, "they do differ");
+        for pair in differences.windows(2) {
+            assert!(
+                (pair[1] * 100.0 / pair[0] - 1.0).abs() < 0.1,
+                "{differences:?}"
+            );
+        }
+        assert!(apart(&of(1e10), &rigid) < 1e-8);
+    }
+}
+
+#[test]
+fn far_beyond_the_explicit_step() {
+    let scenario = stiff(pulled(three_veins()), 1e8);
+    let leaf = Leaf::new(&scenario);
+    let state = rest(&scenario, 8);
+    let explicit = Explicit::new(discrete(&leaf, 8), Physics::new(&leaf), &state, None).unwrap();
+    let stable = explicit.stable_step().step;
+    let on = |h: f64| numbers(&moved(&scenario, &state, Steps::Fixed(h), 2.0).0);
+    let fine = on(0.002);
+    for (h, within) in [(0.25, 0.2), (0.1, 0.04), (0.02, 4e-3)] {
+        let off = distance(&on(h), &fine);
+        println!("{:.0} stable steps in one: off by {off:.1e}", h / stable);
+        assert!(h > 100.0 * stable && off < within, "{h}: {off}");
+    }
+}
+
+/// In positions and rotations; velocities of rigid rods, whose forces are not
+/// smooth at first, are not looked at.
+#[test]
+fn of_second_order_at_any_stiffness() {
+    for leaf in [pulled(twisted_rod()), pulled(three_veins())] {
+        for stiffness in [1e5, 1e8, f64::INFINITY] {
+            let leaf = stiff(leaf.clone(), stiffness);
+            let state = rest(&leaf, 4);
+            let on = |h: f64| moved(&leaf, &state, Steps::Fixed(h), 1.0).0.state;
+            let found = [0.004, 0.002, 0.001].map(|h| {
+                let state = on(h);
+                let q = state.q.iter().flat_map(|q| q.to_array());
+                let x = state.x.iter().flat_map(|x| x.to_array());
+                x.chain(q).collect::<Vec<f64>>()
+            });
+            let changes = [0, 1].map(|k| distance(&found[k], &found[k + 1]));
+            let order = (changes[0] / changes[1]).log2();
+            println!("{stiffness:e}: order {order:.3}, changes {changes:?}");
+            assert!((order - 2.0).abs() < 0.1, "{stiffness}: {order}");
+        }
+    }
+}
+
+/// Energy that an undamped motion loses to the method falls with the third
+/// power of the step, where steps resolve the motion.
+#[test]
+fn what_it_damps_vanishes_with_the_step() {
+    for stiffness in [1e4, f64::INFINITY] {
+        let mut rod = stiff(twisted_rod(), stiffness);
+        rod.dynamics.gravity = Schedule::constant([0.5, -1.5, 1.0]);
+        let state = rest(&twisted_rod(), 4);
+        let lost = [0.04, 0.02, 0.01, 0.005, 0.0025].map(|h| {
+            let leaf = Leaf::new(&rod);
+            let mut method = SemiImplicit::new(
+                discrete(&leaf, 4),
+                Physics::new(&leaf),
+                &state,
+                Steps::Fixed(h),
+            );
+            let start = method.snapshot().energy.balance();
+            method.advance(20.0).unwrap();
+            method.snapshot().energy.balance() - start
+        });
+        println!("{stiffness:e}: {lost:?}");
+        assert!(
+            lost.iter().all(|lost| *lost < 0.0),
+            "damped, not fed: {lost:?}"
+        );
+        assert!(lost.is_sorted(), "less with every step: {lost:?}");
+        if stiffness.is_infinite() {
+            // What is left of a rigid rod's motion is resolved by these steps.
+            let orders = [3, 4].map(|k| (lost[k - 1] / lost[k]).log2());
+            assert!(
+                orders.iter().all(|order| (2.5..3.2).contains(order)),
+                "{orders:?}"
+            );
+        }
+    }
+}
+
+/// Rigid rods at steps of any length: the shorter, the heavier inertia is
+/// beside what holds segments together.
+#[test]
+fn rigid_rods_at_very_short_steps() {
+    let leaf = stiff(pulled(three_veins()), f64::INFINITY);
+    let state = rest(&leaf, 16);
+    let long = moved(&leaf, &state, Steps::Fixed(0.01), 0.05).0.state;
+    for h in [1e-3, 1e-4, 1e-5] {
+        let steps = 0.05_f64.min(200.0 * h) / h;
+        let (now, made) = moved(&leaf, &state, Steps::Fixed(h), steps.round() * h);
+        assert_eq!(made, steps.round() as usize, "no step fails");
+        let off = apart(&now.state, &long);
+        println!("{h}: {made} steps, off by {off:.1e}");
+        assert!(h < 1e-3 || off < 1e-5);
+        assert!(now.energy.kinetic < 1e-3);
+    }
+}
+
+/// Let go from arcs that strain it, with steps by their error, undamped and
+/// damped.
+#[test]
+fn let_go_with_steps_by_their_error() {
+    for damping in [0.0, 7.0] {
+        let mut leaf = fig04(3);
+        leaf.dynamics.external_damping = damping;
+        let model = Leaf::new(&leaf);
+        let state = start(&discrete(&model, 8));
+        let (now, steps) = moved(&leaf, &state, Steps::Error(1e-4), 5.0);
+        println!("damping {damping}: {steps} steps, {:.2?}", now.energy);
+        if damping > 0.0 {
+            let off = now
+                .state
+                .tip(0)
+                .distance(settle_on(&leaf, 8, false).tips[0]);
+            assert!(off < 1e-3, "{off}");
+        }
+    }
+}
