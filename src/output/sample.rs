@@ -12,6 +12,7 @@ use crate::simulate::{Frame, Moment, Record, Scheme, Still};
 use crate::study::{
     Base, Check, Confidence, Map, MapMethod, MapOutcome, MapRequest, MapRow, Shot, Verdict,
 };
+use crate::undulation::{Undulation, Vein};
 
 /// A fan of `rods` arcs of length 1, given at `segments` + 1 stations.
 pub fn fan(rods: usize, segments: usize) -> Equilibrium {
@@ -70,6 +71,9 @@ pub fn fan(rods: usize, segments: usize) -> Equilibrium {
         stations,
         rods: shapes,
         curves,
+        undulation: Undulation {
+            veins: vec![Vein::default(); rods],
+        },
     }
 }
 
@@ -172,6 +176,9 @@ pub fn map() -> Map {
             detail: format!("said of cell {cell}, \"quoted\""),
             index: rests.then_some(if outcome == MapOutcome::Saddle { 3 } else { 0 }),
             tip: rests.then_some([0.9, 0.1 * cell as f64, -1.0 / 3.0]),
+            margin_waves: rests.then_some(if cell == 2 { 1.5 } else { 0.0 }),
+            margin_amplitude: rests.then_some(0.01),
+            twist: rests.then_some(-0.5),
             energy: rests.then_some(-1.5e-7),
             error: rests.then_some(1e-9),
             error_estimate: rests.then_some(2e-9),

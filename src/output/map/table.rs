@@ -14,7 +14,7 @@ use crate::study::{Map, MapRequest, MapRow};
 pub struct MapTable;
 
 /// The columns after those of the varied keys.
-const COLUMNS: [&str; 12] = [
+const COLUMNS: [&str; 15] = [
     "method",
     "outcome",
     "detail",
@@ -27,6 +27,9 @@ const COLUMNS: [&str; 12] = [
     "error_estimate",
     "seconds",
     "reference",
+    "margin_waves",
+    "margin_amplitude",
+    "twist",
 ];
 
 impl Format<Map> for MapTable {
@@ -84,6 +87,9 @@ fn fields(request: &MapRequest, row: &MapRow) -> Vec<String> {
         optional(row.error_estimate),
         format!("{:.6}", row.seconds),
         row.reference.to_string(),
+        optional(row.margin_waves),
+        optional(row.margin_amplitude),
+        optional(row.twist),
     ]);
     fields
 }
@@ -167,6 +173,9 @@ fn row(
         error_estimate: number(9)?,
         seconds: number(10)?.unwrap_or_default(),
         reference: parsed(fields[11])?,
+        margin_waves: number(12)?,
+        margin_amplitude: number(13)?,
+        twist: number(14)?,
     })
 }
 
