@@ -2,15 +2,14 @@
 //! the twist of its section, and what linear theory says of both.
 //!
 //! **Waves.** A vein waves where it bends out of the surface now to one side,
-//! now to the other. Its polyline is cut at its inflections, where its normal
-//! curvature changes sign: the component of its turn along the normal of the
-//! surface, which its tangent and the line between its two neighbours span (a
-//! single vein's own director d2 takes the place of that line). The line
-//! through the inflections is the local mean of the vein, and what lies between
-//! two of them is a half-wave: its height over their chord, along the normal,
-//! is its amplitude. So nothing has to be fitted, a leaf that simply droops is
-//! one half-wave, however it droops, and the numbers neither depend on where
-//! the leaf lies nor on the order of its veins. Half-waves lower than
+//! now to the other. Its normal curvature is the part of its curvature along
+//! the normal of the leaf, which its tangent and the line from one margin to
+//! the other at equal fractions of the length span (a single vein's own
+//! director d2 takes the place of that line). The plane curve that has this curvature is cut at its inflections:
+//! what lies between two of them is a half-wave, and its height over their
+//! chord is its amplitude. So nothing has to be fitted, a vein that simply
+//! droops is one half-wave, however it droops, and the numbers depend neither
+//! on where the leaf lies nor on the order of its veins. Half-waves lower than
 //! [`LEAST_HEIGHT`] lengths, or than four error estimates, are no waves: they
 //! are joined with those beside them.
 //!
@@ -30,7 +29,7 @@
 
 use std::f64::consts::PI;
 
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 use crate::rotation;
 use crate::scenario::Scenario;
@@ -41,6 +40,10 @@ pub const LEAST_HEIGHT: f64 = 1e-3;
 
 /// And in error estimates: a height is the difference of three positions.
 const ERRORS: f64 = 4.0;
+
+/// Sine of the angle between a vein and the line between the margins below
+/// which these are one.
+const SAME_PLACE: f64 = 1e-6;
 
 /// A mean twist below this, in radians, has no hand.
 const LEAST_TWIST: f64 = 1e-3;
@@ -224,80 +227,86 @@ struct HalfWave {
     place: f64,
 }
 
-/// A vein seen from the surface it lies in.
+/// A vein developed into a plane by its normal curvature alone: what bends it
+/// within the surface is straightened out.
 struct Curve {
-    points: Vec<DVec3>,
+    /// Turn out of the surface at each inner node, in radians.
+    turns: Vec<f64>,
+    points: Vec<DVec2>,
     /// Arc length of the polyline up to each node.
     along: Vec<f64>,
-    /// Unit normals of the surface, at inner nodes.
-    normals: Vec<DVec3>,
 }
 
 impl Curve {
+    /// Of vein `j`, which has three nodes at least.
     fn of(lines: &[Centerline], j: usize) -> Self {
         let line = &lines[j];
-        let points: Vec<DVec3> = line.iter().map(|(x, _)| *x).collect();
-        let mut along = vec![0.0];
-        for pair in points.windows(2) {
-            along.push(along[along.len() - 1] + (pair[1] - pair[0]).length());
+        let steps: Vec<DVec3> = line.windows(2).map(|w| w[1].0 - w[0].0).collect();
+        let (mut turns, mut last) = (Vec::new(), None);
+        for (i, pair) in steps.windows(2).enumerate() {
+            let [from, to] = [pair[0], pair[1]].map(DVec3::normalize_or_zero);
+            let tangent = (from + to).normalize_or_zero();
+            let across = lines[lines.len() - 1][i + 1].0 - lines[0][i + 1].0;
+            let mut normal = tangent.cross(across.normalize_or_zero());
+            // Where the margins meet there is no surface but the section's.
+            if normal.length() < SAME_PLACE {
+                normal = tangent.cross(line[i + 1].1 * DVec3::Y);
+            }
+            normal = normal.normalize_or_zero();
+            // Margins that cross change places, but the surface goes on.
+            if last.is_some_and(|last: DVec3| last.dot(normal) < 0.0) {
+                normal = -normal;
+            }
+            last = Some(normal);
+            turns.push((to - from).dot(normal).clamp(-1.0, 1.0).asin());
         }
-        let (before, after) = (j.saturating_sub(1), (j + 1).min(lines.len() - 1));
-        let normals = (0..points.len())
-            .map(|i| {
-                let ends = [i.saturating_sub(1), (i + 1).min(points.len() - 1)];
-                let tangent = (points[ends[1]] - points[ends[0]]).normalize_or_zero();
-                let across = lines[after][i].0 - lines[before][i].0;
-                let normal = tangent.cross(across.normalize_or_zero());
-                // Where neighbours meet there is no surface but the section's.
-                match normal.length() > 1e-6 {
-                    true => normal.normalize(),
-                    false => tangent.cross(line[i].1 * DVec3::Y).normalize_or_zero(),
-                }
-            })
-            .collect();
+        let (mut points, mut along, mut angle) = (vec![DVec2::ZERO], vec![0.0], 0.0);
+        for (i, step) in steps.iter().enumerate() {
+            let (length, k) = (step.length(), points.len() - 1);
+            points.push(points[k] + length * DVec2::from_angle(angle));
+            along.push(along[k] + length);
+            angle += turns.get(i).copied().unwrap_or(0.0);
+        }
         Curve {
+            turns,
             points,
             along,
-            normals,
         }
     }
 
-    /// A value between nodes.
-    fn between<T>(values: &[T], at: f64) -> T
-    where
-        T: Copy
-            + std::ops::Add<Output = T>
-            + std::ops::Sub<Output = T>
-            + std::ops::Mul<f64, Output = T>,
-    {
-        let i = (at as usize).min(values.len() - 2);
-        values[i] + (values[i + 1] - values[i]) * (at - i as f64)
+    /// The point a fraction of a segment beyond a node.
+    fn point(&self, at: f64) -> DVec2 {
+        let i = (at as usize).min(self.points.len() - 2);
+        self.points[i].lerp(self.points[i + 1], at - i as f64)
     }
 
-    /// Where the normal curvature changes sign.
+    /// Where the normal curvature changes sign: between the last node on one
+    /// side and the first on the other.
     fn inflections(&self) -> Vec<f64> {
-        let bends: Vec<f64> = (1..self.points.len() - 1)
-            .map(|i| {
-                let [a, b, c] = [i - 1, i, i + 1].map(|k| self.points[k]);
-                let turn = (c - b).normalize_or_zero() - (b - a).normalize_or_zero();
-                turn.dot(self.normals[i])
-            })
-            .collect();
-        let pairs = bends.windows(2).enumerate();
-        pairs
-            .filter(|(_, b)| b[0] * b[1] < 0.0)
-            .map(|(i, b)| (i + 1) as f64 + b[0] / (b[0] - b[1]))
-            .collect()
+        let mut found = Vec::new();
+        let mut last: Option<(usize, f64)> = None;
+        for (i, &turn) in self
+            .turns
+            .iter()
+            .enumerate()
+            .filter(|(_, turn)| **turn != 0.0)
+        {
+            if let Some((k, before)) = last.filter(|(_, before)| before * turn < 0.0) {
+                let part = before / (before - turn);
+                found.push((k + 1) as f64 + part * (i - k) as f64);
+            }
+            last = Some((i, turn));
+        }
+        found
     }
 
     fn half_wave(&self, ends: [f64; 2]) -> HalfWave {
-        let [from, to] = ends.map(|end| Curve::between(&self.points, end));
+        let [from, to] = ends.map(|end| self.point(end));
         let chord = (to - from).normalize_or_zero();
-        let (mut height, mut place) = (0.0, Curve::between(&self.along, ends[0]));
-        let inside = ends[0].ceil() as usize..=ends[1].floor() as usize;
-        for i in inside {
-            let off = self.points[i] - from;
-            let off = (off - chord * off.dot(chord)).dot(self.normals[i]).abs();
+        let first = ends[0].ceil() as usize;
+        let (mut height, mut place) = (0.0, self.along[first]);
+        for i in first..=ends[1].floor() as usize {
+            let off = chord.perp_dot(self.points[i] - from).abs();
             if off > height {
                 (height, place) = (off, self.along[i]);
             }

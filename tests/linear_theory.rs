@@ -18,18 +18,22 @@ const A3: f64 = 1.3;
 fn solve(axis: usize, load: f64, tension: f64) -> Equilibrium {
     let mut gravity = [0.0; 3];
     gravity[axis] = load;
+    pulled(gravity, [tension, 0.0, 0.0], 1e-11)
+}
+
+fn pulled(gravity: [f64; 3], tip_force: [f64; 3], tolerance: f64) -> Equilibrium {
     let scenario = parse(&format!(
         r#"
         name = "rod"
         leaf = {{ rods = 1, length = {LENGTH:?}, fan = [0.0] }}
         stiffness = {{ torsion = 1.0, bending_2 = {A2:?}, bending_3 = {A3:?}, axial = inf, shear_2 = inf, shear_3 = inf }}
-        load = {{ gravity = {gravity:?}, tip_force = [{tension:?}, 0.0, 0.0] }}
+        load = {{ gravity = {gravity:?}, tip_force = {tip_force:?} }}
         "#
     ));
     // Above its buckling load the rod has no stable equilibrium near the axis.
     let options = Options {
         keep_unstable: true,
-        tolerance: Some(1e-11),
+        tolerance: Some(tolerance),
         ..Options::default()
     };
     let leaf = relax(&scenario, &options, &mut |_| {}).unwrap();
@@ -71,13 +75,10 @@ fn the_full_model_tends_to_it_with_the_square_of_the_load() {
     for axis in [1, 2] {
         for tension in [-30.0, -6.0, -0.7, 0.5, 4.0, 40.0] {
             let errors = [2e-2, 1e-2, 5e-3].map(|load| relative_error(axis, load, tension));
-            assert!(errors[0] < 0.02, "{tension}: {errors:.1e?}");
+            assert!(errors[0] < 0.02, "{tension}: {errors:?}");
             for pair in errors.windows(2) {
                 let order = (pair[0] / pair[1]).log2();
-                assert!(
-                    (order - 2.0).abs() < 0.05,
-                    "{axis}, {tension}: {errors:.1e?}"
-                );
+                assert!((order - 2.0).abs() < 0.05, "{axis}, {tension}: {errors:?}");
             }
         }
     }
@@ -104,7 +105,7 @@ fn its_wavenumber_is_the_one_that_is_reported() {
 #[test]
 fn a_compressed_rod_waves_as_predicted() {
     for tension in [-60.0, -140.0, -260.0] {
-        let leaf = solve(2, 0.5, tension);
+        let leaf = pulled([0.0; 3], [tension, 0.0, 0.1 * tension], 1e-7);
         let vein = leaf.undulation.veins[0];
         let apart = vein.waves() - vein.predicted_waves();
         assert!(apart.abs() <= 0.5, "{tension}: {vein:?}");
