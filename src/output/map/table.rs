@@ -25,11 +25,11 @@ const COLUMNS: [&str; 15] = [
     "energy",
     "error",
     "error_estimate",
-    "seconds",
-    "reference",
     "margin_waves",
     "margin_amplitude",
     "twist",
+    "seconds",
+    "reference",
 ];
 
 impl Format<Map> for MapTable {
@@ -85,11 +85,11 @@ fn fields(request: &MapRequest, row: &MapRow) -> Vec<String> {
         optional(row.energy),
         optional(row.error),
         optional(row.error_estimate),
-        format!("{:.6}", row.seconds),
-        row.reference.to_string(),
         optional(row.margin_waves),
         optional(row.margin_amplitude),
         optional(row.twist),
+        format!("{:.6}", row.seconds),
+        row.reference.to_string(),
     ]);
     fields
 }
@@ -171,11 +171,11 @@ fn row(
         energy: number(7)?,
         error: number(8)?,
         error_estimate: number(9)?,
-        seconds: number(10)?.unwrap_or_default(),
-        reference: parsed(fields[11])?,
-        margin_waves: number(12)?,
-        margin_amplitude: number(13)?,
-        twist: number(14)?,
+        margin_waves: number(10)?,
+        margin_amplitude: number(11)?,
+        twist: number(12)?,
+        seconds: number(13)?.unwrap_or_default(),
+        reference: parsed(fields[14])?,
     })
 }
 
