@@ -45,9 +45,9 @@ fn pulled(gravity: [f64; 3], tip_force: [f64; 3], tolerance: f64) -> Equilibrium
 fn deflection(s: f64, load: f64, tension: f64, bending: f64) -> f64 {
     let k = (tension.abs() / bending).sqrt();
     // cosh and sinh in tension, cos and sin in compression; c'' = sign k^2 c.
-    let (c, d): (fn(f64) -> f64, fn(f64) -> f64) = match tension > 0.0 {
-        true => (f64::cosh, f64::sinh),
-        false => (f64::cos, f64::sin),
+    let (c, d) = match tension > 0.0 {
+        true => (f64::cosh as fn(f64) -> f64, f64::sinh as fn(f64) -> f64),
+        false => (f64::cos as _, f64::sin as _),
     };
     let curved = -load / tension;
     let slope = load * LENGTH / tension;

@@ -209,3 +209,44 @@ fn mirror_images_turn_the_other_way() {
     let [first, last] = none.margins().unwrap().map(|vein| vein.twist);
     assert!((first + last).abs() < 1e-6 && first.abs() > 0.1, "{first}");
 }
+
+/// The leaf of docs/undulation.md: what waves, and what does not.
+#[test]
+fn long_margins_on_a_stiff_midrib_wave_and_are_stable() {
+    let relaxed = |entries: &[&str]| {
+        let entries: Vec<String> = entries.iter().map(|entry| entry.to_string()).collect();
+        settle(&scenario("study/undulation", &entries), 1e-5)
+    };
+    let leaf = relaxed(&[]);
+    assert_eq!(leaf.stable(), Some(true));
+    let margin = leaf.undulation.margin().unwrap();
+    assert_eq!(margin.waves(), 2.0);
+    assert!(margin.amplitude > 0.05 && margin.tension < 0.0);
+    assert!((margin.predicted_waves() - 2.0).abs() < 1.0, "{margin:?}");
+    // Not without excess length, nor where the veins bend up and down as hard
+    // as sideways.
+    let stiff = "stiffness.bending_2=[1, 1, 1, 1, 1, 1000, 1, 1, 1, 1, 1]";
+    for entry in ["rest.stretch=1.0", stiff] {
+        let leaf = relaxed(&[entry]);
+        assert_eq!(leaf.stable(), Some(true), "{entry}");
+        assert_eq!(leaf.undulation.margin().unwrap().waves(), 0.0, "{entry}");
+    }
+    // A soft midrib gives way, and the leaf folds up.
+    let folded = relaxed(&["stiffness.bending_2=0.01", "stiffness.bending_3=1.0"]);
+    assert!(folded.tips[0].x < 0.1 && folded.tips[0].z.abs() > 0.5);
+}
+
+/// Without their weight the paper's soft leaves have a flat equilibrium: a
+/// saddle, whose index no longer changes with the grid.
+#[test]
+fn the_papers_soft_leaves_are_saddles_when_flat() {
+    for (figure, index) in [("fig08", 45), ("fig09", 6), ("fig10", 18)] {
+        let entries = ["leaf.rods=5".into(), "load.gravity=[0, 0, 0]".into()];
+        let flat = scenario(&format!("paper/{figure}"), &entries);
+        for segments in [160, 320] {
+            let leaf = common::settle_on(&flat, segments, true);
+            assert_eq!(leaf.negative_eigenvalues, Some(index), "{figure}");
+            assert!(leaf.tips[0].z.abs() < 1e-12);
+        }
+    }
+}

@@ -58,7 +58,7 @@ pub fn fill(page: &mut Drawing, cell: Cell, outcome: MapOutcome) {
 }
 
 /// Waves beyond which colours do not change any more.
-const MOST_WAVES: f64 = 3.0;
+const MOST_WAVES: f64 = 2.5;
 
 /// Fills a cell by its number of waves: none is pale.
 pub fn fill_waves(page: &mut Drawing, cell: Cell, waves: f64) {
