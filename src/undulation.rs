@@ -45,6 +45,10 @@ const ERRORS: f64 = 4.0;
 /// which these are one.
 const SAME_PLACE: f64 = 1e-6;
 
+/// A turn at a node below this, in radians, is rounding: not even thousands of
+/// them make a half-wave that counts.
+const STRAIGHT: f64 = 1e-10;
+
 /// A mean twist below this, in radians, has no hand.
 const LEAST_TWIST: f64 = 1e-3;
 
@@ -289,7 +293,7 @@ impl Curve {
             .turns
             .iter()
             .enumerate()
-            .filter(|(_, turn)| **turn != 0.0)
+            .filter(|(_, turn)| turn.abs() > STRAIGHT)
         {
             if let Some((k, before)) = last.filter(|(_, before)| before * turn < 0.0) {
                 let part = before / (before - turn);
