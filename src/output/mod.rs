@@ -2,6 +2,7 @@
 //! trait. A file is complete or absent, never half written.
 
 mod atomic;
+mod chart;
 mod checksum;
 mod csv;
 mod figure;
@@ -11,7 +12,7 @@ mod part;
 mod recording;
 #[cfg(test)]
 mod sample;
-mod table;
+
 mod words;
 
 use std::io::{self, Write};
@@ -20,12 +21,12 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 pub use atomic::{abandon_unfinished, check_writable};
+pub use chart::{ChartTable, ScalingTable};
 pub use csv::Centerlines;
 pub use figure::{FigurePng, FigureSvg, MotionFigure};
 pub use json::{ChartSummary, CheckSummary, MapSummary, MotionSummary, Summary};
 pub use map::{Journal, MapFileError, MapTable, belongs, claim, read_rows, write_rows};
 pub use recording::{CannotResume, Keeper, Recording};
-pub use table::{ChartTable, ScalingTable};
 pub use words::{
     contender, equilibrium_of_index, headline, model, power_of_ten, shooting, verdict,
 };

@@ -10,7 +10,7 @@ use super::loglog::LogLog;
 use super::page::WIDTH;
 use super::series::{Failure, Marker, Point, Series};
 use crate::output::words::{contender, power_of_ten};
-use crate::study::{Chart, Contender, Peer, Row, Scaling};
+use crate::study::{Chart, Contender, Peer, Row, Scaling, Spread};
 
 /// Colours that must be told apart, also by the colour-blind (Okabe and Ito);
 /// methods of one kind are alike.
@@ -24,12 +24,17 @@ const COLORS: [Color; 7] = [
     Color(60, 60, 66),
 ];
 
-/// Colours of peers, in turn.
-const PEERS: [Color; 4] = [
-    Color(120, 120, 128),
-    Color(150, 105, 60),
-    Color(100, 130, 90),
+/// Colours of the peers that come with this crate, so that they are the same in
+/// every chart; and of others, in turn.
+const KNOWN_PEERS: [(&str, Color); 3] = [
+    ("solve_bvp", Color(120, 120, 128)),
+    ("exudyn", Color(150, 105, 60)),
+    ("pyelastica", Color(100, 130, 90)),
+];
+const OTHER_PEERS: [Color; 3] = [
     Color(125, 100, 160),
+    Color(70, 130, 140),
+    Color(165, 120, 130),
 ];
 
 impl Pictured for Chart {
@@ -45,7 +50,10 @@ impl Pictured for Chart {
         });
         let panel = LogLog {
             series: contenders.chain(peers(&self.peers)).collect(),
-            across: ("time, on one thread", Labels::Times),
+            across: (
+                "time on one thread: median, and quartiles as a thin line",
+                Labels::Times,
+            ),
             up: ("largest true error of positions / L", Labels::Powers),
             floor: self.reference.as_ref().map(|found| found.known_within),
         };
@@ -61,6 +69,7 @@ impl Pictured for Chart {
                 power_of_ten(found.known_within)
             ),
         });
+        notes.push("left is faster, down is more accurate".into());
         let title = format!("{}: speed against accuracy", self.scenario);
         page(&title, &notes, &panel)
     }
@@ -100,7 +109,7 @@ impl Pictured for Scaling {
         let panel = LogLog {
             series: contenders.collect(),
             across: ("number of veins N", Labels::Numbers(rods)),
-            up: ("time, on one thread", Labels::Times),
+            up: ("time on one thread: median and quartiles", Labels::Times),
             floor: None,
         };
         let mut notes = vec![format!("to a tolerance of {:e}", self.tolerance)];
@@ -138,7 +147,10 @@ fn series(
     place: impl Fn(usize, &Row) -> Option<(f64, f64)>,
 ) -> Series {
     let mut series = Series {
-        name: contender(who).into(),
+        name: match who {
+            Contender::SemiImplicit => format!("{} (default)", contender(who)),
+            _ => contender(who).into(),
+        },
         color,
         dashed: false,
         marker: match who {
@@ -156,6 +168,7 @@ fn series(
             Some((x, y)) => series.points.push(Point {
                 x,
                 y,
+                spread: quartiles(row).and_then(|[q1, q3]| Some([place(i, &q1)?, place(i, &q3)?])),
                 front: row.pareto,
             }),
             None => series.failures.push(Failure {
@@ -167,6 +180,21 @@ fn series(
     series
 }
 
+/// The row as if its quartiles were its time.
+fn quartiles(row: &Row) -> Option<[Row; 2]> {
+    let spread = row.seconds?;
+    let taking = |median: f64| Row {
+        seconds: Some(Spread { median, ..spread }),
+        ..row.clone()
+    };
+    Some([spread.q1, spread.q3].map(taking))
+}
+
+fn peer_color(name: &str, others: usize) -> Color {
+    let known = KNOWN_PEERS.iter().find(|(known, _)| *known == name);
+    known.map_or(OTHER_PEERS[others % OTHER_PEERS.len()], |(_, color)| *color)
+}
+
 /// One dashed line for each peer, from large errors to small.
 fn peers(peers: &[Peer]) -> Vec<Series> {
     let mut all: Vec<Series> = Vec::new();
@@ -175,7 +203,7 @@ fn peers(peers: &[Peer]) -> Vec<Series> {
         let place = place.unwrap_or_else(|| {
             all.push(Series {
                 name: peer.name.clone(),
-                color: PEERS[all.len() % PEERS.len()],
+                color: peer_color(&peer.name, all.len()),
                 dashed: true,
                 marker: Marker::Ring,
                 points: Vec::new(),
@@ -187,6 +215,7 @@ fn peers(peers: &[Peer]) -> Vec<Series> {
             Some((x, y)) => all[place].points.push(Point {
                 x,
                 y,
+                spread: Some([(peer.seconds.q1, y), (peer.seconds.q3, y)]),
                 front: peer.pareto,
             }),
             None => all[place].failures.push(Failure {
@@ -268,6 +297,39 @@ mod tests {
         }
         scaling.unconfirmed = vec![15];
         assert!(svg(&scaling).contains("NOT confirmed for N = 15"));
+    }
+
+    #[test]
+    fn times_are_spread_along_their_axis() {
+        let chart = sample::chart();
+        let rows = [&chart.rows[0]];
+        let across = series(rows[0].contender, COLORS[0], &rows, |_, row| row.point());
+        let wanted = Some([(8.75e-4, 1e-4), (1.2e-3, 1e-4)]);
+        assert_eq!(across.points[0].spread, wanted);
+        let up = |_, row: &Row| Some((5.0, row.point()?.0));
+        let up = series(rows[0].contender, COLORS[0], &rows, up);
+        let wanted = Some([(5.0, 8.75e-4), (5.0, 1.2e-3)]);
+        assert_eq!(up.points[0].spread, wanted);
+    }
+
+    #[test]
+    fn a_peer_has_one_colour_in_every_chart() {
+        let mut chart = sample::chart();
+        let of = |chart: &Chart| -> Vec<(String, Color)> {
+            let all = peers(&chart.peers).into_iter();
+            all.map(|peer| (peer.name, peer.color)).collect()
+        };
+        let alone = of(&chart)[0].clone();
+        chart.peers.insert(
+            0,
+            Peer {
+                name: "another".into(),
+                ..chart.peers[0].clone()
+            },
+        );
+        let both = of(&chart);
+        assert_eq!(both[1], alone);
+        assert_ne!(both[0].1, alone.1);
     }
 
     #[test]

@@ -12,7 +12,7 @@ use super::series::{FRONT, Point, Series, cross, halo, marker, stretch};
 
 const FRAME_HEIGHT: f64 = 430.0;
 /// Right of the frame, for the key and the names of lanes.
-const KEY: f64 = 236.0;
+const KEY: f64 = 252.0;
 /// Height of a lane of failures.
 const LANE: f64 = 16.0;
 /// Between the lanes and the frame.
@@ -219,7 +219,7 @@ impl LogLog {
         }
         if !self.lanes().is_empty() {
             cross(page, middle(at), NOTE);
-            say(page, at, "failed: how is told above", NOTE);
+            say(page, at, "failed or not run: see above", NOTE);
             at.y += ENTRY;
         }
         if self.floor.is_some() {
@@ -256,6 +256,10 @@ impl Plot {
     }
 
     fn draw_points(&self, page: &mut Drawing, series: &Series) {
+        for [from, to] in series.points.iter().filter_map(|point| point.spread) {
+            let [from, to] = [from, to].map(|(x, y)| self.place(x, y));
+            page.line(from, to, Stroke::new(series.color, 1.1));
+        }
         for point in &series.points {
             marker(page, self.place(point.x, point.y), series);
         }

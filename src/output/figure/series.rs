@@ -25,6 +25,8 @@ pub enum Marker {
 pub struct Point {
     pub x: f64,
     pub y: f64,
+    /// From here to there it was spread in repeated measurements.
+    pub spread: Option<[(f64, f64); 2]>,
     /// Whether it is on the Pareto front.
     pub front: bool,
 }
