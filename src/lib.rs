@@ -143,6 +143,10 @@
 //! the relaxed leaf confirmed by shooting: right, another equilibrium, a saddle,
 //! not as accurate as it says, or none.
 //!
+//! **Speed against accuracy** ([`study::chart()`]). Every method runs over its
+//! own accuracy, in turns with all others, and is judged by its true error: the
+//! distance from the relaxed leaf at the best tolerance, confirmed by shooting.
+//!
 //! # Layout
 //!
 //! [`scenario`] (TOML to a checked [`scenario::Scenario`]) and [`rotation`],

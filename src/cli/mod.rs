@@ -1,5 +1,7 @@
 //! The command line: one file per verb. What is computed is in the library.
 
+mod chart;
+mod chart_report;
 mod check;
 mod check_report;
 mod map;
@@ -33,6 +35,7 @@ pub struct Cli {
 enum Verb {
     Relax(relax::Relax),
     Check(check::Check),
+    Chart(chart::Chart),
     Map(map::Map),
     Simulate(simulate::Simulate),
 }
@@ -43,6 +46,7 @@ impl Cli {
         match self.verb {
             Verb::Relax(relax) => relax.run(),
             Verb::Check(check) => check.run(),
+            Verb::Chart(chart) => chart.run(),
             Verb::Map(map) => map.run(),
             Verb::Simulate(simulate) => simulate.run(),
         }
@@ -56,11 +60,12 @@ pub type Refusal = Box<dyn Error>;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// At rest within the tolerance; of a check: both methods agree; of a
-    /// simulation: followed to its end.
+    /// simulation: followed to its end; of a chart: its reference is confirmed.
     Success = 0,
     /// The run ended otherwise: not at rest within the tolerance; of a check:
     /// the methods differ or could not be compared; of a simulation: it ended
-    /// early. What was found is written all the same.
+    /// early; of a chart: its reference is not confirmed. What was found is
+    /// written all the same.
     Failure = 1,
     /// The request was refused, or its result could not be written.
     Refused = 2,

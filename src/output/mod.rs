@@ -2,6 +2,7 @@
 //! trait. A file is complete or absent, never half written.
 
 mod atomic;
+mod chart;
 mod checksum;
 mod csv;
 mod figure;
@@ -11,6 +12,7 @@ mod part;
 mod recording;
 #[cfg(test)]
 mod sample;
+
 mod words;
 
 use std::io::{self, Write};
@@ -19,16 +21,19 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 pub use atomic::{abandon_unfinished, check_writable};
+pub use chart::{ChartTable, ScalingTable};
 pub use csv::Centerlines;
 pub use figure::{FigurePng, FigureSvg, MotionFigure};
-pub use json::{CheckSummary, MapSummary, MotionSummary, Summary};
+pub use json::{ChartSummary, CheckSummary, MapSummary, MotionSummary, Summary};
 pub use map::{Journal, MapFileError, MapTable, belongs, claim, read_rows, write_rows};
 pub use recording::{CannotResume, Keeper, Recording};
-pub use words::{equilibrium_of_index, headline, model, power_of_ten, shooting, verdict};
+pub use words::{
+    contender, equilibrium_of_index, headline, model, power_of_ten, shooting, verdict,
+};
 
 use crate::relax::Equilibrium;
 use crate::simulate::Record;
-use crate::study::{Check, Map};
+use crate::study::{Chart, Check, Map, Scaling};
 
 /// One way to write a result down.
 pub trait Format<R> {
@@ -68,6 +73,16 @@ impl Written for Record {
         &MotionFigure::FILMSTRIP_SVG,
         &MotionFigure::FILMSTRIP_PNG,
     ];
+}
+
+impl Written for Chart {
+    const FORMATS: &'static [&'static dyn Format<Self>] =
+        &[&ChartSummary, &ChartTable, &FigureSvg, &FigurePng];
+}
+
+/// Its numbers are also in the JSON of its chart.
+impl Written for Scaling {
+    const FORMATS: &'static [&'static dyn Format<Self>] = &[&ScalingTable, &FigureSvg, &FigurePng];
 }
 
 /// Why a file could not be written.

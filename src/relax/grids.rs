@@ -5,7 +5,7 @@ use crate::relax::equilibrium::{Equilibrium, Saddle, Work};
 use crate::relax::explicit;
 use crate::relax::moment;
 use crate::relax::options::{
-    LARGEST_TOLERANCE, MAX_NODES, Method, Options, Progress, RelaxError, SMALLEST_TOLERANCE, past,
+    MAX_NODES, Method, Options, Progress, RelaxError, check_tolerance, past,
 };
 use crate::relax::prolong::{predict, prolong};
 use crate::relax::report;
@@ -80,9 +80,7 @@ pub fn relax(
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Equilibrium, RelaxError> {
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-    if !(SMALLEST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
-        return Err(RelaxError::Tolerance { found: tolerance });
-    }
+    check_tolerance(tolerance)?;
     if options.method == Method::Shooting {
         return shooting::relax(scenario, options, tolerance);
     }
@@ -275,7 +273,11 @@ impl<'a, 'o> Run<'a, 'o> {
             let level = self.levels.last().expect("the leaf has landed");
             let finer = level.leaf.grid.refined();
             let nodes = self.leaf.rods() * finer.segments();
-            if self.options.segments.is_some() || finer.segments() > FINEST || nodes > MAX_NODES {
+            if self.options.segments.is_some()
+                || finer.segments() > FINEST
+                || nodes > MAX_NODES
+                || self.beyond_rounding(finer.segments())
+            {
                 return match self.judge_stability() {
                     Err(Some(settled)) => End::Failed(settled),
                     _ => End::NotAccurate,
@@ -309,6 +311,14 @@ impl<'a, 'o> Run<'a, 'o> {
         let segments = self.levels.last()?.leaf.segments();
         let best = self.table.best()?;
         Some(best.error + EXTRAPOLATED * self.remaining + ROUNDING * segments as f64)
+    }
+
+    /// Whether unfinished iterations and rounding alone are more than the
+    /// tolerance on a grid of so many `segments`, and already on the present one
+    /// most of the error: no refinement helps then.
+    pub fn beyond_rounding(&self, segments: usize) -> bool {
+        let floor = EXTRAPOLATED * self.remaining + ROUNDING * segments as f64;
+        floor > self.tolerance && self.error().is_some_and(|error| error <= 2.0 * floor)
     }
 
     /// From the start to rest on the first grid that resolves it. A leaf that

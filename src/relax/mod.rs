@@ -20,7 +20,10 @@ pub use crate::shape::{NodeState, RodShape};
 pub use equilibrium::{Equilibrium, Model, Outcome, Saddle, Work};
 pub use grids::{check_segments, relax};
 pub use index::index_near;
-pub use options::{LARGEST_TOLERANCE, Method, Options, Progress, RelaxError, SMALLEST_TOLERANCE};
+pub use options::{
+    LARGEST_TOLERANCE, MAX_NODES, Method, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
+    check_tolerance,
+};
 pub(crate) use shape::node as node_state;
 pub use shooting::check_intervals;
 pub use start::start;

@@ -80,6 +80,17 @@ pub const MAX_NODES: usize = 4_000_000;
 /// Most intervals of a shooting.
 pub const MAX_INTERVALS: usize = 4096;
 
+/// Refuses a tolerance that is out of range.
+///
+/// # Errors
+/// If it is.
+pub fn check_tolerance(tolerance: f64) -> Result<(), RelaxError> {
+    match (SMALLEST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
+        true => Ok(()),
+        false => Err(RelaxError::Tolerance { found: tolerance }),
+    }
+}
+
 /// A request that cannot be met.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RelaxError {

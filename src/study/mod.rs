@@ -1,9 +1,14 @@
 //! What is built on the solvers.
 
+mod chart;
 mod check;
 mod map;
 mod vary;
 
+pub use chart::{
+    Chart, ChartError, ChartOptions, Contender, Decade, Ending, Peer, PeerRow, PeersError,
+    Reference, Row, Scaling, ScalingRow, Setting, Spread, Turn, chart, read_peers, scaling,
+};
 pub use check::{Check, CheckOptions, Place, Quantity, Shot, Verdict, check};
 pub use map::{
     CELL_SECONDS, Confidence, Map, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow,

@@ -1,5 +1,6 @@
 //! JSON, for scripts: compact, numbers that are not finite as null.
 
+mod chart;
 mod check;
 mod map;
 mod motion;
@@ -11,6 +12,7 @@ use glam::DVec3;
 use serde::Serialize;
 use serde_json::ser::Formatter;
 
+pub use chart::ChartSummary;
 pub use check::CheckSummary;
 pub use map::MapSummary;
 pub use motion::MotionSummary;
