@@ -164,6 +164,7 @@
 
 pub mod bvp;
 pub mod leaf;
+pub mod modes;
 pub mod motion;
 pub mod output;
 pub mod relax;

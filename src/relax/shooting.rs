@@ -147,6 +147,8 @@ fn blank(scenario: &Scenario, rods: Vec<RodShape>) -> Equilibrium {
             .map(|node| node.rotation * node.n)
             .sum::<DVec3>(),
         negative_eigenvalues: None,
+        modes: None,
+        mode_shapes: false,
         saddle: None,
         model: Model {
             rods: scenario.rods.len(),

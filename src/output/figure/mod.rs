@@ -1,6 +1,6 @@
 //! Figures: a leaf from above, from the side, from the front and in space; of a
 //! check also how far both solutions are apart; of a motion the energies in
-//! time, and the leaf at some instants.
+//! time, and the leaf at some instants; and the modes of a leaf at rest.
 //!
 //! One drawing code fills a [`drawing::Drawing`]; `svg` writes it down and
 //! `png` paints it, so that both files are the same picture.
@@ -18,14 +18,17 @@ mod header;
 mod leaf;
 mod map;
 mod markers;
+mod modes;
 mod motion;
 mod page;
 mod png;
 mod space;
+mod strip;
 mod svg;
 mod ticks;
 mod veins;
 
+pub use modes::ModesFigure;
 pub use motion::MotionFigure;
 pub use png::FigurePng;
 pub use svg::FigureSvg;

@@ -1,0 +1,259 @@
+//! Small vibrations about an equilibrium: the lowest eigenvalues of
+//! K x = lambda M x with the Hessian K of the energy and the masses M of the
+//! leaf in motion ([`crate::motion`]), without damping. Dimensionless: lambda in
+//! units of A/(rho L^4).
+//!
+//! A positive lambda is the square of a frequency, a negative one that of the
+//! rate at which the leaf leaves an unstable equilibrium.
+//!
+//! K - sigma M is factorised for a sigma below all eigenvalues, which the signs
+//! of its pivots prove, and the Lanczos method finds the eigenvalues next to
+//! sigma. How many there are up to the last one found is again told by the
+//! signs of the pivots (Sylvester's law), of a second factorisation there: those
+//! that were missed, such as the second one of a double eigenvalue, are looked
+//! for besides the known ones until the numbers agree. A list that could not
+//! be proved is not handed out.
+
+mod lanczos;
+mod masses;
+
+use crate::leaf::{DiscreteLeaf, Increment, SparseError, SparseFactor, SparsePattern};
+use crate::leaf::{State, System, shift, turn};
+use crate::motion::Physics;
+use glam::DVec3;
+use lanczos::{Found, Lanczos};
+use masses::Masses;
+
+/// Stiffness, in A/L^2, to which stiffer rods are softened: what that does to
+/// an eigenvalue is taken back, to first order. A larger one costs digits.
+const STIFFEST: f64 = 1e6;
+
+/// The first shift below zero that is tried for an unstable leaf, in
+/// A/(rho L^4), and the factor to the next.
+const FIRST_SHIFT: f64 = 1e-3;
+const NEXT_SHIFT: f64 = 8.0;
+
+/// Eigenvalues are counted up to this part of the way from the shift to the
+/// last one above it.
+const ABOVE: f64 = 1e-4;
+
+/// Searches before the list is given up.
+const SEARCHES: usize = 12;
+
+/// A mode and its eigenvalue.
+#[derive(Clone, Debug)]
+pub struct Eigenpair {
+    /// Lambda.
+    pub eigenvalue: f64,
+    /// Turns and shifts of all nodes, rod after rod, base to tip.
+    pub shape: Vec<Increment>,
+}
+
+/// The modes could not be found.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+pub enum ModesError {
+    /// The matrix does not fit into memory.
+    #[error(transparent)]
+    Memory(#[from] SparseError),
+    /// The eigenvalues found are not as many as there are.
+    #[error("the lowest eigenvalues could not be told apart")]
+    Unproved,
+}
+
+/// A leaf at rest, about to vibrate.
+struct Vibration<'a> {
+    leaf: &'a DiscreteLeaf<'a>,
+    state: &'a State,
+    system: System,
+    pattern: SparsePattern,
+    masses: Masses,
+}
+
+/// The lowest `count` eigenvalues, ascending, all if there are fewer, with
+/// their modes, which are orthonormal with the masses.
+///
+/// # Errors
+/// If memory is short, or the list cannot be proved to be complete.
+pub fn lowest(
+    leaf: &DiscreteLeaf,
+    physics: &Physics,
+    state: &State,
+    count: usize,
+) -> Result<Vec<Eigenpair>, ModesError> {
+    let mut soft = leaf.clone();
+    for section in &mut soft.sections {
+        section.condensing = section.condensing.min(DVec3::splat(STIFFEST));
+    }
+    let system = System::new(&soft);
+    let pattern = SparsePattern::new(&system)?;
+    let mut vibration = Vibration {
+        masses: Masses::new(&soft, physics, state, &pattern),
+        leaf: &soft,
+        state,
+        system,
+        pattern,
+    };
+    let found = vibration.lowest(count)?;
+    let mut pairs: Vec<Eigenpair> = found
+        .iter()
+        .map(|(eigenvalue, vector)| {
+            let shape = vibration.shape(vector);
+            Eigenpair {
+                eigenvalue: eigenvalue + softening(&soft, state, &shape),
+                shape,
+            }
+        })
+        .collect();
+    pairs.sort_by(|a, b| a.eigenvalue.total_cmp(&b.eigenvalue));
+    Ok(pairs)
+}
+
+/// What rounding may do to an eigenvalue.
+pub fn rounding(leaf: &DiscreteLeaf) -> f64 {
+    let stiffness = |m: f64, k: DVec3| m.max(k.max_element().min(STIFFEST));
+    let sections = leaf.sections.iter();
+    let stiffest = sections.fold(0.0, |m, s| stiffness(m, s.condensing));
+    f64::EPSILON * stiffest * (leaf.segments() * leaf.segments()) as f64
+}
+
+impl Vibration<'_> {
+    /// K - shift M, factorised.
+    fn factorize(&mut self, shift: f64) -> Result<SparseFactor<'_>, SparseError> {
+        self.leaf.assemble(self.state, &mut self.system);
+        self.masses.add(&mut self.system, -shift);
+        self.pattern.factorize(&self.system, 0.0)
+    }
+
+    /// A shift below all eigenvalues, no farther than it must be.
+    fn below_all(&mut self) -> Result<f64, ModesError> {
+        let mut shift = -self.leaf.neutral_shift();
+        while self.factorize(shift)?.negative() > 0 {
+            shift = (NEXT_SHIFT * shift).min(-FIRST_SHIFT);
+            if !shift.is_finite() {
+                return Err(ModesError::Unproved);
+            }
+        }
+        Ok(shift)
+    }
+
+    /// Eigenvalues and vectors, ascending.
+    fn lowest(&mut self, count: usize) -> Result<Vec<(f64, Vec<f64>)>, ModesError> {
+        let size = self.pattern.size();
+        let count = count.min(size);
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let rounding = rounding(self.leaf);
+        let shift = self.below_all()?;
+        let eigenvalue = |found: &Found| shift + 1.0 / found.inverse;
+        let mut found: Vec<Found> = Vec::new();
+        let (mut wanted, mut least) = (count, 0.0);
+        for search in 0..SEARCHES {
+            self.search(shift, (wanted, least), search, &mut found)?;
+            if found.len() < count {
+                wanted = count - found.len();
+                continue;
+            }
+            let last = eigenvalue(&found[count - 1]);
+            let limit = last + (ABOVE * (last - shift)).max(4.0 * rounding);
+            let there = self.factorize(limit)?.negative();
+            let here = found.iter().filter(|f| eigenvalue(f) < limit).count();
+            if here == there {
+                found.truncate(count);
+                let pair = |f: Found| (shift + 1.0 / f.inverse, f.vector);
+                return Ok(found.into_iter().map(pair).collect());
+            }
+            if here > there {
+                return Err(ModesError::Unproved);
+            }
+            (wanted, least) = (there - here, 1.0 / (limit - shift));
+        }
+        Err(ModesError::Unproved)
+    }
+
+    /// Adds to the eigenvalues found so many more of those next to the shift
+    /// whose inverse distance is not below `least`.
+    fn search(
+        &mut self,
+        shift: f64,
+        (wanted, least): (usize, f64),
+        search: usize,
+        found: &mut Vec<Found>,
+    ) -> Result<(), ModesError> {
+        let start = self.start(search);
+        self.leaf.assemble(self.state, &mut self.system);
+        self.masses.add(&mut self.system, -shift);
+        let mut factor = self.pattern.factorize(&self.system, 0.0)?;
+        let mut lanczos = Lanczos {
+            masses: &self.masses,
+            solve: &mut |b| factor.solve_vector(b),
+            known: found,
+        };
+        let more = lanczos.run(start, wanted, least);
+        found.extend(more);
+        found.sort_by(|a, b| b.inverse.total_cmp(&a.inverse));
+        Ok(())
+    }
+
+    /// A load without any symmetry, another one in every search.
+    fn start(&self, search: usize) -> Vec<f64> {
+        // Multiples of the golden ratio spread evenly: no symmetry, no chance.
+        let golden = |k: usize| (k as f64 * 0.618_033_988_749_895).fract() - 0.5;
+        let mut load = vec![0.0; self.pattern.size()];
+        let n = self.leaf.segments();
+        for j in 0..self.leaf.rods() {
+            for i in 1..=n {
+                let sigma = self.leaf.grid.sigma()[i];
+                let wave = (7.0 * search as f64 * sigma).sin();
+                for (kind, first) in self.pattern.unknowns(j, i).into_iter().enumerate() {
+                    for c in 0..3 {
+                        let k = 18 * (j + 97 * search) + 3 * kind + c;
+                        load[first + c] +=
+                            golden(k + 1) + sigma * golden(k + 7) + wave * golden(k + 13);
+                    }
+                }
+            }
+        }
+        self.masses.times(&load)
+    }
+
+    /// A vector as turns and shifts of all nodes.
+    fn shape(&self, vector: &[f64]) -> Vec<Increment> {
+        let n = self.leaf.segments();
+        let mut shape = vec![[0.0; 6]; self.leaf.rods() * (n + 1)];
+        for j in 0..self.leaf.rods() {
+            for i in 1..=n {
+                let [turn, shift] = self.pattern.unknowns(j, i);
+                let node = &mut shape[self.state.base(j) + i];
+                node[..3].copy_from_slice(&vector[turn..turn + 3]);
+                node[3..].copy_from_slice(&vector[shift..shift + 3]);
+            }
+        }
+        shape
+    }
+}
+
+/// By how much an eigenvalue rises if the rods are as stiff as they are and
+/// not softened, to first order in the compliance: the sum over the segments
+/// of ds (1/S - 1/H) n^2, with the force n that the mode lets them carry.
+fn softening(leaf: &DiscreteLeaf, state: &State, shape: &[Increment]) -> f64 {
+    let n = leaf.segments();
+    let mut sum = 0.0;
+    for j in 0..leaf.rods() {
+        for i in 0..n {
+            let section = leaf.section(j, i);
+            let softer = section.condensing.recip() - section.compliance;
+            if softer.max_element() <= f64::EPSILON * section.compliance.max_element() {
+                continue;
+            }
+            let mut segment = leaf.segment(state, j, i, state.n[j * n + i]);
+            // What the equilibrium itself leaves of it is no matter of the mode.
+            segment.gap = DVec3::ZERO;
+            let [a, b] = [0, 1].map(|end| &shape[state.base(j) + i + end]);
+            let force = segment.force_increment(section, shift(b) - shift(a), turn(a), turn(b));
+            let force = segment.frame.transpose() * force;
+            sum += section.ds * (softer * force * force).element_sum();
+        }
+    }
+    sum
+}
