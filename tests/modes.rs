@@ -153,7 +153,8 @@ fn a_hanging_chain() {
         let growth = 4.2_f64;
         let knots = (0..=48).map(|i| (growth * f64::from(i) / 48.0).exp_m1() / growth.exp_m1());
         let at: Vec<f64> = knots.collect();
-        let value = vec![soft; at.len()];
+        // Twist is fast.
+        let value = vec![1e4 * soft; at.len()];
         rod.rods[0].couple_stiffness[0] = Profile::Linear { at, value };
         let leaf = solve(&rod, &with(4));
         let found: Vec<f64> = modes_of(&leaf).iter().filter_map(Mode::frequency).collect();
@@ -409,7 +410,7 @@ fn shapes_are_orthonormal() {
 fn bits(leaf: &Equilibrium) -> Vec<u64> {
     let mut bits = Vec::new();
     for mode in modes_of(leaf) {
-        bits.extend([mode.eigenvalue, mode.error.unwrap()].map(f64::to_bits));
+        bits.push(mode.eigenvalue.to_bits());
         let shapes = mode.displacement.iter().chain(&mode.rotation).flatten();
         bits.extend(shapes.flat_map(|v| v.to_array()).map(f64::to_bits));
     }
@@ -425,9 +426,8 @@ fn modes_are_equal_bit_by_bit_on_any_number_of_threads() {
             .unwrap();
         pool.install(|| {
             let options = Options {
-                tolerance: Some(1e-5),
-                modes: 3,
-                ..Options::default()
+                segments: Some(32),
+                ..with(2)
             };
             solve(&fig04(300), &options)
         })
@@ -437,7 +437,7 @@ fn modes_are_equal_bit_by_bit_on_any_number_of_threads() {
         alone.segments.last().unwrap() * 300 >= 8192,
         "too small to be shared out"
     );
-    for threads in [1, 2, 5] {
+    for threads in [1, 2] {
         assert_eq!(bits(&on(threads)), bits(&alone), "{threads} threads");
     }
 }

@@ -9,12 +9,12 @@ use nalgebra::{DMatrix, SymmetricEigen};
 /// Accuracy of an eigenvector, relative to its eigenvalue; that of the
 /// eigenvalue is the square of it. The second is relative to the largest, and
 /// rounding.
-const ACCURACY: f64 = 1e-9;
+const ACCURACY: f64 = 1e-7;
 const LEAST_ACCURACY: f64 = 1e-13;
 
 /// Directions after which a run ends, and those more for every pair wanted.
-const MOST: usize = 160;
-const MOST_A_PAIR: usize = 6;
+const MOST: usize = 40;
+const MOST_A_PAIR: usize = 4;
 
 /// Directions between looks at what has converged.
 const LOOK: usize = 4;
@@ -25,14 +25,16 @@ const NOTHING: f64 = 1e-13;
 
 /// An eigenvector of unit mass.
 pub struct Found {
-    /// 1/(lambda - sigma).
-    pub inverse: f64,
+    /// Lambda.
+    pub eigenvalue: f64,
     pub vector: Vec<f64>,
 }
 
 /// What a run needs.
 pub struct Lanczos<'a> {
     pub masses: &'a Masses,
+    /// Sigma.
+    pub shift: f64,
     /// Solves (K - sigma M) x = b in place.
     pub solve: &'a mut dyn FnMut(&mut [f64]),
     /// Eigenvectors that are not to be found again.
@@ -48,10 +50,15 @@ fn subtract(a: &mut [f64], factor: f64, b: &[f64]) {
 }
 
 impl Lanczos<'_> {
-    /// The largest eigenvalues, descending, from the load `start`: `wanted`
-    /// or more of them, less if there are no more above `least` or the run
-    /// becomes too long.
-    pub fn run(&mut self, mut start: Vec<f64>, wanted: usize, least: f64) -> Vec<Found> {
+    /// The eigenvalues next above sigma, from the load `start`: `wanted` or
+    /// more of them, less if there are no more below `limit` or the run becomes
+    /// too long. Then also a value that the wanted ones do not exceed.
+    pub fn run(
+        &mut self,
+        mut start: Vec<f64>,
+        wanted: usize,
+        limit: f64,
+    ) -> (Vec<Found>, Option<f64>) {
         (self.solve)(&mut start);
         let most = (MOST + MOST_A_PAIR * wanted).min(start.len() - self.known.len());
         let mut basis: Vec<Vec<f64>> = Vec::new();
@@ -77,23 +84,24 @@ impl Lanczos<'_> {
                 let good =
                     |k: usize| error(k) <= (ACCURACY * values[k]).max(LEAST_ACCURACY * values[0]);
                 let done = (0..size).take_while(|&k| good(k)).count();
-                let below = done > 0 && values[done - 1] < least;
-                if done >= wanted || below || size == most || length == 0.0 {
+                let eigenvalue = |k: usize| self.shift + 1.0 / values[k];
+                let beyond = done > 0 && eigenvalue(done - 1) > limit;
+                if done >= wanted || beyond || size == most || length == 0.0 {
                     let pair = |k: usize| Found {
-                        inverse: values[k],
+                        eigenvalue: eigenvalue(k),
                         vector: self.combined(&basis, &vectors, k),
                     };
                     // What is not positive is rounding.
-                    return (0..done)
-                        .take_while(|&k| values[k] > 0.0)
-                        .map(pair)
-                        .collect();
+                    let positive = values.iter().take_while(|&&value| value > 0.0).count();
+                    let found = (0..done.min(positive)).map(pair).collect();
+                    let short = done < wanted && wanted <= positive;
+                    return (found, short.then(|| eigenvalue(wanted - 1)));
                 }
             }
             off.push(length);
             next = image;
         }
-        Vec::new()
+        (Vec::new(), None)
     }
 
     /// Makes a vector orthogonal to the basis and to what is known, twice, as

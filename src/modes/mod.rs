@@ -16,16 +16,19 @@
 
 mod lanczos;
 mod masses;
+mod quotient;
 
 use crate::leaf::{DiscreteLeaf, Increment, SparseError, SparseFactor, SparsePattern};
-use crate::leaf::{State, System, shift, turn};
+use crate::leaf::{State, System};
 use crate::motion::Physics;
 use glam::DVec3;
 use lanczos::{Found, Lanczos};
 use masses::Masses;
+use quotient::quotient;
+pub use quotient::rounding;
 
-/// Stiffness, in A/L^2, to which stiffer rods are softened: what that does to
-/// an eigenvalue is taken back, to first order. A larger one costs digits.
+/// Stiffness, in A/L^2, to which stiffer rods are softened in the matrix, as a
+/// larger one costs digits. The eigenvalues do not feel it to first order.
 const STIFFEST: f64 = 1e6;
 
 /// The first shift below zero that is tried for an unstable leaf, in
@@ -35,10 +38,15 @@ const NEXT_SHIFT: f64 = 8.0;
 
 /// Eigenvalues are counted up to this part of the way from the shift to the
 /// last one above it.
-const ABOVE: f64 = 1e-4;
+const ABOVE: f64 = 1e-7;
+
+/// Shifts closer to eigenvalues that are close together: by what part of the
+/// way from there back to the last shift, and the factor to the next try.
+const FIRST_PART: f64 = 2e-3;
+const NEXT_PART: f64 = 6.0;
 
 /// Searches before the list is given up.
-const SEARCHES: usize = 12;
+const SEARCHES: usize = 16;
 
 /// A mode and its eigenvalue.
 #[derive(Clone, Debug)]
@@ -96,10 +104,10 @@ pub fn lowest(
     let found = vibration.lowest(count)?;
     let mut pairs: Vec<Eigenpair> = found
         .iter()
-        .map(|(eigenvalue, vector)| {
+        .map(|vector| {
             let shape = vibration.shape(vector);
             Eigenpair {
-                eigenvalue: eigenvalue + softening(&soft, state, &shape),
+                eigenvalue: quotient(&soft, state, &shape),
                 shape,
             }
         })
@@ -108,11 +116,10 @@ pub fn lowest(
     Ok(pairs)
 }
 
-/// What rounding may do to an eigenvalue.
-pub fn rounding(leaf: &DiscreteLeaf) -> f64 {
-    let stiffness = |m: f64, k: DVec3| m.max(k.max_element().min(STIFFEST));
+/// What rounding may do to the eigenvalues of the matrix.
+fn rounding_of_matrix(leaf: &DiscreteLeaf) -> f64 {
     let sections = leaf.sections.iter();
-    let stiffest = sections.fold(0.0, |m, s| stiffness(m, s.condensing));
+    let stiffest = sections.fold(0.0_f64, |m, s| m.max(s.condensing.max_element()));
     f64::EPSILON * stiffest * (leaf.segments() * leaf.segments()) as f64
 }
 
@@ -136,63 +143,81 @@ impl Vibration<'_> {
         Ok(shift)
     }
 
-    /// Eigenvalues and vectors, ascending.
-    fn lowest(&mut self, count: usize) -> Result<Vec<(f64, Vec<f64>)>, ModesError> {
+    /// Eigenvectors of unit mass, eigenvalues ascending.
+    fn lowest(&mut self, count: usize) -> Result<Vec<Vec<f64>>, ModesError> {
         let size = self.pattern.size();
         let count = count.min(size);
         if count == 0 {
             return Ok(Vec::new());
         }
-        let rounding = rounding(self.leaf);
-        let shift = self.below_all()?;
-        let eigenvalue = |found: &Found| shift + 1.0 / found.inverse;
+        let rounding = rounding_of_matrix(self.leaf);
+        let lowest = self.below_all()?;
+        let (mut shift, mut limit) = (lowest, f64::INFINITY);
         let mut found: Vec<Found> = Vec::new();
-        let (mut wanted, mut least) = (count, 0.0);
+        let mut wanted = count;
         for search in 0..SEARCHES {
-            self.search(shift, (wanted, least), search, &mut found)?;
+            let bound = self.search(shift, (wanted, limit), search, &mut found)?;
             if found.len() < count {
                 wanted = count - found.len();
+                if let Some(bound) = bound {
+                    shift = self.closer(shift, bound, &found)?;
+                }
                 continue;
             }
-            let last = eigenvalue(&found[count - 1]);
-            let limit = last + (ABOVE * (last - shift)).max(4.0 * rounding);
+            let last = found[count - 1].eigenvalue;
+            limit = last + (ABOVE * (last - lowest)).max(4.0 * rounding);
             let there = self.factorize(limit)?.negative();
-            let here = found.iter().filter(|f| eigenvalue(f) < limit).count();
+            let here = found.iter().filter(|f| f.eigenvalue < limit).count();
             if here == there {
                 found.truncate(count);
-                let pair = |f: Found| (shift + 1.0 / f.inverse, f.vector);
-                return Ok(found.into_iter().map(pair).collect());
+                return Ok(found.into_iter().map(|found| found.vector).collect());
             }
             if here > there {
                 return Err(ModesError::Unproved);
             }
-            (wanted, least) = (there - here, 1.0 / (limit - shift));
+            wanted = there - here;
+            shift = lowest;
         }
         Err(ModesError::Unproved)
     }
 
-    /// Adds to the eigenvalues found so many more of those next to the shift
-    /// whose inverse distance is not below `least`.
+    /// A shift closer to the next eigenvalues, where many are close together:
+    /// somewhat below `bound`, but above no more than those found.
+    fn closer(&mut self, shift: f64, bound: f64, found: &[Found]) -> Result<f64, ModesError> {
+        let mut part = FIRST_PART;
+        while part < 1.0 {
+            let closer = bound - part * (bound - shift);
+            if self.factorize(closer)?.negative() <= found.len() {
+                return Ok(closer);
+            }
+            part *= NEXT_PART;
+        }
+        Ok(shift)
+    }
+
+    /// Adds to the eigenvalues found `wanted` more of those next above the
+    /// shift, fewer if there are no more below a limit; see [`Lanczos::run`].
     fn search(
         &mut self,
         shift: f64,
-        (wanted, least): (usize, f64),
+        (wanted, limit): (usize, f64),
         search: usize,
         found: &mut Vec<Found>,
-    ) -> Result<(), ModesError> {
+    ) -> Result<Option<f64>, ModesError> {
         let start = self.start(search);
         self.leaf.assemble(self.state, &mut self.system);
         self.masses.add(&mut self.system, -shift);
         let mut factor = self.pattern.factorize(&self.system, 0.0)?;
         let mut lanczos = Lanczos {
             masses: &self.masses,
+            shift,
             solve: &mut |b| factor.solve_vector(b),
             known: found,
         };
-        let more = lanczos.run(start, wanted, least);
+        let (more, bound) = lanczos.run(start, wanted, limit);
         found.extend(more);
-        found.sort_by(|a, b| b.inverse.total_cmp(&a.inverse));
-        Ok(())
+        found.sort_by(|a, b| a.eigenvalue.total_cmp(&b.eigenvalue));
+        Ok(bound)
     }
 
     /// A load without any symmetry, another one in every search.
@@ -231,29 +256,4 @@ impl Vibration<'_> {
         }
         shape
     }
-}
-
-/// By how much an eigenvalue rises if the rods are as stiff as they are and
-/// not softened, to first order in the compliance: the sum over the segments
-/// of ds (1/S - 1/H) n^2, with the force n that the mode lets them carry.
-fn softening(leaf: &DiscreteLeaf, state: &State, shape: &[Increment]) -> f64 {
-    let n = leaf.segments();
-    let mut sum = 0.0;
-    for j in 0..leaf.rods() {
-        for i in 0..n {
-            let section = leaf.section(j, i);
-            let softer = section.condensing.recip() - section.compliance;
-            if softer.max_element() <= f64::EPSILON * section.compliance.max_element() {
-                continue;
-            }
-            let mut segment = leaf.segment(state, j, i, state.n[j * n + i]);
-            // What the equilibrium itself leaves of it is no matter of the mode.
-            segment.gap = DVec3::ZERO;
-            let [a, b] = [0, 1].map(|end| &shape[state.base(j) + i + end]);
-            let force = segment.force_increment(section, shift(b) - shift(a), turn(a), turn(b));
-            let force = segment.frame.transpose() * force;
-            sum += section.ds * (softer * force * force).element_sum();
-        }
-    }
-    sum
 }

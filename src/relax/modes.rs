@@ -14,11 +14,11 @@ use glam::DVec3;
 
 /// Unknowns of the finest grid on which modes are looked for unless their
 /// shapes are asked for: about a second.
-const FEW_UNKNOWNS: usize = 200_000;
+const FEW_UNKNOWNS: usize = 20_000;
 
 /// The same of grids beyond those of the relaxation, which are there to make
 /// eigenvalues accurate.
-const FEW_MORE_UNKNOWNS: usize = 20_000;
+const FEW_MORE_UNKNOWNS: usize = 4_000;
 const MANY_MORE_UNKNOWNS: usize = 200_000;
 
 /// Grids that are extrapolated, at most, and those of them that may be beyond
