@@ -38,7 +38,7 @@ pub struct Relax {
     keep_unstable: bool,
 
     /// Write and draw the K lowest modes of the leaf at rest; left out: the eigenvalues of 3 are told, unless the leaf is large; 0: none
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
     modes: Option<usize>,
 
     /// Solve for the whole leaf even if half of it would do

@@ -8,7 +8,7 @@
 //!
 //! K - sigma M is factorised for a sigma below all eigenvalues, which the signs
 //! of its pivots prove, and the Lanczos method finds the eigenvalues next to
-//! sigma. How many there are up to the last one found is again told by the
+//! sigma. How many there are below the last one found is again told by the
 //! signs of the pivots (Sylvester's law), of a second factorisation there: those
 //! that were missed, such as the second one of a double eigenvalue, are looked
 //! for besides the known ones until the numbers agree. A list that could not
@@ -21,7 +21,6 @@ mod quotient;
 use crate::leaf::{DiscreteLeaf, Increment, SparseError, SparseFactor, SparsePattern};
 use crate::leaf::{State, System};
 use crate::motion::Physics;
-use glam::DVec3;
 use lanczos::{Found, Lanczos};
 use masses::Masses;
 use quotient::quotient;
@@ -31,21 +30,25 @@ pub use quotient::rounding;
 /// larger one costs digits. The eigenvalues do not feel it to first order.
 const STIFFEST: f64 = 1e6;
 
+/// It is at least so many times the largest force carried.
+const STIFFER: f64 = 1e4;
+
 /// The first shift below zero that is tried for an unstable leaf, in
 /// A/(rho L^4), and the factor to the next.
 const FIRST_SHIFT: f64 = 1e-3;
 const NEXT_SHIFT: f64 = 8.0;
 
-/// Eigenvalues are counted up to this part of the way from the shift to the
-/// last one above it.
-const ABOVE: f64 = 1e-7;
+/// Eigenvalues are counted below the last one less this part of the way to it
+/// from below all; the first of these that does not hit another one.
+const BELOW: [f64; 3] = [1e-7, 1e-6, 1e-5];
 
 /// Shifts closer to eigenvalues that are close together: by what part of the
 /// way from there back to the last shift, and the factor to the next try.
 const FIRST_PART: f64 = 2e-3;
 const NEXT_PART: f64 = 6.0;
 
-/// Searches before the list is given up.
+/// Searches before the list is given up, besides one for every mode wanted: of
+/// equal eigenvalues each finds one.
 const SEARCHES: usize = 16;
 
 /// A mode and its eigenvalue.
@@ -66,6 +69,12 @@ pub enum ModesError {
     /// The eigenvalues found are not as many as there are.
     #[error("the lowest eigenvalues could not be told apart")]
     Unproved,
+}
+
+/// Eigenvalues not yet found, all below this.
+struct Missing {
+    count: usize,
+    below: f64,
 }
 
 /// A leaf at rest, about to vibrate.
@@ -89,8 +98,9 @@ pub fn lowest(
     count: usize,
 ) -> Result<Vec<Eigenpair>, ModesError> {
     let mut soft = leaf.clone();
+    let pull = state.n.iter().fold(0.0_f64, |m, n| m.max(n.length()));
     for section in &mut soft.sections {
-        section.condensing = section.condensing.min(DVec3::splat(STIFFEST));
+        *section = section.condense(STIFFEST.max(STIFFER * pull));
     }
     let system = System::new(&soft);
     let pattern = SparsePattern::new(&system)?;
@@ -150,12 +160,11 @@ impl Vibration<'_> {
         if count == 0 {
             return Ok(Vec::new());
         }
-        let rounding = rounding_of_matrix(self.leaf);
         let lowest = self.below_all()?;
         let (mut shift, mut limit) = (lowest, f64::INFINITY);
         let mut found: Vec<Found> = Vec::new();
         let mut wanted = count;
-        for search in 0..SEARCHES {
+        for search in 0..SEARCHES + count {
             let bound = self.search(shift, (wanted, limit), search, &mut found)?;
             if found.len() < count {
                 wanted = count - found.len();
@@ -164,19 +173,35 @@ impl Vibration<'_> {
                 }
                 continue;
             }
-            let last = found[count - 1].eigenvalue;
-            limit = last + (ABOVE * (last - lowest)).max(4.0 * rounding);
-            let there = self.factorize(limit)?.negative();
-            let here = found.iter().filter(|f| f.eigenvalue < limit).count();
-            if here == there {
+            let missing = self.missing(&found, count, lowest)?;
+            if missing.count == 0 {
                 found.truncate(count);
                 return Ok(found.into_iter().map(|found| found.vector).collect());
             }
-            if here > there {
-                return Err(ModesError::Unproved);
-            }
-            wanted = there - here;
+            (wanted, limit) = (missing.count.min(count), missing.below);
             shift = lowest;
+        }
+        Err(ModesError::Unproved)
+    }
+
+    /// How many eigenvalues are missing below the `count`-th of those found, to
+    /// which there may be more that are equal.
+    fn missing(
+        &mut self,
+        found: &[Found],
+        count: usize,
+        lowest: f64,
+    ) -> Result<Missing, ModesError> {
+        let last = found[count - 1].eigenvalue;
+        let rounding = rounding_of_matrix(self.leaf);
+        for part in BELOW {
+            let below = last - (part * (last - lowest)).max(4.0 * rounding);
+            let there = self.factorize(below)?.negative();
+            let here = found.iter().filter(|f| f.eigenvalue < below).count();
+            // Too many: one is equal to the limit but for rounding.
+            if let Some(count) = there.checked_sub(here) {
+                return Ok(Missing { count, below });
+            }
         }
         Err(ModesError::Unproved)
     }
