@@ -15,10 +15,10 @@ use common::{close, extrapolate, fig04, paper_leaf, scenario};
 use leafdyn::leaf::{Leaf, State};
 use leafdyn::modes;
 use leafdyn::motion::{Inertia, Physics};
-use leafdyn::relax::{Equilibrium, Mode, Options, relax};
+use leafdyn::relax::{Equilibrium, Method, Mode, Options, relax};
 use leafdyn::scenario::{Profile, Scenario, Schedule};
 use linear::Linear;
-use motion::{Scheme, discrete, method, rest, three_veins};
+use motion::{Scheme, discrete, method as moving_by, rest, three_veins};
 use nalgebra::SymmetricEigen;
 use proptest::prelude::*;
 use rayon::ThreadPoolBuilder;
@@ -241,8 +241,22 @@ fn eigenvalues_are_those_of_a_dense_method() {
     assert_as_dense("a saddle", &flat, &on(10, 30, true));
 }
 
-/// Frequencies do not depend on whether half of a leaf was solved for, nor on
-/// the units.
+/// The three veins brought to rest by motion have the same modes.
+#[test]
+fn the_explicit_method_tells_the_same_modes() {
+    let explicit = Options {
+        method: Method::Explicit,
+        ..with(4)
+    };
+    let leaf = fig04(3);
+    let (implicit, explicit) = (solve(&leaf, &with(4)), solve(&leaf, &explicit));
+    for (a, b) in modes_of(&implicit).iter().zip(modes_of(&explicit)) {
+        let apart = (a.eigenvalue - b.eigenvalue).abs();
+        assert!(apart <= a.error.unwrap() + b.error.unwrap() + 1e-7 * a.eigenvalue);
+    }
+}
+
+/// Frequencies do not depend on whether half of a leaf was solved for.
 #[test]
 fn half_of_a_leaf_tells_the_modes_of_the_whole() {
     let entries = ["leaf.rods=4".to_string(), "leaf.fan='symmetric'".into()];
@@ -348,7 +362,7 @@ fn a_leaf_let_go_in_a_mode_keeps_its_frequency() {
         }
         let h = 1e-3;
         let seen = 2.0 / h * (0.5 * omega * h).asin();
-        let mut leapfrog = method(Scheme::Explicit, &leaf, &start, h);
+        let mut leapfrog = moving_by(Scheme::Explicit, &leaf, &start, h);
         let positions =
             |state: &State| -> Vec<f64> { state.x.iter().flat_map(|x| x.to_array()).collect() };
         let mut worst = 0.0_f64;

@@ -65,6 +65,7 @@ pub fn relax(
         Err(failure) => lost(scenario, failure),
     };
     result.tolerance = tolerance;
+    result.mode_shapes = options.mode_shapes;
     result.stations = grid.sigma().to_vec();
     result.curves = (result.rods.iter())
         .map(|rod| rod.nodes.iter().map(|node| node.position).collect())

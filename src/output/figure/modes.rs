@@ -143,3 +143,50 @@ fn displaced(equilibrium: &Equilibrium, rest: &Veins, mode: &Mode) -> Veins {
     let tips: Vec<DVec3> = ends.filter_map(|curve| curve.last()).copied().collect();
     Veins::through(&curves, &tips, rest.unit)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::sample;
+
+    fn shaking(eigenvalue: f64, size: f64) -> Equilibrium {
+        let mut leaf = sample::fan(3, 8);
+        let shape = vec![vec![size * DVec3::Z; 9]; 3];
+        let mode = Mode {
+            eigenvalue,
+            error: Some(1e-9),
+            displacement: shape.clone(),
+            rotation: shape,
+        };
+        leaf.modes = Some(vec![mode; 14]);
+        leaf.mode_shapes = true;
+        leaf
+    }
+
+    fn svg(leaf: &Equilibrium) -> String {
+        let mut bytes = Vec::new();
+        ModesFigure::SVG.write(leaf, &mut bytes).unwrap();
+        String::from_utf8(bytes).unwrap()
+    }
+
+    #[test]
+    fn frequencies_growth_and_neutral_modes_are_told() {
+        for (eigenvalue, text) in [
+            (4.0, "ω = 2<"),
+            (-9.0, "unstable: grows at 3<"),
+            (1e-10, "neutral"),
+        ] {
+            let svg = svg(&shaking(eigenvalue, 1.0));
+            assert_eq!(svg.matches(text).count(), MOST, "{text}");
+            assert!(svg.contains("the lowest 12 of 14"));
+        }
+    }
+
+    #[test]
+    fn shapes_gone_wild_are_drawn_without_a_panic() {
+        for wild in [0.0, f64::NAN, f64::INFINITY, 1e300, -1e-300] {
+            let svg = svg(&shaking(wild, wild));
+            assert!(!svg.contains("NaN") && !svg.contains("inf"), "{wild}");
+        }
+    }
+}
