@@ -184,11 +184,11 @@ impl Series {
 
     /// Whether all frequencies are known to this part of them.
     fn accurate(&self, tolerance: f64) -> bool {
-        let judged = self.judged();
-        let judged = judged.iter().enumerate();
-        judged
-            .map(|(k, (_, error))| error.is_some_and(|e| e <= 2.0 * tolerance * self.unit(k)))
-            .all(|accurate| accurate)
+        let known = |(k, error): (usize, Option<f64>)| {
+            error.is_some_and(|error| error <= 2.0 * tolerance * self.unit(k))
+        };
+        let errors = self.judged().into_iter().map(|(_, error)| error);
+        errors.enumerate().all(known)
     }
 }
 
@@ -196,7 +196,7 @@ impl Series {
 type Shape = (Vec<Vec<DVec3>>, Vec<Vec<DVec3>>);
 
 /// Shapes as they are handed out: scaled so that the largest displacement is
-/// the longest rod, and the first large component is positive.
+/// the longest rod, and the last of the largest components is positive.
 fn shapes(level: &Level, pairs: &[Eigenpair]) -> Vec<Shape> {
     let length = level.leaf.leaf.scale.length;
     let nodes = level.leaf.segments() + 1;
@@ -214,8 +214,7 @@ fn shapes(level: &Level, pairs: &[Eigenpair]) -> Vec<Shape> {
         let most = components().fold(0.0_f64, |m, c| m.max(c.abs()));
         // The last of those that are equal but for rounding: a tip's.
         let sign = components()
-            .filter(|c| c.abs() > 0.99 * most)
-            .last()
+            .rfind(|c| c.abs() > 0.99 * most)
             .map_or(1.0, f64::signum);
         let rods = |part: fn(&[f64; 6]) -> DVec3, unit: f64| {
             let rod = |rod: &[[f64; 6]]| rod.iter().map(|node| part(node) * unit).collect();
