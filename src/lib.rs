@@ -130,6 +130,12 @@
 //! was met is told ([`relax::Equilibrium::saddle`]). How a run ended is one of a
 //! few words, [`relax::Outcome`].
 //!
+//! **Modes** ([`modes`]). The lowest eigenvalues of K x = lambda M x with that
+//! Hessian and the masses of the leaf in motion: squared frequencies, or negative
+//! where the leaf is unstable. A Lanczos method finds them from one factorisation,
+//! and the pivots of a second one tell whether any was missed. Over the grids they
+//! are extrapolated as positions are ([`relax::Equilibrium::modes`]).
+//!
 //! **The independent road** ([`bvp`]). The same equations (1) to (6) with (a) to
 //! (e) as a boundary-value problem: 13 functions per rod, integrated from the
 //! base by a Runge-Kutta method of order 8 together with their sensitivities, and
@@ -150,7 +156,7 @@
 //! # Layout
 //!
 //! [`scenario`] (TOML to a checked [`scenario::Scenario`]) and [`rotation`],
-//! [`rod`], [`leaf`], [`shape`], [`bvp`], [`motion`], [`relax`], [`simulate`],
+//! [`rod`], [`leaf`], [`shape`], [`bvp`], [`motion`], [`modes`], [`relax`], [`simulate`],
 //! [`study`], [`output`] (JSON, tables, figures): each module uses those named
 //! before it and knows nothing of those after it.
 //!
@@ -168,6 +174,7 @@
 
 pub mod bvp;
 pub mod leaf;
+pub mod modes;
 pub mod motion;
 pub mod output;
 pub mod relax;

@@ -26,9 +26,9 @@ pub fn report(chart: &Chart, folder: Option<&Path>) -> String {
             .map(|remark| ("remark", remark.clone())),
     );
     if let Some(folder) = folder {
-        lines.push(("written", written::<Chart>(folder)));
+        lines.push(("written", written(chart, folder)));
         if chart.scaling.is_some() {
-            lines.push(("", written::<Scaling>(folder)));
+            lines.push(("", written(scaling, folder)));
         }
     }
     let veins = veins_of(chart.rods, chart.joined);

@@ -24,6 +24,7 @@ pub struct SparsePattern {
     /// First unknown of the joint tip.
     tip: Option<usize>,
     size: usize,
+    segments: usize,
 }
 
 /// L B L^T of a leaf's matrix by Bunch and Kaufman within supernodes.
@@ -74,7 +75,23 @@ impl SparsePattern {
             first,
             tip,
             size,
+            segments: n,
         })
+    }
+
+    /// Number of unknowns.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// First unknown of the turn and of the shift of node `i` (from 1) of rod
+    /// `j`. A joint tip has one shift for all rods.
+    pub fn unknowns(&self, j: usize, i: usize) -> [usize; 2] {
+        let first = self.first[j * self.segments + i - 1];
+        match self.tip {
+            Some(tip) if i == self.segments => [first, tip],
+            _ => [first, first + 3],
+        }
     }
 
     /// Factorises the matrix assembled in `system`, of the same leaf, plus
@@ -151,6 +168,22 @@ impl SparseFactor<'_> {
         negative
     }
 
+    /// Solves in place, with unknowns numbered as by [`SparsePattern::unknowns`].
+    pub fn solve_vector(&mut self, b: &mut [f64]) {
+        let mut x: Vec<f64> = self.forward.iter().map(|&k| b[k]).collect();
+        let mut memory = std::mem::replace(&mut self.memory, MemBuffer::new(Default::default()));
+        self.parts().solve_in_place_no_numeric_permute_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(&mut x, b.len(), 1),
+            Par::Seq,
+            MemStack::new(&mut memory),
+        );
+        self.memory = memory;
+        for (b, &k) in b.iter_mut().zip(&self.inverse) {
+            *b = x[k];
+        }
+    }
+
     /// Solves for the right-hand side assembled in `system` plus `inertia`
     /// (see [`System::solve`]); the solution stands in `system` afterwards.
     pub fn solve(&mut self, system: &mut System, inertia: Option<(&[Vec<Increment>], f64)>) {
@@ -168,18 +201,7 @@ impl SparseFactor<'_> {
                 _ => b[first..first + 6].copy_from_slice(rhs),
             }
         });
-        let mut x: Vec<f64> = self.forward.iter().map(|&k| b[k]).collect();
-        let mut memory = std::mem::replace(&mut self.memory, MemBuffer::new(Default::default()));
-        self.parts().solve_in_place_no_numeric_permute_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(&mut x, size, 1),
-            Par::Seq,
-            MemStack::new(&mut memory),
-        );
-        self.memory = memory;
-        for (b, &k) in b.iter_mut().zip(&self.inverse) {
-            *b = x[k];
-        }
+        self.solve_vector(&mut b);
         system.each_solution(|j, i, solution: &mut Increment| {
             let first = self.pattern.first[j * n + i];
             solution[..3].copy_from_slice(&b[first..first + 3]);

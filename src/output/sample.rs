@@ -60,6 +60,8 @@ pub fn fan(rods: usize, segments: usize) -> Equilibrium {
         tips: vec![point(0, 1.0)],
         tip_force_sum: DVec3::ZERO,
         negative_eigenvalues: Some(0),
+        modes: None,
+        mode_shapes: false,
         saddle: None,
         work: Work {
             steps: 8,

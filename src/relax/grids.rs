@@ -3,9 +3,10 @@
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, Solved, State, System, half_of, whole_of};
 use crate::relax::equilibrium::{Equilibrium, Saddle, Work};
 use crate::relax::explicit;
+use crate::relax::modes;
 use crate::relax::moment;
 use crate::relax::options::{
-    MAX_NODES, Method, Options, Progress, RelaxError, check_tolerance, past,
+    MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError, check_tolerance, past,
 };
 use crate::relax::prolong::{predict, prolong};
 use crate::relax::report;
@@ -81,6 +82,11 @@ pub fn relax(
 ) -> Result<Equilibrium, RelaxError> {
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
     check_tolerance(tolerance)?;
+    if options.modes > MOST_MODES {
+        return Err(RelaxError::Modes {
+            found: options.modes,
+        });
+    }
     if options.method == Method::Shooting {
         return shooting::relax(scenario, options, tolerance);
     }
@@ -105,9 +111,7 @@ pub fn relax(
         let end = run.solve(grid.clone());
         if matches!(end, End::Rest | End::NotAccurate) && run.index == Some(0) {
             let run = run.completed(&leaf);
-            let (outcome, remark) = report::outcome(&run, end);
-            let seconds = clock.elapsed().as_secs_f64();
-            return Ok(report::equilibrium(run, outcome, remark, seconds));
+            return Ok(finished(run, end, clock));
         }
         // The whole leaf has something to say: it moves out of its valley, or
         // breaks the mirror.
@@ -116,9 +120,20 @@ pub fn relax(
     let mut run = Run::new(&leaf, options, tolerance, progress);
     run.work = work;
     let end = run.solve(grid);
+    Ok(finished(run, end, clock))
+}
+
+/// The result of a run, and of a leaf at rest its modes, which are not counted
+/// in the time of the solution.
+fn finished(run: Run, end: End, clock: Instant) -> Equilibrium {
+    let at_rest = matches!(end, End::Rest | End::NotAccurate);
     let (outcome, remark) = report::outcome(&run, end);
     let seconds = clock.elapsed().as_secs_f64();
-    Ok(report::equilibrium(run, outcome, remark, seconds))
+    let modes = if at_rest { modes::lowest(&run) } else { None };
+    Equilibrium {
+        modes,
+        ..report::equilibrium(run, outcome, remark, seconds)
+    }
 }
 
 /// Whether half of a leaf may be solved for the whole: where the way to rest

@@ -1,10 +1,11 @@
 //! How a leaf comes to rest: the start, the semi-implicit motion on one grid,
-//! the nested grids with their extrapolation, saddles, and the result.
+//! the nested grids with their extrapolation, saddles, modes, and the result.
 
 mod equilibrium;
 mod explicit;
 mod grids;
 mod index;
+mod modes;
 mod moment;
 mod options;
 mod prolong;
@@ -17,12 +18,12 @@ mod shooting;
 mod start;
 
 pub use crate::shape::{NodeState, RodShape};
-pub use equilibrium::{Equilibrium, Model, Outcome, Saddle, Work};
+pub use equilibrium::{Equilibrium, Mode, Model, Outcome, Saddle, Work};
 pub use grids::{check_segments, relax};
 pub use index::index_near;
 pub use options::{
-    LARGEST_TOLERANCE, MAX_NODES, Method, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
-    check_tolerance,
+    LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError,
+    SMALLEST_TOLERANCE, check_tolerance,
 };
 pub(crate) use shape::node as node_state;
 pub use shooting::check_intervals;

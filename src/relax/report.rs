@@ -66,6 +66,8 @@ pub fn equilibrium(
             .collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
         negative_eigenvalues: run.index,
+        modes: None,
+        mode_shapes: run.options.mode_shapes,
         saddle: run.saddle,
         model: Model {
             rods: run.solved,
