@@ -162,6 +162,7 @@
 
 #![warn(missing_docs)]
 
+pub mod branch;
 pub mod bvp;
 pub mod leaf;
 pub mod motion;

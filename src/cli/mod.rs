@@ -11,6 +11,8 @@ mod request;
 mod simulate;
 mod simulate_report;
 mod text;
+mod trace;
+mod trace_report;
 
 use std::error::Error;
 use std::io::{self, IsTerminal, Write};
@@ -35,6 +37,7 @@ enum Verb {
     Check(check::Check),
     Map(map::Map),
     Simulate(simulate::Simulate),
+    Trace(trace::Trace),
 }
 
 impl Cli {
@@ -45,6 +48,7 @@ impl Cli {
             Verb::Check(check) => check.run(),
             Verb::Map(map) => map.run(),
             Verb::Simulate(simulate) => simulate.run(),
+            Verb::Trace(trace) => trace.run(),
         }
     }
 }

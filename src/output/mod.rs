@@ -11,6 +11,7 @@ mod part;
 mod recording;
 #[cfg(test)]
 mod sample;
+mod trace;
 mod words;
 
 use std::io::{self, Write};
@@ -21,14 +22,15 @@ use thiserror::Error;
 pub use atomic::{abandon_unfinished, check_writable};
 pub use csv::Centerlines;
 pub use figure::{FigurePng, FigureSvg, MotionFigure};
-pub use json::{CheckSummary, MapSummary, MotionSummary, Summary};
+pub use json::{CheckSummary, MapSummary, MotionSummary, Summary, TraceSummary};
 pub use map::{Journal, MapFileError, MapTable, belongs, claim, read_rows, write_rows};
 pub use recording::{CannotResume, Keeper, Recording};
-pub use words::{equilibrium_of_index, headline, model, power_of_ten, shooting, verdict};
+pub use trace::TraceTable;
+pub use words::{branch_end, equilibrium_of_index, headline, model, power_of_ten, shooting, verdict};
 
 use crate::relax::Equilibrium;
 use crate::simulate::Record;
-use crate::study::{Check, Map};
+use crate::study::{Check, Map, Trace};
 
 /// One way to write a result down.
 pub trait Format<R> {
@@ -58,6 +60,11 @@ impl Written for Check {
 impl Written for Map {
     const FORMATS: &'static [&'static dyn Format<Self>] =
         &[&MapSummary, &MapTable, &FigureSvg, &FigurePng];
+}
+
+impl Written for Trace {
+    const FORMATS: &'static [&'static dyn Format<Self>] =
+        &[&TraceSummary, &TraceTable, &FigureSvg, &FigurePng];
 }
 
 impl Written for Record {

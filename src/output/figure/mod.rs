@@ -24,6 +24,7 @@ mod png;
 mod space;
 mod svg;
 mod ticks;
+mod trace;
 mod veins;
 
 pub use motion::MotionFigure;
