@@ -258,7 +258,7 @@ impl Critical {
             }
             let next = search.at(way + step)?;
             let after = next.eigenvalues[self.which];
-            if step.abs() > LOCAL * LOCAL {
+            if step.abs() > LOCAL {
                 slope = (after - value) / step;
             }
             (way, value) = (way + step, after);
@@ -266,7 +266,7 @@ impl Critical {
                 true => best = next,
                 false => worse += 1,
             }
-            if step.abs() < ACCURACY || worse > 2 {
+            if step.abs() < ACCURACY || worse > 1 {
                 break;
             }
         }

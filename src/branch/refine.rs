@@ -19,7 +19,7 @@ const ALONG: f64 = 0.05;
 
 /// Compliance by which matrices of nearly rigid leaves are softened, in units
 /// of L^2/A, times one to four; and the stiffness from which on they are.
-const SOFTENING: f64 = 3e-5;
+const SOFTENING: f64 = 1e-4;
 const NEARLY_RIGID: f64 = 1e4;
 
 /// A point without the error of its grid.
