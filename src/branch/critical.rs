@@ -161,7 +161,10 @@ impl Search<'_, '_> {
             if (at - last).abs() > LOCAL * whole {
                 slope = (now - last_value) / (at - last);
             }
-            if best.as_ref().is_none_or(|(_, held)| now.abs() <= held.eigenvalues[which].abs()) {
+            if best
+                .as_ref()
+                .is_none_or(|(_, held)| now.abs() <= held.eigenvalues[which].abs())
+            {
                 best = Some((at, sample));
             }
             if done {
@@ -179,7 +182,10 @@ impl Search<'_, '_> {
         }
         let (at, sample) = best.ok_or(Stuck::NotConverged)?;
         let kept = (self.held, &self.from.tangent);
-        Ok((at, critical(self.equations, sample, which, slope, kept, indices)))
+        Ok((
+            at,
+            critical(self.equations, sample, which, slope, kept, indices),
+        ))
     }
 }
 
@@ -211,7 +217,11 @@ fn critical(
         add(&mut mode, *part, other);
     }
     let norm = equations.product(&mode, &mode).sqrt();
-    let drive: f64 = vector.iter().zip(sample.deflated.drive.iter()).map(|(v, d)| v * d).sum();
+    let drive: f64 = vector
+        .iter()
+        .zip(sample.deflated.drive.iter())
+        .map(|(v, d)| v * d)
+        .sum();
     let all = sample.deflated.drive.norm();
     Critical {
         kind: match drive.abs() > DRIVEN * all.max(DRIVEN) {

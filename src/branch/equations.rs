@@ -345,7 +345,9 @@ impl<'a> Equations<'a> {
             self.pattern = Some(SparsePattern::new(system).map_err(|_| Stuck::TooLarge)?);
         }
         let pattern = self.pattern.as_ref().ok_or(Stuck::TooLarge)?;
-        let factor = pattern.factorize(system, shift).map_err(|_| Stuck::TooLarge)?;
+        let factor = pattern
+            .factorize(system, shift)
+            .map_err(|_| Stuck::TooLarge)?;
         Ok(factor.negative())
     }
 
@@ -410,7 +412,10 @@ impl<'a> Equations<'a> {
                     fraction,
                     h,
                     drive: DVector::from_vec(rate.multipliers),
-                    modes: columns.into_iter().map(|column| column.increments).collect(),
+                    modes: columns
+                        .into_iter()
+                        .map(|column| column.increments)
+                        .collect(),
                 });
             }
             // What is below rounding decides nothing.

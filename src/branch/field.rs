@@ -40,9 +40,7 @@ pub fn add(a: &mut Field, factor: f64, b: &Field) {
 /// a times a factor.
 pub fn times(a: &Field, factor: f64) -> Field {
     let of = |a: &Increment| a.map(|a| factor * a);
-    a.iter()
-        .map(|rod| rod.iter().map(of).collect())
-        .collect()
+    a.iter().map(|rod| rod.iter().map(of).collect()).collect()
 }
 
 /// The largest component.
@@ -80,7 +78,9 @@ fn prolong_rod(rod: &[Increment]) -> Vec<Increment> {
             let mut sum = [0.0; 6];
             for i in 0..count {
                 let others = (0..count).filter(|&o| o != i);
-                let weight: f64 = others.map(|o| (t - o as f64) / (i as f64 - o as f64)).product();
+                let weight: f64 = others
+                    .map(|o| (t - o as f64) / (i as f64 - o as f64))
+                    .product();
                 let value = at(first + i);
                 for c in 0..6 {
                     sum[c] += weight * value[c];

@@ -9,9 +9,12 @@ use crate::leaf::{Grid, State};
 use crate::relax::prolong::prolong;
 use crate::relax::richardson::Richardson;
 
-/// Grids of a regular point, and of a critical one.
-const GRIDS: usize = 3;
+/// Grids of a regular point at most, and of a critical one.
+const GRIDS: usize = 6;
 const CRITICAL_GRIDS: usize = 4;
+
+/// A critical parameter within this part of its range is exact.
+const EXACT: f64 = 1e-12;
 
 /// A point is sought at the same parameter on all grids where the branch goes
 /// at least this much along it, else in the same plane.
@@ -41,11 +44,16 @@ pub struct Refined {
     pub grid: Grid,
 }
 
-/// A regular point to the given accuracy of its tips, on up to three grids.
+/// A regular point to the given accuracy of its tips, on as many grids as it takes.
 ///
 /// # Errors
 /// If it is not there on the grid it was found on.
-pub fn refine(family: &Family, grid: &Grid, point: &Point, accuracy: f64) -> Result<Refined, Stuck> {
+pub fn refine(
+    family: &Family,
+    grid: &Grid,
+    point: &Point,
+    accuracy: f64,
+) -> Result<Refined, Stuck> {
     let mut table = Table::default();
     let mut equations = Equations::new(family, grid.clone())?;
     table.push(&equations, &point.state, point.fraction)?;
@@ -108,24 +116,31 @@ pub fn refine_critical(family: &Family, grid: &Grid, found: &Critical) -> Result
         let rigid = family.with(critical.fraction, &equations.grid, |leaf| {
             leaf.stiffest() * NEARLY_RIGID < 1.0
         })?;
-        table.rounding = table.rounding.max(family.with(
-            critical.fraction,
-            &equations.grid,
-            |leaf| {
-                let stiffest = leaf.sections.iter().fold(0.0_f64, |most, section| {
-                    let limit = if rigid { 1.0 / SOFTENING } else { f64::INFINITY };
-                    most.max(section.condensing.max_element().min(limit))
-                });
-                let segments = leaf.segments() as f64;
-                f64::EPSILON * stiffest * segments * segments / critical.steepness()
-            },
-        )?);
+        table.rounding =
+            table
+                .rounding
+                .max(family.with(critical.fraction, &equations.grid, |leaf| {
+                    let stiffest = leaf.sections.iter().fold(0.0_f64, |most, section| {
+                        let limit = if rigid {
+                            1.0 / SOFTENING
+                        } else {
+                            f64::INFINITY
+                        };
+                        most.max(section.condensing.max_element().min(limit))
+                    });
+                    let segments = leaf.segments() as f64;
+                    f64::EPSILON * stiffest * segments * segments / critical.steepness()
+                })?);
         match rigid {
             false => table.push(&equations, &critical.state, critical.fraction)?,
             true => {
                 let fraction = unsoftened(family, &equations.grid, &critical)?;
                 table.push(&equations, &critical.state, fraction)?;
             }
+        }
+        // A finer grid would only add rounding.
+        if (table.fraction.best()).is_some_and(|best| best.error < table.rounding.max(EXACT)) {
+            break;
         }
     }
     Ok(table.refined(critical.state, equations.grid.clone()))

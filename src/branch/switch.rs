@@ -15,7 +15,9 @@ pub fn switch(equations: &mut Equations, critical: &Critical, mode: usize) -> Ve
         .iter()
         .filter_map(|direction| {
             let tries = AWAY.iter();
-            tries.filter_map(|&away| leave(equations, critical, direction, away).ok()).next()
+            tries
+                .filter_map(|&away| leave(equations, critical, direction, away).ok())
+                .next()
         })
         .collect()
 }

@@ -71,7 +71,10 @@ pub fn report(trace: &Trace, folder: Option<&Path>) -> String {
     let errors = errors.filter_map(|point| point.error);
     if let Some(worst) = errors.reduce(f64::max) {
         let worst = format!("tips within {}", power_of_ten(worst));
-        lines.push(("error", format!("{worst}, followed on {} segments a vein", trace.segments)));
+        lines.push((
+            "error",
+            format!("{worst}, followed on {} segments a vein", trace.segments),
+        ));
     }
     lines.push((
         "work",
@@ -110,5 +113,8 @@ fn critical(trace: &Trace, point: &TracePoint, before: usize) -> String {
         None => String::new(),
     };
     let value = trace.keys.text(point.value);
-    format!("{what} at {value}{within}: index {before} to {}", point.index)
+    format!(
+        "{what} at {value}{within}: index {before} to {}",
+        point.index
+    )
 }

@@ -26,7 +26,9 @@ pub use json::{CheckSummary, MapSummary, MotionSummary, Summary, TraceSummary};
 pub use map::{Journal, MapFileError, MapTable, belongs, claim, read_rows, write_rows};
 pub use recording::{CannotResume, Keeper, Recording};
 pub use trace::TraceTable;
-pub use words::{branch_end, equilibrium_of_index, headline, model, power_of_ten, shooting, verdict};
+pub use words::{
+    branch_end, equilibrium_of_index, headline, model, power_of_ten, shooting, verdict,
+};
 
 use crate::relax::Equilibrium;
 use crate::simulate::Record;

@@ -10,8 +10,9 @@ use crate::relax::{Equilibrium, Model, NodeState, Outcome, RodShape, Work};
 use crate::scenario::Units;
 use crate::shape::Difference;
 use crate::simulate::{Frame, Moment, Record, Scheme, Still};
-use crate::study::{Law, PointKind, Trace, TraceBranch, TraceEnd, TracePoint,
-    Base, Check, Confidence, Map, MapMethod, MapOutcome, MapRequest, MapRow, Shot, Verdict,
+use crate::study::{
+    Base, Check, Confidence, Law, Map, MapMethod, MapOutcome, MapRequest, MapRow, PointKind, Shot,
+    Trace, TraceBranch, TraceEnd, TracePoint, Verdict,
 };
 
 /// A fan of `rods` arcs of length 1, given at `segments` + 1 stations.

@@ -9,7 +9,7 @@ use glam::DVec3;
 use leafdyn::bvp::{self, Failure, Solution, Start};
 use leafdyn::leaf::{Leaf, Scale};
 use leafdyn::relax::{Equilibrium, NodeState, Options, RodShape, relax};
-use leafdyn::scenario::{Units, Dynamics, Profile, Rod, Scenario};
+use leafdyn::scenario::{Dynamics, Profile, Rod, Scenario, Units};
 use leafdyn::shape::Difference;
 
 /// The tolerance at which canonical values are checked: small enough for the

@@ -90,7 +90,10 @@ fn notes(trace: &Trace) -> Vec<String> {
     let points: usize = trace.branches.iter().map(|b| b.points.len()).sum();
     let mut notes = vec![
         rods,
-        format!("{points} points on {} branches", trace.branches.len()),
+        match trace.branches.len() {
+            1 => format!("{points} points"),
+            branches => format!("{points} points on {branches} branches"),
+        },
         format!("followed on {} segments a vein", trace.segments),
     ];
     let errors = trace.branches.iter().flat_map(|b| &b.points);
@@ -136,7 +139,9 @@ fn axis(trace: &Trace) -> usize {
     let low = tips().fold(DVec3::INFINITY, |low, tip| low.min(*tip));
     let high = tips().fold(DVec3::NEG_INFINITY, |high, tip| high.max(*tip));
     let way = high - low;
-    (0..3).max_by(|&a, &b| way[a].total_cmp(&way[b])).unwrap_or(2)
+    (0..3)
+        .max_by(|&a, &b| way[a].total_cmp(&way[b]))
+        .unwrap_or(2)
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -161,7 +166,12 @@ fn branches(page: &mut Drawing, trace: &Trace, shown: &[[usize; 2]], cell: Cell)
         across: Range::of(all().map(|p| at(p).0)).airy(),
         up: Range::of(all().map(|p| at(p).1)).airy(),
     };
-    title(page, cell.corner, "(a)", "equilibria: stable drawn solid, unstable dashed");
+    title(
+        page,
+        cell.corner,
+        "(a)",
+        "equilibria: stable drawn solid, unstable dashed",
+    );
     let tip = format!("{} of the tip", AXES[axis]);
     let across = match trace.keys.to_string() {
         force if force.starts_with("load.tip_force") => with_unit(&force, &trace.units.force),
@@ -195,7 +205,13 @@ fn branches(page: &mut Drawing, trace: &Trace, shown: &[[usize; 2]], cell: Cell)
     for (number, &[b, p]) in shown.iter().enumerate() {
         let place = axes.at(at(&trace.branches[b].points[p]));
         let beside = place + DVec2::new(7.0, -6.0);
-        page.label(beside, &(number + 1).to_string(), TICK_SIZE, Anchor::Start, INK);
+        page.label(
+            beside,
+            &(number + 1).to_string(),
+            TICK_SIZE,
+            Anchor::Start,
+            INK,
+        );
     }
     markers_key(page, cell, trace.branches.len().min(8));
 }
@@ -223,7 +239,11 @@ fn dashes(page: &mut Drawing, line: &[DVec2], stroke: Stroke) {
         let mut from = 0.0;
         while from < length {
             let phase: f64 = (gone + from) % (2.0 * DASH);
-            let left = if phase < DASH { DASH - phase } else { 2.0 * DASH - phase };
+            let left = if phase < DASH {
+                DASH - phase
+            } else {
+                2.0 * DASH - phase
+            };
             let to = (from + left.max(1e-3)).min(length);
             if phase < DASH {
                 let at = |s: f64| pair[0] + way * (s / length);
@@ -241,7 +261,12 @@ fn critical_marker(page: &mut Drawing, at: DVec2, kind: PointKind) {
         PointKind::Fold => page.shape(circle(at, 3.4), WHITE, rim),
         _ => {
             let corner = |x: f64, y: f64| at + 4.6 * DVec2::new(x, y);
-            let corners = [corner(1.0, 0.0), corner(0.0, 1.0), corner(-1.0, 0.0), corner(0.0, -1.0)];
+            let corners = [
+                corner(1.0, 0.0),
+                corner(0.0, 1.0),
+                corner(-1.0, 0.0),
+                corner(0.0, -1.0),
+            ];
             page.shape(polygon(&corners), INK, Some(Stroke::new(WHITE, 0.8)));
         }
     }
@@ -250,7 +275,10 @@ fn critical_marker(page: &mut Drawing, at: DVec2, kind: PointKind) {
 fn markers_key(page: &mut Drawing, cell: Cell, entries: usize) {
     let x = cell.corner.x + cell.size.x + 27.0;
     let y = cell.corner.y + 14.0 + 40.0 * entries as f64;
-    let kinds = [(PointKind::Branching(1), "branches cross"), (PointKind::Fold, "fold")];
+    let kinds = [
+        (PointKind::Branching(1), "branches cross"),
+        (PointKind::Fold, "fold"),
+    ];
     for (row, (kind, name)) in kinds.into_iter().enumerate() {
         let at = DVec2::new(x, y + 18.0 * row as f64);
         critical_marker(page, at, kind);
@@ -266,13 +294,22 @@ fn hooke(page: &mut Drawing, trace: &Trace, cell: Cell) {
     };
     let tip = |point: &TracePoint| point.tips.first().map_or(f64::NAN, |tip| tip[law.axis]);
     let start = branch.points.first().map_or(0.0, tip);
-    let points: Vec<(f64, f64)> = branch.points.iter().map(|p| (tip(p) - start, p.value)).collect();
+    let points: Vec<(f64, f64)> = branch
+        .points
+        .iter()
+        .map(|p| (tip(p) - start, p.value))
+        .collect();
     let axes = Axes {
         cell,
         across: Range::of(points.iter().map(|p| p.0)).airy(),
         up: Range::of(points.iter().map(|p| p.1)).airy(),
     };
-    title(page, cell.corner, "(b)", "force against displacement of the tip");
+    title(
+        page,
+        cell.corner,
+        "(b)",
+        "force against displacement of the tip",
+    );
     let name = format!("displacement along {}", AXES[law.axis]);
     axes.draw(
         page,
@@ -339,7 +376,13 @@ fn small_leaves(page: &mut Drawing, trace: &Trace, shown: &[[usize; 2]], top: f6
         };
         let what = format!("at {}, {index}", short(found.value));
         title(page, cell.corner, &format!("{}", number + 1), &what);
-        draw_box(page, &camera, low, high, &edges_with(&camera, low, high, |_| step));
+        draw_box(
+            page,
+            &camera,
+            low,
+            high,
+            &edges_with(&camera, low, high, |_| step),
+        );
         draw_veins(page, &camera, veins, low.z, THINNER * veins.line_width());
         clamp_marker(page, camera.place(DVec3::ZERO));
         if veins.tips.iter().all(|(tip, _)| is_near(*tip)) {

@@ -105,7 +105,10 @@ fn branch(branch: &TraceBranch) -> Option<BranchObject> {
         remark: branch.remark.clone(),
         first: point(0, &branch.points[0]),
         last: point(last, &branch.points[last]),
-        critical: branch.critical().map(|(k, found)| point(k, found)).collect(),
+        critical: branch
+            .critical()
+            .map(|(k, found)| point(k, found))
+            .collect(),
     })
 }
 
@@ -151,14 +154,26 @@ mod tests {
     fn the_keys_are_those_of_the_readme() {
         let text = text(&TraceSummary, &sample::trace());
         let wanted = [
-            "scenario", "vary", "range", "rods", "segments", "tolerance", "complete", "branches",
-            "law", "factorizations", "wall_seconds",
+            "scenario",
+            "vary",
+            "range",
+            "rods",
+            "segments",
+            "tolerance",
+            "complete",
+            "branches",
+            "law",
+            "factorizations",
+            "wall_seconds",
         ];
         assert_eq!(keys(&text), wanted);
         let object: serde_json::Value = serde_json::from_str(&text).unwrap();
         assert_eq!(object["branches"][1]["from"], serde_json::json!([1, 6]));
         assert_eq!(object["branches"][0]["critical"][0]["kind"], "branch-point");
-        assert_eq!(object["branches"][0]["critical"][0]["negative_eigenvalues"], 1);
+        assert_eq!(
+            object["branches"][0]["critical"][0]["negative_eigenvalues"],
+            1
+        );
         assert_eq!(object["law"]["axis"], "x");
     }
 }

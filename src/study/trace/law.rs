@@ -25,12 +25,14 @@ pub struct Law {
 impl Law {
     /// Of a branch along which a component of the force on the joint tip
     /// varies; `None` along others, or with fewer than three points.
-    pub(super) fn of(
-        keys: &Keys,
-        branch: &TraceBranch,
-        cross_section: Option<f64>,
-    ) -> Option<Law> {
-        let [Target::Entry { key: Key::TipForce, index: Some(axis) }] = keys.targets() else {
+    pub(super) fn of(keys: &Keys, branch: &TraceBranch, cross_section: Option<f64>) -> Option<Law> {
+        let [
+            Target::Entry {
+                key: Key::TipForce,
+                index: Some(axis),
+            },
+        ] = keys.targets()
+        else {
             return None;
         };
         let first = branch.points.first()?;
@@ -54,8 +56,8 @@ impl Law {
         let slope = xy / xx;
         let off = |p: &(f64, f64)| (p.1 - y - slope * (p.0 - x)).abs();
         let forces = points.iter().map(|p| p.1);
-        let range = forces.clone().fold(f64::NEG_INFINITY, f64::max)
-            - forces.fold(f64::INFINITY, f64::min);
+        let range =
+            forces.clone().fold(f64::NEG_INFINITY, f64::max) - forces.fold(f64::INFINITY, f64::min);
         let length = tip.length();
         Some(Law {
             axis: *axis,

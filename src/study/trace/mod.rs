@@ -92,8 +92,14 @@ impl TraceRequest {
                 Target::Entry { key, .. } if key.path().starts_with("dynamics.") => {
                     return Err(refuse("changes a motion, but no equilibrium"));
                 }
-                Target::Entry { key: Key::TipMoment, .. } => return Err(refuse(NO_MOMENT)),
-                Target::Entry { key: Key::Tolerance, .. } => {
+                Target::Entry {
+                    key: Key::TipMoment,
+                    ..
+                } => return Err(refuse(NO_MOMENT)),
+                Target::Entry {
+                    key: Key::Tolerance,
+                    ..
+                } => {
                     return Err(refuse("changes no leaf"));
                 }
                 Target::Entry { .. } => {}

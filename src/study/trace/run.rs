@@ -196,8 +196,8 @@ impl Run<'_, '_> {
     ) -> Vec<Entrance> {
         let mut found = Vec::new();
         for (which, (after, critical)) in branch.critical.iter().enumerate() {
-            let known = (self.known.iter())
-                .any(|(fraction, state)| near(*fraction, state, critical));
+            let known =
+                (self.known.iter()).any(|(fraction, state)| near(*fraction, state, critical));
             if critical.kind != Kind::Branching || known {
                 continue;
             }
@@ -222,18 +222,17 @@ impl Run<'_, '_> {
             .collect();
         let mut told = Vec::new();
         for (i, (refined, point)) in points.into_iter().enumerate() {
-            let refined = refined.unwrap_or_else(|| {
-                unrefined(family, grid, &point.state, point.fraction)
-            });
+            let refined =
+                refined.unwrap_or_else(|| unrefined(family, grid, &point.state, point.fraction));
             told.push(self.point(PointKind::Regular, point.index, &refined));
             for (_, refined, point) in critical.iter().filter(|(after, ..)| *after == i) {
                 let kind = match point.kind {
                     Kind::Fold => PointKind::Fold,
                     Kind::Branching => PointKind::Branching(point.modes.len()),
                 };
-                let refined = refined.clone().unwrap_or_else(|| {
-                    unrefined(family, grid, &point.state, point.fraction)
-                });
+                let refined = refined
+                    .clone()
+                    .unwrap_or_else(|| unrefined(family, grid, &point.state, point.fraction));
                 told.push(self.point(kind, point.indices[1], &refined));
             }
         }
@@ -257,7 +256,10 @@ impl Run<'_, '_> {
         let scale = self.family.scale();
         let value = self.family.value(refined.fraction);
         let joined = self.request.base.scenario().joined;
-        let tips = refined.tips.iter().map(|tip| DVec3::from_array(*tip) * scale.length);
+        let tips = refined
+            .tips
+            .iter()
+            .map(|tip| DVec3::from_array(*tip) * scale.length);
         let nodes = refined.grid.segments() + 1;
         TracePoint {
             kind,
