@@ -27,6 +27,10 @@ const DRIFT: f64 = 0.5;
 const MOST_CHANGES: usize = 2;
 const SHORT_ENOUGH: f64 = 0.02;
 
+/// A change of the index that is not explained is taken as it is where steps
+/// are shorter than this part of the longest.
+const UNEXPLAINED: f64 = 1e-3;
+
 /// A branch that comes back to its first point to within this part of a step is
 /// closed; looked for after so many points.
 const CLOSED: f64 = 0.75;
@@ -130,13 +134,19 @@ pub fn walk(
         }
         if next.point.index != now.index {
             let after = branch.points.len() - 1;
-            match locate(equations, &now, &next.point, next.step) {
-                Ok(critical) if !critical.is_empty() => {
-                    let all = critical.into_iter();
-                    branch.critical.extend(all.map(|point| (after, point)));
+            let found = locate(equations, &now, &next.point, next.step).unwrap_or_default();
+            let changes: usize = found.iter().map(|critical| critical.modes.len()).sum();
+            if changes != next.point.index.abs_diff(now.index) {
+                // A change that nothing on the way explains: this is another
+                // branch, passing nearby.
+                if next.step > UNEXPLAINED * how.longest {
+                    step = 0.5 * next.step;
+                    continue;
                 }
-                _ => branch.missed.push(after),
+                branch.missed.push(after);
             }
+            let all = found.into_iter();
+            branch.critical.extend(all.map(|point| (after, point)));
         }
         let closed = edge.is_none()
             && branch.points.len() > CLOSED_AFTER

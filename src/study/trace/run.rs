@@ -56,7 +56,7 @@ pub fn trace(
     };
     let first = relax(&scenario, &options, &mut |_| {})?;
     let leaf = Leaf::new(&scenario);
-    let (grid, state) = beginning(&leaf, &first, request.segments)?;
+    let (grid, state) = beginning(&family, &leaf, &first, request.segments)?;
     let mut trace = Trace {
         scenario: scenario.name.clone(),
         keys: keys.clone(),
@@ -97,8 +97,13 @@ pub fn trace(
     Ok(trace)
 }
 
-/// The grid on which branches are followed, and the first equilibrium on it.
+/// The finest grid on which branches are followed unless told otherwise.
+const FINEST: usize = 128;
+
+/// The grid on which branches are followed, and the first equilibrium near it:
+/// as asked for, or one on which the index is that of the finest.
 fn beginning(
+    family: &Family,
     leaf: &Leaf,
     first: &Equilibrium,
     segments: Option<usize>,
@@ -111,12 +116,24 @@ fn beginning(
         None => 2 * grid.segments(),
         Some(wanted) => crate::relax::check_segments(leaf, Some(wanted), wanted)?,
     };
-    while grid.segments() < wanted {
+    while grid.segments() < wanted || segments.is_none() && unsettled(family, &grid, &state, first)
+    {
         let discrete = DiscreteLeaf::new(leaf, grid.clone());
         state = branch::prolonged(&discrete, &state);
         grid = grid.refined();
     }
     Ok((grid, state))
+}
+
+/// Whether the index on a grid is another than on the finest.
+fn unsettled(family: &Family, grid: &Grid, state: &State, first: &Equilibrium) -> bool {
+    if grid.segments() >= FINEST {
+        return false;
+    }
+    let found = Equations::new(family, grid.clone())
+        .ok()
+        .and_then(|mut equations| equations.correct(state, 0.0, None).ok());
+    found.is_none_or(|(point, _)| Some(point.index) != first.negative_eigenvalues)
 }
 
 /// A place where another branch begins.
