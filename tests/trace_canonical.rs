@@ -179,9 +179,9 @@ const LENS: &str = r#"
 /// it buckles out of the plane; its critical length by collocation.
 #[test]
 fn lens_with_midrib() {
-    for (axial, shear, exact) in [
-        ("2500.0", "1000.0", 0.93780575743),
-        ("1e5", "4e4", 0.92789056742),
+    for (axial, shear, end, exact) in [
+        ("2500.0", "1000.0", 0.94, 0.93780575743),
+        ("1e5", "4e4", 0.93, 0.92789056742),
     ] {
         let set = [
             format!("stiffness.axial={axial}"),
@@ -190,7 +190,7 @@ fn lens_with_midrib() {
             "leaf.length=[1.0, 0.9, 1.0]".into(),
         ];
         let set: Vec<&str> = set.iter().map(String::as_str).collect();
-        let found = follow(LENS, &set, "leaf.length[1]=0.9..0.94", false);
+        let found = follow(LENS, &set, &format!("leaf.length[1]=0.9..{end}"), false);
         agree("midrib", &found, &[(exact, 1)], 1e-10);
     }
 }

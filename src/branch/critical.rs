@@ -1,7 +1,7 @@
 //! Where the index changes: folds and points where branches cross.
 
 use super::equations::{Deflated, Equations, Stuck};
-use super::field::{add, plus, times};
+use super::field::{add, dot, plus, times};
 use super::{Point, Tangent};
 use crate::leaf::{Field, State};
 
@@ -102,12 +102,10 @@ pub fn locate(
         before = after;
         all.push(critical);
     }
-    let turns = a.tangent.fraction * b.tangent.fraction < 0.0;
     for critical in &mut all {
-        critical.kind = match turns && critical.modes.len() == 1 && critical.kind == Kind::Fold {
-            true => Kind::Fold,
-            false => Kind::Branching,
-        };
+        if critical.modes.len() > 1 {
+            critical.kind = Kind::Branching;
+        }
     }
     Ok(all)
 }
@@ -127,9 +125,9 @@ struct Sample {
     vectors: Vec<Vec<f64>>,
 }
 
-/// Below this part of the forces' change with the parameter, what the mode
-/// feels of it is rounding.
-const DRIVEN: f64 = 1e-7;
+/// Below this part of what a mode could feel of the parameter, it feels
+/// nothing but rounding.
+const DRIVEN: f64 = 1e-6;
 
 impl Search<'_, '_> {
     fn at(&mut self, way: f64) -> Result<Sample, Stuck> {
@@ -222,9 +220,10 @@ fn critical(
         .zip(sample.deflated.drive.iter())
         .map(|(v, d)| v * d)
         .sum();
-    let all = sample.deflated.drive.norm();
+    let rate = &sample.deflated.rate;
+    let most = (dot(rate, rate) * dot(&mode, &mode)).sqrt();
     Critical {
-        kind: match drive.abs() > DRIVEN * all.max(DRIVEN) {
+        kind: match drive.abs() > DRIVEN * most.max(slope.abs()) {
             true => Kind::Fold,
             false => Kind::Branching,
         },

@@ -97,6 +97,8 @@ pub struct Deflated {
     pub modes: Vec<Field>,
     /// How the modes feel the parameter: zero at a bifurcation, not at a fold.
     pub drive: DVector<f64>,
+    /// How the forces change with it.
+    pub rate: Field,
 }
 
 impl<'a> Equations<'a> {
@@ -412,6 +414,7 @@ impl<'a> Equations<'a> {
                     fraction,
                     h,
                     drive: DVector::from_vec(rate.multipliers),
+                    rate: linear.rate,
                     modes: columns
                         .into_iter()
                         .map(|column| column.increments)

@@ -180,7 +180,8 @@ fn branches(page: &mut Drawing, trace: &Trace, shown: &[[usize; 2]], cell: Cell)
     axes.draw(page, &across, &with_unit(&tip, &trace.units.length));
     for (b, branch) in trace.branches.iter().enumerate() {
         let color = CURVES[b % CURVES.len()];
-        for (points, stable) in pieces(branch) {
+        let entrance = branch.from.map(|[b, p]| &trace.branches[b].points[p]);
+        for (points, stable) in pieces(entrance, branch) {
             let line: Vec<DVec2> = points.iter().map(|p| axes.at(at(p))).collect();
             let width = if stable { 2.0 } else { 1.2 };
             let stroke = Stroke::new(color, width);
@@ -216,10 +217,16 @@ fn branches(page: &mut Drawing, trace: &Trace, shown: &[[usize; 2]], cell: Cell)
     markers_key(page, cell, trace.branches.len().min(8));
 }
 
-/// The points of a branch in pieces of one stability each; a piece begins where
-/// the one before it ends.
-fn pieces(branch: &TraceBranch) -> Vec<(Vec<&TracePoint>, bool)> {
+/// The points of a branch, with that from which it was entered, in pieces of one
+/// stability each; a piece begins where the one before it ends.
+fn pieces<'t>(
+    entrance: Option<&'t TracePoint>,
+    branch: &'t TraceBranch,
+) -> Vec<(Vec<&'t TracePoint>, bool)> {
     let mut pieces: Vec<(Vec<&TracePoint>, bool)> = Vec::new();
+    if let (Some(entrance), Some(first)) = (entrance, branch.points.first()) {
+        pieces.push((vec![entrance, first], first.index == 0));
+    }
     for pair in branch.points.windows(2) {
         // The index of a critical point is that behind it.
         let stable = pair[0].index == 0;
