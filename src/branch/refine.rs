@@ -23,7 +23,7 @@ const ALONG: f64 = 0.05;
 /// Compliance by which matrices of nearly rigid leaves are softened, in units
 /// of L^2/A, times one to four; and the stiffness from which on they are.
 const SOFTENING: f64 = 1e-4;
-const NEARLY_RIGID: f64 = 0.99e5;
+const NEARLY_RIGID: f64 = 1.01e5;
 
 /// A point without the error of its grid.
 #[derive(Clone, Debug)]
