@@ -172,6 +172,7 @@
 
 #![warn(missing_docs)]
 
+pub mod branch;
 pub mod bvp;
 pub mod leaf;
 pub mod modes;

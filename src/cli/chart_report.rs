@@ -27,7 +27,7 @@ pub fn report(chart: &Chart, folder: Option<&Path>) -> String {
     );
     if let Some(folder) = folder {
         lines.push(("written", written(chart, folder)));
-        if chart.scaling.is_some() {
+        if let Some(scaling) = &chart.scaling {
             lines.push(("", written(scaling, folder)));
         }
     }

@@ -13,6 +13,8 @@ mod request;
 mod simulate;
 mod simulate_report;
 mod text;
+mod trace;
+mod trace_report;
 
 use std::error::Error;
 use std::io::{self, IsTerminal, Write};
@@ -38,6 +40,7 @@ enum Verb {
     Chart(chart::Chart),
     Map(map::Map),
     Simulate(simulate::Simulate),
+    Trace(trace::Trace),
 }
 
 impl Cli {
@@ -49,6 +52,7 @@ impl Cli {
             Verb::Chart(chart) => chart.run(),
             Verb::Map(map) => map.run(),
             Verb::Simulate(simulate) => simulate.run(),
+            Verb::Trace(trace) => trace.run(),
         }
     }
 }

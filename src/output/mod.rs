@@ -12,6 +12,7 @@ mod part;
 mod recording;
 #[cfg(test)]
 mod sample;
+mod trace;
 mod words;
 
 use std::fs;
@@ -24,16 +25,17 @@ pub use atomic::{abandon_unfinished, check_writable};
 pub use chart::{ChartTable, ScalingTable};
 pub use csv::{Centerlines, ModesTable};
 pub use figure::{FigurePng, FigureSvg, ModesFigure, MotionFigure};
-pub use json::{ChartSummary, CheckSummary, MapSummary, MotionSummary, Summary};
+pub use json::{ChartSummary, CheckSummary, MapSummary, MotionSummary, Summary, TraceSummary};
 pub use map::{Journal, MapFileError, MapTable, belongs, claim, read_rows, write_rows};
 pub use recording::{CannotResume, Keeper, Recording};
+pub use trace::TraceTable;
 pub use words::{
-    contender, equilibrium_of_index, headline, model, power_of_ten, shooting, verdict,
+    branch_end, contender, equilibrium_of_index, headline, model, power_of_ten, shooting, verdict,
 };
 
 use crate::relax::Equilibrium;
 use crate::simulate::Record;
-use crate::study::{Chart, Check, Map, Scaling};
+use crate::study::{Chart, Check, Map, Scaling, Trace};
 
 /// One way to write a result down.
 pub trait Format<R> {
@@ -86,6 +88,11 @@ impl Written for Check {
 impl Written for Map {
     const FORMATS: &'static [&'static dyn Format<Self>] =
         &[&MapSummary, &MapTable, &FigureSvg, &FigurePng];
+}
+
+impl Written for Trace {
+    const FORMATS: &'static [&'static dyn Format<Self>] =
+        &[&TraceSummary, &TraceTable, &FigureSvg, &FigurePng];
 }
 
 impl Written for Record {

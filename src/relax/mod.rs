@@ -8,9 +8,9 @@ mod index;
 mod modes;
 mod moment;
 mod options;
-mod prolong;
+pub(crate) mod prolong;
 mod report;
-mod richardson;
+pub(crate) mod richardson;
 mod saddle;
 mod semi_implicit;
 mod shape;
@@ -20,7 +20,7 @@ mod start;
 pub use crate::shape::{NodeState, RodShape};
 pub use equilibrium::{Equilibrium, Mode, Model, Outcome, Saddle, Work};
 pub use grids::{check_segments, relax};
-pub use index::index_near;
+pub use index::{index_near, project};
 pub use options::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError,
     SMALLEST_TOLERANCE, check_tolerance,

@@ -6,6 +6,10 @@
 pub enum Key {
     /// `name`: the leaf's name.
     Name,
+    /// `units.length`: name of the unit of length.
+    UnitLength,
+    /// `units.force`: name of the unit of force.
+    UnitForce,
     /// `leaf.rods`: number of rods.
     Rods,
     /// `leaf.length`: lengths.
@@ -77,8 +81,10 @@ pub enum Key {
 const LOAD_IN_TIME: &str = "{ at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]] }";
 
 /// Key, full path, and an example of its value; in the order of [`Key`].
-const FORMAT: [(Key, &str, &str); 34] = [
+const FORMAT: [(Key, &str, &str); 36] = [
     (Key::Name, "name", "\"my-leaf\""),
+    (Key::UnitLength, "units.length", "\"cm\""),
+    (Key::UnitForce, "units.force", "\"N\""),
     (Key::Rods, "leaf.rods", "5"),
     (Key::Length, "leaf.length", "1.0"),
     (Key::Fan, "leaf.fan", "\"symmetric\""),
@@ -119,7 +125,8 @@ const FORMAT: [(Key, &str, &str); 34] = [
 ];
 
 /// The tables of the format.
-pub(super) const TABLES: [&str; 7] = [
+pub(super) const TABLES: [&str; 8] = [
+    "units",
     "leaf",
     "stiffness",
     "rest",

@@ -3,6 +3,7 @@
 mod chart;
 mod check;
 mod map;
+mod trace;
 mod vary;
 
 pub use chart::{
@@ -13,5 +14,9 @@ pub use check::{Check, CheckOptions, Place, Quantity, Shot, Verdict, check};
 pub use map::{
     CELL_SECONDS, Confidence, Map, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow,
     UnknownWord, map,
+};
+pub use trace::{
+    Law, MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceEnd, TraceError,
+    TracePoint, TraceRequest, trace,
 };
 pub use vary::{Base, Keys, Knob, Knobs, Target, Varied, Vary, VaryError};

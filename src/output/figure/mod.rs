@@ -31,6 +31,7 @@ mod space;
 mod strip;
 mod svg;
 mod ticks;
+mod trace;
 mod veins;
 
 pub use modes::ModesFigure;

@@ -5,6 +5,7 @@ mod check;
 mod map;
 mod motion;
 mod summary;
+mod trace;
 
 use std::io::{self, Write};
 
@@ -17,6 +18,7 @@ pub use check::CheckSummary;
 pub use map::MapSummary;
 pub use motion::MotionSummary;
 pub use summary::Summary;
+pub use trace::TraceSummary;
 
 type Point = [f64; 3];
 
