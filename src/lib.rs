@@ -136,6 +136,12 @@
 //! waves that the paper's linear theory predicts from the axial force it
 //! carries.
 //!
+//! **Modes** ([`modes`]). The lowest eigenvalues of K x = lambda M x with that
+//! Hessian and the masses of the leaf in motion: squared frequencies, or negative
+//! where the leaf is unstable. A Lanczos method finds them from one factorisation,
+//! and the pivots of a second one tell whether any was missed. Over the grids they
+//! are extrapolated as positions are ([`relax::Equilibrium::modes`]).
+//!
 //! **The independent road** ([`bvp`]). The same equations (1) to (6) with (a) to
 //! (e) as a boundary-value problem: 13 functions per rod, integrated from the
 //! base by a Runge-Kutta method of order 8 together with their sensitivities, and
@@ -149,10 +155,15 @@
 //! the relaxed leaf confirmed by shooting: right, another equilibrium, a saddle,
 //! not as accurate as it says, or none.
 //!
+//! **Speed against accuracy** ([`study::chart()`]). Every method runs over its
+//! own accuracy, in turns with all others, and is judged by its true error: the
+//! distance from the relaxed leaf at the best tolerance, confirmed by shooting.
+//!
 //! # Layout
 //!
 //! [`scenario`] (TOML to a checked [`scenario::Scenario`]) and [`rotation`],
-//! [`rod`], [`leaf`], [`shape`], [`undulation`], [`bvp`], [`motion`], [`relax`], [`simulate`],
+//! [`rod`], [`leaf`], [`shape`], [`undulation`], [`bvp`], [`motion`], [`modes`],
+//! [`relax`], [`simulate`],
 //! [`study`], [`output`] (JSON, tables, figures): each module uses those named
 //! before it and knows nothing of those after it.
 //!
@@ -168,8 +179,10 @@
 
 #![warn(missing_docs)]
 
+pub mod branch;
 pub mod bvp;
 pub mod leaf;
+pub mod modes;
 pub mod motion;
 pub mod output;
 pub mod relax;

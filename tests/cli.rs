@@ -27,6 +27,7 @@ fn help_names_every_option() {
         "--out",
         "--json",
         "--keep-unstable",
+        "--modes",
         "semi-implicit",
     ] {
         assert!(text(&output.stdout).contains(option), "{option}");

@@ -24,7 +24,7 @@ pub fn report(check: &Check, folder: Option<&Path>) -> String {
         lines.push(("remark", remark.clone()));
     }
     if let Some(folder) = folder {
-        lines.push(("written", written::<Check>(folder)));
+        lines.push(("written", written(check, folder)));
     }
     let relaxed = &check.relaxed;
     let heading = format!(

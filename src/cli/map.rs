@@ -118,7 +118,7 @@ impl Map {
                 show(report.as_bytes())?;
             }
             None => self.request.deliver(&map, &folder, |folder| {
-                let files = folder.map(super::text::written::<Cells>);
+                let files = folder.map(|folder| super::text::written(&map, folder));
                 map_report::report(&map, told, &files.unwrap_or_default())
             })?,
         }

@@ -1,5 +1,7 @@
 //! The command line: one file per verb. What is computed is in the library.
 
+mod chart;
+mod chart_report;
 mod check;
 mod check_report;
 mod map;
@@ -11,6 +13,8 @@ mod request;
 mod simulate;
 mod simulate_report;
 mod text;
+mod trace;
+mod trace_report;
 
 use std::error::Error;
 use std::io::{self, IsTerminal, Write};
@@ -33,8 +37,10 @@ pub struct Cli {
 enum Verb {
     Relax(relax::Relax),
     Check(check::Check),
+    Chart(chart::Chart),
     Map(map::Map),
     Simulate(simulate::Simulate),
+    Trace(trace::Trace),
 }
 
 impl Cli {
@@ -43,8 +49,10 @@ impl Cli {
         match self.verb {
             Verb::Relax(relax) => relax.run(),
             Verb::Check(check) => check.run(),
+            Verb::Chart(chart) => chart.run(),
             Verb::Map(map) => map.run(),
             Verb::Simulate(simulate) => simulate.run(),
+            Verb::Trace(trace) => trace.run(),
         }
     }
 }
@@ -56,11 +64,12 @@ pub type Refusal = Box<dyn Error>;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// At rest within the tolerance; of a check: both methods agree; of a
-    /// simulation: followed to its end.
+    /// simulation: followed to its end; of a chart: its reference is confirmed.
     Success = 0,
     /// The run ended otherwise: not at rest within the tolerance; of a check:
     /// the methods differ or could not be compared; of a simulation: it ended
-    /// early. What was found is written all the same.
+    /// early; of a chart: its reference is not confirmed. What was found is
+    /// written all the same.
     Failure = 1,
     /// The request was refused, or its result could not be written.
     Refused = 2,

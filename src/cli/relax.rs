@@ -9,6 +9,9 @@ use super::progress::ProgressLine;
 use super::request::Request;
 use super::{Refusal, Status, note, report};
 
+/// Eigenvalues that are told unasked.
+const MODES: usize = 3;
+
 /// Find how a leaf comes to rest, how accurate that is and whether it is stable.
 ///
 /// Exit status: 0 at rest within the tolerance; 1 not (the files are still
@@ -33,6 +36,10 @@ pub struct Relax {
     /// Stop at a saddle instead of leaving it for a stable equilibrium
     #[arg(long)]
     keep_unstable: bool,
+
+    /// Write and draw the K lowest modes of the leaf at rest; left out: the eigenvalues of 3 are told, unless the leaf is large; 0: none
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    modes: Option<usize>,
 
     /// Solve for the whole leaf even if half of it would do
     #[arg(long)]
@@ -81,6 +88,8 @@ impl Relax {
             keep_unstable: self.keep_unstable,
             full_model: self.full_model,
             intervals: self.intervals,
+            modes: self.modes.unwrap_or(MODES),
+            mode_shapes: self.modes.is_some_and(|count| count > 0),
             deadline: None,
         };
         let mut line = ProgressLine::new(&scenario.name);

@@ -3,12 +3,15 @@
 use std::path::Path;
 
 use leafdyn::output::{model, shooting, verdict};
-use leafdyn::relax::{Equilibrium, Method, Outcome};
+use leafdyn::relax::{Equilibrium, Method, Mode, Outcome};
 
 use super::text::{
-    bound, decimals, eigenvalues, grids, lay_out, longest_rod, point, seconds, significant, veins,
-    written,
+    bound, brief, decimals, eigenvalues, grids, lay_out, longest_rod, point, seconds, significant,
+    veins, written,
 };
+
+/// Modes whose numbers are told.
+const MODES_TOLD: usize = 6;
 
 /// What was solved, what was found, how well, and where the files are.
 pub fn report(equilibrium: &Equilibrium, folder: Option<&Path>) -> String {
@@ -36,12 +39,15 @@ pub fn report(equilibrium: &Equilibrium, folder: Option<&Path>) -> String {
         lines.push(("waves", waves));
     }
     lines.push(("error", error(equilibrium)));
+    if let Some(modes) = modes(equilibrium) {
+        lines.push(("modes", modes));
+    }
     if !equilibrium.segments.is_empty() {
         lines.push(("model", model(equilibrium)));
     }
     lines.push(("work", work(equilibrium)));
     if let Some(folder) = folder {
-        lines.push(("written", written::<Equilibrium>(folder)));
+        lines.push(("written", written(equilibrium, folder)));
     }
     if let Some(remark) = &equilibrium.remark {
         lines.push(("remark", remark.clone()));
@@ -111,6 +117,33 @@ fn waves(equilibrium: &Equilibrium) -> Option<String> {
         ),
         None => format!("none along the margins; {predicted}"),
     })
+}
+
+/// The lowest eigenvalues, as growth rates and frequencies.
+fn modes(equilibrium: &Equilibrium) -> Option<String> {
+    let Some(modes) = &equilibrium.modes else {
+        return equilibrium.mode_shapes.then(|| "not known".into());
+    };
+    let unstable = |mode: &&Mode| mode.growth().is_some() && !mode.is_neutral();
+    let list = |values: &mut dyn Iterator<Item = f64>| {
+        let told: Vec<String> = values.take(MODES_TOLD).map(brief).collect();
+        told.join(", ")
+    };
+    let growth = list(&mut modes.iter().filter(unstable).filter_map(Mode::growth));
+    let frequencies = modes.iter().filter(|mode| !unstable(mode));
+    let frequencies = list(&mut frequencies.map(|mode| match mode.is_neutral() {
+        true => 0.0,
+        false => mode.frequency().unwrap_or_default(),
+    }));
+    let phrases = [
+        ("growth rates", growth),
+        ("lowest frequencies", frequencies),
+    ];
+    let phrases = phrases.iter().filter(|(_, list)| !list.is_empty());
+    let told: Vec<String> = phrases
+        .map(|(what, list)| format!("{what} {list}"))
+        .collect();
+    (!told.is_empty()).then(|| told.join("; "))
 }
 
 fn work(equilibrium: &Equilibrium) -> String {

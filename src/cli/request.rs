@@ -60,6 +60,12 @@ impl Request {
         Ok(folder)
     }
 
+    /// The scenario with one entry more overridden.
+    pub fn with(&self, entry: &str) -> Result<Scenario, Refusal> {
+        let overrides = [self.overrides.as_slice(), &[entry.into()]].concat();
+        Ok(Scenario::read(&self.scenario, &overrides)?)
+    }
+
     /// Writes the files and shows the result: as JSON, or as a report that is
     /// told the folder if there are files in it. What was found is shown even
     /// if the files could not be written.

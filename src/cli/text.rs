@@ -20,8 +20,8 @@ pub fn lay_out(heading: &str, lines: &[(&str, String)]) -> String {
 }
 
 /// The files of a result in their folder.
-pub fn written<R: Written>(folder: &Path) -> String {
-    named(folder, R::FORMATS.iter().map(|format| format.file_name()))
+pub fn written<R: Written>(result: &R, folder: &Path) -> String {
+    named(folder, result.file_names().into_iter())
 }
 
 /// Files in a folder.

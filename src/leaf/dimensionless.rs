@@ -58,11 +58,17 @@ pub struct Leaf<'a> {
 impl<'a> Leaf<'a> {
     /// Scales a checked scenario.
     pub fn new(scenario: &'a Scenario) -> Self {
-        let length = longest(&scenario.rods);
         let scale = Scale {
-            length,
+            length: longest(&scenario.rods),
             stiffness: mean_bending(&scenario.rods),
         };
+        Leaf::in_units(scenario, scale)
+    }
+
+    /// The same in given units, in which leaves that differ in length or
+    /// stiffness can be compared.
+    pub fn in_units(scenario: &'a Scenario, scale: Scale) -> Self {
+        let length = scale.length;
         let mut kinks: Vec<f64> = scenario
             .rods
             .iter()

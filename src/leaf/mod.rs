@@ -14,6 +14,6 @@ pub use assembly::{DiscreteLeaf, Loads, Sums};
 pub use dimensionless::{Leaf, Scale};
 pub use grid::Grid;
 pub use mirror::{half_of, whole_of};
-pub use sparse::{SparseError, SparseFactor, SparsePattern};
-pub use state::{Increment, State, shift, turn};
+pub use sparse::{Bordered, SparseError, SparseFactor, SparsePattern};
+pub use state::{Field, Increment, State, shift, turn};
 pub use system::{Solved, System};

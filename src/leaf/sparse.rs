@@ -1,7 +1,7 @@
 //! The whole matrix of the leaf as one sparse symmetric indefinite
 //! factorisation: for the Morse index, and for Newton's method at a saddle.
 
-use super::state::Increment;
+use super::state::{Field, Increment};
 use super::system::System;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::PermRef;
@@ -23,7 +23,19 @@ pub struct SparsePattern {
     first: Vec<usize>,
     /// First unknown of the joint tip.
     tip: Option<usize>,
+    /// First of the rows that border the matrix, behind all others.
+    border: usize,
     size: usize,
+    segments: usize,
+}
+
+/// The solution of a bordered system.
+#[derive(Clone, Debug)]
+pub struct Bordered {
+    /// The increments.
+    pub increments: Field,
+    /// The multipliers of the border.
+    pub multipliers: Vec<f64>,
 }
 
 /// L B L^T of a leaf's matrix by Bunch and Kaufman within supernodes.
@@ -45,6 +57,11 @@ impl SparsePattern {
     /// Orders the unknowns by nested dissection of the grid of rods and nodes,
     /// the joint tip last, and factorises symbolically.
     pub fn new(system: &System) -> Result<Self, SparseError> {
+        SparsePattern::bordered(system, 0)
+    }
+
+    /// The same with so many dense rows and columns at the end.
+    pub fn bordered(system: &System, rows: usize) -> Result<Self, SparseError> {
         let (rods, n) = (system.rods.len(), system.segments());
         let mut nodes = Vec::with_capacity(rods * n);
         dissect((0, rods), (0, n), &mut nodes);
@@ -56,8 +73,16 @@ impl SparsePattern {
         }
         let tip = system.joined().then_some(size);
         size += if system.joined() { 3 } else { 0 };
+        let border = size;
+        size += rows;
+        let unknowns = Unknowns {
+            first: &first,
+            tip,
+            segments: n,
+        };
+        let ones = vec![vec![vec![[1.0; 6]; n]; rods]; rows];
         // With its ordering given, faer reads the pattern of the upper triangle.
-        let matrix = triangle(system, &first, tip, 0.0, Side::Upper)?;
+        let matrix = triangle(system, &unknowns, &ones, border, 0.0, Side::Upper)?;
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
@@ -73,17 +98,53 @@ impl SparsePattern {
             symbolic,
             first,
             tip,
+            border,
             size,
+            segments: n,
         })
+    }
+
+    fn table(&self, segments: usize) -> Unknowns<'_> {
+        Unknowns {
+            first: &self.first,
+            tip: self.tip,
+            segments,
+        }
+    }
+
+    /// Number of unknowns.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// First unknown of the turn and of the shift of node `i` (from 1) of rod
+    /// `j`. A joint tip has one shift for all rods.
+    pub fn unknowns(&self, j: usize, i: usize) -> [usize; 2] {
+        let first = self.first[j * self.segments + i - 1];
+        match self.tip {
+            Some(tip) if i == self.segments => [first, tip],
+            _ => [first, first + 3],
+        }
     }
 
     /// Factorises the matrix assembled in `system`, of the same leaf, plus
     /// `shift` times its mass matrix.
     pub fn factorize(&self, system: &System, shift: f64) -> Result<SparseFactor<'_>, SparseError> {
+        self.factorize_bordered(system, shift, &[])
+    }
+
+    /// The same, bordered by as many rows as the pattern has, zero where they meet.
+    pub fn factorize_bordered(
+        &self,
+        system: &System,
+        shift: f64,
+        border: &[Field],
+    ) -> Result<SparseFactor<'_>, SparseError> {
         let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
             return Err(SparseError);
         };
-        let matrix = triangle(system, &self.first, self.tip, shift, Side::Lower)?;
+        let unknowns = self.table(system.segments());
+        let matrix = triangle(system, &unknowns, border, self.border, shift, Side::Lower)?;
         let scratch =
             supernodal::factorize_supernodal_numeric_intranode_lblt_scratch::<usize, f64>(
                 symbolic,
@@ -151,28 +212,13 @@ impl SparseFactor<'_> {
         negative
     }
 
-    /// Solves for the right-hand side assembled in `system` plus `inertia`
-    /// (see [`System::solve`]); the solution stands in `system` afterwards.
-    pub fn solve(&mut self, system: &mut System, inertia: Option<(&[Vec<Increment>], f64)>) {
-        let (size, n) = (self.pattern.size, system.segments());
-        let mut b = vec![0.0; size];
-        system.each_rhs(inertia, |j, i, rhs| {
-            let first = self.pattern.first[j * n + i];
-            match self.pattern.tip {
-                Some(tip) if i + 1 == n => {
-                    b[first..first + 3].copy_from_slice(&rhs[..3]);
-                    for c in 0..3 {
-                        b[tip + c] += rhs[3 + c];
-                    }
-                }
-                _ => b[first..first + 6].copy_from_slice(rhs),
-            }
-        });
+    /// Solves in place, with unknowns numbered as by [`SparsePattern::unknowns`].
+    pub fn solve_vector(&mut self, b: &mut [f64]) {
         let mut x: Vec<f64> = self.forward.iter().map(|&k| b[k]).collect();
         let mut memory = std::mem::replace(&mut self.memory, MemBuffer::new(Default::default()));
         self.parts().solve_in_place_no_numeric_permute_with_conj(
             Conj::No,
-            MatMut::from_column_major_slice_mut(&mut x, size, 1),
+            MatMut::from_column_major_slice_mut(&mut x, b.len(), 1),
             Par::Seq,
             MemStack::new(&mut memory),
         );
@@ -180,15 +226,71 @@ impl SparseFactor<'_> {
         for (b, &k) in b.iter_mut().zip(&self.inverse) {
             *b = x[k];
         }
+    }
+
+    /// Solves for the right-hand side assembled in `system` plus `inertia`
+    /// (see [`System::solve`]); the solution stands in `system` afterwards.
+    pub fn solve(&mut self, system: &mut System, inertia: Option<(&[Vec<Increment>], f64)>) {
+        let unknowns = self.pattern.table(system.segments());
+        let mut b = vec![0.0; self.pattern.size];
+        system.each_rhs(inertia, |j, i, rhs| unknowns.gather(j, i, rhs, &mut b));
+        self.solve_vector(&mut b);
         system.each_solution(|j, i, solution: &mut Increment| {
-            let first = self.pattern.first[j * n + i];
-            solution[..3].copy_from_slice(&b[first..first + 3]);
-            let shift = match self.pattern.tip {
-                Some(tip) if i + 1 == n => tip,
-                _ => first + 3,
-            };
-            solution[3..].copy_from_slice(&b[shift..shift + 3]);
+            *solution = unknowns.scatter(j, i, &b);
         });
+    }
+
+    /// Solves the bordered system for forces `rhs`, and `below` in the rows of
+    /// the border.
+    pub fn solve_bordered(&mut self, rhs: &Field, below: &[f64]) -> Bordered {
+        let unknowns = self.pattern.table(rhs[0].len());
+        let mut b = vec![0.0; self.pattern.size];
+        for (j, rod) in rhs.iter().enumerate() {
+            for (i, rhs) in rod.iter().enumerate() {
+                unknowns.gather(j, i, rhs, &mut b);
+            }
+        }
+        b[self.pattern.border..].copy_from_slice(below);
+        self.solve_vector(&mut b);
+        let nodes = |j: usize, rod: &Vec<Increment>| {
+            let nodes = 0..rod.len();
+            nodes.map(|i| unknowns.scatter(j, i, &b)).collect()
+        };
+        Bordered {
+            increments: (rhs.iter().enumerate())
+                .map(|(j, rod)| nodes(j, rod))
+                .collect(),
+            multipliers: b[self.pattern.border..].to_vec(),
+        }
+    }
+}
+
+/// Where the unknowns of the nodes stand.
+struct Unknowns<'a> {
+    first: &'a [usize],
+    tip: Option<usize>,
+    segments: usize,
+}
+
+impl Unknowns<'_> {
+    /// Component `c` of node `i` (from 0) of rod `j`.
+    fn at(&self, j: usize, i: usize, c: usize) -> usize {
+        match self.tip {
+            Some(tip) if i + 1 == self.segments && c >= 3 => tip + c - 3,
+            _ => self.first[j * self.segments + i] + c,
+        }
+    }
+
+    /// Adds the forces on a node.
+    fn gather(&self, j: usize, i: usize, forces: &Increment, all: &mut [f64]) {
+        for c in 0..6 {
+            all[self.at(j, i, c)] += forces[c];
+        }
+    }
+
+    /// The increments of a node.
+    fn scatter(&self, j: usize, i: usize, all: &[f64]) -> Increment {
+        std::array::from_fn(|c| all[self.at(j, i, c)])
     }
 }
 
@@ -214,21 +316,18 @@ fn dissect(rods: (usize, usize), nodes: (usize, usize), order: &mut Vec<(usize, 
     }
 }
 
-/// One triangle of K.
+/// One triangle of K and its border.
 fn triangle(
     system: &System,
-    first: &[usize],
-    tip: Option<usize>,
+    unknowns: &Unknowns,
+    border: &[Field],
+    first_border: usize,
     shift: f64,
     side: Side,
 ) -> Result<SparseColMat<usize, f64>, SparseError> {
     let n = system.segments();
-    let unknown = |j: usize, i: usize, c: usize| match tip {
-        Some(tip) if i + 1 == n && c >= 3 => tip + c - 3,
-        _ => first[j * n + i] + c,
-    };
     let mut entries = Vec::new();
-    let mut size = 0;
+    let size = first_border + border.len();
     let mut add = |a: usize, b: usize, value: f64| {
         let (low, high) = (a.min(b), a.max(b));
         entries.push(match side {
@@ -237,35 +336,41 @@ fn triangle(
         });
     };
     for (j, rod) in system.rods.iter().enumerate() {
+        let at = |i: usize, c: usize| unknowns.at(j, i, c);
         for (i, block) in rod.chain.diagonal.iter().enumerate() {
-            size = size.max(unknown(j, i, 2) + 1).max(unknown(j, i, 5) + 1);
             for r in 0..6 {
-                add(
-                    unknown(j, i, r),
-                    unknown(j, i, r),
-                    shift * rod.mass[i][r / 3],
-                );
+                add(at(i, r), at(i, r), shift * rod.mass[i][r / 3]);
                 for c in r..6 {
-                    add(unknown(j, i, r), unknown(j, i, c), block[r][c]);
+                    add(at(i, r), at(i, c), block[r][c]);
                 }
             }
         }
         for (i, block) in rod.chain.off.iter().enumerate() {
             for r in 0..6 {
                 for c in 0..6 {
-                    add(unknown(j, i, r), unknown(j, i + 1, c), block[r][c]);
+                    add(at(i, r), at(i + 1, c), block[r][c]);
                 }
             }
         }
         if let Some(springs) = system.springs.get(j) {
             for (i, spring) in springs.iter().enumerate() {
-                if tip.is_none() || i + 1 < n {
+                if unknowns.tip.is_none() || i + 1 < n {
                     for c in 0..3 {
-                        add(unknown(j, i, 3 + c), unknown(j + 1, i, 3 + c), -spring[c]);
+                        add(at(i, 3 + c), unknowns.at(j + 1, i, 3 + c), -spring[c]);
                     }
                 }
             }
         }
+        for (k, row) in border.iter().enumerate() {
+            for (i, forces) in row[j].iter().enumerate() {
+                for c in 0..6 {
+                    add(at(i, c), first_border + k, forces[c]);
+                }
+            }
+        }
+    }
+    for k in 0..border.len() {
+        add(first_border + k, first_border + k, 0.0);
     }
     SparseColMat::try_new_from_triplets(size, size, &entries).map_err(|_| SparseError)
 }

@@ -20,6 +20,11 @@ pub struct State {
 /// displacement.
 pub type Increment = [f64; 6];
 
+/// Increments, or the forces that are dual to them, of all nodes of a leaf but
+/// the bases: rods, then nodes 1 to n. With a joint tip the last displacement is
+/// the same in every rod, and the last force is every rod's share.
+pub type Field = Vec<Vec<Increment>>;
+
 /// The rotation part of an increment.
 #[inline]
 pub fn turn(increment: &Increment) -> DVec3 {

@@ -9,7 +9,7 @@
 
 use super::assembly::{DiscreteLeaf, Sums};
 use super::chain::{Chain, Factor, TipFactor};
-use super::state::{Increment, shift, turn};
+use super::state::{Field, Increment, shift, turn};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -234,6 +234,38 @@ impl System {
             }
         }
         self.factorize(shift)
+    }
+
+    /// The right-hand side as of the last assembly.
+    pub fn rhs(&self) -> Field {
+        self.rods.iter().map(|rod| rod.rhs.clone()).collect()
+    }
+
+    /// Puts another right-hand side in its place.
+    pub fn set_rhs(&mut self, rhs: &Field) {
+        for (rod, rhs) in self.rods.iter_mut().zip(rhs) {
+            rod.rhs.copy_from_slice(rhs);
+        }
+    }
+
+    /// The last solution.
+    pub fn solution(&self) -> Field {
+        self.rods.iter().map(|rod| rod.solution.clone()).collect()
+    }
+
+    /// Puts other increments in its place.
+    pub fn set_solution(&mut self, increments: &Field) {
+        for (rod, increments) in self.rods.iter_mut().zip(increments) {
+            rod.solution.copy_from_slice(increments);
+        }
+    }
+
+    /// The mass matrix times increments.
+    pub fn momentum(&self, increments: &Field) -> Field {
+        let of = |(v, m): (&Increment, &[f64; 2])| std::array::from_fn(|c| m[c / 3] * v[c]);
+        let rods = self.rods.iter().zip(increments);
+        rods.map(|(rod, v)| v.iter().zip(&rod.mass).map(of).collect())
+            .collect()
     }
 
     pub(super) fn parallel(&self) -> bool {

@@ -2,8 +2,9 @@
 //! Dimensionless: time in units of sqrt(rho L^4/A).
 
 use crate::leaf::{Grid, Leaf, Loads, Scale};
+use crate::rotation::outer;
 use crate::scenario::Dynamics;
-use glam::DVec3;
+use glam::{DMat3, DQuat, DVec3};
 
 /// Inertia of a node: the mass and the moments of inertia of the half-segments
 /// beside it.
@@ -21,6 +22,13 @@ impl Inertia {
     /// Moment of inertia about d1.
     pub fn polar(&self) -> f64 {
         self.transverse * (1.0 + self.excess)
+    }
+
+    /// Tensor of inertia of the node turned by `rotation`, along the lab axes.
+    pub fn tensor(&self, rotation: DQuat) -> DMat3 {
+        let d1 = rotation * DVec3::X;
+        let excess = self.excess * self.transverse;
+        DMat3::from_diagonal(DVec3::splat(self.transverse)) + outer(d1, d1) * excess
     }
 }
 

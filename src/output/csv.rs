@@ -1,4 +1,5 @@
-//! `centerlines.csv`: every rod at every station, for spreadsheets and scripts.
+//! `centerlines.csv` and `modes.csv`: every rod at every station, for
+//! spreadsheets and scripts.
 
 use std::io::{self, Write};
 
@@ -28,6 +29,55 @@ impl Format<Equilibrium> for Centerlines {
         for (index, rod) in equilibrium.rods.iter().enumerate() {
             for (&sigma, node) in equilibrium.stations.iter().zip(&rod.nodes) {
                 table.serialize((index + 1, sigma, sigma * rod.length, columns(node)))?;
+            }
+        }
+        table.flush()
+    }
+}
+
+/// `modes.csv`: one row per mode, rod and station.
+pub struct ModesTable;
+
+/// Names of the columns. Modes and rods are numbered from 1; displacements and
+/// rotation vectors are along the lab axes.
+const MODES_HEADER: [&str; 12] = [
+    "mode",
+    "eigenvalue",
+    "error",
+    "frequency",
+    "rod",
+    "sigma",
+    "dx",
+    "dy",
+    "dz",
+    "rx",
+    "ry",
+    "rz",
+];
+
+impl Format<Equilibrium> for ModesTable {
+    fn file_name(&self) -> &'static str {
+        "modes.csv"
+    }
+
+    fn write(&self, equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
+        let mut table = csv::WriterBuilder::new()
+            .has_headers(false)
+            .from_writer(out);
+        table.write_record(MODES_HEADER)?;
+        let stations = &equilibrium.stations;
+        for (index, mode) in equilibrium.modes.iter().flatten().enumerate() {
+            let of_mode = (index + 1, mode.eigenvalue, mode.error, mode.frequency());
+            let rods = mode.displacement.iter().zip(&mode.rotation);
+            for (rod, (displacement, rotation)) in rods.enumerate() {
+                // Stations are every so many-th node.
+                let stride = (displacement.len() - 1) / (stations.len() - 1).max(1);
+                for (station, &sigma) in stations.iter().enumerate() {
+                    let node = station * stride;
+                    let [d, r] = [displacement[node], rotation[node]];
+                    let shape = [d.x, d.y, d.z, r.x, r.y, r.z].map(|value| value + 0.0);
+                    table.serialize((of_mode, rod + 1, sigma, shape))?;
+                }
             }
         }
         table.flush()

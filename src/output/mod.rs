@@ -2,6 +2,7 @@
 //! trait. A file is complete or absent, never half written.
 
 mod atomic;
+mod chart;
 mod checksum;
 mod csv;
 mod figure;
@@ -11,24 +12,30 @@ mod part;
 mod recording;
 #[cfg(test)]
 mod sample;
+mod trace;
 mod words;
 
+use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
 pub use atomic::{abandon_unfinished, check_writable};
-pub use csv::Centerlines;
-pub use figure::{FigurePng, FigureSvg, MotionFigure};
-pub use json::{CheckSummary, MapSummary, MotionSummary, Summary};
+pub use chart::{ChartTable, ScalingTable};
+pub use csv::{Centerlines, ModesTable};
+pub use figure::{FigurePng, FigureSvg, ModesFigure, MotionFigure};
+pub use json::{ChartSummary, CheckSummary, MapSummary, MotionSummary, Summary, TraceSummary};
 pub use map::{Journal, MapFileError, MapTable, belongs, claim, read_rows, write_rows};
 pub use recording::{CannotResume, Keeper, Recording};
-pub use words::{equilibrium_of_index, headline, model, power_of_ten, shooting, verdict};
+pub use trace::TraceTable;
+pub use words::{
+    branch_end, contender, equilibrium_of_index, headline, model, power_of_ten, shooting, verdict,
+};
 
 use crate::relax::Equilibrium;
 use crate::simulate::Record;
-use crate::study::{Check, Map};
+use crate::study::{Chart, Check, Map, Scaling, Trace};
 
 /// One way to write a result down.
 pub trait Format<R> {
@@ -44,11 +51,34 @@ pub trait Written: Sized + 'static {
     /// Every format, in the order in which the files are written; first the
     /// JSON that is also shown on request.
     const FORMATS: &'static [&'static dyn Format<Self>];
+
+    /// Formats of what not every result has, written after the others. If this
+    /// one has not, what an earlier run has left of them is removed.
+    const MORE: &'static [&'static dyn Format<Self>] = &[];
+
+    /// Whether these are written.
+    fn has_more(&self) -> bool {
+        false
+    }
+
+    /// Names of the files written.
+    fn file_names(&self) -> Vec<&'static str> {
+        let more = if self.has_more() { Self::MORE } else { &[] };
+        let formats = Self::FORMATS.iter().chain(more);
+        formats.map(|format| format.file_name()).collect()
+    }
 }
 
 impl Written for Equilibrium {
     const FORMATS: &'static [&'static dyn Format<Self>] =
         &[&Summary, &Centerlines, &FigureSvg, &FigurePng];
+
+    const MORE: &'static [&'static dyn Format<Self>] =
+        &[&ModesTable, &ModesFigure::SVG, &ModesFigure::PNG];
+
+    fn has_more(&self) -> bool {
+        self.mode_shapes && self.modes.as_ref().is_some_and(|modes| !modes.is_empty())
+    }
 }
 
 impl Written for Check {
@@ -60,6 +90,11 @@ impl Written for Map {
         &[&MapSummary, &MapTable, &FigureSvg, &FigurePng];
 }
 
+impl Written for Trace {
+    const FORMATS: &'static [&'static dyn Format<Self>] =
+        &[&TraceSummary, &TraceTable, &FigureSvg, &FigurePng];
+}
+
 impl Written for Record {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
         &MotionSummary,
@@ -68,6 +103,16 @@ impl Written for Record {
         &MotionFigure::FILMSTRIP_SVG,
         &MotionFigure::FILMSTRIP_PNG,
     ];
+}
+
+impl Written for Chart {
+    const FORMATS: &'static [&'static dyn Format<Self>] =
+        &[&ChartSummary, &ChartTable, &FigureSvg, &FigurePng];
+}
+
+/// Its numbers are also in the JSON of its chart.
+impl Written for Scaling {
+    const FORMATS: &'static [&'static dyn Format<Self>] = &[&ScalingTable, &FigureSvg, &FigurePng];
 }
 
 /// Why a file could not be written.
@@ -118,5 +163,11 @@ pub fn write_all<R: Written>(folder: &Path, result: &R) -> Result<Vec<PathBuf>, 
             .map(|()| file.clone())
             .map_err(|reason| OutputError::File { file, reason })
     };
-    R::FORMATS.iter().map(write_one).collect()
+    let more = if result.has_more() { R::MORE } else { &[] };
+    let written = R::FORMATS.iter().chain(more).map(write_one).collect();
+    for format in R::MORE.iter().skip(more.len()) {
+        // Of another result. That there is none is the rule.
+        let _ = fs::remove_file(folder.join(format.file_name()));
+    }
+    written
 }

@@ -7,10 +7,13 @@ use glam::{DQuat, DVec3};
 use crate::bvp::{self, Neutral, Solution};
 use crate::motion::{Energy, StableStep, Velocity};
 use crate::relax::{Equilibrium, Model, NodeState, Outcome, RodShape, Work};
+use crate::scenario::Units;
 use crate::shape::Difference;
 use crate::simulate::{Frame, Moment, Record, Scheme, Still};
 use crate::study::{
-    Base, Check, Confidence, Map, MapMethod, MapOutcome, MapRequest, MapRow, Shot, Verdict,
+    Base, Chart, Check, Confidence, Contender, Ending, Law, Map, MapMethod, MapOutcome, MapRequest,
+    MapRow, Peer, PointKind, Reference, Row, Scaling, ScalingRow, Setting, Shot, Spread, Trace,
+    TraceBranch, TraceEnd, TracePoint, Verdict,
 };
 use crate::undulation::{Undulation, Vein};
 
@@ -60,6 +63,8 @@ pub fn fan(rods: usize, segments: usize) -> Equilibrium {
         tips: vec![point(0, 1.0)],
         tip_force_sum: DVec3::ZERO,
         negative_eigenvalues: Some(0),
+        modes: None,
+        mode_shapes: false,
         saddle: None,
         work: Work {
             steps: 8,
@@ -194,6 +199,66 @@ pub fn map() -> Map {
     Map::new(request, rows.collect())
 }
 
+/// A branch that loses its stability where another leaves it.
+pub fn trace() -> Trace {
+    let leaf = fan(3, 4);
+    let point = |value: f64, side: f64, index: usize| TracePoint {
+        kind: PointKind::Regular,
+        value,
+        value_error: None,
+        tips: vec![leaf.tips[0] + DVec3::new(0.0, 0.0, side)],
+        error: Some(1e-9),
+        energy: 0.1 * value,
+        index,
+        curves: leaf.curves.clone(),
+    };
+    let mut points: Vec<TracePoint> = (0..10)
+        .map(|k| point(0.1 * f64::from(k), 0.0, usize::from(k >= 5)))
+        .collect();
+    points[5].kind = PointKind::Branching(1);
+    points[5].value_error = Some(1e-12);
+    let other = (5..10).map(|k| {
+        let value = 0.1 * f64::from(k);
+        point(value, (value - 0.5).sqrt(), 0)
+    });
+    let law = Law {
+        axis: 0,
+        slope: 3.0,
+        r_squared: 0.99,
+        deviation: 0.02,
+        length: 0.9,
+        young: None,
+    };
+    Trace {
+        scenario: "fan".into(),
+        keys: "load.tip_force[0]".parse().unwrap(),
+        range: [0.0, 0.9],
+        units: Units::default(),
+        rods: 3,
+        joined: true,
+        tolerance: 1e-6,
+        segments: 16,
+        branches: vec![
+            TraceBranch {
+                from: None,
+                points,
+                end: TraceEnd::Reached,
+                remark: None,
+            },
+            TraceBranch {
+                from: Some([0, 5]),
+                points: other.collect(),
+                end: TraceEnd::MostPoints,
+                remark: Some("there are more points".into()),
+            },
+        ],
+        law: Some(law),
+        remark: None,
+        factorizations: 40,
+        wall_seconds: 0.1,
+    }
+}
+
 /// That fan at a time, swinging up and down.
 pub fn frame(rods: usize, segments: usize, time: f64) -> Frame {
     let leaf = fan(rods, segments);
@@ -266,5 +331,122 @@ pub fn record(rods: usize, segments: usize) -> Record {
         tips: vec![moments[100].tip],
         moments,
         wall_seconds: 0.1,
+    }
+}
+
+fn spread(median: f64) -> Spread {
+    Spread {
+        min: 0.8 * median,
+        q1: 0.875 * median,
+        median,
+        q3: 1.2 * median,
+        runs: 5,
+    }
+}
+
+fn row(contender: Contender, knob: Setting, seconds: f64, error: f64) -> Row {
+    Row {
+        contender,
+        knob,
+        seconds: Some(spread(seconds)),
+        work: Work {
+            steps: 8,
+            factorizations: 9,
+            force_evaluations: 9,
+            cg_iterations: 40,
+        },
+        true_error: Some(error),
+        error_estimate: Some(10.0 * error),
+        ending: Ending::Ended(Outcome::Converged),
+        remark: None,
+        pareto: false,
+    }
+}
+
+fn not_run(contender: Contender, knob: Setting) -> Row {
+    Row {
+        seconds: None,
+        true_error: None,
+        error_estimate: None,
+        ending: Ending::NotRun,
+        ..row(contender, knob, 1.0, 1.0)
+    }
+}
+
+/// A chart of few points, two failures and a peer.
+pub fn chart() -> Chart {
+    use Setting::{Segments, Tolerance};
+    let on_it = |row: Row| Row {
+        pareto: true,
+        ..row
+    };
+    Chart {
+        scenario: "fan".into(),
+        rods: 5,
+        joined: true,
+        reference: Some(Reference {
+            confirmed: true,
+            told: "relaxation and shooting agree within their error estimates".into(),
+            known_within: 1e-12,
+            relaxed: Some(1e-12),
+            shot: Some(2e-12),
+            difference: Some(1e-14),
+            neutral: None,
+        }),
+        rows: vec![
+            on_it(row(Contender::SemiImplicit, Tolerance(1e-2), 1e-3, 1e-4)),
+            on_it(row(Contender::SemiImplicit, Tolerance(1e-6), 2e-3, 1e-8)),
+            on_it(Row {
+                error_estimate: None,
+                ..row(Contender::SemiImplicitGrid, Segments(4), 5e-4, 9e-3)
+            }),
+            row(Contender::Explicit, Tolerance(1e-2), 2e-2, 1e-4),
+            not_run(Contender::Explicit, Tolerance(1e-11)),
+            Row {
+                true_error: None,
+                error_estimate: None,
+                ending: Ending::Ended(Outcome::NotAtRest),
+                remark: Some("perturbations grow".into()),
+                ..row(Contender::SingleShooting, Tolerance(1e-6), 7e-2, 1.0)
+            },
+        ],
+        peers: vec![
+            Peer {
+                name: "solve_bvp".into(),
+                knob: "tol=0.001".into(),
+                seconds: spread(0.25),
+                true_error: Some(5e-6),
+                outcome: "converged".into(),
+                pareto: false,
+            },
+            Peer {
+                name: "solve_bvp".into(),
+                knob: "tol=1e-09".into(),
+                seconds: spread(16.0),
+                true_error: None,
+                outcome: "not-converged max-nodes".into(),
+                pareto: false,
+            },
+        ],
+        rounds: 5,
+        remarks: vec!["1 row of --peers is about another leaf, and left out".into()],
+        scaling: None,
+    }
+}
+
+/// Two leaves, two contenders, one of which was too slow.
+pub fn scaling() -> Scaling {
+    let knob = Setting::Tolerance(1e-6);
+    let found = |rods: usize, row: Row| ScalingRow { rods, row };
+    Scaling {
+        scenario: "fan".into(),
+        tolerance: 1e-6,
+        rows: vec![
+            found(5, row(Contender::SemiImplicit, knob, 1e-3, 1e-8)),
+            found(15, row(Contender::SemiImplicit, knob, 3e-3, 1e-8)),
+            found(5, row(Contender::Explicit, knob, 3e-2, 1e-8)),
+            found(15, not_run(Contender::Explicit, knob)),
+        ],
+        unconfirmed: Vec::new(),
     }
 }

@@ -1,7 +1,7 @@
 //! Sentences about a result that the figure and the command line share.
 
 use crate::relax::{Equilibrium, Method, Outcome};
-use crate::study::Verdict;
+use crate::study::{Contender, TraceEnd, Verdict};
 
 /// How the run ended and what was found, in one phrase.
 pub fn verdict(equilibrium: &Equilibrium) -> String {
@@ -81,6 +81,32 @@ pub fn headline(verdict: &Verdict) -> &'static str {
         Verdict::Agree => "both methods agree",
         Verdict::Differ => "the methods differ",
         Verdict::NotCompared(_) => "could not be compared",
+    }
+}
+
+/// A way to bring a leaf to rest, as a chart names it.
+pub fn contender(contender: Contender) -> &'static str {
+    match contender {
+        Contender::SemiImplicit => "semi-implicit, extrapolated",
+        Contender::SemiImplicitGrid => "semi-implicit, single grids",
+        Contender::Explicit => "explicit, extrapolated",
+        Contender::ExplicitGrid => "explicit, single grids",
+        Contender::SingleShooting => "single shooting",
+        Contender::MultipleShooting => "multiple shooting",
+        Contender::RelaxedShooting => "shooting from the relaxed leaf",
+    }
+}
+
+/// How a branch ended, in a phrase.
+pub fn branch_end(end: TraceEnd) -> &'static str {
+    match end {
+        TraceEnd::Reached => "to the end of the range",
+        TraceEnd::Returned => "back to its start",
+        TraceEnd::Closed => "closed",
+        TraceEnd::MostPoints => "goes on",
+        TraceEnd::OutOfRange => "ends where no leaf is",
+        TraceEnd::Unresolved => "ends: grid too coarse",
+        TraceEnd::Stuck => "lost",
     }
 }
 

@@ -85,6 +85,42 @@ pub struct Model {
     pub stretch: Option<f64>,
 }
 
+/// A way in which the leaf moves by itself, without damping and by so little
+/// that forces change in proportion: sin(omega t) times its shape, or
+/// exp(gamma t) where the equilibrium is unstable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mode {
+    /// omega^2, or -gamma^2 if negative: the eigenvalue of the energy's Hessian
+    /// over the masses, per time squared.
+    pub eigenvalue: f64,
+    /// Bound on its error; `None` on a single grid.
+    pub error: Option<f64>,
+    /// Displacement of the nodes of [`Equilibrium::curves`], one list per rod.
+    /// The largest is as long as the longest rod, but of a mode that turns the
+    /// rods without displacing them, of which the largest rotation is 1.
+    pub displacement: Vec<Vec<DVec3>>,
+    /// Rotation vector of these nodes, along the lab axes, radians.
+    pub rotation: Vec<Vec<DVec3>>,
+}
+
+impl Mode {
+    /// Angular frequency omega, radians per time; `None` if it is unstable.
+    pub fn frequency(&self) -> Option<f64> {
+        (self.eigenvalue >= 0.0).then(|| self.eigenvalue.sqrt())
+    }
+
+    /// Rate gamma at which the leaf leaves an unstable equilibrium, per time.
+    pub fn growth(&self) -> Option<f64> {
+        (self.eigenvalue < 0.0).then(|| (-self.eigenvalue).sqrt())
+    }
+
+    /// Whether the eigenvalue cannot be told from zero.
+    pub fn is_neutral(&self) -> bool {
+        self.error
+            .is_some_and(|error| self.eigenvalue.abs() <= error)
+    }
+}
+
 /// A leaf at rest (or as far as it came), in the units of its scenario.
 #[derive(Clone, Debug)]
 pub struct Equilibrium {
@@ -120,6 +156,11 @@ pub struct Equilibrium {
     /// Morse index: negative eigenvalues of the energy's Hessian. `None` if
     /// the leaf is not at rest.
     pub negative_eigenvalues: Option<usize>,
+    /// The lowest modes, ascending, none left out. `None` if they were not asked
+    /// for or not found, the leaf is not at rest, or it was shot.
+    pub modes: Option<Vec<Mode>>,
+    /// Whether the shapes of the modes were asked for.
+    pub mode_shapes: bool,
     /// A saddle that was met and left.
     pub saddle: Option<Saddle>,
     /// What was solved.

@@ -3,9 +3,10 @@
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, Solved, State, System, half_of, whole_of};
 use crate::relax::equilibrium::{Equilibrium, Saddle, Work};
 use crate::relax::explicit;
+use crate::relax::modes;
 use crate::relax::moment;
 use crate::relax::options::{
-    LARGEST_TOLERANCE, MAX_NODES, Method, Options, Progress, RelaxError, SMALLEST_TOLERANCE, past,
+    MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError, check_tolerance, past,
 };
 use crate::relax::prolong::{predict, prolong};
 use crate::relax::report;
@@ -80,8 +81,11 @@ pub fn relax(
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Equilibrium, RelaxError> {
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
-    if !(SMALLEST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
-        return Err(RelaxError::Tolerance { found: tolerance });
+    check_tolerance(tolerance)?;
+    if options.modes > MOST_MODES {
+        return Err(RelaxError::Modes {
+            found: options.modes,
+        });
     }
     if options.method == Method::Shooting {
         return shooting::relax(scenario, options, tolerance);
@@ -107,9 +111,7 @@ pub fn relax(
         let end = run.solve(grid.clone());
         if matches!(end, End::Rest | End::NotAccurate) && run.index == Some(0) {
             let run = run.completed(&leaf);
-            let (outcome, remark) = report::outcome(&run, end);
-            let seconds = clock.elapsed().as_secs_f64();
-            return Ok(report::equilibrium(run, outcome, remark, seconds));
+            return Ok(finished(run, end, clock));
         }
         // The whole leaf has something to say: it moves out of its valley, or
         // breaks the mirror.
@@ -118,9 +120,20 @@ pub fn relax(
     let mut run = Run::new(&leaf, options, tolerance, progress);
     run.work = work;
     let end = run.solve(grid);
+    Ok(finished(run, end, clock))
+}
+
+/// The result of a run, and of a leaf at rest its modes, which are not counted
+/// in the time of the solution.
+fn finished(run: Run, end: End, clock: Instant) -> Equilibrium {
+    let at_rest = matches!(end, End::Rest | End::NotAccurate);
     let (outcome, remark) = report::outcome(&run, end);
     let seconds = clock.elapsed().as_secs_f64();
-    Ok(report::equilibrium(run, outcome, remark, seconds))
+    let modes = if at_rest { modes::lowest(&run) } else { None };
+    Equilibrium {
+        modes,
+        ..report::equilibrium(run, outcome, remark, seconds)
+    }
 }
 
 /// Whether half of a leaf may be solved for the whole: where the way to rest
@@ -275,7 +288,11 @@ impl<'a, 'o> Run<'a, 'o> {
             let level = self.levels.last().expect("the leaf has landed");
             let finer = level.leaf.grid.refined();
             let nodes = self.leaf.rods() * finer.segments();
-            if self.options.segments.is_some() || finer.segments() > FINEST || nodes > MAX_NODES {
+            if self.options.segments.is_some()
+                || finer.segments() > FINEST
+                || nodes > MAX_NODES
+                || self.beyond_rounding(finer.segments())
+            {
                 return match self.judge_stability() {
                     Err(Some(settled)) => End::Failed(settled),
                     _ => End::NotAccurate,
@@ -309,6 +326,14 @@ impl<'a, 'o> Run<'a, 'o> {
         let segments = self.levels.last()?.leaf.segments();
         let best = self.table.best()?;
         Some(best.error + EXTRAPOLATED * self.remaining + ROUNDING * segments as f64)
+    }
+
+    /// Whether unfinished iterations and rounding alone are more than the
+    /// tolerance on a grid of so many `segments`, and already on the present one
+    /// most of the error: no refinement helps then.
+    pub fn beyond_rounding(&self, segments: usize) -> bool {
+        let floor = EXTRAPOLATED * self.remaining + ROUNDING * segments as f64;
+        floor > self.tolerance && self.error().is_some_and(|error| error <= 2.0 * floor)
     }
 
     /// From the start to rest on the first grid that resolves it. A leaf that

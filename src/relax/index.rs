@@ -40,7 +40,7 @@ pub fn index_near(scenario: &Scenario, grid: Grid, rods: &[RodShape]) -> Option<
 }
 
 /// The state of the discrete leaf at the given nodes.
-fn project(leaf: &Leaf, discrete: &DiscreteLeaf, rods: &[RodShape]) -> State {
+pub fn project(leaf: &Leaf, discrete: &DiscreteLeaf, rods: &[RodShape]) -> State {
     let nodes = || rods.iter().flat_map(|rod| &rod.nodes);
     let mut state = State::new(
         discrete.segments(),

@@ -1,15 +1,16 @@
 //! How a leaf comes to rest: the start, the semi-implicit motion on one grid,
-//! the nested grids with their extrapolation, saddles, and the result.
+//! the nested grids with their extrapolation, saddles, modes, and the result.
 
 mod equilibrium;
 mod explicit;
 mod grids;
 mod index;
+mod modes;
 mod moment;
 mod options;
-mod prolong;
+pub(crate) mod prolong;
 mod report;
-mod richardson;
+pub(crate) mod richardson;
 mod saddle;
 mod semi_implicit;
 mod shape;
@@ -17,10 +18,13 @@ mod shooting;
 mod start;
 
 pub use crate::shape::{NodeState, RodShape};
-pub use equilibrium::{Equilibrium, Model, Outcome, Saddle, Work};
+pub use equilibrium::{Equilibrium, Mode, Model, Outcome, Saddle, Work};
 pub use grids::{check_segments, relax};
-pub use index::index_near;
-pub use options::{LARGEST_TOLERANCE, Method, Options, Progress, RelaxError, SMALLEST_TOLERANCE};
+pub use index::{index_near, project};
+pub use options::{
+    LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError,
+    SMALLEST_TOLERANCE, check_tolerance,
+};
 pub(crate) use shape::node as node_state;
 pub use shooting::check_intervals;
 pub use start::start;

@@ -45,6 +45,12 @@ pub struct Options {
     /// Shooting only: over so many intervals; `None`: as many as the growth of
     /// perturbations needs.
     pub intervals: Option<usize>,
+    /// How many of the lowest modes are looked for once the leaf is at rest, at
+    /// most [`MOST_MODES`]; that is no part of the time told. 0: none.
+    pub modes: usize,
+    /// Whether their shapes are wanted. Without them modes are left out where
+    /// the leaf is large, and are known a little less accurately.
+    pub mode_shapes: bool,
     /// When to give up, at rest or not: the leaf is then not at rest. Looked at
     /// where progress is told and between grids, so that a run may end a little
     /// later.
@@ -77,8 +83,22 @@ pub const LARGEST_TOLERANCE: f64 = 0.1;
 /// Most nodes of a leaf, all rods together: about 1.5 kB each.
 pub const MAX_NODES: usize = 4_000_000;
 
+/// Most modes.
+pub const MOST_MODES: usize = 100;
+
 /// Most intervals of a shooting.
 pub const MAX_INTERVALS: usize = 4096;
+
+/// Refuses a tolerance that is out of range.
+///
+/// # Errors
+/// If it is.
+pub fn check_tolerance(tolerance: f64) -> Result<(), RelaxError> {
+    match (SMALLEST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
+        true => Ok(()),
+        false => Err(RelaxError::Tolerance { found: tolerance }),
+    }
+}
 
 /// A request that cannot be met.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -142,6 +162,12 @@ pub enum RelaxError {
     #[error("--intervals {found}: only shooting has intervals; add --method shooting")]
     NoIntervals {
         /// Intervals asked for.
+        found: usize,
+    },
+    /// Too many modes.
+    #[error("--modes {found}: allowed are 0 to {MOST_MODES}")]
+    Modes {
+        /// Modes asked for.
         found: usize,
     },
     /// The number of intervals is out of range.

@@ -70,6 +70,8 @@ pub fn equilibrium(
             .collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
         negative_eigenvalues: run.index,
+        modes: None,
+        mode_shapes: run.options.mode_shapes,
         saddle: run.saddle,
         model: Model {
             rods: run.solved,
@@ -193,9 +195,12 @@ pub fn outcome(run: &Run, end: End) -> (Outcome, Option<String>) {
         ),
         End::NotAccurate => (
             Outcome::ToleranceNotReached,
-            Some(format!(
-                "{finest} segments a rod, the finest grid allowed, do not reach the tolerance: ask for a larger one"
-            )),
+            Some(match run.beyond_rounding(2 * finest) {
+                true => "rounding and unfinished iterations leave more than the tolerance on any grid: ask for a larger one".into(),
+                false => format!(
+                    "{finest} segments a rod, the finest grid allowed, do not reach the tolerance: ask for a larger one"
+                ),
+            }),
         ),
         End::Failed(settled) => (
             match settled {

@@ -66,6 +66,7 @@ pub fn relax(
         Err(failure) => lost(scenario, failure),
     };
     result.tolerance = tolerance;
+    result.mode_shapes = options.mode_shapes;
     result.stations = grid.sigma().to_vec();
     result.curves = (result.rods.iter())
         .map(|rod| rod.nodes.iter().map(|node| node.position).collect())
@@ -154,6 +155,8 @@ fn blank(scenario: &Scenario, rods: Vec<RodShape>) -> Equilibrium {
             .map(|node| node.rotation * node.n)
             .sum::<DVec3>(),
         negative_eigenvalues: None,
+        modes: None,
+        mode_shapes: false,
         saddle: None,
         model: Model {
             rods: scenario.rods.len(),

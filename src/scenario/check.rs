@@ -9,7 +9,7 @@ use toml::de::DeValue;
 use super::error::{Because, Needed, Problem, ScenarioError, Spot};
 use super::key::Key;
 use super::raw::{Item, Raw};
-use super::{Profile, Rod, Scenario, dynamics, limits, quantity};
+use super::{Profile, Rod, Scenario, Units, dynamics, limits, quantity};
 
 type Result<T> = std::result::Result<T, ScenarioError>;
 
@@ -21,6 +21,8 @@ pub(super) const MAGNITUDES: (f64, f64) = (1e-50, 1e50);
 const MOST_RODS: usize = 100_000;
 /// Longest name: a folder of it, and files in that, must be allowed everywhere.
 const LONGEST_NAME: usize = 100;
+/// Longest name of a unit: it stands beside axes.
+const LONGEST_UNIT: usize = 20;
 const TOLERANCE_DEFAULT: f64 = 1e-6;
 /// What is left of double precision after a solve on a fine grid.
 const TOLERANCE_LEAST: f64 = 1e-12;
@@ -38,6 +40,10 @@ pub(super) enum Range {
 
 pub(super) fn check(raw: &Raw) -> Result<Scenario> {
     let name = name(raw.required(Key::Name)?)?;
+    let units = Units {
+        length: raw.optional(Key::UnitLength).map(unit).transpose()?,
+        force: raw.optional(Key::UnitForce).map(unit).transpose()?,
+    };
     let rods = rods(raw.required(Key::Rods)?)?;
     let rods = veins(raw, rods)?;
     let joined = raw.optional(Key::Joined).map_or(Ok(true), truth)?;
@@ -49,6 +55,7 @@ pub(super) fn check(raw: &Raw) -> Result<Scenario> {
     let dynamics = dynamics::check::read(raw, &rods, [gravity, tip_force, tip_moment])?;
     let scenario = Scenario {
         name,
+        units,
         rods,
         joined,
         coupling,
@@ -74,6 +81,19 @@ fn name(item: Item) -> Result<String> {
         Ok(name.to_string())
     } else {
         Err(item.refuse(Problem::Name { most: LONGEST_NAME }))
+    }
+}
+
+fn unit(item: Item) -> Result<String> {
+    let DeValue::String(unit) = item.value() else {
+        return Err(item.refuse(Problem::WrongType {
+            needed: Needed::Text,
+        }));
+    };
+    let printed = !unit.trim().is_empty() && !unit.chars().any(char::is_control);
+    match printed && unit.chars().count() <= LONGEST_UNIT {
+        true => Ok(unit.trim().to_string()),
+        false => Err(item.refuse(Problem::Unit { most: LONGEST_UNIT })),
     }
 }
 

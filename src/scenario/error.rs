@@ -296,6 +296,12 @@ pub enum Problem {
         /// Most bytes allowed.
         most: usize,
     },
+    /// A name of a unit that is too long for an axis.
+    #[error("must be 1 to {most} characters that can be printed")]
+    Unit {
+        /// Most characters allowed.
+        most: usize,
+    },
     /// A tip moment on more than one rod.
     #[error("a moment at the tip needs leaf.rods = 1 (here {rods}): joined tips pass on no moment")]
     MomentOnManyRods {

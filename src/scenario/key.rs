@@ -6,6 +6,10 @@
 pub enum Key {
     /// `name`: the leaf's name.
     Name,
+    /// `units.length`: name of the unit of length.
+    UnitLength,
+    /// `units.force`: name of the unit of force.
+    UnitForce,
     /// `leaf.rods`: number of rods.
     Rods,
     /// `leaf.length`: lengths.
@@ -79,8 +83,10 @@ pub enum Key {
 const LOAD_IN_TIME: &str = "{ at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]] }";
 
 /// Key, full path, and an example of its value; in the order of [`Key`].
-const FORMAT: [(Key, &str, &str); 35] = [
+const FORMAT: [(Key, &str, &str); 37] = [
     (Key::Name, "name", "\"my-leaf\""),
+    (Key::UnitLength, "units.length", "\"cm\""),
+    (Key::UnitForce, "units.force", "\"N\""),
     (Key::Rods, "leaf.rods", "5"),
     (Key::Length, "leaf.length", "1.0"),
     (Key::Fan, "leaf.fan", "\"symmetric\""),
@@ -122,7 +128,8 @@ const FORMAT: [(Key, &str, &str); 35] = [
 ];
 
 /// The tables of the format.
-pub(super) const TABLES: [&str; 7] = [
+pub(super) const TABLES: [&str; 8] = [
+    "units",
     "leaf",
     "stiffness",
     "rest",

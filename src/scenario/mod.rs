@@ -30,6 +30,8 @@ pub use schedule::Schedule;
 pub struct Scenario {
     /// Name of the scenario; output goes to `out/<name>` by default.
     pub name: String,
+    /// Names of the units, for axes; nothing is converted.
+    pub units: Units,
     /// The veins, from one edge of the leaf to the other; at least one.
     pub rods: Vec<Rod>,
     /// Whether all tips share one point.
@@ -48,6 +50,15 @@ pub struct Scenario {
     pub tolerance: f64,
     /// How the leaf moves; what is at rest does not depend on it.
     pub dynamics: Dynamics,
+}
+
+/// Names of the units a scenario is written in.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Units {
+    /// Of lengths.
+    pub length: Option<String>,
+    /// Of forces.
+    pub force: Option<String>,
 }
 
 /// One vein as a special Cosserat rod. Index 0 of every triple belongs to the

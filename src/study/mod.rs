@@ -1,12 +1,22 @@
 //! What is built on the solvers.
 
+mod chart;
 mod check;
 mod map;
+mod trace;
 mod vary;
 
+pub use chart::{
+    Chart, ChartError, ChartOptions, Contender, Decade, Ending, Peer, PeerRow, PeersError,
+    Reference, Row, Scaling, ScalingRow, Setting, Spread, Turn, chart, read_peers, scaling,
+};
 pub use check::{Check, CheckOptions, Place, Quantity, Shot, Verdict, check};
 pub use map::{
     CELL_SECONDS, Confidence, Map, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow, MapShow,
     UnknownWord, map,
+};
+pub use trace::{
+    Law, MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceEnd, TraceError,
+    TracePoint, TraceRequest, trace,
 };
 pub use vary::{Base, Keys, Knob, Knobs, Target, Varied, Vary, VaryError};

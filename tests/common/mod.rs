@@ -9,7 +9,7 @@ use glam::DVec3;
 use leafdyn::bvp::{self, Failure, Solution, Start};
 use leafdyn::leaf::{Leaf, Scale};
 use leafdyn::relax::{Equilibrium, NodeState, Options, RodShape, relax};
-use leafdyn::scenario::{Dynamics, Profile, Rod, Scenario};
+use leafdyn::scenario::{Dynamics, Profile, Rod, Scenario, Units};
 use leafdyn::shape::Difference;
 
 /// The tolerance at which canonical values are checked: small enough for the
@@ -245,6 +245,7 @@ pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -
     let gravity = [0.0, 0.0, -weight];
     Scenario {
         name: "leaf".into(),
+        units: Units::default(),
         dynamics: Dynamics::default_for(&veins).with_loads(gravity, [0.0; 3], [0.0; 3]),
         rods: veins,
         joined: true,

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::step::{add_inertia, tensor};
+use super::step::add_inertia;
 use super::{Moving, SemiImplicit};
 
 /// A first step from rest, of implicit Euler, so short that the leaf hardly
@@ -98,7 +98,7 @@ impl SemiImplicit<'_> {
                 let k = self.state.base(j) + i;
                 let (moment, force) = self.system.unbalanced(j, i);
                 let inertia = self.inertia[k];
-                let tensor = tensor(&inertia, &self.state, k);
+                let tensor = inertia.tensor(self.state.q[k]);
                 let w = [tensor.inverse() * moment, force / inertia.mass];
                 if i == n {
                     tip_force += force;

@@ -5,7 +5,6 @@ use glam::DVec3;
 use super::super::friction::rates;
 use super::super::ledger::Exchange;
 use super::SemiImplicit;
-use super::step::tensor;
 use crate::leaf::{Loads, State};
 use crate::rotation;
 
@@ -117,7 +116,7 @@ impl SemiImplicit<'_> {
             let mean = |c: usize| 0.5 * (before.v[c] + after.v[c]);
             let turn = rotation::log(self.state.q[k] * self.trial.q[k].conjugate());
             let shift = self.state.x[k] - self.trial.x[k];
-            sum += turn.dot(tensor(inertia, &self.state, k) * mean(0));
+            sum += turn.dot(inertia.tensor(self.state.q[k]) * mean(0));
             sum += inertia.mass * shift.dot(mean(1));
         }
         sum

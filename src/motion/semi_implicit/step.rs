@@ -193,16 +193,9 @@ pub(super) fn add_inertia(
     for j in 0..state.rods() {
         for i in 1..=n {
             let k = state.base(j) + i;
-            let tensor = tensor(&inertia[k], state, k);
+            let tensor = inertia[k].tensor(state.q[k]);
             let matrix = (tensor * heavy, inertia[k].mass * heavy);
             system.add(j, i, matrix, load(k, &tensor));
         }
     }
-}
-
-/// Tensor of inertia of a node.
-pub(super) fn tensor(inertia: &Inertia, state: &State, k: usize) -> DMat3 {
-    let d1 = state.q[k] * DVec3::X;
-    let excess = inertia.excess * inertia.transverse;
-    DMat3::from_diagonal(DVec3::splat(inertia.transverse)) + rotation::outer(d1, d1) * excess
 }

@@ -101,6 +101,11 @@ pub struct Axes {
 }
 
 impl Axes {
+    /// Where a point is on the page.
+    pub fn at(&self, (x, y): (f64, f64)) -> DVec2 {
+        self.place(x, y)
+    }
+
     fn place(&self, x: f64, y: f64) -> DVec2 {
         let part = |range: Range, value: f64| (value - range.low) / (range.high - range.low);
         let Cell { corner, size } = self.cell;

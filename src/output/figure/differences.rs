@@ -216,7 +216,8 @@ fn draw_axes(page: &mut Drawing, axis: &Axis) {
     );
 }
 
-fn dashes(page: &mut Drawing, from: DVec2, to: DVec2, color: Color) {
+/// A dashed line.
+pub fn dashes(page: &mut Drawing, from: DVec2, to: DVec2, stroke: Stroke) {
     const DASH: f64 = 5.0;
     const GAP: f64 = 4.0;
     let length = to.distance(from);
@@ -224,7 +225,6 @@ fn dashes(page: &mut Drawing, from: DVec2, to: DVec2, color: Color) {
     let mut start = 0.0;
     while start < length {
         let end = (start + DASH).min(length);
-        let stroke = Stroke::new(color, 1.0);
         page.line(from + start * along, from + end * along, stroke);
         start += DASH + GAP;
     }
@@ -233,7 +233,8 @@ fn dashes(page: &mut Drawing, from: DVec2, to: DVec2, color: Color) {
 fn draw_allowed(page: &mut Drawing, axis: &Axis, curve: &Curve) {
     if let Some(y) = curve.allowed.and_then(|allowed| axis.up(allowed)) {
         let (from, to) = (axis.across(0.0), axis.across(1.0));
-        dashes(page, DVec2::new(from, y), DVec2::new(to, y), curve.color);
+        let stroke = Stroke::new(curve.color, 1.0);
+        dashes(page, DVec2::new(from, y), DVec2::new(to, y), stroke);
     }
 }
 
@@ -294,7 +295,7 @@ fn draw_key(page: &mut Drawing, curves: &[Curve], cell: Cell) {
         at.y += ENTRY;
     }
     let end = at + DVec2::new(SWATCH, 0.0);
-    dashes(page, at, end, NOTE);
+    dashes(page, at, end, Stroke::new(NOTE, 1.0));
     let base = DVec2::new(text, at.y + HALF_CAPITAL * TICK_SIZE);
     let dashed = "dashed: allowed difference";
     page.label(base, dashed, TICK_SIZE, Anchor::Start, NOTE);

@@ -1,9 +1,11 @@
 //! JSON, for scripts: compact, numbers that are not finite as null.
 
+mod chart;
 mod check;
 mod map;
 mod motion;
 mod summary;
+mod trace;
 
 use std::io::{self, Write};
 
@@ -11,10 +13,12 @@ use glam::DVec3;
 use serde::Serialize;
 use serde_json::ser::Formatter;
 
+pub use chart::ChartSummary;
 pub use check::CheckSummary;
 pub use map::MapSummary;
 pub use motion::MotionSummary;
 pub use summary::Summary;
+pub use trace::TraceSummary;
 
 type Point = [f64; 3];
 

@@ -45,6 +45,8 @@ struct Object<'a> {
     tip_force_sum: Point,
     stable: Option<bool>,
     negative_eigenvalues: Option<usize>,
+    lowest_eigenvalues: Option<Vec<f64>>,
+    eigenvalue_errors: Option<Vec<f64>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     saddle: Option<Saddle>,
     undulation: Waves,
@@ -148,6 +150,8 @@ impl<'a> From<&'a Equilibrium> for Object<'a> {
             tip_force_sum: equilibrium.tip_force_sum.to_array(),
             stable: equilibrium.stable(),
             negative_eigenvalues: equilibrium.negative_eigenvalues,
+            lowest_eigenvalues: eigenvalues(equilibrium),
+            eigenvalue_errors: errors(equilibrium),
             saddle: equilibrium.saddle.map(|saddle| Saddle {
                 energy: saddle.energy,
                 negative_eigenvalues: saddle.negative_eigenvalues,
@@ -172,6 +176,17 @@ impl<'a> From<&'a Equilibrium> for Object<'a> {
                 .collect(),
         }
     }
+}
+
+fn eigenvalues(equilibrium: &Equilibrium) -> Option<Vec<f64>> {
+    let modes = equilibrium.modes.as_ref()?;
+    Some(modes.iter().map(|mode| mode.eigenvalue).collect())
+}
+
+/// Only all together.
+fn errors(equilibrium: &Equilibrium) -> Option<Vec<f64>> {
+    let modes = equilibrium.modes.as_ref()?;
+    modes.iter().map(|mode| mode.error).collect()
 }
 
 #[cfg(test)]
@@ -203,6 +218,8 @@ mod tests {
             "tip_force_sum",
             "stable",
             "negative_eigenvalues",
+            "lowest_eigenvalues",
+            "eigenvalue_errors",
             "undulation",
             "model",
             "shear_effect",

@@ -1,0 +1,314 @@
+//! Where the index changes: folds and points where branches cross.
+
+use super::equations::{Deflated, Equations, Stuck};
+use super::field::{add, dot, plus, times};
+use super::{Point, Tangent};
+use crate::leaf::{Field, State};
+
+/// Modes held besides those that change their sign: neutral ones may be there.
+const MORE: usize = 2;
+
+/// Evaluations on the way to a zero.
+const EVALUATIONS: usize = 40;
+
+/// Accuracy of a zero, as a part of the step in which it lies.
+const ACCURACY: f64 = 1e-13;
+
+/// A slope from points nearer than this part of a step is rounding.
+const LOCAL: f64 = 1e-6;
+
+/// Eigenvalues that change less than this are neutral, not changing sign.
+const NEUTRAL: f64 = 1e-6;
+
+/// Zeros within this part of a step are one.
+const SAME: f64 = 1e-6;
+
+/// What a critical point is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The branch turns round in the parameter.
+    Fold,
+    /// Other branches cross.
+    Branching,
+}
+
+/// A point of a branch at which the matrix is singular.
+#[derive(Clone, Debug)]
+pub struct Critical {
+    /// The state.
+    pub state: State,
+    /// The parameter, as a fraction of its range.
+    pub fraction: f64,
+    /// The direction of the branch.
+    pub tangent: Tangent,
+    /// What it is.
+    pub kind: Kind,
+    /// Morse index before and after.
+    pub indices: [usize; 2],
+    /// The neutral modes, of mass one.
+    pub modes: Vec<Field>,
+    /// All modes of the border.
+    pub held: Vec<Field>,
+    /// Which of the sorted eigenvalues of H is zero, and its change with the
+    /// way along the tangent.
+    pub which: usize,
+    /// That change.
+    pub slope: f64,
+}
+
+/// The critical points between two points of a branch, the second of them
+/// found by a step of the given length from the first.
+///
+/// # Errors
+/// If the branch cannot be followed between them.
+pub fn locate(
+    equations: &mut Equations,
+    a: &Point,
+    b: &Point,
+    step: f64,
+) -> Result<Vec<Critical>, Stuck> {
+    let count = a.index.abs_diff(b.index) + MORE;
+    let held = equations.soft_modes(a, count)?;
+    let mut search = Search {
+        equations,
+        from: a,
+        held: &held,
+    };
+    let ends = [search.at(0.0)?, search.at(step)?];
+    let mut found: Vec<(f64, Critical)> = Vec::new();
+    for which in 0..ends[0].eigenvalues.len() {
+        let values = [0, 1].map(|k| ends[k].eigenvalues[which]);
+        let large = values[0].abs().max(values[1].abs()) > NEUTRAL;
+        if values[0] * values[1] < 0.0 && large {
+            let (at, critical) = search.zero(which, [0.0, step], values, [a.index, b.index])?;
+            match found.iter_mut().find(|(s, _)| (s - at).abs() < SAME * step) {
+                Some((_, same)) => same.modes.extend(critical.modes),
+                None => found.push((at, critical)),
+            }
+        }
+    }
+    found.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    // Each takes its own share of the change, in the order of the way.
+    let mut before = a.index;
+    let up = b.index > a.index;
+    let mut all: Vec<Critical> = Vec::new();
+    for (_, mut critical) in found {
+        let change = critical.modes.len();
+        let after = match up {
+            true => before + change,
+            false => before.saturating_sub(change),
+        };
+        critical.indices = [before, after];
+        before = after;
+        all.push(critical);
+    }
+    for critical in &mut all {
+        if critical.modes.len() > 1 {
+            critical.kind = Kind::Branching;
+        }
+    }
+    Ok(all)
+}
+
+/// Points along the tangent of one, and the eigenvalues of H there.
+struct Search<'s, 'a> {
+    equations: &'s mut Equations<'a>,
+    from: &'s Point,
+    held: &'s [Field],
+}
+
+/// What is found at one of them.
+struct Sample {
+    deflated: Deflated,
+    eigenvalues: Vec<f64>,
+    /// Eigenvectors of H, in the order of the eigenvalues.
+    vectors: Vec<Vec<f64>>,
+}
+
+/// Below this part of what a mode could feel of the parameter, it feels
+/// nothing but rounding.
+const DRIVEN: f64 = 1e-6;
+
+impl Search<'_, '_> {
+    fn at(&mut self, way: f64) -> Result<Sample, Stuck> {
+        let t = &self.from.tangent;
+        let (state, fraction) = (&self.from.state, self.from.fraction);
+        let moved = (self.equations).moved(state, fraction, &t.increments, way)?;
+        let fraction = fraction + way * t.fraction;
+        let deflated = (self.equations).deflated(&moved, fraction, t, self.held)?;
+        Ok(sample(deflated))
+    }
+
+    /// The zero of one eigenvalue by the method of Anderson and Bjorck.
+    fn zero(
+        &mut self,
+        which: usize,
+        mut way: [f64; 2],
+        mut value: [f64; 2],
+        indices: [usize; 2],
+    ) -> Result<(f64, Critical), Stuck> {
+        let whole = way[1] - way[0];
+        let mut slope = (value[1] - value[0]) / whole;
+        let mut best: Option<(f64, Sample)> = None;
+        let (mut last, mut last_value) = (way[1], value[1]);
+        for _ in 0..EVALUATIONS {
+            let at = (way[0] * value[1] - way[1] * value[0]) / (value[1] - value[0]);
+            let sample = self.at(at)?;
+            let now = sample.eigenvalues[which];
+            let done = (at - last).abs() < ACCURACY * whole || now == 0.0;
+            if (at - last).abs() > LOCAL * whole {
+                slope = (now - last_value) / (at - last);
+            }
+            if best
+                .as_ref()
+                .is_none_or(|(_, held)| now.abs() <= held.eigenvalues[which].abs())
+            {
+                best = Some((at, sample));
+            }
+            if done {
+                break;
+            }
+            (last, last_value) = (at, now);
+            if now * value[1] < 0.0 {
+                way[0] = way[1];
+                value[0] = value[1];
+            } else {
+                let shrunk = 1.0 - now / value[1];
+                value[0] *= if shrunk > 0.0 { shrunk } else { 0.5 };
+            }
+            (way[1], value[1]) = (at, now);
+        }
+        let (at, sample) = best.ok_or(Stuck::NotConverged)?;
+        let kept = (self.held, &self.from.tangent);
+        Ok((
+            at,
+            critical(self.equations, sample, which, slope, kept, indices),
+        ))
+    }
+}
+
+fn sample(deflated: Deflated) -> Sample {
+    let eigen = deflated.h.clone().symmetric_eigen();
+    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    Sample {
+        eigenvalues: order.iter().map(|&k| eigen.eigenvalues[k]).collect(),
+        vectors: order
+            .iter()
+            .map(|&k| eigen.eigenvectors.column(k).iter().copied().collect())
+            .collect(),
+        deflated,
+    }
+}
+
+fn critical(
+    equations: &Equations,
+    sample: Sample,
+    which: usize,
+    slope: f64,
+    (held, tangent): (&[Field], &Tangent),
+    indices: [usize; 2],
+) -> Critical {
+    let vector = &sample.vectors[which];
+    let mut mode = times(&sample.deflated.modes[0], 0.0);
+    for (part, other) in vector.iter().zip(&sample.deflated.modes) {
+        add(&mut mode, *part, other);
+    }
+    let norm = equations.product(&mode, &mode).sqrt();
+    let drive: f64 = vector
+        .iter()
+        .zip(sample.deflated.drive.iter())
+        .map(|(v, d)| v * d)
+        .sum();
+    let rate = &sample.deflated.rate;
+    let most = (dot(rate, rate) * dot(&mode, &mode)).sqrt();
+    Critical {
+        kind: match drive.abs() > DRIVEN * most.max(slope.abs()) {
+            true => Kind::Fold,
+            false => Kind::Branching,
+        },
+        state: sample.deflated.state,
+        fraction: sample.deflated.fraction,
+        tangent: tangent.clone(),
+        indices,
+        modes: vec![times(&mode, 1.0 / norm)],
+        held: held.to_vec(),
+        which,
+        slope,
+    }
+}
+
+impl Critical {
+    /// The same point on another grid or of a softened matrix, near the given
+    /// state, by the secant method.
+    ///
+    /// # Errors
+    /// If it is not there.
+    pub fn again(&self, equations: &mut Equations) -> Result<Critical, Stuck> {
+        let from = Point {
+            state: self.state.clone(),
+            fraction: self.fraction,
+            tangent: self.tangent.clone(),
+            index: self.indices[0],
+        };
+        let mut search = Search {
+            equations,
+            from: &from,
+            held: &self.held,
+        };
+        let (mut way, mut slope) = (0.0, self.slope);
+        let mut best = search.at(way)?;
+        let mut value = best.eigenvalues[self.which];
+        let mut worse = 0;
+        for _ in 0..EVALUATIONS {
+            let step = -value / slope;
+            if !step.is_finite() || step.abs() > 1.0 {
+                return Err(Stuck::NotConverged);
+            }
+            let next = search.at(way + step)?;
+            let after = next.eigenvalues[self.which];
+            if step.abs() > LOCAL {
+                slope = (after - value) / step;
+            }
+            (way, value) = (way + step, after);
+            match after.abs() < best.eigenvalues[self.which].abs() {
+                true => best = next,
+                false => worse += 1,
+            }
+            if step.abs() < ACCURACY || worse > 1 {
+                break;
+            }
+        }
+        let sample = best;
+        let mut found = critical(
+            search.equations,
+            sample,
+            self.which,
+            slope,
+            (&self.held, &self.tangent),
+            self.indices,
+        );
+        found.kind = self.kind;
+        Ok(found)
+    }
+
+    /// Change of the eigenvalue with the parameter, but at a fold, where it is
+    /// infinite and the parameter as exact as it can be.
+    pub fn steepness(&self) -> f64 {
+        match self.kind {
+            Kind::Fold => f64::INFINITY,
+            Kind::Branching => (self.slope / self.tangent.fraction).abs(),
+        }
+    }
+
+    /// A direction along which another branch may leave: a neutral mode
+    /// without its part along this branch.
+    pub fn across(&self, equations: &Equations, mode: usize) -> Tangent {
+        let mode = &self.modes[mode];
+        let part = equations.product(&self.tangent.increments, mode);
+        equations.normalised(Tangent {
+            increments: plus(mode, -part, &self.tangent.increments),
+            fraction: -part * self.tangent.fraction,
+        })
+    }
+}

@@ -1,0 +1,584 @@
+//! The equations of a branch on one grid, linearised and solved.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::family::{Family, OutOfRange, clamp};
+use super::field::{add, dot, is_finite, largest, plus, times};
+use super::{Point, Tangent};
+use crate::leaf::{Bordered, DiscreteLeaf, Field, Grid, Solved, SparsePattern, State, System};
+use crate::rod::RESOLVED_TURN;
+
+/// Part of the parameter's range over which forces are differenced: the error
+/// is a ten-thousand-millionth, and what rounding makes of it no larger.
+const DIFFERENCE: f64 = 1e-5;
+
+/// Newton iterations that lead back to a branch.
+const ITERATIONS: usize = 10;
+
+/// Largest increment (radians, lengths, fractions) on the way.
+const LARGEST: f64 = 1.0;
+
+/// Relative accuracy of the conjugate gradients.
+const CG_TOLERANCE: f64 = 1e-11;
+
+/// Accuracy of a point (radians, lengths).
+const ACCURACY: f64 = 1e-10;
+
+/// A step by which no eigenvalue, not even a neutral one, changes its sign.
+const SAME_INDEX: f64 = 1e-9;
+
+/// What of a singular matrix of the border counts as zero, relative to the rest.
+const NEUTRAL: f64 = 1e-7;
+
+/// Rounding of a force, in units of that of the stiffest segment.
+const ROUNDING: f64 = 10.0;
+
+/// Why there is no point.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum Stuck {
+    /// The parameter has left its range.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
+    /// A segment bends by more than the grid resolves.
+    #[error("a vein bends by more than a right angle within one segment")]
+    Unresolved,
+    /// Newton's method does not converge.
+    #[error("Newton's method does not lead back to the branch")]
+    NotConverged,
+    /// The matrix does not fit into memory.
+    #[error("the sparse factorisation of the leaf does not fit into memory")]
+    TooLarge,
+}
+
+/// The equations of a family of leaves on a grid, with room for their solution.
+pub struct Equations<'a> {
+    /// The leaves.
+    pub family: &'a Family<'a>,
+    /// The same with softened matrices, where these decide what is critical.
+    /// Newton's method needs the true ones: next to a singularity of the softened
+    /// it would not converge.
+    pub softened: Option<Family<'a>>,
+    /// The grid.
+    pub grid: Grid,
+    system: System,
+    pattern: Option<SparsePattern>,
+    bordered: Option<(usize, SparsePattern)>,
+    /// Whether rods are solved one by one, as can be in a valley.
+    rodwise: bool,
+    /// Matrices factorised so far.
+    pub factorizations: usize,
+}
+
+/// Forces and their derivative at some state.
+struct Linear {
+    /// Unbalanced forces.
+    forces: Field,
+    /// Their change with the parameter.
+    rate: Field,
+}
+
+/// Solutions of one matrix for two right-hand sides.
+struct Pair {
+    forces: Field,
+    rate: Field,
+    /// Negative eigenvalues, where the factorisation tells them.
+    index: Option<usize>,
+}
+
+/// A point found in the presence of modes that are nearly neutral.
+pub struct Deflated {
+    /// The state.
+    pub state: State,
+    /// The parameter.
+    pub fraction: f64,
+    /// H of the border: minus the eigenvalues, in the limit, on its diagonal.
+    pub h: DMatrix<f64>,
+    /// X of the border: the modes.
+    pub modes: Vec<Field>,
+    /// How the modes feel the parameter: zero at a bifurcation, not at a fold.
+    pub drive: DVector<f64>,
+    /// How the forces change with it.
+    pub rate: Field,
+}
+
+impl<'a> Equations<'a> {
+    /// Room for the equations of `family` on `grid`.
+    ///
+    /// # Errors
+    /// If the family has no leaf at the start of its range.
+    pub fn new(family: &'a Family<'a>, grid: Grid) -> Result<Self, OutOfRange> {
+        let system = family.with(0.0, &grid, System::new)?;
+        Ok(Equations {
+            family,
+            softened: None,
+            grid,
+            system,
+            pattern: None,
+            bordered: None,
+            rodwise: true,
+            factorizations: 0,
+        })
+    }
+
+    /// The same on the grid with all segments halved.
+    ///
+    /// # Errors
+    /// As [`Equations::new`].
+    pub fn refined(&self) -> Result<Self, OutOfRange> {
+        Equations::new(self.family, self.grid.refined())
+    }
+
+    /// Product of two increments over the masses, per unit of the leaf's mass.
+    pub fn product(&self, a: &Field, b: &Field) -> f64 {
+        dot(&self.system.momentum(a), b) / self.mass()
+    }
+
+    /// The mass matrix times increments, per unit of the leaf's mass.
+    pub fn momentum(&self, a: &Field) -> Field {
+        times(&self.system.momentum(a), 1.0 / self.mass())
+    }
+
+    fn mass(&self) -> f64 {
+        let ones = vec![vec![[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]; self.grid.segments()]; self.rods()];
+        dot(&self.system.momentum(&ones), &ones)
+    }
+
+    fn rods(&self) -> usize {
+        self.system.rods.len()
+    }
+
+    /// Product of two directions.
+    pub fn along(&self, a: &Tangent, b: &Tangent) -> f64 {
+        self.product(&a.increments, &b.increments) + a.fraction * b.fraction
+    }
+
+    /// A direction of length one.
+    pub fn normalised(&self, t: Tangent) -> Tangent {
+        let length = self.along(&t, &t).sqrt();
+        Tangent {
+            increments: times(&t.increments, 1.0 / length),
+            fraction: t.fraction / length,
+        }
+    }
+
+    /// The state that lies `step` further along a direction.
+    ///
+    /// # Errors
+    /// If the family has no leaf at `fraction`.
+    pub fn moved(
+        &mut self,
+        state: &State,
+        fraction: f64,
+        increments: &Field,
+        step: f64,
+    ) -> Result<State, OutOfRange> {
+        self.system.set_solution(increments);
+        let system = &self.system;
+        self.family.with(fraction, &self.grid, |leaf| {
+            let mut next = state.clone();
+            leaf.advance(state, system, step, &mut next);
+            next
+        })
+    }
+
+    /// The forces, their rates, and the matrix (left in the system).
+    fn linearise(&mut self, state: &mut State, fraction: f64) -> Result<Linear, Stuck> {
+        self.linearise_in(*self.family, state, fraction)
+    }
+
+    fn linearise_in(
+        &mut self,
+        family: Family,
+        state: &mut State,
+        fraction: f64,
+    ) -> Result<Linear, Stuck> {
+        let (grid, system) = (&self.grid, &mut self.system);
+        let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
+            // At an end of the range there may be nothing beyond.
+            let mut at = |step: f64| {
+                family.with(fraction + step, grid, |leaf| {
+                    let mut moved = state.clone();
+                    clamp(leaf, &mut moved);
+                    leaf.assemble(&moved, system);
+                    (step, system.rhs())
+                })
+            };
+            at(step).or_else(|_| at(0.0))
+        });
+        let ((after, forces_after), (before, forces_before)) = (after?, before?);
+        let rate = plus(&forces_after, -1.0, &forces_before);
+        let rate = times(&rate, 1.0 / (after - before));
+        let turn = family.with(fraction, grid, |leaf| {
+            clamp(leaf, state);
+            leaf.assemble(state, system).turn
+        })?;
+        if !turn.is_finite() || turn > RESOLVED_TURN {
+            return Err(Stuck::Unresolved);
+        }
+        Ok(Linear {
+            forces: system.rhs(),
+            rate,
+        })
+    }
+
+    /// Solves for both right-hand sides with K + shift M: rod by rod if that
+    /// goes, or directly.
+    fn solve(&mut self, linear: &Linear, shift: f64) -> Result<Pair, Stuck> {
+        self.factorizations += 1;
+        if self.rodwise {
+            let system = &mut self.system;
+            let mut solved = |rhs: &Field| {
+                system.set_rhs(rhs);
+                match system.solve(None, CG_TOLERANCE) {
+                    Solved::Yes(_) => Some(system.solution()),
+                    _ => None,
+                }
+            };
+            let _ = &mut solved;
+            if self.system.factorize(shift) {
+                let mut solved = |rhs: &Field| {
+                    self.system.set_rhs(rhs);
+                    let found = self.system.solve(None, CG_TOLERANCE);
+                    matches!(found, Solved::Yes(_)).then(|| self.system.solution())
+                };
+                if let (Some(forces), Some(rate)) = (solved(&linear.forces), solved(&linear.rate)) {
+                    return Ok(Pair {
+                        forces,
+                        rate,
+                        index: None,
+                    });
+                }
+            }
+            self.rodwise = false;
+            self.factorizations += 1;
+        }
+        if self.pattern.is_none() {
+            self.pattern = Some(SparsePattern::new(&self.system).map_err(|_| Stuck::TooLarge)?);
+        }
+        let pattern = self.pattern.as_ref().ok_or(Stuck::TooLarge)?;
+        let factor = pattern.factorize(&self.system, shift);
+        let mut factor = factor.map_err(|_| Stuck::TooLarge)?;
+        Ok(Pair {
+            forces: factor.solve_bordered(&linear.forces, &[]).increments,
+            rate: factor.solve_bordered(&linear.rate, &[]).increments,
+            index: Some(factor.negative()),
+        })
+    }
+
+    /// Newton's method back to the branch within the plane normal to `normal`
+    /// through the given state; with no normal, at the given parameter. Returns
+    /// the point, with its tangent so that it goes on along `normal`, and the
+    /// number of iterations.
+    ///
+    /// # Errors
+    /// If there is no point.
+    pub fn correct(
+        &mut self,
+        state: &State,
+        fraction: f64,
+        normal: Option<&Tangent>,
+    ) -> Result<(Point, usize), Stuck> {
+        let (mut state, mut fraction) = (state.clone(), fraction);
+        let dual = normal.map(|t| (self.momentum(&t.increments), t.fraction));
+        let mut previous = f64::INFINITY;
+        for iteration in 1..=ITERATIONS {
+            let linear = self.linearise(&mut state, fraction)?;
+            let shift = self.neutral_shift(fraction)?;
+            let pair = self.solve(&linear, shift)?;
+            let step = match &dual {
+                None => 0.0,
+                Some((dual, own)) => -dot(dual, &pair.forces) / (dot(dual, &pair.rate) + own),
+            };
+            let increments = plus(&pair.forces, step, &pair.rate);
+            let size = largest(&increments).max(step.abs());
+            if !is_finite(&increments) || !step.is_finite() || size > LARGEST {
+                return Err(Stuck::NotConverged);
+            }
+            state = self.moved(&state, fraction, &increments, 1.0)?;
+            fraction += step;
+            if converged(size, previous) {
+                let (family, grid) = (self.family, &self.grid);
+                family.with(fraction, grid, |leaf| clamp(leaf, &mut state))?;
+                let tangent = self.normalised(Tangent {
+                    increments: pair.rate,
+                    fraction: 1.0,
+                });
+                let tangent = match normal {
+                    Some(normal) if self.along(&tangent, normal) < 0.0 => reversed(tangent),
+                    _ => tangent,
+                };
+                // The matrix at hand is that of the state before.
+                let index = match pair.index {
+                    Some(index) if size < SAME_INDEX => index,
+                    _ => self.index(&state, fraction)?,
+                };
+                return Ok((
+                    Point {
+                        state,
+                        fraction,
+                        tangent,
+                        index,
+                    },
+                    iteration,
+                ));
+            }
+            previous = size;
+        }
+        Err(Stuck::NotConverged)
+    }
+
+    /// Morse index of a state at rest, neutral modes not counting.
+    fn index(&mut self, state: &State, fraction: f64) -> Result<usize, Stuck> {
+        let shift = self.neutral_shift(fraction)?;
+        let (family, grid, system) = (self.family, &self.grid, &mut self.system);
+        self.factorizations += 1;
+        let assemble = |system: &mut System| {
+            family.with(fraction, grid, |leaf| {
+                leaf.assemble(state, system);
+            })
+        };
+        assemble(system)?;
+        if system.stable_without_coupling(shift) {
+            return Ok(0);
+        }
+        assemble(system)?;
+        self.factorizations += 1;
+        if self.pattern.is_none() {
+            self.pattern = Some(SparsePattern::new(system).map_err(|_| Stuck::TooLarge)?);
+        }
+        let pattern = self.pattern.as_ref().ok_or(Stuck::TooLarge)?;
+        let factor = pattern
+            .factorize(system, shift)
+            .map_err(|_| Stuck::TooLarge)?;
+        Ok(factor.negative())
+    }
+
+    /// Rounding of the forces.
+    fn rounding(&self, fraction: f64) -> Result<f64, OutOfRange> {
+        self.family.with(fraction, &self.grid, |leaf| {
+            let sections = leaf.sections.iter();
+            let stiffest = sections.fold(1.0, |m: f64, s| m.max(s.condensing.max_element()));
+            ROUNDING * f64::EPSILON * stiffest
+        })
+    }
+
+    fn neutral_shift(&self, fraction: f64) -> Result<f64, OutOfRange> {
+        let shift = |leaf: &DiscreteLeaf| leaf.neutral_shift();
+        self.family.with(fraction, &self.grid, shift)
+    }
+
+    /// The point of the branch in a plane, where the matrix may be singular:
+    /// it is bordered by the masses times `modes`, and what these cannot decide
+    /// is left as it is.
+    ///
+    /// # Errors
+    /// If there is no point.
+    pub fn deflated(
+        &mut self,
+        state: &State,
+        fraction: f64,
+        normal: &Tangent,
+        modes: &[Field],
+    ) -> Result<Deflated, Stuck> {
+        let (mut state, mut fraction) = (state.clone(), fraction);
+        let border: Vec<Field> = modes.iter().map(|mode| self.momentum(mode)).collect();
+        let (dual, own) = (self.momentum(&normal.increments), normal.fraction);
+        let p = modes.len();
+        let mut previous = f64::INFINITY;
+        let mut finished = false;
+        for _ in 0..=ITERATIONS {
+            let family = match (finished, self.softened) {
+                (true, Some(softened)) => softened,
+                _ => *self.family,
+            };
+            let linear = self.linearise_in(family, &mut state, fraction)?;
+            let mut solve = self.factor_bordered(&border)?;
+            let none = vec![0.0; p];
+            let forces = solve(&linear.forces, &none);
+            let rate = solve(&linear.rate, &none);
+            let zero = times(&linear.forces, 0.0);
+            let columns: Vec<Bordered> = (0..p)
+                .map(|i| {
+                    let mut unit = none.clone();
+                    unit[i] = 1.0;
+                    solve(&zero, &unit)
+                })
+                .collect();
+            drop(solve);
+            let h = DMatrix::from_fn(p, p, |r, c| {
+                0.5 * (columns[c].multipliers[r] + columns[r].multipliers[c])
+            });
+            if finished {
+                return Ok(Deflated {
+                    state,
+                    fraction,
+                    h,
+                    drive: DVector::from_vec(rate.multipliers),
+                    rate: linear.rate,
+                    modes: columns
+                        .into_iter()
+                        .map(|column| column.increments)
+                        .collect(),
+                });
+            }
+            // What is below rounding decides nothing.
+            let noise = self.rounding(fraction)?;
+            let felt = |force: f64| if force.abs() < noise { 0.0 } else { force };
+            let mut matrix = DMatrix::zeros(p + 1, p + 1);
+            let mut right = DVector::zeros(p + 1);
+            for r in 0..p {
+                for c in 0..p {
+                    matrix[(r, c)] = h[(r, c)];
+                }
+                matrix[(r, p)] = rate.multipliers[r];
+                matrix[(p, r)] = dot(&dual, &columns[r].increments);
+                right[r] = -felt(forces.multipliers[r]);
+            }
+            matrix[(p, p)] = dot(&dual, &rate.increments) + own;
+            right[p] = -dot(&dual, &forces.increments);
+            let svd = matrix.svd(true, true);
+            let least = NEUTRAL * svd.singular_values.max();
+            let solution = svd.solve(&right, least).map_err(|_| Stuck::NotConverged)?;
+            let mut increments = plus(&forces.increments, solution[p], &rate.increments);
+            for (column, part) in columns.iter().zip(solution.iter()) {
+                add(&mut increments, *part, &column.increments);
+            }
+            let size = largest(&increments).max(solution[p].abs());
+            if !is_finite(&increments) || size > LARGEST {
+                return Err(Stuck::NotConverged);
+            }
+            state = self.moved(&state, fraction, &increments, 1.0)?;
+            fraction += solution[p];
+            finished = converged(size, previous);
+            previous = size;
+        }
+        Err(Stuck::NotConverged)
+    }
+
+    /// Factorises the matrix of the system with a border.
+    fn factor_bordered(
+        &mut self,
+        border: &[Field],
+    ) -> Result<impl FnMut(&Field, &[f64]) -> Bordered, Stuck> {
+        let rows = border.len();
+        if self.bordered.as_ref().is_none_or(|(held, _)| *held != rows) {
+            let pattern = SparsePattern::bordered(&self.system, rows);
+            self.bordered = Some((rows, pattern.map_err(|_| Stuck::TooLarge)?));
+        }
+        let Some((_, pattern)) = &self.bordered else {
+            return Err(Stuck::TooLarge);
+        };
+        self.factorizations += 1;
+        let factor = pattern.factorize_bordered(&self.system, 0.0, border);
+        let mut factor = factor.map_err(|_| Stuck::TooLarge)?;
+        Ok(move |rhs: &Field, below: &[f64]| factor.solve_bordered(rhs, below))
+    }
+
+    /// The `count` modes whose eigenvalues are next to zero at a point, by
+    /// inverse iteration of a subspace; of mass one, the next to zero first.
+    ///
+    /// # Errors
+    /// If the point cannot be linearised.
+    pub fn soft_modes(&mut self, point: &Point, count: usize) -> Result<Vec<Field>, Stuck> {
+        let mut state = point.state.clone();
+        self.linearise(&mut state, point.fraction)?;
+        let count = count.min(6 * self.rods() * self.grid.segments() / 2).max(1);
+        if self.pattern.is_none() {
+            self.pattern = Some(SparsePattern::new(&self.system).map_err(|_| Stuck::TooLarge)?);
+        }
+        let pattern = self.pattern.as_ref().ok_or(Stuck::TooLarge)?;
+        let shift = 1e-9;
+        let factor = pattern.factorize(&self.system, shift);
+        let mut factor = factor.map_err(|_| Stuck::TooLarge)?;
+        let mut modes: Vec<Field> = (0..count)
+            .map(|k| {
+                self.system.seed_mode();
+                let mut seed = self.system.rhs();
+                // Each with another pattern along the rods.
+                for (j, rod) in seed.iter_mut().enumerate() {
+                    for (i, forces) in rod.iter_mut().enumerate() {
+                        for (c, force) in forces.iter_mut().enumerate() {
+                            let phase = (k * (3 * i + 7 * c + 11 * j + 1)) as f64;
+                            *force *= (0.7 * phase).cos();
+                        }
+                    }
+                }
+                seed
+            })
+            .collect();
+        for _ in 0..SUBSPACE_ITERATIONS {
+            for mode in &mut modes {
+                *mode = factor.solve_bordered(mode, &[]).increments;
+            }
+            // Gram and Schmidt over the masses, then Ritz: the operator is
+            // K^-1 M, whose largest values belong to the softest modes.
+            for k in 0..count {
+                for l in 0..k {
+                    let part = self.product(&modes[l], &modes[k]);
+                    let other = modes[l].clone();
+                    add(&mut modes[k], -part, &other);
+                }
+                let norm = self.product(&modes[k], &modes[k]).sqrt();
+                modes[k] = times(&modes[k], 1.0 / norm);
+            }
+            let momenta: Vec<Field> = modes.iter().map(|mode| self.momentum(mode)).collect();
+            let images: Vec<Field> = momenta
+                .iter()
+                .map(|momentum| factor.solve_bordered(momentum, &[]).increments)
+                .collect();
+            let ritz = DMatrix::from_fn(count, count, |r, c| {
+                0.5 * (dot(&momenta[r], &images[c]) + dot(&momenta[c], &images[r]))
+            });
+            let eigen = ritz.symmetric_eigen();
+            let mut order: Vec<usize> = (0..count).collect();
+            order.sort_by(|&a, &b| {
+                let [a, b] = [a, b].map(|k| eigen.eigenvalues[k].abs());
+                b.total_cmp(&a)
+            });
+            modes = order
+                .iter()
+                .map(|&k| {
+                    let mut mode = times(&modes[0], 0.0);
+                    for (l, other) in modes.iter().enumerate() {
+                        add(&mut mode, eigen.eigenvectors[(l, k)], other);
+                    }
+                    mode
+                })
+                .collect();
+            // Forces again, for the next inverse iteration.
+            if !modes.iter().all(is_finite) {
+                return Err(Stuck::NotConverged);
+            }
+            modes = modes.iter().map(|mode| self.momentum(mode)).collect();
+        }
+        Ok(modes
+            .iter()
+            .map(|momentum| {
+                let mode = factor.solve_bordered(momentum, &[]).increments;
+                let norm = self.product(&mode, &mode).sqrt();
+                times(&mode, 1.0 / norm)
+            })
+            .collect())
+    }
+}
+
+/// Iterations of the subspace: the wanted modes are far softer than the rest.
+const SUBSPACE_ITERATIONS: usize = 8;
+
+/// The same direction, backwards.
+pub fn reversed(t: Tangent) -> Tangent {
+    Tangent {
+        increments: times(&t.increments, -1.0),
+        fraction: -t.fraction,
+    }
+}
+
+/// Whether a Newton step of this size after one of size `previous` ends it.
+fn converged(size: f64, previous: f64) -> bool {
+    let rate = (size / previous).min(1.0);
+    let remaining = match previous.is_finite() {
+        true => size * rate * rate,
+        false => 10.0 * size * size,
+    };
+    remaining <= ACCURACY || (size < 1e-8 && rate > 0.3)
+}

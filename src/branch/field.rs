@@ -1,0 +1,107 @@
+//! Sums over the increments of a leaf.
+
+use crate::leaf::{Field, Increment};
+
+fn each(a: &Field, b: &Field, mut f: impl FnMut(&Increment, &Increment)) {
+    for (a, b) in a.iter().zip(b) {
+        for (a, b) in a.iter().zip(b) {
+            f(a, b);
+        }
+    }
+}
+
+/// The work of forces on increments.
+pub fn dot(forces: &Field, increments: &Field) -> f64 {
+    let mut sum = 0.0;
+    each(forces, increments, |f, d| {
+        sum += (0..6).map(|c| f[c] * d[c]).sum::<f64>();
+    });
+    sum
+}
+
+/// a + factor b.
+pub fn plus(a: &Field, factor: f64, b: &Field) -> Field {
+    let mut sum = a.clone();
+    add(&mut sum, factor, b);
+    sum
+}
+
+/// a <- a + factor b.
+pub fn add(a: &mut Field, factor: f64, b: &Field) {
+    for (a, b) in a.iter_mut().zip(b) {
+        for (a, b) in a.iter_mut().zip(b) {
+            for c in 0..6 {
+                a[c] += factor * b[c];
+            }
+        }
+    }
+}
+
+/// a times a factor.
+pub fn times(a: &Field, factor: f64) -> Field {
+    let of = |a: &Increment| a.map(|a| factor * a);
+    a.iter().map(|rod| rod.iter().map(of).collect()).collect()
+}
+
+/// The largest component.
+pub fn largest(a: &Field) -> f64 {
+    let all = a.iter().flatten().flatten();
+    all.fold(0.0, |m, v| m.max(v.abs()))
+}
+
+/// Whether all components are finite.
+pub fn is_finite(a: &Field) -> bool {
+    a.iter().flatten().flatten().all(|v| v.is_finite())
+}
+
+/// Increments of the grid on which every segment is halved: cubic between the nodes,
+/// zero at the bases.
+pub fn prolong(a: &Field) -> Field {
+    a.iter().map(|rod| prolong_rod(rod)).collect()
+}
+
+fn prolong_rod(rod: &[Increment]) -> Vec<Increment> {
+    let n = rod.len();
+    let at = |i: usize| match i {
+        0 => [0.0; 6],
+        _ => rod[i - 1],
+    };
+    // Four neighbouring nodes, shifted inwards at the ends.
+    let count = 4.min(n + 1);
+    (1..=2 * n)
+        .map(|k| {
+            if k % 2 == 0 {
+                return at(k / 2);
+            }
+            let first = (k / 2).saturating_sub(1).min(n + 1 - count);
+            let t = k as f64 / 2.0 - first as f64;
+            let mut sum = [0.0; 6];
+            for i in 0..count {
+                let others = (0..count).filter(|&o| o != i);
+                let weight: f64 = others
+                    .map(|o| (t - o as f64) / (i as f64 - o as f64))
+                    .product();
+                let value = at(first + i);
+                for c in 0..6 {
+                    sum[c] += weight * value[c];
+                }
+            }
+            sum
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cubics_are_prolonged_exactly() {
+        let f = |s: f64| [s, s * s, s * s * s, 2.0 * s - s * s, 0.0, -s];
+        let on = |n: usize| vec![(1..=n).map(|i| f(i as f64 / n as f64)).collect::<Vec<_>>()];
+        for n in [3, 4, 7] {
+            let difference = plus(&prolong(&on(n)), -1.0, &on(2 * n));
+            assert!(largest(&difference) < 1e-14, "{n}");
+        }
+    }
+}

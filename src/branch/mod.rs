@@ -1,0 +1,61 @@
+//! A branch: an equilibrium followed through a parameter, through folds, with
+//! its Morse index, and the points at which that changes.
+//!
+//! With the unbalanced forces g(z, l) of a leaf in the state z at the parameter
+//! l, a branch is a curve g = 0. It is followed by arclength (Keller, in:
+//! Applications of Bifurcation Theory, 1977): from a point with tangent t a step
+//! is predicted along t, and Newton's method goes back to the curve within the
+//! plane normal to t. Matrices are those of the relaxation.
+//!
+//! Where the index changes, the matrix K is singular. There it is bordered by
+//! the modes that become neutral, the masses times them as P,
+//!
+//! ```text
+//! [ K   P ] [ X ]   [ 0 ]
+//! [ P^T 0 ] [ H ] = [ 1 ]
+//! ```
+//!
+//! which is regular (Govaerts, Numerical Methods for Bifurcations of Dynamical
+//! Equilibria, 2000). An eigenvalue of H is zero where one of K is, and smooth,
+//! so that a secant method finds its zero to rounding.
+
+mod critical;
+mod equations;
+mod family;
+mod field;
+mod refine;
+mod switch;
+mod walk;
+
+pub use critical::{Critical, Kind, locate};
+pub use equations::{Equations, Stuck};
+pub use family::{Family, OutOfRange};
+pub use refine::{Refined, refine, refine_critical};
+pub use switch::switch;
+pub use walk::{Branch, End, Walk, walk};
+
+pub(crate) use crate::relax::prolong::prolong as prolonged;
+
+use crate::leaf::{Field, State};
+
+/// A point of a branch on one grid.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// The state of the leaf.
+    pub state: State,
+    /// The parameter, as a fraction of its range.
+    pub fraction: f64,
+    /// The direction of the branch.
+    pub tangent: Tangent,
+    /// Morse index.
+    pub index: usize,
+}
+
+/// A direction in which a branch may go, of length one.
+#[derive(Clone, Debug)]
+pub struct Tangent {
+    /// Increments of the nodes.
+    pub increments: Field,
+    /// Change of the parameter, as a fraction of its range.
+    pub fraction: f64,
+}

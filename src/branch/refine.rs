@@ -1,0 +1,203 @@
+//! Points of a branch on finer and finer grids, extrapolated.
+
+use super::critical::Critical;
+use super::equations::{Equations, Stuck};
+use super::family::Family;
+use super::field::prolong as prolong_field;
+use super::{Point, Tangent};
+use crate::leaf::{Grid, State};
+use crate::relax::prolong::prolong;
+use crate::relax::richardson::Richardson;
+
+/// Grids of a regular point at most, and of a critical one.
+const GRIDS: usize = 6;
+const CRITICAL_GRIDS: usize = 4;
+
+/// A critical parameter within this part of its range is exact.
+const EXACT: f64 = 1e-12;
+
+/// A point is sought at the same parameter on all grids where the branch goes
+/// at least this much along it, else in the same plane.
+const ALONG: f64 = 0.05;
+
+/// Compliance by which matrices of nearly rigid leaves are softened, in units
+/// of L^2/A, times one to four; and the stiffness from which on they are.
+const SOFTENING: f64 = 1e-4;
+const NEARLY_RIGID: f64 = 1.01e5;
+
+/// A point without the error of its grid.
+#[derive(Clone, Debug)]
+pub struct Refined {
+    /// The parameter, as a fraction of its range.
+    pub fraction: f64,
+    /// Energy, in the family's units.
+    pub energy: f64,
+    /// Tips of all rods, in the family's units.
+    pub tips: Vec<[f64; 3]>,
+    /// Bound on the error of the tips, or null on one grid.
+    pub error: Option<f64>,
+    /// Bound on the error of the parameter, as a fraction of its range.
+    pub fraction_error: Option<f64>,
+    /// The state on the finest grid.
+    pub state: State,
+    /// That grid.
+    pub grid: Grid,
+}
+
+/// A regular point to the given accuracy of its tips, on as many grids as it takes.
+///
+/// # Errors
+/// If it is not there on the grid it was found on.
+pub fn refine(
+    family: &Family,
+    grid: &Grid,
+    point: &Point,
+    accuracy: f64,
+) -> Result<Refined, Stuck> {
+    let mut table = Table::default();
+    let mut equations = Equations::new(family, grid.clone())?;
+    table.push(&equations, &point.state, point.fraction)?;
+    let (mut state, mut fraction) = (point.state.clone(), point.fraction);
+    let mut tangent = point.tangent.clone();
+    let mut error = f64::INFINITY;
+    for _ in 1..GRIDS {
+        if error <= accuracy {
+            break;
+        }
+        let before = &equations.grid;
+        let finer = family.with(fraction, before, |leaf| prolong(leaf, &state))?;
+        tangent = Tangent {
+            increments: prolong_field(&tangent.increments),
+            ..tangent
+        };
+        equations = equations.refined()?;
+        let normal = equations.normalised(tangent.clone());
+        let normal = (normal.fraction.abs() < ALONG).then_some(normal);
+        let Ok((found, _)) = equations.correct(&finer, fraction, normal.as_ref()) else {
+            break;
+        };
+        (state, fraction) = (found.state, found.fraction);
+        table.push(&equations, &state, fraction)?;
+        error = table.tips.best().map_or(f64::INFINITY, |best| best.error);
+    }
+    Ok(table.refined(state, equations.grid.clone()))
+}
+
+/// A critical point, on four grids.
+///
+/// # Errors
+/// If it is not there on the grid it was found on.
+pub fn refine_critical(family: &Family, grid: &Grid, found: &Critical) -> Result<Refined, Stuck> {
+    let mut table = Table::default();
+    let mut equations = Equations::new(family, grid.clone())?;
+    let mut critical = found.clone();
+    for level in 0..CRITICAL_GRIDS {
+        if level > 0 {
+            let before = &equations.grid;
+            let state = family.with(critical.fraction, before, |leaf| {
+                prolong(leaf, &critical.state)
+            })?;
+            equations = equations.refined()?;
+            let tangent = equations.normalised(Tangent {
+                increments: prolong_field(&critical.tangent.increments),
+                ..critical.tangent
+            });
+            let finer = Critical {
+                state,
+                tangent,
+                held: critical.held.iter().map(prolong_field).collect(),
+                ..critical.clone()
+            };
+            match finer.again(&mut equations) {
+                Ok(found) => critical = found,
+                Err(_) => break,
+            }
+        }
+        let rigid = family.with(critical.fraction, &equations.grid, |leaf| {
+            leaf.stiffest() * NEARLY_RIGID < 1.0
+        })?;
+        table.rounding =
+            table
+                .rounding
+                .max(family.with(critical.fraction, &equations.grid, |leaf| {
+                    let stiffest = leaf.sections.iter().fold(0.0_f64, |most, section| {
+                        let limit = if rigid {
+                            1.0 / SOFTENING
+                        } else {
+                            f64::INFINITY
+                        };
+                        most.max(section.condensing.max_element().min(limit))
+                    });
+                    let segments = leaf.segments() as f64;
+                    f64::EPSILON * stiffest * segments * segments / critical.steepness()
+                })?);
+        match rigid {
+            false => table.push(&equations, &critical.state, critical.fraction)?,
+            true => {
+                let fraction = unsoftened(family, &equations.grid, &critical)?;
+                table.push(&equations, &critical.state, fraction)?;
+            }
+        }
+        // A finer grid would only add rounding.
+        if (table.fraction.best()).is_some_and(|best| best.error < table.rounding.max(EXACT)) {
+            break;
+        }
+    }
+    Ok(table.refined(critical.state, equations.grid.clone()))
+}
+
+/// The parameter of a critical point of a nearly rigid leaf: by softened
+/// matrices, extrapolated to none.
+fn unsoftened(family: &Family, grid: &Grid, critical: &Critical) -> Result<f64, Stuck> {
+    let mut fractions = [0.0; 4];
+    let mut near = critical.clone();
+    for (k, fraction) in fractions.iter_mut().enumerate().rev() {
+        let mut equations = Equations::new(family, grid.clone())?;
+        equations.softened = Some(family.softened(SOFTENING * (k + 1) as f64));
+        near = near.again(&mut equations)?;
+        *fraction = near.fraction;
+    }
+    // The cubic through values at 1, 2, 3, 4 at zero.
+    let [a, b, c, d] = fractions;
+    Ok(4.0 * a - 6.0 * b + 4.0 * c - d)
+}
+
+/// What is extrapolated.
+#[derive(Default)]
+struct Table {
+    tips: Richardson,
+    fraction: Richardson,
+    energy: Richardson,
+    /// What rounding of the matrix may have done to the fraction.
+    rounding: f64,
+}
+
+impl Table {
+    fn push(&mut self, equations: &Equations, state: &State, fraction: f64) -> Result<(), Stuck> {
+        let energy = equations
+            .family
+            .with(fraction, &equations.grid, |leaf| leaf.energy(state))?;
+        let tips = (0..state.rods()).flat_map(|j| state.tip(j).to_array());
+        self.tips.push(tips.collect());
+        self.fraction.push(vec![fraction]);
+        self.energy.push(vec![energy]);
+        Ok(())
+    }
+
+    fn refined(&self, state: State, grid: Grid) -> Refined {
+        let best = self.tips.best();
+        let columns = best.as_ref().map_or(0, |best| best.columns);
+        let tips = self.tips.column(columns);
+        let own = self.fraction.best();
+        let own_columns = own.as_ref().map_or(0, |best| best.columns);
+        Refined {
+            fraction: self.fraction.column(own_columns)[0],
+            energy: self.energy.column(columns)[0],
+            tips: tips.chunks(3).map(|tip| [tip[0], tip[1], tip[2]]).collect(),
+            error: best.map(|best| best.error),
+            fraction_error: own.map(|best| best.error + self.rounding),
+            state,
+            grid,
+        }
+    }
+}

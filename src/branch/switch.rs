@@ -1,0 +1,36 @@
+//! From a point where branches cross to another of them.
+
+use super::critical::Critical;
+use super::equations::{Equations, Stuck, reversed};
+use super::{Point, Tangent};
+
+/// How far from the crossing the other branch is looked for, in turn.
+const AWAY: [f64; 5] = [0.01, 0.003, 0.03, 0.1, 0.3];
+
+/// The first points of the branches that cross at `critical` in the plane of
+/// one of its neutral modes, one to either side.
+pub fn switch(equations: &mut Equations, critical: &Critical, mode: usize) -> Vec<Point> {
+    let across = critical.across(equations, mode);
+    [across.clone(), reversed(across)]
+        .iter()
+        .filter_map(|direction| {
+            let tries = AWAY.iter();
+            tries
+                .filter_map(|&away| leave(equations, critical, direction, away).ok())
+                .next()
+        })
+        .collect()
+}
+
+fn leave(
+    equations: &mut Equations,
+    critical: &Critical,
+    direction: &Tangent,
+    away: f64,
+) -> Result<Point, Stuck> {
+    let increments = &direction.increments;
+    let state = equations.moved(&critical.state, critical.fraction, increments, away)?;
+    let fraction = critical.fraction + away * direction.fraction;
+    let (point, _) = equations.correct(&state, fraction, Some(direction))?;
+    Ok(point)
+}

@@ -1,0 +1,162 @@
+//! `leafdyn chart`: speed charted against accuracy.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum, ValueHint};
+
+use leafdyn::output::{self, contender};
+use leafdyn::scenario::Scenario;
+use leafdyn::study::{self, ChartOptions, Contender, Scaling, Turn};
+
+use super::progress::ProgressLine;
+use super::request::Request;
+use super::{Refusal, Status, chart_report, note};
+
+/// Measure every method over its own accuracy, and chart time against true error.
+///
+/// Exit status: 0 charted; 1 two independent methods do not confirm the
+/// reference that errors are measured against (the files are still written and
+/// say so); 2 the request was refused.
+#[derive(Debug, Args)]
+pub struct Chart {
+    #[command(flatten)]
+    request: Request,
+
+    /// About how long to measure; slow runs are made once whatever they take
+    #[arg(long, value_name = "S", default_value_t = ChartOptions::default().seconds, allow_negative_numbers = true)]
+    seconds: f64,
+
+    /// Chart these methods only
+    #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
+    methods: Vec<ContenderName>,
+
+    /// Measurements of other programs, as benches/peers writes them; may repeat
+    #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath)]
+    peers: Vec<PathBuf>,
+
+    /// Also chart time against the number of veins, at the tolerance: --rods 5,15,35
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    rods: Vec<usize>,
+}
+
+/// The contenders by the names users type.
+#[derive(Clone, Copy, Debug)]
+struct ContenderName(Contender);
+
+impl ValueEnum for ContenderName {
+    fn value_variants<'a>() -> &'a [Self] {
+        const ALL: [ContenderName; Contender::ALL.len()] = {
+            let mut all = [ContenderName(Contender::SemiImplicit); Contender::ALL.len()];
+            let mut i = 0;
+            while i < all.len() {
+                all[i] = ContenderName(Contender::ALL[i]);
+                i += 1;
+            }
+            all
+        };
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<clap::builder::PossibleValue> {
+        Some(clap::builder::PossibleValue::new(self.0.word()))
+    }
+}
+
+impl Chart {
+    pub fn run(self) -> Result<Status, Refusal> {
+        let (scenario, folder) = self.request.open()?;
+        if self.request.tolerance.is_some() && self.rods.is_empty() {
+            return Err(
+                "--tolerance: a chart runs over all tolerances; it is that of --rods".into(),
+            );
+        }
+        let leaves = self.leaves()?;
+        let mut options = ChartOptions {
+            seconds: self.seconds,
+            ..ChartOptions::default()
+        };
+        if !self.methods.is_empty() {
+            let wanted = |who: &Contender| self.methods.iter().any(|name| name.0 == *who);
+            options.contenders.retain(wanted);
+        }
+        for file in &self.peers {
+            options.peers.extend(study::read_peers(file)?);
+        }
+        let mut line = ProgressLine::new(&scenario.name);
+        let mut progress = |turn: &Turn| {
+            line.say(|elapsed| {
+                format!(
+                    "{} veins, {}, {}, round {} of {}, {:.0} s",
+                    turn.rods,
+                    contender(turn.contender),
+                    turn.knob,
+                    turn.round,
+                    turn.rounds,
+                    elapsed.as_secs_f64(),
+                )
+            });
+        };
+        // What is asked of the second is looked at before the first is made.
+        let tolerance = self.request.tolerance.unwrap_or(scenario.tolerance);
+        leafdyn::relax::check_tolerance(tolerance)?;
+        let mut chart = study::chart(&scenario, &options, &mut progress)?;
+        if !leaves.is_empty() {
+            chart.scaling = Some(study::scaling(&leaves, tolerance, &options, &mut progress)?);
+        }
+        drop(line);
+        if self.request.json {
+            for remark in &chart.remarks {
+                note(&format!("{}: {remark}", chart.scenario));
+            }
+        }
+        let scaled = match &chart.scaling {
+            Some(scaling) => output::write_all(&folder, scaling).map(drop),
+            None => Ok(()),
+        };
+        self.request.deliver(&chart, &folder, |folder| {
+            chart_report::report(&chart, folder.filter(|_| scaled.is_ok()))
+        })?;
+        scaled?;
+        Ok(status(chart.confirmed(), chart.scaling.as_ref()))
+    }
+
+    /// The leaves of `--rods`.
+    fn leaves(&self) -> Result<Vec<Scenario>, Refusal> {
+        let rods = self.rods.iter();
+        rods.map(|rods| self.request.with(&format!("leaf.rods={rods}")))
+            .collect()
+    }
+}
+
+fn status(confirmed: bool, scaling: Option<&Scaling>) -> Status {
+    match confirmed && scaling.is_none_or(|scaling| scaling.unconfirmed.is_empty()) {
+        true => Status::Success,
+        false => Status::Failure,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_confirmed_references_are_success() {
+        let scaling = |unconfirmed: Vec<usize>| Scaling {
+            scenario: "leaf".into(),
+            tolerance: 1e-6,
+            rows: Vec::new(),
+            unconfirmed,
+        };
+        assert_eq!(status(true, None), Status::Success);
+        assert_eq!(status(false, None), Status::Failure);
+        assert_eq!(status(true, Some(&scaling(vec![]))), Status::Success);
+        assert_eq!(status(true, Some(&scaling(vec![35]))), Status::Failure);
+    }
+
+    #[test]
+    fn every_contender_can_be_named() {
+        let names = ContenderName::value_variants().iter();
+        let names: Vec<Contender> = names.map(|name| name.0).collect();
+        assert_eq!(names, Contender::ALL);
+    }
+}

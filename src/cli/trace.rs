@@ -1,0 +1,83 @@
+//! `leafdyn trace`: an equilibrium followed through a number of its scenario.
+
+use clap::Args;
+
+use leafdyn::study::{self, MOST_POINTS, TraceRequest, Vary};
+
+use super::progress::ProgressLine;
+use super::request::Request;
+use super::{Refusal, Status, note, trace_report};
+
+/// Follow an equilibrium through one number of the scenario: through folds, with the Morse index along the way.
+///
+/// Exit status: 0 all branches are followed to an end of the range or in a
+/// circle; 1 not (the files are still written and say how far); 2 the request
+/// was refused.
+#[derive(Debug, Args)]
+pub struct Trace {
+    #[command(flatten)]
+    request: Request,
+
+    /// What varies: a number of the scenario as in --set, an entry of a list counted from 0 (load.gravity[2]); several keys that vary together are joined by +; COUNT values set the longest step
+    #[arg(long, value_name = "KEY=FROM..TO[:COUNT][log]", required = true)]
+    vary: Vary,
+
+    /// Also follow the branches that cross
+    #[arg(long)]
+    switch: bool,
+
+    /// Go to the first equilibrium by Newton's method, stable or not
+    #[arg(long)]
+    keep_unstable: bool,
+
+    /// Follow branches on N segments a rod; left out: as the first equilibrium needs
+    #[arg(long, value_name = "N")]
+    segments: Option<usize>,
+
+    /// Most points of a branch
+    #[arg(long, value_name = "N", default_value_t = MOST_POINTS)]
+    points: usize,
+
+    /// Area of the leaf's cross-section: gives Young's modulus where a tip force varies
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    cross_section: Option<f64>,
+}
+
+impl Trace {
+    pub fn run(self) -> Result<Status, Refusal> {
+        let (base, folder) = self.request.open_base()?;
+        let name = base.scenario().name.clone();
+        let request = TraceRequest {
+            base,
+            vary: self.vary,
+            switch: self.switch,
+            keep_unstable: self.keep_unstable,
+            segments: self.segments,
+            tolerance: self.request.tolerance,
+            most_points: self.points,
+            cross_section: self.cross_section,
+        };
+        let mut line = ProgressLine::new(&name);
+        let trace = study::trace(&request, &mut |branch, points, value| {
+            line.say(|elapsed| {
+                format!(
+                    "branch {}, {points} points, at {}, {:.0} s",
+                    branch + 1,
+                    request.vary.keys.text(value),
+                    elapsed.as_secs_f64()
+                )
+            });
+        })?;
+        drop(line);
+        if let (true, Some(remark)) = (self.request.json, &trace.remark) {
+            note(&format!("{name}: {remark}"));
+        }
+        self.request.deliver(&trace, &folder, |folder| {
+            trace_report::report(&trace, folder)
+        })?;
+        Ok(match trace.complete() {
+            true => Status::Success,
+            false => Status::Failure,
+        })
+    }
+}

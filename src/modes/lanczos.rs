@@ -1,0 +1,149 @@
+//! The Lanczos method for (K - sigma M)^-1 M, in the inner product of M, every
+//! new direction made orthogonal to all others (C. Lanczos, J. Res. Nat. Bur.
+//! Standards 45, 1950; T. Ericsson and A. Ruhe, Math. Comp. 35, 1980, for the
+//! inverse).
+
+use super::masses::Masses;
+use nalgebra::{DMatrix, SymmetricEigen};
+
+/// Accuracy of an eigenvector, relative to its eigenvalue; that of the
+/// eigenvalue is the square of it. The second is relative to the largest, and
+/// rounding.
+const ACCURACY: f64 = 1e-7;
+const LEAST_ACCURACY: f64 = 1e-13;
+
+/// Directions after which a run ends, and those more for every pair wanted.
+const MOST: usize = 40;
+const MOST_A_PAIR: usize = 4;
+
+/// Directions between looks at what has converged.
+const LOOK: usize = 4;
+
+/// A direction shorter than this part of what it was has no digit left: all
+/// that the start can reach is found.
+const NOTHING: f64 = 1e-13;
+
+/// An eigenvector of unit mass.
+pub struct Found {
+    /// Lambda.
+    pub eigenvalue: f64,
+    pub vector: Vec<f64>,
+}
+
+/// What a run needs.
+pub struct Lanczos<'a> {
+    pub masses: &'a Masses,
+    /// Sigma.
+    pub shift: f64,
+    /// Solves (K - sigma M) x = b in place.
+    pub solve: &'a mut dyn FnMut(&mut [f64]),
+    /// Eigenvectors that are not to be found again.
+    pub known: &'a [Found],
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn subtract(a: &mut [f64], factor: f64, b: &[f64]) {
+    a.iter_mut().zip(b).for_each(|(a, b)| *a -= factor * b);
+}
+
+impl Lanczos<'_> {
+    /// The eigenvalues next above sigma, from the load `start`: `wanted` or
+    /// more of them, less if there are no more below `limit` or the run becomes
+    /// too long. Then also a value that the wanted ones do not exceed.
+    pub fn run(
+        &mut self,
+        mut start: Vec<f64>,
+        wanted: usize,
+        limit: f64,
+    ) -> (Vec<Found>, Option<f64>) {
+        (self.solve)(&mut start);
+        let most = (MOST + MOST_A_PAIR * wanted).min(start.len() - self.known.len());
+        let mut basis: Vec<Vec<f64>> = Vec::new();
+        let (mut diagonal, mut off): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+        let mut next = start;
+        let mut length = self.orthogonal(&mut next, &basis);
+        while basis.len() < most && length > 0.0 {
+            next.iter_mut().for_each(|x| *x /= length);
+            let loaded = self.masses.times(&next);
+            let mut image = loaded.clone();
+            (self.solve)(&mut image);
+            diagonal.push(dot(&image, &loaded));
+            basis.push(next);
+            let before = dot(&image, &self.masses.times(&image)).max(0.0).sqrt();
+            length = self.orthogonal(&mut image, &basis);
+            if length <= NOTHING * before {
+                length = 0.0;
+            }
+            let size = basis.len();
+            if size.is_multiple_of(LOOK) || size == most || length == 0.0 {
+                let (values, vectors) = ritz(&diagonal, &off);
+                let error = |k: usize| length * vectors[(size - 1, k)].abs();
+                let good =
+                    |k: usize| error(k) <= (ACCURACY * values[k]).max(LEAST_ACCURACY * values[0]);
+                let done = (0..size).take_while(|&k| good(k)).count();
+                let eigenvalue = |k: usize| self.shift + 1.0 / values[k];
+                let beyond = done > 0 && eigenvalue(done - 1) > limit;
+                if done >= wanted || beyond || size == most || length == 0.0 {
+                    let pair = |k: usize| Found {
+                        eigenvalue: eigenvalue(k),
+                        vector: self.combined(&basis, &vectors, k),
+                    };
+                    // What is not positive is rounding.
+                    let positive = values.iter().take_while(|&&value| value > 0.0).count();
+                    let found = (0..done.min(positive)).map(pair).collect();
+                    let short = done < wanted && wanted <= positive;
+                    return (found, short.then(|| eigenvalue(wanted - 1)));
+                }
+            }
+            off.push(length);
+            next = image;
+        }
+        (Vec::new(), None)
+    }
+
+    /// Makes a vector orthogonal to the basis and to what is known, twice, as
+    /// once does not reach the last digits. Returns its length.
+    fn orthogonal(&self, vector: &mut [f64], basis: &[Vec<f64>]) -> f64 {
+        for _ in 0..2 {
+            let loaded = self.masses.times(vector);
+            let known = self.known.iter().map(|found| &found.vector);
+            for direction in known.chain(basis) {
+                subtract(vector, dot(direction, &loaded), direction);
+            }
+        }
+        dot(vector, &self.masses.times(vector)).max(0.0).sqrt()
+    }
+
+    /// The combination of the basis with the coefficients in a column.
+    fn combined(&self, basis: &[Vec<f64>], coefficients: &DMatrix<f64>, column: usize) -> Vec<f64> {
+        let mut sum = vec![0.0; basis[0].len()];
+        for (k, direction) in basis.iter().enumerate() {
+            subtract(&mut sum, -coefficients[(k, column)], direction);
+        }
+        // Not but for rounding.
+        let length = dot(&sum, &self.masses.times(&sum)).sqrt();
+        sum.iter_mut().for_each(|x| *x /= length);
+        sum
+    }
+}
+
+/// Eigenvalues, descending, and eigenvectors of the tridiagonal matrix.
+fn ritz(diagonal: &[f64], off: &[f64]) -> (Vec<f64>, DMatrix<f64>) {
+    let size = diagonal.len();
+    let mut matrix = DMatrix::zeros(size, size);
+    for k in 0..size {
+        matrix[(k, k)] = diagonal[k];
+        if k > 0 {
+            matrix[(k, k - 1)] = off[k - 1];
+            matrix[(k - 1, k)] = off[k - 1];
+        }
+    }
+    let eigen = SymmetricEigen::new(matrix);
+    let mut order: Vec<usize> = (0..size).collect();
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    let values = order.iter().map(|&k| eigen.eigenvalues[k]).collect();
+    (values, eigen.eigenvectors.select_columns(&order))
+}

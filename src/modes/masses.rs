@@ -1,0 +1,68 @@
+//! The mass matrix: a tensor for the turn of every node, a mass for its shift.
+
+use crate::leaf::{DiscreteLeaf, SparsePattern, State, System};
+use crate::motion::Physics;
+use glam::{DMat3, DVec3};
+
+/// Inertia of a node.
+struct Node {
+    rod: usize,
+    /// From 1.
+    node: usize,
+    unknowns: [usize; 2],
+    tensor: DMat3,
+    mass: f64,
+}
+
+/// The mass matrix of a leaf, its unknowns numbered as by the pattern of its
+/// stiffness. A joint tip has the masses of all rods' ends.
+pub struct Masses {
+    nodes: Vec<Node>,
+}
+
+impl Masses {
+    /// As they are in motion, the nodes turned as in `state`.
+    pub fn new(
+        leaf: &DiscreteLeaf,
+        physics: &Physics,
+        state: &State,
+        pattern: &SparsePattern,
+    ) -> Self {
+        let nodes = (0..leaf.rods()).flat_map(|j| (1..=leaf.segments()).map(move |i| (j, i)));
+        let node = |(j, i)| {
+            let inertia = physics.inertia(leaf.leaf, &leaf.grid, j, i);
+            Node {
+                rod: j,
+                node: i,
+                unknowns: pattern.unknowns(j, i),
+                tensor: inertia.tensor(state.q[state.base(j) + i]),
+                mass: inertia.mass,
+            }
+        };
+        Masses {
+            nodes: nodes.map(node).collect(),
+        }
+    }
+
+    /// M v.
+    pub fn times(&self, v: &[f64]) -> Vec<f64> {
+        let mut product = vec![0.0; v.len()];
+        for node in &self.nodes {
+            let [turn, shift] = node.unknowns;
+            let turned = node.tensor * DVec3::from_slice(&v[turn..turn + 3]);
+            for c in 0..3 {
+                product[turn + c] += turned[c];
+                product[shift + c] += node.mass * v[shift + c];
+            }
+        }
+        product
+    }
+
+    /// Adds `factor` M to the matrix of a system.
+    pub fn add(&self, system: &mut System, factor: f64) {
+        for node in &self.nodes {
+            let matrix = (node.tensor * factor, node.mass * factor);
+            system.add(node.rod, node.node, matrix, (DVec3::ZERO, DVec3::ZERO));
+        }
+    }
+}

@@ -1,0 +1,284 @@
+//! Small vibrations about an equilibrium: the lowest eigenvalues of
+//! K x = lambda M x with the Hessian K of the energy and the masses M of the
+//! leaf in motion ([`crate::motion`]), without damping. Dimensionless: lambda in
+//! units of A/(rho L^4).
+//!
+//! A positive lambda is the square of a frequency, a negative one that of the
+//! rate at which the leaf leaves an unstable equilibrium.
+//!
+//! K - sigma M is factorised for a sigma below all eigenvalues, which the signs
+//! of its pivots prove, and the Lanczos method finds the eigenvalues next to
+//! sigma. How many there are below the last one found is again told by the
+//! signs of the pivots (Sylvester's law), of a second factorisation there: those
+//! that were missed, such as the second one of a double eigenvalue, are looked
+//! for besides the known ones until the numbers agree. A list that could not
+//! be proved is not handed out.
+
+mod lanczos;
+mod masses;
+mod quotient;
+
+use crate::leaf::{DiscreteLeaf, Increment, SparseError, SparseFactor, SparsePattern};
+use crate::leaf::{State, System};
+use crate::motion::Physics;
+use lanczos::{Found, Lanczos};
+use masses::Masses;
+use quotient::quotient;
+pub use quotient::rounding;
+
+/// Stiffness, in A/L^2, to which stiffer rods are softened in the matrix, as a
+/// larger one costs digits. The eigenvalues do not feel it to first order.
+const STIFFEST: f64 = 1e6;
+
+/// It is at least so many times the largest force carried.
+const STIFFER: f64 = 1e4;
+
+/// The first shift below zero that is tried for an unstable leaf, in
+/// A/(rho L^4), and the factor to the next.
+const FIRST_SHIFT: f64 = 1e-3;
+const NEXT_SHIFT: f64 = 8.0;
+
+/// Eigenvalues are counted below the last one less this part of the way to it
+/// from below all; the first of these that does not hit another one.
+const BELOW: [f64; 3] = [1e-7, 1e-6, 1e-5];
+
+/// Shifts closer to eigenvalues that are close together: by what part of the
+/// way from there back to the last shift, and the factor to the next try.
+const FIRST_PART: f64 = 2e-3;
+const NEXT_PART: f64 = 6.0;
+
+/// Searches before the list is given up, besides one for every mode wanted: of
+/// equal eigenvalues each finds one.
+const SEARCHES: usize = 16;
+
+/// A mode and its eigenvalue.
+#[derive(Clone, Debug)]
+pub struct Eigenpair {
+    /// Lambda.
+    pub eigenvalue: f64,
+    /// Turns and shifts of all nodes, rod after rod, base to tip.
+    pub shape: Vec<Increment>,
+}
+
+/// The modes could not be found.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+pub enum ModesError {
+    /// The matrix does not fit into memory.
+    #[error(transparent)]
+    Memory(#[from] SparseError),
+    /// The eigenvalues found are not as many as there are.
+    #[error("the lowest eigenvalues could not be told apart")]
+    Unproved,
+}
+
+/// Eigenvalues not yet found, all below this.
+struct Missing {
+    count: usize,
+    below: f64,
+}
+
+/// A leaf at rest, about to vibrate.
+struct Vibration<'a> {
+    leaf: &'a DiscreteLeaf<'a>,
+    state: &'a State,
+    system: System,
+    pattern: SparsePattern,
+    masses: Masses,
+}
+
+/// The lowest `count` eigenvalues, ascending, all if there are fewer, with
+/// their modes, which are orthonormal with the masses.
+///
+/// # Errors
+/// If memory is short, or the list cannot be proved to be complete.
+pub fn lowest(
+    leaf: &DiscreteLeaf,
+    physics: &Physics,
+    state: &State,
+    count: usize,
+) -> Result<Vec<Eigenpair>, ModesError> {
+    let mut soft = leaf.clone();
+    let pull = state.n.iter().fold(0.0_f64, |m, n| m.max(n.length()));
+    for section in &mut soft.sections {
+        *section = section.condense(STIFFEST.max(STIFFER * pull));
+    }
+    let system = System::new(&soft);
+    let pattern = SparsePattern::new(&system)?;
+    let mut vibration = Vibration {
+        masses: Masses::new(&soft, physics, state, &pattern),
+        leaf: &soft,
+        state,
+        system,
+        pattern,
+    };
+    let found = vibration.lowest(count)?;
+    let mut pairs: Vec<Eigenpair> = found
+        .iter()
+        .map(|vector| {
+            let shape = vibration.shape(vector);
+            Eigenpair {
+                eigenvalue: quotient(&soft, state, &shape),
+                shape,
+            }
+        })
+        .collect();
+    pairs.sort_by(|a, b| a.eigenvalue.total_cmp(&b.eigenvalue));
+    Ok(pairs)
+}
+
+/// What rounding may do to the eigenvalues of the matrix.
+fn rounding_of_matrix(leaf: &DiscreteLeaf) -> f64 {
+    let sections = leaf.sections.iter();
+    let stiffest = sections.fold(0.0_f64, |m, s| m.max(s.condensing.max_element()));
+    f64::EPSILON * stiffest * (leaf.segments() * leaf.segments()) as f64
+}
+
+impl Vibration<'_> {
+    /// K - shift M, factorised.
+    fn factorize(&mut self, shift: f64) -> Result<SparseFactor<'_>, SparseError> {
+        self.leaf.assemble(self.state, &mut self.system);
+        self.masses.add(&mut self.system, -shift);
+        self.pattern.factorize(&self.system, 0.0)
+    }
+
+    /// A shift below all eigenvalues, no farther than it must be.
+    fn below_all(&mut self) -> Result<f64, ModesError> {
+        let mut shift = -self.leaf.neutral_shift();
+        while self.factorize(shift)?.negative() > 0 {
+            shift = (NEXT_SHIFT * shift).min(-FIRST_SHIFT);
+            if !shift.is_finite() {
+                return Err(ModesError::Unproved);
+            }
+        }
+        Ok(shift)
+    }
+
+    /// Eigenvectors of unit mass, eigenvalues ascending.
+    fn lowest(&mut self, count: usize) -> Result<Vec<Vec<f64>>, ModesError> {
+        let size = self.pattern.size();
+        let count = count.min(size);
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let lowest = self.below_all()?;
+        let (mut shift, mut limit) = (lowest, f64::INFINITY);
+        let mut found: Vec<Found> = Vec::new();
+        let mut wanted = count;
+        for search in 0..SEARCHES + count {
+            let bound = self.search(shift, (wanted, limit), search, &mut found)?;
+            if found.len() < count {
+                wanted = count - found.len();
+                if let Some(bound) = bound {
+                    shift = self.closer(shift, bound, &found)?;
+                }
+                continue;
+            }
+            let missing = self.missing(&found, count, lowest)?;
+            if missing.count == 0 {
+                found.truncate(count);
+                return Ok(found.into_iter().map(|found| found.vector).collect());
+            }
+            (wanted, limit) = (missing.count.min(count), missing.below);
+            shift = lowest;
+        }
+        Err(ModesError::Unproved)
+    }
+
+    /// How many eigenvalues are missing below the `count`-th of those found, to
+    /// which there may be more that are equal.
+    fn missing(
+        &mut self,
+        found: &[Found],
+        count: usize,
+        lowest: f64,
+    ) -> Result<Missing, ModesError> {
+        let last = found[count - 1].eigenvalue;
+        let rounding = rounding_of_matrix(self.leaf);
+        for part in BELOW {
+            let below = last - (part * (last - lowest)).max(4.0 * rounding);
+            let there = self.factorize(below)?.negative();
+            let here = found.iter().filter(|f| f.eigenvalue < below).count();
+            // Too many: one is equal to the limit but for rounding.
+            if let Some(count) = there.checked_sub(here) {
+                return Ok(Missing { count, below });
+            }
+        }
+        Err(ModesError::Unproved)
+    }
+
+    /// A shift closer to the next eigenvalues, where many are close together:
+    /// somewhat below `bound`, but above no more than those found.
+    fn closer(&mut self, shift: f64, bound: f64, found: &[Found]) -> Result<f64, ModesError> {
+        let mut part = FIRST_PART;
+        while part < 1.0 {
+            let closer = bound - part * (bound - shift);
+            if self.factorize(closer)?.negative() <= found.len() {
+                return Ok(closer);
+            }
+            part *= NEXT_PART;
+        }
+        Ok(shift)
+    }
+
+    /// Adds to the eigenvalues found `wanted` more of those next above the
+    /// shift, fewer if there are no more below a limit; see [`Lanczos::run`].
+    fn search(
+        &mut self,
+        shift: f64,
+        (wanted, limit): (usize, f64),
+        search: usize,
+        found: &mut Vec<Found>,
+    ) -> Result<Option<f64>, ModesError> {
+        let start = self.start(search);
+        self.leaf.assemble(self.state, &mut self.system);
+        self.masses.add(&mut self.system, -shift);
+        let mut factor = self.pattern.factorize(&self.system, 0.0)?;
+        let mut lanczos = Lanczos {
+            masses: &self.masses,
+            shift,
+            solve: &mut |b| factor.solve_vector(b),
+            known: found,
+        };
+        let (more, bound) = lanczos.run(start, wanted, limit);
+        found.extend(more);
+        found.sort_by(|a, b| a.eigenvalue.total_cmp(&b.eigenvalue));
+        Ok(bound)
+    }
+
+    /// A load without any symmetry, another one in every search.
+    fn start(&self, search: usize) -> Vec<f64> {
+        // Multiples of the golden ratio spread evenly: no symmetry, no chance.
+        let golden = |k: usize| (k as f64 * 0.618_033_988_749_895).fract() - 0.5;
+        let mut load = vec![0.0; self.pattern.size()];
+        let n = self.leaf.segments();
+        for j in 0..self.leaf.rods() {
+            for i in 1..=n {
+                let sigma = self.leaf.grid.sigma()[i];
+                let wave = (7.0 * search as f64 * sigma).sin();
+                for (kind, first) in self.pattern.unknowns(j, i).into_iter().enumerate() {
+                    for c in 0..3 {
+                        let k = 18 * (j + 97 * search) + 3 * kind + c;
+                        load[first + c] +=
+                            golden(k + 1) + sigma * golden(k + 7) + wave * golden(k + 13);
+                    }
+                }
+            }
+        }
+        self.masses.times(&load)
+    }
+
+    /// A vector as turns and shifts of all nodes.
+    fn shape(&self, vector: &[f64]) -> Vec<Increment> {
+        let n = self.leaf.segments();
+        let mut shape = vec![[0.0; 6]; self.leaf.rods() * (n + 1)];
+        for j in 0..self.leaf.rods() {
+            for i in 1..=n {
+                let [turn, shift] = self.pattern.unknowns(j, i);
+                let node = &mut shape[self.state.base(j) + i];
+                node[..3].copy_from_slice(&vector[turn..turn + 3]);
+                node[3..].copy_from_slice(&vector[shift..shift + 3]);
+            }
+        }
+        shape
+    }
+}

@@ -1,0 +1,54 @@
+//! The eigenvalue that belongs to a shape.
+
+use crate::leaf::{DiscreteLeaf, Increment, State, shift, turn};
+use crate::rod::{Section, Segment};
+use glam::DVec3;
+
+/// What rounding may do to a quotient of a mode of unit mass.
+pub fn rounding(leaf: &DiscreteLeaf) -> f64 {
+    let sections = leaf.sections.iter();
+    let stiffest = sections.fold(0.0_f64, |m, s| m.max(s.couple_stiffness.max_element()));
+    4.0 * f64::EPSILON * stiffest * (leaf.segments() * leaf.segments()) as f64
+}
+
+/// Rayleigh's quotient of a shape of unit mass, in mixed form: with the forces
+/// that the shape lets the segments carry, taken as independent. An error of the
+/// shape or of these forces enters in the second order only, be it rounding or
+/// that of a stiffness by which the forces were condensed out; and no large
+/// stiffness stands in it.
+pub fn quotient(leaf: &DiscreteLeaf, state: &State, shape: &[Increment]) -> f64 {
+    let n = leaf.segments();
+    let mut sum = 0.0;
+    for j in 0..leaf.rods() {
+        for i in 0..n {
+            let segment = leaf.segment(state, j, i, state.n[j * n + i]);
+            let [a, b] = [0, 1].map(|end| &shape[state.base(j) + i + end]);
+            sum += of_segment(segment, leaf.section(j, i), a, b);
+        }
+        for i in 1..=n {
+            if j + 1 < leaf.rods() {
+                let [a, b] = [j, j + 1].map(|rod| shift(&shape[state.base(rod) + i]));
+                sum += (b - a).dot(leaf.spring(j, i) * (b - a));
+            }
+        }
+    }
+    sum
+}
+
+/// The part of a segment with the increments `a` and `b` of its nodes.
+fn of_segment(mut segment: Segment, section: &Section, a: &Increment, b: &Increment) -> f64 {
+    let (dx, a, b) = (shift(b) - shift(a), turn(a), turn(b));
+    // What the equilibrium itself leaves of it is no matter of the mode.
+    segment.gap = DVec3::ZERO;
+    let force = segment.force_increment(section, dx, a, b);
+    let force = segment.frame.transpose() * force;
+    let compliance = 2.0 * section.condensing.recip() - section.compliance;
+    // The rest of the second derivatives, at constant force.
+    let bare = Section {
+        condensing: DVec3::ZERO,
+        ..*section
+    };
+    let k = segment.hessian(&bare);
+    let turns = a.dot(k.aa * a) + 2.0 * a.dot(k.ab * b) + b.dot(k.bb * b);
+    section.ds * (compliance * force * force).element_sum() + turns
+}

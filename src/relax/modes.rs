@@ -1,0 +1,227 @@
+//! The modes of the settled leaf: from nested grids to the units of the
+//! scenario.
+
+use crate::leaf::{DiscreteLeaf, State, System, shift, turn};
+use crate::modes::{self, Eigenpair};
+use crate::motion::Physics;
+use crate::relax::equilibrium::{Mode, Work};
+use crate::relax::grids::{Level, Run};
+use crate::relax::prolong::{predict, prolong};
+use crate::relax::richardson::Richardson;
+use crate::relax::saddle;
+use crate::relax::semi_implicit::Settled;
+use glam::DVec3;
+
+/// Unknowns of the finest grid on which modes are looked for unless their
+/// shapes are asked for: about a second.
+const FEW_UNKNOWNS: usize = 20_000;
+
+/// The same of grids beyond those of the relaxation, which are there to make
+/// eigenvalues accurate.
+const FEW_MORE_UNKNOWNS: usize = 4_000;
+const MANY_MORE_UNKNOWNS: usize = 200_000;
+
+/// Grids that are extrapolated, at most, and those of them that may be beyond
+/// those of the relaxation.
+const GRIDS: usize = 4;
+const MORE_GRIDS: usize = 6;
+
+/// Smaller eigenvalues than this part of the largest are as accurate as that.
+const SMALL: f64 = 1e-3;
+
+/// Newton iterations on a further grid, and how far they may move a node, in
+/// lengths: farther away is another equilibrium.
+const ITERATIONS: usize = 12;
+const SAME_PLACE: f64 = 0.02;
+
+/// A mode that moves less than this, in lengths per radian of its rotation,
+/// is one of rotation alone.
+const STILL: f64 = 1e-6;
+
+/// The lowest modes of a settled leaf. `None` where they cannot be found: too
+/// large a leaf, or too many modes on a coarse grid.
+pub fn lowest(run: &Run) -> Option<Vec<Mode>> {
+    let options = run.options;
+    let finest = run.levels.last()?;
+    if options.modes == 0 || finest.leaf.tip_moment() != DVec3::ZERO {
+        return None;
+    }
+    if unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes {
+        return None;
+    }
+    let physics = Physics::new(run.leaf);
+    let on = |level: &Level| modes::lowest(&level.leaf, &physics, &level.state, options.modes).ok();
+    // The finest first: what is too large for it need not be begun.
+    let pairs = on(finest)?;
+    let first = run.levels.len().saturating_sub(GRIDS);
+    let mut series = Series::new(pairs.len());
+    for level in &run.levels[first..run.levels.len() - 1] {
+        match on(level) {
+            Some(pairs) => series.push(&pairs),
+            // Grids must follow each other.
+            None => series.grids.clear(),
+        }
+    }
+    series.push(&pairs);
+    let shapes = shapes(finest, &pairs);
+    if options.segments.is_none() {
+        refine(run, &mut series, on);
+    }
+    let rounding = modes::rounding(&finest.leaf);
+    let unit = physics.time.powi(-2);
+    let modes = series.judged().into_iter().zip(shapes);
+    Some(
+        modes
+            .map(|((eigenvalue, error), (displacement, rotation))| Mode {
+                eigenvalue: eigenvalue * unit,
+                error: error.map(|error| (error + rounding) * unit),
+                displacement,
+                rotation,
+            })
+            .collect(),
+    )
+}
+
+fn unknowns(leaf: &DiscreteLeaf) -> usize {
+    6 * leaf.rods() * leaf.segments()
+}
+
+/// Goes on to finer grids until the eigenvalues are as accurate as the shape.
+fn refine(run: &Run, series: &mut Series, on: impl Fn(&Level) -> Option<Vec<Eigenpair>>) {
+    let most = match run.options.mode_shapes {
+        true => MANY_MORE_UNKNOWNS,
+        false => FEW_MORE_UNKNOWNS,
+    };
+    let mut finer: Vec<Level> = Vec::new();
+    while finer.len() < MORE_GRIDS && !series.accurate(run.tolerance) && !run.late() {
+        let levels: Vec<&Level> = run.levels.iter().chain(&finer).collect();
+        let [.., last] = levels.as_slice() else {
+            return;
+        };
+        if 2 * unknowns(&last.leaf) > most {
+            return;
+        }
+        let before = levels.len().checked_sub(2).map(|k| &levels[k].state);
+        let Some(next) = settle(last, before, run.tolerance) else {
+            return;
+        };
+        let Some(pairs) = on(&next) else {
+            return;
+        };
+        series.push(&pairs);
+        finer.push(next);
+    }
+}
+
+/// The same equilibrium on the next finer grid.
+fn settle<'a>(last: &Level<'a>, before: Option<&State>, tolerance: f64) -> Option<Level<'a>> {
+    let mut state = prolong(&last.leaf, &last.state);
+    if let Some(before) = before {
+        predict(before, &last.state, &mut state);
+    }
+    let leaf = DiscreteLeaf::new(last.leaf.leaf, last.leaf.grid.refined());
+    let mut system = System::new(&leaf);
+    let guess = state.clone();
+    let accuracy = 1e-3 * tolerance;
+    let settled = saddle::newton(
+        &leaf,
+        &mut state,
+        &mut system,
+        accuracy,
+        ITERATIONS,
+        &mut Work::default(),
+        &mut |_, _| {},
+    );
+    let moved = guess.x.iter().zip(&state.x).map(|(a, b)| a.distance(*b));
+    let near = moved.fold(0.0, f64::max) < SAME_PLACE;
+    (matches!(settled, Settled::Rest(_)) && near).then_some(Level { leaf, state })
+}
+
+/// Eigenvalues on nested grids, each extrapolated on its own.
+struct Series {
+    grids: Vec<Vec<f64>>,
+    count: usize,
+}
+
+impl Series {
+    fn new(count: usize) -> Self {
+        Series {
+            grids: Vec::new(),
+            count,
+        }
+    }
+
+    fn push(&mut self, pairs: &[Eigenpair]) {
+        self.grids
+            .push(pairs.iter().map(|pair| pair.eigenvalue).collect());
+    }
+
+    /// The size an eigenvalue's error is measured with.
+    fn unit(&self, k: usize) -> f64 {
+        let finest = &self.grids[self.grids.len() - 1];
+        let largest = finest.iter().fold(0.0_f64, |m, value| m.max(value.abs()));
+        let unit = finest[k].abs().max(SMALL * largest);
+        if unit > 0.0 { unit } else { 1.0 }
+    }
+
+    /// Best values, and their errors if there are two grids.
+    fn judged(&self) -> Vec<(f64, Option<f64>)> {
+        let judge = |k: usize| {
+            let unit = self.unit(k);
+            // A coarse grid may have fewer modes.
+            let values = self.grids.iter().filter_map(|grid| grid.get(k));
+            let last = values.clone().count().saturating_sub(GRIDS);
+            let mut table = Richardson::default();
+            for value in values.skip(last) {
+                table.push(vec![value / unit]);
+            }
+            let best = table.best();
+            let value = table.column(best.map_or(0, |best| best.columns))[0];
+            (value * unit, best.map(|best| best.error * unit))
+        };
+        (0..self.count).map(judge).collect()
+    }
+
+    /// Whether all frequencies are known to this part of them.
+    fn accurate(&self, tolerance: f64) -> bool {
+        let known = |(k, error): (usize, Option<f64>)| {
+            error.is_some_and(|error| error <= 2.0 * tolerance * self.unit(k))
+        };
+        let errors = self.judged().into_iter().map(|(_, error)| error);
+        errors.enumerate().all(known)
+    }
+}
+
+/// Displacements and rotations of all nodes, rod by rod.
+type Shape = (Vec<Vec<DVec3>>, Vec<Vec<DVec3>>);
+
+/// Shapes as they are handed out: scaled so that the largest displacement is
+/// the longest rod, and the last of the largest components is positive.
+fn shapes(level: &Level, pairs: &[Eigenpair]) -> Vec<Shape> {
+    let length = level.leaf.leaf.scale.length;
+    let nodes = level.leaf.segments() + 1;
+    let shape = |pair: &Eigenpair| {
+        let largest = |part: fn(&[f64; 6]) -> DVec3| {
+            let lengths = pair.shape.iter().map(|node| part(node).length());
+            lengths.fold(0.0, f64::max)
+        };
+        let (far, turned) = (largest(shift), largest(turn));
+        let (size, part): (f64, fn(&[f64; 6]) -> DVec3) = match far > STILL * turned {
+            true => (far, shift),
+            false => (turned, turn),
+        };
+        let components = || pair.shape.iter().flat_map(|node| part(node).to_array());
+        let most = components().fold(0.0_f64, |m, c| m.max(c.abs()));
+        // The last of those that are equal but for rounding: a tip's.
+        let sign = components()
+            .rfind(|c| c.abs() > 0.99 * most)
+            .map_or(1.0, f64::signum);
+        let rods = |part: fn(&[f64; 6]) -> DVec3, unit: f64| {
+            let rod = |rod: &[[f64; 6]]| rod.iter().map(|node| part(node) * unit).collect();
+            pair.shape.chunks(nodes).map(rod).collect()
+        };
+        let unit = sign / size;
+        (rods(shift, unit * length), rods(turn, unit))
+    };
+    pairs.iter().map(shape).collect()
+}

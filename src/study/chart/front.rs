@@ -1,0 +1,65 @@
+//! What is fast and accurate at once.
+
+/// Which points (seconds, error) are on the Pareto front: no other is at least
+/// as fast and as accurate. Errors below `floor` are equal; of equal points the
+/// first is on the front.
+pub fn front(points: &[(f64, f64)], floor: f64) -> Vec<bool> {
+    let error = |i: usize| points[i].1.max(floor);
+    let beats = |j: usize, i: usize| {
+        let (a, b) = (points[j].0, points[i].0);
+        a <= b && error(j) <= error(i) && (a < b || error(j) < error(i) || j < i)
+    };
+    (0..points.len())
+        .map(|i| (0..points.len()).all(|j| !beats(j, i)))
+        .collect()
+}
+
+/// The fastest of the points with an error of at most `error`.
+pub fn fastest(points: impl IntoIterator<Item = (f64, f64)>, error: f64) -> Option<usize> {
+    let points = points.into_iter().enumerate();
+    points
+        .filter(|(_, point)| point.1 <= error)
+        .min_by(|(_, a), (_, b)| a.0.total_cmp(&b.0))
+        .map(|(i, _)| i)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_on_the_front_is_beaten() {
+        let points = [
+            (1.0, 1e-2), // on it: fastest
+            (2.0, 1e-2), // slower, no better
+            (2.0, 1e-4), // on it
+            (3.0, 1e-3), // slower and worse than the one before
+            (5.0, 1e-9), // on it: most accurate
+            (9.0, 1e-9), // as accurate, slower
+        ];
+        assert_eq!(front(&points, 0.0), [true, false, true, false, true, false]);
+        assert_eq!(front(&[], 0.0), [false; 0]);
+    }
+
+    #[test]
+    fn of_equal_points_one_is_on_the_front() {
+        assert_eq!(front(&[(1.0, 1e-3); 3], 0.0), [true, false, false]);
+    }
+
+    #[test]
+    fn errors_that_cannot_be_told_from_none_are_equal() {
+        let points = [(1.0, 1e-13), (2.0, 1e-15), (3.0, 0.0)];
+        assert_eq!(front(&points, 1e-12), [true, false, false]);
+        assert_eq!(front(&points, 0.0), [true, true, true]);
+    }
+
+    #[test]
+    fn the_fastest_is_accurate_enough() {
+        let points = [(1.0, 1e-2), (3.0, 1e-6), (2.0, 1e-5)];
+        let at = |error| fastest(points, error);
+        assert_eq!(
+            [at(1e-2), at(1e-5), at(1e-6), at(1e-7)],
+            [Some(0), Some(2), Some(1), None]
+        );
+    }
+}

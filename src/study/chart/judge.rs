@@ -1,0 +1,370 @@
+//! From what runs found to the rows of a chart: true errors, and runs that
+//! ended elsewhere.
+
+use super::plan::{Cell, Contender};
+use super::reference::Reference;
+use super::run::{Shape, longest};
+use super::timing::{Measured, Spread};
+use super::{Ending, Row};
+use crate::relax::{Outcome, Work};
+use crate::scenario::Scenario;
+
+/// Errors above this are not of discretisation if the run's own estimate is
+/// less than half as large: it is another equilibrium.
+const ELSEWHERE: f64 = 1e-2;
+const MUCH_LESS: f64 = 0.5;
+
+/// Stations at which the reference is wanted: those of all runs, so that
+/// nothing has to be interpolated. Runs on one grid have those of the others
+/// among their own, if they are fine enough; only those that have not add theirs.
+pub fn stations(measured: &[Measured]) -> Vec<f64> {
+    let runs = || {
+        measured
+            .iter()
+            .filter_map(|cell| cell.found.as_ref()?.as_ref().ok())
+    };
+    let Some(fewest) = runs().min_by_key(|run| run.shape.stations.len()) else {
+        return Vec::new();
+    };
+    let common = &fewest.shape.stations;
+    let mut wanted = common.clone();
+    for run in runs() {
+        if !run.shape.covers(common) {
+            wanted.extend(&run.shape.stations);
+        }
+    }
+    wanted
+}
+
+/// The rows of cells of one leaf.
+pub fn rows(
+    scenario: &Scenario,
+    cells: &[Cell],
+    measured: Vec<Measured>,
+    reference: Option<&Shape>,
+) -> Vec<Row> {
+    let unit = longest(scenario);
+    let at_rest: Vec<Option<&Shape>> = measured.iter().map(shape_at_rest).collect();
+    let errors: Vec<Option<f64>> = at_rest
+        .iter()
+        .map(|shape| Some((*shape)?.distance(reference?)? / unit))
+        .collect();
+    let elsewhere: Vec<bool> = (0..cells.len())
+        .map(|i| match errors[i] {
+            Some(error) if error > ELSEWHERE => {
+                if cells[i].contender.on_one_grid() {
+                    return is_elsewhere(i, cells, &at_rest, &errors, unit);
+                }
+                let found = measured[i].found.as_ref().and_then(|run| run.as_ref().ok());
+                let estimate = found.and_then(|run| run.estimate);
+                estimate.is_some_and(|estimate| estimate < MUCH_LESS * error)
+            }
+            _ => false,
+        })
+        .collect();
+    let rows = cells
+        .iter()
+        .zip(measured)
+        .zip(errors.into_iter().zip(elsewhere));
+    rows.map(|((cell, measured), (error, elsewhere))| row(cell, measured, error, elsewhere))
+        .collect()
+}
+
+/// Where a run knows the leaf to be at rest.
+fn shape_at_rest(measured: &Measured) -> Option<&Shape> {
+    let run = measured.found.as_ref()?.as_ref().ok()?;
+    run.at_rest().then_some(&run.shape)
+}
+
+/// Whether a run on one grid, which has no estimate of its error, owes that to
+/// being in another equilibrium: a coarser grid does much better, or the next
+/// grid finds nearly the same shape.
+fn is_elsewhere(
+    i: usize,
+    cells: &[Cell],
+    at_rest: &[Option<&Shape>],
+    errors: &[Option<f64>],
+    unit: f64,
+) -> bool {
+    let (Some(shape), Some(error)) = (at_rest[i], errors[i]) else {
+        return false;
+    };
+    let alike = |j: &usize| cells[*j].contender == cells[i].contender;
+    let mut coarser = (0..i).filter(alike);
+    if coarser.any(|j| errors[j].is_some_and(|other| other < MUCH_LESS * error)) {
+        return true;
+    }
+    let finer = (i + 1..cells.len()).find(alike).and_then(|j| at_rest[j]);
+    let coarser = || (0..i).rfind(alike).and_then(|j| at_rest[j]);
+    let next = finer.or_else(coarser);
+    let apart = next.and_then(|next| shape.distance(next));
+    apart.is_some_and(|apart| apart / unit < MUCH_LESS * error)
+}
+
+fn row(cell: &Cell, measured: Measured, true_error: Option<f64>, elsewhere: bool) -> Row {
+    let blank = Row {
+        contender: cell.contender,
+        knob: cell.knob,
+        seconds: Spread::of(&measured.seconds),
+        work: Work::default(),
+        true_error: None,
+        error_estimate: None,
+        ending: Ending::NotRun,
+        remark: None,
+        pareto: false,
+    };
+    let run = match measured.found {
+        None => return blank,
+        Some(Err(refusal)) => {
+            return Row {
+                ending: Ending::Refused,
+                remark: Some(refusal.to_string()),
+                ..blank
+            };
+        }
+        Some(Ok(run)) => run,
+    };
+    let ending = match run.outcome {
+        Outcome::Saddle => Ending::Ended(Outcome::Saddle),
+        _ if elsewhere => Ending::OtherEquilibrium,
+        outcome => Ending::Ended(outcome),
+    };
+    Row {
+        work: run.work,
+        true_error,
+        error_estimate: run.estimate,
+        ending,
+        // That the count of eigenvalues is not known is no failure.
+        remark: run.remark.filter(|_| !ending.is_success()),
+        ..blank
+    }
+}
+
+/// What is to be said of these rows and their reference.
+pub fn remarks(
+    rows: &[Row],
+    contenders: &[Contender],
+    reference: Option<&Reference>,
+) -> Vec<String> {
+    let floor = reference.map_or(0.0, |found| found.known_within);
+    let neutral = reference.and_then(|found| found.neutral.as_ref());
+    let mut remarks = Vec::new();
+    if contenders
+        .iter()
+        .any(|contender| matches!(contender, Contender::Explicit | Contender::ExplicitGrid))
+    {
+        remarks.push(
+            "explicit relaxation has no knob for its time step: it takes the longest stable one"
+                .into(),
+        );
+    }
+    if let Some(neutral) = neutral {
+        remarks.push(format!(
+            "errors tell little: {neutral}, and runs come to rest in different places"
+        ));
+    }
+    for contender in contenders {
+        let of_it = || rows.iter().filter(|row| row.contender == *contender);
+        if of_it().all(|row| row.ending == Ending::Refused)
+            && let Some(why) = of_it().find_map(|row| row.remark.as_ref())
+        {
+            remarks.push(format!("{} is not charted: {why}", contender.word()));
+        }
+        if let Some(first) = of_it().find(|row| row.ending == Ending::NotRun) {
+            remarks.push(format!(
+                "{} is not run from {} on: the run before took too long; allow more --seconds",
+                contender.word(),
+                first.knob
+            ));
+        }
+        // The chart is the place where an estimate is found out.
+        let too_small = |row: &&Row| {
+            let estimate = row.error_estimate.unwrap_or(f64::INFINITY).max(floor);
+            row.ending.is_success() && row.true_error.is_some_and(|error| error > estimate)
+        };
+        let knobs: Vec<String> = of_it()
+            .filter(too_small)
+            .map(|row| row.knob.to_string())
+            .collect();
+        if !knobs.is_empty() && neutral.is_none() {
+            remarks.push(format!(
+                "{} underestimates its error at {}",
+                contender.word(),
+                knobs.join(", ")
+            ));
+        }
+    }
+    remarks
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::super::{plan, run::Run};
+    use super::*;
+    use crate::relax::RelaxError;
+
+    const STATIONS: [f64; 3] = [0.0, 0.5, 1.0];
+
+    fn scenario() -> Scenario {
+        let leaf = r#"
+            name = "cantilever"
+            leaf = { rods = 1, length = 2.0, fan = [0.0] }
+            stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }
+        "#;
+        Scenario::from_toml(leaf).unwrap()
+    }
+
+    /// Straight but for a shift of its tip.
+    fn shape(shift: f64) -> Shape {
+        let at = STATIONS.map(|sigma| DVec3::new(2.0 * sigma, 0.0, shift * sigma));
+        Shape {
+            stations: STATIONS.to_vec(),
+            positions: vec![at.to_vec()],
+        }
+    }
+
+    fn found(outcome: Outcome, shift: f64, estimate: Option<f64>) -> Measured {
+        Measured {
+            found: Some(Ok(Run {
+                outcome,
+                remark: Some("why".into()),
+                shape: shape(shift),
+                estimate,
+                work: Work::default(),
+            })),
+            seconds: vec![1.0],
+        }
+    }
+
+    /// The rows of a contender that found this at its first settings.
+    fn judged(contender: Contender, mut measured: Vec<Measured>) -> Vec<Row> {
+        let scenario = scenario();
+        let cells = plan::cells(&scenario, &[contender]);
+        measured.resize_with(cells.len(), || Measured {
+            found: None,
+            seconds: Vec::new(),
+        });
+        rows(&scenario, &cells, measured, Some(&shape(0.0)))
+    }
+
+    #[test]
+    fn errors_are_relative_and_remarks_are_for_failures() {
+        let row = &judged(
+            Contender::SemiImplicit,
+            vec![found(Outcome::Converged, 2e-4, Some(3e-4))],
+        )[0];
+        assert_eq!(row.true_error, Some(1e-4));
+        assert_eq!(row.error_estimate, Some(3e-4));
+        assert_eq!((row.ending.word(), &row.remark), ("converged", &None));
+        assert_eq!(row.point(), Some((1.0, 1e-4)));
+    }
+
+    #[test]
+    fn what_ends_elsewhere_is_no_success() {
+        let rows = judged(
+            Contender::MultipleShooting,
+            vec![
+                found(Outcome::Converged, 0.5, Some(1e-3)),
+                found(Outcome::Saddle, 0.5, Some(1e-3)),
+                found(Outcome::Saddle, 0.0, Some(1e-3)),
+                found(Outcome::NotAtRest, 0.5, None),
+                found(Outcome::Converged, 0.03, Some(1e-2)),
+                found(Outcome::ToleranceNotReached, 1e-6, Some(1e-6)),
+            ],
+        );
+        let words: Vec<&str> = rows.iter().map(|row| row.ending.word()).collect();
+        assert_eq!(
+            words[..7],
+            [
+                "other-equilibrium",
+                "saddle",
+                "saddle",
+                "not-at-rest",
+                "converged",
+                "tolerance-not-reached",
+                "not-run"
+            ]
+        );
+        let successes = rows.iter().filter(|row| row.point().is_some());
+        assert_eq!(successes.count(), 1);
+        assert_eq!(rows[0].true_error, Some(0.25));
+        assert_eq!(rows[3].true_error, None);
+        assert_eq!(rows[3].remark.as_deref(), Some("why"));
+    }
+
+    /// A coarse grid is far off because it is coarse, unless the next grid is
+    /// as far off in the same place.
+    #[test]
+    fn a_coarse_grid_is_not_called_another_equilibrium() {
+        let at = |shift| found(Outcome::Converged, shift, None);
+        let coarse = vec![at(1.6), at(0.4), at(0.1), at(0.025)];
+        let rows = judged(Contender::SemiImplicitGrid, coarse);
+        assert!(rows[..4].iter().all(|row| row.ending.is_success()));
+        let elsewhere = vec![at(0.52), at(0.51), at(0.505)];
+        let rows = judged(Contender::SemiImplicitGrid, elsewhere);
+        let other = Ending::OtherEquilibrium;
+        assert!(rows[..3].iter().all(|row| row.ending == other));
+        let astray = vec![at(0.4), at(0.1), at(0.5), at(6e-3)];
+        let rows = judged(Contender::SemiImplicitGrid, astray);
+        let astray: Vec<bool> = rows.iter().map(|row| row.ending == other).collect();
+        assert_eq!(astray[..4], [false, false, true, false]);
+    }
+
+    #[test]
+    fn refusals_and_underestimates_are_told() {
+        let refused = |_| Measured {
+            found: Some(Err(RelaxError::Rigid)),
+            seconds: Vec::new(),
+        };
+        let mut rows = judged(Contender::Explicit, (0..10).map(refused).collect());
+        assert!(rows.iter().all(|row| row.ending == Ending::Refused));
+        let semi_implicit = vec![
+            found(Outcome::Converged, 2e-4, Some(1e-5)),
+            found(Outcome::Converged, 2e-12, Some(1e-15)),
+        ];
+        rows.extend(judged(Contender::SemiImplicit, semi_implicit));
+        let contenders = [Contender::Explicit, Contender::SemiImplicit];
+        let mut reference = Reference {
+            confirmed: true,
+            told: String::new(),
+            known_within: 1e-11,
+            relaxed: None,
+            shot: None,
+            difference: None,
+            neutral: None,
+        };
+        let told = remarks(&rows, &contenders, Some(&reference));
+        assert_eq!(told.len(), 4, "{told:?}");
+        assert!(told[0].contains("time step"));
+        assert!(told[1].starts_with("explicit is not charted: "));
+        assert!(told[2].starts_with("semi-implicit is not run from tolerance=1e-4 on"));
+        assert_eq!(
+            told[3],
+            "semi-implicit underestimates its error at tolerance=1e-2"
+        );
+
+        // Along a neutral direction no estimate can be wrong.
+        reference.neutral = Some("the leaf can move".into());
+        let told = remarks(&rows, &contenders, Some(&reference));
+        assert_eq!(told.len(), 4, "{told:?}");
+        assert!(told[1].starts_with("errors tell little: the leaf can move"));
+    }
+
+    #[test]
+    fn the_reference_is_wanted_where_a_run_has_stations_of_its_own() {
+        let with = |stations: &[f64]| {
+            let mut measured = found(Outcome::Converged, 0.0, None);
+            if let Some(Ok(run)) = &mut measured.found {
+                run.shape.stations = stations.to_vec();
+            }
+            measured
+        };
+        let nested = [with(&[0.0, 0.25, 0.5, 0.75, 1.0]), with(&STATIONS)];
+        assert_eq!(stations(&nested), STATIONS);
+        let other = [with(&[0.0, 0.3, 0.6, 1.0]), with(&STATIONS)];
+        assert_eq!(stations(&other), [0.0, 0.5, 1.0, 0.0, 0.3, 0.6, 1.0]);
+        assert!(stations(&[]).is_empty());
+    }
+}

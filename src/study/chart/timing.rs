@@ -1,0 +1,196 @@
+//! Time measured fairly: all cells take turns, so that a busy machine treats
+//! them alike.
+
+use super::plan::{Cell, Contender};
+use super::run::{Run, run};
+use crate::relax::RelaxError;
+
+/// Runs that take longer, in seconds, are slow: they are not repeated.
+const SLOW: f64 = 1.0;
+
+/// Runs of the others, at least and at most.
+const FEWEST: usize = 3;
+const MOST: usize = 101;
+
+/// How far the measurement has come.
+#[derive(Clone, Copy, Debug)]
+pub struct Turn {
+    /// Veins of the leaf that is run next.
+    pub rods: usize,
+    /// How it is run.
+    pub contender: Contender,
+    /// Where its knob stands.
+    pub knob: super::Setting,
+    /// Present round.
+    pub round: usize,
+    /// Rounds in all, as far as known.
+    pub rounds: usize,
+}
+
+/// A cell after all rounds.
+pub struct Measured {
+    /// What the first run found. `None`: it was not run, as a coarser one of
+    /// its contender took too long already.
+    pub found: Option<Result<Run, RelaxError>>,
+    /// Seconds of each run, ascending.
+    pub seconds: Vec<f64>,
+}
+
+/// The spread of repeated measurements, in seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    /// Shortest.
+    pub min: f64,
+    /// First quartile.
+    pub q1: f64,
+    /// Median.
+    pub median: f64,
+    /// Third quartile.
+    pub q3: f64,
+    /// Number of measurements.
+    pub runs: usize,
+}
+
+impl Spread {
+    /// Of measurements in ascending order; `None` without any.
+    pub fn of(sorted: &[f64]) -> Option<Self> {
+        let last = sorted.len().checked_sub(1)?;
+        let at = |part: f64| {
+            let place = part * last as f64;
+            let below = place.floor() as usize;
+            let above = (below + 1).min(last);
+            let rest = place - below as f64;
+            (1.0 - rest) * sorted[below] + rest * sorted[above]
+        };
+        Some(Spread {
+            min: sorted[0],
+            q1: at(0.25),
+            median: at(0.5),
+            q3: at(0.75),
+            runs: sorted.len(),
+        })
+    }
+}
+
+/// Runs all cells once, in order, and those that are not slow [`FEWEST`] times;
+/// then again and again for about `budget` seconds in all, each about equally
+/// long. Cells of one contender go from cheap to dear: if one takes longer than
+/// the budget (or [`SLOW`]), those after it are not run. Returns also the number
+/// of rounds.
+pub fn measure(
+    cells: &[Cell],
+    budget: f64,
+    progress: &mut (dyn FnMut(&Turn) + Send),
+) -> (Vec<Measured>, usize) {
+    let mut tell = |cell: &Cell, round: usize, rounds: usize| {
+        progress(&Turn {
+            rods: cell.scenario.rods.len(),
+            contender: cell.contender,
+            knob: cell.knob,
+            round,
+            rounds,
+        });
+    };
+    let longest = budget.max(SLOW);
+    let mut too_slow = Vec::new();
+    let mut measured: Vec<Measured> = Vec::with_capacity(cells.len());
+    for cell in cells {
+        let mut seconds = Vec::new();
+        let found = (!too_slow.contains(&cell.contender)).then(|| {
+            tell(cell, 1, FEWEST);
+            let (run, time) = run(cell)?;
+            seconds.push(time);
+            if time > longest {
+                too_slow.push(cell.contender);
+            }
+            Ok(run)
+        });
+        measured.push(Measured { found, seconds });
+    }
+    let mut again = |measured: &mut [Measured], round: usize, rounds: usize, part: &[bool]| {
+        let cells = cells.iter().zip(measured).zip(part);
+        for ((cell, measured), _) in cells.filter(|(_, part)| **part) {
+            tell(cell, round, rounds);
+            // What ran once runs again.
+            if let Ok((_, time)) = run(cell) {
+                measured.seconds.push(time);
+            }
+        }
+    };
+    let is_fast = |cell: &Measured| cell.seconds.first().is_some_and(|&time| time < SLOW);
+    let fast: Vec<bool> = measured.iter().map(is_fast).collect();
+    for round in 1..FEWEST {
+        again(&mut measured, round + 1, FEWEST, &fast);
+    }
+    let share = budget / fast.iter().filter(|fast| **fast).count().max(1) as f64;
+    let repeats: Vec<usize> = measured
+        .iter()
+        .map(|cell| repeats(&cell.seconds, share))
+        .collect();
+    let rest = repeats.iter().copied().max().unwrap_or(0);
+    for round in 0..rest {
+        let part = repeats
+            .iter()
+            .map(|&repeats| takes_part(round, repeats, rest));
+        let part: Vec<bool> = part.collect();
+        again(&mut measured, FEWEST + round + 1, FEWEST + rest, &part);
+    }
+    for cell in &mut measured {
+        cell.seconds.sort_by(f64::total_cmp);
+    }
+    (measured, FEWEST + rest)
+}
+
+/// Runs after the first few, for a `share` of the time: none of a slow cell. A
+/// first run may be disturbed, the shortest is not.
+fn repeats(seconds: &[f64], share: f64) -> usize {
+    let shortest = seconds.iter().copied().reduce(f64::min);
+    match shortest {
+        Some(time) if seconds.len() >= FEWEST => {
+            ((share / time) as usize).clamp(FEWEST, MOST) - FEWEST
+        }
+        _ => 0,
+    }
+}
+
+/// Whether a cell with so many `repeats` runs in this of all `rounds`: they are
+/// spread evenly.
+fn takes_part(round: usize, repeats: usize, rounds: usize) -> bool {
+    (round + 1) * repeats / rounds > round * repeats / rounds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn repeats_are_as_many_as_wanted_and_spread() {
+        for repeats in [0, 1, 2, 7, 100] {
+            let rounds: Vec<usize> = (0..100).filter(|&r| takes_part(r, repeats, 100)).collect();
+            assert_eq!(rounds.len(), repeats);
+            let gaps = rounds.windows(2).map(|pair| pair[1] - pair[0]);
+            assert!(gaps.max().unwrap_or(0) <= 100_usize.div_ceil(repeats.max(1)));
+        }
+    }
+
+    #[test]
+    fn fast_runs_are_repeated_often_and_slow_ones_not() {
+        assert_eq!(repeats(&[1e-6; 3], 0.1), MOST - FEWEST);
+        assert_eq!(repeats(&[0.3, 0.01, 0.02], 0.1), 10 - FEWEST);
+        assert_eq!(repeats(&[0.9; 3], 0.1), 0);
+        assert_eq!(repeats(&[2.0], 0.1), 0);
+        assert_eq!(repeats(&[], 0.1), 0);
+    }
+
+    #[test]
+    fn quartiles() {
+        let spread = Spread::of(&[1.0, 2.0, 3.0, 4.0, 10.0]).unwrap();
+        assert_eq!(
+            (spread.min, spread.q1, spread.median, spread.q3),
+            (1.0, 2.0, 3.0, 4.0)
+        );
+        let spread = Spread::of(&[1.0, 2.0]).unwrap();
+        assert_eq!((spread.q1, spread.median), (1.25, 1.5));
+        assert_eq!(Spread::of(&[]), None);
+    }
+}

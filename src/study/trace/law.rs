@@ -1,0 +1,116 @@
+//! Force against displacement, as a tensile test measures it.
+
+use super::result::TraceBranch;
+use crate::scenario::Key;
+use crate::study::{Keys, Target};
+
+/// The straight line through the forces on a tip against its displacements
+/// along them: Hooke's law, and how well it holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Law {
+    /// Axis of the force: 0, 1, 2 for x, y, z.
+    pub axis: usize,
+    /// Stiffness: slope of the line of least squares, force per length.
+    pub slope: f64,
+    /// Coefficient of determination of that line: 1 for a straight one.
+    pub r_squared: f64,
+    /// The largest deviation from the line, as a part of the range of the forces.
+    pub deviation: f64,
+    /// Distance of base and tip where the range begins.
+    pub length: f64,
+    /// slope * length / cross-section, if one is given.
+    pub young: Option<f64>,
+}
+
+impl Law {
+    /// Of a branch along which a component of the force on the joint tip
+    /// varies; `None` along others, or with fewer than three points.
+    pub(super) fn of(keys: &Keys, branch: &TraceBranch, cross_section: Option<f64>) -> Option<Law> {
+        let [
+            Target::Entry {
+                key: Key::TipForce,
+                index: Some(axis),
+            },
+        ] = keys.targets()
+        else {
+            return None;
+        };
+        let first = branch.points.first()?;
+        let [tip] = first.tips[..] else {
+            return None;
+        };
+        let points: Vec<(f64, f64)> = branch
+            .points
+            .iter()
+            .map(|point| (point.tips[0][*axis] - tip[*axis], point.value))
+            .collect();
+        let count = points.len() as f64;
+        if points.len() < 3 {
+            return None;
+        }
+        let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
+        let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
+        let xx = mean(&|p| (p.0 - x) * (p.0 - x));
+        let xy = mean(&|p| (p.0 - x) * (p.1 - y));
+        let yy = mean(&|p| (p.1 - y) * (p.1 - y));
+        let slope = xy / xx;
+        let off = |p: &(f64, f64)| (p.1 - y - slope * (p.0 - x)).abs();
+        let forces = points.iter().map(|p| p.1);
+        let range =
+            forces.clone().fold(f64::NEG_INFINITY, f64::max) - forces.fold(f64::INFINITY, f64::min);
+        let length = tip.length();
+        Some(Law {
+            axis: *axis,
+            slope,
+            r_squared: xy * xy / (xx * yy),
+            deviation: points.iter().map(off).fold(0.0, f64::max) / range,
+            length,
+            young: cross_section.map(|area| slope * length / area),
+        })
+        .filter(|law| law.slope.is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::trace::{PointKind, TraceEnd, TracePoint};
+    use glam::DVec3;
+
+    fn branch(tip: impl Fn(f64) -> f64) -> TraceBranch {
+        let point = |force: f64| TracePoint {
+            kind: PointKind::Regular,
+            value: force,
+            value_error: None,
+            tips: vec![DVec3::new(tip(force), 0.0, 0.0)],
+            error: None,
+            energy: 0.0,
+            index: 0,
+            curves: Vec::new(),
+        };
+        TraceBranch {
+            from: None,
+            points: (0..=10).map(|k| point(0.1 * f64::from(k))).collect(),
+            end: TraceEnd::Reached,
+            remark: None,
+        }
+    }
+
+    #[test]
+    fn a_spring_is_a_spring() {
+        let keys: Keys = "load.tip_force[0]".parse().unwrap();
+        let law = Law::of(&keys, &branch(|f| 2.0 + f / 3.0), Some(0.5)).unwrap();
+        assert!((law.slope - 3.0).abs() < 1e-12 && (law.r_squared - 1.0).abs() < 1e-12);
+        assert!(law.deviation < 1e-12);
+        assert!((law.young.unwrap() - 12.0).abs() < 1e-10);
+    }
+
+    #[test]
+    fn what_bends_away_from_the_line_is_said() {
+        let keys: Keys = "load.tip_force[0]".parse().unwrap();
+        let law = Law::of(&keys, &branch(|f| 2.0 + f + f * f), None).unwrap();
+        assert!(law.r_squared < 0.99 && law.deviation > 0.02);
+        let other: Keys = "load.gravity[2]".parse().unwrap();
+        assert_eq!(Law::of(&other, &branch(|f| f), None), None);
+    }
+}

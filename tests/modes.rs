@@ -1,0 +1,500 @@
+//! The lowest modes of leaves at rest: known frequencies, none left out, as
+//! many unstable ones as there are, and the leaf does vibrate so.
+
+mod common;
+#[path = "common/linear.rs"]
+mod linear;
+#[path = "common/motion.rs"]
+mod motion;
+#[path = "common/random.rs"]
+mod random;
+
+use std::f64::consts::PI;
+
+use common::{close, extrapolate, fig04, paper_leaf, scenario};
+use leafdyn::leaf::{Leaf, State};
+use leafdyn::modes;
+use leafdyn::motion::{Inertia, Physics};
+use leafdyn::relax::{Equilibrium, Method, Mode, Options, relax};
+use leafdyn::scenario::{Profile, Scenario, Schedule};
+use linear::Linear;
+use motion::{Scheme, discrete, method as moving_by, rest, three_veins};
+use nalgebra::SymmetricEigen;
+use proptest::prelude::*;
+use rayon::ThreadPoolBuilder;
+
+fn with(count: usize) -> Options {
+    Options {
+        modes: count,
+        mode_shapes: true,
+        ..Options::default()
+    }
+}
+
+#[track_caller]
+fn solve(scenario: &Scenario, options: &Options) -> Equilibrium {
+    let leaf = relax(scenario, options, &mut |_| {}).unwrap();
+    assert!(leaf.outcome.is_success(), "{:?}", leaf.outcome);
+    leaf
+}
+
+#[track_caller]
+fn modes_of(leaf: &Equilibrium) -> &[Mode] {
+    leaf.modes.as_deref().expect("modes are found")
+}
+
+/// Frequencies must be those known to 1e-6 of them, and the estimates of the
+/// errors must hold, but for the `digits` to which they are known.
+#[track_caller]
+fn assert_known(name: &str, leaf: &Equilibrium, known: &[f64], digits: f64) {
+    let modes = modes_of(leaf);
+    assert_eq!(modes.len(), known.len());
+    for (k, (mode, known)) in modes.iter().zip(known).enumerate() {
+        let found = mode.frequency().expect("the rod is stable");
+        let error = (found / known - 1.0).abs();
+        let estimate = mode.error.expect("several grids") / (2.0 * known * known);
+        println!(
+            "{name}, mode {}: {found:.10}, error {error:.1e}, estimate {estimate:.1e}",
+            k + 1
+        );
+        assert!(error < 1e-6, "{name}, mode {}: {found} for {known}", k + 1);
+        assert!(
+            error <= estimate + digits,
+            "{name}, mode {}: {error:.1e}, estimate {estimate:.1e}",
+            k + 1
+        );
+    }
+}
+
+/// A straight rod of unit length, bending stiffness and mass, as stiff in all
+/// directions, with the rotary inertia r2.
+fn beam(r2: f64, [axial, shear]: [f64; 2]) -> Scenario {
+    let mut beam = paper_leaf(1, [1.0; 3], [axial, shear, shear], 0.0);
+    beam.rods[0].angle = 0.0;
+    beam.dynamics.rotary_inertia = vec![Profile::Constant(r2)];
+    beam
+}
+
+/// Squares of the roots of cos b cosh b = -1 (S. Timoshenko, Vibration problems
+/// in engineering), each twice.
+#[test]
+fn a_slender_beam_vibrates_as_euler_and_bernoulli_say() {
+    let known = [1.875104068711961_f64, 4.694091132974175, 7.854757438237613].map(|b| b * b);
+    let known: Vec<f64> = known.iter().flat_map(|&omega| [omega, omega]).collect();
+    let slender = beam(1e-10, [f64::INFINITY; 2]);
+    assert_known("Euler-Bernoulli", &solve(&slender, &with(6)), &known, 1e-8);
+}
+
+/// Roots of the frequency equation of the clamped Timoshenko beam (T. C. Huang,
+/// J. Appl. Mech. 28, 1961) to 13 digits. Rods also twist and stretch, both
+/// with (k - 1/2) pi/r here: the whole spectrum is known.
+#[test]
+fn timoshenko_beams_with_all_modes_in_space() {
+    for (r2, s2, bending) in [
+        (
+            1e-4_f64,
+            2.6e-4,
+            [
+                3.513078252179,
+                21.90711479483,
+                60.85906859261,
+                117.9269574473,
+            ],
+        ),
+        (
+            0.0016,
+            0.00416,
+            [
+                3.470067483695,
+                20.23985098215,
+                51.63550442718,
+                90.90518380084,
+            ],
+        ),
+        (
+            0.01,
+            0.026,
+            [
+                3.259779790893,
+                15.02362640182,
+                33.03084600553,
+                50.83238503823,
+            ],
+        ),
+    ] {
+        let bars = (1..10).map(|k| (f64::from(k) - 0.5) * PI / r2.sqrt());
+        let mut known: Vec<f64> = bars.chain(bending).flat_map(|omega| [omega; 2]).collect();
+        known.sort_by(f64::total_cmp);
+        known.retain(|&omega| omega <= bending[3]);
+        let name = format!("r2 = {r2}, s2 = {s2}");
+        let beam = beam(r2, [1.0 / r2, 1.0 / s2]);
+        assert_known(&name, &solve(&beam, &with(known.len())), &known, 1e-12);
+    }
+}
+
+/// (j/2)^2 with the zeros j of the Bessel function J0 (H. Lamb, Higher
+/// mechanics): a rod of length, mass and gravity one that hardly bends, by the
+/// stiffness `part`^2, and less and less of it.
+#[test]
+fn a_hanging_chain() {
+    let known = [1.445796490736696_f64, 7.617815585915522].map(f64::sqrt);
+    let softer = [0.02, 0.01, 0.005, 0.0025, 0.00125].map(|part| {
+        let [soft, stiff] = [part * part, 1.0 / (part * part)];
+        let mut rod = paper_leaf(1, [soft; 3], [stiff; 3], 0.0);
+        rod.rods[0].angle = 0.0;
+        rod.dynamics.density = vec![Profile::Constant(1.0)];
+        rod.dynamics.rotary_inertia = vec![Profile::Constant(soft)];
+        rod.gravity = [1.0, 0.0, 0.0];
+        // A layer at the clamp, `part` thick, bends: knots put most nodes there.
+        let growth = 4.2_f64;
+        let knots = (0..=48).map(|i| (growth * f64::from(i) / 48.0).exp_m1() / growth.exp_m1());
+        let at: Vec<f64> = knots.collect();
+        // Twist is fast.
+        let value = vec![1e4 * soft; at.len()];
+        rod.rods[0].couple_stiffness[0] = Profile::Linear { at, value };
+        let leaf = solve(&rod, &with(4));
+        let found: Vec<f64> = modes_of(&leaf).iter().filter_map(Mode::frequency).collect();
+        println!("bending {part}: {found:?} on {:?}", leaf.segments);
+        close("twice", found[1] / found[0], 1.0, 1e-8);
+        close("twice", found[3] / found[2], 1.0, 1e-8);
+        [found[0], found[2]]
+    });
+    for (k, within) in [(0, 1e-6), (1, 2e-5)] {
+        let found = extrapolate(&softer.map(|pair| pair[k]), 0.5);
+        println!("mode {}: {:.1e}", k + 1, found / known[k] - 1.0);
+        close("frequency", found / known[k], 1.0, within);
+    }
+}
+
+/// All eigenvalues, ascending, by a dense method, and the matrix made from the
+/// segments' derivatives by the tests themselves.
+fn dense(scenario: &Scenario, state: &State) -> Vec<f64> {
+    let leaf = Leaf::new(scenario);
+    let grid = discrete(&leaf, state.segments());
+    let linear = Linear::new(&grid, &Physics::new(&leaf), state);
+    let matrix = linear.scaled(&(&linear.strains + &linear.coupling));
+    let mut values: Vec<f64> = SymmetricEigen::new(matrix)
+        .eigenvalues
+        .iter()
+        .copied()
+        .collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+/// The state of a result on one grid.
+fn state_of(scenario: &Scenario, leaf: &Equilibrium) -> State {
+    let scale = Leaf::new(scenario).scale;
+    let nodes = || leaf.rods.iter().flat_map(|rod| &rod.nodes);
+    State::new(
+        leaf.stations.len() - 1,
+        nodes().map(|node| node.position / scale.length).collect(),
+        nodes().map(|node| node.rotation).collect(),
+    )
+}
+
+#[track_caller]
+fn assert_as_dense(name: &str, scenario: &Scenario, options: &Options) {
+    let leaf = solve(scenario, options);
+    let physics = Physics::new(&Leaf::new(scenario));
+    let known = dense(scenario, &state_of(scenario, &leaf));
+    let found: Vec<f64> = modes_of(&leaf).iter().map(|mode| mode.eigenvalue).collect();
+    assert_eq!(found.len(), options.modes.min(known.len()), "{name}");
+    let size = known[known.len() - 1].abs();
+    for (k, (found, known)) in found.iter().zip(&known).enumerate() {
+        let found = found * physics.time.powi(2);
+        // A dense method's error is a part of the largest eigenvalue.
+        let error = (found - known).abs() / (1e-9 * known.abs() + 1e-14 * size);
+        assert!(error < 1.0, "{name}, {k}: {found} for {known}");
+    }
+}
+
+#[test]
+fn eigenvalues_are_those_of_a_dense_method() {
+    let on = |segments, count, keep_unstable| Options {
+        segments: Some(segments),
+        keep_unstable,
+        tolerance: Some(1e-12),
+        ..with(count)
+    };
+    assert_as_dense("three veins", &three_veins(), &on(6, 25, false));
+    let mut round = three_veins();
+    round.dynamics.polar_excess = 1.0;
+    round.dynamics.density = vec![Profile::Constant(7.0); 3];
+    assert_as_dense("heavier", &round, &on(6, 25, false));
+    let mut free = three_veins();
+    free.joined = false;
+    assert_as_dense("free tips", &free, &on(6, 25, false));
+    assert_as_dense("Fig. 4", &fig04(5), &on(8, 20, false));
+    // Every vein vibrates nearly alike, or exactly: eigenvalues are close
+    // together, or the same twelve times.
+    assert_as_dense("Fig. 4, many veins", &fig04(20), &on(4, 12, false));
+    let mut same = paper_leaf(6, [1.0; 3], [100.0; 3], 0.0);
+    same.joined = false;
+    same.coupling = vec![[0.0; 3]; 5];
+    for count in [2, 12, 15] {
+        assert_as_dense("six equal veins", &same, &on(4, count, false));
+    }
+    // All there are.
+    assert_as_dense("one vein", &fig04(1), &on(4, 100, false));
+    let flat = scenario("paper/fig10", &["leaf.rods=5".into()]);
+    assert_as_dense("a saddle", &flat, &on(10, 30, true));
+}
+
+/// The three veins brought to rest by motion have the same modes.
+#[test]
+fn the_explicit_method_tells_the_same_modes() {
+    let explicit = Options {
+        method: Method::Explicit,
+        ..with(4)
+    };
+    let leaf = fig04(3);
+    let (implicit, explicit) = (solve(&leaf, &with(4)), solve(&leaf, &explicit));
+    for (a, b) in modes_of(&implicit).iter().zip(modes_of(&explicit)) {
+        let apart = (a.eigenvalue - b.eigenvalue).abs();
+        assert!(apart <= a.error.unwrap() + b.error.unwrap() + 1e-7 * a.eigenvalue);
+    }
+}
+
+/// Frequencies do not depend on whether half of a leaf was solved for.
+#[test]
+fn half_of_a_leaf_tells_the_modes_of_the_whole() {
+    let entries = ["leaf.rods=4".to_string(), "leaf.fan='symmetric'".into()];
+    let leaf = scenario("paper/fig04", &entries);
+    let half = solve(&leaf, &with(6));
+    assert_eq!(half.model.rods, 2);
+    let whole = Options {
+        full_model: true,
+        ..with(6)
+    };
+    let whole = solve(&leaf, &whole);
+    for (a, b) in modes_of(&half).iter().zip(modes_of(&whole)) {
+        let apart = (a.eigenvalue - b.eigenvalue).abs();
+        assert!(apart <= a.error.unwrap() + b.error.unwrap());
+        close("eigenvalue", a.eigenvalue / b.eigenvalue, 1.0, 1e-5);
+        assert_eq!(a.displacement.len(), 4);
+    }
+}
+
+/// The number of negative eigenvalues listed.
+fn negative(leaf: &Equilibrium) -> usize {
+    modes_of(leaf)
+        .iter()
+        .filter(|mode| mode.eigenvalue < 0.0)
+        .count()
+}
+
+#[test]
+fn saddles_have_as_many_negative_eigenvalues_as_their_index() {
+    let flat = scenario("paper/fig10", &["leaf.rods=5".into()]);
+    for (segments, index) in [(10, 14), (20, 16), (40, 18)] {
+        let options = Options {
+            segments: Some(segments),
+            keep_unstable: true,
+            ..with(24)
+        };
+        let leaf = solve(&flat, &options);
+        assert_eq!(leaf.negative_eigenvalues, Some(index));
+        assert_eq!(negative(&leaf), index, "{segments} segments");
+        assert!(modes_of(&leaf).is_sorted_by_key(|mode| mode.eigenvalue));
+        assert!(modes_of(&leaf)[0].frequency().is_none());
+        assert!(modes_of(&leaf)[0].growth().unwrap() > 0.0);
+    }
+}
+
+/// Euler's column, P = 4.5 pi^2: it buckles in four ways, two by two alike.
+#[test]
+fn a_round_column_leaves_its_saddle_in_pairs_of_ways() {
+    let mut column = beam(1e-4, [1e4, 1e4]);
+    column.tip_force = [-4.5 * PI * PI, 0.0, 0.0];
+    let options = Options {
+        keep_unstable: true,
+        ..with(6)
+    };
+    let leaf = solve(&column, &options);
+    assert_eq!(leaf.negative_eigenvalues, Some(4));
+    assert_eq!(negative(&leaf), 4);
+    for pair in modes_of(&leaf).chunks(2) {
+        close("twice", pair[1].eigenvalue / pair[0].eigenvalue, 1.0, 1e-7);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn random_leaves_have_as_many_negative_eigenvalues_as_their_index(
+        leaf in random::leaves(), keep_unstable: bool,
+    ) {
+        let options = Options {
+            segments: Some(12.max(Leaf::new(&leaf).kinks().len() + 1)),
+            keep_unstable,
+            ..with(12)
+        };
+        let found = relax(&leaf, &options, &mut |_| {}).unwrap();
+        if found.outcome.is_success() {
+            let index = found.negative_eigenvalues.unwrap();
+            let negative = negative(&found);
+            prop_assert_eq!(index.min(12), negative);
+            prop_assert!(modes_of(&found).is_sorted_by_key(|mode| mode.eigenvalue));
+        }
+    }
+}
+
+/// The stable leaf does vibrate with the frequency of a mode if it is let go in
+/// its shape: by leapfrog with steps of h at 2/h asin(omega h/2).
+#[test]
+fn a_leaf_let_go_in_a_mode_keeps_its_frequency() {
+    const SIZE: f64 = 1e-6;
+    let mut veins = three_veins();
+    veins.dynamics.gravity = Schedule::constant([1.0, -2.0, -3.0]);
+    veins.gravity = [1.0, -2.0, -3.0];
+    let state = rest(&veins, 6);
+    let leaf = Leaf::new(&veins);
+    let (grid, physics) = (discrete(&leaf, 6), Physics::new(&leaf));
+    let mut exact = state.clone();
+    settle_forces(&grid, &mut exact);
+    for pair in modes::lowest(&grid, &physics, &exact, 5).unwrap() {
+        let omega = pair.eigenvalue.sqrt();
+        let mut start = state.clone();
+        for (node, increment) in pair.shape.iter().enumerate() {
+            start.advance(node, increment, SIZE);
+        }
+        let h = 1e-3;
+        let seen = 2.0 / h * (0.5 * omega * h).asin();
+        let mut leapfrog = moving_by(Scheme::Explicit, &leaf, &start, h);
+        let positions =
+            |state: &State| -> Vec<f64> { state.x.iter().flat_map(|x| x.to_array()).collect() };
+        let mut worst = 0.0_f64;
+        for k in 1..=40 {
+            let until = h * (100 * k) as f64;
+            leapfrog.advance(until).unwrap();
+            let now = positions(&leapfrog.snapshot().state);
+            let cosine = (seen * until).cos();
+            let (rest, start) = (positions(&state), positions(&start));
+            for ((now, rest), start) in now.iter().zip(&rest).zip(&start) {
+                worst = worst.max((now - rest - cosine * (start - rest)).abs() / SIZE);
+            }
+        }
+        println!("omega {omega}: within {worst:.1e}");
+        assert!(worst < 1e-4, "omega {omega}: {worst:.1e}");
+    }
+}
+
+/// Lets the segments carry what their strains tell.
+fn settle_forces(grid: &leafdyn::leaf::DiscreteLeaf, state: &mut State) {
+    let n = grid.segments();
+    for j in 0..grid.rods() {
+        for i in 0..n {
+            let section = *grid.section(j, i);
+            let idle = grid.segment(state, j, i, glam::DVec3::ZERO);
+            let strain = idle.v(&section) - section.rest_strain;
+            state.n[j * n + i] = idle.frame * (strain / section.compliance);
+        }
+    }
+}
+
+/// Shapes are orthonormal with the masses, and satisfy the equations: their
+/// quotient is the eigenvalue.
+#[test]
+fn shapes_are_orthonormal() {
+    let veins = fig04(4);
+    let state = rest(&veins, 8);
+    let leaf = Leaf::new(&veins);
+    let (grid, physics) = (discrete(&leaf, 8), Physics::new(&leaf));
+    let mut exact = state.clone();
+    settle_forces(&grid, &mut exact);
+    let pairs = modes::lowest(&grid, &physics, &exact, 8).unwrap();
+    for (a, first) in pairs.iter().enumerate() {
+        for (b, second) in pairs.iter().enumerate() {
+            let mut product = 0.0;
+            for j in 0..4 {
+                for i in 1..=8 {
+                    let node = state.base(j) + i;
+                    let (p, q) = (first.shape[node], second.shape[node]);
+                    let inertia: Inertia = physics.inertia(&leaf, &grid.grid, j, i);
+                    let tensor = inertia.tensor(exact.q[node]);
+                    let [p, q] = [p, q].map(|s| {
+                        let (turn, shift) = (leafdyn::leaf::turn(&s), leafdyn::leaf::shift(&s));
+                        (turn, shift)
+                    });
+                    product += p.0.dot(tensor * q.0) + inertia.mass * p.1.dot(q.1);
+                }
+            }
+            close("product", product, f64::from(u8::from(a == b)), 1e-9);
+        }
+    }
+}
+
+fn bits(leaf: &Equilibrium) -> Vec<u64> {
+    let mut bits = Vec::new();
+    for mode in modes_of(leaf) {
+        bits.push(mode.eigenvalue.to_bits());
+        let shapes = mode.displacement.iter().chain(&mode.rotation).flatten();
+        bits.extend(shapes.flat_map(|v| v.to_array()).map(f64::to_bits));
+    }
+    bits
+}
+
+#[test]
+fn modes_are_equal_bit_by_bit_on_any_number_of_threads() {
+    let on = |threads: usize| {
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| {
+            let options = Options {
+                segments: Some(32),
+                ..with(2)
+            };
+            solve(&fig04(300), &options)
+        })
+    };
+    let alone = on(1);
+    assert!(
+        alone.segments.last().unwrap() * 300 >= 8192,
+        "too small to be shared out"
+    );
+    for threads in [1, 2] {
+        assert_eq!(bits(&on(threads)), bits(&alone), "{threads} threads");
+    }
+}
+
+/// Nothing is said where nothing is known.
+#[test]
+fn no_modes_without_a_potential_or_rest_or_request() {
+    let mut rollup = fig04(1);
+    rollup.tip_moment = [0.0, 1.0, 0.0];
+    assert!(solve(&rollup, &with(3)).modes.is_none());
+    assert!(solve(&fig04(2), &Options::default()).modes.is_none());
+    let options = Options {
+        modes: 3,
+        ..Options::default()
+    };
+    let leaf = solve(&fig04(3), &options);
+    assert_eq!(modes_of(&leaf).len(), 3);
+    let many = relax(&fig04(1), &with(101), &mut |_| {});
+    assert!(many.unwrap_err().to_string().contains("--modes 101"));
+}
+
+/// Other units, the same leaf.
+#[test]
+fn frequencies_are_in_the_units_of_the_scenario() {
+    let natural = solve(&fig04(3), &with(3));
+    // Lengths times 10, stiffness times 1000, density times 4.
+    let mut other = paper_leaf(3, [1000.0; 3], [1000.0; 3], 1.0);
+    for rod in &mut other.rods {
+        rod.length = 10.0;
+    }
+    // Force over displacement and length: A/L^4.
+    other.coupling = vec![[0.0, 0.1, 0.1]; 2];
+    other.dynamics = leafdyn::scenario::Dynamics::default_for(&other.rods);
+    let density = 4.0 * other.dynamics.mean_density();
+    other.dynamics.density = vec![Profile::Constant(density); 3];
+    other.dynamics.rotary_inertia = vec![Profile::Constant(density); 3];
+    let other = solve(&other, &with(3));
+    for (a, b) in modes_of(&natural).iter().zip(modes_of(&other)) {
+        close("eigenvalue", 4.0 * b.eigenvalue / a.eigenvalue, 1.0, 1e-9);
+    }
+}

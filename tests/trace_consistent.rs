@@ -1,0 +1,121 @@
+//! Along every branch of random leaves what must agree does: the energy changes
+//! by the work of the load that varies, every change of the index is one of so
+//! many modes, and at a fold the branch turns round.
+
+mod common;
+#[path = "common/random.rs"]
+mod random;
+
+use leafdyn::branch::{Equations, Family, Kind, Point, Walk, walk};
+use leafdyn::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use leafdyn::relax::{Options, project, relax};
+use leafdyn::scenario::Scenario;
+use proptest::strategy::{Strategy, ValueTree};
+use proptest::test_runner::TestRunner;
+use random::leaves;
+
+/// The leaf under loads turned over, from as they are to their opposite times
+/// `MOST`: what was lifted is pressed down.
+const MOST: f64 = -12.0;
+
+fn loaded(leaf: &Scenario, part: f64) -> Scenario {
+    let mut leaf = leaf.clone();
+    leaf.gravity = leaf.gravity.map(|g| part * g);
+    leaf.tip_force = leaf.tip_force.map(|f| part * f);
+    leaf
+}
+
+fn begin(scenario: &Scenario, equations: &mut Equations) -> Option<Point> {
+    let options = Options {
+        tolerance: Some(1e-6),
+        ..Options::default()
+    };
+    let rest = relax(scenario, &options, &mut |_| {}).unwrap();
+    let leaf = Leaf::new(scenario);
+    let grid = Grid::new(rest.stations.len() - 1, leaf.kinks());
+    let state = project(&leaf, &DiscreteLeaf::new(&leaf, grid), &rest.rods);
+    let (mut point, _) = equations.correct(&state, 0.0, None).ok()?;
+    point.tangent = point.tangent.towards(true);
+    Some(point)
+}
+
+/// Energy of a state under the loads at a fraction of their range.
+fn energy(family: &Family, grid: &Grid, state: &State, fraction: f64) -> f64 {
+    family
+        .with(fraction, grid, |leaf| leaf.energy(state))
+        .unwrap()
+}
+
+#[test]
+fn random_branches() {
+    let mut runner = TestRunner::deterministic();
+    let (mut points, mut folds, mut crossings, mut missed, mut lost) = (0, 0, 0, 0, 0);
+    for case in 0..60 {
+        let scenario = leaves().new_tree(&mut runner).unwrap().current();
+        let make = |part: f64| Ok(loaded(&scenario, part));
+        let family = Family::new(&make, (1.0, MOST), false).unwrap();
+        let leaf = Leaf::new(&scenario);
+        let grid = Grid::new(8.max(leaf.kinks().len() + 1), leaf.kinks());
+        let mut equations = Equations::new(&family, grid.clone()).unwrap();
+        let Some(first) = begin(&scenario, &mut equations) else {
+            lost += 1;
+            continue;
+        };
+        let how = Walk {
+            longest: 0.02,
+            most: 120,
+        };
+        let branch = walk(&mut equations, first, &how, &mut |_| {});
+        points += branch.points.len();
+        missed += branch.missed.len();
+
+        // By parts: the energy is stationary in the state, so that only the
+        // load's own change remains.
+        let rate = |point: &Point| {
+            let at = |step: f64| energy(&family, &grid, &point.state, point.fraction + step);
+            (at(1e-4) - at(-1e-4)) / 2e-4
+        };
+        let (mut sum, mut scale) = (0.0, 0.0_f64);
+        for pair in branch.points.windows(2) {
+            let way = pair[1].fraction - pair[0].fraction;
+            sum += 0.5 * way * (rate(&pair[0]) + rate(&pair[1]));
+            scale = scale.max(rate(&pair[0]).abs() * way.abs());
+        }
+        let [start, end] = [&branch.points[0], branch.points.last().unwrap()]
+            .map(|point| energy(&family, &grid, &point.state, point.fraction));
+        let off = (end - start - sum).abs();
+        assert!(
+            off < 0.02 * (1.0 + scale),
+            "{case}: {off} of {}",
+            end - start
+        );
+
+        for (after, critical) in &branch.critical {
+            let (a, b) = (&branch.points[*after], &branch.points[after + 1]);
+            let all = branch.critical.iter().filter(|(other, _)| other == after);
+            let modes: usize = all.map(|(_, other)| other.modes.len()).sum();
+            if !branch.missed.contains(after) {
+                assert_eq!(modes, a.index.abs_diff(b.index), "{case}");
+            }
+            match critical.kind {
+                Kind::Fold => folds += 1,
+                Kind::Branching => crossings += 1,
+            }
+        }
+        // It turns round as often as there are folds.
+        for (k, pair) in branch.points.windows(2).enumerate() {
+            let turned = pair[0].tangent.fraction * pair[1].tangent.fraction < 0.0;
+            let here = branch.critical.iter().filter(|(after, _)| *after == k);
+            let found = here
+                .filter(|(_, critical)| critical.kind == Kind::Fold)
+                .count();
+            if !branch.missed.contains(&k) {
+                assert_eq!(found % 2 == 1, turned, "{case}: {found} folds at {k}");
+            }
+        }
+    }
+    println!("{points} points, {folds} folds, {crossings} crossings, {missed} missed, {lost} lost");
+    assert!(folds >= 10 && points > 3000);
+    assert!(10 * missed <= folds + crossings, "{missed}");
+    assert!(lost <= 3, "{lost}");
+}
