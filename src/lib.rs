@@ -53,13 +53,14 @@
 //!   n' = n x u - R^T f    m' = m x u + n x v         the same, components       (3) (4)
 //!
 //!   m_i = A_i (u_i - u0_i)                           torsion A1, bending A2, A3     (5)
-//!   n_i = H_i (v_i - delta_i1)                       axial H1, shear H2, H3         (6)
+//!   n_i = H_i (v_i - v0_i)                           axial H1, shear H2, H3         (6)
 //!
 //!   f = g - q e3          g = sum of kappa o (r_neighbour - r)     coupling, gravity
 //! ```
 //!
 //! A2 is the bending about d2, which moves a vein up and down; A3 the one
-//! about d3, sideways within the leaf. u0 is the curvature at rest. An infinite
+//! about d3, sideways within the leaf. u0 is the curvature at rest; v0 is
+//! e1 or, where a vein has grown, a multiple of it (`rest.stretch`). An infinite
 //! H_i is a constraint: inextensible, unshearable. The coupling acts between
 //! neighbours at equal fractions of their lengths, axis by axis, and is kept
 //! per gap, so that what one rod gains the other loses. The boundary conditions
@@ -130,6 +131,11 @@
 //! was met is told ([`relax::Equilibrium::saddle`]). How a run ended is one of a
 //! few words, [`relax::Outcome`].
 //!
+//! **Undulation** ([`undulation`]). Half-waves of each vein out of the leaf's
+//! surface, counted between its inflections; the twist of its section; and the
+//! waves that the paper's linear theory predicts from the axial force it
+//! carries.
+//!
 //! **Modes** ([`modes`]). The lowest eigenvalues of K x = lambda M x with that
 //! Hessian and the masses of the leaf in motion: squared frequencies, or negative
 //! where the leaf is unstable. A Lanczos method finds them from one factorisation,
@@ -156,7 +162,8 @@
 //! # Layout
 //!
 //! [`scenario`] (TOML to a checked [`scenario::Scenario`]) and [`rotation`],
-//! [`rod`], [`leaf`], [`shape`], [`bvp`], [`motion`], [`modes`], [`relax`], [`simulate`],
+//! [`rod`], [`leaf`], [`shape`], [`undulation`], [`bvp`], [`motion`], [`modes`],
+//! [`relax`], [`simulate`],
 //! [`study`], [`output`] (JSON, tables, figures): each module uses those named
 //! before it and knows nothing of those after it.
 //!
@@ -185,3 +192,4 @@ pub mod scenario;
 pub mod shape;
 pub mod simulate;
 pub mod study;
+pub mod undulation;

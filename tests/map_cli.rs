@@ -58,6 +58,7 @@ fn help_names_every_option_and_exit_status() {
         "--cell-seconds",
         "--shard",
         "--draw",
+        "--show",
         "--tolerance",
         "--set",
         "--out",
@@ -93,7 +94,7 @@ fn a_map_is_a_table_a_summary_and_a_figure() {
     let rows = lines(&place, "out/map.csv");
     assert_eq!(
         rows[0],
-        "load.gravity[2],coupling.y,method,outcome,detail,index,tip_x,tip_y,tip_z,energy,error,error_estimate,seconds,reference"
+        "load.gravity[2],coupling.y,method,outcome,detail,index,tip_x,tip_y,tip_z,energy,error,error_estimate,margin_waves,margin_amplitude,twist,seconds,reference"
     );
     assert_eq!(rows.len(), 1 + 36);
     assert!(rows[1].starts_with("-0.01,-1.0,semi-implicit,refused,"));
@@ -101,6 +102,13 @@ fn a_map_is_a_table_a_summary_and_a_figure() {
     assert!(rows[1].ends_with(",none"));
     assert!(rows[36].starts_with("-10.0,1.0,shooting-from-rest,right,"));
     assert!(rows[36].ends_with(",confirmed"));
+
+    // The same rows, drawn by their waves.
+    assert!(svg.contains("where methods fail") && !svg.contains("no waves"));
+    run(&place, &["--show", "waves"], "2");
+    let svg = fs::read_to_string(place.path("out/map.svg")).unwrap();
+    assert!(svg.contains("waves along the margins") && svg.contains("stable, no waves"));
+    assert_eq!(lines(&place, "out/map.csv"), rows);
 
     let json = fs::read(place.path("out/map.json")).unwrap();
     let json: Value = serde_json::from_slice(&json).unwrap();

@@ -11,7 +11,7 @@ use serde_json::Value;
 
 fn files() -> Vec<PathBuf> {
     let mut files = Vec::new();
-    for folder in ["paper/fig04", "classic/rollup"] {
+    for folder in ["paper/fig04", "classic/rollup", "study/undulation"] {
         let folder = common::path(folder).parent().unwrap().to_path_buf();
         files.extend(
             fs::read_dir(folder)
@@ -78,7 +78,7 @@ fn every_scenario_file_ends_at_rest_within_its_tolerance() {
 /// Length of the scenario's longest rod.
 fn longest(summary: &Value) -> f64 {
     let name = summary["scenario"].as_str().unwrap();
-    let file = ["paper", "classic"]
+    let file = ["paper", "classic", "study"]
         .iter()
         .map(|folder| common::path(&format!("{folder}/{name}")))
         .find(|path| path.exists())

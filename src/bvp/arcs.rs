@@ -14,24 +14,29 @@ const SHORTEST_CHORD: f64 = 0.05;
 /// Rest shape of one rod of that leaf.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arc {
-    /// Rest stretch v1.
-    pub stretch: f64,
+    /// Rest stretch v1, or the rod's own.
+    stretch: Option<f64>,
     /// Rest bend about d3, or the rod's own rest curvature.
     bend: Option<f64>,
 }
 
 impl Arc {
+    /// Rest stretch, where the scenario has `own`.
+    pub fn stretch(&self, own: f64) -> f64 {
+        self.stretch.unwrap_or(own)
+    }
+
     /// Rest curvature, where the scenario has `own`.
     pub fn curvature(&self, own: DVec3) -> DVec3 {
         self.bend.map_or(own, |bend| bend * DVec3::Z)
     }
 }
 
-/// One arc per rod, of the given dimensionless lengths.
+/// One arc per rod, of the given dimensionless lengths before any growth.
 pub fn arcs(scenario: &Scenario, lengths: &[f64]) -> Vec<Arc> {
     if !scenario.joined || lengths.len() == 1 {
         let free = Arc {
-            stretch: 1.0,
+            stretch: None,
             bend: None,
         };
         return vec![free; lengths.len()];
@@ -56,9 +61,11 @@ pub fn arcs(scenario: &Scenario, lengths: &[f64]) -> Vec<Arc> {
         small if small < 1e-8 => 1.0,
         _ => (opening.sin() / opening).max(SHORTEST_CHORD),
     };
+    let grown = (scenario.rods.iter().zip(lengths))
+        .map(|(rod, length)| length * rod.rest_stretch.integral(1.0));
     let tip = openings
         .iter()
-        .zip(lengths)
+        .zip(grown)
         .map(|(&opening, length)| length * chord(opening))
         .sum::<f64>()
         / lengths.len() as f64;
@@ -66,7 +73,7 @@ pub fn arcs(scenario: &Scenario, lengths: &[f64]) -> Vec<Arc> {
         .iter()
         .zip(lengths)
         .map(|(&opening, length)| Arc {
-            stretch: tip / (length * chord(opening)),
+            stretch: Some(tip / (length * chord(opening))),
             bend: Some(-2.0 * opening / length),
         })
         .collect()

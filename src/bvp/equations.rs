@@ -8,7 +8,7 @@
 //!
 //! ```text
 //! r' = L R v,   q' = L/2 (R u) q,   n' = -L f,   m' = n x r'
-//! v = e1 + H^-1 R^T n,   u = u0 + A^-1 R^T m                      eqs (5) (6)
+//! v = v0 + H^-1 R^T n,   u = u0 + A^-1 R^T m                      eqs (5) (6)
 //! ```
 
 use glam::{DMat3, DQuat, DVec3};
@@ -153,7 +153,9 @@ impl<'a> Equations<'a> {
                 let stiffness = rods[j].force_stiffness.iter().map(Profile::min);
                 let stiffness = stiffness.fold(f64::INFINITY, f64::min) / force;
                 let bend = (pull * lengths[j] * lengths[j] / softest[j]).sqrt().sqrt();
-                bend.max((pull / stiffness).sqrt())
+                // Forces have the longer arms of a vein that has grown.
+                let grown = rods[j].rest_stretch.max_abs().sqrt();
+                (grown * bend).max((pull / stiffness).sqrt())
             })
             .collect();
         Equations {
@@ -187,13 +189,19 @@ impl<'a> Equations<'a> {
     /// Rate per sigma at which perturbations of rod `j` grow or turn: a rod
     /// under the axial force T bends with the wavenumber sqrt(T/A).
     pub fn rate(&self, j: usize, force: f64) -> f64 {
-        let tension = self.lengths[j] * (force / self.softest[j]).sqrt();
+        let grown = self.scenario.rods[j].rest_stretch.max_abs();
+        let tension = self.lengths[j] * (grown * force / self.softest[j]).sqrt();
         tension.max(self.coupled_rate[j])
     }
 
     /// Length of rod `j`.
     pub fn rod_length(&self, j: usize) -> f64 {
         self.lengths[j]
+    }
+
+    /// Length at rest of rod `j` from the base up to `sigma`, with its growth.
+    pub fn grown(&self, j: usize, sigma: f64) -> f64 {
+        self.lengths[j] * self.scenario.rods[j].rest_stretch.integral(sigma)
     }
 
     /// Smallest couple stiffness of rod `j`.
@@ -221,7 +229,7 @@ impl<'a> Equations<'a> {
                     &rod.force_stiffness,
                     &rod.rest_curvature,
                 );
-                a.iter().chain(h).chain(u)
+                a.iter().chain(h).chain(u).chain([&rod.rest_stretch])
             })
             .flat_map(|profile| profile.kinks().iter().copied())
             .collect();
@@ -250,11 +258,12 @@ impl<'a> Equations<'a> {
         }
         let flexibility = self.force * self.length * self.length * stiffness.recip();
         let (arc, part) = (&self.arcs[j], self.part);
+        let stretch = rod.rest_stretch.at(sigma);
         // Where it is the scenario's, the law is not to be rounded.
         let (rest_strain, rest_curvature) = match part == 1.0 {
-            true => (DVec3::X, at(&rod.rest_curvature) * self.length),
+            true => (DVec3::X * stretch, at(&rod.rest_curvature) * self.length),
             false => (
-                DVec3::X * (part + (1.0 - part) * arc.stretch),
+                DVec3::X * (part * stretch + (1.0 - part) * arc.stretch(stretch)),
                 at(&rod.rest_curvature) * (part * self.length)
                     + arc.curvature(self.length * at(&rod.rest_curvature)) * (1.0 - part),
             ),
@@ -380,7 +389,7 @@ mod tests {
         name = "rod"
         leaf = { rods = 1, length = 1.4, fan = [0.3] }
         stiffness = { torsion = 0.8, bending_2 = { at = [0.0, 1.0], value = [1.0, 2.0] }, bending_3 = 1.5, axial = 20.0, shear_2 = inf, shear_3 = 10.0 }
-        rest = { twist = 0.5, bend_2 = 1.0, bend_3 = -0.8 }
+        rest = { stretch = { at = [0.0, 1.0], value = [1.1, 1.5] }, twist = 0.5, bend_2 = 1.0, bend_3 = -0.8 }
         load = { gravity = [0.2, -0.3, -2.0] }
     "#;
 

@@ -140,7 +140,7 @@ impl Trajectory {
             let mut y = vec![0.0; equations.size()];
             for j in 0..equations.rods() {
                 let mut rod = equations.base(j, DVec3::ZERO, DVec3::ZERO);
-                rod.r = rod.q * DVec3::X * (sigma * equations.rod_length(j));
+                rod.r = rod.q * DVec3::X * equations.grown(j, sigma);
                 rod.write(&mut y, j);
             }
             y

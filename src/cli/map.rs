@@ -8,7 +8,9 @@ use std::time::Instant;
 use clap::{Args, ValueHint};
 
 use leafdyn::output::{self, Journal, OutputError};
-use leafdyn::study::{self, CELL_SECONDS, Map as Cells, MapMethod, MapRequest, MapRow, Vary};
+use leafdyn::study::{
+    self, CELL_SECONDS, Map as Cells, MapMethod, MapRequest, MapRow, MapShow, Vary,
+};
 
 use super::progress::ProgressLine;
 use super::request::Request;
@@ -38,6 +40,10 @@ pub struct Map {
     /// Solve every K-th cell from the I-th on, into map-I-of-K.csv: for jobs that share a map
     #[arg(long, value_name = "I/K", conflicts_with = "draw")]
     shard: Option<Shard>,
+
+    /// What the figure shows: outcomes, or waves: how many the margins of stable answers make
+    #[arg(long, value_name = "WHAT", default_value_t)]
+    show: MapShow,
 
     /// Solve nothing: take the rows of these files, and draw
     #[arg(long, value_name = "FILE.csv", num_args = 1.., value_hint = ValueHint::FilePath)]
@@ -96,7 +102,8 @@ impl Map {
         };
         let before = known.len();
         let count = computed.len();
-        let map = Cells::new(request, [known, computed].concat());
+        let mut map = Cells::new(request, [known, computed].concat());
+        map.show = self.show;
         let told = map_report::Told {
             known: before,
             computed: count,

@@ -35,6 +35,9 @@ pub fn report(equilibrium: &Equilibrium, folder: Option<&Path>) -> String {
         }
         lines.push(("energy", significant(equilibrium.energy)));
     }
+    if let Some(waves) = waves(equilibrium) {
+        lines.push(("waves", waves));
+    }
     lines.push(("error", error(equilibrium)));
     if let Some(modes) = modes(equilibrium) {
         lines.push(("modes", modes));
@@ -87,6 +90,33 @@ fn error(equilibrium: &Equilibrium) -> String {
             _ => "not known".into(),
         },
     }
+}
+
+/// What the margins do, where some vein waves.
+fn waves(equilibrium: &Equilibrium) -> Option<String> {
+    let undulation = &equilibrium.undulation;
+    let margin = undulation.margin()?;
+    if undulation.veins.iter().all(|vein| vein.waves() == 0.0) {
+        return None;
+    }
+    let predicted = format!(
+        "linear theory: {:.1} at |T| L²/A2 = {:.1} of {}",
+        margin.predicted_waves(),
+        margin.load_number,
+        match margin.tension < 0.0 {
+            true => "compression",
+            false => "tension",
+        }
+    );
+    Some(match margin.wavelength {
+        Some(length) => format!(
+            "{} along the margins, {:.4} high and {:.3} long; {predicted}",
+            margin.waves(),
+            margin.amplitude,
+            length
+        ),
+        None => format!("none along the margins; {predicted}"),
+    })
 }
 
 /// The lowest eigenvalues, as growth rates and frequencies.

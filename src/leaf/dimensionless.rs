@@ -80,6 +80,7 @@ impl<'a> Leaf<'a> {
                 ]
                 .into_iter()
                 .flatten()
+                .chain([&rod.rest_stretch])
                 .flat_map(|profile| profile.kinks().iter().copied())
             })
             .collect();
@@ -137,6 +138,11 @@ impl<'a> Leaf<'a> {
         self.rod(j).length / self.scale.length
     }
 
+    /// Length at rest of rod `j` from the base up to `sigma`, with its growth.
+    pub fn grown(&self, j: usize, sigma: f64) -> f64 {
+        self.length(j) * self.rod(j).rest_stretch.integral(sigma)
+    }
+
     /// Base rotation of rod `j` (paper, section 2.4 (c)).
     pub fn base(&self, j: usize) -> DQuat {
         rotation::exp(self.rod(j).angle * DVec3::Z)
@@ -154,7 +160,7 @@ impl<'a> Leaf<'a> {
             ds: self.length(j) * width,
             couple_stiffness: share * at(&rod.couple_stiffness) / self.scale.stiffness,
             rest_curvature: at(&rod.rest_curvature) * self.scale.length,
-            rest_strain: DVec3::X,
+            rest_strain: DVec3::X * rod.rest_stretch.at(sigma),
             compliance: (share * at(&rod.force_stiffness) / self.scale.force()).recip(),
             condensing: DVec3::ZERO,
         }

@@ -68,6 +68,7 @@ fn are_images(a: &Rod, b: &Rod) -> bool {
         && a.angle == -b.angle
         && a.couple_stiffness == b.couple_stiffness
         && a.force_stiffness == b.force_stiffness
+        && a.rest_stretch == b.rest_stretch
         && opposite(&a.rest_curvature[0], &b.rest_curvature[0])
         && a.rest_curvature[1] == b.rest_curvature[1]
         && opposite(&a.rest_curvature[2], &b.rest_curvature[2])
@@ -136,7 +137,11 @@ mod tests {
 
     #[test]
     fn mirrored_leaves_are_known() {
-        for entry in ["name='same'", "rest.bend_3=[1.0, 0.0, 0.0, 0.0, -1.0]"] {
+        for entry in [
+            "name='same'",
+            "rest.stretch=[1.2, 1.1, 1.0, 1.1, 1.2]",
+            "rest.bend_3=[1.0, 0.0, 0.0, 0.0, -1.0]",
+        ] {
             assert!(half(entry), "{entry}");
         }
         for entry in [
@@ -144,6 +149,7 @@ mod tests {
             "leaf.length=[0.9, 1.0, 1.1, 1.0, 0.8]",
             "stiffness.axial=[1, 2, 3, 2, 2]",
             "rest.twist=0.1",
+            "rest.stretch=[1.2, 1.1, 1.0, 1.1, 1.0]",
             "rest.bend_3=[1.0, 0.0, 0.0, 0.0, 1.0]",
             "rest.bend_3=[1.0, 0.0, 0.5, 0.0, -1.0]",
             "coupling.z=[1.0, 2.0, 2.0, 3.0]",

@@ -2,13 +2,13 @@
 //! the midpoint element, and the motion of the nodes.
 //!
 //! The element is that of [`crate::rod`] with the force not carried as an
-//! unknown but following from the strains, n = H (v - e1), which has the same
+//! unknown but following from the strains, n = H (v - v0), which has the same
 //! equilibria. With q0, q1 at its ends, s = q0 + q1, and w the vector part of
 //! q0^* q1:
 //!
 //! ```text
 //! R = R(s/|s|),   tau = 2 w/|s|^2 = tan(psi/4),   psi = 2 sigma w
-//! N = R H/ds (R^T dx - ds e1),   G = dx x N,   M = S A/ds (psi - ds u0)
+//! N = R H/ds (R^T dx - ds v0),   G = dx x N,   M = S A/ds (psi - ds u0)
 //! moments on the ends:  G/2 + T,  G/2 - T,   T = R (M - tau x R^T G / 2)
 //! ```
 //!
@@ -97,7 +97,7 @@ pub struct Past {
 pub struct Material {
     /// H/ds.
     pub stretch: [Vec<f64>; 3],
-    /// ds times the rest strain (1, 0, 0).
+    /// ds times the rest stretch: the rest strain is v0 = (stretch, 0, 0).
     pub rest_length: Vec<f64>,
     /// A/ds.
     pub bend: [Vec<f64>; 3],

@@ -92,7 +92,7 @@ pub fn rod(leaf: &DiscreteLeaf, physics: &Physics, state: &State, j: usize) -> R
         }
         if i < n {
             let section = leaf.section(j, i);
-            m.rest_length[at] = section.ds;
+            m.rest_length[at] = section.rest_strain.x * section.ds;
             for c in 0..3 {
                 m.stretch[c][at] = 1.0 / (section.compliance[c] * section.ds);
                 m.bend[c][at] = section.couple_stiffness[c] / section.ds;

@@ -15,6 +15,7 @@ use crate::study::{
     MapRow, Peer, PointKind, Reference, Row, Scaling, ScalingRow, Setting, Shot, Spread, Trace,
     TraceBranch, TraceEnd, TracePoint, Verdict,
 };
+use crate::undulation::{Undulation, Vein};
 
 /// A fan of `rods` arcs of length 1, given at `segments` + 1 stations.
 pub fn fan(rods: usize, segments: usize) -> Equilibrium {
@@ -75,6 +76,9 @@ pub fn fan(rods: usize, segments: usize) -> Equilibrium {
         stations,
         rods: shapes,
         curves,
+        undulation: Undulation {
+            veins: vec![Vein::default(); rods],
+        },
     }
 }
 
@@ -177,6 +181,9 @@ pub fn map() -> Map {
             detail: format!("said of cell {cell}, \"quoted\""),
             index: rests.then_some(if outcome == MapOutcome::Saddle { 3 } else { 0 }),
             tip: rests.then_some([0.9, 0.1 * cell as f64, -1.0 / 3.0]),
+            margin_waves: rests.then_some(if cell == 2 { 1.5 } else { 0.0 }),
+            margin_amplitude: rests.then_some(0.01),
+            twist: rests.then_some(-0.5),
             energy: rests.then_some(-1.5e-7),
             error: rests.then_some(1e-9),
             error_estimate: rests.then_some(2e-9),

@@ -1,6 +1,7 @@
 //! What a relaxation returns: the shape, and everything that judges it.
 
 use crate::shape::RodShape;
+use crate::undulation::Undulation;
 use glam::DVec3;
 
 /// How a run ended: one word per way.
@@ -174,6 +175,8 @@ pub struct Equilibrium {
     pub rods: Vec<RodShape>,
     /// Centerlines on the finest grid, one per rod, for drawing.
     pub curves: Vec<Vec<DVec3>>,
+    /// Waves and twist of the veins on the finest grid.
+    pub undulation: Undulation,
 }
 
 impl Equilibrium {

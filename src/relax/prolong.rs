@@ -32,7 +32,7 @@ pub fn prolong(leaf: &DiscreteLeaf, state: &State) -> State {
             let (section, k) = (leaf.section(j, i), base + i);
             let tangent = |i: usize| {
                 let q = state.q[base + i];
-                q * (DVec3::X + section.compliance * (q.conjugate() * nodal(&force, i)))
+                q * (section.rest_strain + section.compliance * (q.conjugate() * nodal(&force, i)))
             };
             let middle = 0.5 * (state.x[k] + state.x[k + 1])
                 + section.ds / 8.0 * (tangent(i) - tangent(i + 1));

@@ -7,6 +7,7 @@ use crate::relax::richardson::Richardson;
 use crate::relax::semi_implicit::Settled;
 use crate::relax::shape;
 use crate::shape::{NodeState, RodShape};
+use crate::undulation::{Centerline, Undulation};
 use glam::{DQuat, DVec3};
 
 /// Positions of all rods at every `stride`-th node, dimensionless.
@@ -43,6 +44,9 @@ pub fn equilibrium(
     for level in &run.levels {
         energies.push(vec![level.leaf.energy(&level.state)]);
     }
+    let stations = first.leaf.grid.sigma().to_vec();
+    let error_estimate = run.error().map(|error| error * scale.length);
+    let lines = centerlines(finest);
     let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
     Equilibrium {
         scenario: run.leaf.scenario().name.clone(),
@@ -57,7 +61,7 @@ pub fn equilibrium(
         intervals: None,
         tolerance: run.tolerance,
         residual: finest.leaf.residual(&finest.state),
-        error_estimate: run.error().map(|error| error * scale.length),
+        error_estimate,
         energy: energies.column(columns)[0] * scale.moment(),
         joined,
         tips: tips
@@ -76,16 +80,33 @@ pub fn equilibrium(
         },
         work: run.work,
         wall_seconds,
-        stations: first.leaf.grid.sigma().to_vec(),
+        undulation: Undulation::of(
+            run.leaf.scenario(),
+            &lines,
+            &stations,
+            &rods,
+            error_estimate,
+        ),
+        stations,
         rods,
-        curves: (0..finest.leaf.rods())
-            .map(|j| {
-                let base = finest.state.base(j);
-                let nodes = &finest.state.x[base..=base + finest.leaf.segments()];
-                nodes.iter().map(|x| *x * scale.length).collect()
-            })
+        curves: (lines.iter())
+            .map(|line| line.iter().map(|(x, _)| *x).collect())
             .collect(),
     }
+}
+
+/// All nodes of a level, in units of the scenario.
+fn centerlines(level: &Level) -> Vec<Centerline> {
+    let (n, length) = (level.leaf.segments(), level.leaf.leaf.scale.length);
+    (0..level.leaf.rods())
+        .map(|j| {
+            let base = level.state.base(j);
+            let nodes = base..=base + n;
+            nodes
+                .map(|k| (level.state.x[k] * length, level.state.q[k]))
+                .collect()
+        })
+        .collect()
 }
 
 /// Values carried per node through the extrapolation: position, quaternion, n, m.

@@ -48,6 +48,6 @@ pub fn node(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> NodeState
 /// Sets v and u of a node from its n and m by the constitutive law.
 pub fn strains(leaf: &DiscreteLeaf, j: usize, sigma: f64, node: &mut NodeState) {
     let section = leaf.leaf.section(j, sigma, 1.0);
-    node.v = DVec3::X + section.compliance * node.n;
+    node.v = section.rest_strain + section.compliance * node.n;
     node.u = section.rest_curvature + node.m / section.couple_stiffness;
 }

@@ -8,6 +8,7 @@ use crate::relax::index::index_near;
 use crate::relax::options::{MAX_INTERVALS, Options, RelaxError};
 use crate::scenario::Scenario;
 use crate::shape::RodShape;
+use crate::undulation::Undulation;
 use glam::DVec3;
 use std::time::Instant;
 
@@ -70,6 +71,12 @@ pub fn relax(
     result.curves = (result.rods.iter())
         .map(|rod| rod.nodes.iter().map(|node| node.position).collect())
         .collect();
+    result.undulation = Undulation::at_stations(
+        scenario,
+        &result.stations,
+        &result.rods,
+        result.error_estimate,
+    );
     result.work = Work {
         steps: work.iterations,
         factorizations: work.linearizations,
@@ -160,5 +167,6 @@ fn blank(scenario: &Scenario, rods: Vec<RodShape>) -> Equilibrium {
         stations: Vec::new(),
         rods,
         curves: Vec::new(),
+        undulation: Undulation::default(),
     }
 }

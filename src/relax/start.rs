@@ -37,13 +37,15 @@ fn arcs(leaf: &DiscreteLeaf) -> State {
     };
     let sinc = |x: f64| if x.abs() < 1e-8 { 1.0 } else { x.sin() / x };
     let chords: f64 = (0..leaf.rods())
-        .map(|j| model.length(j) * sinc(opening(angles[j])))
+        .map(|j| model.grown(j, 1.0) * sinc(opening(angles[j])))
         .sum();
     let direction = DVec3::new(mean.cos(), mean.sin(), 0.0);
     let tip = direction * (chords / leaf.rods() as f64);
     let (mut x, mut q) = (Vec::new(), Vec::new());
     for (j, &phi) in angles.iter().enumerate() {
-        let (delta, length) = (opening(phi), model.length(j));
+        let (delta, length) = (opening(phi), model.grown(j, 1.0));
+        // The turn is spread evenly over the length the vein has grown to.
+        let part = |sigma: f64| model.grown(j, sigma) / length;
         let arc = |sigma: f64| {
             // A chord leaves half-way between the tangents at its ends.
             let turned = phi - delta * sigma;
@@ -51,6 +53,7 @@ fn arcs(leaf: &DiscreteLeaf) -> State {
         };
         let missing = tip - arc(1.0);
         for &sigma in leaf.grid.sigma() {
+            let sigma = part(sigma);
             x.push(arc(sigma) + sigma * missing);
             q.push(rotation::exp((phi - 2.0 * delta * sigma) * DVec3::Z));
         }
@@ -59,7 +62,7 @@ fn arcs(leaf: &DiscreteLeaf) -> State {
     State::new(leaf.segments(), x, q)
 }
 
-/// Unstrained rods: v = (1, 0, 0), u = u0.
+/// Unstrained rods: v = v0, u = u0.
 fn rest_shapes(leaf: &DiscreteLeaf) -> State {
     let (mut xs, mut qs) = (Vec::new(), Vec::new());
     for j in 0..leaf.rods() {
@@ -69,7 +72,7 @@ fn rest_shapes(leaf: &DiscreteLeaf) -> State {
         for i in 0..leaf.segments() {
             let section = leaf.section(j, i);
             let next = (q * rotation::exp(section.rest_curvature * section.ds)).normalize();
-            x += section.ds * (rotation::midpoint(q, next) * DVec3::X);
+            x += section.ds * (rotation::midpoint(q, next) * section.rest_strain);
             q = next;
             xs.push(x);
             qs.push(q);

@@ -13,7 +13,8 @@
 //! Pi = nu . (R^T (x1 - x0) - ds v0) - ds/2 sum_k c_k nu_k^2
 //!      + ds/2 sum_k A_k (u_k - u0_k)^2,
 //!
-//! the rest strain v0 being e1 but where internal friction acts.
+//! the rest strain v0 being (stretch, 0, 0), e1 where nothing has grown, but
+//! where internal friction acts.
 //!
 //! Stationary in n this is the paper's law; the implicit midpoint rule on eqs
 //! (1) and (2) and the minimum of a discrete energy coincide. The force is
@@ -33,7 +34,7 @@ pub struct Section {
     pub couple_stiffness: DVec3,
     /// Rest curvature u0.
     pub rest_curvature: DVec3,
-    /// Rest strain v0; (1, 0, 0) is unstretched and unsheared.
+    /// Rest strain v0; (1, 0, 0) has neither grown nor been sheared.
     pub rest_strain: DVec3,
     /// Compliance 1/H: axial, shear along d2, along d3; zero if rigid.
     pub compliance: DVec3,

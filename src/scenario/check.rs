@@ -123,6 +123,10 @@ fn veins(raw: &Raw, rods: usize) -> Result<Vec<Rod>> {
         Some(item) => quantity::read(item, rods, Range::Finite),
         None => Ok(vec![Profile::Constant(0.0); rods]),
     };
+    let mut stretch = match raw.optional(Key::RestStretch) {
+        Some(item) => quantity::read(item, rods, Range::Positive)?,
+        None => vec![Profile::Constant(1.0); rods],
+    };
     let mut couple = [
         required(Key::Torsion, Range::Positive)?,
         required(Key::Bending2, Range::Positive)?,
@@ -138,10 +142,10 @@ fn veins(raw: &Raw, rods: usize) -> Result<Vec<Rod>> {
         or_zero(Key::RestBend2)?,
         or_zero(Key::RestBend3)?,
     ];
-    let take = |of: &mut [Vec<Profile>; 3], rod: usize| {
-        of.each_mut()
-            .map(|profiles| std::mem::replace(&mut profiles[rod], Profile::Constant(0.0)))
-    };
+    let one =
+        |of: &mut Vec<Profile>, rod: usize| std::mem::replace(&mut of[rod], Profile::Constant(0.0));
+    let take =
+        |of: &mut [Vec<Profile>; 3], rod: usize| of.each_mut().map(|profiles| one(profiles, rod));
     Ok((0..rods)
         .map(|rod| Rod {
             length: length[rod],
@@ -149,6 +153,7 @@ fn veins(raw: &Raw, rods: usize) -> Result<Vec<Rod>> {
             couple_stiffness: take(&mut couple, rod),
             force_stiffness: take(&mut force, rod),
             rest_curvature: take(&mut rest, rod),
+            rest_stretch: one(&mut stretch, rod),
         })
         .collect())
 }

@@ -36,6 +36,8 @@ pub enum Key {
     RestBend2,
     /// `rest.bend_3`: u0 about d3.
     RestBend3,
+    /// `rest.stretch`: growth of the rest length, a factor.
+    RestStretch,
     /// `coupling.x`: coupling along e1.
     CouplingX,
     /// `coupling.y`: coupling along e2.
@@ -81,7 +83,7 @@ pub enum Key {
 const LOAD_IN_TIME: &str = "{ at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]] }";
 
 /// Key, full path, and an example of its value; in the order of [`Key`].
-const FORMAT: [(Key, &str, &str); 36] = [
+const FORMAT: [(Key, &str, &str); 37] = [
     (Key::Name, "name", "\"my-leaf\""),
     (Key::UnitLength, "units.length", "\"cm\""),
     (Key::UnitForce, "units.force", "\"N\""),
@@ -98,6 +100,7 @@ const FORMAT: [(Key, &str, &str); 36] = [
     (Key::RestTwist, "rest.twist", "0.0"),
     (Key::RestBend2, "rest.bend_2", "0.0"),
     (Key::RestBend3, "rest.bend_3", "0.0"),
+    (Key::RestStretch, "rest.stretch", "1.0"),
     (Key::CouplingX, "coupling.x", "0.0"),
     (Key::CouplingY, "coupling.y", "1.0"),
     (Key::CouplingZ, "coupling.z", "1.0"),

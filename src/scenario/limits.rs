@@ -19,6 +19,8 @@ pub(super) const MOST_REST_ANGLE: f64 = 1e3;
 /// H L^2/A: below, a rod is softer against stretch or shear than against
 /// bending into a curl a thousandth of its length.
 const LEAST_FORCE_STIFFNESS: f64 = 1e-6;
+/// Growth of the rest length, and its inverse: as with lengths.
+const MOST_STRETCH: f64 = 1e3;
 /// Longest to shortest rod.
 const MOST_LENGTH_RATIO: f64 = 1e3;
 
@@ -39,6 +41,8 @@ pub(super) const CURLED: &str =
     "an angle in radians: the rod at rest would be wound up more than 150 times";
 const SOFT: &str = "A is the smallest bending stiffness of the rod and L its length; \
      below the limit the rod is softer in stretch or shear than any beam: raise this stiffness";
+const GROWN: &str = "the factor of the rest length; beyond it or its inverse one grid \
+     of equal fractions of the length does not serve the leaf";
 const SHORT: &str = "the ratio of the longest rod to this shortest one: \
      one grid of equal fractions of the length does not serve both";
 
@@ -123,6 +127,15 @@ fn stiffness(raw: &Raw, scenario: &Scenario) -> Result<(), ScenarioError> {
             let angle = curvature.max_abs() * rod.length;
             if angle > MOST_REST_ANGLE {
                 return refuse(key, ("|u0| L", angle, MOST_REST_ANGLE, CURLED));
+            }
+        }
+        let (least, most) = (rod.rest_stretch.min(), rod.rest_stretch.max_abs());
+        for (found, limit, beyond) in [
+            (most, MOST_STRETCH, most > MOST_STRETCH),
+            (least, 1.0 / MOST_STRETCH, least < 1.0 / MOST_STRETCH),
+        ] {
+            if beyond {
+                return refuse(Key::RestStretch, ("v0", found, limit, GROWN));
             }
         }
     }

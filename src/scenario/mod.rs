@@ -76,4 +76,7 @@ pub struct Rod {
     pub force_stiffness: [Profile; 3],
     /// u0: twist, bend about d2, bend about d3; per length.
     pub rest_curvature: [Profile; 3],
+    /// Growth of the rest length: an element ds rests at this factor times ds,
+    /// v0 = (stretch, 0, 0); positive, 1 without growth.
+    pub rest_stretch: Profile,
 }

@@ -34,6 +34,22 @@ impl Profile {
         }
     }
 
+    /// The integral over fractions from 0 to `sigma` in [0, 1].
+    pub fn integral(&self, sigma: f64) -> f64 {
+        match self {
+            Profile::Constant(value) => value * sigma,
+            Profile::Linear { at, .. } => {
+                let inside = at.iter().copied().filter(|&knot| knot < sigma);
+                let mut knots: Vec<f64> = inside.collect();
+                knots.push(sigma);
+                knots
+                    .windows(2)
+                    .map(|w| (w[1] - w[0]) * self.at(0.5 * (w[0] + w[1])))
+                    .sum()
+            }
+        }
+    }
+
     /// Fractions strictly inside (0, 1) where the slope may jump.
     pub fn kinks(&self) -> &[f64] {
         match self {
@@ -88,6 +104,7 @@ mod tests {
         assert_eq!(rigid.at(0.0), f64::INFINITY);
         assert_eq!(rigid.at(1.0), f64::INFINITY);
         assert!(rigid.kinks().is_empty());
+        assert_eq!(Profile::Constant(-2.0).integral(0.25), -0.5);
         assert_eq!(Profile::Constant(-2.0).max_abs(), 2.0);
         assert_eq!(Profile::Constant(-2.0).min(), -2.0);
     }
@@ -103,6 +120,9 @@ mod tests {
             (1.0, -6.0),
         ] {
             assert_eq!(tent.at(sigma), value, "at {sigma}");
+        }
+        for (sigma, integral) in [(0.0, 0.0), (0.125, 0.1875), (0.25, 0.5), (1.0, -0.625)] {
+            assert_eq!(tent.integral(sigma), integral, "to {sigma}");
         }
         assert_eq!(tent.kinks(), [0.25]);
         assert_eq!(tent.max_abs(), 6.0);

@@ -11,7 +11,7 @@ mod cell;
 mod motion;
 mod row;
 
-pub use row::{Confidence, MapMethod, MapOutcome, MapRow, UnknownWord};
+pub use row::{Confidence, MapMethod, MapOutcome, MapRow, MapShow, UnknownWord};
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -220,6 +220,9 @@ impl MapRequest {
                     index: None,
                     tip: None,
                     energy: None,
+                    margin_waves: None,
+                    margin_amplitude: None,
+                    twist: None,
                     error: None,
                     error_estimate: None,
                     seconds: 0.0,
@@ -241,6 +244,8 @@ pub struct Map {
     pub request: MapRequest,
     /// What is known, sorted by cell and method, none twice.
     pub rows: Vec<MapRow>,
+    /// What the figure shows.
+    pub show: MapShow,
 }
 
 impl Map {
@@ -248,7 +253,11 @@ impl Map {
     pub fn new(request: MapRequest, mut rows: Vec<MapRow>) -> Self {
         rows.sort_by_key(|row| (row.cell, row.method));
         rows.dedup_by_key(|row| (row.cell, row.method));
-        Map { request, rows }
+        Map {
+            request,
+            rows,
+            show: MapShow::default(),
+        }
     }
 
     /// How often a method had an outcome.

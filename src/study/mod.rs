@@ -12,7 +12,7 @@ pub use chart::{
 };
 pub use check::{Check, CheckOptions, Place, Quantity, Shot, Verdict, check};
 pub use map::{
-    CELL_SECONDS, Confidence, Map, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow,
+    CELL_SECONDS, Confidence, Map, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow, MapShow,
     UnknownWord, map,
 };
 pub use trace::{

@@ -239,6 +239,7 @@ pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -
             couple_stiffness: constant(couple),
             force_stiffness: constant(force),
             rest_curvature: constant([0.0; 3]),
+            rest_stretch: Profile::Constant(1.0),
         })
         .collect();
     let gravity = [0.0, 0.0, -weight];

@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::{Point, points, tips, write};
 use crate::output::{Format, words};
 use crate::relax::Equilibrium;
+use crate::undulation::Undulation;
 
 /// `summary.json`, which is also what `--json` prints.
 pub struct Summary;
@@ -48,6 +49,7 @@ struct Object<'a> {
     eigenvalue_errors: Option<Vec<f64>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     saddle: Option<Saddle>,
+    undulation: Waves,
     model: String,
     shear_effect: Option<f64>,
     stretch_effect: Option<f64>,
@@ -62,6 +64,61 @@ struct Saddle {
     energy: f64,
     negative_eigenvalues: usize,
     tip: Point,
+}
+
+/// Waves and twist of the veins; lengths in units of length, angles in radians.
+#[derive(Serialize)]
+struct Waves {
+    handedness: &'static str,
+    twist: f64,
+    margins: Option<Margins>,
+    veins: Vec<VeinWaves>,
+}
+
+/// Of the margin that has more waves, or higher ones.
+#[derive(Serialize)]
+struct Margins {
+    waves: f64,
+    amplitude: f64,
+    wavelength: Option<f64>,
+    predicted_waves: f64,
+}
+
+#[derive(Serialize)]
+struct VeinWaves {
+    waves: f64,
+    amplitude: f64,
+    wavelength: Option<f64>,
+    twist: f64,
+    tension: f64,
+    load_number: f64,
+    predicted_waves: f64,
+}
+
+impl From<&Undulation> for Waves {
+    fn from(undulation: &Undulation) -> Self {
+        Waves {
+            handedness: undulation.hand().word(),
+            twist: undulation.twist(),
+            margins: undulation.margin().map(|vein| Margins {
+                waves: vein.waves(),
+                amplitude: vein.amplitude,
+                wavelength: vein.wavelength,
+                predicted_waves: vein.predicted_waves(),
+            }),
+            veins: (undulation.veins.iter())
+                .map(|vein| VeinWaves {
+                    waves: vein.waves(),
+                    amplitude: vein.amplitude,
+                    wavelength: vein.wavelength,
+                    twist: vein.twist,
+                    tension: vein.tension,
+                    load_number: vein.load_number,
+                    predicted_waves: vein.predicted_waves(),
+                })
+                .collect(),
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -100,6 +157,7 @@ impl<'a> From<&'a Equilibrium> for Object<'a> {
                 negative_eigenvalues: saddle.negative_eigenvalues,
                 tip: saddle.tip.to_array(),
             }),
+            undulation: Waves::from(&equilibrium.undulation),
             model: words::model(equilibrium),
             shear_effect: equilibrium.model.shear,
             stretch_effect: equilibrium.model.stretch,
@@ -162,6 +220,7 @@ mod tests {
             "negative_eigenvalues",
             "lowest_eigenvalues",
             "eigenvalue_errors",
+            "undulation",
             "model",
             "shear_effect",
             "stretch_effect",

@@ -14,7 +14,7 @@ use crate::study::{Map, MapRequest, MapRow};
 pub struct MapTable;
 
 /// The columns after those of the varied keys.
-const COLUMNS: [&str; 12] = [
+const COLUMNS: [&str; 15] = [
     "method",
     "outcome",
     "detail",
@@ -25,6 +25,9 @@ const COLUMNS: [&str; 12] = [
     "energy",
     "error",
     "error_estimate",
+    "margin_waves",
+    "margin_amplitude",
+    "twist",
     "seconds",
     "reference",
 ];
@@ -82,6 +85,9 @@ fn fields(request: &MapRequest, row: &MapRow) -> Vec<String> {
         optional(row.energy),
         optional(row.error),
         optional(row.error_estimate),
+        optional(row.margin_waves),
+        optional(row.margin_amplitude),
+        optional(row.twist),
         format!("{:.6}", row.seconds),
         row.reference.to_string(),
     ]);
@@ -165,8 +171,11 @@ fn row(
         energy: number(7)?,
         error: number(8)?,
         error_estimate: number(9)?,
-        seconds: number(10)?.unwrap_or_default(),
-        reference: parsed(fields[11])?,
+        margin_waves: number(10)?,
+        margin_amplitude: number(11)?,
+        twist: number(12)?,
+        seconds: number(13)?.unwrap_or_default(),
+        reference: parsed(fields[14])?,
     })
 }
 

@@ -78,6 +78,7 @@ impl Dynamics {
     ///     couple_stiffness: [8.0; 3].map(Profile::Constant),
     ///     force_stiffness: [f64::INFINITY; 3].map(Profile::Constant),
     ///     rest_curvature: [0.0; 3].map(Profile::Constant),
+    ///     rest_stretch: Profile::Constant(1.0),
     /// };
     /// let weight = [0.0, 0.0, -1.0];
     /// let dynamics = Dynamics::default_for(&[rod]).with_loads(weight, [0.0; 3], [0.0; 3]);
@@ -184,6 +185,7 @@ mod tests {
                 couple_stiffness: constant([0.1, bending, bending]),
                 force_stiffness: constant([f64::INFINITY; 3]),
                 rest_curvature: constant([0.0; 3]),
+                rest_stretch: Profile::Constant(1.0),
             })
             .collect()
     }

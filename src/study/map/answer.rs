@@ -7,6 +7,7 @@ use crate::leaf::{Grid, Leaf};
 use crate::relax::{self, Options, Outcome, index_near};
 use crate::scenario::Scenario;
 use crate::shape::{Difference, RodShape};
+use crate::undulation::Undulation;
 
 use super::row::MapOutcome;
 
@@ -17,6 +18,8 @@ pub struct Answer {
     pub stations: Vec<f64>,
     /// The shape there.
     pub rods: Vec<RodShape>,
+    /// Waves and twist of its veins.
+    pub undulation: Undulation,
     /// Energy.
     pub energy: f64,
     /// Negative eigenvalues.
@@ -118,6 +121,7 @@ pub fn relaxed(scenario: &Scenario, options: &Options) -> Found {
         return Found::Failed(MapOutcome::NotConverged, why.into());
     };
     Found::Rest(Box::new(Answer {
+        undulation: leaf.undulation,
         stations: leaf.stations,
         rods: leaf.rods,
         energy: leaf.energy,
@@ -211,7 +215,10 @@ impl Shooting<'_> {
             count => format!("{count} intervals"),
         };
         let neutral = solution.neutral.map(|neutral| format!("; {neutral}"));
+        let error = Some(solution.error.position);
+        let undulation = Undulation::at_stations(self.scenario, &stations, &solution.rods, error);
         Found::Rest(Box::new(Answer {
+            undulation,
             index: index_near(self.scenario, self.grid.clone(), &rods),
             rods: solution.rods,
             stations,

@@ -89,6 +89,9 @@ impl<'a> Cell<'a> {
             index: None,
             tip: None,
             energy: None,
+            margin_waves: None,
+            margin_amplitude: None,
+            twist: None,
             error: None,
             error_estimate: None,
             seconds,
@@ -103,6 +106,7 @@ impl<'a> Cell<'a> {
             Found::Rest(answer) => {
                 let error = self.reference.as_ref().map(|it| it.distance(&answer));
                 let (outcome, detail) = self.judge(&answer, error);
+                let margin = answer.undulation.margin();
                 let tip = answer.rods.first().and_then(|rod| rod.nodes.last());
                 MapRow {
                     outcome,
@@ -110,6 +114,9 @@ impl<'a> Cell<'a> {
                     index: answer.index,
                     tip: tip.map(|node| node.position.to_array()),
                     energy: Some(answer.energy),
+                    margin_waves: margin.map(|vein| vein.waves()),
+                    margin_amplitude: margin.map(|vein| vein.amplitude / length),
+                    twist: Some(answer.undulation.twist()),
                     error: error.map(|error| error / length),
                     error_estimate: Some(answer.estimate / length),
                     ..blank

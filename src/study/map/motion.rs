@@ -8,6 +8,7 @@ use crate::motion::{Broken, Explicit, Method, Physics};
 use crate::relax::{self, Options, index_near, node_state, start};
 use crate::scenario::Scenario;
 use crate::shape::RodShape;
+use crate::undulation::Undulation;
 
 use super::answer::{Answer, Found, SAME_PLACE, fine_grid, grid_error};
 use super::row::MapOutcome;
@@ -96,13 +97,15 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, deadline: Insta
     };
     let length = leaf.scale.length;
     let error = grid_error(scenario, &options).unwrap_or(SAME_PLACE * length);
+    let estimate = error + tolerance * length;
     Found::Rest(Box::new(Answer {
+        undulation: Undulation::at_stations(scenario, grid.sigma(), &rods, Some(estimate)),
         stations: grid.sigma().to_vec(),
         rods,
         energy: (end.energy.elastic + end.energy.coupling + end.energy.potential)
             * leaf.scale.moment(),
         index,
-        estimate: error + tolerance * length,
+        estimate,
         note,
     }))
 }

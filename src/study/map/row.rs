@@ -125,6 +125,29 @@ impl Confidence {
     }
 }
 
+/// What the figure of a map shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MapShow {
+    /// How each method fared.
+    #[default]
+    Outcomes,
+    /// How many waves the margins of stable answers make.
+    Waves,
+}
+
+impl MapShow {
+    /// Both.
+    pub const ALL: [MapShow; 2] = [MapShow::Outcomes, MapShow::Waves];
+
+    /// The word used on the command line.
+    pub fn word(self) -> &'static str {
+        match self {
+            MapShow::Outcomes => "outcomes",
+            MapShow::Waves => "waves",
+        }
+    }
+}
+
 /// A word that is none of those allowed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{found}: must be one of {}", allowed.join(", "))]
@@ -157,7 +180,7 @@ macro_rules! words {
     )*};
 }
 
-words!(MapMethod, MapOutcome, Confidence);
+words!(MapMethod, MapOutcome, Confidence, MapShow);
 
 /// One method in one cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -174,6 +197,12 @@ pub struct MapRow {
     pub index: Option<usize>,
     /// The joint tip, or the first rod's.
     pub tip: Option<[f64; 3]>,
+    /// Waves along the margins of the equilibrium found: a multiple of 1/2.
+    pub margin_waves: Option<f64>,
+    /// Their amplitude, relative to the longest rod.
+    pub margin_amplitude: Option<f64>,
+    /// Mean twist of its veins from base to tip, in radians; positive: right-handed.
+    pub twist: Option<f64>,
     /// Energy of the equilibrium found.
     pub energy: Option<f64>,
     /// Largest distance from the reference, relative to the longest rod.
@@ -184,4 +213,12 @@ pub struct MapRow {
     pub seconds: f64,
     /// What it was compared with.
     pub reference: Confidence,
+}
+
+impl MapRow {
+    /// Waves along the margins of a stable equilibrium; `None` where the
+    /// method found none.
+    pub fn stable_waves(&self) -> Option<f64> {
+        self.margin_waves.filter(|_| self.index == Some(0))
+    }
 }

@@ -127,18 +127,25 @@ fn decades(low: f64, high: f64, sign: f64, most: usize) -> Vec<(f64, String)> {
         .collect()
 }
 
+/// Of more keys than these the first and the last are named.
+const NAMED: usize = 4;
+
 /// Keys of one table are told with its name once: `stiffness: axial = shear_2`.
 fn name(keys: &str) -> String {
     let keys: Vec<&str> = keys.split('+').collect();
     let table = |key: &str| key.split('.').next().unwrap_or_default().to_string();
     let first = table(keys[0]);
+    let joined = |keys: &[&str]| match keys {
+        [first, .., last] if keys.len() > NAMED => format!("{first} = … = {last}"),
+        few => few.join(" = "),
+    };
     if keys.len() == 1 || keys.iter().any(|key| table(key) != first) {
-        return keys.join(" = ");
+        return joined(&keys);
     }
     let short: Vec<&str> = (keys.iter())
         .map(|key| key.split_once('.').map_or(*key, |(_, name)| name))
         .collect();
-    format!("{first}: {}", short.join(" = "))
+    format!("{first}: {}", joined(&short))
 }
 
 #[cfg(test)]
@@ -189,6 +196,8 @@ mod tests {
     fn a_table_is_told_once() {
         let h = "stiffness.axial+stiffness.shear_2";
         assert_eq!(name(h), "stiffness: axial = shear_2");
+        let many: Vec<String> = (0..6).map(|i| format!("rest.twist[{i}]")).collect();
+        assert_eq!(name(&many.join("+")), "rest: twist[0] = … = twist[5]");
         assert_eq!(name("load.gravity[2]"), "load.gravity[2]");
         assert_eq!(name("method.step+leaf.length"), "method.step = leaf.length");
     }

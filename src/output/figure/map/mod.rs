@@ -1,4 +1,5 @@
-//! The figure of a map: one panel a method, one colour an outcome.
+//! The figure of a map: one panel a method, one colour an outcome or, of
+//! stable leaves if that is asked for, a number of waves.
 
 mod axis;
 mod panel;
@@ -10,7 +11,7 @@ use super::colors::{INK, NOTE};
 use super::drawing::{Anchor, Drawing, HALF_CAPITAL};
 use super::font::Font;
 use super::page::{Cell, LEFT, PANEL_TITLE, RIGHT, TEXT_SIZE, TICK_SIZE, TITLE_SIZE, WIDTH};
-use crate::study::{Confidence, Knob, Map, MapMethod, MapOutcome};
+use crate::study::{Confidence, Knob, Map, MapMethod, MapOutcome, MapRow, MapShow};
 use axis::Axis;
 use panel::{Panel, Tile};
 
@@ -40,7 +41,11 @@ impl Pictured for Map {
     const PNG: &'static str = "map.png";
 
     fn draw(&self) -> Drawing {
-        let title = format!("{}: where methods fail", self.request.base.scenario().name);
+        let name = &self.request.base.scenario().name;
+        let title = match self.show {
+            MapShow::Outcomes => format!("{name}: where methods fail"),
+            MapShow::Waves => format!("{name}: waves along the margins"),
+        };
         let mut drawing = Drawing {
             width: match (self.request.axes.len(), self.request.methods.len()) {
                 (2, 1) => NARROW,
@@ -123,7 +128,8 @@ fn legend(page: &mut Drawing, map: &Map, mut base: f64) -> f64 {
         x += width + 20.0;
     };
     for outcome in MapOutcome::ALL {
-        if map.rows.iter().any(|row| row.outcome == outcome) {
+        let shown = |row: &MapRow| row.outcome == outcome && waves(map, row).is_none();
+        if map.rows.iter().any(shown) {
             let text = match outcome {
                 MapOutcome::Saddle => "saddle, with its index".to_string(),
                 outcome => outcome.word().replace('-', " "),
@@ -132,6 +138,19 @@ fn legend(page: &mut Drawing, map: &Map, mut base: f64) -> f64 {
                 panel::fill(page, swatch, outcome)
             });
         }
+    }
+    let mut counts: Vec<f64> = map.rows.iter().filter_map(|row| waves(map, row)).collect();
+    counts.sort_by(f64::total_cmp);
+    counts.dedup();
+    for waves in counts {
+        let text = match waves {
+            0.0 => "stable, no waves".into(),
+            1.0 => "1 wave".into(),
+            waves => format!("{waves} waves"),
+        };
+        entry(page, &text, &|page, swatch| {
+            panel::fill_waves(page, swatch, waves)
+        });
     }
     for reference in [Confidence::Unconfirmed, Confidence::None] {
         if map.rows.iter().any(|row| row.reference == reference) {
@@ -167,12 +186,23 @@ fn tiles(map: &Map, method: MapMethod) -> Vec<Option<Tile>> {
             outcome: row.outcome,
             index: row.index,
             reference: row.reference,
+            waves: waves(map, row),
         });
     }
     tiles
 }
 
+/// The waves a cell shows.
+fn waves(map: &Map, row: &MapRow) -> Option<f64> {
+    row.stable_waves().filter(|_| map.show == MapShow::Waves)
+}
+
 fn count(map: &Map, method: MapMethod) -> String {
+    if map.show == MapShow::Waves {
+        let waving = |row: &&MapRow| row.method == method && row.stable_waves() > Some(0.0);
+        let count = map.rows.iter().filter(waving).count();
+        return format!("{count} of {} wave", map.request.cells());
+    }
     let right = map.count(method, MapOutcome::Right);
     format!("{right} of {} right", map.request.cells())
 }
@@ -281,6 +311,18 @@ mod tests {
         }
         assert_eq!(svg.matches("<g ").count(), svg.matches("</g>").count());
         assert!(!svg.contains("NaN") && !svg.contains("inf"));
+    }
+
+    #[test]
+    fn waves_are_shown_in_place_of_outcomes() {
+        let mut map = sample::map();
+        assert!(!svg(&map).contains("waves"));
+        map.show = MapShow::Waves;
+        let svg = svg(&map);
+        for text in ["waves along the margins", ">1.5 waves<", "stable, no waves"] {
+            assert!(svg.contains(text), "{text}");
+        }
+        assert!(!svg.contains("other equilibrium") && svg.contains("saddle"));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::super::colors::{Color, FRAME, INK, NOTE, WHITE};
+use super::super::colors::{Color, FRAME, INK, NOTE, WHITE, vein_color};
 use super::super::drawing::{Anchor, Drawing, HALF_CAPITAL, Stroke, circle, rectangle};
 use super::super::page::{Cell, TICK_SIZE};
 use super::axis::Axis;
@@ -23,6 +23,8 @@ pub struct Tile {
     pub outcome: MapOutcome,
     pub index: Option<usize>,
     pub reference: Confidence,
+    /// Waves along the margins, where these are shown and the leaf is stable.
+    pub waves: Option<f64>,
 }
 
 /// Colours that the colour-blind can tell apart (Okabe and Ito), right ones
@@ -40,6 +42,9 @@ fn color(outcome: MapOutcome) -> Color {
     }
 }
 
+/// A leaf that does not wave.
+const PALE: Color = Color(226, 236, 226);
+
 /// Fills a cell; one that was refused is crossed out.
 pub fn fill(page: &mut Drawing, cell: Cell, outcome: MapOutcome) {
     page.shape(rectangle(cell.corner, cell.size), color(outcome), None);
@@ -50,6 +55,18 @@ pub fn fill(page: &mut Drawing, cell: Cell, outcome: MapOutcome) {
         page.line(low, high, thin);
         page.line(DVec2::new(low.x, high.y), DVec2::new(high.x, low.y), thin);
     }
+}
+
+/// Waves beyond which colours do not change any more.
+const MOST_WAVES: f64 = 2.5;
+
+/// Fills a cell by its number of waves: none is pale.
+pub fn fill_waves(page: &mut Drawing, cell: Cell, waves: f64) {
+    let color = match waves {
+        0.0 => PALE,
+        waves => vein_color((waves - 1.0) / (MOST_WAVES - 1.0)),
+    };
+    page.shape(rectangle(cell.corner, cell.size), color, None);
 }
 
 /// Marks a cell whose reference is not confirmed: a dot, or a ring if there is
@@ -120,15 +137,21 @@ impl Panel<'_> {
             cell.corner += air;
             cell.size -= 2.0 * air;
         }
-        fill(page, cell, tile.outcome);
+        match tile.waves {
+            Some(waves) => fill_waves(page, cell, waves),
+            None => fill(page, cell, tile.outcome),
+        }
         if large {
             mark(page, cell, tile.reference);
         }
-        if let (MapOutcome::Saddle, Some(index)) = (tile.outcome, tile.index)
-            && cell.size.min_element() >= NUMBERED
-        {
+        let number = match (tile.outcome, tile.index, tile.waves) {
+            (MapOutcome::Saddle, Some(index), _) => index.to_string(),
+            (_, _, Some(waves)) if waves > 0.0 => waves.to_string(),
+            _ => return,
+        };
+        if cell.size.min_element() >= NUMBERED {
             let middle = cell.corner + 0.5 * cell.size;
-            page.centered(middle, &index.to_string(), NUMBER_SIZE, WHITE);
+            page.centered(middle, &number, NUMBER_SIZE, WHITE);
         }
     }
 

@@ -1,0 +1,365 @@
+//! Undulation as numbers: the waves of each vein out of the leaf's surface,
+//! the twist of its section, and what linear theory says of both.
+//!
+//! **Waves.** A vein waves where it bends out of the surface now to one side,
+//! now to the other. Its normal curvature is the part of its curvature along
+//! the normal of the leaf, which its tangent and the line from one margin to
+//! the other at equal fractions of the length span (a single vein's own
+//! director d2 takes the place of that line). The plane curve that has this curvature is cut at its inflections:
+//! what lies between two of them is a half-wave, and its height over their
+//! chord is its amplitude. So nothing has to be fitted, a vein that simply
+//! droops is one half-wave, however it droops, and the numbers depend neither
+//! on where the leaf lies nor on the order of its veins. Half-waves lower than
+//! [`LEAST_HEIGHT`] lengths, or than four error estimates, are no waves: they
+//! are joined with those beside them.
+//!
+//! **Chirality.** The twist is the integral of u1 from base to tip, in radians,
+//! with that at rest. It is positive where d2 turns about d1 as a right-handed
+//! screw does when it is seen from the base.
+//!
+//! **Linear theory** (section 5.1 of the paper). Under a mean axial force T the
+//! lateral displacement obeys, with eqs (12) and (13),
+//!
+//! ```text
+//! A2 Z'''' = f3 + T Z''
+//! ```
+//!
+//! and oscillates with the wavenumber sqrt(-T/A2) if T is compressive, which
+//! makes sqrt(-T/A2) L/pi half-waves along the vein.
+
+use std::f64::consts::PI;
+
+use glam::{DQuat, DVec2, DVec3};
+
+use crate::rotation;
+use crate::scenario::Scenario;
+use crate::shape::RodShape;
+
+/// Height of the lowest half-wave that counts, in lengths of the longest rod.
+pub const LEAST_HEIGHT: f64 = 1e-3;
+
+/// And in error estimates: a height is the difference of three positions.
+const ERRORS: f64 = 4.0;
+
+/// Sine of the angle between a vein and the line between the margins below
+/// which these are one.
+const SAME_PLACE: f64 = 1e-6;
+
+/// A turn at a node below this, in radians, is rounding: not even thousands of
+/// them make a half-wave that counts.
+const STRAIGHT: f64 = 1e-10;
+
+/// A mean twist below this, in radians, has no hand.
+const LEAST_TWIST: f64 = 1e-3;
+
+/// Which way the sections turn from base to tip, on average.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hand {
+    /// As a right-handed screw: the mean twist is positive.
+    Right,
+    /// As a left-handed one.
+    Left,
+    /// Not at all, or as much to the right as to the left.
+    None,
+}
+
+impl Hand {
+    /// The word used in `summary.json`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Hand::Right => "right",
+            Hand::Left => "left",
+            Hand::None => "none",
+        }
+    }
+}
+
+/// What one vein does.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Vein {
+    /// Half-waves along it: alternating extrema.
+    pub half_waves: usize,
+    /// Largest half of a height from crest to trough, in units of length; 0
+    /// without waves.
+    pub amplitude: f64,
+    /// Mean distance along the vein between one crest and the next, in units
+    /// of length; `None` without waves.
+    pub wavelength: Option<f64>,
+    /// Twist of the section from base to tip, in radians.
+    pub twist: f64,
+    /// Mean axial force T; negative: compression.
+    pub tension: f64,
+    /// |T| L^2/A2, free of units, with the mean A2; times the mean growth of
+    /// the rest length.
+    pub load_number: f64,
+}
+
+impl Vein {
+    /// Number of waves, a multiple of 1/2; a single bend is none.
+    pub fn waves(&self) -> f64 {
+        match self.half_waves {
+            0 | 1 => 0.0,
+            count => 0.5 * count as f64,
+        }
+    }
+
+    /// Waves by linear theory: half of sqrt(|T|/A2) L/pi if T is compressive,
+    /// none in tension.
+    pub fn predicted_waves(&self) -> f64 {
+        match self.tension < 0.0 {
+            true => 0.5 * self.load_number.sqrt() / PI,
+            false => 0.0,
+        }
+    }
+}
+
+/// What all veins do, from one edge of the leaf to the other.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Undulation {
+    /// One entry per vein.
+    pub veins: Vec<Vein>,
+}
+
+/// A centerline with the directors along it, base to tip.
+pub type Centerline = Vec<(DVec3, DQuat)>;
+
+impl Undulation {
+    /// Of a leaf at rest: waves and twist by its `lines`, one per rod and all
+    /// with nodes at the same fractions of the length; forces by its `rods` at
+    /// the `stations`. `error` bounds the error of positions, where known.
+    pub fn of(
+        scenario: &Scenario,
+        lines: &[Centerline],
+        stations: &[f64],
+        rods: &[RodShape],
+        error: Option<f64>,
+    ) -> Self {
+        let longest = rods.iter().map(|rod| rod.length).fold(0.0, f64::max);
+        let least = (LEAST_HEIGHT * longest).max(ERRORS * error.unwrap_or(0.0));
+        let veins = (0..lines.len().min(rods.len()))
+            .map(|j| {
+                let half_waves = half_waves(lines, j, least);
+                let material = &scenario.rods[j];
+                // Forces have the longer arms of a vein that has grown.
+                let grown = material.rest_stretch.integral(1.0);
+                let tension = mean(stations, rods[j].nodes.iter().map(|node| node.n.x));
+                let bending = material.couple_stiffness[1].integral(1.0);
+                Vein {
+                    amplitude: amplitude(&half_waves),
+                    wavelength: wavelength(&half_waves),
+                    half_waves: half_waves.len(),
+                    twist: twist(&lines[j]),
+                    tension,
+                    load_number: tension.abs() * grown * material.length.powi(2) / bending,
+                }
+            })
+            .collect();
+        Undulation { veins }
+    }
+
+    /// The same, where the shape is known at no more than its stations.
+    pub fn at_stations(
+        scenario: &Scenario,
+        stations: &[f64],
+        rods: &[RodShape],
+        error: Option<f64>,
+    ) -> Self {
+        let line = |rod: &RodShape| -> Centerline {
+            let nodes = rod.nodes.iter();
+            nodes.map(|node| (node.position, node.rotation)).collect()
+        };
+        let lines: Vec<Centerline> = rods.iter().map(line).collect();
+        Undulation::of(scenario, &lines, stations, rods, error)
+    }
+
+    /// The first and the last vein, which are one in a leaf of one.
+    pub fn margins(&self) -> Option<[&Vein; 2]> {
+        Some([self.veins.first()?, self.veins.last()?])
+    }
+
+    /// The margin that has more waves, or higher ones.
+    pub fn margin(&self) -> Option<&Vein> {
+        let [first, last] = self.margins()?;
+        let more = last.half_waves.cmp(&first.half_waves);
+        match more.then(last.amplitude.total_cmp(&first.amplitude)) {
+            std::cmp::Ordering::Greater => Some(last),
+            _ => Some(first),
+        }
+    }
+
+    /// Mean twist of all veins from base to tip, in radians.
+    pub fn twist(&self) -> f64 {
+        let sum: f64 = self.veins.iter().map(|vein| vein.twist).sum();
+        sum / self.veins.len().max(1) as f64
+    }
+
+    /// Which way that is.
+    pub fn hand(&self) -> Hand {
+        match self.twist() {
+            twist if twist > LEAST_TWIST => Hand::Right,
+            twist if twist < -LEAST_TWIST => Hand::Left,
+            _ => Hand::None,
+        }
+    }
+}
+
+/// Trapezoidal mean over the length.
+fn mean(stations: &[f64], values: impl Iterator<Item = f64>) -> f64 {
+    let values: Vec<f64> = values.collect();
+    let pairs = stations.windows(2).zip(values.windows(2));
+    pairs
+        .map(|(s, v)| 0.5 * (s[1] - s[0]) * (v[0] + v[1]))
+        .sum()
+}
+
+/// The integral of u1: the twists of all segments.
+fn twist(line: &Centerline) -> f64 {
+    let pairs = line.windows(2);
+    pairs
+        .map(|pair| rotation::log(pair[0].1.conjugate() * pair[1].1).x)
+        .sum()
+}
+
+/// A half-wave between two inflections.
+#[derive(Clone, Copy, Debug)]
+struct HalfWave {
+    /// Where it begins and ends: nodes and fractions of segments beyond them.
+    ends: [f64; 2],
+    /// Height of its extremum over the chord.
+    height: f64,
+    /// How far along the vein that is.
+    place: f64,
+}
+
+/// A vein developed into a plane by its normal curvature alone: what bends it
+/// within the surface is straightened out.
+struct Curve {
+    /// Turn out of the surface at each inner node, in radians.
+    turns: Vec<f64>,
+    points: Vec<DVec2>,
+    /// Arc length of the polyline up to each node.
+    along: Vec<f64>,
+}
+
+impl Curve {
+    /// Of vein `j`, which has three nodes at least.
+    fn of(lines: &[Centerline], j: usize) -> Self {
+        let line = &lines[j];
+        let steps: Vec<DVec3> = line.windows(2).map(|w| w[1].0 - w[0].0).collect();
+        let (mut turns, mut last) = (Vec::new(), None);
+        for (i, pair) in steps.windows(2).enumerate() {
+            let [from, to] = [pair[0], pair[1]].map(DVec3::normalize_or_zero);
+            let tangent = (from + to).normalize_or_zero();
+            let across = lines[lines.len() - 1][i + 1].0 - lines[0][i + 1].0;
+            let mut normal = tangent.cross(across.normalize_or_zero());
+            // Where the margins meet there is no surface but the section's.
+            if normal.length() < SAME_PLACE {
+                normal = tangent.cross(line[i + 1].1 * DVec3::Y);
+            }
+            normal = normal.normalize_or_zero();
+            // Margins that cross change places, but the surface goes on.
+            if last.is_some_and(|last: DVec3| last.dot(normal) < 0.0) {
+                normal = -normal;
+            }
+            last = Some(normal);
+            turns.push((to - from).dot(normal).clamp(-1.0, 1.0).asin());
+        }
+        let (mut points, mut along, mut angle) = (vec![DVec2::ZERO], vec![0.0], 0.0);
+        for (i, step) in steps.iter().enumerate() {
+            let (length, k) = (step.length(), points.len() - 1);
+            points.push(points[k] + length * DVec2::from_angle(angle));
+            along.push(along[k] + length);
+            angle += turns.get(i).copied().unwrap_or(0.0);
+        }
+        Curve {
+            turns,
+            points,
+            along,
+        }
+    }
+
+    /// The point a fraction of a segment beyond a node.
+    fn point(&self, at: f64) -> DVec2 {
+        let i = (at as usize).min(self.points.len() - 2);
+        self.points[i].lerp(self.points[i + 1], at - i as f64)
+    }
+
+    /// Where the normal curvature changes sign: between the last node on one
+    /// side and the first on the other.
+    fn inflections(&self) -> Vec<f64> {
+        let mut found = Vec::new();
+        let mut last: Option<(usize, f64)> = None;
+        for (i, &turn) in self
+            .turns
+            .iter()
+            .enumerate()
+            .filter(|(_, turn)| turn.abs() > STRAIGHT)
+        {
+            if let Some((k, before)) = last.filter(|(_, before)| before * turn < 0.0) {
+                let part = before / (before - turn);
+                found.push((k + 1) as f64 + part * (i - k) as f64);
+            }
+            last = Some((i, turn));
+        }
+        found
+    }
+
+    fn half_wave(&self, ends: [f64; 2]) -> HalfWave {
+        let [from, to] = ends.map(|end| self.point(end));
+        let chord = (to - from).normalize_or_zero();
+        let first = ends[0].ceil() as usize;
+        let (mut height, mut place) = (0.0, self.along[first]);
+        for i in first..=ends[1].floor() as usize {
+            let off = chord.perp_dot(self.points[i] - from).abs();
+            if off > height {
+                (height, place) = (off, self.along[i]);
+            }
+        }
+        HalfWave {
+            ends,
+            height,
+            place,
+        }
+    }
+}
+
+/// The half-waves of vein `j` that are at least so high.
+fn half_waves(lines: &[Centerline], j: usize, least: f64) -> Vec<HalfWave> {
+    if lines[j].len() < 4 {
+        return Vec::new();
+    }
+    let curve = Curve::of(lines, j);
+    let mut ends = vec![0.0];
+    ends.extend(curve.inflections());
+    ends.push((curve.points.len() - 1) as f64);
+    let mut waves: Vec<HalfWave> = (ends.windows(2))
+        .map(|pair| curve.half_wave([pair[0], pair[1]]))
+        .collect();
+    // The lowest goes first; what it parted bends to the same side and is one.
+    while let Some(low) = (0..waves.len())
+        .filter(|&i| waves[i].height < least)
+        .min_by(|&a, &b| waves[a].height.total_cmp(&waves[b].height))
+    {
+        if waves.len() == 1 {
+            return Vec::new();
+        }
+        let (first, last) = (low.saturating_sub(1), (low + 1).min(waves.len() - 1));
+        let joined = curve.half_wave([waves[first].ends[0], waves[last].ends[1]]);
+        waves.splice(first..=last, [joined]);
+    }
+    waves
+}
+
+fn amplitude(waves: &[HalfWave]) -> f64 {
+    let pairs = waves.windows(2);
+    pairs
+        .map(|pair| 0.5 * (pair[0].height + pair[1].height))
+        .fold(0.0, f64::max)
+}
+
+fn wavelength(waves: &[HalfWave]) -> Option<f64> {
+    match waves {
+        [] | [_] => None,
+        [first, .., last] => Some(2.0 * (last.place - first.place) / (waves.len() - 1) as f64),
+    }
+}
