@@ -114,7 +114,7 @@ fn unknown_keys() {
             "did you mean solve?",
             "leaf, stiffness";
         "name =" => "colour = 1\nname =" =>
-            "leaf.toml:2: unknown key colour: allowed here: name, leaf";
+            "leaf.toml:2: unknown key colour: allowed here: name, units, leaf";
     }
 }
 
@@ -523,7 +523,7 @@ fn refused_overrides_say_that_they_are_overrides() {
         ),
         (
             "stifness.torsion=1",
-            "unknown key stifness.torsion (did you mean stiffness.torsion?): allowed here: name, leaf.rods",
+            "unknown key stifness.torsion (did you mean stiffness.torsion?): allowed here: name, units.length",
         ),
         (
             "gravity=[0,0,1]",

@@ -26,7 +26,7 @@ fn both_agree(scenario: &Scenario, within: f64) {
 #[test]
 fn on_every_figure_of_the_paper() {
     let paper = files("paper");
-    assert_eq!(paper.len(), 7);
+    assert_eq!(paper.len(), 9);
     for file in paper {
         for rods in [1, 2, 3, 5] {
             let entry = format!("leaf.rods={rods}");

@@ -1,5 +1,6 @@
 //! The command line: one file per verb. What is computed is in the library.
 
+mod all_report;
 mod chart;
 mod chart_report;
 mod check;

@@ -1,13 +1,16 @@
 //! `leafdyn relax`: a leaf comes to rest.
 
+use std::path::Path;
+
 use clap::{Args, ValueEnum};
 
 use leafdyn::relax::{self, Equilibrium, Method, Options};
 use leafdyn::scenario::Scenario;
+use leafdyn::study;
 
 use super::progress::ProgressLine;
 use super::request::Request;
-use super::{Refusal, Status, note, report};
+use super::{Refusal, Status, all_report, note, report};
 
 /// Eigenvalues that are told unasked.
 const MODES: usize = 3;
@@ -41,6 +44,10 @@ pub struct Relax {
     #[arg(long, value_name = "K", allow_negative_numbers = true)]
     modes: Option<usize>,
 
+    /// Look for all equilibria, from many starts, and list them by energy
+    #[arg(long, conflicts_with_all = ["keep_unstable", "modes", "segments"])]
+    all: bool,
+
     /// Solve for the whole leaf even if half of it would do
     #[arg(long)]
     full_model: bool,
@@ -67,6 +74,9 @@ impl From<MethodName> for Method {
 impl Relax {
     pub fn run(self) -> Result<Status, Refusal> {
         let (scenario, folder) = self.request.open()?;
+        if self.all {
+            return self.all(&scenario, &folder);
+        }
         let equilibrium = self.solve(&scenario)?;
         if let (true, Some(remark)) = (self.request.json, &equilibrium.remark) {
             note(&format!("{}: {remark}", equilibrium.scenario));
@@ -80,8 +90,8 @@ impl Relax {
         })
     }
 
-    fn solve(&self, scenario: &Scenario) -> Result<Equilibrium, Refusal> {
-        let options = Options {
+    fn options(&self) -> Options {
+        Options {
             method: self.method.into(),
             segments: self.segments,
             tolerance: self.request.tolerance,
@@ -90,11 +100,38 @@ impl Relax {
             intervals: self.intervals,
             modes: self.modes.unwrap_or(MODES),
             mode_shapes: self.modes.is_some_and(|count| count > 0),
-            deadline: None,
-        };
+            ..Options::default()
+        }
+    }
+
+    fn solve(&self, scenario: &Scenario) -> Result<Equilibrium, Refusal> {
         let mut line = ProgressLine::new(&scenario.name);
-        Ok(relax::relax(scenario, &options, &mut |progress| {
+        Ok(relax::relax(scenario, &self.options(), &mut |progress| {
             line.update(progress)
         })?)
+    }
+
+    fn all(&self, scenario: &Scenario, folder: &Path) -> Result<Status, Refusal> {
+        if !matches!(self.method, MethodName::SemiImplicit) {
+            return Err("--all: only with the method semi-implicit".into());
+        }
+        let options = Options {
+            modes: 0,
+            ..self.options()
+        };
+        let mut line = ProgressLine::new(&scenario.name);
+        let all = study::all(scenario, &options, &mut |starts, found| {
+            line.say(|elapsed| {
+                let seconds = elapsed.as_secs_f64();
+                format!("{starts} starts, {found} equilibria, {seconds:.0} s")
+            });
+        })?;
+        drop(line);
+        self.request
+            .deliver(&all, folder, |folder| all_report::report(&all, folder))?;
+        Ok(match all.found.is_empty() {
+            false => Status::Success,
+            true => Status::Failure,
+        })
     }
 }

@@ -25,7 +25,9 @@ pub use atomic::{abandon_unfinished, check_writable};
 pub use chart::{ChartTable, ScalingTable};
 pub use csv::{Centerlines, ModesTable};
 pub use figure::{FigurePng, FigureSvg, ModesFigure, MotionFigure};
-pub use json::{ChartSummary, CheckSummary, MapSummary, MotionSummary, Summary, TraceSummary};
+pub use json::{
+    AllSummary, ChartSummary, CheckSummary, MapSummary, MotionSummary, Summary, TraceSummary,
+};
 pub use map::{Journal, MapFileError, MapTable, belongs, claim, read_rows, write_rows};
 pub use recording::{CannotResume, Keeper, Recording};
 pub use trace::TraceTable;
@@ -35,7 +37,7 @@ pub use words::{
 
 use crate::relax::Equilibrium;
 use crate::simulate::Record;
-use crate::study::{Chart, Check, Map, Scaling, Trace};
+use crate::study::{All, Chart, Check, Map, Scaling, Trace};
 
 /// One way to write a result down.
 pub trait Format<R> {
@@ -88,6 +90,10 @@ impl Written for Check {
 impl Written for Map {
     const FORMATS: &'static [&'static dyn Format<Self>] =
         &[&MapSummary, &MapTable, &FigureSvg, &FigurePng];
+}
+
+impl Written for All {
+    const FORMATS: &'static [&'static dyn Format<Self>] = &[&AllSummary, &FigureSvg, &FigurePng];
 }
 
 impl Written for Trace {

@@ -14,7 +14,7 @@ use crate::relax::richardson::Richardson;
 use crate::relax::saddle;
 use crate::relax::semi_implicit::{Relaxation, Settled};
 use crate::relax::shooting;
-use crate::relax::start::start;
+use crate::relax::start::{disturb, start};
 use crate::scenario::Scenario;
 use glam::DVec3;
 use std::time::Instant;
@@ -139,7 +139,10 @@ fn finished(run: Run, end: End, clock: Instant) -> Equilibrium {
 /// Whether half of a leaf may be solved for the whole: where the way to rest
 /// is Newton's, which knows no other way than the shape it starts from.
 fn reducible(options: &Options) -> bool {
-    options.method == Method::SemiImplicit && !options.keep_unstable && !options.full_model
+    options.method == Method::SemiImplicit
+        && !options.keep_unstable
+        && !options.full_model
+        && options.disturbance.is_none()
 }
 
 /// Segments of a grid: so many as asked for, or at least `least`, as many as
@@ -399,7 +402,13 @@ impl<'a, 'o> Run<'a, 'o> {
         let mut near_rest = matches!(from, From::Coarser(_));
         let mut state = match from {
             From::Start => match self.whole {
-                None => start(&leaf),
+                None => {
+                    let mut state = start(&leaf);
+                    if let Some(number) = self.options.disturbance {
+                        disturb(&leaf, number, &mut state);
+                    }
+                    state
+                }
                 Some(whole) => {
                     let whole = DiscreteLeaf::new(whole, leaf.grid.clone());
                     half_of(self.leaf, &start(&whole))

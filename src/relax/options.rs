@@ -51,6 +51,10 @@ pub struct Options {
     /// Whether their shapes are wanted. Without them modes are left out where
     /// the leaf is large, and are known a little less accurately.
     pub mode_shapes: bool,
+    /// Begin not in the plain start but in the one of this number in an endless
+    /// series of disturbed ones: the leaf thrown out of its plane, each in its own
+    /// way, a number and the next to opposite sides.
+    pub disturbance: Option<usize>,
     /// When to give up, at rest or not: the leaf is then not at rest. Looked at
     /// where progress is told and between grids, so that a run may end a little
     /// later.

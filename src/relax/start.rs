@@ -80,3 +80,54 @@ fn rest_shapes(leaf: &DiscreteLeaf) -> State {
     }
     State::new(leaf.segments(), xs, qs)
 }
+
+/// Largest slope of a disturbance, and how many sizes there are.
+const STEEPEST: f64 = 0.8;
+const SIZES: usize = 4;
+
+/// Waves of a disturbance along the rods and across the leaf.
+const ALONG: usize = 3;
+const ACROSS: usize = 3;
+
+/// Lifts the nodes of a start out of the plane of the fan, and turns them as
+/// the lift tells: a smooth pattern that is another for every number but the
+/// sign, which alternates, and the same on all grids. A joint tip stays joint.
+pub fn disturb(leaf: &DiscreteLeaf, number: usize, state: &mut State) {
+    let (pattern, sign) = (
+        number / 2,
+        if number.is_multiple_of(2) { 1.0 } else { -1.0 },
+    );
+    // Multiples of the golden ratio spread evenly: no chance.
+    let golden = |k: usize| 2.0 * (k as f64 * 0.618_033_988_749_895).fract() - 1.0;
+    let size = sign * STEEPEST * (1 + pattern % SIZES) as f64 / SIZES as f64;
+    let rods = leaf.rods();
+    let joined = leaf.leaf.joined() && rods > 1;
+    for j in 0..rods {
+        let across = match rods {
+            1 => 0.0,
+            _ => j as f64 / (rods - 1) as f64,
+        };
+        let base = state.base(j);
+        for (i, &sigma) in leaf.grid.sigma().iter().enumerate().skip(1) {
+            let (mut lift, mut slope) = (0.0, 0.0);
+            for k in 1..=ALONG {
+                for l in 0..ACROSS {
+                    let part = golden(1 + 13 * pattern + ALONG * l + k) / (k * (l + 1)) as f64;
+                    let part = part * (PI * l as f64 * across).cos();
+                    // Flat at the base; what differs across ends at the tip.
+                    let (wave, k) = (PI * k as f64 * sigma, k as f64);
+                    let end = if joined && l > 0 { 1.0 - sigma } else { 1.0 };
+                    let fall = if joined && l > 0 { 1.0 } else { 0.0 };
+                    let bump = (1.0 - wave.cos()) / (PI * k);
+                    lift += part * bump * end;
+                    slope += part * (wave.sin() * end - bump * fall);
+                }
+            }
+            let length = leaf.leaf.length(j);
+            state.x[base + i].z += size * lift * length;
+            let sideways = state.q[base + i] * DVec3::Y;
+            let turn = rotation::exp(-(size * slope).atan() * sideways);
+            state.q[base + i] = (turn * state.q[base + i]).normalize();
+        }
+    }
+}

@@ -1,11 +1,13 @@
 //! What is built on the solvers.
 
+mod all;
 mod chart;
 mod check;
 mod map;
 mod trace;
 mod vary;
 
+pub use all::{All, Found, all};
 pub use chart::{
     Chart, ChartError, ChartOptions, Contender, Decade, Ending, Peer, PeerRow, PeersError,
     Reference, Row, Scaling, ScalingRow, Setting, Spread, Turn, chart, read_peers, scaling,

@@ -6,6 +6,7 @@
 //! One drawing code fills a [`drawing::Drawing`]; `svg` writes it down and
 //! `png` paints it, so that both files are the same picture.
 
+mod all;
 mod chart;
 mod check;
 mod colors;
@@ -27,6 +28,7 @@ mod motion;
 mod page;
 mod png;
 mod series;
+mod small;
 mod space;
 mod strip;
 mod svg;

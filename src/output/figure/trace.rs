@@ -10,11 +10,8 @@ use super::drawing::{Anchor, Drawing, HALF_CAPITAL, Stroke, circle, polygon};
 use super::energy::short;
 use super::flat::title;
 use super::header::{self, HEADER};
-use super::markers::{clamp_marker, tip_markers};
 use super::page::{Cell, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH};
-use super::space::{Camera, Room, draw_box, draw_veins, edges_with, surrounding_box};
-use super::ticks::round_step;
-use super::veins::{Veins, is_near};
+use super::small::{SmallLeaf, small_height, small_leaves};
 use crate::output::words::{branch_end, power_of_ten};
 use crate::study::{PointKind, Trace, TraceBranch, TracePoint};
 
@@ -27,21 +24,9 @@ const BOTTOM: f64 = 10.0;
 
 /// Leaves drawn.
 const MOST_LEAVES: usize = 8;
-const COLUMNS: usize = 4;
-const SIDE: f64 = 22.0;
-const GAP: f64 = 12.0;
-const LEAF: f64 = 170.0;
-const GRID: f64 = 17.0;
-const THINNER: f64 = 0.75;
 
 /// Length of a dash and of the gap after it.
 const DASH: f64 = 5.0;
-
-const ROOM: Room = Room {
-    left: 8.0,
-    right: 8.0,
-    below: 8.0,
-};
 
 impl Pictured for Trace {
     const SVG: &'static str = "trace.svg";
@@ -49,7 +34,6 @@ impl Pictured for Trace {
 
     fn draw(&self) -> Drawing {
         let shown = shown(self);
-        let rows = shown.len().div_ceil(COLUMNS);
         let law = match self.law {
             Some(_) => PANEL_TITLE + LAW + PANEL_AXIS + BETWEEN,
             None => 0.0,
@@ -59,7 +43,7 @@ impl Pictured for Trace {
         let name = format!("{}: equilibria along {}", self.scenario, self.keys);
         let mut drawing = Drawing {
             width: WIDTH,
-            height: leaves + rows as f64 * (PANEL_TITLE + LEAF + GAP) + BOTTOM,
+            height: leaves + small_height(shown.len()) + BOTTOM,
             description: name.clone(),
             marks: Vec::new(),
         };
@@ -77,7 +61,9 @@ impl Pictured for Trace {
             let top = diagram + DIAGRAM + PANEL_AXIS + PANEL_TITLE + BETWEEN;
             drawing.group("law", |page| hooke(page, self, cell(top, LAW)));
         }
-        drawing.group("leaves", |page| small_leaves(page, self, &shown, leaves));
+        drawing.group("leaves", |page| {
+            small_leaves(page, &self::leaves(self, &shown), leaves);
+        });
         drawing
     }
 }
@@ -348,52 +334,20 @@ fn hooke(page: &mut Drawing, trace: &Trace, cell: Cell) {
     }
 }
 
-fn small_leaves(page: &mut Drawing, trace: &Trace, shown: &[[usize; 2]], top: f64) {
-    let point = |at: &[usize; 2]| &trace.branches[at[0]].points[at[1]];
-    let longest = (shown.iter().flat_map(|at| &point(at).curves))
-        .map(|rod| rod.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>())
-        .fold(0.0, f64::max);
-    let veins: Vec<Veins> = shown
-        .iter()
-        .map(|at| Veins::through(&point(at).curves, &point(at).tips, longest))
-        .collect();
-    let lows = veins.iter().map(|veins| veins.low);
-    let highs = veins.iter().map(|veins| veins.high);
-    let (low, high) = surrounding_box(
-        lows.reduce(DVec3::min).unwrap_or(DVec3::ZERO),
-        highs.reduce(DVec3::max).unwrap_or(DVec3::ZERO),
-    );
-    let width = (WIDTH - 2.0 * SIDE - (COLUMNS - 1) as f64 * GAP) / COLUMNS as f64;
-    for (number, (veins, at)) in veins.iter().zip(shown).enumerate() {
-        let (row, column) = (number / COLUMNS, number % COLUMNS);
-        let cell = Cell {
-            corner: DVec2::new(
-                SIDE + column as f64 * (width + GAP),
-                top + PANEL_TITLE + row as f64 * (PANEL_TITLE + LEAF + GAP),
-            ),
-            size: DVec2::new(width, LEAF),
-        };
-        let camera = Camera::facing(low, high, cell, ROOM);
-        let step = round_step(GRID / camera.scale());
-        let found = point(at);
+/// The leaves at some points, and what each of them is.
+fn leaves<'t>(trace: &'t Trace, shown: &[[usize; 2]]) -> Vec<SmallLeaf<'t>> {
+    let leaf = |at: &[usize; 2]| {
+        let found = &trace.branches[at[0]].points[at[1]];
         let index = match (found.kind, found.index) {
             (PointKind::Regular, 0) => "stable".into(),
             (PointKind::Regular, index) => format!("index {index}"),
             (kind, _) => kind.word().replace('-', " "),
         };
-        let what = format!("at {}, {index}", short(found.value));
-        title(page, cell.corner, &format!("{}", number + 1), &what);
-        draw_box(
-            page,
-            &camera,
-            low,
-            high,
-            &edges_with(&camera, low, high, |_| step),
-        );
-        draw_veins(page, &camera, veins, low.z, THINNER * veins.line_width());
-        clamp_marker(page, camera.place(DVec3::ZERO));
-        if veins.tips.iter().all(|(tip, _)| is_near(*tip)) {
-            tip_markers(page, veins, |tip| camera.place(tip));
+        SmallLeaf {
+            curves: &found.curves,
+            tips: &found.tips,
+            title: format!("at {}, {index}", short(found.value)),
         }
-    }
+    };
+    shown.iter().map(leaf).collect()
 }

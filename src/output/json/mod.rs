@@ -1,5 +1,6 @@
 //! JSON, for scripts: compact, numbers that are not finite as null.
 
+mod all;
 mod chart;
 mod check;
 mod map;
@@ -13,6 +14,7 @@ use glam::DVec3;
 use serde::Serialize;
 use serde_json::ser::Formatter;
 
+pub use all::AllSummary;
 pub use chart::ChartSummary;
 pub use check::CheckSummary;
 pub use map::MapSummary;

@@ -1,0 +1,143 @@
+//! All shapes of a leaf, as far as many starts find them.
+
+use rayon::prelude::*;
+
+use crate::relax::{Equilibrium, Options, RelaxError, relax};
+use crate::scenario::Scenario;
+
+/// Starts that are made at once, between two looks at what is new.
+const BATCH: usize = 16;
+
+/// The search ends when so many starts in a row have found nothing new, or all
+/// have been made.
+const IN_VAIN: usize = 32;
+const MOST: usize = 160;
+
+/// Equilibria nearer to each other than this part of the longest rod, or than
+/// their error estimates, are one.
+const SAME: f64 = 1e-3;
+
+/// The equilibria of a leaf that many starts have found.
+#[derive(Clone, Debug)]
+pub struct All {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// The equilibria, lowest energy first.
+    pub found: Vec<Found>,
+    /// Starts that were made.
+    pub starts: usize,
+    /// Those that did not come to rest within the tolerance.
+    pub failed: usize,
+    /// Time of all, in seconds.
+    pub wall_seconds: f64,
+}
+
+/// One of them.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// The equilibrium.
+    pub equilibrium: Equilibrium,
+    /// Starts that ended in it.
+    pub starts: usize,
+    /// Whether the plain start, that of a relaxation, is one of them.
+    pub plain: bool,
+}
+
+/// Lets the leaf come to rest from its plain start, from many disturbed ones,
+/// and to the equilibrium, stable or not, that Newton's method finds. Which
+/// equilibria there are no number of starts can prove.
+///
+/// # Errors
+/// Requests that cannot be met.
+pub fn all(
+    scenario: &Scenario,
+    options: &Options,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Result<All, RelaxError> {
+    let clock = std::time::Instant::now();
+    let mut all = All {
+        scenario: scenario.name.clone(),
+        found: Vec::new(),
+        starts: 0,
+        failed: 0,
+        wall_seconds: 0.0,
+    };
+    let plain = relax(scenario, options, &mut |_| {})?;
+    let any = Options {
+        keep_unstable: true,
+        ..options.clone()
+    };
+    let any = relax(scenario, &any, &mut |_| {})?;
+    all.take(plain, true);
+    all.take(any, false);
+    let mut in_vain = 0;
+    let mut next = 0;
+    while next < MOST && in_vain < IN_VAIN {
+        let batch: Vec<Result<Equilibrium, RelaxError>> = (next..next + BATCH)
+            .into_par_iter()
+            .map(|number| {
+                let disturbed = Options {
+                    disturbance: Some(number),
+                    ..options.clone()
+                };
+                relax(scenario, &disturbed, &mut |_| {})
+            })
+            .collect();
+        next += BATCH;
+        for ended in batch {
+            let before = all.found.len();
+            all.take(ended?, false);
+            in_vain = if all.found.len() > before {
+                0
+            } else {
+                in_vain + 1
+            };
+        }
+        progress(all.starts, all.found.len());
+    }
+    all.found.sort_by(|a, b| {
+        let [a, b] = [a, b].map(|found| found.equilibrium.energy);
+        a.total_cmp(&b)
+    });
+    all.wall_seconds = clock.elapsed().as_secs_f64();
+    Ok(all)
+}
+
+impl All {
+    fn take(&mut self, equilibrium: Equilibrium, plain: bool) {
+        self.starts += 1;
+        if !equilibrium.outcome.is_success() {
+            self.failed += 1;
+            return;
+        }
+        let mut known = self.found.iter_mut();
+        match known.find(|found| same(&found.equilibrium, &equilibrium)) {
+            Some(found) => {
+                found.starts += 1;
+                found.plain |= plain;
+            }
+            None => self.found.push(Found {
+                equilibrium,
+                starts: 1,
+                plain,
+            }),
+        }
+    }
+}
+
+fn same(a: &Equilibrium, b: &Equilibrium) -> bool {
+    let longest = a.rods.iter().fold(0.0_f64, |m, rod| m.max(rod.length));
+    let errors = [a, b].map(|leaf| leaf.error_estimate.unwrap_or(0.0));
+    let within = (SAME * longest).max(2.0 * (errors[0] + errors[1]));
+    // Their grids may differ: compared at the stations that both have.
+    let both: Vec<(usize, usize)> = (a.stations.iter().enumerate())
+        .filter_map(|(i, sigma)| {
+            let near = |other: &f64| (other - sigma).abs() < 1e-12;
+            Some((i, b.stations.iter().position(near)?))
+        })
+        .collect();
+    a.rods.iter().zip(&b.rods).all(|(a, b)| {
+        both.iter()
+            .all(|&(i, j)| a.nodes[i].position.distance(b.nodes[j].position) < within)
+    })
+}
