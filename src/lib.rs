@@ -150,6 +150,13 @@
 //! from a relaxed leaf or from arcs. [`study::check`] compares it with the
 //! relaxation; the two share neither grid nor element nor linear algebra.
 //!
+//! **Branches** ([`study::trace()`]). An equilibrium is followed through a number
+//! of its scenario by arclength ([`branch`]), so that folds are no obstacle. Where
+//! its Morse index changes the matrix is singular; bordered by the modes that
+//! become neutral it is not, and the place is found to rounding on each grid, and
+//! extrapolated. Branches that cross there can be followed as well.
+//! [`study::all()`] looks for equilibria by many starts instead.
+//!
 //! **Where methods fail** ([`study::map()`]). Numbers of a scenario vary
 //! ([`study::Vary`]), and in each cell every method's answer is judged against
 //! the relaxed leaf confirmed by shooting: right, another equilibrium, a saddle,
@@ -163,7 +170,7 @@
 //!
 //! [`scenario`] (TOML to a checked [`scenario::Scenario`]) and [`rotation`],
 //! [`rod`], [`leaf`], [`shape`], [`undulation`], [`bvp`], [`motion`], [`modes`],
-//! [`relax`], [`simulate`],
+//! [`relax`], [`branch`], [`simulate`],
 //! [`study`], [`output`] (JSON, tables, figures): each module uses those named
 //! before it and knows nothing of those after it.
 //!

@@ -57,7 +57,7 @@ fn a_trace_is_a_table_a_summary_and_a_figure() {
     let lines: Vec<&str> = table.lines().collect();
     assert_eq!(
         lines[0],
-        "branch,point,kind,value,value_error,tip_x,tip_y,tip_z,error,energy,negative_eigenvalues,stable,multiplicity"
+        "branch,point,kind,value,value_error,tip_x,tip_y,tip_z,error,energy,negative_eigenvalues,stable,multiplicity,margin_waves,margin_amplitude,twist"
     );
     assert!(lines.len() > 10);
     assert!(lines[1].starts_with("1,1,regular,0.0,,"), "{}", lines[1]);

@@ -16,9 +16,10 @@ const CRITICAL_GRIDS: usize = 4;
 /// A critical parameter within this part of its range is exact.
 const EXACT: f64 = 1e-12;
 
-/// A point is sought at the same parameter on all grids where the branch goes
-/// at least this much along it, else in the same plane.
-const ALONG: f64 = 0.05;
+/// A point is sought where the leaf has gone the same way on all grids, since
+/// each has its own critical parameters. But at the same parameter at the ends of
+/// its range, and where the branch goes at least this much along it alone.
+const ALONG: f64 = 0.995;
 
 /// Compliance by which matrices of nearly rigid leaves are softened, in units
 /// of L^2/A, times one to four; and the stiffness from which on they are.
@@ -60,6 +61,7 @@ pub fn refine(
     let (mut state, mut fraction) = (point.state.clone(), point.fraction);
     let mut tangent = point.tangent.clone();
     let mut error = f64::INFINITY;
+    let mut reached = grid.clone();
     for _ in 1..GRIDS {
         if error <= accuracy {
             break;
@@ -71,16 +73,25 @@ pub fn refine(
             ..tangent
         };
         equations = equations.refined()?;
-        let normal = equations.normalised(tangent.clone());
-        let normal = (normal.fraction.abs() < ALONG).then_some(normal);
+        // Next to a crossing the same plane may hold another branch, too; the
+        // same way of the leaf does not.
+        let along = equations.normalised(tangent.clone()).fraction.abs();
+        let inside = fraction != 0.0 && fraction != 1.0;
+        let normal = (inside && along < ALONG).then(|| {
+            equations.normalised(Tangent {
+                increments: tangent.increments.clone(),
+                fraction: 0.0,
+            })
+        });
         let Ok((found, _)) = equations.correct(&finer, fraction, normal.as_ref()) else {
             break;
         };
         (state, fraction) = (found.state, found.fraction);
+        reached.clone_from(&equations.grid);
         table.push(&equations, &state, fraction)?;
         error = table.tips.best().map_or(f64::INFINITY, |best| best.error);
     }
-    Ok(table.refined(state, equations.grid.clone()))
+    Ok(table.refined(state, reached))
 }
 
 /// A critical point, on four grids.
@@ -91,6 +102,7 @@ pub fn refine_critical(family: &Family, grid: &Grid, found: &Critical) -> Result
     let mut table = Table::default();
     let mut equations = Equations::new(family, grid.clone())?;
     let mut critical = found.clone();
+    let mut reached = grid.clone();
     for level in 0..CRITICAL_GRIDS {
         if level > 0 {
             let before = &equations.grid;
@@ -109,7 +121,10 @@ pub fn refine_critical(family: &Family, grid: &Grid, found: &Critical) -> Result
                 ..critical.clone()
             };
             match finer.again(&mut equations) {
-                Ok(found) => critical = found,
+                Ok(found) => {
+                    critical = found;
+                    reached.clone_from(&equations.grid);
+                }
                 Err(_) => break,
             }
         }
@@ -143,7 +158,7 @@ pub fn refine_critical(family: &Family, grid: &Grid, found: &Critical) -> Result
             break;
         }
     }
-    Ok(table.refined(critical.state, equations.grid.clone()))
+    Ok(table.refined(critical.state, reached))
 }
 
 /// The parameter of a critical point of a nearly rigid leaf: by softened

@@ -5,7 +5,7 @@ use super::equations::{Equations, Stuck, reversed};
 use super::{Point, Tangent};
 
 /// How far from the crossing the other branch is looked for, in turn.
-const AWAY: [f64; 5] = [0.01, 0.003, 0.03, 0.1, 0.3];
+const AWAY: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
 
 /// The first points of the branches that cross at `critical` in the plane of
 /// one of its neutral modes, one to either side.

@@ -229,6 +229,7 @@ pub fn trace() -> Trace {
         error: Some(1e-9),
         energy: 0.1 * value,
         index,
+        undulation: Undulation::default(),
         curves: leaf.curves.clone(),
     };
     let mut points: Vec<TracePoint> = (0..10)

@@ -10,7 +10,7 @@ pub struct TraceTable;
 
 /// Names of the columns; the number that varies stands in `value`. Branches and
 /// points are numbered from 1. The tip is the joint one, or the first rod's.
-const HEADER: [&str; 13] = [
+const HEADER: [&str; 16] = [
     "branch",
     "point",
     "kind",
@@ -24,6 +24,9 @@ const HEADER: [&str; 13] = [
     "negative_eigenvalues",
     "stable",
     "multiplicity",
+    "margin_waves",
+    "margin_amplitude",
+    "twist",
 ];
 
 impl Format<Trace> for TraceTable {
@@ -43,6 +46,7 @@ impl Format<Trace> for TraceTable {
                     .tips
                     .first()
                     .map_or([f64::NAN; 3], |tip| tip.to_array());
+                let margin = point.undulation.margin();
                 let multiplicity = match point.kind {
                     Branching(modes) => Some(modes),
                     _ => None,
@@ -63,6 +67,11 @@ impl Format<Trace> for TraceTable {
                         point.index,
                         point.index == 0,
                         multiplicity,
+                    ),
+                    (
+                        margin.map(|vein| vein.waves()),
+                        margin.map(|vein| vein.amplitude),
+                        point.undulation.twist() + 0.0,
                     ),
                 ))?;
             }

@@ -75,6 +75,7 @@ impl Law {
 mod tests {
     use super::*;
     use crate::study::trace::{PointKind, TraceEnd, TracePoint};
+    use crate::undulation::Undulation;
     use glam::DVec3;
 
     fn branch(tip: impl Fn(f64) -> f64) -> TraceBranch {
@@ -86,6 +87,7 @@ mod tests {
             error: None,
             energy: 0.0,
             index: 0,
+            undulation: Undulation::default(),
             curves: Vec::new(),
         };
         TraceBranch {

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::law::Law;
 use crate::scenario::Units;
 use crate::study::Keys;
+use crate::undulation::Undulation;
 
 /// An equilibrium followed through a number of its scenario.
 #[derive(Clone, Debug)]
@@ -67,6 +68,8 @@ pub struct TracePoint {
     pub energy: f64,
     /// Morse index; at a critical point that behind it.
     pub index: usize,
+    /// Waves and twist of the veins.
+    pub undulation: Undulation,
     /// Centerlines on the finest grid, one per rod.
     pub curves: Vec<Vec<DVec3>>,
 }

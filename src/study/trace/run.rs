@@ -13,8 +13,10 @@ use crate::branch::{
     refine_critical, switch, walk,
 };
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
-use crate::relax::{Equilibrium, Options, project, relax};
+use crate::relax::{Equilibrium, Options, node_state, project, relax};
 use crate::scenario::Scenario;
+use crate::shape::RodShape;
+use crate::undulation::Undulation;
 
 /// Longest step along a branch where few values are asked for.
 const LONGEST: f64 = 0.1;
@@ -269,6 +271,35 @@ impl Run<'_, '_> {
         }
     }
 
+    /// Waves and twist of a point's leaf, by its finest grid.
+    fn undulation(&self, refined: &Refined) -> Option<Undulation> {
+        let (family, state, grid) = (self.family, &refined.state, &refined.grid);
+        let scenario = family.scenario(refined.fraction).ok()?;
+        let scale = family.scale();
+        let shapes = |leaf: &DiscreteLeaf| -> Vec<RodShape> {
+            let rod = |j: usize| RodShape {
+                length: leaf.leaf.length(j) * scale.length,
+                nodes: (0..=grid.segments())
+                    .map(|i| {
+                        let mut node = node_state(leaf, state, j, i);
+                        node.position *= scale.length;
+                        node.n *= scale.force();
+                        node
+                    })
+                    .collect(),
+            };
+            (0..leaf.rods()).map(rod).collect()
+        };
+        let rods = family.with(refined.fraction, grid, shapes).ok()?;
+        let error = refined.error.map(|error| error * scale.length);
+        Some(Undulation::at_stations(
+            &scenario,
+            grid.sigma(),
+            &rods,
+            error,
+        ))
+    }
+
     fn point(&self, kind: PointKind, index: usize, refined: &Refined) -> TracePoint {
         let scale = self.family.scale();
         let value = self.family.value(refined.fraction);
@@ -292,6 +323,7 @@ impl Run<'_, '_> {
             error: refined.error.map(|error| error * scale.length),
             energy: refined.energy * scale.moment(),
             index,
+            undulation: self.undulation(refined).unwrap_or_default(),
             curves: (refined.state.x.chunks(nodes))
                 .map(|rod| rod.iter().map(|x| *x * scale.length).collect())
                 .collect(),
