@@ -143,7 +143,9 @@ fn modes(equilibrium: &Equilibrium) -> Option<String> {
     let told: Vec<String> = phrases
         .map(|(what, list)| format!("{what} {list}"))
         .collect();
-    (!told.is_empty()).then(|| told.join("; "))
+    let unjudged = modes.iter().any(|mode| mode.error.is_none());
+    let roughly = if unjudged { " (on one grid)" } else { "" };
+    (!told.is_empty()).then(|| told.join("; ") + roughly)
 }
 
 fn work(equilibrium: &Equilibrium) -> String {

@@ -16,9 +16,12 @@ use glam::DVec3;
 /// shapes are asked for: about a second.
 const FEW_UNKNOWNS: usize = 20_000;
 
-/// The same of grids beyond those of the relaxation, which are there to make
-/// eigenvalues accurate.
-const FEW_MORE_UNKNOWNS: usize = 4_000;
+/// Without their shapes coarser grids of a stable leaf will do, with fewer
+/// unknowns than this if there are such: about as long as a relaxation.
+const AT_A_GLANCE: usize = 4_000;
+
+/// Unknowns of the finest grid beyond those of the relaxation, which is there to
+/// make eigenvalues accurate.
 const MANY_MORE_UNKNOWNS: usize = 200_000;
 
 /// Grids that are extrapolated, at most, and those of them that may be beyond
@@ -49,13 +52,15 @@ pub fn lowest(run: &Run) -> Option<Vec<Mode>> {
     if unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes {
         return None;
     }
+    let levels = levels(run)?;
+    let finest = levels.last()?;
     let physics = Physics::new(run.leaf);
     let on = |level: &Level| modes::lowest(&level.leaf, &physics, &level.state, options.modes).ok();
     // The finest first: what is too large for it need not be begun.
     let pairs = on(finest)?;
-    let first = run.levels.len().saturating_sub(GRIDS);
+    let first = levels.len().saturating_sub(GRIDS);
     let mut series = Series::new(pairs.len());
-    for level in &run.levels[first..run.levels.len() - 1] {
+    for level in &levels[first..levels.len() - 1] {
         match on(level) {
             Some(pairs) => series.push(&pairs),
             // Grids must follow each other.
@@ -64,7 +69,7 @@ pub fn lowest(run: &Run) -> Option<Vec<Mode>> {
     }
     series.push(&pairs);
     let shapes = shapes(finest, &pairs);
-    if options.segments.is_none() {
+    if options.segments.is_none() && options.mode_shapes {
         refine(run, &mut series, on);
     }
     let rounding = modes::rounding(&finest.leaf);
@@ -82,23 +87,29 @@ pub fn lowest(run: &Run) -> Option<Vec<Mode>> {
     )
 }
 
+/// The grids on which modes are looked for.
+fn levels<'r, 'a>(run: &'r Run<'a, '_>) -> Option<&'r [Level<'a>]> {
+    if run.options.mode_shapes || run.index != Some(0) {
+        return Some(&run.levels);
+    }
+    let few = |level: &&Level| unknowns(&level.leaf) < AT_A_GLANCE;
+    let count = run.levels.iter().take_while(few).count();
+    run.levels.get(..count.max(1))
+}
+
 fn unknowns(leaf: &DiscreteLeaf) -> usize {
     6 * leaf.rods() * leaf.segments()
 }
 
 /// Goes on to finer grids until the eigenvalues are as accurate as the shape.
 fn refine(run: &Run, series: &mut Series, on: impl Fn(&Level) -> Option<Vec<Eigenpair>>) {
-    let most = match run.options.mode_shapes {
-        true => MANY_MORE_UNKNOWNS,
-        false => FEW_MORE_UNKNOWNS,
-    };
     let mut finer: Vec<Level> = Vec::new();
     while finer.len() < MORE_GRIDS && !series.accurate(run.tolerance) && !run.late() {
         let levels: Vec<&Level> = run.levels.iter().chain(&finer).collect();
         let [.., last] = levels.as_slice() else {
             return;
         };
-        if 2 * unknowns(&last.leaf) > most {
+        if 2 * unknowns(&last.leaf) > MANY_MORE_UNKNOWNS {
             return;
         }
         let before = levels.len().checked_sub(2).map(|k| &levels[k].state);
