@@ -1,6 +1,7 @@
 //! Where the index changes: folds and points where branches cross.
 
-use super::equations::{Deflated, Equations, Stuck};
+use super::deflation::Deflated;
+use super::equations::{Equations, Stuck};
 use super::field::{add, dot, plus, times};
 use super::{Point, Tangent};
 use crate::leaf::{Field, State};

@@ -20,6 +20,7 @@
 //! so that a secant method finds its zero to rounding.
 
 mod critical;
+mod deflation;
 mod equations;
 mod family;
 mod field;

@@ -1,0 +1,226 @@
+//! The equations of a branch where the matrix is singular, or nearly so.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::equations::{Equations, ITERATIONS, LARGEST, Stuck, converged};
+use super::field::{add, dot, is_finite, largest, plus, times};
+use super::{Point, Tangent};
+use crate::leaf::{Bordered, Field, SparsePattern, State};
+
+/// What of a singular matrix of the border counts as zero, relative to the rest.
+const NEUTRAL: f64 = 1e-7;
+
+/// Iterations of the subspace: the wanted modes are far softer than the rest.
+const SUBSPACE_ITERATIONS: usize = 8;
+
+/// A point found in the presence of modes that are nearly neutral.
+pub struct Deflated {
+    /// The state.
+    pub state: State,
+    /// The parameter.
+    pub fraction: f64,
+    /// H of the border: minus the eigenvalues, in the limit, on its diagonal.
+    pub h: DMatrix<f64>,
+    /// X of the border: the modes.
+    pub modes: Vec<Field>,
+    /// How the modes feel the parameter: zero at a bifurcation, not at a fold.
+    pub drive: DVector<f64>,
+    /// How the forces change with it.
+    pub rate: Field,
+}
+
+impl Equations<'_> {
+    /// The point of the branch in a plane, where the matrix may be singular:
+    /// it is bordered by the masses times `modes`, and what these cannot decide
+    /// is left as it is.
+    ///
+    /// # Errors
+    /// If there is no point.
+    pub fn deflated(
+        &mut self,
+        state: &State,
+        fraction: f64,
+        normal: &Tangent,
+        modes: &[Field],
+    ) -> Result<Deflated, Stuck> {
+        let (mut state, mut fraction) = (state.clone(), fraction);
+        let border: Vec<Field> = modes.iter().map(|mode| self.momentum(mode)).collect();
+        let (dual, own) = (self.momentum(&normal.increments), normal.fraction);
+        let p = modes.len();
+        let mut previous = f64::INFINITY;
+        let mut finished = false;
+        for _ in 0..=ITERATIONS {
+            let family = match (finished, self.softened) {
+                (true, Some(softened)) => softened,
+                _ => *self.family,
+            };
+            let linear = self.linearise_in(family, &mut state, fraction)?;
+            let mut solve = self.factor_bordered(&border)?;
+            let none = vec![0.0; p];
+            let forces = solve(&linear.forces, &none);
+            let rate = solve(&linear.rate, &none);
+            let zero = times(&linear.forces, 0.0);
+            let columns: Vec<Bordered> = (0..p)
+                .map(|i| {
+                    let mut unit = none.clone();
+                    unit[i] = 1.0;
+                    solve(&zero, &unit)
+                })
+                .collect();
+            drop(solve);
+            let h = DMatrix::from_fn(p, p, |r, c| {
+                0.5 * (columns[c].multipliers[r] + columns[r].multipliers[c])
+            });
+            if finished {
+                return Ok(Deflated {
+                    state,
+                    fraction,
+                    h,
+                    drive: DVector::from_vec(rate.multipliers),
+                    rate: linear.rate,
+                    modes: columns
+                        .into_iter()
+                        .map(|column| column.increments)
+                        .collect(),
+                });
+            }
+            // What is below rounding decides nothing.
+            let noise = self.rounding(fraction)?;
+            let felt = |force: f64| if force.abs() < noise { 0.0 } else { force };
+            let mut matrix = DMatrix::zeros(p + 1, p + 1);
+            let mut right = DVector::zeros(p + 1);
+            for r in 0..p {
+                for c in 0..p {
+                    matrix[(r, c)] = h[(r, c)];
+                }
+                matrix[(r, p)] = rate.multipliers[r];
+                matrix[(p, r)] = dot(&dual, &columns[r].increments);
+                right[r] = -felt(forces.multipliers[r]);
+            }
+            matrix[(p, p)] = dot(&dual, &rate.increments) + own;
+            right[p] = -dot(&dual, &forces.increments);
+            let svd = matrix.svd(true, true);
+            let least = NEUTRAL * svd.singular_values.max();
+            let solution = svd.solve(&right, least).map_err(|_| Stuck::NotConverged)?;
+            let mut increments = plus(&forces.increments, solution[p], &rate.increments);
+            for (column, part) in columns.iter().zip(solution.iter()) {
+                add(&mut increments, *part, &column.increments);
+            }
+            let size = largest(&increments).max(solution[p].abs());
+            if !is_finite(&increments) || size > LARGEST {
+                return Err(Stuck::NotConverged);
+            }
+            state = self.moved(&state, fraction, &increments, 1.0)?;
+            fraction += solution[p];
+            finished = converged(size, previous);
+            previous = size;
+        }
+        Err(Stuck::NotConverged)
+    }
+
+    /// Factorises the matrix of the system with a border.
+    fn factor_bordered(
+        &mut self,
+        border: &[Field],
+    ) -> Result<impl FnMut(&Field, &[f64]) -> Bordered, Stuck> {
+        let rows = border.len();
+        if self.bordered.as_ref().is_none_or(|(held, _)| *held != rows) {
+            let pattern = SparsePattern::bordered(&self.system, rows);
+            self.bordered = Some((rows, pattern.map_err(|_| Stuck::TooLarge)?));
+        }
+        let Some((_, pattern)) = &self.bordered else {
+            return Err(Stuck::TooLarge);
+        };
+        self.factorizations += 1;
+        let factor = pattern.factorize_bordered(&self.system, 0.0, border);
+        let mut factor = factor.map_err(|_| Stuck::TooLarge)?;
+        Ok(move |rhs: &Field, below: &[f64]| factor.solve_bordered(rhs, below))
+    }
+
+    /// The `count` modes whose eigenvalues are next to zero at a point, by
+    /// inverse iteration of a subspace; of mass one, the next to zero first.
+    ///
+    /// # Errors
+    /// If the point cannot be linearised.
+    pub fn soft_modes(&mut self, point: &Point, count: usize) -> Result<Vec<Field>, Stuck> {
+        let mut state = point.state.clone();
+        self.linearise(&mut state, point.fraction)?;
+        let count = count.min(6 * self.rods() * self.grid.segments() / 2).max(1);
+        if self.pattern.is_none() {
+            self.pattern = Some(SparsePattern::new(&self.system).map_err(|_| Stuck::TooLarge)?);
+        }
+        let pattern = self.pattern.as_ref().ok_or(Stuck::TooLarge)?;
+        let shift = 1e-9;
+        let factor = pattern.factorize(&self.system, shift);
+        let mut factor = factor.map_err(|_| Stuck::TooLarge)?;
+        let mut modes: Vec<Field> = (0..count)
+            .map(|k| {
+                self.system.seed_mode();
+                let mut seed = self.system.rhs();
+                // Each with another pattern along the rods.
+                for (j, rod) in seed.iter_mut().enumerate() {
+                    for (i, forces) in rod.iter_mut().enumerate() {
+                        for (c, force) in forces.iter_mut().enumerate() {
+                            let phase = (k * (3 * i + 7 * c + 11 * j + 1)) as f64;
+                            *force *= (0.7 * phase).cos();
+                        }
+                    }
+                }
+                seed
+            })
+            .collect();
+        for _ in 0..SUBSPACE_ITERATIONS {
+            for mode in &mut modes {
+                *mode = factor.solve_bordered(mode, &[]).increments;
+            }
+            // Gram and Schmidt over the masses, then Ritz: the operator is
+            // K^-1 M, whose largest values belong to the softest modes.
+            for k in 0..count {
+                for l in 0..k {
+                    let part = self.product(&modes[l], &modes[k]);
+                    let other = modes[l].clone();
+                    add(&mut modes[k], -part, &other);
+                }
+                let norm = self.product(&modes[k], &modes[k]).sqrt();
+                modes[k] = times(&modes[k], 1.0 / norm);
+            }
+            let momenta: Vec<Field> = modes.iter().map(|mode| self.momentum(mode)).collect();
+            let images: Vec<Field> = momenta
+                .iter()
+                .map(|momentum| factor.solve_bordered(momentum, &[]).increments)
+                .collect();
+            let ritz = DMatrix::from_fn(count, count, |r, c| {
+                0.5 * (dot(&momenta[r], &images[c]) + dot(&momenta[c], &images[r]))
+            });
+            let eigen = ritz.symmetric_eigen();
+            let mut order: Vec<usize> = (0..count).collect();
+            order.sort_by(|&a, &b| {
+                let [a, b] = [a, b].map(|k| eigen.eigenvalues[k].abs());
+                b.total_cmp(&a)
+            });
+            modes = order
+                .iter()
+                .map(|&k| {
+                    let mut mode = times(&modes[0], 0.0);
+                    for (l, other) in modes.iter().enumerate() {
+                        add(&mut mode, eigen.eigenvectors[(l, k)], other);
+                    }
+                    mode
+                })
+                .collect();
+            // Forces again, for the next inverse iteration.
+            if !modes.iter().all(is_finite) {
+                return Err(Stuck::NotConverged);
+            }
+            modes = modes.iter().map(|mode| self.momentum(mode)).collect();
+        }
+        Ok(modes
+            .iter()
+            .map(|momentum| {
+                let mode = factor.solve_bordered(momentum, &[]).increments;
+                let norm = self.product(&mode, &mode).sqrt();
+                times(&mode, 1.0 / norm)
+            })
+            .collect())
+    }
+}
