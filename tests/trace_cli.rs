@@ -259,3 +259,31 @@ fn a_branch_that_goes_on_is_an_outcome() {
     );
     assert_eq!(place.names("out/small"), FILES);
 }
+
+/// The rest length of one vein grows.
+#[test]
+fn a_vein_that_grows_is_followed() {
+    let place = Workplace::new();
+    let output = place.run(&[
+        "trace",
+        "leaf.toml",
+        "--vary",
+        "rest.stretch[0]=1..1.2",
+        "--json",
+    ]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let grown = json(&output.stdout)["branches"][0]["last"].clone();
+    let set = [
+        "--set",
+        "rest.stretch=[1.2,1,1,1,1]",
+        "--json",
+        "--out",
+        "r",
+    ];
+    let output = place.run(&[&["relax", "leaf.toml"], &set[..]].concat());
+    let leaf = json(&output.stdout);
+    for axis in 0..3 {
+        let [a, b] = [&grown["tip"][axis], &leaf["tip"][axis]].map(|x| x.as_f64().unwrap());
+        assert!((a - b).abs() < 2e-6, "{a} {b}");
+    }
+}

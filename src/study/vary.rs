@@ -120,6 +120,7 @@ fn kind(key: Key) -> Kind {
         | Key::RestTwist
         | Key::RestBend2
         | Key::RestBend3
+        | Key::RestStretch
         | Key::Density
         | Key::RotaryInertia
         | Key::SectionRadius => Kind::PerRod,

@@ -147,7 +147,10 @@ impl Base {
             Some(Value::Array(list)) => list.clone(),
             Some(number @ (Value::Float(_) | Value::Integer(_))) => vec![number.clone(); count],
             Some(_) => return Err(refuse("is no list in the scenario".into())),
-            None if is_zero_if_left_out(key) => vec![Value::Float(0.0); count],
+            None if has_default(key) => {
+                let ungrown = if key == Key::RestStretch { 1.0 } else { 0.0 };
+                vec![Value::Float(ungrown); count]
+            }
             None => {
                 return Err(refuse(
                     "is not in the scenario: write its list first".into(),
@@ -167,7 +170,7 @@ impl Base {
     }
 }
 
-fn is_zero_if_left_out(key: Key) -> bool {
+fn has_default(key: Key) -> bool {
     let tables = ["rest.", "coupling.", "load."];
     tables.iter().any(|table| key.path().starts_with(table))
 }
