@@ -55,6 +55,8 @@ pub struct Equations<'a> {
     pub softened: Option<Family<'a>>,
     /// The grid.
     pub grid: Grid,
+    /// The mass of the leaf but for its base.
+    mass: f64,
     pub(super) system: System,
     pub(super) pattern: Option<SparsePattern>,
     pub(super) bordered: Option<(usize, SparsePattern)>,
@@ -87,9 +89,12 @@ impl<'a> Equations<'a> {
     /// If the family has no leaf at the start of its range.
     pub fn new(family: &'a Family<'a>, grid: Grid) -> Result<Self, OutOfRange> {
         let system = family.with(0.0, &grid, System::new)?;
+        let one = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
+        let ones = vec![vec![one; grid.segments()]; system.rods.len()];
         Ok(Equations {
             family,
             softened: None,
+            mass: dot(&system.momentum(&ones), &ones),
             grid,
             system,
             pattern: None,
@@ -109,17 +114,12 @@ impl<'a> Equations<'a> {
 
     /// Product of two increments over the masses, per unit of the leaf's mass.
     pub fn product(&self, a: &Field, b: &Field) -> f64 {
-        dot(&self.system.momentum(a), b) / self.mass()
+        dot(&self.system.momentum(a), b) / self.mass
     }
 
     /// The mass matrix times increments, per unit of the leaf's mass.
     pub fn momentum(&self, a: &Field) -> Field {
-        times(&self.system.momentum(a), 1.0 / self.mass())
-    }
-
-    fn mass(&self) -> f64 {
-        let ones = vec![vec![[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]; self.grid.segments()]; self.rods()];
-        dot(&self.system.momentum(&ones), &ones)
+        times(&self.system.momentum(a), 1.0 / self.mass)
     }
 
     pub(super) fn rods(&self) -> usize {

@@ -3,7 +3,6 @@
 use super::critical::{Critical, locate};
 use super::equations::{Equations, Stuck, reversed};
 use super::{Point, Tangent};
-use crate::leaf::State;
 
 /// First step as a part of the longest, and the shortest.
 const FIRST: f64 = 0.25;
@@ -150,7 +149,7 @@ pub fn walk(
         }
         let closed = edge.is_none()
             && branch.points.len() > CLOSED_AFTER
-            && distance(equations, &first, &next.point) < CLOSED * step;
+            && distance(&first, &next.point) < CLOSED * step;
         now = next.point;
         progress(&now);
         branch.points.push(now.clone());
@@ -195,7 +194,9 @@ fn advance(equations: &mut Equations, now: &Point, step: f64) -> Result<Found, S
     let fraction = now.fraction + step * tangent.fraction;
     let state = equations.moved(&now.state, now.fraction, &tangent.increments, step)?;
     let (point, iterations) = equations.correct(&state, fraction, Some(tangent))?;
-    let drift = shift(&state, &point.state).max((point.fraction - fraction).abs());
+    let drift = state
+        .shift_to(&point.state)
+        .max((point.fraction - fraction).abs());
     Ok(Found {
         point,
         iterations,
@@ -214,15 +215,11 @@ fn arrive(equations: &mut Equations, now: &Point, step: f64, edge: f64) -> Resul
     Ok(point)
 }
 
-/// Largest displacement between two states.
-fn shift(a: &State, b: &State) -> f64 {
-    let pairs = a.x.iter().zip(&b.x);
-    pairs.fold(0.0, |m, (a, b)| m.max(a.distance(*b)))
-}
-
 /// Distance of two points: of the shapes, or in the parameter.
-fn distance(_: &Equations, a: &Point, b: &Point) -> f64 {
-    shift(&a.state, &b.state).max((a.fraction - b.fraction).abs())
+fn distance(a: &Point, b: &Point) -> f64 {
+    a.state
+        .shift_to(&b.state)
+        .max((a.fraction - b.fraction).abs())
 }
 
 impl Tangent {

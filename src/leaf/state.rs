@@ -70,6 +70,12 @@ impl State {
         self.x[self.base(j) + self.segments]
     }
 
+    /// The largest displacement between this state and another on the same grid.
+    pub fn shift_to(&self, other: &State) -> f64 {
+        let pairs = self.x.iter().zip(&other.x);
+        pairs.fold(0.0, |most, (a, b)| most.max(a.distance(*b)))
+    }
+
     /// Turns and moves node `k` by `step` times the increment.
     #[inline]
     pub fn advance(&mut self, k: usize, increment: &Increment, step: f64) {

@@ -143,8 +143,7 @@ fn settle<'a>(last: &Level<'a>, before: Option<&State>, tolerance: f64) -> Optio
         &mut Work::default(),
         &mut |_, _| {},
     );
-    let moved = guess.x.iter().zip(&state.x).map(|(a, b)| a.distance(*b));
-    let near = moved.fold(0.0, f64::max) < SAME_PLACE;
+    let near = guess.shift_to(&state) < SAME_PLACE;
     (matches!(settled, Settled::Rest(_)) && near).then_some(Level { leaf, state })
 }
 

@@ -128,11 +128,7 @@ pub fn polish(
         work,
         &mut |_, _| {},
     );
-    let moved = state
-        .x
-        .iter()
-        .zip(&exact.x)
-        .fold(0.0_f64, |m, (a, b)| m.max((*a - *b).length()));
+    let moved = state.shift_to(&exact);
     match settled {
         Settled::Rest(_) if moved < POLISH_DISTANCE => {
             *state = exact;

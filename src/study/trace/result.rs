@@ -139,8 +139,7 @@ impl TraceEnd {
 }
 
 impl TraceBranch {
-    /// Way from point to point: of the tips, in units of `length`, and of the
-    /// number, in units of `range`.
+    /// Its critical points, with their numbers.
     pub fn critical(&self) -> impl Iterator<Item = (usize, &TracePoint)> {
         let points = self.points.iter().enumerate();
         points.filter(|(_, point)| point.kind != PointKind::Regular)

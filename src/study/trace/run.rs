@@ -346,9 +346,7 @@ fn unrefined(family: &Family, grid: &Grid, state: &State, fraction: f64) -> Refi
 }
 
 fn near(fraction: f64, state: &State, critical: &Critical) -> bool {
-    let pairs = state.x.iter().zip(&critical.state.x);
-    let shift = pairs.fold(0.0_f64, |m, (a, b)| m.max(a.distance(*b)));
-    (fraction - critical.fraction).abs() < SAME && shift < SAME.sqrt()
+    (fraction - critical.fraction).abs() < SAME && state.shift_to(&critical.state) < SAME.sqrt()
 }
 
 fn end(end: &End) -> (TraceEnd, Option<String>) {
