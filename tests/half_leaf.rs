@@ -67,7 +67,8 @@ proptest! {
         let scale = common::scale(&leaf);
         let apart = Difference::between(&half.rods, &whole.rods);
         prop_assert!(apart.position < 1e-10 * scale.length, "{:?}", apart);
-        prop_assert!(apart.rotation < 1e-9, "{:?}", apart);
+        // Ends that differ by so much turn a segment of a twentieth by so much more.
+        prop_assert!(apart.rotation < 20.0 * 1e-10, "{:?}", apart);
         prop_assert!(apart.force < 1e-8 * scale.force(), "{:?}", apart);
         prop_assert!(apart.moment < 1e-8 * scale.moment(), "{:?}", apart);
         let energy = half.energy - whole.energy;

@@ -11,7 +11,7 @@ mod random;
 
 use std::f64::consts::PI;
 
-use common::{close, extrapolate, fig04, paper_leaf, scenario};
+use common::{TIMOSHENKO, close, extrapolate, fig04, paper_leaf, scenario};
 use leafdyn::leaf::{Leaf, State};
 use leafdyn::modes;
 use leafdyn::motion::{Inertia, Physics};
@@ -90,38 +90,7 @@ fn a_slender_beam_vibrates_as_euler_and_bernoulli_say() {
 /// with (k - 1/2) pi/r here: the whole spectrum is known.
 #[test]
 fn timoshenko_beams_with_all_modes_in_space() {
-    for (r2, s2, bending) in [
-        (
-            1e-4_f64,
-            2.6e-4,
-            [
-                3.513078252179,
-                21.90711479483,
-                60.85906859261,
-                117.9269574473,
-            ],
-        ),
-        (
-            0.0016,
-            0.00416,
-            [
-                3.470067483695,
-                20.23985098215,
-                51.63550442718,
-                90.90518380084,
-            ],
-        ),
-        (
-            0.01,
-            0.026,
-            [
-                3.259779790893,
-                15.02362640182,
-                33.03084600553,
-                50.83238503823,
-            ],
-        ),
-    ] {
+    for (r2, s2, bending) in TIMOSHENKO {
         let bars = (1..10).map(|k| (f64::from(k) - 0.5) * PI / r2.sqrt());
         let mut known: Vec<f64> = bars.chain(bending).flat_map(|omega| [omega; 2]).collect();
         known.sort_by(f64::total_cmp);

@@ -9,7 +9,7 @@ mod linear;
 #[path = "common/motion.rs"]
 mod motion;
 
-use common::{extrapolate, paper_leaf};
+use common::{TIMOSHENKO, extrapolate, paper_leaf};
 use glam::{DQuat, DVec3};
 use leafdyn::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use leafdyn::motion::Physics;
@@ -75,38 +75,7 @@ fn assert_near(name: &str, found: &[f64], known: &[f64], within: f64) {
 /// digits, from its closed form.
 #[test]
 fn clamped_timoshenko_beams() {
-    for (r2, s2, known) in [
-        (
-            1e-4,
-            2.6e-4,
-            [
-                3.513078252179,
-                21.90711479483,
-                60.85906859261,
-                117.9269574473,
-            ],
-        ),
-        (
-            0.0016,
-            0.00416,
-            [
-                3.470067483695,
-                20.23985098215,
-                51.63550442718,
-                90.90518380084,
-            ],
-        ),
-        (
-            0.01,
-            0.026,
-            [
-                3.259779790893,
-                15.02362640182,
-                33.03084600553,
-                50.83238503823,
-            ],
-        ),
-    ] {
+    for (r2, s2, known) in TIMOSHENKO {
         let name = format!("r2 = {r2}, s2 = {s2}");
         let found = of_beam::<4>(&name, &beam(r2, s2));
         assert_near(&name, &found, &known, 1e-8);

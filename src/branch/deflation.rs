@@ -85,8 +85,13 @@ impl Equations<'_> {
                 });
             }
             // What is below rounding decides nothing.
-            let noise = self.rounding(fraction)?;
-            let felt = |force: f64| if force.abs() < noise { 0.0 } else { force };
+            let felt = |force: f64| {
+                if force.abs() < linear.noise {
+                    0.0
+                } else {
+                    force
+                }
+            };
             let mut matrix = DMatrix::zeros(p + 1, p + 1);
             let mut right = DVector::zeros(p + 1);
             for r in 0..p {

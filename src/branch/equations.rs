@@ -3,7 +3,7 @@
 use super::family::{Family, OutOfRange, clamp};
 use super::field::{dot, is_finite, largest, plus, times};
 use super::{Point, Tangent};
-use crate::leaf::{DiscreteLeaf, Field, Grid, Solved, SparsePattern, State, System};
+use crate::leaf::{Field, Grid, Solved, SparsePattern, State, System};
 use crate::rod::RESOLVED_TURN;
 
 /// Part of the parameter's range over which forces are differenced: the error
@@ -72,6 +72,10 @@ pub(super) struct Linear {
     pub forces: Field,
     /// Their change with the parameter.
     pub rate: Field,
+    /// The shift that leaves neutral modes where they are.
+    shift: f64,
+    /// Rounding of the forces.
+    pub noise: f64,
 }
 
 /// Solutions of one matrix for two right-hand sides.
@@ -187,9 +191,13 @@ impl<'a> Equations<'a> {
         let ((after, forces_after), (before, forces_before)) = (after?, before?);
         let rate = plus(&forces_after, -1.0, &forces_before);
         let rate = times(&rate, 1.0 / (after - before));
-        let turn = family.with(fraction, grid, |leaf| {
+        let (turn, shift, noise) = family.with(fraction, grid, |leaf| {
             clamp(leaf, state);
-            leaf.assemble(state, system).turn
+            let turn = leaf.assemble(state, system).turn;
+            let sections = leaf.sections.iter();
+            let stiffest = sections.fold(1.0, |m: f64, s| m.max(s.condensing.max_element()));
+            let noise = ROUNDING * f64::EPSILON * stiffest;
+            (turn, leaf.neutral_shift(), noise)
         })?;
         if !turn.is_finite() || turn > RESOLVED_TURN {
             return Err(Stuck::Unresolved);
@@ -197,12 +205,15 @@ impl<'a> Equations<'a> {
         Ok(Linear {
             forces: system.rhs(),
             rate,
+            shift,
+            noise,
         })
     }
 
     /// Solves for both right-hand sides with K + shift M: rod by rod if that
     /// goes, or directly.
-    fn solve(&mut self, linear: &Linear, shift: f64) -> Result<Pair, Stuck> {
+    fn solve(&mut self, linear: &Linear) -> Result<Pair, Stuck> {
+        let shift = linear.shift;
         self.factorizations += 1;
         if self.rodwise {
             let system = &mut self.system;
@@ -262,8 +273,7 @@ impl<'a> Equations<'a> {
         let mut previous = f64::INFINITY;
         for iteration in 1..=ITERATIONS {
             let linear = self.linearise(&mut state, fraction)?;
-            let shift = self.neutral_shift(fraction)?;
-            let pair = self.solve(&linear, shift)?;
+            let pair = self.solve(&linear)?;
             let step = match &dual {
                 None => 0.0,
                 Some((dual, own)) => -dot(dual, &pair.forces) / (dot(dual, &pair.rate) + own),
@@ -308,15 +318,15 @@ impl<'a> Equations<'a> {
 
     /// Morse index of a state at rest, neutral modes not counting.
     fn index(&mut self, state: &State, fraction: f64) -> Result<usize, Stuck> {
-        let shift = self.neutral_shift(fraction)?;
         let (family, grid, system) = (self.family, &self.grid, &mut self.system);
         self.factorizations += 1;
         let assemble = |system: &mut System| {
             family.with(fraction, grid, |leaf| {
                 leaf.assemble(state, system);
+                leaf.neutral_shift()
             })
         };
-        assemble(system)?;
+        let shift = assemble(system)?;
         if system.stable_without_coupling(shift) {
             return Ok(0);
         }
@@ -330,20 +340,6 @@ impl<'a> Equations<'a> {
             .factorize(system, shift)
             .map_err(|_| Stuck::TooLarge)?;
         Ok(factor.negative())
-    }
-
-    /// Rounding of the forces.
-    pub(super) fn rounding(&self, fraction: f64) -> Result<f64, OutOfRange> {
-        self.family.with(fraction, &self.grid, |leaf| {
-            let sections = leaf.sections.iter();
-            let stiffest = sections.fold(1.0, |m: f64, s| m.max(s.condensing.max_element()));
-            ROUNDING * f64::EPSILON * stiffest
-        })
-    }
-
-    fn neutral_shift(&self, fraction: f64) -> Result<f64, OutOfRange> {
-        let shift = |leaf: &DiscreteLeaf| leaf.neutral_shift();
-        self.family.with(fraction, &self.grid, shift)
     }
 }
 

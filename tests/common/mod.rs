@@ -344,3 +344,39 @@ pub fn agree(what: &str, scenario: &Scenario, leaf: &Equilibrium, shot: &Solutio
         "{what}: {found:?}, energy {energy:.1e}"
     );
 }
+
+/// Frequencies of the clamped Timoshenko beam, times sqrt(rho A L^4/EI), for r^2 = I/(A L^2)
+/// and s^2 = EI/(k G A L^2): roots of its frequency equation (T. C. Huang, J. Appl.
+/// Mech. 28, 1961) to 13 digits.
+pub const TIMOSHENKO: [(f64, f64, [f64; 4]); 3] = [
+    (
+        1e-4,
+        2.6e-4,
+        [
+            3.513078252179,
+            21.90711479483,
+            60.85906859261,
+            117.9269574473,
+        ],
+    ),
+    (
+        0.0016,
+        0.00416,
+        [
+            3.470067483695,
+            20.23985098215,
+            51.63550442718,
+            90.90518380084,
+        ],
+    ),
+    (
+        0.01,
+        0.026,
+        [
+            3.259779790893,
+            15.02362640182,
+            33.03084600553,
+            50.83238503823,
+        ],
+    ),
+];
