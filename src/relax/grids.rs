@@ -11,14 +11,14 @@ use crate::relax::modes;
 use crate::relax::options::{
     MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError, check_tolerance, past,
 };
-use crate::relax::prolong::{predict, prolong};
+use crate::relax::prolong::{between, predict, prolong};
 use crate::relax::report;
 use crate::relax::richardson::Richardson;
 use crate::relax::semi_implicit::Settled;
 use crate::relax::shooting;
 use crate::scenario::Scenario;
-use request::reducible;
 pub use request::{check_segments, coarsest};
+use request::{least, reducible};
 use settle::From;
 use stability::complete;
 use std::time::Instant;
@@ -39,8 +39,18 @@ const FINEST_LANDING: usize = 256;
 /// The finest grid that is tried when coarser ones do not resolve the bending.
 const FINEST_RESOLVING: usize = 2048;
 
-/// Growth of errors of single grids by extrapolation, sum of the weights at most.
+/// Growth of errors of single grids by extrapolation, sum of the weights at most:
+/// over halved grids, and with one between the finest two.
 const EXTRAPOLATED: f64 = 2.0;
+const EXTRAPOLATED_BETWEEN: f64 = 6.3;
+
+/// Where the error estimate is to become smaller by no more than this, a grid
+/// between the finest two is enough.
+const BETWEEN: f64 = 30.0;
+
+/// Growth of the estimate from two grids of which the coarser is one of a loose
+/// tolerance: it may miss layers that the coupling makes.
+const TWO_COARSE: f64 = 1.5;
 
 /// Part of the rounding error that grows with the number of segments.
 const ROUNDING: f64 = 4e-15;
@@ -86,7 +96,7 @@ pub fn relax(
     if options.method == Method::Explicit {
         explicit::check(&leaf, options)?;
     }
-    let first = check_segments(&leaf, options.segments, COARSEST)?;
+    let first = check_segments(&leaf, options.segments, least(options, tolerance))?;
     let half = match reducible(options) {
         true => leaf.half(),
         false => None,
@@ -148,6 +158,12 @@ pub(super) struct Run<'a, 'o> {
     pub work: Work,
     pub saddle: Option<Saddle>,
     pub levels: Vec<Level<'a>>,
+    /// The leaf on a grid between the finest two, if their extrapolation has it too.
+    pub between: Option<Level<'a>>,
+    /// What that changed, times a safety factor: so near to the finest two, it may
+    /// have gained nothing where layers are thin, and the last correction does
+    /// not tell.
+    change: Option<f64>,
     pub table: Richardson,
     pub index: Option<usize>,
     /// Largest iteration error left on any grid.
@@ -178,6 +194,8 @@ impl<'a, 'o> Run<'a, 'o> {
             work: Work::default(),
             saddle: None,
             levels: Vec::new(),
+            between: None,
+            change: None,
             table: Richardson::default(),
             index: None,
             remaining: 0.0,
@@ -189,11 +207,12 @@ impl<'a, 'o> Run<'a, 'o> {
 
     /// The run as if it had been one of the whole leaf.
     fn completed(mut self, whole: &'a Leaf<'a>) -> Self {
-        self.table = Richardson::default();
-        for level in std::mem::take(&mut self.levels) {
-            self.push(complete(self.leaf, whole, &level));
-        }
+        let half = self.leaf;
+        let complete = |level: &Level| complete(half, whole, level);
+        self.levels = self.levels.iter().map(complete).collect();
+        self.between = self.between.as_ref().map(complete);
         self.leaf = whole;
+        self.tabulate();
         self
     }
 
@@ -202,7 +221,7 @@ impl<'a, 'o> Run<'a, 'o> {
             return End::Failed(settled);
         }
         loop {
-            if self.accurate() {
+            if self.accurate() || self.accurate_with_between() {
                 match self.judge_stability() {
                     Ok(()) => return End::Rest,
                     Err(None) => {}
@@ -252,7 +271,72 @@ impl<'a, 'o> Run<'a, 'o> {
     pub fn error(&self) -> Option<f64> {
         let segments = self.levels.last()?.leaf.segments();
         let best = self.table.best()?;
-        Some(best.error + EXTRAPOLATED * self.remaining + ROUNDING * segments as f64)
+        let extrapolation = match self.levels.as_slice() {
+            [first, _] if self.too_coarse(first.leaf.segments()) => TWO_COARSE * best.error,
+            _ => best.error.max(self.change.unwrap_or(0.0)),
+        };
+        let growth = match self.between {
+            Some(_) => EXTRAPOLATED_BETWEEN,
+            None => EXTRAPOLATED,
+        };
+        Some(extrapolation + growth * self.remaining + ROUNDING * segments as f64)
+    }
+
+    /// Whether a grid between the finest two makes the extrapolation accurate
+    /// enough: it gains about as much as one twice as fine as the finest, for
+    /// three eighths of its segments.
+    fn accurate_with_between(&mut self) -> bool {
+        let [.., coarse, middle, fine] = self.levels.as_slice() else {
+            return false;
+        };
+        let near = self
+            .error()
+            .is_some_and(|error| error <= BETWEEN * self.tolerance);
+        let clean = (self.table.best()).is_some_and(|best| best.columns + 1 == self.levels.len());
+        if !near || !clean || self.options.method != Method::SemiImplicit {
+            return false;
+        }
+        let mut state = between(&fine.state);
+        predict(&middle.state, &fine.state, &mut state);
+        let grid = coarse.leaf.grid.tripled();
+        // Stability is judged on the finest grid.
+        let last = self.last.take();
+        let (level, settled, _) = self.settle(grid, From::Finer(state));
+        self.last = last;
+        if !matches!(settled, Settled::Rest(_)) {
+            return false;
+        }
+        let without = self.table.clone();
+        self.between = Some(level);
+        self.tabulate();
+        self.change = self.table.judged_by(&without);
+        if self.accurate() {
+            return true;
+        }
+        self.between = None;
+        self.change = None;
+        self.tabulate();
+        false
+    }
+
+    /// The grids that are extrapolated, from coarse to fine.
+    pub fn series(&self) -> Vec<&Level<'a>> {
+        let mut series: Vec<_> = self.levels.iter().collect();
+        if let Some(between) = &self.between {
+            series.insert(series.len() - 1, between);
+        }
+        series
+    }
+
+    fn tabulate(&mut self) {
+        let mut table = Richardson::default();
+        let series = self.series();
+        for level in &series {
+            let segments = level.leaf.segments();
+            let stride = segments / series[0].leaf.segments();
+            table.push(segments, report::positions(level, stride));
+        }
+        self.table = table;
     }
 
     /// Whether unfinished iterations and rounding alone are more than the
@@ -273,6 +357,9 @@ impl<'a, 'o> Run<'a, 'o> {
             let fixed = self.options.segments.is_some();
             let last = fixed || finer.segments() > FINEST_LANDING || self.late();
             match settled {
+                // Where a leaf that moves lands is not for so coarse a grid to say.
+                _ if self.too_coarse(level.leaf.segments())
+                    && (moved || !matches!(settled, Settled::Rest(_))) => {}
                 _ if self.whole.is_some() && !matches!(settled, Settled::Rest(_)) => {
                     self.push(level);
                     return Err(settled);
@@ -309,12 +396,18 @@ impl<'a, 'o> Run<'a, 'o> {
         }
     }
 
+    /// Whether a grid is one for leaves only that settle where they start.
+    fn too_coarse(&self, segments: usize) -> bool {
+        self.options.segments.is_none() && segments < COARSEST
+    }
+
     fn push(&mut self, level: Level<'a>) {
+        let segments = level.leaf.segments();
         let stride = match self.levels.first() {
-            Some(first) => level.leaf.segments() / first.leaf.segments(),
+            Some(first) => segments / first.leaf.segments(),
             None => 1,
         };
-        self.table.push(report::positions(&level, stride));
+        self.table.push(segments, report::positions(&level, stride));
         self.levels.push(level);
     }
 }

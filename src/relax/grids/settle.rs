@@ -30,6 +30,8 @@ pub enum From {
     Start,
     /// The equilibrium of the next coarser grid, prolonged.
     Coarser(State),
+    /// The equilibrium of the next finer grid, interpolated.
+    Finer(State),
     /// A saddle the leaf was pushed off.
     Pushed(State),
 }
@@ -41,7 +43,14 @@ impl<'a> Run<'a, '_> {
     pub(super) fn settle(&mut self, grid: Grid, from: From) -> (Level<'a>, Settled, bool) {
         self.last = None;
         let leaf = DiscreteLeaf::new(self.leaf, grid);
-        let mut near_rest = matches!(from, From::Coarser(_));
+        let mut near_rest = matches!(from, From::Coarser(_) | From::Finer(_));
+        let cg_tolerance = match from {
+            From::Start | From::Pushed(_) => 1e-2,
+            From::Coarser(_) => 1e-4,
+            // The error of interpolation is one of stiff modes, the error that
+            // is to be removed one of soft ones: a small part of the energy.
+            From::Finer(_) => 1e-8,
+        };
         let mut state = match from {
             From::Start => match self.whole {
                 None => {
@@ -56,7 +65,7 @@ impl<'a> Run<'a, '_> {
                     half_of(self.leaf, &start(&whole))
                 }
             },
-            From::Coarser(state) | From::Pushed(state) => state,
+            From::Coarser(state) | From::Finer(state) | From::Pushed(state) => state,
         };
         let mut system = System::new(&leaf);
         let accuracy = match self.options.segments {
@@ -64,6 +73,7 @@ impl<'a> Run<'a, '_> {
             None => ITERATION_PART * self.tolerance,
         };
         let segments = leaf.segments();
+        let convex_only = self.whole.is_some() || self.too_coarse(segments);
         let progress = &mut *self.progress;
         let mut tell = |step: usize, residual: f64| {
             progress(&Progress {
@@ -123,11 +133,12 @@ impl<'a> Run<'a, '_> {
                 work: &mut self.work,
                 progress: &mut tell,
                 near_rest,
+                cg_tolerance,
                 pushes,
                 direct: None,
                 most_evaluations: begun + allowed,
                 deadline: self.options.deadline,
-                convex_only: self.whole.is_some(),
+                convex_only,
                 moved: false,
             };
             let before = relaxation.work.force_evaluations;
@@ -142,7 +153,7 @@ impl<'a> Run<'a, '_> {
                     self.effects = effects(&leaf, &state, &mut system);
                 }
             }
-            if self.whole.is_some() && !matches!(settled, Settled::Rest(_)) {
+            if convex_only && !matches!(settled, Settled::Rest(_)) {
                 return (Level { leaf, state }, settled, moved);
             }
             if settled != Settled::Saddle {
