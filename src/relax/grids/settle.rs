@@ -11,11 +11,16 @@ use crate::relax::semi_implicit::{Relaxation, Settled};
 use crate::relax::start::{disturb, start};
 use glam::DVec3;
 
-/// Iteration error allowed on each grid, as a part of the tolerance.
+/// Iteration error allowed on each grid, as a part of the tolerance: after so
+/// coarse a first grid a little more saves a step on the finest.
 const ITERATION_PART: f64 = 1e-3;
+const ITERATION_PART_FROM_COARSE: f64 = 5e-3;
 
 /// Iteration error allowed on a fixed grid, which is there to be compared.
 const FIXED_ACCURACY: f64 = 1e-12;
+
+/// Accuracy of the first solutions with conjugate gradients far from rest.
+const FAR_FROM_REST: f64 = 1e-2;
 
 /// Force evaluations that even the largest leaf is granted on every grid,
 /// whatever was spent before.
@@ -44,8 +49,8 @@ impl<'a> Run<'a, '_> {
         self.last = None;
         let leaf = DiscreteLeaf::new(self.leaf, grid);
         let mut near_rest = matches!(from, From::Coarser(_) | From::Finer(_));
-        let cg_tolerance = match from {
-            From::Start | From::Pushed(_) => 1e-2,
+        let mut cg_tolerance = match from {
+            From::Start | From::Pushed(_) => FAR_FROM_REST,
             From::Coarser(_) => 1e-4,
             // The error of interpolation is one of stiff modes, the error that
             // is to be removed one of soft ones: a small part of the energy.
@@ -68,11 +73,13 @@ impl<'a> Run<'a, '_> {
             From::Coarser(state) | From::Finer(state) | From::Pushed(state) => state,
         };
         let mut system = System::new(&leaf);
+        let segments = leaf.segments();
+        let first = (self.levels.first()).map_or(segments, |first| first.leaf.segments());
         let accuracy = match self.options.segments {
             Some(_) => FIXED_ACCURACY,
+            None if self.too_coarse(first) => ITERATION_PART_FROM_COARSE * self.tolerance,
             None => ITERATION_PART * self.tolerance,
         };
-        let segments = leaf.segments();
         let convex_only = self.whole.is_some() || self.too_coarse(segments);
         let progress = &mut *self.progress;
         let mut tell = |step: usize, residual: f64| {
@@ -168,7 +175,7 @@ impl<'a> Run<'a, '_> {
                 _ => {}
             }
             saddle::push_off(&leaf, &mut state, &mut system, &mut self.work);
-            near_rest = false;
+            (near_rest, cg_tolerance) = (false, FAR_FROM_REST);
         }
         (Level { leaf, state }, Settled::StepLimit, moved)
     }
