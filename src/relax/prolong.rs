@@ -125,7 +125,7 @@ pub fn between(state: &State) -> State {
                 let turned = state.q[first + a];
                 let sign = turned.dot(state.q[first]).signum();
                 position += weight * state.x[first + a];
-                rotation = rotation + turned * (weight * sign);
+                rotation += turned * (weight * sign);
             }
             x.push(position);
             q.push(rotation.normalize());

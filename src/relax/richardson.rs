@@ -15,6 +15,10 @@ const WORTHLESS: f64 = 0.1;
 /// Safety factor on the last change of a column without a proven order.
 const UNORDERED: f64 = 3.0;
 
+/// Safety factor on what a grid between the finest two changed: of some 250 runs
+/// (as below) none had an error of more than 2.2 times that.
+const CHANGED: f64 = 2.5;
+
 /// Changes below this, relative to the leaf's length, are rounding.
 const ROUNDING: f64 = 1e-13;
 
@@ -69,7 +73,7 @@ impl Richardson {
             self.best()?.columns,
             without.column(without.best()?.columns),
         );
-        Some(UNORDERED * distance(self.column(with), without))
+        Some(CHANGED * distance(self.column(with), without))
     }
 
     /// The best column on the finest grid and the estimate of its largest
