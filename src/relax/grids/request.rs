@@ -1,0 +1,83 @@
+//! Segments of the coarsest grid, as wanted or as needed.
+
+use super::{COARSEST, FINEST};
+use crate::leaf::Leaf;
+use crate::relax::options::{MAX_NODES, Method, Options, RelaxError};
+
+/// Segments of the coarsest grid if the tolerance is loose, that is if it is at
+/// least so large, and the leaf settles in the valley it starts in.
+const COARSEST_OF_LOOSE: usize = 4;
+const LOOSE: f64 = 1e-3;
+
+/// Rotation per segment (radians) that the coarsest grid must resolve where
+/// rest curvature and tip moment alone tell it.
+const COARSEST_TURN: f64 = 0.8;
+
+/// Whether half of a leaf may be solved for the whole: where the way to rest
+/// is Newton's, which knows no other way than the shape it starts from.
+pub fn reducible(options: &Options) -> bool {
+    options.method == Method::SemiImplicit
+        && !options.keep_unstable
+        && !options.full_model
+        && options.disturbance.is_none()
+}
+
+/// Segments of the coarsest grid, unless a leaf needs more.
+pub fn least(options: &Options, tolerance: f64) -> usize {
+    let settles = options.method == Method::SemiImplicit
+        && !options.keep_unstable
+        && options.disturbance.is_none();
+    match settles && tolerance >= LOOSE {
+        true => COARSEST_OF_LOOSE,
+        false => COARSEST,
+    }
+}
+
+/// Segments of a grid: so many as asked for, or at least `least`, as many as
+/// the kinks of the profiles, the rest shape and the tip moment need.
+///
+/// # Errors
+/// If that is too few or too many.
+pub fn check_segments(
+    leaf: &Leaf,
+    asked: Option<usize>,
+    least: usize,
+) -> Result<usize, RelaxError> {
+    let panels = leaf.kinks().len() + 1;
+    let segments = match asked {
+        Some(found) if found < panels => {
+            return Err(RelaxError::TooFewSegments {
+                found,
+                least: panels,
+            });
+        }
+        Some(segments) => segments,
+        None => coarsest(leaf, least).max(panels),
+    };
+    let nodes = leaf.rods().saturating_mul(segments);
+    if nodes > MAX_NODES {
+        return Err(RelaxError::TooManyNodes {
+            rods: leaf.rods(),
+            segments,
+            nodes,
+        });
+    }
+    Ok(segments)
+}
+
+/// Segments of the coarsest grid.
+pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
+    let moment = leaf.tip_moment.length();
+    let turn = (0..leaf.rods())
+        .map(|j| {
+            let section = leaf.section(j, 0.5, 1.0);
+            (section.rest_curvature.length() + moment / section.couple_stiffness.min_element())
+                * leaf.length(j)
+        })
+        .fold(0.0, f64::max);
+    let mut segments = least;
+    while (segments as f64) * COARSEST_TURN < turn && segments < FINEST {
+        segments *= 2;
+    }
+    segments
+}
