@@ -12,7 +12,7 @@ use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::TestRunner;
 use random::leaves;
 
-const TOLERANCES: [f64; 3] = [1e-4, 1e-6, 1e-8];
+const TOLERANCES: [f64; 5] = [1e-2, 1e-3, 1e-4, 1e-6, 1e-8];
 
 fn solve(scenario: &Scenario, tolerance: f64) -> Equilibrium {
     let options = Options {

@@ -3,8 +3,7 @@
 
 mod common;
 
-use common::{SHARP, TIGHT, agree, files, scenario, settle, shoot_near};
-use leafdyn::bvp::{self, Start};
+use common::{TIGHT, agree, files, scenario, settle, shoot_near};
 use leafdyn::scenario::Scenario;
 
 /// Of position, in lengths of the leaf; ten times that of all else.
@@ -77,7 +76,7 @@ fn from_rough_starts_too() {
     for figure in ["fig04", "fig05", "fig06", "fig13"] {
         let leaf = scenario(&format!("paper/{figure}"), &["leaf.rods=5".into()]);
         let (rough, fine) = (settle(&leaf, 0.1), settle(&leaf, TIGHT));
-        let mut start = rough;
+        let mut start = rough.clone();
         for rod in &mut start.rods {
             for node in &mut rod.nodes {
                 node.position.z += 0.01;
@@ -85,17 +84,8 @@ fn from_rough_starts_too() {
                 node.m.y -= 0.1;
             }
         }
-        // The rough leaf is known at fewer stations.
-        let options = bvp::Options {
-            tolerance: SHARP,
-            intervals: None,
-            stations: fine.stations.clone(),
-        };
-        let start = Start::Leaf {
-            stations: &start.stations,
-            rods: &start.rods,
-        };
-        let shot = bvp::solve(&leaf, start, &options).unwrap();
+        let shot = shoot_near(&leaf, &start).unwrap();
+        assert_eq!(rough.stations, fine.stations);
         agree(figure, &leaf, &fine, &shot, CLOSE);
     }
 }

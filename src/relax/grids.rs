@@ -18,8 +18,8 @@ use crate::relax::richardson::Richardson;
 use crate::relax::semi_implicit::Settled;
 use crate::relax::shooting;
 use crate::scenario::Scenario;
+use request::{COARSEST_TURN, least, reducible};
 pub use request::{check_segments, coarsest};
-use request::{least, reducible};
 use settle::From;
 use stability::complete;
 use std::time::Instant;
@@ -299,7 +299,9 @@ impl<'a, 'o> Run<'a, 'o> {
             match settled {
                 // Where a leaf that moves lands is not for so coarse a grid to say.
                 _ if self.too_coarse(level.leaf.segments())
-                    && (moved || !matches!(settled, Settled::Rest(_))) => {}
+                    && (moved
+                        || !matches!(settled, Settled::Rest(_))
+                        || largest_turn(&level) > COARSEST_TURN) => {}
                 _ if self.whole.is_some() && !matches!(settled, Settled::Rest(_)) => {
                     self.push(level);
                     return Err(settled);
@@ -350,6 +352,15 @@ impl<'a, 'o> Run<'a, 'o> {
         self.table.push(segments, report::positions(&level, stride));
         self.levels.push(level);
     }
+}
+
+/// Largest rotation between the ends of a segment.
+fn largest_turn(level: &Level) -> f64 {
+    let n = level.leaf.segments();
+    let rods = level.state.q.chunks_exact(n + 1);
+    rods.flat_map(|rod| rod.windows(2))
+        .map(|ends| ends[0].angle_between(ends[1]))
+        .fold(0.0, f64::max)
 }
 
 /// Largest distance between a level and the next finer one at common stations.

@@ -103,7 +103,7 @@ pub fn predict(coarse: &State, middle: &State, fine: &mut State) {
 
 /// Weight of the value at point `a` of 0, 1, ..., `count` - 1 in the value at `t` of
 /// the polynomial through all of them.
-fn lagrange(count: usize, a: usize, t: f64) -> f64 {
+pub fn lagrange(count: usize, a: usize, t: f64) -> f64 {
     (0..count)
         .filter(|&b| b != a)
         .map(|b| (t - b as f64) / (a as f64 - b as f64))

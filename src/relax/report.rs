@@ -3,6 +3,7 @@
 use crate::leaf::DiscreteLeaf;
 use crate::relax::equilibrium::{Equilibrium, Model, Outcome};
 use crate::relax::grids::{End, Level, Run};
+use crate::relax::prolong::lagrange;
 use crate::relax::richardson::Richardson;
 use crate::relax::semi_implicit::Settled;
 use crate::relax::shape;
@@ -30,22 +31,20 @@ pub fn equilibrium(
     remark: Option<String>,
     wall_seconds: f64,
 ) -> Equilibrium {
-    let (first, finest) = match (run.levels.first(), run.levels.last()) {
-        (Some(first), Some(finest)) => (first, finest),
-        _ => unreachable!("a run leaves at least the grid it failed on"),
+    let Some(finest) = run.levels.last() else {
+        unreachable!("a run leaves at least the grid it failed on")
     };
     let scale = run.leaf.scale;
     let best = run.table.best();
     let columns = best.as_ref().map_or(0, |best| best.columns);
     let series = run.series();
-    let rods = fields(&series, columns);
+    let (stations, rods) = fields(&series, columns);
     let joined = run.leaf.joined();
     let tips = rods.iter().take(if joined { 1 } else { rods.len() });
     let mut energies = Richardson::default();
     for level in &series {
         energies.push(level.leaf.segments(), vec![level.leaf.energy(&level.state)]);
     }
-    let stations = first.leaf.grid.sigma().to_vec();
     let error_estimate = run.error().map(|error| error * scale.length);
     let lines = centerlines(finest);
     let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
@@ -109,39 +108,90 @@ fn centerlines(level: &Level) -> Vec<Centerline> {
 /// Values carried per node through the extrapolation: position, quaternion, n, m.
 const FIELDS: usize = 13;
 
-/// All nodal fields at the stations of the first level, in the scenario's
-/// units, with `columns` extrapolations.
-fn fields(levels: &[&Level], columns: usize) -> Vec<RodShape> {
+/// Stations at which a result is told, if it is known there.
+const STATIONS: usize = 8;
+
+/// All nodal fields, in the scenario's units, with `columns` extrapolations: at
+/// the stations of the first level, or if these are few of the second. What the
+/// first level corrects is interpolated then.
+fn fields(levels: &[&Level], columns: usize) -> (Vec<f64>, Vec<RodShape>) {
     let first = levels[0];
-    let (n, scale) = (first.leaf.segments(), first.leaf.leaf.scale);
+    let (n, length) = (first.leaf.segments(), first.leaf.leaf.scale.length);
     let used = &levels[levels.len() - 1 - columns..];
-    (0..first.leaf.rods())
+    let told = match levels {
+        [_, second, ..] if n < STATIONS => second,
+        _ => first,
+    };
+    let rods = (0..first.leaf.rods())
         .map(|j| {
-            let mut table = Richardson::default();
-            let mut reference: Vec<DQuat> = Vec::new();
-            for level in used {
-                let stride = level.leaf.segments() / n;
-                let nodes: Vec<NodeState> = (0..=n)
-                    .map(|i| shape::node(&level.leaf, &level.state, j, i * stride))
-                    .collect();
-                if reference.is_empty() {
-                    reference = nodes.iter().map(|node| node.rotation).collect();
+            let mut nodes = extrapolated(used, j, n);
+            let stations = told.leaf.segments();
+            if stations > n {
+                let from = used.len().min(levels.len() - 1);
+                let finer = extrapolated(&used[used.len() - from..], j, stations);
+                let stride = stations / n;
+                for (i, node) in nodes.iter_mut().enumerate() {
+                    for (value, finer) in node.iter_mut().zip(&finer[i * stride]) {
+                        *value -= finer;
+                    }
                 }
-                let values = nodes.iter().zip(&reference).flat_map(pack).collect();
-                table.push(level.leaf.segments(), values);
+                nodes = interpolated(&nodes, finer);
             }
-            let values = table.column(columns);
-            let nodes = values
-                .chunks_exact(FIELDS)
-                .enumerate()
-                .map(|(i, values)| unpack(&first.leaf, j, i, values))
-                .collect();
+            let nodes = nodes.iter().enumerate();
             RodShape {
-                length: first.leaf.leaf.length(j) * scale.length,
-                nodes,
+                length: first.leaf.leaf.length(j) * length,
+                nodes: nodes.map(|(i, v)| unpack(&told.leaf, j, i, v)).collect(),
             }
         })
-        .collect()
+        .collect();
+    (told.leaf.grid.sigma().to_vec(), rods)
+}
+
+/// The nodal fields of rod `j` at the ends of `n` parts.
+fn extrapolated(levels: &[&Level], j: usize, n: usize) -> Vec<[f64; FIELDS]> {
+    let reference = rotations(levels[0], j, n);
+    let mut table = Richardson::default();
+    for level in levels {
+        let stride = level.leaf.segments() / n;
+        let node = |i: usize| shape::node(&level.leaf, &level.state, j, i * stride);
+        let values = (0..=n).flat_map(|i| pack((&node(i), &reference[i])));
+        table.push(level.leaf.segments(), values.collect());
+    }
+    table.column(levels.len() - 1).as_chunks().0.to_vec()
+}
+
+/// Rotations of rod `j` at the ends of `n` parts, of a continuous sign.
+fn rotations(level: &Level, j: usize, n: usize) -> Vec<DQuat> {
+    let stride = level.leaf.segments() / n;
+    let mut rotations: Vec<DQuat> = Vec::new();
+    for i in 0..=n {
+        let q = level.state.q[level.state.base(j) + i * stride];
+        let before = rotations.last().copied().unwrap_or(q);
+        rotations.push(if q.dot(before) < 0.0 { -q } else { q });
+    }
+    rotations
+}
+
+/// Adds to `nodes` what `corrections` at fewer of them are in between.
+fn interpolated(
+    corrections: &[[f64; FIELDS]],
+    mut nodes: Vec<[f64; FIELDS]>,
+) -> Vec<[f64; FIELDS]> {
+    let count = corrections.len().min(5);
+    let width = (corrections.len() - 1) as f64 / (nodes.len() - 1) as f64;
+    for (k, values) in nodes.iter_mut().enumerate() {
+        let at = k as f64 * width;
+        let begin = (at as usize)
+            .saturating_sub(1)
+            .min(corrections.len() - count);
+        for a in 0..count {
+            let weight = lagrange(count, a, at - begin as f64);
+            for (value, correction) in values.iter_mut().zip(&corrections[begin + a]) {
+                *value += weight * correction;
+            }
+        }
+    }
+    nodes
 }
 
 fn pack((node, reference): (&NodeState, &DQuat)) -> [f64; FIELDS] {

@@ -10,8 +10,9 @@ const COARSEST_OF_LOOSE: usize = 4;
 const LOOSE: f64 = 1e-3;
 
 /// Rotation per segment (radians) that the coarsest grid must resolve where
-/// rest curvature and tip moment alone tell it.
-const COARSEST_TURN: f64 = 0.8;
+/// rest curvature and tip moment alone tell it, and the most that one of a loose
+/// tolerance may come to.
+pub const COARSEST_TURN: f64 = 0.8;
 
 /// Whether half of a leaf may be solved for the whole: where the way to rest
 /// is Newton's, which knows no other way than the shape it starts from.
