@@ -42,6 +42,8 @@ pub struct Leaf<'a> {
     scenario: &'a Scenario,
     /// Whether this is half of a leaf that is its own mirror image.
     pub(super) mirrored: bool,
+    /// Whether it is solved in its plane.
+    pub(super) planar: bool,
     /// The units.
     pub scale: Scale,
     /// Gravity per unit length.
@@ -99,6 +101,7 @@ impl<'a> Leaf<'a> {
         Leaf {
             scenario,
             mirrored: false,
+            planar: false,
             scale,
             gravity: vector(scenario.gravity, scale.force() / length),
             tip_force: vector(scenario.tip_force, scale.force()),

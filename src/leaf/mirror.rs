@@ -7,6 +7,7 @@
 //! across the plane, if N is even, only the coupling along y is ever stretched.
 
 use super::dimensionless::Leaf;
+use super::planar::is_planar;
 use super::state::State;
 use crate::scenario::{Profile, Rod, Scenario};
 use glam::{DQuat, DVec3};
@@ -19,11 +20,14 @@ pub const FORBIDDEN: [usize; 3] = [0, 2, 4];
 pub const ACROSS: usize = 4;
 
 impl<'a> Leaf<'a> {
-    /// Half of the leaf, if it is its own mirror image.
-    pub fn half(&self) -> Option<Leaf<'a>> {
-        let mut half = self.clone();
-        half.mirrored = is_mirrored(self.scenario());
-        half.mirrored.then_some(half)
+    /// The leaf with as few unknowns as its symmetries leave it, if it has
+    /// any: half of it if it is its own mirror image, and that in its plane if
+    /// nothing acts out of it.
+    pub fn reduced(&self) -> Option<Leaf<'a>> {
+        let mut reduced = self.clone();
+        reduced.mirrored = is_mirrored(self.scenario());
+        reduced.planar = is_planar(self.scenario());
+        (reduced.mirrored || reduced.planar).then_some(reduced)
     }
 
     /// Part of rod `j` that belongs to the leaf, or to its half.
@@ -76,6 +80,9 @@ fn are_images(a: &Rod, b: &Rod) -> bool {
 
 /// The state of the half of a leaf in the state `whole`.
 pub fn half_of(half: &Leaf, whole: &State) -> State {
+    if !half.mirrored {
+        return whole.clone();
+    }
     let (rods, n) = (half.rods(), whole.segments());
     let nodes = rods * (n + 1);
     let mut state = State::new(n, whole.x[..nodes].to_vec(), whole.q[..nodes].to_vec());
@@ -89,6 +96,9 @@ pub fn half_of(half: &Leaf, whole: &State) -> State {
 
 /// The state of the whole leaf of which a half is in the state `state`.
 pub fn whole_of(half: &Leaf, state: &State) -> State {
+    if !half.mirrored {
+        return state.clone();
+    }
     let (rods, n) = (half.scenario().rods.len(), state.segments());
     let (mut x, mut q, mut forces) = (Vec::new(), Vec::new(), Vec::new());
     for j in 0..rods {
@@ -132,7 +142,7 @@ mod tests {
 
     fn half(entry: &str) -> bool {
         let scenario = Scenario::from_toml_with(LEAF, "leaf", &[entry.into()]).unwrap();
-        Leaf::new(&scenario).half().is_some()
+        Leaf::new(&scenario).reduced().is_some()
     }
 
     #[test]

@@ -348,6 +348,9 @@ impl Relaxation<'_> {
                 }
                 Solved::TooSlow(iterations) => {
                     self.work.cg_iterations += iterations;
+                    if !system.spatial() {
+                        return false;
+                    }
                     self.work.factorizations += 1;
                     self.direct = SparsePattern::new(system).ok();
                 }
