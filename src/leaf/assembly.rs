@@ -1,9 +1,8 @@
 //! The discretised leaf: its unbalanced forces, its matrix, its energy.
 
-use super::chain::{Block, Chain, RodMatrix, SPATIAL, first, turns};
+use super::chain::{Block, Chain, RodMatrix, SPATIAL, turns};
 use super::dimensionless::Leaf;
 use super::grid::Grid;
-use super::mirror::{ACROSS, FORBIDDEN};
 use super::state::{Increment, State, shift, turn};
 use super::system::{System, each_rod};
 use crate::rod::{Blocks, Ends, Section, Segment};
@@ -34,6 +33,8 @@ pub struct DiscreteLeaf<'a> {
     pub loads: Loads,
     /// Whether this is half of a leaf that is its own mirror image.
     pub(super) mirrored: bool,
+    /// Whether it is solved in its plane.
+    pub(super) planar: bool,
 }
 
 /// Dead loads.
@@ -80,6 +81,24 @@ impl<'a> DiscreteLeaf<'a> {
                 tip_moment: leaf.tip_moment,
             },
             mirrored: leaf.mirrored,
+            planar: leaf.planar,
+        }
+    }
+
+    /// The same rods, all of them, seen as those of `leaf`.
+    pub fn seen_as(&self, leaf: &'a Leaf<'a>) -> Self {
+        DiscreteLeaf {
+            leaf,
+            planar: leaf.planar,
+            ..self.clone()
+        }
+    }
+
+    /// The same, in space if it was in its plane.
+    pub fn in_space(&self) -> Self {
+        DiscreteLeaf {
+            planar: false,
+            ..self.clone()
         }
     }
 
@@ -315,7 +334,7 @@ impl<'a> DiscreteLeaf<'a> {
             }
         }
         if self.leaf.beside_image(j) {
-            let across = ACROSS - first(B);
+            let across = turns + 1;
             block[across][across] += 2.0 * self.spring(j, i).y;
         }
         self.load(state, j, i)
@@ -324,22 +343,14 @@ impl<'a> DiscreteLeaf<'a> {
     /// Writes the right-hand side of the change, to first order, if the rods
     /// had no compliance in the components `dropped` (ones and zeros).
     pub fn assemble_stiffening(&self, state: &State, dropped: DVec3, system: &mut System) {
-        let n = self.segments();
         for (j, rod) in system.rods.iter_mut().enumerate() {
             rod.rhs.fill([0.0; 6]);
-            if self.leaf.planar {
-                self.stiffen_planar(j, state, dropped, &mut rod.rhs);
-            }
-            for i in 0..if self.leaf.planar { 0 } else { n } {
-                let segment = self.segment(state, j, i, state.n[j * n + i]);
-                let (g_x, g_a, g_b) = segment.stiffening_gradient(self.section(j, i), dropped);
-                if i > 0 {
-                    add(&mut rod.rhs[i - 1], -g_a, g_x);
-                }
-                add(&mut rod.rhs[i], -g_b, -g_x);
+            match self.planar {
+                false => self.stiffen_spatial(j, state, dropped, &mut rod.rhs),
+                true => self.stiffen_planar(j, state, dropped, &mut rod.rhs),
             }
             if self.mirrored {
-                for i in 0..n {
+                for i in 0..self.segments() {
                     for &c in self.forbidden(j, i + 1) {
                         rod.rhs[i][c] = 0.0;
                     }
@@ -348,45 +359,15 @@ impl<'a> DiscreteLeaf<'a> {
         }
     }
 
-    /// What the increments of node `i` (from 1) of rod `j` of half a leaf must
-    /// not have.
-    fn forbidden(&self, j: usize, i: usize) -> &'static [usize] {
-        if self.leaf.in_plane(j) {
-            &FORBIDDEN
-        } else if self.leaf.joined() && i == self.segments() {
-            &FORBIDDEN[2..]
-        } else {
-            &[]
-        }
-    }
-
-    /// Keeps what lies in the plane of the mirror there: the increments that
-    /// would leave it have equations of their own, which make them zero.
-    fn confine<const B: usize>(&self, j: usize, chain: &mut Chain<B>, rhs: &mut [Increment]) {
-        if !self.mirrored {
-            return;
-        }
-        for i in 0..self.segments() {
-            for &forbidden in self.forbidden(j, i + 1) {
-                rhs[i][forbidden] = 0.0;
-                let Some(c) = forbidden.checked_sub(first(B)) else {
-                    continue;
-                };
-                let block = &mut chain.diagonal[i];
-                for k in 0..B {
-                    block[c][k] = 0.0;
-                    block[k][c] = 0.0;
-                }
-                block[c][c] = 1.0;
-                if i > 0 {
-                    for row in &mut chain.off[i - 1] {
-                        row[c] = 0.0;
-                    }
-                }
-                if let Some(off) = chain.off.get_mut(i) {
-                    off[c] = [0.0; B];
-                }
+    fn stiffen_spatial(&self, j: usize, state: &State, dropped: DVec3, rhs: &mut [Increment]) {
+        let n = self.segments();
+        for i in 0..n {
+            let segment = self.segment(state, j, i, state.n[j * n + i]);
+            let (g_x, g_a, g_b) = segment.stiffening_gradient(self.section(j, i), dropped);
+            if i > 0 {
+                add(&mut rhs[i - 1], -g_a, g_x);
             }
+            add(&mut rhs[i], -g_b, -g_x);
         }
     }
 
@@ -395,7 +376,7 @@ impl<'a> DiscreteLeaf<'a> {
     pub fn advance(&self, state: &State, solution: &System, step: f64, next: &mut State) {
         let n = self.segments();
         next.clone_from(state);
-        if self.leaf.planar {
+        if self.planar {
             return self.advance_planar(state, solution, step, next);
         }
         for (j, rod) in solution.rods.iter().enumerate() {
@@ -448,15 +429,6 @@ impl<'a> DiscreteLeaf<'a> {
             largest.max(tip.abs().max_element())
         } else {
             largest
-        }
-    }
-
-    /// The largest components of an unbalanced force and moment on a node of
-    /// rod `j` that the mirror does not balance.
-    fn felt(&self, j: usize, force: DVec3, moment: DVec3) -> (f64, f64) {
-        match self.leaf.in_plane(j) {
-            true => (force.x.abs().max(force.z.abs()), moment.y.abs()),
-            false => (force.abs().max_element(), moment.abs().max_element()),
         }
     }
 

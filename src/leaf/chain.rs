@@ -118,12 +118,13 @@ impl<const B: usize> Factor<B> {
     /// slot then holds what the rod adds to the tip's right-hand side.
     pub fn forward(&self, y: &mut [Increment]) {
         let (n, first) = (self.upper.len(), first(B));
+        let mut before = [0.0; B];
         for i in 0..n {
             let mut b: [f64; B] = unknowns(&y[i]);
             if i > 0 {
-                let (w, upper, before) = (&self.w[i - 1], &self.upper[i - 1], &y[i - 1]);
+                let (w, upper) = (&self.w[i - 1], &self.upper[i - 1]);
                 for k in 0..B {
-                    let t = before[first + k] * upper[k][k];
+                    let t = before[k] * upper[k][k];
                     for c in 0..B {
                         b[c] -= t * w[k][c];
                     }
@@ -138,6 +139,7 @@ impl<const B: usize> Factor<B> {
                 }
             }
             y[i][first..first + B].copy_from_slice(&b);
+            before = b;
         }
     }
 
@@ -145,12 +147,13 @@ impl<const B: usize> Factor<B> {
     /// with a joint tip its displacement must stand in the last dx slot.
     pub fn backward(&self, y: &mut [Increment]) {
         let (n, first) = (self.upper.len(), first(B));
+        let mut after = [0.0; B];
         for i in (0..n).rev() {
             let upper = &self.upper[i];
             let mut b: [f64; B] = unknowns(&y[i]);
             let count = if i + 1 < n { B } else { self.last };
             if i + 1 < n {
-                let (w, after) = (&self.w[i], unknowns::<B>(&y[i + 1]));
+                let w = &self.w[i];
                 for k in 0..B {
                     // Two sums, neither of which waits for the other.
                     let mut sums = [0.0; 2];
@@ -171,6 +174,7 @@ impl<const B: usize> Factor<B> {
                 b[k] = t;
             }
             y[i][first..first + B].copy_from_slice(&b);
+            after = b;
         }
     }
 }

@@ -1,5 +1,7 @@
 //! A scenario in dimensionless form.
 
+use super::mirror::is_mirrored;
+use super::planar::is_planar;
 use crate::rod::Section;
 use crate::rotation;
 use crate::scenario::{Rod, Scenario, longest, mean_bending};
@@ -109,6 +111,16 @@ impl<'a> Leaf<'a> {
             kinks,
             softest: softest / scale.stiffness,
         }
+    }
+
+    /// The leaf with no more unknowns than its symmetries leave it, if it has
+    /// any: half of it if it is its own mirror image, that in its plane if
+    /// nothing acts out of it.
+    pub fn reduced(&self) -> Option<Leaf<'a>> {
+        let mut reduced = self.clone();
+        reduced.mirrored = is_mirrored(self.scenario);
+        reduced.planar = is_planar(self.scenario);
+        (reduced.mirrored || reduced.planar).then_some(reduced)
     }
 
     /// The scenario it was made from.

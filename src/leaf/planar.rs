@@ -33,6 +33,11 @@ impl Leaf<'_> {
 }
 
 impl DiscreteLeaf<'_> {
+    /// Whether it is solved in its plane.
+    pub fn planar(&self) -> bool {
+        self.planar
+    }
+
     /// Segment `i` of rod `j` of a leaf in the plane.
     fn planar_segment(&self, state: &State, j: usize, i: usize) -> PlanarSegment {
         let k = state.base(j) + i;
