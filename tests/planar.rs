@@ -41,7 +41,7 @@ fn in_plane(mut leaf: Scenario) -> Scenario {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 20000,max_shrink_iters: 1, max_global_rejects: 100000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn a_leaf_in_its_plane_is_the_leaf(leaf in random::leaves()) {
@@ -54,8 +54,9 @@ proptest! {
         prop_assume!(full.outcome.is_success());
         let scale = common::scale(&leaf);
         let apart = Difference::between(&planar.rods, &full.rods);
-        prop_assert!(apart.position < 1e-10 * scale.length, "{:?} {:?} {:?}", apart, (planar.residual, planar.work, planar.model.planar), (full.residual, full.work));
-        prop_assert!(apart.rotation < 2e-9, "{:?}", apart);
+        prop_assert!(apart.position < 1e-10 * scale.length, "{:?}", apart);
+        // Ends that differ by so much turn a segment of a twentieth by so much more.
+        prop_assert!(apart.rotation < 20.0 * 1e-10, "{:?}", apart);
         prop_assert!(apart.force < 1e-6 * scale.force(), "{:?}", apart);
         prop_assert!(apart.moment < 1e-7 * scale.moment(), "{:?}", apart);
         let energy = planar.energy - full.energy;
@@ -132,13 +133,14 @@ proptest! {
 }
 
 /// The leaf of Fig. 5 lies flat: half of its unknowns, all of its Newton steps,
-/// and one more assembly that tells whether it stays flat.
+/// and five looks at its matrix in space, at the four steps on the coarsest grid
+/// and at rest.
 #[test]
 fn the_paper_s_flat_leaf_is_found_in_its_plane() {
     for (rods, work) in [
-        (5, [8, 9, 12, 34]),
-        (21, [8, 9, 12, 36]),
-        (35, [8, 9, 12, 35]),
+        (5, [8, 13, 16, 34]),
+        (21, [8, 13, 16, 36]),
+        (35, [8, 13, 16, 35]),
     ] {
         let leaf = fig05(&[&format!("leaf.rods={rods}")]);
         let (planar, full) = (rest(&leaf, false, None), rest(&leaf, true, None));
@@ -153,8 +155,8 @@ fn the_paper_s_flat_leaf_is_found_in_its_plane() {
             cg_iterations,
         };
         assert_eq!(planar.work, counted, "{rods} rods");
-        let evaluations = full.work.force_evaluations + 1;
-        assert_eq!(planar.work.force_evaluations, evaluations);
+        assert_eq!(planar.work.steps, full.work.steps);
+        assert_eq!(planar.work.cg_iterations, full.work.cg_iterations);
         let apart = Difference::between(&planar.rods, &full.rods);
         assert!(
             apart.position < 1e-13 && apart.rotation < 1e-12,
@@ -236,6 +238,35 @@ fn a_leaf_that_buckles_out_of_its_plane_is_followed() {
         let leaf = fig05(&[&soft, entries, &[&fan], &stiff[..]].concat());
         assert!(rest(&leaf, false, None).model.planar, "{what}");
     }
+}
+
+/// Flat at rest this leaf is stable, but not on its way there: in space it
+/// leaves the plane and comes to rest elsewhere. The answer is that in space.
+#[test]
+fn a_flat_valley_that_the_leaf_does_not_come_to_is_not_told() {
+    let leaf = common::parse(
+        r#"
+        name = "two_valleys"
+        leaf = { rods = 2, length = [1.1602764955215343, 1.162438327833955], fan = [-0.07237179647058896, 1.039812713018257] }
+        stiffness.torsion = { at = [0.0, 0.3512142618678161, 1.0], value = [0.1284452439112738, 0.14359498887548044, 0.07706714634676427] }
+        stiffness.bending_2 = 0.7830801094214045
+        stiffness.bending_3 = 0.38309378941088756
+        stiffness.axial = inf
+        stiffness.shear_2 = 74.7976509039849
+        stiffness.shear_3 = 67.26264986497492
+        coupling = { x = 1.2701123121090474, y = 0.9544600194057796, z = 1.1053997707532524 }
+        load = { gravity = [-0.27481151713278484, -0.3020747217601999, 0.0], tip_force = [-0.9125959227821634, -0.61559480013023, 0.0] }
+        [rest.bend_3]
+        at = [0.0, 0.3512142618678161, 1.0]
+        value = [[1.3714156700735378, 1.0032007292937608], [1.533170181247829, 1.1215253533429401], [0.8228494020441227, 0.6019203742353649]]
+    "#,
+    );
+    let (found, full) = (rest(&leaf, false, Some(20)), rest(&leaf, true, Some(20)));
+    assert!(!found.model.planar);
+    assert_eq!(found.outcome, full.outcome);
+    let apart = Difference::between(&found.rods, &full.rods);
+    assert!(apart.position < 1e-12, "{apart:?}");
+    assert!(full.tips[0].z.abs() > 0.05, "{}", full.tips[0]);
 }
 
 /// What acts out of the plane, however little, and what may: a start that is

@@ -173,3 +173,46 @@ fn couple(block: &mut Block<PLANAR>, k: &PlanarBlocks) {
         [-xt.y, -xx.x_axis.y, -xx.y_axis.y],
     ];
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LEAF: &str = r#"
+        name = "leaf"
+        leaf = { rods = 3, length = 1.0, fan = "paper" }
+        stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }
+        coupling = { x = 1.0, y = 1.0, z = 1.0 }
+    "#;
+
+    #[test]
+    fn planar_leaves_are_known() {
+        let planar = |entry: &str| {
+            let scenario = Scenario::from_toml_with(LEAF, "leaf", &[entry.into()]).unwrap();
+            is_planar(&scenario)
+        };
+        for entry in [
+            "load.gravity=[1.0, -2.0, 0.0]",
+            "load.tip_force=[1.0, -2.0, 0.0]",
+            "rest.bend_3=[1.0, 2.0, -3.0]",
+            "rest.stretch=[1.0, 1.1, 1.0]",
+        ] {
+            assert!(planar(entry), "{entry}");
+        }
+        for entry in [
+            "load.gravity=[0.0, 0.0, 1e-9]",
+            "load.tip_force=[0.0, 0.0, 1e-9]",
+            "rest.twist=[0.0, 0.0, 1e-9]",
+            "rest.bend_2=[0.0, 1e-9, 0.0]",
+        ] {
+            assert!(!planar(entry), "{entry}");
+        }
+    }
+
+    #[test]
+    fn turns_add() {
+        let q = turned(turned(DQuat::IDENTITY, 2.5), 1.5);
+        let wanted = DQuat::from_rotation_z(4.0);
+        assert!((q.dot(wanted).abs() - 1.0).abs() < 1e-15);
+    }
+}
