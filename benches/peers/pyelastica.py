@@ -14,6 +14,10 @@ length, and that of a round section of radius 0.2 L (A: mean bending stiffness, 
 T = sqrt(rho L^4/A), leafdyn's unit of time, is 1. The time step is STEP of the time a wave takes through
 the shortest element, about half of what is stable.
 
+With --own-classes everything but the coupling, for which it has none, is done by PyElastica's own classes,
+as its manual does: on every rod a GravityForces, a OneEndFixedBC and an AnalyticalLinearDamper, and from tip
+to tip a FreeJoint, a spring.
+
 Without --relax: nanoseconds per element and step of position Verlet, for one rod and for leaves of 5 and
 35 rods (CASES), median of REPEATS. The rate depends on the numbers of rods and elements, not on the
 material. numba compiles before. Every LAP the motion begins anew, as by PyElastica's own law vibrations
@@ -157,14 +161,20 @@ class LinearLaw(elastica.ConstraintBase):
         pass
 
 
-class Simulator(elastica.BaseSystemCollection, elastica.Constraints, elastica.Forcing, elastica.Damping):
+class Simulator(
+    elastica.BaseSystemCollection,
+    elastica.Constraints,
+    elastica.Forcing,
+    elastica.Damping,
+    elastica.Connections,
+):
     pass
 
 
 class Motion:
     """A leaf in PyElastica, with n elements a rod."""
 
-    def __init__(self, leaf, n, linear):
+    def __init__(self, leaf, n, linear, own_classes=False):
         if leaf.tip_moment.any():
             raise Refused("load.tip_moment: not here, as PyElastica has no director at the tip to apply it to")
         nodes, middles = np.linspace(0.0, 1.0, n + 1), (np.arange(n) + 0.5) / n
@@ -202,21 +212,40 @@ class Motion:
         dead = leaf.gravity[:, None, None] * leaf.length[:, None] / n * weights
         dead[:, :, -1] += leaf.tip_force[:, None] / (leaf.rods if leaf.joined else 1)
         spring = (leaf.coupling * leaf.gap)[:, :, None] / n * weights
-        # Index -1 is the block of all rods, which comes after them.
-        self.simulator.constrain(-1).using(Held, leaf.base[:, ORDER], leaf.joined)
-        if linear:
-            self.simulator.constrain(-1).using(LinearLaw, force.swapaxes(0, 1).copy(), couple.swapaxes(0, 1).copy())
-        self.simulator.add_forcing_to(-1).using(Loads, dead, spring)
-        self.simulator.dampen(-1).using(
-            elastica.AnalyticalLinearDamper,
-            uniform_damping_constant=2 * 3.516,  # critical for a clamped rod, as T = 1
-            time_step=self.step,
-        )
+        damping = {"uniform_damping_constant": 2 * 3.516, "time_step": self.step}  # critical for a clamped rod, as T = 1
+        if own_classes:
+            self.by_own_classes(leaf, density, spring, damping)
+        else:
+            # Index -1 is the block of all rods, which comes after them.
+            self.simulator.constrain(-1).using(Held, leaf.base[:, ORDER], leaf.joined)
+            if linear:
+                matrices = force.swapaxes(0, 1).copy(), couple.swapaxes(0, 1).copy()
+                self.simulator.constrain(-1).using(LinearLaw, *matrices)
+            self.simulator.add_forcing_to(-1).using(Loads, dead, spring)
+            self.simulator.dampen(-1).using(elastica.AnalyticalLinearDamper, **damping)
         self.simulator.finalize()
 
         block = next(self.simulator.final_systems())
         state = block.position_collection, block.director_collection, block.velocity_collection, block.omega_collection
         self.start = [(array, array.copy()) for array in state]
+
+    def by_own_classes(self, leaf, density, spring, damping):
+        """Adds PyElastica's classes for what acts on the rods. Joints are as stiff as an element of a rod."""
+        if leaf.tip_force.any():
+            raise Refused("load.tip_force: not with --own-classes")
+        for rod in self.rods:
+            clamp = {"constrained_position_idx": (0,), "constrained_director_idx": (0,)}
+            self.simulator.constrain(rod).using(elastica.OneEndFixedBC, **clamp)
+            self.simulator.add_forcing_to(rod).using(elastica.GravityForces, acc_gravity=leaf.gravity / density)
+            self.simulator.dampen(rod).using(elastica.AnalyticalLinearDamper, **damping)
+        stiffness = max(rod.shear_matrix.max() / rod.rest_lengths.min() for rod in self.rods)
+        for here, there in zip(self.rods[:-1], self.rods[1:]):
+            if leaf.joined:
+                ends = {"first_connect_idx": -1, "second_connect_idx": -1}
+                self.simulator.connect(here, there, **ends).using(elastica.FreeJoint, k=stiffness, nu=0.0)
+        if spring.any():
+            none = np.zeros((3, leaf.rods, 0))
+            self.simulator.add_forcing_to(-1).using(Loads, none, spring)
 
     def restart(self):
         for array, start in self.start:
@@ -273,7 +302,7 @@ def rates(options):
     print("| --- | --- | --- | --- | --- |" + (" --- | --- | --- | --- |" if options.leafdyn else ""))
     good = True
     for leaf, (rods, n) in zip(leaves, CASES):
-        motion = Motion(leaf, n, linear=False)
+        motion = Motion(leaf, n, linear=False, own_classes=options.own_classes)
         motion.run(motion.step)  # compiles
         laps = int(np.ceil(SECONDS / motion.laps(1)))
         steps = laps * int(np.ceil(LAP / motion.step))
@@ -302,7 +331,8 @@ def rates(options):
                 print(f"{program}, {rods} x {n}: {outcome}", file=sys.stderr)
                 good = False
             if options.csv:
-                row = [leaf.name, rods, f"n={n} steps={count}", f"{seconds:.4g}", "", outcome]
+                knob = f"n={n} steps={count}" + (" own-classes" if options.own_classes and program == "pyelastica" else "")
+                row = [leaf.name, rods, knob, f"{seconds:.4g}", "", outcome]
                 append(options.csv, [program, *row])
     return good
 
@@ -351,7 +381,10 @@ def main():
     parser.add_argument("--relax", action="store_true", help="follow the motion until the leaf rests")
     parser.add_argument("--segments", type=int, metavar="N", help="with --relax: elements a rod (default: 50)")
     parser.add_argument("--own-law", action="store_true", help="with --relax: PyElastica's own law of stretching")
+    parser.add_argument("--own-classes", action="store_true", help="only PyElastica's own loads, clamps and joints")
     options = parser.parse_args()
+    if options.relax and options.own_classes:
+        parser.error("--own-classes is not for --relax")
     if options.relax and options.leafdyn:
         parser.error("--leafdyn is not for --relax; see --compare")
     only = options.segments, options.compare, options.own_law, options.max_seconds < np.inf

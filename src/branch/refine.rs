@@ -193,9 +193,10 @@ impl Table {
             .family
             .with(fraction, &equations.grid, |leaf| leaf.energy(state))?;
         let tips = (0..state.rods()).flat_map(|j| state.tip(j).to_array());
-        self.tips.push(tips.collect());
-        self.fraction.push(vec![fraction]);
-        self.energy.push(vec![energy]);
+        let segments = state.segments();
+        self.tips.push(segments, tips.collect());
+        self.fraction.push(segments, vec![fraction]);
+        self.energy.push(segments, vec![energy]);
         Ok(())
     }
 

@@ -48,6 +48,17 @@ impl Grid {
         Grid { sigma }
     }
 
+    /// The same grid with every segment cut in three.
+    pub fn tripled(&self) -> Self {
+        let mut sigma = Vec::with_capacity(3 * self.sigma.len() - 2);
+        for pair in self.sigma.windows(2) {
+            let third = (pair[1] - pair[0]) / 3.0;
+            sigma.extend([pair[0], pair[0] + third, pair[1] - third]);
+        }
+        sigma.push(1.0);
+        Grid { sigma }
+    }
+
     /// Number of segments of each rod.
     pub fn segments(&self) -> usize {
         self.sigma.len() - 1

@@ -1,8 +1,29 @@
 //! Several numbers at once: what one instruction of the processor works on.
 
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::{Add, Deref, Mul, Neg, Sub};
 
 use pulp::Simd;
+
+/// The part of an array at a place: index of the first, count.
+#[inline(always)]
+pub fn slice(array: &[f64], (first, count): (usize, usize)) -> &[f64] {
+    &array[first..first + count]
+}
+
+/// The parts of several arrays at a place.
+#[inline(always)]
+pub fn cut<const K: usize>(arrays: &[impl AsRef<[f64]>; K], place: (usize, usize)) -> [&[f64]; K] {
+    arrays.each_ref().map(|array| slice(array.as_ref(), place))
+}
+
+/// The same, to be written.
+#[inline(always)]
+pub fn cut_mut<const K: usize>(
+    arrays: &mut [impl AsMut<[f64]>; K],
+    (first, count): (usize, usize),
+) -> [&mut [f64]; K] {
+    (arrays.each_mut()).map(|array| &mut array.as_mut()[first..first + count])
+}
 
 /// One number for each of several neighbouring nodes.
 #[derive(Clone, Copy)]
@@ -19,6 +40,12 @@ impl<S: Simd> Lanes<S> {
             simd,
             v: simd.splat_f64s(value),
         }
+    }
+
+    /// The instructions it works with.
+    #[inline(always)]
+    pub fn simd(self) -> S {
+        self.simd
     }
 
     /// Reads `array` from `at` on.
@@ -69,10 +96,19 @@ impl<S: Simd> Lanes<S> {
         self.simd.reduce_sum_f64s(self.v)
     }
 
-    /// The polynomial with these coefficients, constant term first. In thirds,
-    /// which do not wait for each other.
+    /// The polynomial with these coefficients, constant term first.
     #[inline(always)]
     pub fn polynomial<const N: usize>(self, coefficients: &[f64; N]) -> Self {
+        let mut sum = Lanes::splat(self.simd, coefficients[N - 1]);
+        for k in (0..N - 1).rev() {
+            sum = sum.times(self, Lanes::splat(self.simd, coefficients[k]));
+        }
+        sum
+    }
+
+    /// A long one, in thirds, which do not wait for each other.
+    #[inline(always)]
+    pub fn long_polynomial<const N: usize>(self, coefficients: &[f64; N]) -> Self {
         let coefficient = |k: usize| Lanes::splat(self.simd, coefficients[k]);
         let cube = self * self * self;
         let third = |first: usize| {
@@ -154,7 +190,7 @@ impl<S: Simd> Vectors<S> {
     }
 
     #[inline(always)]
-    pub fn load(simd: S, arrays: &[Vec<f64>; 3], at: usize) -> Self {
+    pub fn load(simd: S, arrays: &[impl Deref<Target = [f64]>; 3], at: usize) -> Self {
         Vectors {
             x: Lanes::load(simd, &arrays[0], at),
             y: Lanes::load(simd, &arrays[1], at),
@@ -163,10 +199,10 @@ impl<S: Simd> Vectors<S> {
     }
 
     #[inline(always)]
-    pub fn store(self, arrays: &mut [Vec<f64>; 3], at: usize) {
-        self.x.store(&mut arrays[0], at);
-        self.y.store(&mut arrays[1], at);
-        self.z.store(&mut arrays[2], at);
+    pub fn store(self, arrays: &mut [&mut [f64]; 3], at: usize) {
+        self.x.store(arrays[0], at);
+        self.y.store(arrays[1], at);
+        self.z.store(arrays[2], at);
     }
 
     #[inline(always)]
@@ -191,6 +227,33 @@ impl<S: Simd> Vectors<S> {
             y: self.y * factor,
             z: self.z * factor,
         }
+    }
+
+    /// term - self * factor.
+    #[inline(always)]
+    pub fn times_from(self, factor: Lanes<S>, term: Self) -> Self {
+        Vectors {
+            x: self.x.times_from(factor, term.x),
+            y: self.y.times_from(factor, term.y),
+            z: self.z.times_from(factor, term.z),
+        }
+    }
+
+    /// self - a x b.
+    #[inline(always)]
+    pub fn less_cross(self, a: Self, b: Self) -> Self {
+        Vectors {
+            x: a.y.times_from(b.z, a.z.times(b.y, self.x)),
+            y: a.z.times_from(b.x, a.x.times(b.z, self.y)),
+            z: a.x.times_from(b.y, a.y.times(b.x, self.z)),
+        }
+    }
+
+    /// The vector with these components along `directors`.
+    #[inline(always)]
+    pub fn along(self, directors: [Self; 3]) -> Self {
+        let [d1, d2, d3] = directors;
+        d1.times(self.x, d2.times(self.y, d3.scale(self.z)))
     }
 
     /// Component by component.

@@ -1,6 +1,6 @@
 //! From the leaf to the arrays of the explicit method, and back.
 
-use super::kernel::{GROUP, Material, Motion, Past, Positions, Powers};
+use super::kernel::{Done, GROUP, Material, Motion, Past, Positions};
 use super::method::Velocity;
 use super::physics::Physics;
 use crate::leaf::{DiscreteLeaf, State};
@@ -12,24 +12,23 @@ pub struct Rod {
     pub motion: Motion,
     pub material: Material,
     pub past: Past,
-    /// What the last loops over the rod summed up.
-    pub powers: Powers,
-    pub twice_kinetic: f64,
+    /// What the last step did.
+    pub done: Done,
 }
 
 fn arrays<const K: usize>(length: usize) -> [Vec<f64>; K] {
     std::array::from_fn(|_| vec![0.0; length])
 }
 
-/// Number of groups of nodes a rod has.
-pub fn groups(segments: usize) -> usize {
-    (segments + 1).div_ceil(GROUP)
+/// Length of a rod's arrays.
+fn length(segments: usize) -> usize {
+    (segments + 1).next_multiple_of(GROUP) + 2 * GROUP
 }
 
 /// Positions of a rod.
 pub fn positions(leaf: &DiscreteLeaf, state: &State, j: usize) -> Positions {
     let n = leaf.segments();
-    let mut x = arrays::<3>(GROUP * (groups(n) + 2));
+    let mut x = arrays::<3>(length(n));
     for i in 0..=n {
         for c in 0..3 {
             x[c][GROUP + i] = state.x[state.base(j) + i][c];
@@ -41,15 +40,12 @@ pub fn positions(leaf: &DiscreteLeaf, state: &State, j: usize) -> Positions {
 /// A rod at rest.
 pub fn rod(leaf: &DiscreteLeaf, physics: &Physics, state: &State, j: usize) -> Rod {
     let n = leaf.segments();
-    let length = GROUP * (groups(n) + 2);
+    let length = length(n);
     let joined = leaf.leaf.joined() && leaf.rods() > 1;
     let mut motion = Motion {
         q: arrays(length),
         v: arrays(length),
         p: arrays(length),
-        n: arrays(length),
-        left: arrays(length),
-        right: arrays(length),
     };
     motion.q[3].fill(1.0);
     let one = || vec![0.0; length];
@@ -100,7 +96,8 @@ pub fn rod(leaf: &DiscreteLeaf, physics: &Physics, state: &State, j: usize) -> R
             }
         }
     }
-    let past = || [arrays::<3>(length), arrays::<3>(length)];
+    let remembered = if physics.retardation > 0.0 { length } else { 0 };
+    let past = || [arrays::<3>(remembered), arrays::<3>(remembered)];
     let mut rod = Rod {
         motion,
         material,
@@ -108,8 +105,7 @@ pub fn rod(leaf: &DiscreteLeaf, physics: &Physics, state: &State, j: usize) -> R
             one: past(),
             two: past(),
         },
-        powers: Powers::default(),
-        twice_kinetic: 0.0,
+        done: Done::default(),
     };
     rod.close(n);
     rod
@@ -140,9 +136,9 @@ impl Rod {
         q.iter_mut().chain(v).chain(p).chain(past)
     }
 
-    /// Angular velocity of a node with angular momentum `p`.
-    pub fn spin(&self, at: usize, p: DVec3) -> DVec3 {
-        let d1 = self.rotation(at) * DVec3::X;
+    /// Angular velocity of a node with rotation `q` and angular momentum `p`.
+    pub fn spin(&self, at: usize, q: DQuat, p: DVec3) -> DVec3 {
+        let d1 = q * DVec3::X;
         p * self.material.per_inertia[at] + d1 * (d1.dot(p) * self.material.per_spin[at])
     }
 
@@ -162,7 +158,7 @@ impl Rod {
         (GROUP..=GROUP + segments).map(move |at| {
             let (v, p) = self.moving(at);
             Velocity {
-                angular: self.spin(at, p),
+                angular: self.spin(at, self.rotation(at), p),
                 linear: v,
             }
         })

@@ -1,5 +1,6 @@
 //! Nested grids: as fine as the tolerance needs, with an error estimate.
 
+mod between;
 mod request;
 mod settle;
 mod stability;
@@ -17,8 +18,8 @@ use crate::relax::richardson::Richardson;
 use crate::relax::semi_implicit::Settled;
 use crate::relax::shooting;
 use crate::scenario::Scenario;
-use request::reducible;
 pub use request::{check_segments, coarsest};
+use request::{least, reducible};
 use settle::From;
 use stability::complete;
 use std::time::Instant;
@@ -39,8 +40,14 @@ const FINEST_LANDING: usize = 256;
 /// The finest grid that is tried when coarser ones do not resolve the bending.
 const FINEST_RESOLVING: usize = 2048;
 
-/// Growth of errors of single grids by extrapolation, sum of the weights at most.
+/// Growth of errors of single grids by extrapolation, sum of the weights at most:
+/// over halved grids, and with one between the finest two.
 const EXTRAPOLATED: f64 = 2.0;
+const EXTRAPOLATED_BETWEEN: f64 = 6.3;
+
+/// Growth of the estimate from two grids of which the coarser is one of a loose
+/// tolerance: it may miss layers that the coupling makes.
+const TWO_COARSE: f64 = 1.5;
 
 /// Part of the rounding error that grows with the number of segments.
 const ROUNDING: f64 = 4e-15;
@@ -86,7 +93,7 @@ pub fn relax(
     if options.method == Method::Explicit {
         explicit::check(&leaf, options)?;
     }
-    let first = check_segments(&leaf, options.segments, COARSEST)?;
+    let first = check_segments(&leaf, options.segments, least(options, tolerance))?;
     let reduced = match reducible(options) {
         true => leaf.reduced(),
         false => None,
@@ -150,6 +157,12 @@ pub(super) struct Run<'a, 'o> {
     pub work: Work,
     pub saddle: Option<Saddle>,
     pub levels: Vec<Level<'a>>,
+    /// The leaf on a grid between the finest two, if their extrapolation has it too.
+    pub between: Option<Level<'a>>,
+    /// What that changed, times a safety factor: so near to the finest two, it may
+    /// have gained nothing where layers are thin, and the last correction does
+    /// not tell.
+    change: Option<f64>,
     pub table: Richardson,
     pub index: Option<usize>,
     /// Largest iteration error left on any grid.
@@ -181,6 +194,8 @@ impl<'a, 'o> Run<'a, 'o> {
             work: Work::default(),
             saddle: None,
             levels: Vec::new(),
+            between: None,
+            change: None,
             table: Richardson::default(),
             index: None,
             remaining: 0.0,
@@ -192,11 +207,12 @@ impl<'a, 'o> Run<'a, 'o> {
 
     /// The run as if it had been one of the whole leaf.
     fn completed(mut self, whole: &'a Leaf<'a>) -> Self {
-        self.table = Richardson::default();
-        for level in std::mem::take(&mut self.levels) {
-            self.push(complete(self.leaf, whole, &level));
-        }
+        let reduced = self.leaf;
+        let complete = |level: &Level<'a>| complete(reduced, whole, level);
+        self.levels = self.levels.iter().map(complete).collect();
+        self.between = self.between.as_ref().map(complete);
         self.leaf = whole;
+        self.tabulate();
         self
     }
 
@@ -205,7 +221,7 @@ impl<'a, 'o> Run<'a, 'o> {
             return End::Failed(settled);
         }
         loop {
-            if self.accurate() {
+            if self.accurate() || self.accurate_with_between() {
                 match self.judge_stability() {
                     Ok(()) => return End::Rest,
                     Err(None) => {}
@@ -255,7 +271,15 @@ impl<'a, 'o> Run<'a, 'o> {
     pub fn error(&self) -> Option<f64> {
         let segments = self.levels.last()?.leaf.segments();
         let best = self.table.best()?;
-        Some(best.error + EXTRAPOLATED * self.remaining + ROUNDING * segments as f64)
+        let extrapolation = match self.levels.as_slice() {
+            [first, _] if self.too_coarse(first.leaf.segments()) => TWO_COARSE * best.error,
+            _ => best.error.max(self.change.unwrap_or(0.0)),
+        };
+        let growth = match self.between {
+            Some(_) => EXTRAPOLATED_BETWEEN,
+            None => EXTRAPOLATED,
+        };
+        Some(extrapolation + growth * self.remaining + ROUNDING * segments as f64)
     }
 
     /// Whether unfinished iterations and rounding alone are more than the
@@ -276,6 +300,9 @@ impl<'a, 'o> Run<'a, 'o> {
             let fixed = self.options.segments.is_some();
             let last = fixed || finer.segments() > FINEST_LANDING || self.late();
             match settled {
+                // Where a leaf that moves lands is not for so coarse a grid to say.
+                _ if self.too_coarse(level.leaf.segments())
+                    && (moved || !matches!(settled, Settled::Rest(_))) => {}
                 _ if self.whole.is_some() && !matches!(settled, Settled::Rest(_)) => {
                     self.push(level);
                     return Err(settled);
@@ -312,12 +339,18 @@ impl<'a, 'o> Run<'a, 'o> {
         }
     }
 
+    /// Whether a grid is one for leaves only that settle where they start.
+    fn too_coarse(&self, segments: usize) -> bool {
+        self.options.segments.is_none() && segments < COARSEST
+    }
+
     fn push(&mut self, level: Level<'a>) {
+        let segments = level.leaf.segments();
         let stride = match self.levels.first() {
-            Some(first) => level.leaf.segments() / first.leaf.segments(),
+            Some(first) => segments / first.leaf.segments(),
             None => 1,
         };
-        self.table.push(report::positions(&level, stride));
+        self.table.push(segments, report::positions(&level, stride));
         self.levels.push(level);
     }
 }

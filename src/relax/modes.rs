@@ -182,8 +182,8 @@ impl Series {
             let values = self.grids.iter().filter_map(|grid| grid.get(k));
             let last = values.clone().count().saturating_sub(GRIDS);
             let mut table = Richardson::default();
-            for value in values.skip(last) {
-                table.push(vec![value / unit]);
+            for (k, value) in values.skip(last).enumerate() {
+                table.push(1 << k, vec![value / unit]);
             }
             let best = table.best();
             let value = table.column(best.map_or(0, |best| best.columns))[0];

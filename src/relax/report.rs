@@ -37,12 +37,13 @@ pub fn equilibrium(
     let scale = run.leaf.scale;
     let best = run.table.best();
     let columns = best.as_ref().map_or(0, |best| best.columns);
-    let rods = fields(&run.levels, columns);
+    let series = run.series();
+    let rods = fields(&series, columns);
     let joined = run.leaf.joined();
     let tips = rods.iter().take(if joined { 1 } else { rods.len() });
     let mut energies = Richardson::default();
-    for level in &run.levels {
-        energies.push(vec![level.leaf.energy(&level.state)]);
+    for level in &series {
+        energies.push(level.leaf.segments(), vec![level.leaf.energy(&level.state)]);
     }
     let stations = first.leaf.grid.sigma().to_vec();
     let error_estimate = run.error().map(|error| error * scale.length);
@@ -53,11 +54,7 @@ pub fn equilibrium(
         method: run.options.method.name(),
         outcome,
         remark,
-        segments: run
-            .levels
-            .iter()
-            .map(|level| level.leaf.segments())
-            .collect(),
+        segments: series.iter().map(|level| level.leaf.segments()).collect(),
         intervals: None,
         tolerance: run.tolerance,
         residual: finest.leaf.residual(&finest.state),
@@ -115,8 +112,8 @@ const FIELDS: usize = 13;
 
 /// All nodal fields at the stations of the first level, in the scenario's
 /// units, with `columns` extrapolations.
-fn fields(levels: &[Level], columns: usize) -> Vec<RodShape> {
-    let first = &levels[0];
+fn fields(levels: &[&Level], columns: usize) -> Vec<RodShape> {
+    let first = levels[0];
     let (n, scale) = (first.leaf.segments(), first.leaf.leaf.scale);
     let used = &levels[levels.len() - 1 - columns..];
     (0..first.leaf.rods())
@@ -131,7 +128,8 @@ fn fields(levels: &[Level], columns: usize) -> Vec<RodShape> {
                 if reference.is_empty() {
                     reference = nodes.iter().map(|node| node.rotation).collect();
                 }
-                table.push(nodes.iter().zip(&reference).flat_map(pack).collect());
+                let values = nodes.iter().zip(&reference).flat_map(pack).collect();
+                table.push(level.leaf.segments(), values);
             }
             let values = table.column(columns);
             let nodes = values

@@ -109,6 +109,8 @@ pub struct Relaxation<'a> {
     /// Whether the state is one that only has to be corrected: a stiff leaf is
     /// then not softened first.
     pub near_rest: bool,
+    /// Relative accuracy of the conjugate gradients in the first step.
+    pub cg_tolerance: f64,
     /// How often it was pushed off saddles before: each time it is softened
     /// less, since a softened leaf may find its way back.
     pub pushes: i32,
@@ -177,7 +179,7 @@ impl Relaxation<'_> {
             if turn > RESOLVED_TURN {
                 return Settled::Unresolved;
             }
-            let tolerance = cg_tolerance(previous, self.near_rest);
+            let tolerance = cg_tolerance(previous, self.cg_tolerance);
             loop {
                 let shift = neutral + stiffening;
                 if self.convex_in_space(space.as_ref(), shift)
@@ -239,7 +241,7 @@ impl Relaxation<'_> {
             }
             // A positive definite matrix and its solution, with as long a time
             // step as it takes.
-            let tolerance = cg_tolerance(previous, self.near_rest);
+            let tolerance = cg_tolerance(previous, self.cg_tolerance);
             while !self.solve(leaf, space.as_ref(), system, dt, &velocity, tolerance) {
                 if resting {
                     return Settled::Saddle;
@@ -409,8 +411,7 @@ pub fn at_rest(size: f64, previous: f64, cg_tolerance: f64, accuracy: f64) -> Op
 /// Relative accuracy of the conjugate gradients after a step of size
 /// `previous`: an iteration is cheap beside a new assembly, so that the next
 /// step is never held up by them.
-fn cg_tolerance(previous: f64, near_rest: bool) -> f64 {
-    let loosest = if near_rest { 1e-4 } else { 1e-2 };
+fn cg_tolerance(previous: f64, loosest: f64) -> f64 {
     (3e-3 * previous).clamp(1e-10, loosest)
 }
 

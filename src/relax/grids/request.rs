@@ -1,8 +1,13 @@
 //! Segments of the coarsest grid, as wanted or as needed.
 
-use super::FINEST;
+use super::{COARSEST, FINEST};
 use crate::leaf::Leaf;
 use crate::relax::options::{MAX_NODES, Method, Options, RelaxError};
+
+/// Segments of the coarsest grid if the tolerance is loose, that is if it is at
+/// least so large, and the leaf settles in the valley it starts in.
+const COARSEST_OF_LOOSE: usize = 4;
+const LOOSE: f64 = 1e-3;
 
 /// Rotation per segment (radians) that the coarsest grid must resolve where
 /// rest curvature and tip moment alone tell it.
@@ -16,6 +21,17 @@ pub fn reducible(options: &Options) -> bool {
         && !options.keep_unstable
         && !options.full_model
         && options.disturbance.is_none()
+}
+
+/// Segments of the coarsest grid, unless a leaf needs more.
+pub fn least(options: &Options, tolerance: f64) -> usize {
+    let settles = options.method == Method::SemiImplicit
+        && !options.keep_unstable
+        && options.disturbance.is_none();
+    match settles && tolerance >= LOOSE {
+        true => COARSEST_OF_LOOSE,
+        false => COARSEST,
+    }
 }
 
 /// Segments of a grid: so many as asked for, or at least `least`, as many as

@@ -11,11 +11,16 @@ use crate::relax::semi_implicit::{Relaxation, Settled};
 use crate::relax::start::{disturb, start};
 use glam::DVec3;
 
-/// Iteration error allowed on each grid, as a part of the tolerance.
+/// Iteration error allowed on each grid, as a part of the tolerance: after so
+/// coarse a first grid a little more saves a step on the finest.
 const ITERATION_PART: f64 = 1e-3;
+const ITERATION_PART_FROM_COARSE: f64 = 5e-3;
 
 /// Iteration error allowed on a fixed grid, which is there to be compared.
 const FIXED_ACCURACY: f64 = 1e-12;
+
+/// Accuracy of the first solutions with conjugate gradients far from rest.
+const FAR_FROM_REST: f64 = 1e-2;
 
 /// Force evaluations that even the largest leaf is granted on every grid,
 /// whatever was spent before.
@@ -30,6 +35,8 @@ pub enum From {
     Start,
     /// The equilibrium of the next coarser grid, prolonged.
     Coarser(State),
+    /// The equilibrium of the next finer grid, interpolated.
+    Finer(State),
     /// A saddle the leaf was pushed off.
     Pushed(State),
 }
@@ -41,7 +48,14 @@ impl<'a> Run<'a, '_> {
     pub(super) fn settle(&mut self, grid: Grid, from: From) -> (Level<'a>, Settled, bool) {
         self.last = None;
         let leaf = DiscreteLeaf::new(self.leaf, grid);
-        let mut near_rest = matches!(from, From::Coarser(_));
+        let mut near_rest = matches!(from, From::Coarser(_) | From::Finer(_));
+        let mut cg_tolerance = match from {
+            From::Start | From::Pushed(_) => FAR_FROM_REST,
+            From::Coarser(_) => 1e-4,
+            // The error of interpolation is one of stiff modes, the error that
+            // is to be removed one of soft ones: a small part of the energy.
+            From::Finer(_) => 1e-8,
+        };
         let mut state = match from {
             From::Start => match self.whole {
                 None => {
@@ -56,14 +70,17 @@ impl<'a> Run<'a, '_> {
                     half_of(self.leaf, &start(&whole))
                 }
             },
-            From::Coarser(state) | From::Pushed(state) => state,
+            From::Coarser(state) | From::Finer(state) | From::Pushed(state) => state,
         };
         let mut system = System::new(&leaf);
+        let segments = leaf.segments();
+        let first = (self.levels.first()).map_or(segments, |first| first.leaf.segments());
         let accuracy = match self.options.segments {
             Some(_) => FIXED_ACCURACY,
+            None if self.too_coarse(first) => ITERATION_PART_FROM_COARSE * self.tolerance,
             None => ITERATION_PART * self.tolerance,
         };
-        let segments = leaf.segments();
+        let convex_only = self.whole.is_some() || self.too_coarse(segments);
         let progress = &mut *self.progress;
         let mut tell = |step: usize, residual: f64| {
             progress(&Progress {
@@ -123,11 +140,12 @@ impl<'a> Run<'a, '_> {
                 work: &mut self.work,
                 progress: &mut tell,
                 near_rest,
+                cg_tolerance,
                 pushes,
                 direct: None,
                 most_evaluations: begun + allowed,
                 deadline: self.options.deadline,
-                convex_only: self.whole.is_some(),
+                convex_only,
                 space: (leaf.planar() && self.levels.is_empty())
                     .then(|| System::new(&leaf.in_space())),
                 moved: false,
@@ -144,7 +162,7 @@ impl<'a> Run<'a, '_> {
                     self.effects = effects(&leaf, &state, &mut system);
                 }
             }
-            if self.whole.is_some() && !matches!(settled, Settled::Rest(_)) {
+            if convex_only && !matches!(settled, Settled::Rest(_)) {
                 return (Level { leaf, state }, settled, moved);
             }
             if settled != Settled::Saddle {
@@ -159,7 +177,7 @@ impl<'a> Run<'a, '_> {
                 _ => {}
             }
             saddle::push_off(&leaf, &mut state, &mut system, &mut self.work);
-            near_rest = false;
+            (near_rest, cg_tolerance) = (false, FAR_FROM_REST);
         }
         (Level { leaf, state }, Settled::StepLimit, moved)
     }

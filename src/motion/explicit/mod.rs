@@ -1,0 +1,377 @@
+//! The explicit method: leapfrog for positions and angular momenta.
+//!
+//! Forces at the nodes' positions kick velocities from half a step before to
+//! half a step after; with these, positions and rotations fly on freely for
+//! one step. A node of a round section is a body with one axis of symmetry,
+//! whose free rotation is known in closed form. The method is of second order
+//! and symplectic, and keeps momentum and angular momentum to rounding, since
+//! the forces of a segment, which follow from an energy that no rigid motion
+//! changes, do. External damping enters by its mean over the kick.
+//!
+//! It is stable up to a time step of 2/omega for the highest frequency omega,
+//! which is at most that of a single segment ([`Explicit::stable_step`]), as
+//! long as the step stays the same: steps that alternate between one length
+//! and half of it are unstable from less than 0.9 of that bound on. So all
+//! steps are of one length, and what is asked for at a time between two of
+//! them is reached by a shorter step from the one before, off the path, to
+//! which the motion returns. It does not depend on the times asked for.
+
+mod path;
+#[cfg(test)]
+mod tests;
+
+use glam::DVec3;
+use pulp::Arch;
+use rayon::prelude::*;
+
+use super::fictitious;
+use super::friction::rates;
+use super::kernel::{Block, Forces, GROUP, Law, Neighbour, Positions, Pull, Step};
+use super::ledger::{Exchange, Ledger};
+use super::method::Method;
+use super::nodes::{self, Rod, vector};
+use super::physics::Physics;
+use super::stable::StableStep;
+use crate::leaf::{DiscreteLeaf, Loads, State};
+
+/// Part of the stable time step that is used.
+const SAFETY: f64 = 0.9;
+
+/// From this many nodes on, rods are shared out among threads. Measured: below
+/// it waking the threads costs more than they bring.
+const PARALLEL_NODES: usize = 8192;
+
+/// Rods that one thread takes: a loop over them is too short for finer shares.
+fn share(rods: usize) -> usize {
+    rods.div_ceil(rayon::current_num_threads())
+}
+
+/// A leaf on the move.
+pub struct Explicit<'a> {
+    leaf: DiscreteLeaf<'a>,
+    physics: Physics,
+    arch: Arch,
+    positions: Vec<Positions>,
+    /// Where the next step puts them.
+    next: Vec<Positions>,
+    rods: Vec<Rod>,
+    block: Block,
+    /// Mass of the joint tip, if there is one.
+    tip_mass: Option<f64>,
+    /// Time step.
+    step: f64,
+    /// Time of the last step, and that asked for, less than a step later.
+    stepped: f64,
+    time: f64,
+    steps: usize,
+    /// Time and steps when the first of the present length began.
+    begin: (f64, usize),
+    /// Widths of the last step and of the one before; zero if there was none.
+    widths: [f64; 2],
+    ledger: Ledger,
+    parallel: bool,
+}
+
+/// A stiffness the method cannot handle: that of a rigid rod.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rigid;
+
+impl<'a> Explicit<'a> {
+    /// A leaf at rest in `state`. Time steps are nine tenths of what is stable,
+    /// or `step` if that is given, stable or not.
+    ///
+    /// # Errors
+    /// If a rod is rigid: its waves are infinitely fast.
+    pub fn new(
+        leaf: DiscreteLeaf<'a>,
+        physics: Physics,
+        state: &State,
+        step: Option<f64>,
+    ) -> Result<Self, Rigid> {
+        if leaf.stiffest() == 0.0 {
+            return Err(Rigid);
+        }
+        let rods = leaf.rods();
+        let joined = leaf.leaf.joined() && rods > 1;
+        let tip_mass = |j| {
+            physics
+                .inertia(leaf.leaf, &leaf.grid, j, leaf.segments())
+                .mass
+        };
+        let positions: Vec<_> = (0..rods)
+            .map(|j| nodes::positions(&leaf, state, j))
+            .collect();
+        let mut explicit = Explicit {
+            arch: Arch::new(),
+            next: positions.clone(),
+            positions,
+            block: Block::new(),
+            rods: (0..rods)
+                .map(|j| nodes::rod(&leaf, &physics, state, j))
+                .collect(),
+            tip_mass: joined.then(|| (0..rods).map(tip_mass).sum()),
+            step: 0.0,
+            stepped: 0.0,
+            time: 0.0,
+            steps: 0,
+            begin: (0.0, 0),
+            widths: [0.0; 2],
+            ledger: Ledger::default(),
+            parallel: rods > 1
+                && rods * leaf.segments() >= PARALLEL_NODES
+                && rayon::current_num_threads() > 1,
+            leaf,
+            physics,
+        };
+        explicit.step = step.unwrap_or_else(|| SAFETY * explicit.stable_step().step);
+        explicit.forces(true);
+        for rod in &mut explicit.rods {
+            // At rest the past was like the present.
+            rod.past.two = rod.past.one.clone();
+        }
+        let start = explicit.snapshot();
+        explicit.ledger.begin(&start);
+        Ok(explicit)
+    }
+
+    /// The longest stable time step of the leaf as it stands.
+    pub fn stable_step(&self) -> StableStep {
+        let mut leaf = self.leaf.clone();
+        if self.physics.rest_differs() {
+            leaf.set_rest(self.physics.rest(self.stepped));
+        }
+        StableStep::of(&leaf, &self.physics, &self.state())
+    }
+
+    /// The length of time steps.
+    pub fn longest_step(&self) -> f64 {
+        self.step
+    }
+
+    /// Gives the nodes masses that serve to come to rest, not to move: the
+    /// fastest motions of all segments become alike. Time steps may be as long as one then, and the leaf is
+    /// stopped.
+    pub fn disguise(&mut self) {
+        let tip = fictitious::masses(&self.leaf, &mut self.rods);
+        self.tip_mass = self.tip_mass.map(|_| tip);
+        self.stop();
+    }
+
+    /// Takes all velocities away.
+    pub fn stop(&mut self) {
+        for rod in &mut self.rods {
+            for array in rod.motion.v.iter_mut().chain(&mut rod.motion.p) {
+                array.fill(0.0);
+            }
+        }
+        self.widths = [0.0; 2];
+    }
+
+    /// Lets every velocity decay at this rate from now on.
+    pub fn damp(&mut self, rate: f64) {
+        self.physics.damping = rate;
+    }
+
+    /// One time step of any length; returns twice the kinetic energy at its
+    /// beginning.
+    pub fn step(&mut self, h: f64) -> f64 {
+        let (exchange, energy) = self.go(h);
+        self.ledger.add(exchange);
+        self.steps += 1;
+        self.begin = (self.stepped, self.steps);
+        self.time = self.stepped;
+        energy
+    }
+
+    /// Kicks, and flies on for `h`.
+    fn go(&mut self, h: f64) -> (Exchange, f64) {
+        let done = self.kick(0.5 * h, h, true);
+        self.widths = [h, self.widths[0]];
+        self.stepped += h;
+        done
+    }
+
+    /// By how much time velocities lag behind positions: half a step, but not
+    /// at the start.
+    fn behind(&self) -> f64 {
+        0.5 * self.widths[0]
+    }
+
+    /// Kicks velocities, by the forces at the present positions, to where they
+    /// are `ahead` of these, and lets positions fly on for the time `flight`.
+    /// Strains become the last step's if they are to be remembered. Returns
+    /// twice the kinetic energy in the middle of the kick, too.
+    fn kick(&mut self, ahead: f64, flight: f64, remember: bool) -> (Exchange, f64) {
+        let length = self.behind() + ahead;
+        let [from, to] = [self.stepped - self.behind(), self.stepped + ahead];
+        let loads = self.physics.loads(self.stepped);
+        let mut work = 0.0;
+        if self.physics.loads_change() {
+            work -= self.potential_of(&self.physics.loads(from), &self.physics.loads(to));
+        }
+        let last = GROUP + self.leaf.segments();
+        let (rotation, before) = (self.rods[0].rotation(last), self.rods[0].moving(last));
+        let decay = 0.5 * self.physics.damping * length;
+        let (keep, kick) = ((1.0 - decay) / (1.0 + decay), length / (1.0 + decay));
+        self.step_rods(&loads, (keep, kick), flight, remember);
+        let (mut energy, mut friction, mut rest) = (0.0, 0.0, 0.0);
+        for rod in &self.rods {
+            energy += rod.done.twice_kinetic;
+            friction += self.physics.retardation * rod.done.friction;
+            rest += rod.done.rest;
+        }
+        if let Some(mass) = self.tip_mass {
+            let mut force = loads.tip_force;
+            for rod in &self.rods {
+                force += rod.material.weight[last] * loads.gravity;
+                force -= DVec3::from(rod.done.last_force);
+            }
+            let after = keep * before.0 + force * (kick / mass);
+            energy += mass * (0.5 * (before.0 + after)).length_squared();
+            let tip = vector(&self.next[0].x, last) + flight * after;
+            for (rod, positions) in self.rods.iter_mut().zip(&mut self.positions) {
+                for c in 0..3 {
+                    rod.motion.v[c][last] = after[c];
+                    positions.x[c][last] = tip[c];
+                }
+            }
+        }
+        if loads.tip_moment != DVec3::ZERO {
+            let momentum = 0.5 * (before.1 + self.rods[0].moving(last).1);
+            let spin = self.rods[0].spin(last, rotation, momentum);
+            work += length * loads.tip_moment.dot(spin);
+        }
+        if self.physics.rest_changes() {
+            work -= rest * (self.physics.rest(to) - self.physics.rest(from));
+        }
+        let exchange = Exchange {
+            dissipated: length * (self.physics.damping * energy + friction),
+            work,
+        };
+        (exchange, energy)
+    }
+
+    /// What is between the potentials of two loads, the leaf standing still.
+    fn potential_of(&self, before: &Loads, after: &Loads) -> f64 {
+        let last = GROUP + self.leaf.segments();
+        let gravity = after.gravity - before.gravity;
+        let tip_force = after.tip_force - before.tip_force;
+        let mut lower = 0.0;
+        for (j, (rod, positions)) in self.rods.iter().zip(&self.positions).enumerate() {
+            for at in GROUP..=last {
+                lower += rod.material.weight[at] * gravity.dot(vector(&positions.x, at));
+            }
+            if j == 0 || !self.leaf.leaf.joined() {
+                lower += tip_force.dot(vector(&positions.x, last));
+            }
+        }
+        lower
+    }
+
+    /// How strains make forces now.
+    fn law(&self, remember: bool) -> Law {
+        Law {
+            damped: self.physics.retardation > 0.0,
+            changes: self.physics.rest_changes(),
+            rest: self.physics.rest(self.stepped),
+            retardation: self.physics.retardation,
+            rates: rates(self.widths[0], self.widths[1]),
+            remember,
+        }
+    }
+
+    /// Moves all nodes but a joint tip; the positions before are left in `next`.
+    fn step_rods(&mut self, loads: &Loads, kick: (f64, f64), flight: f64, remember: bool) {
+        let (arch, law, segments) = (self.arch, self.law(remember), self.leaf.segments());
+        // A free tip feels its force in its own rod, a joint one elsewhere.
+        let pull = Pull {
+            gravity: loads.gravity.to_array(),
+            tip_force: match self.tip_mass {
+                Some(_) => [0.0; 3],
+                None => loads.tip_force.to_array(),
+            },
+            tip_moment: loads.tip_moment.to_array(),
+        };
+        let (all, leaf) = (&self.positions, &self.leaf);
+        let one = |block: &mut Block, j: usize, rod: &mut Rod, next: &mut Positions| {
+            let beside = |other: usize, gap: usize| {
+                (other < all.len()).then(|| Neighbour {
+                    positions: &all[other],
+                    stiffness: leaf.leaf.coupling(gap).to_array(),
+                })
+            };
+            let step = Step {
+                segments,
+                positions: &all[j],
+                next,
+                neighbours: [
+                    beside(j.wrapping_sub(1), j.wrapping_sub(1)),
+                    beside(j + 1, j),
+                ],
+                motion: &mut rod.motion,
+                material: &rod.material,
+                past: &mut rod.past,
+                law,
+                pull,
+                keep: kick.0,
+                kick: kick.1,
+                flight,
+                block,
+            };
+            rod.done = step.make(arch);
+            rod.close(segments);
+        };
+        if self.parallel {
+            (self.rods.par_iter_mut().zip(&mut self.next).enumerate())
+                .with_min_len(share(all.len()))
+                .for_each_init(Block::new, |block, (j, (rod, next))| {
+                    one(block, j, rod, next);
+                });
+        } else {
+            for (j, (rod, next)) in self.rods.iter_mut().zip(&mut self.next).enumerate() {
+                one(&mut self.block, j, rod, next);
+            }
+        }
+        std::mem::swap(&mut self.positions, &mut self.next);
+    }
+
+    /// Forces of all segments at the present positions, rod by rod. Strains
+    /// become the last step's if they are to be remembered.
+    fn forces(&mut self, remember: bool) -> Vec<DVec3> {
+        let (law, segments) = (self.law(remember), self.leaf.segments());
+        let mut forces = Vec::with_capacity(self.rods.len() * segments);
+        for (rod, positions) in self.rods.iter_mut().zip(&self.positions) {
+            self.arch.dispatch(Forces {
+                segments,
+                positions,
+                motion: &rod.motion,
+                material: &rod.material,
+                past: &mut rod.past,
+                law,
+                forces: &mut forces,
+            });
+        }
+        forces.into_iter().map(DVec3::from).collect()
+    }
+
+    /// Positions, rotations and segment forces now.
+    pub fn now(&mut self) -> State {
+        let mut state = self.state();
+        state.n = self.forces(false);
+        state
+    }
+
+    /// Positions and rotations now.
+    fn state(&self) -> State {
+        let n = self.leaf.segments();
+        let nodes =
+            || (0..self.rods.len()).flat_map(|j| (GROUP..=GROUP + n).map(move |at| (j, at)));
+        State::new(
+            n,
+            nodes()
+                .map(|(j, at)| vector(&self.positions[j].x, at))
+                .collect(),
+            nodes().map(|(j, at)| self.rods[j].rotation(at)).collect(),
+        )
+    }
+}

@@ -1,0 +1,96 @@
+use super::*;
+use crate::leaf::{Grid, Leaf};
+use crate::relax::start;
+use crate::scenario::Scenario;
+
+const LEAF: &str = r#"
+    name = "leaf"
+    leaf = { rods = 3, length = [1.0, 1.1, 0.9], fan = "paper" }
+    stiffness = { torsion = 1.2, bending_2 = 0.7, bending_3 = [1.0, 2.0, 0.5], axial = 90.0, shear_2 = 50.0, shear_3 = 70.0 }
+    rest = { twist = 0.3, bend_2 = [0.5, 1.0, 0.0], bend_3 = 0.7, stretch = 1.05 }
+    coupling = { x = 3.0, y = 1.0, z = 2.0 }
+    load = { gravity = [0.1, -0.3, -1.0], tip_force = [0.3, 0.2, 0.1] }
+"#;
+
+/// So many that the last of two blocks is not full.
+const SEGMENTS: usize = 70;
+
+/// Curved and twisted, and strained by some percent.
+fn bent(leaf: &DiscreteLeaf) -> State {
+    let mut state = start(leaf);
+    for j in 0..state.rods() {
+        for i in 1..=SEGMENTS {
+            let s = i as f64 / SEGMENTS as f64;
+            let tip = if i == SEGMENTS { 0 } else { j };
+            let phase = 5.0 * s + tip as f64;
+            let turn = DVec3::new(phase.sin(), s, phase.cos()) * s;
+            let shift = DVec3::new(phase.cos(), phase.sin(), s) * (0.02 * s * (1.5 - s));
+            let increment = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
+            state.advance(state.base(j) + i, &increment, 1.0);
+        }
+    }
+    state
+}
+
+/// Force and moment on every node by the gradient of the element's energy.
+fn by_element(leaf: &DiscreteLeaf, state: &State) -> Vec<(DVec3, DVec3)> {
+    let mut all = vec![(DVec3::ZERO, DVec3::ZERO); state.x.len()];
+    for j in 0..leaf.rods() {
+        for i in 0..=SEGMENTS {
+            let k = state.base(j) + i;
+            all[k].0 += leaf.load(state, j, i).0;
+            if i == SEGMENTS {
+                break;
+            }
+            let section = leaf.section(j, i);
+            let idle = leaf.segment(state, j, i, DVec3::ZERO);
+            let strain = idle.v(section) - section.rest_strain;
+            let segment = leaf.segment(state, j, i, idle.frame * (strain / section.compliance));
+            let (x, a, b) = segment.gradient(section);
+            all[k] = (all[k].0 + x, all[k].1 - a);
+            all[k + 1] = (all[k + 1].0 - x, all[k + 1].1 - b);
+        }
+    }
+    all
+}
+
+/// The loops' forces are the gradient of the energy that the relaxation
+/// minimises, whatever instructions the processor has.
+#[test]
+fn forces_are_those_of_the_element() {
+    let scenario = Scenario::from_toml(LEAF).unwrap();
+    let leaf = Leaf::new(&scenario);
+    let discrete = DiscreteLeaf::new(&leaf, Grid::new(SEGMENTS, &[]));
+    let state = bent(&discrete);
+    let expected = by_element(&discrete, &state);
+    let largest = expected.iter().map(|(f, m)| f.length().max(m.length()));
+    let allowed = 1e-12 * largest.fold(0.0, f64::max);
+    for arch in [Arch::new(), Arch::Scalar] {
+        let physics = Physics::at_rest(&leaf);
+        let mut explicit = Explicit::new(discrete.clone(), physics, &state, None).unwrap();
+        explicit.arch = arch;
+        explicit.damp(0.0);
+        let h = 1e-6;
+        explicit.go(h);
+        let mut tip = DVec3::ZERO;
+        for (j, rod) in explicit.rods.iter().enumerate() {
+            for i in 1..=SEGMENTS {
+                let (v, p) = rod.moving(GROUP + i);
+                let (force, moment) = expected[state.base(j) + i];
+                let moment_error = (p / (0.5 * h) - moment).length();
+                assert!(moment_error < allowed, "{j} {i}: {moment_error}");
+                if i == SEGMENTS {
+                    tip += force;
+                } else {
+                    let error = (v * (rod.material.mass[GROUP + i] / (0.5 * h)) - force).length();
+                    assert!(error < allowed, "{j} {i}: {error}");
+                }
+            }
+        }
+        let v = explicit.rods[2].moving(GROUP + SEGMENTS).0;
+        let error = (v * (explicit.tip_mass.unwrap() / (0.5 * h)) - tip).length();
+        assert!(error < allowed, "tip: {error}");
+        // The clamped ends stay where they are.
+        assert_eq!(explicit.state().x[0], DVec3::ZERO);
+    }
+}

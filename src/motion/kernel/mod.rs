@@ -1,0 +1,309 @@
+//! The explicit method's loop over a rod: a whole time step, from the forces of
+//! its segments to the new positions of its nodes.
+//!
+//! It goes along the rod in blocks. The forces of a block's segments
+//! ([`segments`]) stay in the processor's nearest memory until its nodes have
+//! moved ([`flight`]). Nodes that have moved are not looked at again: the next
+//! block's first node gets what the segment before it does from the block
+//! before, and neighbouring rods, which feel where its nodes were, read
+//! positions that are not written over but written anew.
+
+mod flight;
+mod segments;
+
+use pulp::{Arch, Simd};
+
+use self::flight::Flight;
+use self::segments::Nodes;
+use super::lanes::Lanes;
+
+/// Nodes come in groups of so many; arrays are that much longer at both ends.
+pub const GROUP: usize = 4;
+
+/// Nodes of a block. Measured: with all its arrays it fits the nearest memory.
+const BLOCK: usize = 16 * GROUP;
+
+/// Positions of a rod's nodes, one array per component. Node i stands at
+/// GROUP + i; what is before and after is never used, only read.
+#[derive(Clone, Debug)]
+pub struct Positions {
+    pub x: [Vec<f64>; 3],
+}
+
+/// What else moves.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    /// Rotations as unit quaternions.
+    pub q: [Vec<f64>; 4],
+    /// Velocities, half a step behind or ahead.
+    pub v: [Vec<f64>; 3],
+    /// Angular momenta along the lab axes, likewise.
+    pub p: [Vec<f64>; 3],
+}
+
+/// Strains of the last two steps, for internal damping: R^T dx, then psi.
+/// Empty without it.
+#[derive(Clone, Debug)]
+pub struct Past {
+    pub one: [[Vec<f64>; 3]; 2],
+    pub two: [[Vec<f64>; 3]; 2],
+}
+
+/// What a rod is made of, per segment and per node.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// H/ds.
+    pub stretch: [Vec<f64>; 3],
+    /// ds times the rest stretch: the rest strain is v0 = (stretch, 0, 0).
+    pub rest_length: Vec<f64>,
+    /// A/ds.
+    pub bend: [Vec<f64>; 3],
+    /// ds u0.
+    pub rest_turn: [Vec<f64>; 3],
+    /// Mass; that of a held node and of a joint tip is not in here.
+    pub mass: Vec<f64>,
+    /// 1/mass; zero for a node that is held, and for a joint tip.
+    pub per_mass: Vec<f64>,
+    /// 1/J of a node about d2 and d3; zero for a node that is held.
+    pub per_inertia: Vec<f64>,
+    /// 1/J1 - 1/J.
+    pub per_spin: Vec<f64>,
+    /// Length of rod that loads on the node come from.
+    pub weight: Vec<f64>,
+    /// Fraction of the length that coupling on the node comes from.
+    pub coupled: Vec<f64>,
+}
+
+/// How strains make forces at an instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Law {
+    /// Whether there is internal friction.
+    pub damped: bool,
+    /// Whether the rest curvature changes, and what that does is asked.
+    pub changes: bool,
+    /// Factor of the rest curvature.
+    pub rest: f64,
+    /// Retardation time.
+    pub retardation: f64,
+    /// Weights of the present and the past strains in their rate.
+    pub rates: [f64; 3],
+    /// Whether the present becomes the past.
+    pub remember: bool,
+}
+
+/// What the segments of a block do to their ends.
+#[derive(Clone, Debug)]
+pub struct Block {
+    /// Force N of the segment from node i to i + 1, node i of the block at
+    /// GROUP + i; at GROUP - 1 the last segment's of the block before.
+    n: [[f64; GROUP + BLOCK]; 3],
+    /// Twice the moment on its left and on its right end.
+    left: [[f64; GROUP + BLOCK]; 3],
+    right: [[f64; GROUP + BLOCK]; 3],
+    /// 2/|s|^2 (see [`segments`]).
+    twice_inverse: [f64; BLOCK],
+}
+
+impl Block {
+    /// With no forces.
+    pub fn new() -> Self {
+        let zeros = [[0.0; GROUP + BLOCK]; 3];
+        Block {
+            n: zeros,
+            left: zeros,
+            right: zeros,
+            twice_inverse: [0.0; BLOCK],
+        }
+    }
+
+    /// Begins the next block after one of `nodes` nodes.
+    fn carry(&mut self, nodes: usize) {
+        for array in self.n.iter_mut().chain(&mut self.right) {
+            array[GROUP - 1] = array[GROUP + nodes - 1];
+        }
+    }
+}
+
+/// Coupling with a neighbour.
+pub struct Neighbour<'a> {
+    pub positions: &'a Positions,
+    /// Force per displacement and unit of sigma.
+    pub stiffness: [f64; 3],
+}
+
+/// Loads on a rod.
+#[derive(Clone, Copy, Debug)]
+pub struct Pull {
+    /// Force per length.
+    pub gravity: [f64; 3],
+    /// Force and moment on the tip, if that is the rod's own.
+    pub tip_force: [f64; 3],
+    pub tip_moment: [f64; 3],
+}
+
+/// A time step of a rod: a kick by all forces, of length `kick`, velocities
+/// before it times `keep`, and free flight for the time `flight`.
+pub struct Step<'a> {
+    pub segments: usize,
+    pub positions: &'a Positions,
+    /// Where they will be; of a joint tip its maker must say.
+    pub next: &'a mut Positions,
+    pub neighbours: [Option<Neighbour<'a>>; 2],
+    pub motion: &'a mut Motion,
+    pub material: &'a Material,
+    pub past: &'a mut Past,
+    pub law: Law,
+    pub pull: Pull,
+    pub keep: f64,
+    pub kick: f64,
+    pub flight: f64,
+    /// Room to work in.
+    pub block: &'a mut Block,
+}
+
+/// What a step did.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Done {
+    /// Twice the kinetic energy in the middle of the kick.
+    pub twice_kinetic: f64,
+    /// Power of internal friction, over the retardation time.
+    pub friction: f64,
+    /// Elastic energy taken by a rise of the factor of the rest curvature,
+    /// over that rise.
+    pub rest: f64,
+    /// Force of the last segment.
+    pub last_force: [f64; 3],
+}
+
+impl Step<'_> {
+    /// Makes the step.
+    pub fn make(self, arch: Arch) -> Done {
+        match (self.law.damped, self.law.changes) {
+            (true, true) => arch.dispatch(Made::<true, true>(self)),
+            (true, false) => arch.dispatch(Made::<true, false>(self)),
+            (false, true) => arch.dispatch(Made::<false, true>(self)),
+            (false, false) => arch.dispatch(Made::<false, false>(self)),
+        }
+    }
+}
+
+/// The number of nodes from `start` on in the block that begins there, whole
+/// groups of a rod of so many `segments`.
+fn length(segments: usize, start: usize) -> usize {
+    ((segments + 1).next_multiple_of(GROUP) - start).min(BLOCK)
+}
+
+struct Made<'a, const DAMPED: bool, const CHANGES: bool>(Step<'a>);
+
+impl<const DAMPED: bool, const CHANGES: bool> pulp::WithSimd for Made<'_, DAMPED, CHANGES> {
+    type Output = Done;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Done {
+        let Step {
+            segments,
+            positions,
+            next,
+            neighbours,
+            motion,
+            material,
+            past,
+            law,
+            pull,
+            keep,
+            kick,
+            flight,
+            block,
+        } = self.0;
+        let mut done = Done::default();
+        let zero = Lanes::splat(simd, 0.0);
+        let (mut energy, mut friction, mut rest) = (zero, zero, zero);
+        for array in block.n.iter_mut().chain(&mut block.right) {
+            array[GROUP - 1] = 0.0;
+        }
+        let mut start = 0;
+        while start <= segments {
+            let nodes = length(segments, start);
+            let place = (GROUP + start, nodes);
+            let part = Nodes {
+                place,
+                x: &positions.x,
+                q: &motion.q,
+                material,
+                law: &law,
+            };
+            let (power, lost) = segments::forces::<S, DAMPED, CHANGES>(simd, part, past, block);
+            friction = friction + power;
+            rest = rest + lost;
+            // The tip is the last node; no segment follows it.
+            let end = start + nodes > segments;
+            if end {
+                let tip = GROUP + segments - start;
+                for c in 0..3 {
+                    done.last_force[c] = block.n[c][tip - 1];
+                    block.n[c][tip] = pull.tip_force[c];
+                    block.left[c][tip] = 2.0 * pull.tip_moment[c];
+                }
+            }
+            let flight = Flight {
+                positions: &positions.x,
+                next: &mut next.x,
+                neighbours: &neighbours,
+                motion,
+                material,
+                gravity: pull.gravity,
+                keep,
+                kick,
+                step: flight,
+                block,
+            };
+            energy = energy + flight.go(simd, place);
+            block.carry(nodes);
+            start += nodes;
+        }
+        // Velocities were sums of two.
+        done.twice_kinetic = 0.25 * energy.sum();
+        done.friction = friction.sum();
+        done.rest = rest.sum();
+        done
+    }
+}
+
+/// The forces of a rod's segments, and nothing else.
+pub struct Forces<'a> {
+    pub segments: usize,
+    pub positions: &'a Positions,
+    pub motion: &'a Motion,
+    pub material: &'a Material,
+    pub past: &'a mut Past,
+    pub law: Law,
+    /// Where they go, segment by segment.
+    pub forces: &'a mut Vec<[f64; 3]>,
+}
+
+impl pulp::WithSimd for Forces<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let mut block = Block::new();
+        let mut start = 0;
+        while start < self.segments {
+            let nodes = length(self.segments, start);
+            let part = Nodes {
+                place: (GROUP + start, nodes),
+                x: &self.positions.x,
+                q: &self.motion.q,
+                material: self.material,
+                law: &self.law,
+            };
+            match self.law.damped {
+                true => segments::forces::<S, true, false>(simd, part, self.past, &mut block),
+                false => segments::forces::<S, false, false>(simd, part, self.past, &mut block),
+            };
+            let own = GROUP..GROUP + nodes.min(self.segments - start);
+            (self.forces).extend(own.map(|at| [0, 1, 2].map(|c| block.n[c][at])));
+            start += nodes;
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! A motion is the same to the last bit on any number of threads, whether it
+//! is looked at on its way or not, and when it goes on from saved numbers.
+
+use leafdyn::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use leafdyn::motion::{Explicit, Method, Physics, SemiImplicit, Steps};
+use leafdyn::relax::start;
+use leafdyn::scenario::Scenario;
+use rayon::ThreadPoolBuilder;
+
+/// A damped leaf under loads that change.
+fn scenario(rods: usize) -> Scenario {
+    let text = format!(
+        r#"
+        name = "leaf"
+        leaf = {{ rods = {rods}, length = 1.0, fan = "paper" }}
+        stiffness = {{ torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }}
+        coupling = {{ y = 1.0, z = 2.0 }}
+        load = {{ gravity = [0.0, 0.0, -1.0] }}
+        [dynamics]
+        internal_damping = 0.001
+        gravity = {{ at = [0.0, 1.0], value = [[0, 0, -1], [0, 1, 0]] }}
+        "#
+    );
+    Scenario::from_toml(&text).unwrap()
+}
+
+/// Everything about a state, bit by bit.
+fn bits(state: &State) -> Vec<u64> {
+    let x = state.x.iter().flat_map(|x| x.to_array());
+    let q = state.q.iter().flat_map(|q| q.to_array());
+    let n = state.n.iter().flat_map(|n| n.to_array());
+    x.chain(q).chain(n).map(f64::to_bits).collect()
+}
+
+fn methods<'a>(leaf: &'a Leaf<'a>, segments: usize) -> [Box<dyn Method + 'a>; 2] {
+    let discrete = DiscreteLeaf::new(leaf, Grid::new(segments, &[]));
+    let state = start(&discrete);
+    let physics = Physics::new(leaf);
+    let explicit = Explicit::new(discrete.clone(), physics.clone(), &state, None).unwrap();
+    let semi_implicit = SemiImplicit::new(discrete, physics, &state, Steps::Error(1e-4));
+    [Box::new(explicit), Box::new(semi_implicit)]
+}
+
+/// Leaves large enough to be shared out.
+#[test]
+fn on_any_number_of_threads() {
+    let scenario = scenario(30);
+    let leaf = Leaf::new(&scenario);
+    for method in 0..2 {
+        let run = |threads: usize| {
+            let pool = ThreadPoolBuilder::new().num_threads(threads);
+            pool.build().unwrap().install(|| {
+                let [explicit, semi_implicit] = methods(&leaf, 300);
+                let (mut method, until) = match method {
+                    0 => (explicit, 5e-3),
+                    _ => (semi_implicit, 1e-2),
+                };
+                method.advance(until).unwrap();
+                assert!(method.steps() > 5, "{}", method.steps());
+                (bits(&method.snapshot().state), method.save())
+            })
+        };
+        let one = run(1);
+        assert!(run(2) == one && run(3) == one, "method {method}");
+    }
+}
+
+#[test]
+fn looked_at_or_not() {
+    let scenario = scenario(3);
+    let leaf = Leaf::new(&scenario);
+    for (mut looked, mut other) in methods(&leaf, 20).into_iter().zip(methods(&leaf, 20)) {
+        for k in 1..=4 {
+            looked.advance(0.1 * k as f64).unwrap();
+            other.advance(0.1 * k as f64).unwrap();
+            let first = bits(&looked.snapshot().state);
+            assert_eq!(first, bits(&looked.snapshot().state));
+        }
+        assert_eq!(looked.save(), other.save(), "{}", looked.name());
+    }
+}
+
+#[test]
+fn from_saved_numbers() {
+    let scenario = scenario(3);
+    let leaf = Leaf::new(&scenario);
+    for (mut through, mut other) in methods(&leaf, 20).into_iter().zip(methods(&leaf, 20)) {
+        through.advance(0.2).unwrap();
+        assert!(other.restore(&through.save()));
+        for method in [&mut through, &mut other] {
+            method.advance(0.5).unwrap();
+        }
+        assert_eq!(
+            bits(&through.snapshot().state),
+            bits(&other.snapshot().state)
+        );
+        assert_eq!(through.save(), other.save(), "{}", through.name());
+        assert!(!other.restore(&[0.0]));
+    }
+}
