@@ -100,7 +100,7 @@
 //! **The leaf** ([`leaf`]). All last nodes are one shared point: the tip cannot
 //! open, and needs neither penalty nor multiplier. Gravity and coupling act at
 //! the nodes. Newton's equations are solved rod by rod: every rod's own chain of
-//! 6 x 6 blocks is factorised in linear time, and conjugate gradients account
+//! 6 x 6 blocks (3 x 3 in the plane) is factorised in linear time, and conjugate gradients account
 //! for the coupling. A sparse direct factorisation of the whole stands by for
 //! what is not positive definite.
 //!
@@ -109,7 +109,8 @@
 //! implicit Euler steps of a damped motion. While the energy has a direction of
 //! negative curvature, the time step is kept short enough to follow the motion;
 //! otherwise it grows until the step is Newton's. A leaf that is its own mirror
-//! image is solved by half. The explicit method ([`relax::Method::Explicit`])
+//! image is solved by half, one that nothing pulls out of its plane with three
+//! unknowns a node. The explicit method ([`relax::Method::Explicit`])
 //! follows the same motion in steps short enough for the fastest waves into the
 //! valley, and then descends with masses and damping that serve nothing else.
 //!

@@ -90,20 +90,7 @@ impl Relative {
         let cos = sign * p.w;
         let v = sign * DVec3::new(p.x, p.y, p.z);
         let sin_squared = v.length_squared();
-        // asin(z)/z by its series where that is exact and cheap.
-        let s = if sin_squared < 0.01 {
-            let z = sin_squared;
-            1.0 + z
-                * (1.0 / 6.0
-                    + z * (3.0 / 40.0
-                        + z * (15.0 / 336.0
-                            + z * (105.0 / 3456.0
-                                + z * (945.0 / 42240.0
-                                    + z * (10395.0 / 599_040.0 + z * (135_135.0 / 9_676_800.0)))))))
-        } else {
-            let sin = sin_squared.sqrt();
-            sin.atan2(cos) / sin
-        };
+        let s = half_over_sin(sin_squared, cos);
         let half_squared = s * s * sin_squared;
         let sigma = if half_squared < SMALL_HALF_ANGLE * SMALL_HALF_ANGLE {
             let y = half_squared;
@@ -158,6 +145,25 @@ impl Relative {
         let my = m.dot(y);
         let half = outer(c2 * m + (c3 * my) * y, y);
         DMat3::from_diagonal(DVec3::splat(2.0 * c1 * my)) + half + half.transpose()
+    }
+}
+
+/// y / sin y of a half angle y up to a right one, from sin^2 y and cos y.
+#[inline]
+pub fn half_over_sin(sin_squared: f64, cos: f64) -> f64 {
+    // asin(z)/z by its series where that is exact and cheap.
+    if sin_squared < 0.01 {
+        let z = sin_squared;
+        1.0 + z
+            * (1.0 / 6.0
+                + z * (3.0 / 40.0
+                    + z * (15.0 / 336.0
+                        + z * (105.0 / 3456.0
+                            + z * (945.0 / 42240.0
+                                + z * (10395.0 / 599_040.0 + z * (135_135.0 / 9_676_800.0)))))))
+    } else {
+        let sin = sin_squared.sqrt();
+        sin.atan2(cos) / sin
     }
 }
 

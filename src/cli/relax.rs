@@ -48,7 +48,7 @@ pub struct Relax {
     #[arg(long, conflicts_with_all = ["keep_unstable", "modes", "segments"])]
     all: bool,
 
-    /// Solve for the whole leaf even if half of it would do
+    /// Solve for the whole leaf, in space, even if half of it or its plane would do
     #[arg(long)]
     full_model: bool,
 }

@@ -1,11 +1,10 @@
 //! The discretised leaf: its unbalanced forces, its matrix, its energy.
 
-use super::chain::Block;
+use super::chain::{Block, Chain, RodMatrix, SPATIAL, turns};
 use super::dimensionless::Leaf;
 use super::grid::Grid;
-use super::mirror::{ACROSS, FORBIDDEN};
-use super::state::{State, shift, turn};
-use super::system::{RodSystem, System, each_rod};
+use super::state::{Increment, State, shift, turn};
+use super::system::{System, each_rod};
 use crate::rod::{Blocks, Ends, Section, Segment};
 use glam::{DMat3, DVec3};
 
@@ -34,6 +33,8 @@ pub struct DiscreteLeaf<'a> {
     pub loads: Loads,
     /// Whether this is half of a leaf that is its own mirror image.
     pub(super) mirrored: bool,
+    /// Whether it is solved in its plane.
+    pub(super) planar: bool,
 }
 
 /// Dead loads.
@@ -80,6 +81,24 @@ impl<'a> DiscreteLeaf<'a> {
                 tip_moment: leaf.tip_moment,
             },
             mirrored: leaf.mirrored,
+            planar: leaf.planar,
+        }
+    }
+
+    /// The same rods, all of them, seen as those of `leaf`.
+    pub fn seen_as(&self, leaf: &'a Leaf<'a>) -> Self {
+        DiscreteLeaf {
+            leaf,
+            planar: leaf.planar,
+            ..self.clone()
+        }
+    }
+
+    /// The same, in space if it was in its plane.
+    pub fn in_space(&self) -> Self {
+        DiscreteLeaf {
+            planar: false,
+            ..self.clone()
         }
     }
 
@@ -240,7 +259,19 @@ impl<'a> DiscreteLeaf<'a> {
         let parallel = system.parallel();
         system.moment = self.tip_moment();
         each_rod(parallel, &mut system.rods, |j, rod| {
-            rod.sums = self.assemble_rod(j, state, rod);
+            let rhs = &mut rod.rhs;
+            rod.sums = match &mut rod.matrix {
+                RodMatrix::Spatial(chain, _) => {
+                    let sums = self.assemble_spatial(j, state, chain, rhs);
+                    self.confine(j, chain, rhs);
+                    sums
+                }
+                RodMatrix::Planar(chain, _) => {
+                    let sums = self.assemble_planar(j, state, chain, rhs);
+                    self.confine(j, chain, rhs);
+                    sums
+                }
+            };
         });
         let mut total = Sums::default();
         for rod in &system.rods {
@@ -250,10 +281,16 @@ impl<'a> DiscreteLeaf<'a> {
         total
     }
 
-    fn assemble_rod(&self, j: usize, state: &State, rod: &mut RodSystem) -> Sums {
+    /// Assembles rod `j` of a leaf in space.
+    fn assemble_spatial(
+        &self,
+        j: usize,
+        state: &State,
+        chain: &mut Chain<SPATIAL>,
+        rhs: &mut [Increment],
+    ) -> Sums {
         let n = self.segments();
         let mut sums = Sums::default();
-        let chain = &mut rod.chain;
         for i in 0..n {
             let force = state.n[j * n + i];
             let section = self.section(j, i);
@@ -265,48 +302,55 @@ impl<'a> DiscreteLeaf<'a> {
             if i > 0 {
                 add_left(&mut chain.diagonal[i - 1], &blocks);
                 couple(&mut chain.off[i - 1], &blocks);
-                add(&mut rod.rhs[i - 1], -g_a, g_x);
+                add(&mut rhs[i - 1], -g_a, g_x);
             }
             set_right(&mut chain.diagonal[i], &blocks);
-            let (load, potential) = self.load(state, j, i + 1);
+            let (load, potential) = self.bear(state, j, i + 1, &mut chain.diagonal[i]);
             sums.energy += potential;
-            rod.rhs[i] = [0.0; 6];
-            add(&mut rod.rhs[i], -g_b, load - g_x);
-            for g in [j.wrapping_sub(1), j] {
-                if g < self.rods() - 1 {
-                    let spring = self.spring(g, i + 1);
-                    for c in 0..3 {
-                        chain.diagonal[i][3 + c][3 + c] += spring[c];
-                    }
+            rhs[i] = [0.0; 6];
+            add(&mut rhs[i], -g_b, load - g_x);
+        }
+        add(&mut rhs[n - 1], self.tip_moment(), DVec3::ZERO);
+        sums
+    }
+
+    /// Adds the stiffness of the coupling of node `i` of rod `j` to its block;
+    /// tells [`DiscreteLeaf::load`].
+    #[inline]
+    pub(super) fn bear<const B: usize>(
+        &self,
+        state: &State,
+        j: usize,
+        i: usize,
+        block: &mut Block<B>,
+    ) -> (DVec3, f64) {
+        let turns = turns(B);
+        for g in [j.wrapping_sub(1), j] {
+            if g < self.rods() - 1 {
+                let spring = self.spring(g, i);
+                for c in 0..B - turns {
+                    block[turns + c][turns + c] += spring[c];
                 }
             }
-            if self.leaf.beside_image(j) {
-                chain.diagonal[i][ACROSS][ACROSS] += 2.0 * self.spring(j, i + 1).y;
-            }
         }
-        add(&mut rod.rhs[n - 1], self.tip_moment(), DVec3::ZERO);
-        if self.mirrored {
-            self.confine(j, rod);
+        if self.leaf.beside_image(j) {
+            let across = turns + 1;
+            block[across][across] += 2.0 * self.spring(j, i).y;
         }
-        sums
+        self.load(state, j, i)
     }
 
     /// Writes the right-hand side of the change, to first order, if the rods
     /// had no compliance in the components `dropped` (ones and zeros).
     pub fn assemble_stiffening(&self, state: &State, dropped: DVec3, system: &mut System) {
-        let n = self.segments();
         for (j, rod) in system.rods.iter_mut().enumerate() {
             rod.rhs.fill([0.0; 6]);
-            for i in 0..n {
-                let segment = self.segment(state, j, i, state.n[j * n + i]);
-                let (g_x, g_a, g_b) = segment.stiffening_gradient(self.section(j, i), dropped);
-                if i > 0 {
-                    add(&mut rod.rhs[i - 1], -g_a, g_x);
-                }
-                add(&mut rod.rhs[i], -g_b, -g_x);
+            match self.planar {
+                false => self.stiffen_spatial(j, state, dropped, &mut rod.rhs),
+                true => self.stiffen_planar(j, state, dropped, &mut rod.rhs),
             }
             if self.mirrored {
-                for i in 0..n {
+                for i in 0..self.segments() {
                     for &c in self.forbidden(j, i + 1) {
                         rod.rhs[i][c] = 0.0;
                     }
@@ -315,39 +359,15 @@ impl<'a> DiscreteLeaf<'a> {
         }
     }
 
-    /// What the increments of node `i` (from 1) of rod `j` of half a leaf must
-    /// not have.
-    fn forbidden(&self, j: usize, i: usize) -> &'static [usize] {
-        if self.leaf.in_plane(j) {
-            &FORBIDDEN
-        } else if self.leaf.joined() && i == self.segments() {
-            &FORBIDDEN[2..]
-        } else {
-            &[]
-        }
-    }
-
-    /// Keeps what lies in the plane of the mirror there: the increments that
-    /// would leave it have equations of their own, which make them zero.
-    fn confine(&self, j: usize, rod: &mut RodSystem) {
-        for i in 0..self.segments() {
-            for &c in self.forbidden(j, i + 1) {
-                let block = &mut rod.chain.diagonal[i];
-                for k in 0..6 {
-                    block[c][k] = 0.0;
-                    block[k][c] = 0.0;
-                }
-                block[c][c] = 1.0;
-                if i > 0 {
-                    for row in &mut rod.chain.off[i - 1] {
-                        row[c] = 0.0;
-                    }
-                }
-                if let Some(off) = rod.chain.off.get_mut(i) {
-                    off[c] = [0.0; 6];
-                }
-                rod.rhs[i][c] = 0.0;
+    fn stiffen_spatial(&self, j: usize, state: &State, dropped: DVec3, rhs: &mut [Increment]) {
+        let n = self.segments();
+        for i in 0..n {
+            let segment = self.segment(state, j, i, state.n[j * n + i]);
+            let (g_x, g_a, g_b) = segment.stiffening_gradient(self.section(j, i), dropped);
+            if i > 0 {
+                add(&mut rhs[i - 1], -g_a, g_x);
             }
+            add(&mut rhs[i], -g_b, -g_x);
         }
     }
 
@@ -356,6 +376,9 @@ impl<'a> DiscreteLeaf<'a> {
     pub fn advance(&self, state: &State, solution: &System, step: f64, next: &mut State) {
         let n = self.segments();
         next.clone_from(state);
+        if self.planar {
+            return self.advance_planar(state, solution, step, next);
+        }
         for (j, rod) in solution.rods.iter().enumerate() {
             let base = state.base(j);
             let (mut a, mut dx0) = (DVec3::ZERO, DVec3::ZERO);
@@ -409,15 +432,6 @@ impl<'a> DiscreteLeaf<'a> {
         }
     }
 
-    /// The largest components of an unbalanced force and moment on a node of
-    /// rod `j` that the mirror does not balance.
-    fn felt(&self, j: usize, force: DVec3, moment: DVec3) -> (f64, f64) {
-        match self.leaf.in_plane(j) {
-            true => (force.x.abs().max(force.z.abs()), moment.y.abs()),
-            false => (force.abs().max_element(), moment.abs().max_element()),
-        }
-    }
-
     /// Potential energy of a state: elastic, of the coupling, and of the loads.
     /// The dead moment on a rod's tip has no potential and is left out.
     pub fn energy(&self, state: &State) -> f64 {
@@ -443,7 +457,7 @@ fn add(increment: &mut [f64; 6], moment: DVec3, force: DVec3) {
 }
 
 #[inline]
-fn place(block: &mut Block, row: usize, column: usize, k: &DMat3, sign: f64) {
+fn place(block: &mut Block<SPATIAL>, row: usize, column: usize, k: &DMat3, sign: f64) {
     for c in 0..3 {
         let values = k.col(c);
         for r in 0..3 {
@@ -454,7 +468,7 @@ fn place(block: &mut Block, row: usize, column: usize, k: &DMat3, sign: f64) {
 
 /// The block of a segment's right node.
 #[inline]
-fn set_right(block: &mut Block, k: &Blocks) {
+fn set_right(block: &mut Block<SPATIAL>, k: &Blocks) {
     place(block, 0, 0, &k.bb, 1.0);
     place(block, 0, 3, &k.xb.transpose(), 1.0);
     place(block, 3, 0, &k.xb, 1.0);
@@ -463,7 +477,7 @@ fn set_right(block: &mut Block, k: &Blocks) {
 
 /// Adds the block of a segment's left node.
 #[inline]
-fn add_left(block: &mut Block, k: &Blocks) {
+fn add_left(block: &mut Block<SPATIAL>, k: &Blocks) {
     let mut left = [[0.0; 6]; 6];
     place(&mut left, 0, 0, &k.aa, 1.0);
     place(&mut left, 0, 3, &k.xa.transpose(), -1.0);
@@ -478,7 +492,7 @@ fn add_left(block: &mut Block, k: &Blocks) {
 
 /// The block between a segment's left and right node.
 #[inline]
-fn couple(block: &mut Block, k: &Blocks) {
+fn couple(block: &mut Block<SPATIAL>, k: &Blocks) {
     place(block, 0, 0, &k.ab, 1.0);
     place(block, 0, 3, &k.xa.transpose(), 1.0);
     place(block, 3, 0, &k.xb, -1.0);

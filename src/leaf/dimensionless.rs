@@ -1,5 +1,7 @@
 //! A scenario in dimensionless form.
 
+use super::mirror::is_mirrored;
+use super::planar::is_planar;
 use crate::rod::Section;
 use crate::rotation;
 use crate::scenario::{Rod, Scenario, longest, mean_bending};
@@ -42,6 +44,8 @@ pub struct Leaf<'a> {
     scenario: &'a Scenario,
     /// Whether this is half of a leaf that is its own mirror image.
     pub(super) mirrored: bool,
+    /// Whether it is solved in its plane.
+    pub(super) planar: bool,
     /// The units.
     pub scale: Scale,
     /// Gravity per unit length.
@@ -99,6 +103,7 @@ impl<'a> Leaf<'a> {
         Leaf {
             scenario,
             mirrored: false,
+            planar: false,
             scale,
             gravity: vector(scenario.gravity, scale.force() / length),
             tip_force: vector(scenario.tip_force, scale.force()),
@@ -106,6 +111,16 @@ impl<'a> Leaf<'a> {
             kinks,
             softest: softest / scale.stiffness,
         }
+    }
+
+    /// The leaf with no more unknowns than its symmetries leave it, if it has
+    /// any: half of it if it is its own mirror image, that in its plane if
+    /// nothing acts out of it.
+    pub fn reduced(&self) -> Option<Leaf<'a>> {
+        let mut reduced = self.clone();
+        reduced.mirrored = is_mirrored(self.scenario);
+        reduced.planar = is_planar(self.scenario);
+        (reduced.mirrored || reduced.planar).then_some(reduced)
     }
 
     /// The scenario it was made from.

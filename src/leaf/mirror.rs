@@ -6,26 +6,18 @@
 //! about the plane's normal. A joint tip stays in the plane, too. Of the gap
 //! across the plane, if N is even, only the coupling along y is ever stretched.
 
+use super::assembly::DiscreteLeaf;
+use super::chain::{Chain, first};
 use super::dimensionless::Leaf;
-use super::state::State;
+use super::state::{Increment, State};
 use crate::scenario::{Profile, Rod, Scenario};
 use glam::{DQuat, DVec3};
 
 /// Components of a node's increment (turn, shift) that the mirror forbids a
 /// node in its plane: turns about x and z, the shift along y.
-pub const FORBIDDEN: [usize; 3] = [0, 2, 4];
+const FORBIDDEN: [usize; 3] = [0, 2, 4];
 
-/// The shift along y alone: what it forbids a joint tip.
-pub const ACROSS: usize = 4;
-
-impl<'a> Leaf<'a> {
-    /// Half of the leaf, if it is its own mirror image.
-    pub fn half(&self) -> Option<Leaf<'a>> {
-        let mut half = self.clone();
-        half.mirrored = is_mirrored(self.scenario());
-        half.mirrored.then_some(half)
-    }
-
+impl Leaf<'_> {
     /// Part of rod `j` that belongs to the leaf, or to its half.
     pub fn share(&self, j: usize) -> f64 {
         if self.in_plane(j) { 0.5 } else { 1.0 }
@@ -43,8 +35,66 @@ impl<'a> Leaf<'a> {
     }
 }
 
+impl DiscreteLeaf<'_> {
+    /// What the increments of node `i` (from 1) of rod `j` of half a leaf must
+    /// not have.
+    pub(super) fn forbidden(&self, j: usize, i: usize) -> &'static [usize] {
+        if self.leaf.in_plane(j) {
+            &FORBIDDEN
+        } else if self.leaf.joined() && i == self.segments() {
+            &FORBIDDEN[2..]
+        } else {
+            &[]
+        }
+    }
+
+    /// Keeps what lies in the plane of the mirror there: the increments that
+    /// would leave it have equations of their own, which make them zero.
+    pub(super) fn confine<const B: usize>(
+        &self,
+        j: usize,
+        chain: &mut Chain<B>,
+        rhs: &mut [Increment],
+    ) {
+        if !self.mirrored {
+            return;
+        }
+        for i in 0..self.segments() {
+            for &forbidden in self.forbidden(j, i + 1) {
+                rhs[i][forbidden] = 0.0;
+                let Some(c) = forbidden.checked_sub(first(B)) else {
+                    continue;
+                };
+                let block = &mut chain.diagonal[i];
+                for k in 0..B {
+                    block[c][k] = 0.0;
+                    block[k][c] = 0.0;
+                }
+                block[c][c] = 1.0;
+                if i > 0 {
+                    for row in &mut chain.off[i - 1] {
+                        row[c] = 0.0;
+                    }
+                }
+                if let Some(off) = chain.off.get_mut(i) {
+                    off[c] = [0.0; B];
+                }
+            }
+        }
+    }
+
+    /// The largest components of an unbalanced force and moment on a node of
+    /// rod `j` that the mirror does not balance.
+    pub(super) fn felt(&self, j: usize, force: DVec3, moment: DVec3) -> (f64, f64) {
+        match self.leaf.in_plane(j) {
+            true => (force.x.abs().max(force.z.abs()), moment.y.abs()),
+            false => (force.abs().max_element(), moment.abs().max_element()),
+        }
+    }
+}
+
 /// Whether every rod, coupling and load is its own mirror image.
-fn is_mirrored(scenario: &Scenario) -> bool {
+pub(super) fn is_mirrored(scenario: &Scenario) -> bool {
     let Scenario {
         rods,
         coupling,
@@ -76,6 +126,9 @@ fn are_images(a: &Rod, b: &Rod) -> bool {
 
 /// The state of the half of a leaf in the state `whole`.
 pub fn half_of(half: &Leaf, whole: &State) -> State {
+    if !half.mirrored {
+        return whole.clone();
+    }
     let (rods, n) = (half.rods(), whole.segments());
     let nodes = rods * (n + 1);
     let mut state = State::new(n, whole.x[..nodes].to_vec(), whole.q[..nodes].to_vec());
@@ -89,6 +142,9 @@ pub fn half_of(half: &Leaf, whole: &State) -> State {
 
 /// The state of the whole leaf of which a half is in the state `state`.
 pub fn whole_of(half: &Leaf, state: &State) -> State {
+    if !half.mirrored {
+        return state.clone();
+    }
     let (rods, n) = (half.scenario().rods.len(), state.segments());
     let (mut x, mut q, mut forces) = (Vec::new(), Vec::new(), Vec::new());
     for j in 0..rods {
@@ -132,7 +188,9 @@ mod tests {
 
     fn half(entry: &str) -> bool {
         let scenario = Scenario::from_toml_with(LEAF, "leaf", &[entry.into()]).unwrap();
-        Leaf::new(&scenario).half().is_some()
+        Leaf::new(&scenario)
+            .reduced()
+            .is_some_and(|leaf| leaf.mirrored)
     }
 
     #[test]

@@ -6,6 +6,7 @@ mod chain;
 mod dimensionless;
 mod grid;
 mod mirror;
+mod planar;
 mod sparse;
 mod state;
 mod system;

@@ -337,7 +337,8 @@ fn triangle(
     };
     for (j, rod) in system.rods.iter().enumerate() {
         let at = |i: usize, c: usize| unknowns.at(j, i, c);
-        for (i, block) in rod.chain.diagonal.iter().enumerate() {
+        let chain = rod.matrix.spatial();
+        for (i, block) in chain.diagonal.iter().enumerate() {
             for r in 0..6 {
                 add(at(i, r), at(i, r), shift * rod.mass[i][r / 3]);
                 for c in r..6 {
@@ -345,7 +346,7 @@ fn triangle(
                 }
             }
         }
-        for (i, block) in rod.chain.off.iter().enumerate() {
+        for (i, block) in chain.off.iter().enumerate() {
             for r in 0..6 {
                 for c in 0..6 {
                     add(at(i, r), at(i + 1, c), block[r][c]);

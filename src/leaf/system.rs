@@ -8,7 +8,7 @@
 //! solve with B and one product with the sparse E.
 
 use super::assembly::{DiscreteLeaf, Sums};
-use super::chain::{Chain, Factor, TipFactor};
+use super::chain::{RodMatrix, TipFactor};
 use super::state::{Field, Increment, shift, turn};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -23,8 +23,7 @@ const PARALLEL_NODES: usize = 8192;
 /// All that belongs to one rod.
 #[derive(Clone, Debug)]
 pub(crate) struct RodSystem {
-    pub chain: Chain,
-    pub factor: Factor,
+    pub matrix: RodMatrix,
     /// Nodal masses: rotary, translational.
     pub mass: Vec<[f64; 2]>,
     /// Right-hand side; with a joint tip, the last displacement slot holds
@@ -91,8 +90,7 @@ impl System {
         System {
             rods: (0..rods)
                 .map(|j| RodSystem {
-                    chain: Chain::new(n),
-                    factor: Factor::new(n, joined),
+                    matrix: RodMatrix::new(n, joined, leaf.planar),
                     mass: (1..=n).map(|i| leaf.mass(j, i)).collect(),
                     rhs: zeros(),
                     solution: zeros(),
@@ -127,6 +125,11 @@ impl System {
             },
             moment: DVec3::ZERO,
         }
+    }
+
+    /// Whether its nodes move in space, not only in a plane.
+    pub fn spatial(&self) -> bool {
+        matches!(self.rods[0].matrix, RodMatrix::Spatial(..))
     }
 
     pub(super) fn joined(&self) -> bool {
@@ -170,7 +173,10 @@ impl System {
     /// a moment and a force. What inertia adds in a time step.
     pub fn add(&mut self, j: usize, i: usize, matrix: (DMat3, f64), rhs: (DVec3, DVec3)) {
         let rod = &mut self.rods[j];
-        let (block, increment) = (&mut rod.chain.diagonal[i - 1], &mut rod.rhs[i - 1]);
+        let (block, increment) = (
+            &mut rod.matrix.spatial_mut().diagonal[i - 1],
+            &mut rod.rhs[i - 1],
+        );
         for c in 0..3 {
             for r in 0..3 {
                 block[r][c] += matrix.0.col(c)[r];
@@ -225,7 +231,8 @@ impl System {
         for (j, rod) in self.rods.iter_mut().enumerate() {
             for gap in [j.wrapping_sub(1), j] {
                 if let Some(springs) = self.springs.get(gap) {
-                    for (block, spring) in rod.chain.diagonal.iter_mut().zip(springs) {
+                    for (block, spring) in rod.matrix.spatial_mut().diagonal.iter_mut().zip(springs)
+                    {
                         for c in 0..3 {
                             block[3 + c][3 + c] -= spring[c];
                         }
@@ -324,7 +331,7 @@ impl System {
 
     fn factorize_signed(&mut self, shift: f64, any_sign: bool) -> bool {
         each_rod(self.parallel, &mut self.rods, |_, rod| {
-            let tip = rod.factor.factorize(&rod.chain, shift, &rod.mass, any_sign);
+            let tip = rod.matrix.factorize(shift, &rod.mass, any_sign);
             rod.partial = if tip.is_some() { 1.0 } else { -1.0 };
             if let (Some(tip), Some(last)) = (tip, rod.z.last_mut()) {
                 // Carried to the sum below without allocating.
@@ -467,7 +474,7 @@ impl System {
         let last = self.segments - 1;
         each_rod(self.parallel, &mut self.rods, |_, rod| {
             rod.z.copy_from_slice(&rod.residual);
-            rod.factor.forward(&mut rod.z);
+            rod.matrix.forward(&mut rod.z);
         });
         let mut tip = [0.0; 3];
         if let Some(factor) = self.tip.as_ref().filter(|_| self.joined) {
@@ -484,7 +491,7 @@ impl System {
             if joined {
                 rod.z[last][3..].copy_from_slice(&tip);
             }
-            rod.factor.backward(&mut rod.z);
+            rod.matrix.backward(&mut rod.z);
         });
         tip
     }
@@ -543,8 +550,8 @@ impl System {
         for c in 0..3 {
             rod.z.fill([0.0; 6]);
             rod.z[last][c] = 1.0;
-            rod.factor.forward(&mut rod.z);
-            rod.factor.backward(&mut rod.z);
+            rod.matrix.forward(&mut rod.z);
+            rod.matrix.backward(&mut rod.z);
             for r in 0..3 {
                 columns[(r, c)] = rod.z[last][r];
             }
@@ -557,8 +564,8 @@ impl System {
         let moment = inverse * (skew * turn);
         rod.z.fill([0.0; 6]);
         rod.z[last][..3].copy_from_slice(moment.as_slice());
-        rod.factor.forward(&mut rod.z);
-        rod.factor.backward(&mut rod.z);
+        rod.matrix.forward(&mut rod.z);
+        rod.matrix.backward(&mut rod.z);
         for (solution, z) in rod.solution.iter_mut().zip(&rod.z) {
             for c in 0..6 {
                 solution[c] -= z[c];

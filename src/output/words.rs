@@ -52,12 +52,18 @@ pub fn model(equilibrium: &Equilibrium) -> String {
         false if veins == 1 => "1 vein".into(),
         false => format!("all {veins} veins"),
     }];
+    if model.planar {
+        phrases.push("planar".into());
+    }
     if !equilibrium.segments.is_empty() {
         let grids: Vec<String> = equilibrium.segments.iter().map(usize::to_string).collect();
         phrases.push(format!("{} segments", grids.join("+")));
     }
     if model.rods < veins {
         phrases.push("stable against breaking the mirror".into());
+    }
+    if model.planar {
+        phrases.push("stable out of the plane".into());
     }
     for (effect, what) in [(model.shear, "shear"), (model.stretch, "stretch")] {
         if let Some(effect) = effect {

@@ -78,6 +78,8 @@ pub struct Saddle {
 pub struct Model {
     /// Rods solved for; the others are their mirror images.
     pub rods: usize,
+    /// Whether in their plane, which the leaf does not leave.
+    pub planar: bool,
     /// Largest displacement, in units of length, that would follow from
     /// neglecting shear, to first order, on the coarsest grid.
     pub shear: Option<f64>,

@@ -94,22 +94,22 @@ pub fn relax(
         explicit::check(&leaf, options)?;
     }
     let first = check_segments(&leaf, options.segments, least(options, tolerance))?;
-    let half = match reducible(options) {
-        true => leaf.half(),
+    let reduced = match reducible(options) {
+        true => leaf.reduced(),
         false => None,
     };
     let grid = Grid::new(first, leaf.kinks());
     let mut work = Work::default();
-    if let Some(half) = &half {
-        let mut run = Run::new(half, options, tolerance, progress);
+    if let Some(reduced) = &reduced {
+        let mut run = Run::new(reduced, options, tolerance, progress);
         run.whole = Some(&leaf);
         let end = run.solve(grid.clone());
         if matches!(end, End::Rest | End::NotAccurate) && run.index == Some(0) {
             let run = run.completed(&leaf);
             return Ok(finished(run, end, clock));
         }
-        // The whole leaf has something to say: it moves out of its valley, or
-        // breaks the mirror.
+        // The whole leaf has something to say: it moves out of its valley,
+        // breaks the mirror, or leaves the plane.
         work = run.work;
     }
     let mut run = Run::new(&leaf, options, tolerance, progress);
@@ -143,10 +143,12 @@ pub(super) enum End {
 
 pub(super) struct Run<'a, 'o> {
     pub leaf: &'a Leaf<'a>,
-    /// The whole leaf, if `leaf` is half of it.
+    /// The leaf with all of its unknowns, if `leaf` is half of it or in its plane.
     whole: Option<&'a Leaf<'a>>,
     /// Rods solved for.
     pub solved: usize,
+    /// Whether in their plane.
+    pub planar: bool,
     /// What neglecting shear, and stretch, would change.
     pub effects: [Option<f64>; 2],
     pub options: &'o Options,
@@ -184,6 +186,7 @@ impl<'a, 'o> Run<'a, 'o> {
             leaf,
             whole: None,
             solved: leaf.rods(),
+            planar: leaf.planar(),
             effects: [None; 2],
             options,
             tolerance,
@@ -204,8 +207,8 @@ impl<'a, 'o> Run<'a, 'o> {
 
     /// The run as if it had been one of the whole leaf.
     fn completed(mut self, whole: &'a Leaf<'a>) -> Self {
-        let half = self.leaf;
-        let complete = |level: &Level| complete(half, whole, level);
+        let reduced = self.leaf;
+        let complete = |level: &Level<'a>| complete(reduced, whole, level);
         self.levels = self.levels.iter().map(complete).collect();
         self.between = self.between.as_ref().map(complete);
         self.leaf = whole;

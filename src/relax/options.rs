@@ -40,7 +40,8 @@ pub struct Options {
     /// Whether to stop at a saddle instead of leaving it. Newton's method is
     /// then not steered towards stable equilibria at all.
     pub keep_unstable: bool,
-    /// Whether to solve for the whole leaf where half would do.
+    /// Whether to solve for the whole leaf, in space, where half of it or its
+    /// plane would do.
     pub full_model: bool,
     /// Shooting only: over so many intervals; `None`: as many as the growth of
     /// perturbations needs.

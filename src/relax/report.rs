@@ -71,6 +71,7 @@ pub fn equilibrium(
         saddle: run.saddle,
         model: Model {
             rods: run.solved,
+            planar: run.planar,
             shear: run.effects[0].map(|effect| effect * scale.length),
             stretch: run.effects[1].map(|effect| effect * scale.length),
         },

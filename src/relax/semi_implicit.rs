@@ -122,6 +122,9 @@ pub struct Relaxation<'a> {
     pub deadline: Option<Instant>,
     /// Whether to give up at once if the leaf has to move.
     pub convex_only: bool,
+    /// Of a leaf in its plane: room for its matrix in space, which must be positive
+    /// definite wherever that in the plane is, lest the leaf in space move.
+    pub space: Option<System>,
     /// Whether the leaf had to move: its energy was not convex on the way.
     pub moved: bool,
 }
@@ -167,6 +170,7 @@ impl Relaxation<'_> {
     /// Newton's method in the mixed form, for a leaf that is nearly at rest.
     fn newton(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Settled {
         let mut next = self.state.clone();
+        let space = self.space.is_some().then(|| leaf.in_space());
         let (mut stiffening, neutral) = (0.0, leaf.neutral_shift());
         let mut previous = f64::INFINITY;
         for step in 0..STIFF_ITERATIONS {
@@ -177,7 +181,10 @@ impl Relaxation<'_> {
             }
             let tolerance = cg_tolerance(previous, self.cg_tolerance);
             loop {
-                if self.solve_shifted(system, neutral + stiffening, None, tolerance) {
+                let shift = neutral + stiffening;
+                if self.convex_in_space(space.as_ref(), shift)
+                    && self.solve_shifted(system, shift, None, tolerance)
+                {
                     break;
                 }
                 stiffening = (4.0 * stiffening).max(FIRST_STIFFENING);
@@ -224,6 +231,7 @@ impl Relaxation<'_> {
         let mut growth = MAX_GROWTH;
         let mut resting = false;
         let mut previous = f64::INFINITY;
+        let space = self.space.is_some().then(|| leaf.in_space());
         let mut sums = leaf.assemble(&self.state, system);
         self.work.force_evaluations += 1;
 
@@ -234,7 +242,7 @@ impl Relaxation<'_> {
             // A positive definite matrix and its solution, with as long a time
             // step as it takes.
             let tolerance = cg_tolerance(previous, self.cg_tolerance);
-            while !self.solve(leaf, system, dt, &velocity, tolerance) {
+            while !self.solve(leaf, space.as_ref(), system, dt, &velocity, tolerance) {
                 if resting {
                     return Settled::Saddle;
                 }
@@ -311,6 +319,7 @@ impl Relaxation<'_> {
     fn solve(
         &mut self,
         leaf: &DiscreteLeaf,
+        space: Option<&DiscreteLeaf>,
         system: &mut System,
         dt: f64,
         velocity: &[Vec<Increment>],
@@ -322,7 +331,19 @@ impl Relaxation<'_> {
         } else {
             leaf.neutral_shift()
         };
-        self.solve_shifted(system, shift, inertia, tolerance)
+        self.convex_in_space(space, shift) && self.solve_shifted(system, shift, inertia, tolerance)
+    }
+
+    /// Whether K + `shift` M of `leaf`, the one in space, is positive definite
+    /// rod by rod: then the leaf takes the step in its plane that it takes in space.
+    fn convex_in_space(&mut self, leaf: Option<&DiscreteLeaf>, shift: f64) -> bool {
+        let (Some(leaf), Some(system)) = (leaf, &mut self.space) else {
+            return true;
+        };
+        leaf.assemble(&self.state, system);
+        self.work.force_evaluations += 1;
+        self.work.factorizations += 1;
+        system.factorize(shift)
     }
 
     /// Factorises K + `shift` M and solves, rod by rod, or directly from when
@@ -350,6 +371,9 @@ impl Relaxation<'_> {
                 }
                 Solved::TooSlow(iterations) => {
                     self.work.cg_iterations += iterations;
+                    if !system.spatial() {
+                        return false;
+                    }
                     self.work.factorizations += 1;
                     self.direct = SparsePattern::new(system).ok();
                 }

@@ -14,7 +14,8 @@ const LOOSE: f64 = 1e-3;
 /// tolerance may come to.
 pub const COARSEST_TURN: f64 = 0.8;
 
-/// Whether half of a leaf may be solved for the whole: where the way to rest
+/// Whether half of a leaf, or the leaf in its plane, may be solved for the
+/// whole: where the way to rest
 /// is Newton's, which knows no other way than the shape it starts from.
 pub fn reducible(options: &Options) -> bool {
     options.method == Method::SemiImplicit

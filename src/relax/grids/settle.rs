@@ -146,6 +146,8 @@ impl<'a> Run<'a, '_> {
                 most_evaluations: begun + allowed,
                 deadline: self.options.deadline,
                 convex_only,
+                space: (leaf.planar() && self.levels.is_empty())
+                    .then(|| System::new(&leaf.in_space())),
                 moved: false,
             };
             let before = relaxation.work.force_evaluations;

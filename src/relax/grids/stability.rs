@@ -80,11 +80,14 @@ impl<'a> Run<'a, '_> {
     }
 }
 
-/// The whole leaf of which half is settled.
-pub fn complete<'a>(half: &Leaf, whole: &'a Leaf<'a>, level: &Level) -> Level<'a> {
+/// The leaf with all of its unknowns, of which `reduced` is settled.
+pub fn complete<'a>(reduced: &Leaf, whole: &'a Leaf<'a>, level: &Level<'a>) -> Level<'a> {
     Level {
-        leaf: DiscreteLeaf::new(whole, level.leaf.grid.clone()),
-        state: whole_of(half, &level.state),
+        leaf: match reduced.rods() == whole.rods() {
+            true => level.leaf.seen_as(whole),
+            false => DiscreteLeaf::new(whole, level.leaf.grid.clone()),
+        },
+        state: whole_of(reduced, &level.state),
     }
 }
 

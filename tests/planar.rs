@@ -1,0 +1,306 @@
+//! A leaf that nothing pulls out of its plane is solved there, with the result
+//! of the leaf in space; where it leaves the plane, or moves out of its valley,
+//! the leaf in space takes over.
+
+mod common;
+#[path = "common/random.rs"]
+mod random;
+
+use common::scenario;
+use glam::{DMat3, DVec2, DVec3};
+use leafdyn::relax::{Equilibrium, Options, Outcome, Work, relax};
+use leafdyn::rod::{Ends, PlanarSegment, Section, Segment};
+use leafdyn::rotation;
+use leafdyn::scenario::{Profile, Scenario};
+use leafdyn::shape::Difference;
+use proptest::prelude::*;
+
+fn rest(scenario: &Scenario, full_model: bool, segments: Option<usize>) -> Equilibrium {
+    let options = Options {
+        full_model,
+        segments,
+        ..Options::default()
+    };
+    relax(scenario, &options, &mut |_| {}).unwrap()
+}
+
+fn fig05(entries: &[&str]) -> Scenario {
+    let entries: Vec<String> = entries.iter().map(|&entry| entry.into()).collect();
+    scenario("paper/fig05", &entries)
+}
+
+/// What acts within the plane on a random leaf.
+fn in_plane(mut leaf: Scenario) -> Scenario {
+    leaf.gravity[2] = 0.0;
+    leaf.tip_force[2] = 0.0;
+    for rod in &mut leaf.rods {
+        rod.rest_curvature[0] = Profile::Constant(0.0);
+        rod.rest_curvature[1] = Profile::Constant(0.0);
+    }
+    leaf
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_leaf_in_its_plane_is_the_leaf(leaf in random::leaves()) {
+        let leaf = in_plane(leaf);
+        let segments = Some(20);
+        let (planar, full) = (rest(&leaf, false, segments), rest(&leaf, true, segments));
+        prop_assert_eq!(planar.outcome, full.outcome);
+        prop_assert!(!full.model.planar);
+        prop_assert_eq!(planar.negative_eigenvalues, full.negative_eigenvalues);
+        prop_assume!(full.outcome.is_success());
+        let scale = common::scale(&leaf);
+        let apart = Difference::between(&planar.rods, &full.rods);
+        prop_assert!(apart.position < 1e-10 * scale.length, "{:?}", apart);
+        // Ends that differ by so much turn a segment of a twentieth by so much more.
+        prop_assert!(apart.rotation < 20.0 * 1e-10, "{:?}", apart);
+        prop_assert!(apart.force < 1e-6 * scale.force(), "{:?}", apart);
+        prop_assert!(apart.moment < 1e-7 * scale.moment(), "{:?}", apart);
+        let energy = planar.energy - full.energy;
+        prop_assert!(energy.abs() < 1e-10 * scale.moment() * (1.0 + full.energy.abs()));
+        // Nothing is told of the plane that is not so.
+        if planar.model.planar {
+            let nodes = || full.rods.iter().flat_map(|rod| &rod.nodes);
+            prop_assert!(nodes().all(|node| node.position.z == 0.0));
+        }
+    }
+
+    #[test]
+    fn the_element_is_that_in_space(
+        ds in 0.05..0.5_f64,
+        stiffness in prop::array::uniform3(0.1..5.0_f64),
+        u0 in -2.0..2.0_f64,
+        stretch in 0.7..1.3_f64,
+        compliance in prop::array::uniform3(0.001..0.5_f64),
+        softer in prop::array::uniform3(0.1..1.0_f64),
+        dx in prop::array::uniform2(-0.5..0.5_f64),
+        start in -4.0..4.0_f64,
+        angle in prop_oneof![-0.3..0.3_f64, -3.0..3.0_f64],
+        n in prop::array::uniform2(-5.0..5.0_f64),
+        flip in prop::bool::ANY,
+    ) {
+        let compliance = DVec3::from_array(compliance);
+        let section = Section {
+            ds,
+            couple_stiffness: DVec3::from_array(stiffness),
+            rest_curvature: u0 * DVec3::Z,
+            rest_strain: stretch * DVec3::X,
+            compliance,
+            condensing: DVec3::from_array(softer) / compliance,
+        };
+        let (q0, q1) = (rotation::exp(start * DVec3::Z), rotation::exp((start + angle) * DVec3::Z));
+        let dx = DVec2::from_array(dx).extend(0.0);
+        let n = DVec2::from_array(n).extend(0.0);
+        let ends = Ends { x: [DVec3::ZERO, dx], q: [q0, if flip { -q1 } else { q1 }] };
+        let full = Segment::new(&section, &ends, n);
+        let planar = PlanarSegment::new(&section, ends.x, ends.q, n);
+        // Rounding, of numbers of the size of the largest entry.
+        let (stiff, force) = (full.hessian(&section), full.condensed_gradient(&section));
+        let entries = |k: &DMat3| k.to_cols_array().iter().fold(0.0_f64, |m, k| m.max(k.abs()));
+        let largest = 1.0 + entries(&stiff.xx).max(entries(&stiff.xa)).max(entries(&stiff.aa));
+        let equal = |a: f64, b: f64| (a - b).abs() < 1e-13 * largest;
+
+        let energies = (section.planar_strain_energy(&planar), section.strain_energy(&full));
+        prop_assert!((energies.0 - energies.1).abs() < 1e-12 * (1.0 + energies.1));
+        prop_assert!(equal(planar.turn(), full.turn()));
+        for (ours, (g_x, g_a, g_b)) in [
+            (planar.condensed_gradient(&section), force),
+            (
+                planar.stiffening_gradient(&section, DVec3::X),
+                full.stiffening_gradient(&section, DVec3::X),
+            ),
+        ] {
+            prop_assert!(equal(ours.x.x, g_x.x) && equal(ours.x.y, g_x.y));
+            prop_assert!(equal(ours.turn[0], g_a.z) && equal(ours.turn[1], g_b.z));
+        }
+        let ours = planar.hessian(&section);
+        for (column, theirs) in [(ours.xx.x_axis, stiff.xx.x_axis), (ours.xx.y_axis, stiff.xx.y_axis)] {
+            prop_assert!(equal(column.x, theirs.x) && equal(column.y, theirs.y));
+        }
+        for theirs in [stiff.xa.z_axis, stiff.xb.z_axis] {
+            prop_assert!(equal(ours.xt.x, theirs.x) && equal(ours.xt.y, theirs.y));
+        }
+        prop_assert!(equal(ours.same, stiff.aa.z_axis.z) && equal(ours.same, stiff.bb.z_axis.z));
+        prop_assert!(equal(ours.across, stiff.ab.z_axis.z));
+        let (step, a, b) = (DVec2::new(0.3, -0.2), 0.7, -0.4);
+        let ours = planar.force_increment(&section, step, 0.5 * (a + b));
+        let theirs = full.force_increment(&section, step.extend(0.0), a * DVec3::Z, b * DVec3::Z);
+        prop_assert!(equal(ours.x, theirs.x) && equal(ours.y, theirs.y));
+    }
+}
+
+/// The leaf of Fig. 5 lies flat: half of its unknowns, all of its Newton steps,
+/// and five looks at its matrix in space, at the four steps on the coarsest grid
+/// and at rest.
+#[test]
+fn the_paper_s_flat_leaf_is_found_in_its_plane() {
+    for (rods, work) in [
+        (5, [8, 13, 16, 34]),
+        (21, [8, 13, 16, 36]),
+        (35, [8, 13, 16, 35]),
+    ] {
+        let leaf = fig05(&[&format!("leaf.rods={rods}")]);
+        let (planar, full) = (rest(&leaf, false, None), rest(&leaf, true, None));
+        assert!(planar.model.planar && !full.model.planar);
+        assert_eq!(planar.outcome, Outcome::Converged);
+        assert_eq!(planar.segments, full.segments);
+        let [steps, factorizations, force_evaluations, cg_iterations] = work;
+        let counted = Work {
+            steps,
+            factorizations,
+            force_evaluations,
+            cg_iterations,
+        };
+        assert_eq!(planar.work, counted, "{rods} rods");
+        assert_eq!(planar.work.steps, full.work.steps);
+        assert_eq!(planar.work.cg_iterations, full.work.cg_iterations);
+        let apart = Difference::between(&planar.rods, &full.rods);
+        assert!(
+            apart.position < 1e-13 && apart.rotation < 1e-12,
+            "{apart:?}"
+        );
+        for (a, b) in [
+            (planar.model.shear, full.model.shear),
+            (planar.model.stretch, full.model.stretch),
+        ] {
+            assert!((a.unwrap() - b.unwrap()).abs() < 1e-12);
+        }
+    }
+}
+
+/// Half of the leaf in its plane, where it is its own mirror image, too.
+#[test]
+fn both_reductions_go_together() {
+    for (rods, solved) in [(2, 1), (4, 2), (5, 3), (21, 11)] {
+        let leaf = fig05(&[&format!("leaf.rods={rods}"), "leaf.fan='symmetric'"]);
+        let (both, full) = (rest(&leaf, false, Some(16)), rest(&leaf, true, Some(16)));
+        assert!(both.model.planar);
+        assert_eq!(both.model.rods, solved);
+        let apart = Difference::between(&both.rods, &full.rods);
+        assert!(apart.position < 1e-10, "{rods}: {apart:?}");
+    }
+}
+
+/// Flat leaves that are equilibria, and not what the leaf does: pulled sideways
+/// edge-on, pushed back at the tip, bent at rest against each other.
+#[test]
+fn a_leaf_that_buckles_out_of_its_plane_is_followed() {
+    let soft = [
+        "leaf.rods=3",
+        "stiffness.bending_2=0.05",
+        "stiffness.torsion=0.05",
+        "stiffness.axial=100",
+        "stiffness.shear_2=100",
+        "stiffness.shear_3=100",
+        "coupling.z=0",
+    ];
+    for (what, fan, entries) in [
+        (
+            "lateral",
+            "paper",
+            &["stiffness.bending_3=5", "load.tip_force=[0, -4, 0]"][..],
+        ),
+        (
+            "weight",
+            "paper",
+            &["stiffness.bending_3=5", "load.gravity=[0, -6, 0]"],
+        ),
+        (
+            "pushed",
+            "symmetric",
+            &["stiffness.bending_3=2", "load.tip_force=[-2, 0, 0]"],
+        ),
+        (
+            "bent",
+            "paper",
+            &["stiffness.bending_3=5", "rest.bend_3=[3, 0, -3]"],
+        ),
+    ] {
+        let fan = format!("leaf.fan='{fan}'");
+        let leaf = fig05(&[&soft, entries, &[&fan]].concat());
+        for segments in [Some(16), None] {
+            let (found, full) = (rest(&leaf, false, segments), rest(&leaf, true, segments));
+            assert!(found.outcome.is_success(), "{what}: {:?}", found.outcome);
+            assert_eq!(found.outcome, full.outcome, "{what}");
+            assert_eq!(found.negative_eigenvalues, Some(0), "{what}");
+            assert!(!found.model.planar, "{what}");
+            let nodes = || found.rods.iter().flat_map(|rod| &rod.nodes);
+            let lift = nodes().fold(0.0_f64, |most, node| most.max(node.position.z.abs()));
+            assert!(lift > 0.05, "{what}: {lift}");
+            let apart = Difference::between(&found.rods, &full.rods);
+            assert!(apart.position < 1e-12, "{what}: {apart:?}");
+        }
+        // Stiff enough, the same leaf stays flat.
+        let stiff = ["stiffness.bending_2=50", "stiffness.torsion=50"];
+        let leaf = fig05(&[&soft, entries, &[&fan], &stiff[..]].concat());
+        assert!(rest(&leaf, false, None).model.planar, "{what}");
+    }
+}
+
+/// Flat at rest this leaf is stable, but not on its way there: in space it
+/// leaves the plane and comes to rest elsewhere. The answer is that in space.
+#[test]
+fn a_flat_valley_that_the_leaf_does_not_come_to_is_not_told() {
+    let leaf = common::parse(
+        r#"
+        name = "two_valleys"
+        leaf = { rods = 2, length = [1.1602764955215343, 1.162438327833955], fan = [-0.07237179647058896, 1.039812713018257] }
+        stiffness.torsion = { at = [0.0, 0.3512142618678161, 1.0], value = [0.1284452439112738, 0.14359498887548044, 0.07706714634676427] }
+        stiffness.bending_2 = 0.7830801094214045
+        stiffness.bending_3 = 0.38309378941088756
+        stiffness.axial = inf
+        stiffness.shear_2 = 74.7976509039849
+        stiffness.shear_3 = 67.26264986497492
+        coupling = { x = 1.2701123121090474, y = 0.9544600194057796, z = 1.1053997707532524 }
+        load = { gravity = [-0.27481151713278484, -0.3020747217601999, 0.0], tip_force = [-0.9125959227821634, -0.61559480013023, 0.0] }
+        [rest.bend_3]
+        at = [0.0, 0.3512142618678161, 1.0]
+        value = [[1.3714156700735378, 1.533170181247829, 0.8228494020441227], [1.0032007292937608, 1.1215253533429401, 0.6019204375762565]]
+    "#,
+    );
+    let (found, full) = (rest(&leaf, false, Some(20)), rest(&leaf, true, Some(20)));
+    assert!(!found.model.planar);
+    assert_eq!(found.outcome, full.outcome);
+    let apart = Difference::between(&found.rods, &full.rods);
+    assert!(apart.position < 1e-12, "{apart:?}");
+    assert!(full.tips[0].z.abs() > 0.05, "{}", full.tips[0]);
+    let options = Options {
+        keep_unstable: true,
+        segments: Some(20),
+        ..Options::default()
+    };
+    let flat = relax(&leaf, &options, &mut |_| {}).unwrap();
+    assert_eq!(flat.tips[0].z, 0.0);
+    assert_eq!(flat.negative_eigenvalues, Some(0));
+}
+
+/// What acts out of the plane, however little, and what may: a start that is
+/// not flat, a saddle that is kept.
+#[test]
+fn other_leaves_are_solved_in_space() {
+    for entry in [
+        "load.gravity=[0, 0, 1e-9]",
+        "load.tip_force=[0, 0, 1e-9]",
+        "rest.bend_2=1e-9",
+        "rest.twist=1e-9",
+    ] {
+        let leaf = fig05(&["leaf.rods=3", entry]);
+        assert!(!rest(&leaf, false, Some(8)).model.planar, "{entry}");
+    }
+    let leaf = fig05(&["leaf.rods=3"]);
+    for options in [
+        Options {
+            keep_unstable: true,
+            ..Options::default()
+        },
+        Options {
+            disturbance: Some(1),
+            ..Options::default()
+        },
+    ] {
+        assert!(!relax(&leaf, &options, &mut |_| {}).unwrap().model.planar);
+    }
+}
