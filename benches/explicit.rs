@@ -9,7 +9,7 @@ use std::path::Path;
 use std::time::Instant;
 
 /// Veins and segments a vein.
-const LEAVES: [(usize, usize); 8] = [
+const LEAVES: [(usize, usize); 9] = [
     (1, 50),
     (1, 100),
     (1, 1000),
@@ -18,6 +18,7 @@ const LEAVES: [(usize, usize); 8] = [
     (35, 100),
     (35, 200),
     (35, 400),
+    (35, 2000),
 ];
 
 /// Segments times steps of one measurement: some tens of milliseconds.

@@ -6,9 +6,9 @@
 //! about the plane's normal. A joint tip stays in the plane, too. Of the gap
 //! across the plane, if N is even, only the coupling along y is ever stretched.
 
-use super::assembly::DiscreteLeaf;
 use super::chain::{Chain, first};
 use super::dimensionless::Leaf;
+use super::discrete::DiscreteLeaf;
 use super::state::{Increment, State};
 use crate::scenario::{Profile, Rod, Scenario};
 use glam::{DQuat, DVec3};

@@ -4,6 +4,7 @@
 mod assembly;
 mod chain;
 mod dimensionless;
+mod discrete;
 mod grid;
 mod mirror;
 mod planar;
@@ -11,8 +12,9 @@ mod sparse;
 mod state;
 mod system;
 
-pub use assembly::{DiscreteLeaf, Loads, Sums};
+pub use assembly::Sums;
 pub use dimensionless::{Leaf, Scale};
+pub use discrete::{DiscreteLeaf, Loads};
 pub use grid::Grid;
 pub use mirror::{half_of, whole_of};
 pub use sparse::{Bordered, SparseError, SparseFactor, SparsePattern};

@@ -5,9 +5,10 @@
 //! there is for the full matrix to say. Coupling along z, torsion, and bending
 //! about d2 do nothing as long as it does.
 
-use super::assembly::{DiscreteLeaf, Sums};
+use super::assembly::Sums;
 use super::chain::{Block, Chain, PLANAR};
 use super::dimensionless::Leaf;
+use super::discrete::DiscreteLeaf;
 use super::state::{Increment, State, shift};
 use super::system::System;
 use crate::rod::{PlanarBlocks, PlanarGradient, PlanarSegment};

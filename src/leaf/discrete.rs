@@ -1,0 +1,244 @@
+//! The discretised leaf: its segments, loads and coupling.
+
+use super::dimensionless::Leaf;
+use super::grid::Grid;
+use super::state::State;
+use crate::rod::{Ends, Section, Segment};
+use glam::DVec3;
+
+/// Radius of gyration of a vein with the tissue it carries, in units of the
+/// leaf's length: its rotary inertia per unit length and mass is the square.
+/// A thin rod's own is smaller, but a vein turns with its strip of blade.
+const RADIUS_OF_GYRATION: f64 = 0.1;
+
+/// A leaf on a grid.
+#[derive(Clone, Debug)]
+pub struct DiscreteLeaf<'a> {
+    /// The leaf.
+    pub leaf: &'a Leaf<'a>,
+    /// Its grid.
+    pub grid: Grid,
+    /// Sections of all segments, rod after rod.
+    pub sections: Vec<Section>,
+    /// Coupling of each gap, per unit of sigma; the last may be the one between
+    /// a rod and its image.
+    coupling: Vec<DVec3>,
+    /// Trapezoidal weights of the nodes as fractions of the length.
+    weights: Vec<f64>,
+    /// Part of the loads that acts: one, but on the way to a dead moment.
+    pub load_factor: f64,
+    /// The loads.
+    pub loads: Loads,
+    /// Whether this is half of a leaf that is its own mirror image.
+    pub(super) mirrored: bool,
+    /// Whether it is solved in its plane.
+    pub(super) planar: bool,
+}
+
+/// Dead loads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Loads {
+    /// Gravity per unit length.
+    pub gravity: DVec3,
+    /// Force on the joint tip, or on every free one.
+    pub tip_force: DVec3,
+    /// Moment on the tip of a single rod.
+    pub tip_moment: DVec3,
+}
+
+impl<'a> DiscreteLeaf<'a> {
+    /// Discretises `leaf` on `grid`.
+    pub fn new(leaf: &'a Leaf<'a>, grid: Grid) -> Self {
+        let n = grid.segments();
+        let sections = (0..leaf.rods())
+            .flat_map(|j| (0..n).map(move |i| (j, i)))
+            .map(|(j, i)| leaf.section(j, grid.middle(i), grid.width(i)))
+            .collect();
+        let gaps = leaf.rods() - usize::from(!leaf.beside_image(leaf.rods() - 1));
+        let coupling = (0..gaps).map(|g| leaf.coupling(g)).collect();
+        let weights = (0..=n).map(|i| grid.weight(i)).collect();
+        DiscreteLeaf {
+            leaf,
+            grid,
+            sections,
+            coupling,
+            weights,
+            load_factor: 1.0,
+            loads: Loads {
+                gravity: leaf.gravity,
+                tip_force: leaf.tip_force,
+                tip_moment: leaf.tip_moment,
+            },
+            mirrored: leaf.mirrored,
+            planar: leaf.planar,
+        }
+    }
+
+    /// The same rods, all of them, seen as those of `leaf`.
+    pub fn seen_as(&self, leaf: &'a Leaf<'a>) -> Self {
+        DiscreteLeaf {
+            leaf,
+            planar: leaf.planar,
+            ..self.clone()
+        }
+    }
+
+    /// The same, in space if it was in its plane.
+    pub fn in_space(&self) -> Self {
+        DiscreteLeaf {
+            planar: false,
+            ..self.clone()
+        }
+    }
+
+    /// The smallest compliance of any segment, in units of L^2/A.
+    pub fn stiffest(&self) -> f64 {
+        self.sections
+            .iter()
+            .fold(f64::INFINITY, |m, s| m.min(s.compliance.min_element()))
+    }
+
+    /// The same leaf with no compliance below `floor`.
+    pub fn softened(&self, floor: f64) -> Self {
+        let mut soft = self.clone();
+        let n = self.segments();
+        for (k, section) in soft.sections.iter_mut().enumerate() {
+            let floor = floor / self.leaf.share(k / n);
+            section.compliance = section.compliance.max(DVec3::splat(floor));
+            section.condensing = section.condensing.min(DVec3::splat(1.0 / floor));
+        }
+        soft
+    }
+
+    /// A shift of the matrix (times the mass matrix) that is far below the
+    /// squared frequency of any bending mode, and above what rounding and
+    /// unfinished iterations make of a neutral mode's zero.
+    pub fn neutral_shift(&self) -> f64 {
+        let stiffest = self
+            .sections
+            .iter()
+            .fold(0.0_f64, |m, s| m.max(s.condensing.max_element()));
+        let rounding = f64::EPSILON * stiffest * (self.segments() * self.segments()) as f64;
+        1e-7 + 4.0 * rounding
+    }
+
+    /// Segments per rod.
+    pub fn segments(&self) -> usize {
+        self.grid.segments()
+    }
+
+    /// Number of rods.
+    pub fn rods(&self) -> usize {
+        self.leaf.rods()
+    }
+
+    /// Whether the rods feel each other other than through the tip.
+    pub fn coupled(&self) -> bool {
+        let between = self.coupling.iter().take(self.rods() - 1);
+        between.into_iter().any(|&k| k != DVec3::ZERO)
+    }
+
+    /// Coupling of gap `g` at node `i`, force per displacement; none at a
+    /// joint tip, which all rods share.
+    pub(crate) fn spring(&self, g: usize, i: usize) -> DVec3 {
+        if self.leaf.joined() && i == self.segments() {
+            DVec3::ZERO
+        } else {
+            self.coupling[g] * self.weights[i]
+        }
+    }
+
+    /// Dead moment on the tip of a single rod.
+    pub fn tip_moment(&self) -> DVec3 {
+        if self.rods() == 1 {
+            self.loads.tip_moment * self.load_factor
+        } else {
+            DVec3::ZERO
+        }
+    }
+
+    /// Mass of node `i` of rod `j` at unit density: rotary, translational.
+    pub(super) fn mass(&self, j: usize, i: usize) -> [f64; 2] {
+        let mass = self.weights[i] * self.leaf.length(j) * self.leaf.share(j);
+        [RADIUS_OF_GYRATION * RADIUS_OF_GYRATION * mass, mass]
+    }
+
+    /// Segment `i` of rod `j` in `state`, carrying the force `n`.
+    pub fn segment(&self, state: &State, j: usize, i: usize, n: DVec3) -> Segment {
+        let k = state.base(j) + i;
+        let ends = Ends {
+            x: [state.x[k], state.x[k + 1]],
+            q: [state.q[k], state.q[k + 1]],
+        };
+        Segment::new(self.section(j, i), &ends, n)
+    }
+
+    /// Section of segment `i` of rod `j`.
+    #[inline]
+    pub fn section(&self, j: usize, i: usize) -> &Section {
+        &self.sections[j * self.segments() + i]
+    }
+
+    /// Dead load and coupling on node `i` of rod `j`, and its share of the
+    /// potential energy (a gap's belongs to its lower rod). The tip force acts
+    /// on every free tip, and once on a joint one, through the first rod.
+    #[inline]
+    pub fn load(&self, state: &State, j: usize, i: usize) -> (DVec3, f64) {
+        let k = state.base(j) + i;
+        let x = state.x[k];
+        let share = self.leaf.share(j);
+        let weight = self.load_factor * self.weights[i] * self.leaf.length(j) * share;
+        let mut force = self.loads.gravity * weight;
+        if i == self.segments() && (j == 0 || !self.leaf.joined()) {
+            let share = match self.leaf.joined() && self.mirrored {
+                true => 0.5,
+                false => share,
+            };
+            force += share * self.load_factor * self.loads.tip_force;
+        }
+        let mut energy = -force.dot(x);
+        if self.leaf.beside_image(j) {
+            let pull = -2.0 * self.spring(j, i).y * x.y;
+            force.y += pull;
+            energy -= 0.5 * pull * x.y;
+        }
+        if j > 0 {
+            force += self.spring(j - 1, i) * (state.x[k - self.segments() - 1] - x);
+        }
+        if j + 1 < self.rods() {
+            let stretch = state.x[k + self.segments() + 1] - x;
+            let pull = self.spring(j, i) * stretch;
+            force += pull;
+            energy += 0.5 * pull.dot(stretch);
+        }
+        (force, energy)
+    }
+
+    /// Potential energy of the dead loads in a state.
+    pub fn potential(&self, state: &State) -> f64 {
+        let nodes = (0..self.rods()).flat_map(|j| (0..=self.segments()).map(move |i| (j, i)));
+        nodes
+            .map(|(j, i)| self.load(state, j, i).1 - self.coupling_energy(state, j, i))
+            .sum()
+    }
+
+    /// Energy of the coupling of node `i` of rod `j` to the next rod.
+    pub fn coupling_energy(&self, state: &State, j: usize, i: usize) -> f64 {
+        if j + 1 == self.rods() {
+            return 0.0;
+        }
+        let k = state.base(j) + i;
+        let stretch = state.x[k + self.segments() + 1] - state.x[k];
+        0.5 * stretch.dot(self.spring(j, i) * stretch)
+    }
+
+    /// Sets all rest curvatures to the leaf's times `factor`.
+    pub fn set_rest(&mut self, factor: f64) {
+        let n = self.segments();
+        for (k, section) in self.sections.iter_mut().enumerate() {
+            let (j, i) = (k / n, k % n);
+            let own = (self.leaf).section(j, self.grid.middle(i), self.grid.width(i));
+            section.rest_curvature = factor * own.rest_curvature;
+        }
+    }
+}
