@@ -3,6 +3,7 @@
 use crate::leaf::DiscreteLeaf;
 use crate::relax::equilibrium::{Equilibrium, Model, Outcome};
 use crate::relax::grids::{End, Level, Run};
+use crate::relax::options::Method;
 use crate::relax::prolong::lagrange;
 use crate::relax::richardson::Richardson;
 use crate::relax::semi_implicit::Settled;
@@ -259,6 +260,9 @@ pub fn outcome(run: &Run, end: End) -> (Outcome, Option<String>) {
             Some(match settled {
                 Settled::StepLimit if run.late() => format!(
                     "the time allowed was over before rest on {finest} segments: allow more"
+                ),
+                Settled::StepLimit if run.options.method == Method::Explicit => format!(
+                    "the step limit came before rest on {finest} segments: use fewer, or the semi-implicit method"
                 ),
                 Settled::Unresolved => format!(
                     "a vein bends by more than a right angle within one of {finest} segments: use more segments or smaller loads"
