@@ -8,7 +8,7 @@ use crate::motion::method::{Broken, Method, Snapshot, Velocity};
 const NO_TIME: f64 = 1e-9;
 
 /// Steps between looks at the energy.
-const WATCHED: usize = 500;
+const WATCHED: usize = 200;
 
 impl Explicit<'_> {
     fn judge(&mut self) -> Result<(), Broken> {
