@@ -157,3 +157,30 @@ fn of_random_leaves() {
     // hundreds.
     verdict.assert("random", 5);
 }
+
+/// Where the shape is told only after more grids, as of a saddle that is kept,
+/// a grid between the finest two does not stay among them.
+#[test]
+fn of_a_saddle_that_is_kept() {
+    let pushed = |k: usize| vec![format!("load.tip_force=[-{k}, 0, 0]")];
+    for (k, tolerance) in (4..9).flat_map(|k| [1e-6, 1e-7, 3e-8, 1e-8].map(|t| (k, t))) {
+        let scenario = Scenario::read(&path("classic/lens_30"), &pushed(k)).unwrap();
+        let solve = |tolerance| {
+            let options = Options {
+                tolerance: Some(tolerance),
+                keep_unstable: true,
+                ..Options::default()
+            };
+            relax(&scenario, &options, &mut |_| {}).unwrap()
+        };
+        let (truth, saddle) = (solve(1e-10), solve(tolerance));
+        let grids = &saddle.segments;
+        assert!(grids.is_sorted(), "{k}, {tolerance:e}: {grids:?}");
+        let [estimate, uncertain] = [&saddle, &truth].map(|leaf| leaf.error_estimate.unwrap());
+        let error = distance(&saddle, &truth);
+        assert!(
+            error <= estimate + uncertain,
+            "{k}, {tolerance:e}: {error:e}, {estimate:e}"
+        );
+    }
+}

@@ -346,7 +346,9 @@ impl<'a, 'o> Run<'a, 'o> {
         self.options.segments.is_none() && segments < COARSEST
     }
 
+    /// Adds the next finer grid.
     fn push(&mut self, level: Level<'a>) {
+        self.drop_between();
         let segments = level.leaf.segments();
         let stride = match self.levels.first() {
             Some(first) => segments / first.leaf.segments(),

@@ -44,10 +44,16 @@ impl<'a> Run<'a, '_> {
         if self.accurate() {
             return true;
         }
-        self.between = None;
-        self.change = None;
-        self.tabulate();
+        self.drop_between();
         false
+    }
+
+    /// Leaves the grid between out, as where refinement goes on.
+    pub(super) fn drop_between(&mut self) {
+        if self.between.take().is_some() {
+            self.change = None;
+            self.tabulate();
+        }
     }
 
     /// The grids that are extrapolated, from coarse to fine.
