@@ -149,8 +149,8 @@ impl<'a> Explicit<'a> {
     }
 
     /// Gives the nodes masses that serve to come to rest, not to move: the
-    /// fastest motions of all segments become alike. Time steps may be as long as one then, and the leaf is
-    /// stopped.
+    /// fastest motions of all segments become alike. Time steps may be as long
+    /// as one then, and the leaf is stopped.
     pub fn disguise(&mut self) {
         let tip = fictitious::masses(&self.leaf, &mut self.rods);
         self.tip_mass = self.tip_mass.map(|_| tip);

@@ -14,22 +14,23 @@ const LOOSE: f64 = 1e-3;
 /// tolerance may come to.
 pub const COARSEST_TURN: f64 = 0.8;
 
-/// Whether half of a leaf, or the leaf in its plane, may be solved for the
-/// whole: where the way to rest
-/// is Newton's, which knows no other way than the shape it starts from.
-pub fn reducible(options: &Options) -> bool {
+/// Whether the leaf settles in the valley it starts in: where the way to rest is
+/// Newton's, nothing keeps it from leaving saddles, and nothing disturbs it.
+fn settles_where_it_starts(options: &Options) -> bool {
     options.method == Method::SemiImplicit
         && !options.keep_unstable
-        && !options.full_model
         && options.disturbance.is_none()
+}
+
+/// Whether half of a leaf, or the leaf in its plane, may be solved for the
+/// whole.
+pub fn reducible(options: &Options) -> bool {
+    settles_where_it_starts(options) && !options.full_model
 }
 
 /// Segments of the coarsest grid, unless a leaf needs more.
 pub fn least(options: &Options, tolerance: f64) -> usize {
-    let settles = options.method == Method::SemiImplicit
-        && !options.keep_unstable
-        && options.disturbance.is_none();
-    match settles && tolerance >= LOOSE {
+    match settles_where_it_starts(options) && tolerance >= LOOSE {
         true => COARSEST_OF_LOOSE,
         false => COARSEST,
     }
