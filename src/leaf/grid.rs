@@ -9,6 +9,8 @@
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     sigma: Vec<f64>,
+    /// Those of one panel to the last bit alike, as differences of sigma are not.
+    widths: Vec<f64>,
 }
 
 impl Grid {
@@ -30,12 +32,16 @@ impl Grid {
                 .expect("at least one panel");
             counts[longest] += 1;
         }
-        let mut sigma = vec![0.0];
+        let (mut sigma, mut each) = (vec![0.0], Vec::new());
         for ((start, width), count) in edges.iter().zip(&widths).zip(&counts) {
             sigma.extend((1..=*count).map(|i| start + width * i as f64 / *count as f64));
+            each.extend(std::iter::repeat_n(width / *count as f64, *count));
         }
         *sigma.last_mut().expect("at least one node") = 1.0;
-        Grid { sigma }
+        Grid {
+            sigma,
+            widths: each,
+        }
     }
 
     /// The same grid with every segment halved.
@@ -45,18 +51,26 @@ impl Grid {
             sigma.extend([pair[0], 0.5 * (pair[0] + pair[1])]);
         }
         sigma.push(1.0);
-        Grid { sigma }
+        let widths = self.widths.iter().flat_map(|width| [0.5 * width; 2]);
+        Grid {
+            sigma,
+            widths: widths.collect(),
+        }
     }
 
     /// The same grid with every segment cut in three.
     pub fn tripled(&self) -> Self {
         let mut sigma = Vec::with_capacity(3 * self.sigma.len() - 2);
-        for pair in self.sigma.windows(2) {
-            let third = (pair[1] - pair[0]) / 3.0;
+        for (pair, width) in self.sigma.windows(2).zip(&self.widths) {
+            let third = width / 3.0;
             sigma.extend([pair[0], pair[0] + third, pair[1] - third]);
         }
         sigma.push(1.0);
-        Grid { sigma }
+        let widths = self.widths.iter().flat_map(|width| [width / 3.0; 3]);
+        Grid {
+            sigma,
+            widths: widths.collect(),
+        }
     }
 
     /// Number of segments of each rod.
@@ -76,7 +90,7 @@ impl Grid {
 
     /// Width of segment `i` as a fraction of the length.
     pub fn width(&self, i: usize) -> f64 {
-        self.sigma[i + 1] - self.sigma[i]
+        self.widths[i]
     }
 
     /// Trapezoidal weight of node `i` as a fraction of the length.

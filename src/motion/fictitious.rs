@@ -7,7 +7,7 @@
 //! beside it as they can be (P. Underwood, Dynamic relaxation, in: Computational
 //! Methods for Transient Analysis, 1983).
 
-use super::kernel::GROUP;
+use super::kernel::{GROUP, Node, blocks};
 use super::nodes::Rod;
 use crate::leaf::DiscreteLeaf;
 
@@ -21,37 +21,41 @@ pub fn masses(leaf: &DiscreteLeaf, rods: &mut [Rod]) -> f64 {
     let n = leaf.segments();
     let count = rods.len();
     let mut tip = 0.0;
-    for (j, rod) in rods.iter_mut().enumerate() {
-        let m = &mut rod.material;
-        let held = m.per_inertia[GROUP] == 0.0;
+    for j in 0..count {
+        let old: Vec<Node> = (0..=n).map(|i| rods[j].node(GROUP + i)).collect();
+        let mut new = old.clone();
+        let held = old[0].per_inertia == 0.0;
         for i in 0..=n {
-            let at = GROUP + i;
             let (mut mass, mut inertia) = (0.0, 0.0);
-            for segment in [at - 1, at] {
-                let stretch = (0..3).fold(0.0_f64, |s, c| s.max(m.stretch[c][segment]));
-                let bend = (0..3).fold(0.0_f64, |s, c| s.max(m.bend[c][segment]));
-                let arm = 0.5 * m.rest_length[segment];
+            let before = i.checked_sub(1).map(|before| &old[before]);
+            for segment in before.into_iter().chain([&old[i]]) {
+                let stretch = segment.stretch.into_iter().fold(0.0_f64, f64::max);
+                let bend = segment.bend.into_iter().fold(0.0_f64, f64::max);
+                let arm = 0.5 * segment.rest_length;
                 mass += 2.0 * stretch / (4.0 - ROTATING);
                 inertia += 2.0 * (bend + stretch * arm * arm) / ROTATING;
             }
+            let node = &mut new[i];
             // Both neighbours pull on a node that may move as much as they do.
             for gap in [j.wrapping_sub(1), j] {
                 if gap < count - 1 {
-                    mass += 0.5 * (leaf.leaf.coupling(gap) * m.coupled[at]).max_element();
+                    mass += 0.5 * (leaf.leaf.coupling(gap) * node.coupled).max_element();
                 }
             }
             if i == n {
                 tip += mass;
             }
             let moves = !(held && i == 0);
-            let tied = m.per_mass[at] == 0.0;
-            m.per_inertia[at] = if moves { 1.0 / inertia } else { 0.0 };
-            m.per_spin[at] = 0.0;
+            let tied = node.per_mass == 0.0;
+            node.per_inertia = if moves { 1.0 / inertia } else { 0.0 };
+            node.per_spin = 0.0;
             if !tied {
-                m.mass[at] = mass;
-                m.per_mass[at] = 1.0 / mass;
+                node.mass = mass;
+                node.per_mass = 1.0 / mass;
             }
         }
+        let beside = j.checked_sub(1).map(|other| &*rods[other].material);
+        rods[j].material = blocks(&new, beside);
     }
     tip
 }

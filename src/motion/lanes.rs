@@ -10,19 +10,32 @@ pub fn slice(array: &[f64], (first, count): (usize, usize)) -> &[f64] {
     &array[first..first + count]
 }
 
-/// The parts of several arrays at a place.
-#[inline(always)]
-pub fn cut<const K: usize>(arrays: &[impl AsRef<[f64]>; K], place: (usize, usize)) -> [&[f64]; K] {
-    arrays.each_ref().map(|array| slice(array.as_ref(), place))
-}
-
 /// The same, to be written.
 #[inline(always)]
-pub fn cut_mut<const K: usize>(
-    arrays: &mut [impl AsMut<[f64]>; K],
-    (first, count): (usize, usize),
-) -> [&mut [f64]; K] {
-    (arrays.each_mut()).map(|array| &mut array.as_mut()[first..first + count])
+pub fn slice_mut(array: &mut [f64], (first, count): (usize, usize)) -> &mut [f64] {
+    &mut array[first..first + count]
+}
+
+/// The parts of several arrays at a place. (Written out: of `map` compilers make
+/// calls, which for short rods take a tenth of the time.)
+#[inline(always)]
+pub fn cut<const K: usize>(arrays: &[impl AsRef<[f64]>; K], place: (usize, usize)) -> [&[f64]; K] {
+    let mut parts: [&[f64]; K] = [&[]; K];
+    for k in 0..K {
+        parts[k] = slice(arrays[k].as_ref(), place);
+    }
+    parts
+}
+
+/// The same of three, to be written.
+#[inline(always)]
+pub fn cut_mut(arrays: &mut [impl AsMut<[f64]>; 3], place: (usize, usize)) -> [&mut [f64]; 3] {
+    let [x, y, z] = arrays;
+    [
+        slice_mut(x.as_mut(), place),
+        slice_mut(y.as_mut(), place),
+        slice_mut(z.as_mut(), place),
+    ]
 }
 
 /// One number for each of several neighbouring nodes.
@@ -90,38 +103,57 @@ impl<S: Simd> Lanes<S> {
         }
     }
 
+    /// The larger one.
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        Lanes {
+            simd: self.simd,
+            v: self.simd.max_f64s(self.v, other.v),
+        }
+    }
+
+    /// The largest of all.
+    #[inline(always)]
+    pub fn largest(self) -> f64 {
+        self.simd.reduce_max_f64s(self.v)
+    }
+
     /// Sum of all.
     #[inline(always)]
     pub fn sum(self) -> f64 {
         self.simd.reduce_sum_f64s(self.v)
     }
 
-    /// The polynomial with these coefficients, constant term first.
+    /// The polynomial with these coefficients, at most 16, constant term first:
+    /// in pairs, then pairs of these (G. Estrin), which do not wait for each
+    /// other.
     #[inline(always)]
     pub fn polynomial<const N: usize>(self, coefficients: &[f64; N]) -> Self {
-        let mut sum = Lanes::splat(self.simd, coefficients[N - 1]);
-        for k in (0..N - 1).rev() {
-            sum = sum.times(self, Lanes::splat(self.simd, coefficients[k]));
+        let mut terms = [self; N];
+        for k in 0..N {
+            terms[k] = Lanes::splat(self.simd, coefficients[k]);
         }
-        sum
+        // Not in a loop: compilers unroll those inside it only if they know how
+        // long they are.
+        let (second, fourth) = (self * self, self * self * (self * self));
+        let count = self.pair(&mut terms, N);
+        let count = second.pair(&mut terms, count);
+        let count = fourth.pair(&mut terms, count);
+        (fourth * fourth).pair(&mut terms, count);
+        terms[0]
     }
 
-    /// A long one, in thirds, which do not wait for each other.
+    /// Replaces pairs of the first `count` terms by first + self * second;
+    /// returns how many terms there are then.
     #[inline(always)]
-    pub fn long_polynomial<const N: usize>(self, coefficients: &[f64; N]) -> Self {
-        let coefficient = |k: usize| Lanes::splat(self.simd, coefficients[k]);
-        let cube = self * self * self;
-        let third = |first: usize| {
-            let last = first + (N - 1 - first) / 3 * 3;
-            let mut sum = coefficient(last);
-            let mut k = last;
-            while k >= 3 {
-                k -= 3;
-                sum = sum.times(cube, coefficient(k));
-            }
-            sum
-        };
-        third(2).times(self, third(1)).times(self, third(0))
+    fn pair<const N: usize>(self, terms: &mut [Self; N], count: usize) -> usize {
+        for k in 0..count / 2 {
+            terms[k] = terms[2 * k + 1].times(self, terms[2 * k]);
+        }
+        if count % 2 == 1 {
+            terms[count / 2] = terms[count - 1];
+        }
+        count.div_ceil(2)
     }
 }
 

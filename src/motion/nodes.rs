@@ -1,23 +1,24 @@
 //! From the leaf to the arrays of the explicit method, and back.
 
-use super::kernel::{Done, GROUP, Material, Motion, Past, Positions};
+use super::kernel::{Array, Done, GROUP, Material, Motion, Node, Past, Positions, blocks, node};
 use super::method::Velocity;
 use super::physics::Physics;
 use crate::leaf::{DiscreteLeaf, State};
 use glam::{DQuat, DVec3};
+use std::sync::Arc;
 
 /// One rod's arrays but its positions, which its neighbours read.
 #[derive(Clone, Debug)]
 pub struct Rod {
     pub motion: Motion,
-    pub material: Material,
+    pub material: Vec<Arc<Material>>,
     pub past: Past,
     /// What the last step did.
     pub done: Done,
 }
 
-fn arrays<const K: usize>(length: usize) -> [Vec<f64>; K] {
-    std::array::from_fn(|_| vec![0.0; length])
+fn arrays<const K: usize>(length: usize) -> [Array; K] {
+    std::array::from_fn(|_| Array::zeros(length))
 }
 
 /// Length of a rod's arrays.
@@ -37,30 +38,22 @@ pub fn positions(leaf: &DiscreteLeaf, state: &State, j: usize) -> Positions {
     Positions { x }
 }
 
-/// A rod at rest.
-pub fn rod(leaf: &DiscreteLeaf, physics: &Physics, state: &State, j: usize) -> Rod {
+/// A rod at rest; what it has in common with the rod `beside` is shared.
+pub fn rod(
+    leaf: &DiscreteLeaf,
+    physics: &Physics,
+    state: &State,
+    j: usize,
+    beside: Option<&Rod>,
+) -> Rod {
     let n = leaf.segments();
     let length = length(n);
-    let joined = leaf.leaf.joined() && leaf.rods() > 1;
     let mut motion = Motion {
         q: arrays(length),
         v: arrays(length),
         p: arrays(length),
     };
     motion.q[3].fill(1.0);
-    let one = || vec![0.0; length];
-    let mut material = Material {
-        stretch: arrays(length),
-        rest_length: one(),
-        bend: arrays(length),
-        rest_turn: arrays(length),
-        mass: one(),
-        per_mass: one(),
-        per_inertia: one(),
-        per_spin: one(),
-        weight: one(),
-        coupled: one(),
-    };
     let mut last = DQuat::IDENTITY;
     for i in 0..=n {
         let (k, at) = (state.base(j) + i, GROUP + i);
@@ -74,33 +67,13 @@ pub fn rod(leaf: &DiscreteLeaf, physics: &Physics, state: &State, j: usize) -> R
         for (array, value) in motion.q.iter_mut().zip(q.to_array()) {
             array[at] = value;
         }
-        let m = &mut material;
-        m.weight[at] = leaf.grid.weight(i) * leaf.leaf.length(j);
-        if i > 0 || !physics.clamped() {
-            let inertia = physics.inertia(leaf.leaf, &leaf.grid, j, i);
-            m.per_inertia[at] = 1.0 / inertia.transverse;
-            m.per_spin[at] = 1.0 / inertia.polar() - 1.0 / inertia.transverse;
-            if i < n || !joined {
-                m.mass[at] = inertia.mass;
-                m.per_mass[at] = 1.0 / inertia.mass;
-                m.coupled[at] = leaf.grid.weight(i);
-            }
-        }
-        if i < n {
-            let section = leaf.section(j, i);
-            m.rest_length[at] = section.rest_strain.x * section.ds;
-            for c in 0..3 {
-                m.stretch[c][at] = 1.0 / (section.compliance[c] * section.ds);
-                m.bend[c][at] = section.couple_stiffness[c] / section.ds;
-                m.rest_turn[c][at] = section.rest_curvature[c] * section.ds;
-            }
-        }
     }
+    let made_of: Vec<_> = (0..=n).map(|i| made_of(leaf, physics, j, i)).collect();
     let remembered = if physics.retardation > 0.0 { length } else { 0 };
     let past = || [arrays::<3>(remembered), arrays::<3>(remembered)];
     let mut rod = Rod {
         motion,
-        material,
+        material: blocks(&made_of, beside.map(|rod| &*rod.material)),
         past: Past {
             one: past(),
             two: past(),
@@ -111,26 +84,70 @@ pub fn rod(leaf: &DiscreteLeaf, physics: &Physics, state: &State, j: usize) -> R
     rod
 }
 
+/// What node `i` of rod `j` is made of, and the segment behind it.
+fn made_of(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> Node {
+    let n = leaf.segments();
+    let joined = leaf.leaf.joined() && leaf.rods() > 1;
+    let mut node = Node {
+        weight: leaf.grid.weight(i) * leaf.leaf.length(j),
+        ..Node::default()
+    };
+    if i > 0 || !physics.clamped() {
+        let inertia = physics.inertia(leaf.leaf, &leaf.grid, j, i);
+        node.per_inertia = 1.0 / inertia.transverse;
+        node.per_spin = 1.0 / inertia.polar() - 1.0 / inertia.transverse;
+        if i < n || !joined {
+            node.mass = inertia.mass;
+            node.per_mass = 1.0 / inertia.mass;
+            node.coupled = leaf.grid.weight(i);
+        }
+    }
+    if i < n {
+        let section = leaf.section(j, i);
+        // What changes in time is multiplied there.
+        let rest = match physics.rest_changes() {
+            true => 1.0,
+            false => physics.rest(0.0),
+        };
+        node.rest_length = section.rest_strain.x * section.ds;
+        for c in 0..3 {
+            node.stretch[c] = 1.0 / (section.compliance[c] * section.ds);
+            node.bend[c] = section.couple_stiffness[c] / section.ds;
+            node.rest_turn[c] = rest * section.rest_curvature[c] * section.ds;
+        }
+    }
+    node
+}
+
 impl Rod {
-    /// Lets what stands behind the last node be like it, so that the segments
-    /// that are read there, though they have no stiffness, are sound ones.
+    /// What the node at an index of the arrays is made of.
+    pub fn node(&self, at: usize) -> Node {
+        node(&self.material, at - GROUP)
+    }
+
+    /// Lets what stands behind the last node, in its group and next to that, be
+    /// like it, so that the segments that are read there, though they have no
+    /// stiffness, are sound ones.
     pub fn close(&mut self, segments: usize) {
         let last = GROUP + segments;
+        let end = (last + 1).next_multiple_of(GROUP);
         for q in &mut self.motion.q {
             let value = q[last];
-            q[last + 1..].fill(value);
+            for behind in &mut q[last + 1..=end] {
+                *behind = value;
+            }
         }
     }
 
     /// The arrays that tell the future, but positions.
-    pub fn moving_arrays(&self) -> impl Iterator<Item = &Vec<f64>> {
+    pub fn moving_arrays(&self) -> impl Iterator<Item = &Array> {
         let Motion { q, v, p, .. } = &self.motion;
         let past = self.past.one.iter().chain(&self.past.two).flatten();
         q.iter().chain(v).chain(p).chain(past)
     }
 
     /// The same, to be written.
-    pub fn moving_arrays_mut(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
+    pub fn moving_arrays_mut(&mut self) -> impl Iterator<Item = &mut Array> {
         let Motion { q, v, p, .. } = &mut self.motion;
         let past = self.past.one.iter_mut().chain(&mut self.past.two).flatten();
         q.iter_mut().chain(v).chain(p).chain(past)
@@ -139,7 +156,8 @@ impl Rod {
     /// Angular velocity of a node with rotation `q` and angular momentum `p`.
     pub fn spin(&self, at: usize, q: DQuat, p: DVec3) -> DVec3 {
         let d1 = q * DVec3::X;
-        p * self.material.per_inertia[at] + d1 * (d1.dot(p) * self.material.per_spin[at])
+        let node = self.node(at);
+        p * node.per_inertia + d1 * (d1.dot(p) * node.per_spin)
     }
 
     /// Rotation of a node.
@@ -166,6 +184,6 @@ impl Rod {
 }
 
 /// The vector at an index.
-pub fn vector(arrays: &[Vec<f64>; 3], at: usize) -> DVec3 {
+pub fn vector(arrays: &[Array; 3], at: usize) -> DVec3 {
     DVec3::new(arrays[0][at], arrays[1][at], arrays[2][at])
 }

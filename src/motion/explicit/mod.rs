@@ -33,6 +33,7 @@ use super::nodes::{self, Rod, vector};
 use super::physics::Physics;
 use super::stable::StableStep;
 use crate::leaf::{DiscreteLeaf, Loads, State};
+use crate::rod::RESOLVED_TURN;
 
 /// Part of the stable time step that is used.
 const SAFETY: f64 = 0.9;
@@ -56,6 +57,8 @@ pub struct Explicit<'a> {
     next: Vec<Positions>,
     rods: Vec<Rod>,
     block: Block,
+    /// Force per displacement and unit of sigma, of every gap.
+    coupling: Vec<[f64; 3]>,
     /// Mass of the joint tip, if there is one.
     tip_mass: Option<f64>,
     /// Time step.
@@ -91,25 +94,30 @@ impl<'a> Explicit<'a> {
         if leaf.stiffest() == 0.0 {
             return Err(Rigid);
         }
-        let rods = leaf.rods();
-        let joined = leaf.leaf.joined() && rods > 1;
+        let count = leaf.rods();
+        let joined = leaf.leaf.joined() && count > 1;
         let tip_mass = |j| {
             physics
                 .inertia(leaf.leaf, &leaf.grid, j, leaf.segments())
                 .mass
         };
-        let positions: Vec<_> = (0..rods)
+        let positions: Vec<_> = (0..count)
             .map(|j| nodes::positions(&leaf, state, j))
             .collect();
+        let mut rods: Vec<Rod> = Vec::with_capacity(count);
+        for j in 0..count {
+            rods.push(nodes::rod(&leaf, &physics, state, j, rods.last()));
+        }
         let mut explicit = Explicit {
             arch: Arch::new(),
             next: positions.clone(),
             positions,
             block: Block::new(),
-            rods: (0..rods)
-                .map(|j| nodes::rod(&leaf, &physics, state, j))
+            rods,
+            coupling: (1..count)
+                .map(|j| leaf.leaf.coupling(j - 1).to_array())
                 .collect(),
-            tip_mass: joined.then(|| (0..rods).map(tip_mass).sum()),
+            tip_mass: joined.then(|| (0..count).map(tip_mass).sum()),
             step: 0.0,
             stepped: 0.0,
             time: 0.0,
@@ -117,8 +125,8 @@ impl<'a> Explicit<'a> {
             begin: (0.0, 0),
             widths: [0.0; 2],
             ledger: Ledger::default(),
-            parallel: rods > 1
-                && rods * leaf.segments() >= PARALLEL_NODES
+            parallel: count > 1
+                && count * leaf.segments() >= PARALLEL_NODES
                 && rayon::current_num_threads() > 1,
             leaf,
             physics,
@@ -183,6 +191,15 @@ impl<'a> Explicit<'a> {
         energy
     }
 
+    /// Whether what the last step saw is fit to go on from: finite numbers, and no
+    /// segment bent by more than its grid can resolve.
+    fn sound(&self) -> bool {
+        self.rods.iter().all(|rod| {
+            let resolved = rod.done.sharpest.sqrt() <= 2.0 * (0.25 * RESOLVED_TURN).sin();
+            resolved && rod.done.twice_kinetic.is_finite()
+        })
+    }
+
     /// Kicks, and flies on for `h`.
     fn go(&mut self, h: f64) -> (Exchange, f64) {
         let done = self.kick(0.5 * h, h, true);
@@ -223,7 +240,7 @@ impl<'a> Explicit<'a> {
         if let Some(mass) = self.tip_mass {
             let mut force = loads.tip_force;
             for rod in &self.rods {
-                force += rod.material.weight[last] * loads.gravity;
+                force += rod.node(last).weight * loads.gravity;
                 force -= DVec3::from(rod.done.last_force);
             }
             let after = keep * before.0 + force * (kick / mass);
@@ -259,7 +276,7 @@ impl<'a> Explicit<'a> {
         let mut lower = 0.0;
         for (j, (rod, positions)) in self.rods.iter().zip(&self.positions).enumerate() {
             for at in GROUP..=last {
-                lower += rod.material.weight[at] * gravity.dot(vector(&positions.x, at));
+                lower += rod.node(at).weight * gravity.dot(vector(&positions.x, at));
             }
             if j == 0 || !self.leaf.leaf.joined() {
                 lower += tip_force.dot(vector(&positions.x, last));
@@ -273,7 +290,10 @@ impl<'a> Explicit<'a> {
         Law {
             damped: self.physics.retardation > 0.0,
             changes: self.physics.rest_changes(),
-            rest: self.physics.rest(self.stepped),
+            rest: match self.physics.rest_changes() {
+                true => self.physics.rest(self.stepped),
+                false => 1.0,
+            },
             retardation: self.physics.retardation,
             rates: rates(self.widths[0], self.widths[1]),
             remember,
@@ -292,12 +312,12 @@ impl<'a> Explicit<'a> {
             },
             tip_moment: loads.tip_moment.to_array(),
         };
-        let (all, leaf) = (&self.positions, &self.leaf);
+        let (all, coupling) = (&self.positions, &self.coupling);
         let one = |block: &mut Block, j: usize, rod: &mut Rod, next: &mut Positions| {
             let beside = |other: usize, gap: usize| {
                 (other < all.len()).then(|| Neighbour {
                     positions: &all[other],
-                    stiffness: leaf.leaf.coupling(gap).to_array(),
+                    stiffness: coupling[gap],
                 })
             };
             let step = Step {

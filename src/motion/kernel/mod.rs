@@ -8,70 +8,52 @@
 //! before, and neighbouring rods, which feel where its nodes were, read
 //! positions that are not written over but written anew.
 
+mod array;
 mod flight;
+mod material;
 mod segments;
+
+use std::sync::Arc;
 
 use pulp::{Arch, Simd};
 
+pub use self::array::Array;
 use self::flight::Flight;
-use self::segments::Nodes;
+pub use self::material::{Material, Node, blocks, node};
+use self::segments::{Found, Nodes};
 use super::lanes::Lanes;
 
 /// Nodes come in groups of so many; arrays are that much longer at both ends.
 pub const GROUP: usize = 4;
 
-/// Nodes of a block. Measured: with all its arrays it fits the nearest memory.
-const BLOCK: usize = 16 * GROUP;
+/// Nodes of a block: what it is made of, how it moves and the forces on it take
+/// 23 kB, which fits the nearest memory of the processors in use.
+const BLOCK: usize = 32 * GROUP;
 
 /// Positions of a rod's nodes, one array per component. Node i stands at
 /// GROUP + i; what is before and after is never used, only read.
 #[derive(Clone, Debug)]
 pub struct Positions {
-    pub x: [Vec<f64>; 3],
+    pub x: [Array; 3],
 }
 
 /// What else moves.
 #[derive(Clone, Debug)]
 pub struct Motion {
     /// Rotations as unit quaternions.
-    pub q: [Vec<f64>; 4],
+    pub q: [Array; 4],
     /// Velocities, half a step behind or ahead.
-    pub v: [Vec<f64>; 3],
+    pub v: [Array; 3],
     /// Angular momenta along the lab axes, likewise.
-    pub p: [Vec<f64>; 3],
+    pub p: [Array; 3],
 }
 
 /// Strains of the last two steps, for internal damping: R^T dx, then psi.
 /// Empty without it.
 #[derive(Clone, Debug)]
 pub struct Past {
-    pub one: [[Vec<f64>; 3]; 2],
-    pub two: [[Vec<f64>; 3]; 2],
-}
-
-/// What a rod is made of, per segment and per node.
-#[derive(Clone, Debug)]
-pub struct Material {
-    /// H/ds.
-    pub stretch: [Vec<f64>; 3],
-    /// ds times the rest stretch: the rest strain is v0 = (stretch, 0, 0).
-    pub rest_length: Vec<f64>,
-    /// A/ds.
-    pub bend: [Vec<f64>; 3],
-    /// ds u0.
-    pub rest_turn: [Vec<f64>; 3],
-    /// Mass; that of a held node and of a joint tip is not in here.
-    pub mass: Vec<f64>,
-    /// 1/mass; zero for a node that is held, and for a joint tip.
-    pub per_mass: Vec<f64>,
-    /// 1/J of a node about d2 and d3; zero for a node that is held.
-    pub per_inertia: Vec<f64>,
-    /// 1/J1 - 1/J.
-    pub per_spin: Vec<f64>,
-    /// Length of rod that loads on the node come from.
-    pub weight: Vec<f64>,
-    /// Fraction of the length that coupling on the node comes from.
-    pub coupled: Vec<f64>,
+    pub one: [[Array; 3]; 2],
+    pub two: [[Array; 3]; 2],
 }
 
 /// How strains make forces at an instant.
@@ -81,7 +63,7 @@ pub struct Law {
     pub damped: bool,
     /// Whether the rest curvature changes, and what that does is asked.
     pub changes: bool,
-    /// Factor of the rest curvature.
+    /// Factor of the rest curvature if that changes, or one.
     pub rest: f64,
     /// Retardation time.
     pub retardation: f64,
@@ -93,6 +75,7 @@ pub struct Law {
 
 /// What the segments of a block do to their ends.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub struct Block {
     /// Force N of the segment from node i to i + 1, node i of the block at
     /// GROUP + i; at GROUP - 1 the last segment's of the block before.
@@ -150,7 +133,8 @@ pub struct Step<'a> {
     pub next: &'a mut Positions,
     pub neighbours: [Option<Neighbour<'a>>; 2],
     pub motion: &'a mut Motion,
-    pub material: &'a Material,
+    /// Block by block.
+    pub material: &'a [Arc<Material>],
     pub past: &'a mut Past,
     pub law: Law,
     pub pull: Pull,
@@ -171,6 +155,8 @@ pub struct Done {
     /// Elastic energy taken by a rise of the factor of the rest curvature,
     /// over that rise.
     pub rest: f64,
+    /// Largest (2 sin(psi/4))^2 of a segment bent by psi, before the step.
+    pub sharpest: f64,
     /// Force of the last segment.
     pub last_force: [f64; 3],
 }
@@ -217,7 +203,7 @@ impl<const DAMPED: bool, const CHANGES: bool> pulp::WithSimd for Made<'_, DAMPED
         } = self.0;
         let mut done = Done::default();
         let zero = Lanes::splat(simd, 0.0);
-        let (mut energy, mut friction, mut rest) = (zero, zero, zero);
+        let (mut energy, mut found) = (zero, Found::nothing(simd));
         for array in block.n.iter_mut().chain(&mut block.right) {
             array[GROUP - 1] = 0.0;
         }
@@ -229,12 +215,10 @@ impl<const DAMPED: bool, const CHANGES: bool> pulp::WithSimd for Made<'_, DAMPED
                 place,
                 x: &positions.x,
                 q: &motion.q,
-                material,
+                material: &material[start / BLOCK],
                 law: &law,
             };
-            let (power, lost) = segments::forces::<S, DAMPED, CHANGES>(simd, part, past, block);
-            friction = friction + power;
-            rest = rest + lost;
+            segments::forces::<S, DAMPED, CHANGES>(simd, part, past, block, &mut found);
             // The tip is the last node; no segment follows it.
             let end = start + nodes > segments;
             if end {
@@ -250,7 +234,7 @@ impl<const DAMPED: bool, const CHANGES: bool> pulp::WithSimd for Made<'_, DAMPED
                 next: &mut next.x,
                 neighbours: &neighbours,
                 motion,
-                material,
+                material: &material[start / BLOCK],
                 gravity: pull.gravity,
                 keep,
                 kick,
@@ -263,8 +247,9 @@ impl<const DAMPED: bool, const CHANGES: bool> pulp::WithSimd for Made<'_, DAMPED
         }
         // Velocities were sums of two.
         done.twice_kinetic = 0.25 * energy.sum();
-        done.friction = friction.sum();
-        done.rest = rest.sum();
+        done.friction = found.friction.sum();
+        done.rest = found.rest.sum();
+        done.sharpest = found.sharpest.largest();
         done
     }
 }
@@ -274,7 +259,8 @@ pub struct Forces<'a> {
     pub segments: usize,
     pub positions: &'a Positions,
     pub motion: &'a Motion,
-    pub material: &'a Material,
+    /// Block by block.
+    pub material: &'a [Arc<Material>],
     pub past: &'a mut Past,
     pub law: Law,
     /// Where they go, segment by segment.
@@ -287,6 +273,7 @@ impl pulp::WithSimd for Forces<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let mut block = Block::new();
+        let found = &mut Found::nothing(simd);
         let mut start = 0;
         while start < self.segments {
             let nodes = length(self.segments, start);
@@ -294,13 +281,14 @@ impl pulp::WithSimd for Forces<'_> {
                 place: (GROUP + start, nodes),
                 x: &self.positions.x,
                 q: &self.motion.q,
-                material: self.material,
+                material: &self.material[start / BLOCK],
                 law: &self.law,
             };
+            let (past, block) = (&mut *self.past, &mut block);
             match self.law.damped {
-                true => segments::forces::<S, true, false>(simd, part, self.past, &mut block),
-                false => segments::forces::<S, false, false>(simd, part, self.past, &mut block),
-            };
+                true => segments::forces::<S, true, true>(simd, part, past, block, found),
+                false => segments::forces::<S, false, true>(simd, part, past, block, found),
+            }
             let own = GROUP..GROUP + nodes.min(self.segments - start);
             (self.forces).extend(own.map(|at| [0, 1, 2].map(|c| block.n[c][at])));
             start += nodes;

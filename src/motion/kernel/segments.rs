@@ -8,18 +8,24 @@
 //!
 //! ```text
 //! R = R(s/|s|),   tau = 2 w/|s|^2 = tan(psi/4),   psi = 2 sigma w
-//! v = R^T dx,   n = H/ds (v - ds v0),   G = v x n,   M = 2 S A/ds (psi - ds u0)
-//! force N = R n,   twice the moments on the ends R (G + T),  R (G - T),   T = M - tau x G
+//! v = R^T dx,   n = H/ds (v - ds v0),   M = 2 S A/ds (psi - ds u0)
+//! force N = R n,   twice the moments on the ends G + T,  G - T,
+//! G = dx x N,   T = R M - (R tau) x G
 //! ```
+//!
+//! R w is the vector part of q1 q0^*: that of q0^* q1 is its even part less its
+//! odd part, and this their sum.
 //!
 //! S = sigma + c w w^T is the derivative of the rotation vector. As it leaves
 //! what lies along w as it is, c = (1 - sigma)/|w|^2 = -4 B/|s|^2 if sigma is
 //! written as 1 + B delta. B is a polynomial in delta: a segment costs one
 //! division and no root.
 
+use std::ops::Deref;
+
 use pulp::Simd;
 
-use super::{Block, GROUP, Law, Material, Past};
+use super::{Array, Block, GROUP, Law, Material, Past};
 use crate::motion::lanes::{Lanes, Vectors, cut, cut_mut, slice};
 
 /// (sigma - 1)/delta as a polynomial in delta, sigma being (psi/2)/sin(psi/2):
@@ -63,38 +69,61 @@ fn rate<S: Simd>(
 pub struct Nodes<'a> {
     /// Index of the first, count.
     pub place: (usize, usize),
-    pub x: &'a [Vec<f64>; 3],
-    pub q: &'a [Vec<f64>; 4],
+    pub x: &'a [Array; 3],
+    pub q: &'a [Array; 4],
     pub material: &'a Material,
     pub law: &'a Law,
 }
 
-/// Forces and moments of the segments behind `nodes`, put into `block`. Returns
-/// the power of internal friction over the retardation time, if `DAMPED`, and
-/// if `CHANGES` the elastic energy taken by a rise of the factor of the rest
-/// curvature, over that rise.
+/// What is found on the way, summed up over a rod.
+#[derive(Clone, Copy)]
+pub struct Found<S: Simd> {
+    /// Power of internal friction over the retardation time, if `DAMPED`.
+    pub friction: Lanes<S>,
+    /// Elastic energy taken by a rise of the factor of the rest curvature, over
+    /// that rise, if `CHANGES`.
+    pub rest: Lanes<S>,
+    /// Largest delta.
+    pub sharpest: Lanes<S>,
+}
+
+impl<S: Simd> Found<S> {
+    /// Nothing yet.
+    #[inline(always)]
+    pub fn nothing(simd: S) -> Self {
+        let zero = Lanes::splat(simd, 0.0);
+        Found {
+            friction: zero,
+            rest: zero,
+            sharpest: zero,
+        }
+    }
+}
+
+/// Forces and moments of the segments behind `nodes`, put into `block`.
 #[inline(always)]
 pub fn forces<S: Simd, const DAMPED: bool, const CHANGES: bool>(
     simd: S,
     nodes: Nodes,
     past: &mut Past,
     block: &mut Block,
-) -> (Lanes<S>, Lanes<S>) {
+    found: &mut Found<S>,
+) {
     let ([one_v, one_psi], [two_v, two_psi]) = (&mut past.one, &mut past.two);
     // In two loops: of short ones the processor works on several rounds at once.
-    let (bent, lost) = bend::<S, DAMPED, CHANGES>(simd, nodes, (one_psi, two_psi), block);
-    let stretched = stretch::<S, DAMPED>(simd, nodes, (one_v, two_v), block);
-    (bent + stretched, lost)
+    bend::<S, DAMPED, CHANGES>(simd, nodes, (one_psi, two_psi), block, found);
+    stretch::<S, DAMPED>(simd, nodes, (one_v, two_v), block, found);
 }
 
-/// Bending: M, tau and 2/|s|^2, for [`stretch`] to go on with.
+/// Bending: M, R tau and 2/|s|^2, for [`stretch`] to go on with.
 #[inline(always)]
 fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
     simd: S,
     nodes: Nodes,
-    (past_one, past_two): (&mut [Vec<f64>; 3], &mut [Vec<f64>; 3]),
+    (past_one, past_two): (&mut [Array; 3], &mut [Array; 3]),
     block: &mut Block,
-) -> (Lanes<S>, Lanes<S>) {
+    found: &mut Found<S>,
+) {
     let Nodes {
         place: (start, count),
         q,
@@ -105,8 +134,8 @@ fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
     // Of one length all: what is inside one is inside the others.
     let (place, own) = ((start, count), (GROUP, count));
     let (q0, q1) = (cut(q, place), cut(q, (start + 1, count)));
-    let stiffness = cut(&material.bend, place);
-    let rest_turn = cut(&material.rest_turn, place);
+    let stiffness = cut(&material.bend, (0, count));
+    let rest_turn = cut(&material.rest_turn, (0, count));
     let mut moment = cut_mut(&mut block.left, own);
     let mut tangent = cut_mut(&mut block.right, own);
     let twice_inverse = &mut block.twice_inverse[..count];
@@ -114,52 +143,70 @@ fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
     let rates = law.rates.map(|rate| Lanes::splat(simd, rate));
     let retardation = Lanes::splat(simd, law.retardation);
     let rest = Lanes::splat(simd, law.rest);
-    let (one, four) = (Lanes::splat(simd, 1.0), Lanes::splat(simd, 4.0));
-    let mut power = Lanes::splat(simd, 0.0);
-    let mut lost = Lanes::splat(simd, 0.0);
+    let (two, four) = (Lanes::splat(simd, 2.0), Lanes::splat(simd, 4.0));
+    let Found {
+        friction: mut power,
+        rest: mut lost,
+        mut sharpest,
+    } = *found;
     let mut at = 0;
     while at + S::F64_LANES <= count {
         let (a, aw) = quaternion(simd, &q0, at);
         let (b, bw) = quaternion(simd, &q1, at);
         let (d, dw) = (b - a, bw - aw);
-        let delta = d.dot(d) + dw * dw;
+        let delta = d.x.times(d.x, d.y * d.y) + d.z.times(d.z, dw * dw);
+        sharpest = sharpest.max(delta);
         let inverse = (four - delta).recip();
         let twice = inverse + inverse;
-        let w = a.times_from(bw, b.scale(aw)).less_cross(a, b);
-        let series = delta.long_polynomial(&B);
-        let sigma = series.times(delta, one);
-        let two_sigma = sigma + sigma;
-        let psi = w.scale(two_sigma);
+        let (even, odd) = (a.times_from(bw, b.scale(aw)), a.cross(b));
+        let w = even - odd;
+        (even + odd).scale(twice).store(&mut tangent, at);
         let rest_turn = Vectors::load(simd, &rest_turn, at);
-        let mut turn = psi - rest_turn.scale(rest);
         let stiffness = Vectors::load(simd, &stiffness, at);
+        // The moment A (2 sigma w - u0) and its part along w, as far as possible
+        // before sigma is known: the series takes long.
+        let slope = w.each(stiffness);
+        let mut at_rest = rest_turn.each(stiffness);
         if CHANGES {
-            lost = lost + rest_turn.dot(turn.each(stiffness));
+            at_rest = at_rest.scale(rest);
+        }
+        let (slope_along, rest_along) = (w.dot(slope), w.dot(at_rest));
+        let series = delta.polynomial(&B);
+        let two_sigma = series.times(delta + delta, two);
+        let mut m = slope.scale(two_sigma) - at_rest;
+        let mut along = slope_along * two_sigma - rest_along;
+        if CHANGES {
+            lost = lost + rest_turn.dot(m);
         }
         if let Some((one, two)) = &mut past {
-            let rate = rate((one, two), (psi, at), rates, law.remember);
-            turn = rate.times(retardation, turn);
-            power = power + rate.dot(rate.each(stiffness));
+            let rate = rate((one, two), (w.scale(two_sigma), at), rates, law.remember);
+            let friction = rate.each(stiffness);
+            power = power + rate.dot(friction);
+            let friction = friction.scale(retardation);
+            m = m + friction;
+            along = along + w.dot(friction);
         }
-        let m = turn.each(stiffness);
-        let c = series * (four * twice) * w.dot(m);
+        let c = series * (four * twice) * along;
         (w.times_from(c, m.scale(two_sigma))).store(&mut moment, at);
-        w.scale(twice).store(&mut tangent, at);
         twice.store(twice_inverse, at);
         at += S::F64_LANES;
     }
-    (power, lost)
+    *found = Found {
+        friction: power,
+        rest: lost,
+        sharpest,
+    };
 }
 
-/// Stretch and shear, and all that acts on the ends. Returns the power of
-/// friction.
+/// Stretch and shear, and all that acts on the ends.
 #[inline(always)]
 fn stretch<S: Simd, const DAMPED: bool>(
     simd: S,
     nodes: Nodes,
-    (past_one, past_two): (&mut [Vec<f64>; 3], &mut [Vec<f64>; 3]),
+    (past_one, past_two): (&mut [Array; 3], &mut [Array; 3]),
     block: &mut Block,
-) -> Lanes<S> {
+    found: &mut Found<S>,
+) {
     let Nodes {
         place: (start, count),
         x,
@@ -170,8 +217,8 @@ fn stretch<S: Simd, const DAMPED: bool>(
     let (place, after, own) = ((start, count), (start + 1, count), (GROUP, count));
     let (x0, x1) = (cut(x, place), cut(x, after));
     let (q0, q1) = (cut(q, place), cut(q, after));
-    let stiffness = cut(&material.stretch, place);
-    let rest_length = slice(&material.rest_length, place);
+    let stiffness = cut(&material.stretch, (0, count));
+    let rest_length = slice(&material.rest_length, (0, count));
     let mut force = cut_mut(&mut block.n, own);
     let mut left = cut_mut(&mut block.left, own);
     let mut right = cut_mut(&mut block.right, own);
@@ -180,7 +227,7 @@ fn stretch<S: Simd, const DAMPED: bool>(
     let rates = law.rates.map(|rate| Lanes::splat(simd, rate));
     let retardation = Lanes::splat(simd, law.retardation);
     let one = Lanes::splat(simd, 1.0);
-    let mut power = Lanes::splat(simd, 0.0);
+    let mut power = found.friction;
     let mut at = 0;
     while at + S::F64_LANES <= count {
         let (a, aw) = quaternion(simd, &q0, at);
@@ -217,24 +264,30 @@ fn stretch<S: Simd, const DAMPED: bool>(
         }
         let n = strain.each(stiffness);
         let directors = [d1, d2, d3];
-        n.along(directors).store(&mut force, at);
-        let g = v.cross(n);
-        let m = Vectors::load(simd, &left, at);
+        // Along the lab axes from here on: R (v x n) = dx x N.
+        let n = n.along(directors);
+        n.store(&mut force, at);
+        let g = dx.cross(n);
+        let m = Vectors::load(simd, &left, at).along(directors);
         let t = m.less_cross(Vectors::load(simd, &right, at), g);
-        (g + t).along(directors).store(&mut left, at);
-        (g - t).along(directors).store(&mut right, at);
+        (g + t).store(&mut left, at);
+        (g - t).store(&mut right, at);
         at += S::F64_LANES;
     }
-    power
+    found.friction = power;
 }
 
 /// Vector and scalar parts of unit quaternions.
 #[inline(always)]
-pub fn quaternion<S: Simd>(simd: S, q: &[&[f64]; 4], at: usize) -> (Vectors<S>, Lanes<S>) {
+pub fn quaternion<S: Simd>(
+    simd: S,
+    q: &[impl Deref<Target = [f64]>; 4],
+    at: usize,
+) -> (Vectors<S>, Lanes<S>) {
     let vector = Vectors::new(
-        Lanes::load(simd, q[0], at),
-        Lanes::load(simd, q[1], at),
-        Lanes::load(simd, q[2], at),
+        Lanes::load(simd, &q[0], at),
+        Lanes::load(simd, &q[1], at),
+        Lanes::load(simd, &q[2], at),
     );
-    (vector, Lanes::load(simd, q[3], at))
+    (vector, Lanes::load(simd, &q[3], at))
 }

@@ -1,0 +1,105 @@
+//! What a rod is made of, for the loops over its nodes.
+
+use std::sync::Arc;
+
+use super::BLOCK;
+
+/// A node, and the segment from it to the next.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Node {
+    /// H/ds.
+    pub stretch: [f64; 3],
+    /// ds times the rest stretch: the rest strain is v0 = (stretch, 0, 0).
+    pub rest_length: f64,
+    /// A/ds.
+    pub bend: [f64; 3],
+    /// ds u0.
+    pub rest_turn: [f64; 3],
+    /// Mass; that of a held node and of a joint tip is not in here.
+    pub mass: f64,
+    /// 1/mass; zero for a node that is held, and for a joint tip.
+    pub per_mass: f64,
+    /// 1/J of a node about d2 and d3; zero for a node that is held.
+    pub per_inertia: f64,
+    /// 1/J1 - 1/J.
+    pub per_spin: f64,
+    /// Length of rod that loads on the node come from.
+    pub weight: f64,
+    /// Fraction of the length that coupling on the node comes from.
+    pub coupled: f64,
+}
+
+/// The nodes of a block, one array for each number of a [`Node`].
+#[derive(Clone, Debug, PartialEq)]
+#[repr(align(64))]
+pub struct Material {
+    pub stretch: [[f64; BLOCK]; 3],
+    pub rest_length: [f64; BLOCK],
+    pub bend: [[f64; BLOCK]; 3],
+    pub rest_turn: [[f64; BLOCK]; 3],
+    pub mass: [f64; BLOCK],
+    pub per_mass: [f64; BLOCK],
+    pub per_inertia: [f64; BLOCK],
+    pub per_spin: [f64; BLOCK],
+    pub weight: [f64; BLOCK],
+    pub coupled: [f64; BLOCK],
+}
+
+impl Material {
+    fn new(nodes: &[Node]) -> Self {
+        let gather = |number: &dyn Fn(&Node) -> f64| {
+            let mut array = [0.0; BLOCK];
+            for (slot, node) in array.iter_mut().zip(nodes) {
+                *slot = number(node);
+            }
+            array
+        };
+        Material {
+            stretch: [0, 1, 2].map(|c| gather(&|node| node.stretch[c])),
+            rest_length: gather(&|node| node.rest_length),
+            bend: [0, 1, 2].map(|c| gather(&|node| node.bend[c])),
+            rest_turn: [0, 1, 2].map(|c| gather(&|node| node.rest_turn[c])),
+            mass: gather(&|node| node.mass),
+            per_mass: gather(&|node| node.per_mass),
+            per_inertia: gather(&|node| node.per_inertia),
+            per_spin: gather(&|node| node.per_spin),
+            weight: gather(&|node| node.weight),
+            coupled: gather(&|node| node.coupled),
+        }
+    }
+}
+
+/// A rod's nodes in blocks. Blocks that are like the one before, or like the one
+/// at their place in the rod `beside`, are shared: they stay in the processor's
+/// nearest memory, and most leaves have few that differ.
+pub fn blocks(nodes: &[Node], beside: Option<&[Arc<Material>]>) -> Vec<Arc<Material>> {
+    let mut blocks: Vec<Arc<Material>> = Vec::with_capacity(nodes.len().div_ceil(BLOCK));
+    for nodes in nodes.chunks(BLOCK) {
+        let material = Material::new(nodes);
+        let like = [blocks.last(), beside.and_then(|rod| rod.get(blocks.len()))];
+        let same = like
+            .into_iter()
+            .flatten()
+            .find(|other| ***other == material);
+        blocks.push(same.cloned().unwrap_or_else(|| Arc::new(material)));
+    }
+    blocks
+}
+
+/// Node `i` of a rod.
+pub fn node(blocks: &[Arc<Material>], i: usize) -> Node {
+    let (m, at) = (&blocks[i / BLOCK], i % BLOCK);
+    let each = |arrays: &[[f64; BLOCK]; 3]| arrays.each_ref().map(|array| array[at]);
+    Node {
+        stretch: each(&m.stretch),
+        rest_length: m.rest_length[at],
+        bend: each(&m.bend),
+        rest_turn: each(&m.rest_turn),
+        mass: m.mass[at],
+        per_mass: m.per_mass[at],
+        per_inertia: m.per_inertia[at],
+        per_spin: m.per_spin[at],
+        weight: m.weight[at],
+        coupled: m.coupled[at],
+    }
+}
