@@ -38,6 +38,9 @@ use crate::rod::RESOLVED_TURN;
 /// Part of the stable time step that is used.
 const SAFETY: f64 = 0.9;
 
+/// Steps from one to the next by which quaternions get back to unit length.
+const NORMALISED: usize = 8;
+
 /// From this many nodes on, rods are shared out among threads. Measured: below
 /// it waking the threads costs more than they bring.
 const PARALLEL_NODES: usize = 8192;
@@ -312,6 +315,7 @@ impl<'a> Explicit<'a> {
             },
             tip_moment: loads.tip_moment.to_array(),
         };
+        let normalise = self.steps.is_multiple_of(NORMALISED);
         let (all, coupling) = (&self.positions, &self.coupling);
         let one = |block: &mut Block, j: usize, rod: &mut Rod, next: &mut Positions| {
             let beside = |other: usize, gap: usize| {
@@ -336,6 +340,7 @@ impl<'a> Explicit<'a> {
                 keep: kick.0,
                 kick: kick.1,
                 flight,
+                normalise,
                 block,
             };
             rod.done = step.make(arch);

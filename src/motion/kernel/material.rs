@@ -15,6 +15,8 @@ pub struct Node {
     pub bend: [f64; 3],
     /// ds u0.
     pub rest_turn: [f64; 3],
+    /// A u0: the moment that keeps the segment straight.
+    pub rest_moment: [f64; 3],
     /// Mass; that of a held node and of a joint tip is not in here.
     pub mass: f64,
     /// 1/mass; zero for a node that is held, and for a joint tip.
@@ -37,6 +39,7 @@ pub struct Material {
     pub rest_length: [f64; BLOCK],
     pub bend: [[f64; BLOCK]; 3],
     pub rest_turn: [[f64; BLOCK]; 3],
+    pub rest_moment: [[f64; BLOCK]; 3],
     pub mass: [f64; BLOCK],
     pub per_mass: [f64; BLOCK],
     pub per_inertia: [f64; BLOCK],
@@ -59,6 +62,7 @@ impl Material {
             rest_length: gather(&|node| node.rest_length),
             bend: [0, 1, 2].map(|c| gather(&|node| node.bend[c])),
             rest_turn: [0, 1, 2].map(|c| gather(&|node| node.rest_turn[c])),
+            rest_moment: [0, 1, 2].map(|c| gather(&|node| node.rest_moment[c])),
             mass: gather(&|node| node.mass),
             per_mass: gather(&|node| node.per_mass),
             per_inertia: gather(&|node| node.per_inertia),
@@ -95,6 +99,7 @@ pub fn node(blocks: &[Arc<Material>], i: usize) -> Node {
         rest_length: m.rest_length[at],
         bend: each(&m.bend),
         rest_turn: each(&m.rest_turn),
+        rest_moment: each(&m.rest_moment),
         mass: m.mass[at],
         per_mass: m.per_mass[at],
         per_inertia: m.per_inertia[at],

@@ -136,6 +136,7 @@ fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
     let (q0, q1) = (cut(q, place), cut(q, (start + 1, count)));
     let stiffness = cut(&material.bend, (0, count));
     let rest_turn = cut(&material.rest_turn, (0, count));
+    let rest_moment = cut(&material.rest_moment, (0, count));
     let mut moment = cut_mut(&mut block.left, own);
     let mut tangent = cut_mut(&mut block.right, own);
     let twice_inverse = &mut block.twice_inverse[..count];
@@ -161,12 +162,11 @@ fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
         let (even, odd) = (a.times_from(bw, b.scale(aw)), a.cross(b));
         let w = even - odd;
         (even + odd).scale(twice).store(&mut tangent, at);
-        let rest_turn = Vectors::load(simd, &rest_turn, at);
         let stiffness = Vectors::load(simd, &stiffness, at);
         // The moment A (2 sigma w - u0) and its part along w, as far as possible
         // before sigma is known: the series takes long.
         let slope = w.each(stiffness);
-        let mut at_rest = rest_turn.each(stiffness);
+        let mut at_rest = Vectors::load(simd, &rest_moment, at);
         if CHANGES {
             at_rest = at_rest.scale(rest);
         }
@@ -176,7 +176,7 @@ fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
         let mut m = slope.scale(two_sigma) - at_rest;
         let mut along = slope_along * two_sigma - rest_along;
         if CHANGES {
-            lost = lost + rest_turn.dot(m);
+            lost = lost + Vectors::load(simd, &rest_turn, at).dot(m);
         }
         if let Some((one, two)) = &mut past {
             let rate = rate((one, two), (w.scale(two_sigma), at), rates, law.remember);
