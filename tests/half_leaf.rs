@@ -6,20 +6,11 @@ mod common;
 #[path = "common/random.rs"]
 mod random;
 
-use common::scenario;
-use leafdyn::relax::{Equilibrium, Options, Outcome, relax};
+use common::{rest, scenario};
+use leafdyn::relax::Outcome;
 use leafdyn::scenario::{Profile, Scenario};
 use leafdyn::shape::Difference;
 use proptest::prelude::*;
-
-fn rest(scenario: &Scenario, full_model: bool, segments: Option<usize>) -> Equilibrium {
-    let options = Options {
-        full_model,
-        segments,
-        ..Options::default()
-    };
-    relax(scenario, &options, &mut |_| {}).unwrap()
-}
 
 /// A leaf made of the upper half of another and its mirror image.
 fn mirrored(mut leaf: Scenario, odd: bool) -> Scenario {

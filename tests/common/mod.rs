@@ -90,6 +90,16 @@ pub fn settle_on(scenario: &Scenario, segments: usize, keep_unstable: bool) -> E
     leaf
 }
 
+/// An equilibrium as it is found by default, or by the full model.
+pub fn rest(scenario: &Scenario, full_model: bool, segments: Option<usize>) -> Equilibrium {
+    let options = Options {
+        full_model,
+        segments,
+        ..Options::default()
+    };
+    relax(scenario, &options, &mut |_| {}).unwrap()
+}
+
 /// A scenario file with entries replaced, relaxed at the tight tolerance.
 #[track_caller]
 pub fn solve(name: &str, overrides: &[String]) -> Equilibrium {
