@@ -1,6 +1,6 @@
 //! Several numbers at once: what one instruction of the processor works on.
 
-use std::ops::{Add, Deref, Mul, Neg, Sub};
+use std::ops::{Add, Deref, Mul, Sub};
 
 use pulp::Simd;
 
@@ -124,11 +124,11 @@ impl<S: Simd> Lanes<S> {
         self.simd.reduce_sum_f64s(self.v)
     }
 
-    /// The polynomial with these coefficients, at most 16, constant term first:
-    /// in pairs, then pairs of these (G. Estrin), which do not wait for each
-    /// other.
+    /// The polynomial with these coefficients, constant term first: in pairs,
+    /// then pairs of these (G. Estrin), which do not wait for each other.
     #[inline(always)]
     pub fn polynomial<const N: usize>(self, coefficients: &[f64; N]) -> Self {
+        const { assert!(N <= 16, "pairs of pairs of pairs of pairs") };
         let mut terms = [self; N];
         for k in 0..N {
             terms[k] = Lanes::splat(self.simd, coefficients[k]);
@@ -186,17 +186,6 @@ impl<S: Simd> Mul for Lanes<S> {
         Lanes {
             simd: self.simd,
             v: self.simd.mul_f64s(self.v, other.v),
-        }
-    }
-}
-
-impl<S: Simd> Neg for Lanes<S> {
-    type Output = Self;
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Lanes {
-            simd: self.simd,
-            v: self.simd.neg_f64s(self.v),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! From the leaf to the arrays of the explicit method, and back.
 
-use super::kernel::{Array, Done, GROUP, Material, Motion, Node, Past, Positions, blocks, node};
+use super::kernel::{Array, BLOCK, Done, GROUP, Material, Motion, Node, Past, Positions, blocks};
 use super::method::Velocity;
 use super::physics::Physics;
 use crate::leaf::{DiscreteLeaf, State};
@@ -121,9 +121,22 @@ fn made_of(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> Node {
 }
 
 impl Rod {
+    /// The block of the node at an index of the arrays, and its place there.
+    fn block(&self, at: usize) -> (&Material, usize) {
+        let i = at - GROUP;
+        (&self.material[i / BLOCK], i % BLOCK)
+    }
+
+    /// Length of rod that loads on the node at an index of the arrays come from.
+    pub fn weight(&self, at: usize) -> f64 {
+        let (material, i) = self.block(at);
+        material.weight[i]
+    }
+
     /// What the node at an index of the arrays is made of.
     pub fn node(&self, at: usize) -> Node {
-        node(&self.material, at - GROUP)
+        let (material, i) = self.block(at);
+        material.node(i)
     }
 
     /// Lets what stands behind the last node, in its group and next to that, be
@@ -157,14 +170,15 @@ impl Rod {
     /// Angular velocity of a node with rotation `q` and angular momentum `p`.
     pub fn spin(&self, at: usize, q: DQuat, p: DVec3) -> DVec3 {
         let d1 = q * DVec3::X;
-        let node = self.node(at);
-        p * node.per_inertia + d1 * (d1.dot(p) * node.per_spin)
+        let (material, i) = self.block(at);
+        p * material.per_inertia[i] + d1 * (d1.dot(p) * material.per_spin[i])
     }
 
     /// Rotation of a node.
     pub fn rotation(&self, at: usize) -> DQuat {
         let [x, y, z, w] = [0, 1, 2, 3].map(|c| self.motion.q[c][at]);
-        DQuat::from_xyzw(x, y, z, w)
+        // They are brought back to unit length now and then only.
+        DQuat::from_xyzw(x, y, z, w).normalize()
     }
 
     /// Velocity and angular momentum of a node.

@@ -26,7 +26,7 @@ use rayon::prelude::*;
 
 use super::fictitious;
 use super::friction::rates;
-use super::kernel::{Block, Forces, GROUP, Law, Neighbour, Positions, Pull, Step};
+use super::kernel::{self, Block, Forces, GROUP, Law, Neighbour, Positions, Pull, Step};
 use super::ledger::{Exchange, Ledger};
 use super::method::Method;
 use super::nodes::{self, Rod, vector};
@@ -38,7 +38,7 @@ use crate::rod::RESOLVED_TURN;
 /// Part of the stable time step that is used.
 const SAFETY: f64 = 0.9;
 
-/// Steps from one to the next by which quaternions get back to unit length.
+/// Every so many steps quaternions are brought back to unit length.
 const NORMALISED: usize = 8;
 
 /// From this many nodes on, rods are shared out among threads. Measured: below
@@ -112,7 +112,7 @@ impl<'a> Explicit<'a> {
             rods.push(nodes::rod(&leaf, &physics, state, j, rods.last()));
         }
         let mut explicit = Explicit {
-            arch: Arch::new(),
+            arch: kernel::arch(),
             next: positions.clone(),
             positions,
             block: Block::new(),
@@ -194,13 +194,18 @@ impl<'a> Explicit<'a> {
         energy
     }
 
+    /// The largest turn of a segment that the last step saw. That of unit
+    /// quaternions is told up to 2 pi, since their signs are aligned.
+    fn sharpest(&self) -> f64 {
+        let sharpest = self.rods.iter().map(|rod| rod.done.sharpest);
+        4.0 * (0.5 * sharpest.fold(0.0, f64::max).sqrt()).min(1.0).asin()
+    }
+
     /// Whether what the last step saw is fit to go on from: finite numbers, and no
     /// segment bent by more than its grid can resolve.
     fn sound(&self) -> bool {
-        self.rods.iter().all(|rod| {
-            let resolved = rod.done.sharpest.sqrt() <= 2.0 * (0.25 * RESOLVED_TURN).sin();
-            resolved && rod.done.twice_kinetic.is_finite()
-        })
+        let finite = |rod: &Rod| rod.done.twice_kinetic.is_finite();
+        self.sharpest() <= RESOLVED_TURN && self.rods.iter().all(finite)
     }
 
     /// Kicks, and flies on for `h`.
@@ -243,7 +248,7 @@ impl<'a> Explicit<'a> {
         if let Some(mass) = self.tip_mass {
             let mut force = loads.tip_force;
             for rod in &self.rods {
-                force += rod.node(last).weight * loads.gravity;
+                force += rod.weight(last) * loads.gravity;
                 force -= DVec3::from(rod.done.last_force);
             }
             let after = keep * before.0 + force * (kick / mass);
@@ -279,7 +284,7 @@ impl<'a> Explicit<'a> {
         let mut lower = 0.0;
         for (j, (rod, positions)) in self.rods.iter().zip(&self.positions).enumerate() {
             for at in GROUP..=last {
-                lower += rod.node(at).weight * gravity.dot(vector(&positions.x, at));
+                lower += rod.weight(at) * gravity.dot(vector(&positions.x, at));
             }
             if j == 0 || !self.leaf.leaf.joined() {
                 lower += tip_force.dot(vector(&positions.x, last));

@@ -3,6 +3,7 @@
 use super::Explicit;
 use crate::motion::ledger::{Exchange, measure};
 use crate::motion::method::{Broken, Method, Snapshot, Velocity};
+use crate::rod::RESOLVED_TURN;
 
 /// Part of a step that is rounding.
 const NO_TIME: f64 = 1e-9;
@@ -14,7 +15,13 @@ const WATCHED: usize = 1000;
 impl Explicit<'_> {
     fn judge(&mut self) -> Result<(), Broken> {
         let now = self.snapshot();
-        (self.ledger).judge(&self.leaf, &self.physics, &now, self.step)
+        (self.ledger).judge(&self.leaf, &self.physics, &now, self.step)?;
+        // The ledger takes turns for what they are in space, at most pi.
+        let (time, turn) = (self.time, self.sharpest());
+        match turn > RESOLVED_TURN {
+            true => Err(Broken::Unresolved { time, turn }),
+            false => Ok(()),
+        }
     }
 }
 

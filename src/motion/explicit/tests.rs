@@ -12,19 +12,21 @@ const LEAF: &str = r#"
     load = { gravity = [0.1, -0.3, -1.0], tip_force = [0.3, 0.2, 0.1] }
 "#;
 
-/// So many that the last of two blocks is not full.
-const SEGMENTS: usize = 150;
+/// Within a block, up to its end, and beyond: with one node, and with many.
+const SEGMENTS: [usize; 8] = [1, 2, 3, 4, 127, 128, 129, 150];
 
 /// Curved and twisted, and strained by some percent.
 fn bent(leaf: &DiscreteLeaf) -> State {
-    let mut state = start(leaf);
+    let (mut state, n) = (start(leaf), leaf.segments());
     for j in 0..state.rods() {
-        for i in 1..=SEGMENTS {
-            let s = i as f64 / SEGMENTS as f64;
-            let tip = if i == SEGMENTS { 0 } else { j };
+        for i in 1..=n {
+            let s = i as f64 / n as f64;
+            let tip = if i == n { 0 } else { j };
             let phase = 5.0 * s + tip as f64;
             let turn = DVec3::new(phase.sin(), s, phase.cos()) * s;
             let shift = DVec3::new(phase.cos(), phase.sin(), s) * (0.02 * s * (1.5 - s));
+            // No segment is bent by more than a grid resolves.
+            let turn = turn * (n as f64 / 8.0).min(1.0);
             let increment = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
             state.advance(state.base(j) + i, &increment, 1.0);
         }
@@ -36,10 +38,10 @@ fn bent(leaf: &DiscreteLeaf) -> State {
 fn by_element(leaf: &DiscreteLeaf, state: &State) -> Vec<(DVec3, DVec3)> {
     let mut all = vec![(DVec3::ZERO, DVec3::ZERO); state.x.len()];
     for j in 0..leaf.rods() {
-        for i in 0..=SEGMENTS {
+        for i in 0..=leaf.segments() {
             let k = state.base(j) + i;
             all[k].0 += leaf.load(state, j, i).0;
-            if i == SEGMENTS {
+            if i == leaf.segments() {
                 break;
             }
             let section = leaf.section(j, i);
@@ -60,13 +62,19 @@ fn by_element(leaf: &DiscreteLeaf, state: &State) -> Vec<(DVec3, DVec3)> {
 fn forces_are_those_of_the_element() {
     let scenario = Scenario::from_toml(LEAF).unwrap();
     let leaf = Leaf::new(&scenario);
-    let discrete = DiscreteLeaf::new(&leaf, Grid::new(SEGMENTS, &[]));
-    let state = bent(&discrete);
-    let expected = by_element(&discrete, &state);
+    for n in SEGMENTS {
+        let discrete = DiscreteLeaf::new(&leaf, Grid::new(n, &[]));
+        forces_are_those(&discrete);
+    }
+}
+
+fn forces_are_those(discrete: &DiscreteLeaf) {
+    let (leaf, n, state) = (discrete.leaf, discrete.segments(), bent(discrete));
+    let expected = by_element(discrete, &state);
     let largest = expected.iter().map(|(f, m)| f.length().max(m.length()));
     let allowed = 1e-12 * largest.fold(0.0, f64::max);
-    for arch in [Arch::new(), Arch::Scalar] {
-        let physics = Physics::at_rest(&leaf);
+    for arch in [kernel::arch(), Arch::Scalar] {
+        let physics = Physics::at_rest(leaf);
         let mut explicit = Explicit::new(discrete.clone(), physics, &state, None).unwrap();
         explicit.arch = arch;
         explicit.damp(0.0);
@@ -74,12 +82,12 @@ fn forces_are_those_of_the_element() {
         explicit.go(h);
         let mut tip = DVec3::ZERO;
         for (j, rod) in explicit.rods.iter().enumerate() {
-            for i in 1..=SEGMENTS {
+            for i in 1..=n {
                 let (v, p) = rod.moving(GROUP + i);
                 let (force, moment) = expected[state.base(j) + i];
                 let moment_error = (p / (0.5 * h) - moment).length();
                 assert!(moment_error < allowed, "{j} {i}: {moment_error}");
-                if i == SEGMENTS {
+                if i == n {
                     tip += force;
                 } else {
                     let error = (v * (rod.node(GROUP + i).mass / (0.5 * h)) - force).length();
@@ -87,7 +95,7 @@ fn forces_are_those_of_the_element() {
                 }
             }
         }
-        let v = explicit.rods[2].moving(GROUP + SEGMENTS).0;
+        let v = explicit.rods[2].moving(GROUP + n).0;
         let error = (v * (explicit.tip_mass.unwrap() / (0.5 * h)) - tip).length();
         assert!(error < allowed, "tip: {error}");
         // The clamped ends stay where they are.
@@ -121,4 +129,33 @@ fn like_blocks_are_shared() {
     assert_eq!(distinct("rods = 1, length = 1.0", 1000), (3, 8));
     assert_eq!(distinct("rods = 5, length = 1.0", 50), (1, 5));
     assert_eq!(distinct("rods = 3, length = [1.0, 1.0, 1.1]", 50), (2, 3));
+}
+
+/// A constant factor of the rest curvature is as good as other curvatures.
+#[test]
+fn a_constant_factor_of_the_rest_curvature_counts() {
+    let after = |toml: &str| {
+        let scenario = Scenario::from_toml(toml).unwrap();
+        let leaf = Leaf::new(&scenario);
+        let discrete = DiscreteLeaf::new(&leaf, Grid::new(20, &[]));
+        let state = bent(&discrete);
+        let physics = Physics::new(&leaf);
+        let mut explicit = Explicit::new(discrete, physics, &state, None).unwrap();
+        for _ in 0..100 {
+            explicit.step(1e-4);
+        }
+        explicit.now()
+    };
+    let half = LEAF.replace(
+        "rest = {",
+        "dynamics.rest = { at = [0.0], factor = [0.5] }\nrest = {",
+    );
+    let halved = LEAF.replace(
+        "twist = 0.3, bend_2 = [0.5, 1.0, 0.0], bend_3 = 0.7",
+        "twist = 0.15, bend_2 = [0.25, 0.5, 0.0], bend_3 = 0.35",
+    );
+    let (half, halved) = (after(&half), after(&halved));
+    assert_eq!(half.x, halved.x);
+    assert_eq!(half.n, halved.n);
+    assert_ne!(half.x, after(LEAF).x);
 }

@@ -6,11 +6,11 @@ use super::segments::quaternion;
 use super::{Array, Block, GROUP, Material, Motion, Neighbour};
 use crate::motion::lanes::{Lanes, Vectors, cut, cut_mut, slice, slice_mut};
 
-/// cos and sin(a)/a as series in a^2, for angles of a step (halved). They turn
-/// a node by a little more or less than its angular momentum says, by 2e-10 of
-/// the angle at a = 0.1 and with its sixth power, so that the method stays of
-/// its order, and by what still depends on that momentum alone, so that it stays
-/// symplectic. Cut off there, cos^2 + sin^2 is 1 up to 4e-4 a^8.
+/// cos and sin(a)/a as series in a^2, for angles of a step (halved). Truncated,
+/// they turn a node by a little too much: by 2e-10 of the angle at a = 0.1,
+/// growing with a^6, which leaves the order of the method. As the angle still
+/// depends on the angular momentum alone, the method stays symplectic. cos^2 +
+/// sin^2 exceeds 1 by at most 4e-4 a^8.
 const COS: [f64; 4] = [1.0, -1.0 / 2.0, 1.0 / 24.0, -1.0 / 720.0];
 const SINC: [f64; 3] = [1.0, -1.0 / 6.0, 1.0 / 120.0];
 
@@ -62,8 +62,8 @@ impl Flight<'_> {
         let material = self.material;
         let (weight, coupled) = (own(&material.weight), own(&material.coupled));
         let (mass, per_mass) = (own(&material.mass), own(&material.per_mass));
-        let right = cut(&self.block.n, (GROUP, nodes));
-        let left = cut(&self.block.n, (GROUP - 1, nodes));
+        let n_right = cut(&self.block.n, (GROUP, nodes));
+        let n_left = cut(&self.block.n, (GROUP - 1, nodes));
         let x = cut(self.positions, place);
         let mut next = cut_mut(self.next, place);
         let mut v = cut_mut(&mut self.motion.v, place);
@@ -79,7 +79,7 @@ impl Flight<'_> {
         let mut at = 0;
         while at + S::F64_LANES <= nodes {
             let weight = Lanes::load(simd, weight, at);
-            let force = Vectors::load(simd, &right, at) - Vectors::load(simd, &left, at);
+            let force = Vectors::load(simd, &n_right, at) - Vectors::load(simd, &n_left, at);
             let mut force = gravity.times(weight, force);
             let x = Vectors::load(simd, &x, at);
             let share = Lanes::load(simd, coupled, at);

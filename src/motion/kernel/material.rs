@@ -13,9 +13,9 @@ pub struct Node {
     pub rest_length: f64,
     /// A/ds.
     pub bend: [f64; 3],
-    /// ds u0.
+    /// ds u0, and its factor if that is constant.
     pub rest_turn: [f64; 3],
-    /// A u0: the moment that keeps the segment straight.
+    /// A u0, likewise: what the moment lacks where the segment is straight.
     pub rest_moment: [f64; 3],
     /// Mass; that of a held node and of a joint tip is not in here.
     pub mass: f64,
@@ -71,6 +71,24 @@ impl Material {
             coupled: gather(&|node| node.coupled),
         }
     }
+
+    /// Node `i` of the block.
+    pub fn node(&self, i: usize) -> Node {
+        let each = |arrays: &[[f64; BLOCK]; 3]| arrays.each_ref().map(|array| array[i]);
+        Node {
+            stretch: each(&self.stretch),
+            rest_length: self.rest_length[i],
+            bend: each(&self.bend),
+            rest_turn: each(&self.rest_turn),
+            rest_moment: each(&self.rest_moment),
+            mass: self.mass[i],
+            per_mass: self.per_mass[i],
+            per_inertia: self.per_inertia[i],
+            per_spin: self.per_spin[i],
+            weight: self.weight[i],
+            coupled: self.coupled[i],
+        }
+    }
 }
 
 /// A rod's nodes in blocks. Blocks that are like the one before, or like the one
@@ -88,23 +106,4 @@ pub fn blocks(nodes: &[Node], beside: Option<&[Arc<Material>]>) -> Vec<Arc<Mater
         blocks.push(same.cloned().unwrap_or_else(|| Arc::new(material)));
     }
     blocks
-}
-
-/// Node `i` of a rod.
-pub fn node(blocks: &[Arc<Material>], i: usize) -> Node {
-    let (m, at) = (&blocks[i / BLOCK], i % BLOCK);
-    let each = |arrays: &[[f64; BLOCK]; 3]| arrays.each_ref().map(|array| array[at]);
-    Node {
-        stretch: each(&m.stretch),
-        rest_length: m.rest_length[at],
-        bend: each(&m.bend),
-        rest_turn: each(&m.rest_turn),
-        rest_moment: each(&m.rest_moment),
-        mass: m.mass[at],
-        per_mass: m.per_mass[at],
-        per_inertia: m.per_inertia[at],
-        per_spin: m.per_spin[at],
-        weight: m.weight[at],
-        coupled: m.coupled[at],
-    }
 }

@@ -19,16 +19,16 @@ use pulp::{Arch, Simd};
 
 pub use self::array::Array;
 use self::flight::Flight;
-pub use self::material::{Material, Node, blocks, node};
+pub use self::material::{Material, Node, blocks};
 use self::segments::{Found, Nodes};
 use super::lanes::Lanes;
 
 /// Nodes come in groups of so many; arrays are that much longer at both ends.
 pub const GROUP: usize = 4;
 
-/// Nodes of a block. Measured: steps take 1.06 times as long with half as many,
-/// which the loops' beginnings and ends come to; twice as many bring nothing.
-const BLOCK: usize = 32 * GROUP;
+/// Nodes of a block. Measured: with half as many, steps take 1.06 times as long,
+/// for the beginnings and ends of the loops; twice as many gain nothing.
+pub const BLOCK: usize = 32 * GROUP;
 
 /// Positions of a rod's nodes, one array per component. Node i stands at
 /// GROUP + i; what is before and after is never used, only read.
@@ -40,7 +40,8 @@ pub struct Positions {
 /// What else moves.
 #[derive(Clone, Debug)]
 pub struct Motion {
-    /// Rotations as unit quaternions.
+    /// Rotations as quaternions, but for rounding and for what [`flight`] cuts off
+    /// of unit length.
     pub q: [Array; 4],
     /// Velocities, half a step behind or ahead.
     pub v: [Array; 3],
@@ -141,8 +142,8 @@ pub struct Step<'a> {
     pub keep: f64,
     pub kick: f64,
     pub flight: f64,
-    /// Whether quaternions get back to unit length, of which rounding and cut off
-    /// series slowly take them away.
+    /// Whether quaternions are brought back to unit length, from which rounding
+    /// and truncated series slowly take them.
     pub normalise: bool,
     /// Room to work in.
     pub block: &'a mut Block,
@@ -173,6 +174,23 @@ impl Step<'_> {
             (false, true) => arch.dispatch(Made::<false, true>(self)),
             (false, false) => arch.dispatch(Made::<false, false>(self)),
         }
+    }
+}
+
+/// The instructions to work with: the widest there are, if a group of nodes is a
+/// whole number of them.
+pub fn arch() -> Arch {
+    struct Width;
+    impl pulp::WithSimd for Width {
+        type Output = usize;
+        fn with_simd<S: Simd>(self, _: S) -> usize {
+            S::F64_LANES
+        }
+    }
+    let arch = Arch::new();
+    match GROUP.is_multiple_of(arch.dispatch(Width)) {
+        true => arch,
+        false => Arch::Scalar,
     }
 }
 

@@ -234,23 +234,23 @@ fn stretch<S: Simd, const DAMPED: bool>(
         let (b, bw) = quaternion(simd, &q1, at);
         // Midpoint frame: the rotation matrix of s without its length.
         let (s, sw) = (a + b, aw + bw);
-        let t = s.scale(Lanes::load(simd, twice_inverse, at));
-        let (xy, xz, yz) = (s.x * t.y, s.x * t.z, s.y * t.z);
-        let (not_x, not_z) = (s.x.times_from(t.x, one), s.z.times_from(t.z, one));
+        let r = s.scale(Lanes::load(simd, twice_inverse, at));
+        let (xy, xz, yz) = (s.x * r.y, s.x * r.z, s.y * r.z);
+        let (not_x, not_z) = (s.x.times_from(r.x, one), s.z.times_from(r.z, one));
         let d1 = Vectors::new(
-            s.y.times_from(t.y, not_z),
-            sw.times(t.z, xy),
-            sw.times_from(t.y, xz),
+            s.y.times_from(r.y, not_z),
+            sw.times(r.z, xy),
+            sw.times_from(r.y, xz),
         );
         let d2 = Vectors::new(
-            sw.times_from(t.z, xy),
-            s.x.times_from(t.x, not_z),
-            sw.times(t.x, yz),
+            sw.times_from(r.z, xy),
+            s.x.times_from(r.x, not_z),
+            sw.times(r.x, yz),
         );
         let d3 = Vectors::new(
-            sw.times(t.y, xz),
-            sw.times_from(t.x, yz),
-            s.y.times_from(t.y, not_x),
+            sw.times(r.y, xz),
+            sw.times_from(r.x, yz),
+            s.y.times_from(r.y, not_x),
         );
         let dx = Vectors::load(simd, &x1, at) - Vectors::load(simd, &x0, at);
         let length = Lanes::load(simd, rest_length, at);
