@@ -21,8 +21,10 @@ const LEAVES: [(usize, usize); 9] = [
     (35, 2000),
 ];
 
-/// Segments times steps of one measurement: some tens of milliseconds.
+/// Segments times steps of one measurement, some tens of milliseconds, and least
+/// steps: a motion ends with a look at its energy, and has one every so many.
 const WORK: usize = 1_000_000;
+const STEPS: usize = 1000;
 
 const REPEATS: usize = 15;
 
@@ -44,7 +46,7 @@ fn rates(rods: usize, segments: usize, pools: &[rayon::ThreadPool]) -> Vec<f64> 
     let discrete = DiscreteLeaf::new(&leaf, Grid::new(segments, &[]));
     let physics = Physics::new(&leaf);
     let state = start(&discrete);
-    let steps = (WORK / (rods * segments)).max(20);
+    let steps = (WORK / (rods * segments)).max(STEPS);
     let mut found = vec![Vec::new(); pools.len()];
     for _ in 0..REPEATS {
         for (pool, found) in pools.iter().zip(&mut found) {

@@ -22,7 +22,7 @@ Without --relax: nanoseconds per element and step of position Verlet, for one ro
 35 rods (CASES), median of REPEATS. The rate depends on the numbers of rods and elements, not on the
 material. numba compiles before. Every LAP the motion begins anew, as by PyElastica's own law vibrations
 of Fig. 4's leaf grow until they overflow, even with a twentieth of the time step. With --leafdyn,
-leafdyn's explicit method runs the same leaf in turns with it.
+leafdyn's explicit method runs the same leaf in turns with it, in one thread.
 
 With --relax: the damped motion from circular arcs until the kinetic energy is REST of A/L. Here the
 matrices are renewed in every step so that force and moment are linear in the strains, as the scenario
@@ -31,6 +31,7 @@ wants; with --own-law PyElastica's own law stays, by which a stretched rod gets 
 Needs python 3.11 and pyelastica (here 1.0.0). Set OMP_NUM_THREADS=1 and NUMBA_NUM_THREADS=1.
 """
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -283,7 +284,8 @@ def simulate(options, rods, n, duration):
     with tempfile.TemporaryDirectory() as folder:
         command = [options.leafdyn, "simulate", options.scenario, "--method", "explicit", "--segments", str(n)]
         try:
-            done = subprocess.run([*command, *sets, "--json", "--out", folder], capture_output=True, text=True)
+            one = {**os.environ, "RAYON_NUM_THREADS": "1"}
+            done = subprocess.run([*command, *sets, "--json", "--out", folder], capture_output=True, text=True, env=one)
             report = json.loads(done.stdout)
         except OSError as error:
             raise Refused(f"{options.leafdyn}: {error}") from None

@@ -41,9 +41,9 @@ const SAFETY: f64 = 0.9;
 /// Every so many steps quaternions are brought back to unit length.
 const NORMALISED: usize = 8;
 
-/// From this many nodes on, rods are shared out among threads. Measured: below
+/// From this many segments on, rods are shared out among threads. Measured: below
 /// it waking the threads costs more than they bring.
-const PARALLEL_NODES: usize = 8192;
+const PARALLEL_SEGMENTS: usize = 1000;
 
 /// Rods that are not divided any further: some two shares for every thread.
 fn share(rods: usize) -> usize {
@@ -129,7 +129,7 @@ impl<'a> Explicit<'a> {
             widths: [0.0; 2],
             ledger: Ledger::default(),
             parallel: count > 1
-                && count * leaf.segments() >= PARALLEL_NODES
+                && count * leaf.segments() >= PARALLEL_SEGMENTS
                 && rayon::current_num_threads() > 1,
             leaf,
             physics,
