@@ -28,7 +28,7 @@ use super::fictitious;
 use super::friction::rates;
 use super::kernel::{self, Block, Forces, GROUP, Law, Neighbour, Positions, Pull, Step};
 use super::ledger::{Exchange, Ledger};
-use super::method::Method;
+use super::method::{Method, Snapshot};
 use super::nodes::{self, Rod, vector};
 use super::physics::Physics;
 use super::stable::StableStep;
@@ -75,6 +75,9 @@ pub struct Explicit<'a> {
     /// Widths of the last step and of the one before; zero if there was none.
     widths: [f64; 2],
     ledger: Ledger,
+    /// The last look at the leaf, until it moves or is changed: where a motion
+    /// was judged it is often asked for, too.
+    seen: Option<Snapshot>,
     parallel: bool,
 }
 
@@ -128,6 +131,7 @@ impl<'a> Explicit<'a> {
             begin: (0.0, 0),
             widths: [0.0; 2],
             ledger: Ledger::default(),
+            seen: None,
             parallel: count > 1
                 && count * leaf.segments() >= PARALLEL_SEGMENTS
                 && rayon::current_num_threads() > 1,
@@ -170,6 +174,7 @@ impl<'a> Explicit<'a> {
 
     /// Takes all velocities away.
     pub fn stop(&mut self) {
+        self.seen = None;
         for rod in &mut self.rods {
             for array in rod.motion.v.iter_mut().chain(&mut rod.motion.p) {
                 array.fill(0.0);
@@ -180,6 +185,7 @@ impl<'a> Explicit<'a> {
 
     /// Lets every velocity decay at this rate from now on.
     pub fn damp(&mut self, rate: f64) {
+        self.seen = None;
         self.physics.damping = rate;
     }
 
@@ -210,6 +216,7 @@ impl<'a> Explicit<'a> {
 
     /// Kicks, and flies on for `h`.
     fn go(&mut self, h: f64) -> (Exchange, f64) {
+        self.seen = None;
         let done = self.kick(0.5 * h, h, true);
         self.widths = [h, self.widths[0]];
         self.stepped += h;
