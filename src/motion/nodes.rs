@@ -114,7 +114,6 @@ fn made_of(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> Node {
             node.stretch[c] = 1.0 / (section.compliance[c] * section.ds);
             node.bend[c] = section.couple_stiffness[c] / section.ds;
             node.rest_turn[c] = rest * section.rest_curvature[c] * section.ds;
-            node.rest_moment[c] = node.bend[c] * node.rest_turn[c];
         }
     }
     node

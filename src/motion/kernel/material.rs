@@ -15,8 +15,6 @@ pub struct Node {
     pub bend: [f64; 3],
     /// ds u0, and its factor if that is constant.
     pub rest_turn: [f64; 3],
-    /// A u0, likewise: what the moment lacks where the segment is straight.
-    pub rest_moment: [f64; 3],
     /// Mass; that of a held node and of a joint tip is not in here.
     pub mass: f64,
     /// 1/mass; zero for a node that is held, and for a joint tip.
@@ -31,7 +29,8 @@ pub struct Node {
     pub coupled: f64,
 }
 
-/// The nodes of a block, one array for each number of a [`Node`].
+/// The nodes of a block, one array for each number of a [`Node`], and what
+/// follows from these.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(align(64))]
 pub struct Material {
@@ -39,6 +38,7 @@ pub struct Material {
     pub rest_length: [f64; BLOCK],
     pub bend: [[f64; BLOCK]; 3],
     pub rest_turn: [[f64; BLOCK]; 3],
+    /// A u0: what the moment lacks where the segment is straight.
     pub rest_moment: [[f64; BLOCK]; 3],
     pub mass: [f64; BLOCK],
     pub per_mass: [f64; BLOCK],
@@ -62,7 +62,7 @@ impl Material {
             rest_length: gather(&|node| node.rest_length),
             bend: [0, 1, 2].map(|c| gather(&|node| node.bend[c])),
             rest_turn: [0, 1, 2].map(|c| gather(&|node| node.rest_turn[c])),
-            rest_moment: [0, 1, 2].map(|c| gather(&|node| node.rest_moment[c])),
+            rest_moment: [0, 1, 2].map(|c| gather(&|node| node.bend[c] * node.rest_turn[c])),
             mass: gather(&|node| node.mass),
             per_mass: gather(&|node| node.per_mass),
             per_inertia: gather(&|node| node.per_inertia),
@@ -80,7 +80,6 @@ impl Material {
             rest_length: self.rest_length[i],
             bend: each(&self.bend),
             rest_turn: each(&self.rest_turn),
-            rest_moment: each(&self.rest_moment),
             mass: self.mass[i],
             per_mass: self.per_mass[i],
             per_inertia: self.per_inertia[i],
