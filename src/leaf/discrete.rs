@@ -138,6 +138,11 @@ impl<'a> DiscreteLeaf<'a> {
         between.into_iter().any(|&k| k != DVec3::ZERO)
     }
 
+    /// Coupling of gap `g`, force per displacement and unit of sigma.
+    pub(crate) fn coupling(&self, g: usize) -> DVec3 {
+        self.coupling[g]
+    }
+
     /// Coupling of gap `g` at node `i`, force per displacement; none at a
     /// joint tip, which all rods share.
     pub(crate) fn spring(&self, g: usize, i: usize) -> DVec3 {

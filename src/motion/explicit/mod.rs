@@ -60,8 +60,6 @@ pub struct Explicit<'a> {
     next: Vec<Positions>,
     rods: Vec<Rod>,
     block: Block,
-    /// Force per displacement and unit of sigma, of every gap.
-    coupling: Vec<[f64; 3]>,
     /// Mass of the joint tip, if there is one.
     tip_mass: Option<f64>,
     /// Time step.
@@ -120,9 +118,6 @@ impl<'a> Explicit<'a> {
             positions,
             block: Block::new(),
             rods,
-            coupling: (1..count)
-                .map(|j| leaf.leaf.coupling(j - 1).to_array())
-                .collect(),
             tip_mass: joined.then(|| (0..count).map(tip_mass).sum()),
             step: 0.0,
             stepped: 0.0,
@@ -328,12 +323,12 @@ impl<'a> Explicit<'a> {
             tip_moment: loads.tip_moment.to_array(),
         };
         let normalise = self.steps.is_multiple_of(NORMALISED);
-        let (all, coupling) = (&self.positions, &self.coupling);
+        let (all, leaf) = (&self.positions, &self.leaf);
         let one = |block: &mut Block, j: usize, rod: &mut Rod, next: &mut Positions| {
             let beside = |other: usize, gap: usize| {
                 (other < all.len()).then(|| Neighbour {
                     positions: &all[other],
-                    stiffness: coupling[gap],
+                    stiffness: leaf.coupling(gap).to_array(),
                 })
             };
             let step = Step {
