@@ -6,8 +6,8 @@ use std::ops::{Deref, DerefMut, Range};
 const LINE: usize = 8;
 
 /// An array of fixed length whose first number is the first of a line, so that
-/// no group of nodes lies in two. Measured: otherwise steps take 1.1 times as
-/// long.
+/// no group of nodes lies in two. Measured: otherwise steps of long rods take 1.1
+/// times as long.
 #[derive(Debug)]
 pub struct Array {
     room: Vec<f64>,
