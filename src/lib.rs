@@ -26,7 +26,7 @@
 //!
 //! [`Scenario::read`](scenario::Scenario::read) takes a file instead,
 //! [`relax::Options`] a tolerance or a fixed grid, the closure is told how far
-//! a long run has come, and [`output::write_all`] writes the files that the
+//! a long run has come, and [`files::write_all`] writes the files that the
 //! program `leafdyn` writes. What comes back is a [`relax::Equilibrium`].
 //!
 //! # The model
@@ -173,7 +173,7 @@
 //! [`scenario`] (TOML to a checked [`scenario::Scenario`]) and [`rotation`],
 //! [`rod`], [`leaf`], [`shape`], [`undulation`], [`bvp`], [`motion`], [`modes`],
 //! [`relax`], [`branch`], [`simulate`],
-//! [`study`], [`output`] (JSON, tables, figures): each module uses those named
+//! [`study`], [`report`] (console, JSON, tables), [`figure`], [`files`]: each module uses those named
 //! before it and knows nothing of those after it.
 //!
 //! [`motion`] moves a leaf on the same grid in time, without units: by an
@@ -183,18 +183,20 @@
 //!
 //! [`simulate`] follows the leaf of a scenario for its duration, from where
 //! the scenario says, and hands out a [`simulate::Frame`] at every output. An
-//! [`output::Recording`] writes these to files as they come, and can stop and
+//! [`files::Recording`] writes these to files as they come, and can stop and
 //! resume.
 
 #![warn(missing_docs)]
 
 pub mod branch;
 pub mod bvp;
+pub mod figure;
+pub mod files;
 pub mod leaf;
 pub mod modes;
 pub mod motion;
-pub mod output;
 pub mod relax;
+pub mod report;
 pub mod rod;
 pub mod rotation;
 pub mod scenario;

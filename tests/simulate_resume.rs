@@ -9,8 +9,8 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use leafdyn::files::Recording;
 use leafdyn::leaf::Leaf;
-use leafdyn::output::Recording;
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Options, Scheme, Simulation};
 use workplace::{Workplace, leaf, text};

@@ -4,13 +4,16 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum, ValueHint};
 
-use leafdyn::output::{self, contender};
+use leafdyn::files;
+use leafdyn::report::words::contender;
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{self, ChartOptions, Contender, Scaling, Turn};
 
+use leafdyn::report;
+
 use super::progress::ProgressLine;
 use super::request::Request;
-use super::{Refusal, Status, chart_report, note};
+use super::{Refusal, Status, note};
 
 /// Measure every method over its own accuracy, and chart time against true error.
 ///
@@ -110,11 +113,11 @@ impl Chart {
             }
         }
         let scaled = match &chart.scaling {
-            Some(scaling) => output::write_all(&folder, scaling).map(drop),
+            Some(scaling) => files::write_all(&folder, scaling).map(drop),
             None => Ok(()),
         };
         self.request.deliver(&chart, &folder, |folder| {
-            chart_report::report(&chart, folder.filter(|_| scaled.is_ok()))
+            report::chart_report(&chart, folder.filter(|_| scaled.is_ok()))
         })?;
         scaled?;
         Ok(status(chart.confirmed(), chart.scaling.as_ref()))

@@ -4,9 +4,11 @@ use clap::Args;
 
 use leafdyn::study::{self, CheckOptions, Verdict};
 
+use leafdyn::report;
+
 use super::progress::ProgressLine;
 use super::request::Request;
-use super::{Refusal, Status, check_report, note};
+use super::{Refusal, Status, note};
 
 /// Relax a leaf, solve its boundary-value problem by shooting from there, and compare.
 ///
@@ -41,7 +43,7 @@ impl Check {
             note(&format!("{}: {reason}", scenario.name));
         }
         self.request.deliver(&check, &folder, |folder| {
-            check_report::report(&check, folder)
+            report::check_report(&check, folder)
         })?;
         Ok(status(&check.verdict))
     }

@@ -7,14 +7,18 @@ use std::time::Instant;
 
 use clap::{Args, ValueHint};
 
-use leafdyn::output::{self, Journal, OutputError};
+use leafdyn::files;
+use leafdyn::files::Journal;
+use leafdyn::report::OutputError;
 use leafdyn::study::{
     self, CELL_SECONDS, Map as Cells, MapMethod, MapRequest, MapRow, MapShow, Vary,
 };
 
+use leafdyn::report;
+
 use super::progress::ProgressLine;
 use super::request::Request;
-use super::{Refusal, Status, map_report, show};
+use super::{Refusal, Status, show};
 
 /// Solve a leaf by several methods over one or two varying numbers, and map where each method fails.
 ///
@@ -92,10 +96,10 @@ impl Map {
             self.request.tolerance,
             self.cell_seconds,
         )?;
-        output::belongs(&folder, &request)?;
+        files::belongs(&folder, &request)?;
         let clock = Instant::now();
         let known = self.known(&folder, &request)?;
-        output::claim(&folder, &Cells::new(request.clone(), known.clone()))?;
+        files::claim(&folder, &Cells::new(request.clone(), known.clone()))?;
         let computed = match self.draw.is_empty() {
             true => self.solve(&folder, &request, &known)?,
             false => Vec::new(),
@@ -104,7 +108,7 @@ impl Map {
         let count = computed.len();
         let mut map = Cells::new(request, [known, computed].concat());
         map.show = self.show;
-        let told = map_report::Told {
+        let told = report::MapTold {
             known: before,
             computed: count,
             seconds: clock.elapsed().as_secs_f64(),
@@ -112,14 +116,14 @@ impl Map {
         match self.shard {
             Some(shard) => {
                 let name = shard.file_name();
-                output::write_rows(&folder, &name, &map.request, &map.rows)?;
+                files::write_rows(&folder, &name, &map.request, &map.rows)?;
                 let report =
-                    map_report::report(&map, told, &folder.join(name).display().to_string());
+                    report::map_report(&map, told, &folder.join(name).display().to_string());
                 show(report.as_bytes())?;
             }
             None => self.request.deliver(&map, &folder, |folder| {
-                let files = folder.map(|folder| super::text::written(&map, folder));
-                map_report::report(&map, told, &files.unwrap_or_default())
+                let files = folder.map(|folder| report::table::written(&map, folder));
+                report::map_report(&map, told, &files.unwrap_or_default())
             })?,
         }
         Ok(Status::Success)
@@ -139,7 +143,7 @@ impl Map {
         files.extend(self.draw.iter().cloned());
         let mut rows = Vec::new();
         for file in files {
-            rows.extend(output::read_rows(&file, request)?);
+            rows.extend(report::read_rows(&file, request)?);
         }
         rows.sort_by_key(|row| (row.cell, row.method));
         rows.dedup_by_key(|row| (row.cell, row.method));

@@ -1,21 +1,13 @@
 //! The command line: one file per verb. What is computed is in the library.
 
-mod all_report;
 mod chart;
-mod chart_report;
 mod check;
-mod check_report;
 mod map;
-mod map_report;
 mod progress;
 mod relax;
-mod report;
 mod request;
 mod simulate;
-mod simulate_report;
-mod text;
 mod trace;
-mod trace_report;
 
 use std::error::Error;
 use std::io::{self, IsTerminal, Write};
@@ -24,7 +16,9 @@ use std::sync::OnceLock;
 
 use clap::{Parser, Subcommand};
 
-use leafdyn::output::{self, Keeper, OutputError};
+use leafdyn::files;
+use leafdyn::files::Keeper;
+use leafdyn::report::OutputError;
 
 /// How a leaf of coupled elastic veins comes to rest, with an error bar and a statement of stability, and how it moves.
 #[derive(Debug, Parser)]
@@ -93,7 +87,7 @@ static KEEPER: OnceLock<Keeper> = OnceLock::new();
 pub fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     ctrlc::set_handler(|| {
         let kept = KEEPER.get().and_then(Keeper::keep_for_good);
-        output::abandon_unfinished();
+        files::abandon_unfinished();
         if io::stderr().is_terminal() {
             // The progress line may be there.
             let _ = write!(io::stderr(), "\r\x1b[2K");
@@ -117,7 +111,7 @@ fn keep_on_interrupt(keeper: Keeper) {
 fn tell_kept(kept: &Result<f64, OutputError>) -> Status {
     match kept {
         Ok(time) => {
-            let time = text::brief(*time);
+            let time = leafdyn::report::numbers::brief(*time);
             note(&format!("stopped at t = {time}; go on with --resume"));
             Status::Success
         }

@@ -5,12 +5,13 @@ use std::path::Path;
 use clap::{Args, ValueEnum};
 
 use leafdyn::relax::{self, Equilibrium, Method, Options};
+use leafdyn::report;
 use leafdyn::scenario::Scenario;
 use leafdyn::study;
 
 use super::progress::ProgressLine;
 use super::request::Request;
-use super::{Refusal, Status, all_report, note, report};
+use super::{Refusal, Status, note};
 
 /// Eigenvalues that are told unasked.
 const MODES: usize = 3;
@@ -82,7 +83,7 @@ impl Relax {
             note(&format!("{}: {remark}", equilibrium.scenario));
         }
         self.request.deliver(&equilibrium, &folder, |folder| {
-            report::report(&equilibrium, folder)
+            report::relax_report(&equilibrium, folder)
         })?;
         Ok(match equilibrium.outcome.is_success() {
             true => Status::Success,
@@ -128,7 +129,7 @@ impl Relax {
         })?;
         drop(line);
         self.request
-            .deliver(&all, folder, |folder| all_report::report(&all, folder))?;
+            .deliver(&all, folder, |folder| report::all_report(&all, folder))?;
         Ok(match all.found.is_empty() {
             false => Status::Success,
             true => Status::Failure,

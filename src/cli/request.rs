@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueHint};
 
-use leafdyn::output::{self, Written};
+use leafdyn::files;
+use leafdyn::report::Written;
 use leafdyn::scenario::Scenario;
 use leafdyn::study::Base;
 
@@ -56,7 +57,7 @@ impl Request {
             Some(folder) => folder.clone(),
             None => Path::new("out").join(folder_name(name)),
         };
-        output::check_writable(&folder)?;
+        files::check_writable(&folder)?;
         Ok(folder)
     }
 
@@ -75,7 +76,7 @@ impl Request {
         folder: &Path,
         report: impl FnOnce(Option<&Path>) -> String,
     ) -> Result<(), Refusal> {
-        let written = output::write_all(folder, result);
+        let written = files::write_all(folder, result);
         self.show(result, || report(written.is_ok().then_some(folder)))?;
         written?;
         Ok(())

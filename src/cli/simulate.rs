@@ -5,14 +5,17 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
+use leafdyn::files::Recording;
 use leafdyn::leaf::Leaf;
-use leafdyn::output::{OutputError, Recording};
+use leafdyn::report::OutputError;
 use leafdyn::simulate::{Options, Scheme, Simulation, Stopped};
+
+use leafdyn::report;
 
 use super::progress::ProgressLine;
 use super::request::Request;
-use super::text::brief;
-use super::{Refusal, Status, keep_on_interrupt, note, simulate_report, tell_kept};
+use super::{Refusal, Status, keep_on_interrupt, note, tell_kept};
+use leafdyn::report::numbers::brief;
 
 /// Follow a leaf as it moves: its shape, velocities and energies in time.
 ///
@@ -97,7 +100,7 @@ impl Simulate {
         let written = recording.finish(&record);
         self.request.show(&record, || {
             let files = written.as_ref().ok().map(|files| (folder, &files[..]));
-            simulate_report::report(&record, files)
+            report::simulate_report(&record, files)
         })?;
         written?;
         Ok(match stopped {

@@ -4,9 +4,11 @@ use clap::Args;
 
 use leafdyn::study::{self, MOST_POINTS, TraceRequest, Vary};
 
+use leafdyn::report;
+
 use super::progress::ProgressLine;
 use super::request::Request;
-use super::{Refusal, Status, note, trace_report};
+use super::{Refusal, Status, note};
 
 /// Follow an equilibrium through one number of the scenario: through folds, with the Morse index along the way.
 ///
@@ -73,7 +75,7 @@ impl Trace {
             note(&format!("{name}: {remark}"));
         }
         self.request.deliver(&trace, &folder, |folder| {
-            trace_report::report(&trace, folder)
+            report::trace_report(&trace, folder)
         })?;
         Ok(match trace.complete() {
             true => Status::Success,

@@ -1,0 +1,166 @@
+//! The drawing as text that any browser or editor opens.
+
+use std::io::{self, Write};
+
+use glam::DVec2;
+
+use super::Pictured;
+use super::colors::Color;
+use super::drawing::{Anchor, Drawing, Label, Mark, Path, Step, Stroke};
+use crate::report::Format;
+
+/// The figure as SVG: `figure.svg` of a leaf, `check.svg` of a check, `map.svg` of a
+/// map.
+pub struct FigureSvg;
+
+impl<R: Pictured> Format<R> for FigureSvg {
+    fn file_name(&self) -> &'static str {
+        R::SVG
+    }
+
+    fn write(&self, result: &R, out: &mut dyn Write) -> io::Result<()> {
+        write_drawing(&result.draw(), out)
+    }
+}
+
+/// Writes the whole file.
+pub fn write_drawing(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
+    let Drawing { width, height, .. } = drawing;
+    writeln!(
+        out,
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
+         viewBox=\"0 0 {width} {height}\" role=\"img\" fill=\"none\" stroke-linecap=\"round\" \
+         stroke-linejoin=\"round\" font-family=\"DejaVu Sans, Verdana, sans-serif\">"
+    )?;
+    writeln!(out, "<title>{}</title>", escaped(&drawing.description))?;
+    writeln!(
+        out,
+        "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>"
+    )?;
+    for mark in &drawing.marks {
+        match mark {
+            Mark::Group(name) => writeln!(out, "<g id=\"{name}\">")?,
+            Mark::EndGroup => writeln!(out, "</g>")?,
+            Mark::Shape { path, fill, stroke } => {
+                write!(out, "<path d=\"")?;
+                write_path(path, out)?;
+                write!(out, "\"")?;
+                if let Some(fill) = fill {
+                    write!(out, " fill=\"{}\"", hex(*fill))?;
+                }
+                if let Some(stroke) = stroke {
+                    write_stroke(stroke, out)?;
+                }
+                writeln!(out, "/>")?;
+            }
+            Mark::Label(label) => write_label(label, out)?,
+        }
+    }
+    writeln!(out, "</svg>")
+}
+
+fn write_path(path: &Path, out: &mut dyn Write) -> io::Result<()> {
+    for step in path {
+        match step {
+            Step::Move(to) => write!(out, "M{}", point(to))?,
+            Step::Line(to) => write!(out, "L{}", point(to))?,
+            Step::Cubic(a, b, to) => write!(out, "C{} {} {}", point(a), point(b), point(to))?,
+            Step::Close => write!(out, "Z")?,
+        }
+    }
+    Ok(())
+}
+
+fn write_stroke(stroke: &Stroke, out: &mut dyn Write) -> io::Result<()> {
+    write!(
+        out,
+        " stroke=\"{}\" stroke-width=\"{}\"",
+        hex(stroke.color),
+        stroke.width
+    )?;
+    if stroke.opacity < 1.0 {
+        write!(out, " stroke-opacity=\"{}\"", stroke.opacity)?;
+    }
+    Ok(())
+}
+
+fn write_label(label: &Label, out: &mut dyn Write) -> io::Result<()> {
+    let Label {
+        at,
+        text,
+        size,
+        anchor,
+        color,
+        upright,
+    } = label;
+    if *upright {
+        let (x, y) = (number(at.x), number(at.y));
+        write!(out, "<text transform=\"translate({x} {y}) rotate(-90)\"")?;
+    } else {
+        write!(out, "<text x=\"{}\" y=\"{}\"", number(at.x), number(at.y))?;
+    }
+    match anchor {
+        Anchor::Start => (),
+        Anchor::Middle => write!(out, " text-anchor=\"middle\"")?,
+        Anchor::End => write!(out, " text-anchor=\"end\"")?,
+    }
+    writeln!(
+        out,
+        " font-size=\"{size}\" fill=\"{}\">{}</text>",
+        hex(*color),
+        escaped(text)
+    )
+}
+
+fn point(point: &DVec2) -> String {
+    format!("{} {}", number(point.x), number(point.y))
+}
+
+/// To a hundredth of a pixel, without idle zeros.
+fn number(value: f64) -> String {
+    let hundredths = (value * 100.0).round() / 100.0;
+    // Adding zero turns -0 into 0.
+    (hundredths + 0.0).to_string()
+}
+
+fn hex(Color(red, green, blue): Color) -> String {
+    format!("#{red:02x}{green:02x}{blue:02x}")
+}
+
+/// Text as XML allows it: markup escaped, control characters left out.
+fn escaped(text: &str) -> String {
+    text.chars()
+        .filter(|c| !c.is_control())
+        .map(|c| match c {
+            '&' => "&amp;".to_string(),
+            '<' => "&lt;".to_string(),
+            '>' => "&gt;".to_string(),
+            c => c.to_string(),
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn names_are_escaped_and_groups_closed() {
+        let mut leaf = sample::fan(5, 8);
+        leaf.scenario = "a < b & \"c\"\u{1}".into();
+        let mut bytes = Vec::new();
+        FigureSvg.write(&leaf, &mut bytes).unwrap();
+        let svg = String::from_utf8(bytes).unwrap();
+        assert!(svg.contains(">a &lt; b &amp; \"c\"</text>"));
+        assert_eq!(svg.matches("<g ").count(), svg.matches("</g>").count());
+        assert!(!svg.contains("NaN") && !svg.contains("inf"));
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        assert_eq!(number(12.3456), "12.35");
+        assert_eq!(number(-0.001), "0");
+        assert_eq!(number(7.0), "7");
+    }
+}

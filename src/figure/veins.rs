@@ -1,0 +1,283 @@
+//! The veins as smooth curves, in units of the largest rod length.
+
+use glam::DVec3;
+
+use super::colors::{Color, vein_color};
+use crate::relax::{Equilibrium, RodShape};
+
+/// Of a wider leaf, only some veins are drawn: more would not be told apart.
+const MOST_VEINS: usize = 200;
+
+/// Farther away than this many lengths a point is a number gone wild.
+const FARTHEST: f64 = 1e4;
+
+/// How far a drawn curve may be from the computed points, in lengths: a
+/// quarter of a pixel.
+const DRAWN_WITHIN: f64 = 3e-4;
+
+/// No curve is drawn with fewer pieces than this, if it has them.
+const FEWEST_PIECES: usize = 8;
+
+/// Dots of a second solution: on about so many veins at most, about so many in
+/// all, as far apart as this many are on the leaf's extent, and no fewer on a
+/// vein if it has them.
+const MOST_DOTTED: usize = 24;
+const MOST_DOTS: usize = 160;
+const DOTS_PER_EXTENT: f64 = 14.0;
+const FEWEST_DOTS: usize = 8;
+
+/// A cubic Bezier curve in space.
+pub type Piece = [DVec3; 4];
+
+pub struct Vein {
+    pub pieces: Vec<Piece>,
+    pub color: Color,
+}
+
+/// What the figure shows.
+pub struct Veins {
+    pub veins: Vec<Vein>,
+    /// How many veins the leaf has.
+    pub count: usize,
+    /// Every so many-th vein is drawn.
+    pub every: usize,
+    /// Points of a second solution.
+    pub dots: Vec<DVec3>,
+    pub tips: Vec<(DVec3, Color)>,
+    /// Corners of the box that holds all of it; the clamp is at the origin.
+    pub low: DVec3,
+    pub high: DVec3,
+    /// The largest rod length, in the scenario's units.
+    pub unit: f64,
+}
+
+impl Veins {
+    pub fn of(equilibrium: &Equilibrium) -> Self {
+        let lengths = equilibrium.rods.iter().map(|rod| rod.length);
+        let longest = lengths.fold(0.0, f64::max);
+        Veins::through(&equilibrium.curves, &equilibrium.tips, longest)
+    }
+
+    /// Veins through these points, with the longest rod as the unit.
+    pub fn through(curves: &[Vec<DVec3>], tips: &[DVec3], longest: f64) -> Self {
+        let unit = if longest.is_finite() && longest > 0.0 {
+            longest
+        } else {
+            1.0
+        };
+        let count = curves.len();
+        let every = count.div_ceil(MOST_VEINS).max(1);
+        let color = |index: usize| match count {
+            0 | 1 => vein_color(0.3),
+            _ => vein_color(index as f64 / (count - 1) as f64),
+        };
+
+        let chosen = |index: usize| index.is_multiple_of(every) || index + 1 == count;
+        let veins: Vec<Vein> = (0..count)
+            .filter(|&index| chosen(index))
+            .map(|index| {
+                let points = drawable(&curves[index], unit);
+                Vein {
+                    pieces: smooth(&points),
+                    color: color(index),
+                }
+            })
+            .collect();
+        let joined = tips.len() == 1;
+        let tips = (0..tips.len())
+            .filter(|&index| joined || chosen(index))
+            .map(|index| (tips[index] / unit, color(index)))
+            .filter(|(tip, _)| is_near(*tip))
+            .collect();
+
+        let ends = veins
+            .iter()
+            .flat_map(|vein| &vein.pieces)
+            .map(|piece| piece[3]);
+        let (low, high) = ends.fold((DVec3::ZERO, DVec3::ZERO), |(low, high), point| {
+            (low.min(point), high.max(point))
+        });
+        Veins {
+            veins,
+            count,
+            every,
+            dots: Vec::new(),
+            tips,
+            low,
+            high,
+            unit,
+        }
+    }
+
+    /// Adds a second solution as dots: on as many veins, at as many places as
+    /// can be told apart.
+    pub fn dot(&mut self, rods: &[RodShape]) {
+        let every = self.count.div_ceil(MOST_DOTTED).max(1);
+        let most = (MOST_DOTS / rods.len().div_ceil(every).max(1)).max(FEWEST_DOTS);
+        // A vein that is wound up is longer than the leaf.
+        let lengths = 1.0 / self.extent();
+        let wanted = (DOTS_PER_EXTENT * lengths).ceil() as usize;
+        let dots = wanted.clamp(FEWEST_DOTS, most);
+        for rod in rods.iter().step_by(every) {
+            let stride = (rod.nodes.len() - 1).div_ceil(dots).max(1);
+            // The base is under the clamp's marker.
+            let nodes = rod.nodes.iter().skip(stride).step_by(stride);
+            let points = nodes.map(|node| node.position / self.unit);
+            self.dots.extend(points.filter(|&point| is_near(point)));
+        }
+        for &point in &self.dots {
+            (self.low, self.high) = (self.low.min(point), self.high.max(point));
+        }
+    }
+
+    /// What is to be said about lengths and veins.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = vec![format!("L = {}", self.unit)];
+        if self.every > 1 {
+            notes.push(format!("1 vein in {} drawn", self.every));
+        }
+        notes
+    }
+
+    /// The largest side of the box, or 1 if it is a point.
+    pub fn extent(&self) -> f64 {
+        let extent = (self.high - self.low).max_element();
+        if extent > 1e-9 { extent } else { 1.0 }
+    }
+
+    /// A line width that keeps neighbouring veins apart.
+    pub fn line_width(&self) -> f64 {
+        match self.veins.len() {
+            0..=2 => 2.0,
+            3..=8 => 1.7,
+            9..=30 => 1.25,
+            31..=60 => 0.9,
+            61..=120 => 0.65,
+            _ => 0.45,
+        }
+    }
+}
+
+/// Whether a point, in lengths, can be drawn.
+pub fn is_near(point: DVec3) -> bool {
+    point.is_finite() && point.abs().max_element() < FARTHEST
+}
+
+/// The points up to the first that cannot be drawn.
+fn drawable(curve: &[DVec3], unit: f64) -> Vec<DVec3> {
+    curve
+        .iter()
+        .map(|&point| point / unit)
+        .take_while(|&point| is_near(point))
+        .collect()
+}
+
+/// Smooth pieces through the points: through every second, fourth, ... of
+/// them as long as the others are not missed.
+fn smooth(points: &[DVec3]) -> Vec<Piece> {
+    let segments = points.len().saturating_sub(1);
+    let mut stride = 1;
+    while segments.is_multiple_of(2 * stride) && segments / (2 * stride) >= FEWEST_PIECES {
+        stride *= 2;
+    }
+    loop {
+        let kept: Vec<DVec3> = points.iter().copied().step_by(stride).collect();
+        let pieces = through(&kept);
+        if stride == 1 || largest_miss(&pieces, points, stride) < DRAWN_WITHIN {
+            return pieces;
+        }
+        stride /= 2;
+    }
+}
+
+fn largest_miss(pieces: &[Piece], points: &[DVec3], stride: usize) -> f64 {
+    let miss = |(index, &point): (usize, &DVec3)| {
+        let piece = &pieces[(index / stride).min(pieces.len() - 1)];
+        let t = index as f64 / stride as f64 - (index / stride).min(pieces.len() - 1) as f64;
+        at(piece, t).distance(point)
+    };
+    points.iter().enumerate().map(miss).fold(0.0, f64::max)
+}
+
+/// The point of a Bezier curve at `t` in [0, 1].
+fn at(piece: &Piece, t: f64) -> DVec3 {
+    let [a, b, c, d] = *piece;
+    let s = 1.0 - t;
+    s * s * s * a + 3.0 * s * s * t * b + 3.0 * s * t * t * c + t * t * t * d
+}
+
+/// One piece per segment through equally spaced points, with tangents from
+/// differences: of fourth order inside, of second order next to the ends.
+fn through(points: &[DVec3]) -> Vec<Piece> {
+    let p = points;
+    let last = p.len().saturating_sub(1);
+    let tangent = |i: usize| match (i, last) {
+        (_, 0) => DVec3::ZERO,
+        (_, 1) => p[1] - p[0],
+        (0, _) => 2.0 * p[1] - 1.5 * p[0] - 0.5 * p[2],
+        (i, _) if i == last => 1.5 * p[i] - 2.0 * p[i - 1] + 0.5 * p[i - 2],
+        (i, _) if i == 1 || i + 1 == last => 0.5 * (p[i + 1] - p[i - 1]),
+        (i, _) => (8.0 * (p[i + 1] - p[i - 1]) - (p[i + 2] - p[i - 2])) / 12.0,
+    };
+    (0..last)
+        .map(|i| {
+            [
+                p[i],
+                p[i] + tangent(i) / 3.0,
+                p[i + 1] - tangent(i + 1) / 3.0,
+                p[i + 1],
+            ]
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn a_half_circle_is_drawn_round_with_few_pieces() {
+        let points: Vec<DVec3> = (0..=256)
+            .map(|i| PI * f64::from(i) / 256.0)
+            .map(|angle| DVec3::new(angle.cos(), angle.sin(), 0.0) / PI)
+            .collect();
+        let pieces = smooth(&points);
+        assert!(pieces.len() <= 16, "{}", pieces.len());
+        for piece in &pieces {
+            for t in [0.25, 0.5, 0.75] {
+                assert!((at(piece, t).length() * PI - 1.0).abs() < 2e-3);
+            }
+        }
+    }
+
+    #[test]
+    fn curves_of_no_one_and_two_points() {
+        assert!(smooth(&[]).is_empty());
+        assert!(smooth(&[DVec3::X]).is_empty());
+        assert_eq!(smooth(&[DVec3::ZERO, DVec3::X])[0][3], DVec3::X);
+    }
+
+    #[test]
+    fn dots_can_be_told_apart() {
+        for (rods, dots) in [(1, 14), (5, 5 * 14), (21, 21 * 8), (200, 23 * 8)] {
+            let leaf = sample::fan(rods, 64);
+            let mut veins = Veins::of(&leaf);
+            veins.dot(&leaf.rods);
+            assert!(veins.dots.len() <= dots, "{rods}: {}", veins.dots.len());
+            assert!(veins.dots.len() > dots / 2, "{rods}: {}", veins.dots.len());
+        }
+    }
+
+    #[test]
+    fn dots_beside_the_leaf_are_in_the_box() {
+        let leaf = sample::fan(3, 8);
+        let mut veins = Veins::of(&leaf);
+        let mut rods = leaf.rods.clone();
+        rods[1].nodes[8].position.z = 3.0;
+        veins.dot(&rods);
+        assert_eq!(veins.high.z, 3.0);
+    }
+}

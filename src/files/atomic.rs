@@ -1,0 +1,177 @@
+//! Files that are complete or absent: each is written under another name in
+//! its folder and renamed when it is whole.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::mem;
+use std::path::{Path, PathBuf};
+use std::process;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use crate::report::OutputError;
+
+/// Large enough that a centerline file of a wide leaf is not written in crumbs.
+const BUFFER_BYTES: usize = 1 << 16;
+
+/// Files begun and not yet renamed.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+    // A list of paths is whole whatever its last user did.
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the files that were begun and not finished, and keeps other threads
+/// from beginning or finishing one ever after: for a program about to exit.
+pub fn abandon_unfinished() {
+    let mut paths = unfinished();
+    for path in paths.drain(..) {
+        // Nothing is left to do about a file that cannot be removed.
+        let _ = fs::remove_file(path);
+    }
+    mem::forget(paths);
+}
+
+/// Writes `file` through `fill`; on an error `file` is as it was before.
+pub(super) fn write_file(
+    file: &Path,
+    fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
+    let (draft, created) = begin(file)?;
+    let mut out = BufWriter::with_capacity(BUFFER_BYTES, created);
+    let filled = fill(&mut out).and_then(|()| out.flush());
+    drop(out);
+    let finished = filled.and_then(|()| finish(&draft, file));
+    if finished.is_err() {
+        discard(&draft);
+    }
+    finished
+}
+
+/// Begins a file under another name, to be finished or discarded.
+pub(super) fn begin(file: &Path) -> io::Result<(PathBuf, File)> {
+    let draft = draft_path(file);
+    let mut paths = unfinished();
+    let created = File::create(&draft)?;
+    paths.push(draft.clone());
+    Ok((draft, created))
+}
+
+/// Gives a draft the name of a finished file.
+pub(super) fn finish(draft: &Path, file: &Path) -> io::Result<()> {
+    let mut paths = unfinished();
+    fs::rename(draft, file)?;
+    paths.retain(|path| path != draft);
+    Ok(())
+}
+
+/// Removes a draft, if it still is one.
+pub(super) fn discard(draft: &Path) {
+    let mut paths = unfinished();
+    if paths.iter().any(|path| path == draft) {
+        let _ = fs::remove_file(draft);
+        paths.retain(|path| path != draft);
+    }
+}
+
+/// A hidden name beside `file` that no other process uses.
+fn draft_path(file: &Path) -> PathBuf {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    file.with_file_name(format!(".{name}.{}.part", process::id()))
+}
+
+/// Makes the output folder and those above it.
+pub(super) fn make_folder(folder: &Path) -> Result<(), OutputError> {
+    match fs::create_dir_all(folder) {
+        Ok(()) => Ok(()),
+        Err(reason) => Err(blocked(folder, nearest_existing(folder), reason)),
+    }
+}
+
+/// Whether files could be written to `folder`, without leaving anything
+/// there: a long computation should not end at a closed door.
+pub fn check_writable(folder: &Path) -> Result<(), OutputError> {
+    let existing = nearest_existing(folder);
+    let probe = draft_path(&existing.join("probe"));
+    match File::create(&probe).and_then(|_| fs::remove_file(&probe)) {
+        Ok(()) => Ok(()),
+        Err(reason) => Err(blocked(folder, existing, reason)),
+    }
+}
+
+fn blocked(folder: &Path, existing: PathBuf, reason: io::Error) -> OutputError {
+    let folder = folder.to_path_buf();
+    if existing.is_dir() {
+        OutputError::Unwritable { folder, reason }
+    } else {
+        OutputError::NotAFolder {
+            folder,
+            obstacle: existing,
+        }
+    }
+}
+
+/// `path`, or the nearest thing above it that exists.
+fn nearest_existing(path: &Path) -> PathBuf {
+    path.ancestors()
+        .find(|ancestor| ancestor.exists())
+        .filter(|ancestor| !ancestor.as_os_str().is_empty())
+        .unwrap_or(Path::new("."))
+        .to_path_buf()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> = fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn failed_write_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("a.json");
+        write_file(&file, |out| out.write_all(b"old")).unwrap();
+        let failed = write_file(&file, |out| {
+            out.write_all(b"half of the n")?;
+            Err(io::Error::other("disk full"))
+        });
+        assert_eq!(failed.unwrap_err().to_string(), "disk full");
+        assert_eq!(fs::read(&file).unwrap(), b"old");
+        assert_eq!(names(folder.path()), ["a.json"]);
+    }
+
+    #[test]
+    fn probing_leaves_nothing_and_makes_no_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        check_writable(&folder.path().join("out/deep")).unwrap();
+        assert!(names(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn a_file_in_the_way_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("plain");
+        fs::write(&file, "").unwrap();
+        let wanted = file.join("out");
+        for error in [
+            check_writable(&wanted).unwrap_err(),
+            make_folder(&wanted).unwrap_err(),
+        ] {
+            assert!(
+                matches!(&error, OutputError::NotAFolder { obstacle, .. } if *obstacle == file)
+            );
+            assert!(
+                error
+                    .to_string()
+                    .ends_with("is not a folder; name another with --out DIR")
+            );
+        }
+    }
+}

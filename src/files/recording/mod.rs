@@ -1,0 +1,279 @@
+//! The files of a simulation, which grow while it runs.
+//!
+//! `motion.csv` (or `motion.npy`) and `energy.csv` get every output at once,
+//! under names of their own, so that memory does not grow with them. When the
+//! run has ended they get their names, and pictures and a summary are made of
+//! them. A run that is stopped can be kept instead, and resumed.
+
+mod checkpoint;
+mod energy;
+mod keeper;
+mod motion;
+
+use std::fs;
+use std::mem;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use glam::DVec3;
+
+pub use checkpoint::CannotResume;
+pub use keeper::Keeper;
+
+use super::part::{Extent, Lost, Part};
+use super::{atomic, write_all};
+use crate::report::OutputError;
+use crate::simulate::{Frame, Moment, Record, Simulation, Still, Stopped, stills};
+use checkpoint::{Checkpoint, Identity};
+use keeper::Latest;
+use motion::{Form, Size};
+
+/// Shapes that a film strip shows.
+const STILLS: usize = 8;
+
+/// The files of a simulation that is under way.
+///
+/// ```
+/// use leafdyn::leaf::Leaf;
+/// use leafdyn::files::Recording;
+/// use leafdyn::scenario::Scenario;
+/// use leafdyn::simulate::{Options, Simulation};
+///
+/// let cantilever = r#"
+///     name = "cantilever"
+///     leaf = { rods = 1, length = 1.0, fan = [0.0] }
+///     stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }
+///     load = { gravity = [0.0, 0.0, -1.0] }
+/// "#;
+/// # let folder = tempfile::tempdir()?;
+/// # let folder = folder.path();
+/// let scenario = Scenario::from_toml(cantilever)?;
+/// let leaf = Leaf::new(&scenario);
+/// let mut simulation = Simulation::new(&leaf, &Options::default())?;
+/// let mut recording = Recording::begin(folder, &mut simulation)?;
+/// while !simulation.done() {
+///     let frame = simulation.next_frame()?;
+///     recording.add(&simulation, &frame)?;
+/// }
+/// let record = recording.record(&simulation, None)?;
+/// let files = recording.finish(&record)?;
+/// assert_eq!(files.len(), 7);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Recording {
+    folder: PathBuf,
+    run: Identity,
+    form: Form,
+    size: Size,
+    stations: Vec<f64>,
+    joined: bool,
+    motion: Part,
+    energy: Part,
+    moments: Vec<Moment>,
+    tips: Vec<DVec3>,
+    /// Time on the clock in processes before this one.
+    wall: Duration,
+    keeper: Keeper,
+}
+
+impl Recording {
+    /// Begins the files of a simulation in `folder`, which is made if it is
+    /// not there, with the leaf as it is now.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub fn begin(folder: &Path, simulation: &mut Simulation) -> Result<Self, OutputError> {
+        atomic::make_folder(folder)?;
+        let (form, size) = form(simulation);
+        let mut recording = Recording::with(
+            folder,
+            simulation,
+            Part::begin(folder.join(form.file_name()))?,
+            Part::begin(folder.join(energy::FILE_NAME))?,
+        );
+        let start = form.start(size, outputs(simulation));
+        recording.motion.append(|out| out.write_all(&start))?;
+        recording
+            .energy
+            .append(|out| out.write_all(&energy::start()))?;
+        let frame = simulation.frame();
+        recording.add(simulation, &frame)?;
+        Ok(recording)
+    }
+
+    /// Goes on where a simulation of the same leaf and options was kept in
+    /// `folder`: the simulation is brought there, too.
+    ///
+    /// # Errors
+    /// If there is no checkpoint, or it does not fit. Nothing that was kept is
+    /// lost then.
+    pub fn resume(folder: &Path, simulation: &mut Simulation) -> Result<Self, CannotResume> {
+        let run = Identity::of(simulation);
+        let found = Checkpoint::read(folder, &run)?;
+        let damaged = |name: &str, what: &str| CannotResume::Damaged {
+            file: folder.join(name),
+            what: what.into(),
+        };
+        let no_state = || damaged(checkpoint::FILE_NAME, "it does not fit the leaf");
+        let extents = found.extents().ok_or_else(no_state)?;
+        let state = found.state().ok_or_else(no_state)?;
+        if !simulation.restore(&state) {
+            return Err(no_state());
+        }
+        let (form, _) = form(simulation);
+        let part = |name: &str, extent: Extent| {
+            let file = folder.join(name);
+            let kept = Part::kept_path(&file);
+            Part::resume(file, extent).map_err(|lost| match lost {
+                Lost::Changed => CannotResume::Damaged {
+                    file: kept,
+                    what: format!("it is not as {} says", checkpoint::FILE_NAME),
+                },
+                Lost::Unreadable(reason) => CannotResume::Unreadable { file: kept, reason },
+            })
+        };
+        let motion = part(form.file_name(), extents[0])?;
+        let energy = part(energy::FILE_NAME, extents[1])?;
+        let mut recording = Recording::with(folder, simulation, motion, energy);
+        let moments = recording.energy.read(energy::read).ok();
+        recording.moments = moments
+            .filter(|moments| moments.len() == simulation.frames().1 + 1)
+            .ok_or_else(|| damaged(energy::FILE_NAME, "outputs are missing"))?;
+        recording.wall = Duration::from_nanos(found.wall_nanoseconds());
+        let frame = simulation.frame();
+        recording.tips = tips(&frame, recording.joined);
+        recording.look(simulation, extents);
+        Ok(recording)
+    }
+
+    fn with(folder: &Path, simulation: &Simulation, motion: Part, energy: Part) -> Self {
+        let (form, size) = form(simulation);
+        Recording {
+            folder: folder.into(),
+            run: Identity::of(simulation),
+            form,
+            size,
+            stations: simulation.stations().into(),
+            joined: simulation.leaf().joined(),
+            motion,
+            energy,
+            moments: Vec::new(),
+            tips: Vec::new(),
+            wall: Duration::ZERO,
+            keeper: Keeper::default(),
+        }
+    }
+
+    /// What keeps this recording when the program is stopped.
+    pub fn keeper(&self) -> Keeper {
+        self.keeper.clone()
+    }
+
+    /// Adds an output: the leaf of `simulation` now.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn add(&mut self, simulation: &Simulation, frame: &Frame) -> Result<(), OutputError> {
+        let moment = Moment::of(frame, self.joined);
+        let (form, stations) = (self.form, &self.stations);
+        let extents = [
+            self.motion.append(|out| form.write(frame, stations, out))?,
+            self.energy.append(|out| energy::write(&moment, out))?,
+        ];
+        self.moments.push(moment);
+        self.tips = tips(frame, self.joined);
+        self.look(simulation, extents);
+        Ok(())
+    }
+
+    /// Lets the keeper know where the simulation is.
+    fn look(&self, simulation: &Simulation, extents: [Extent; 2]) {
+        let wall = self.wall + simulation.wall_time();
+        *self.keeper.latest() = Some(Latest {
+            run: self.run.clone(),
+            folder: self.folder.clone(),
+            form: self.form,
+            parts: [self.motion.keepable(), self.energy.keepable()],
+            extents,
+            time: simulation.time(),
+            wall_nanoseconds: wall.as_nanos().min(u128::from(u64::MAX)) as u64,
+            state: simulation.save(),
+        });
+    }
+
+    /// What is known of a simulation that has ended here; nothing can be added
+    /// after that.
+    ///
+    /// # Errors
+    /// If what was written cannot be read.
+    pub fn record(
+        &mut self,
+        simulation: &Simulation,
+        stopped: Option<Stopped>,
+    ) -> Result<Record, OutputError> {
+        let mut record = Record::of(simulation, stopped);
+        let chosen = stills(&self.moments, STILLS, record.length);
+        let (form, size) = (self.form, self.size);
+        let shapes = self
+            .motion
+            .read(|file| form.positions(size, &chosen, file))?;
+        let still = |(moment, shape): (usize, Vec<DVec3>)| Still {
+            moment,
+            curves: shape.chunks(size.nodes).map(<[DVec3]>::to_vec).collect(),
+        };
+        record.stills = chosen.into_iter().zip(shapes).map(still).collect();
+        record.moments = mem::take(&mut self.moments);
+        record.tips = mem::take(&mut self.tips);
+        record.wall_seconds += self.wall.as_secs_f64();
+        Ok(record)
+    }
+
+    /// Writes all else about the simulation, gives all files their names, and
+    /// removes what a run that was kept has left. Returns the files.
+    ///
+    /// # Errors
+    /// If a file cannot be written; the recording can then still be kept.
+    pub fn finish(&mut self, record: &Record) -> Result<Vec<PathBuf>, OutputError> {
+        let mut files = write_all(&self.folder, record)?;
+        // From here on there is nothing left to be kept.
+        let mut latest = self.keeper.latest();
+        let start = self.form.start(self.size, record.moments.len());
+        self.motion.replace_start(&start)?;
+        files.push(self.motion.finish()?);
+        files.push(self.energy.finish()?);
+        latest.take();
+        drop(latest);
+        let file = |name: &str| self.folder.join(name);
+        let (this, other) = (self.form.file_name(), self.form.other().file_name());
+        for left in [
+            file(checkpoint::FILE_NAME),
+            Part::kept_path(&file(this)),
+            Part::kept_path(&file(other)),
+            Part::kept_path(&file(energy::FILE_NAME)),
+            file(other),
+        ] {
+            // What is not there need not be removed.
+            let _ = fs::remove_file(left);
+        }
+        Ok(files)
+    }
+}
+
+/// Outputs of a simulation, the first and the last included.
+fn outputs(simulation: &Simulation) -> usize {
+    simulation.frames().0 + 1
+}
+
+fn form(simulation: &Simulation) -> (Form, Size) {
+    let size = Size {
+        rods: simulation.leaf().rods(),
+        nodes: simulation.stations().len(),
+    };
+    (Form::of(size, outputs(simulation)), size)
+}
+
+/// Negative zeros become zeros, as in the files.
+fn tips(frame: &Frame, joined: bool) -> Vec<DVec3> {
+    let tips = frame.tips(joined).into_iter();
+    tips.map(|tip| tip + DVec3::ZERO).collect()
+}

@@ -1,0 +1,72 @@
+//! The equilibria of a leaf as people read them.
+
+use std::path::Path;
+
+use crate::report::numbers::power_of_ten;
+use crate::study::{All, Found};
+
+use super::numbers::{seconds, veins};
+use super::table::{lay_out, written};
+
+/// The equilibria, lowest energy first.
+pub fn report(all: &All, folder: Option<&Path>) -> String {
+    let mut lines: Vec<(&str, String)> = Vec::new();
+    for (number, found) in all.found.iter().enumerate() {
+        let name = if number == 0 { "found" } else { "" };
+        lines.push((name, line(number, found)));
+    }
+    let stable = |found: &&Found| found.equilibrium.stable() == Some(true);
+    let stable = all.found.iter().filter(stable).count();
+    let others = all.found.len() - stable;
+    let failed = match all.failed {
+        0 => String::new(),
+        failed => format!(", {failed} of them without coming to rest"),
+    };
+    lines.push((
+        "work",
+        format!(
+            "{stable} stable and {others} other equilibria from {} starts{failed}, in {}",
+            all.starts,
+            seconds(all.wall_seconds)
+        ),
+    ));
+    lines.extend(folder.map(|folder| ("written", written(all, folder))));
+    lines.push((
+        "remark",
+        "there may be more: no number of starts proves that these are all".into(),
+    ));
+    let leaf = all.found.first();
+    let veins = leaf.map_or("a leaf".into(), |found| veins(&found.equilibrium));
+    lay_out(&format!("{}: {veins}, all shapes", all.scenario), &lines)
+}
+
+fn line(number: usize, found: &Found) -> String {
+    let leaf = &found.equilibrium;
+    let stability = match leaf.negative_eigenvalues {
+        Some(0) => "stable".into(),
+        Some(index) => format!("index {index}"),
+        None => "of unknown stability".into(),
+    };
+    let tip = match &leaf.tips[..] {
+        [tip] => format!(", tip ({:.6}, {:.6}, {:.6})", tip.x, tip.y, tip.z),
+        _ => String::new(),
+    };
+    let within = match leaf.error_estimate {
+        Some(error) => format!(", within {}", power_of_ten(error)),
+        None => String::new(),
+    };
+    let plain = if found.plain {
+        ", the plain one among them"
+    } else {
+        ""
+    };
+    let starts = match found.starts {
+        1 => "1 start".into(),
+        starts => format!("{starts} starts"),
+    };
+    format!(
+        "{:>2}. energy {:.10}: {stability}{tip}{within} ({starts}{plain})",
+        number + 1,
+        leaf.energy
+    )
+}

@@ -1,0 +1,133 @@
+//! `centerlines.csv` and `modes.csv`: every rod at every station, for
+//! spreadsheets and scripts.
+
+use std::io::{self, Write};
+
+use super::Format;
+use crate::relax::{Equilibrium, NodeState};
+
+/// `centerlines.csv`: one row per rod and station.
+pub struct Centerlines;
+
+/// Names of the columns. Rods are numbered from 1; strains and stress
+/// resultants are components along the directors.
+const HEADER: [&str; 22] = [
+    "rod", "sigma", "s", "x", "y", "z", "qw", "qx", "qy", "qz", "v1", "v2", "v3", "u1", "u2", "u3",
+    "n1", "n2", "n3", "m1", "m2", "m3",
+];
+
+impl Format<Equilibrium> for Centerlines {
+    fn file_name(&self) -> &'static str {
+        "centerlines.csv"
+    }
+
+    fn write(&self, equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
+        let mut table = csv::WriterBuilder::new()
+            .has_headers(false)
+            .from_writer(out);
+        table.write_record(HEADER)?;
+        for (index, rod) in equilibrium.rods.iter().enumerate() {
+            for (&sigma, node) in equilibrium.stations.iter().zip(&rod.nodes) {
+                table.serialize((index + 1, sigma, sigma * rod.length, columns(node)))?;
+            }
+        }
+        table.flush()
+    }
+}
+
+/// `modes.csv`: one row per mode, rod and station.
+pub struct ModesTable;
+
+/// Names of the columns. Modes and rods are numbered from 1; displacements and
+/// rotation vectors are along the lab axes.
+const MODES_HEADER: [&str; 12] = [
+    "mode",
+    "eigenvalue",
+    "error",
+    "frequency",
+    "rod",
+    "sigma",
+    "dx",
+    "dy",
+    "dz",
+    "rx",
+    "ry",
+    "rz",
+];
+
+impl Format<Equilibrium> for ModesTable {
+    fn file_name(&self) -> &'static str {
+        "modes.csv"
+    }
+
+    fn write(&self, equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
+        let mut table = csv::WriterBuilder::new()
+            .has_headers(false)
+            .from_writer(out);
+        table.write_record(MODES_HEADER)?;
+        let stations = &equilibrium.stations;
+        for (index, mode) in equilibrium.modes.iter().flatten().enumerate() {
+            let of_mode = (index + 1, mode.eigenvalue, mode.error, mode.frequency());
+            let rods = mode.displacement.iter().zip(&mode.rotation);
+            for (rod, (displacement, rotation)) in rods.enumerate() {
+                // Stations are every so many-th node.
+                let stride = (displacement.len() - 1) / (stations.len() - 1).max(1);
+                for (station, &sigma) in stations.iter().enumerate() {
+                    let node = station * stride;
+                    let [d, r] = [displacement[node], rotation[node]];
+                    let shape = [d.x, d.y, d.z, r.x, r.y, r.z].map(|value| value + 0.0);
+                    table.serialize((of_mode, rod + 1, sigma, shape))?;
+                }
+            }
+        }
+        table.flush()
+    }
+}
+
+/// The columns from `x` on.
+fn columns(node: &NodeState) -> [f64; 19] {
+    let NodeState {
+        position: r,
+        rotation: q,
+        v,
+        u,
+        n,
+        m,
+    } = node;
+    [
+        r.x, r.y, r.z, q.w, q.x, q.y, q.z, v.x, v.y, v.z, u.x, u.y, u.z, n.x, n.y, n.z, m.x, m.y,
+        m.z,
+    ]
+    // Adding zero turns -0 into 0.
+    .map(|value| value + 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn header_and_rows() {
+        let mut leaf = sample::fan(3, 4);
+        leaf.rods[2].length = 2.0;
+        leaf.rods[2].nodes[4].m.z = 1e-7 / 3.0;
+        let mut bytes = Vec::new();
+        Centerlines.write(&leaf, &mut bytes).unwrap();
+        let text = String::from_utf8(bytes).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(
+            lines[0],
+            "rod,sigma,s,x,y,z,qw,qx,qy,qz,v1,v2,v3,u1,u2,u3,n1,n2,n3,m1,m2,m3"
+        );
+        assert_eq!(lines.len(), 1 + 3 * 5);
+        assert!(lines[1].starts_with("1,0.0,0.0,0.0,0.0,"), "{}", lines[1]);
+
+        let last: Vec<&str> = lines[15].split(',').collect();
+        let node = &leaf.rods[2].nodes[4];
+        assert_eq!(last.len(), HEADER.len());
+        assert_eq!(last[..3], ["3", "1.0", "2.0"]);
+        let numbers: Vec<f64> = last[3..].iter().map(|cell| cell.parse().unwrap()).collect();
+        assert_eq!(numbers, columns(node), "every digit is kept");
+    }
+}

@@ -1,0 +1,324 @@
+//! The summary of a chart that people read.
+
+use std::path::Path;
+
+use crate::report::numbers::power_of_ten;
+use crate::report::words::contender;
+use crate::study::{Chart, Decade, Peer, Reference, Row, Scaling};
+
+use super::numbers::{seconds, veins_of};
+use super::table::{lay_out, under, written};
+
+/// What errors are measured against, the Pareto front, the fastest way to every
+/// accuracy, and peers.
+pub fn report(chart: &Chart, folder: Option<&Path>) -> String {
+    let mut lines = under("errors", reference(chart.reference.as_ref()));
+    lines.push(("measured", measured(chart)));
+    lines.extend(under("front", front(chart)));
+    lines.extend(under("fastest", fastest(chart)));
+    lines.extend(under("failed", failed(chart)));
+    lines.extend(under("peers", peers(chart)));
+    if let Some(scaling) = &chart.scaling {
+        lines.extend(under("veins", veins(scaling)));
+    }
+    lines.extend(
+        chart
+            .remarks
+            .iter()
+            .map(|remark| ("remark", remark.clone())),
+    );
+    if let Some(folder) = folder {
+        lines.push(("written", written(chart, folder)));
+        if let Some(scaling) = &chart.scaling {
+            lines.push(("", written(scaling, folder)));
+        }
+    }
+    let veins = veins_of(chart.rods, chart.joined);
+    let heading = format!("{}: {veins}, speed against accuracy", chart.scenario);
+    lay_out(&heading, &lines)
+}
+
+fn reference(reference: Option<&Reference>) -> Vec<String> {
+    let Some(found) = reference else {
+        return vec!["not known: no equilibrium was found to measure them against".into()];
+    };
+    let within = power_of_ten(found.known_within);
+    let told = match found.confirmed {
+        true => format!("against a solution known within {within} of the longest vein"),
+        false => format!(
+            "against a solution that is NOT CONFIRMED, taken to be within {within} of the longest vein"
+        ),
+    };
+    let apart = match found.difference {
+        Some(apart) => format!("{}; they differ by {}", found.told, power_of_ten(apart)),
+        None => found.told.clone(),
+    };
+    vec![told, apart]
+}
+
+fn measured(chart: &Chart) -> String {
+    let spreads = || chart.rows.iter().filter_map(|row| row.seconds);
+    let runs: usize = spreads().map(|spread| spread.runs).sum();
+    format!(
+        "{runs} runs of {} settings in turns, {} rounds, one thread; times are medians",
+        spreads().count(),
+        chart.rounds
+    )
+}
+
+/// A line of a table: time, error, who, how.
+fn entry((time, error): (f64, f64), who: &str, knob: &str) -> String {
+    format!(
+        "{:>10}  {:<9} {who}, {knob}",
+        seconds(time),
+        power_of_ten(error)
+    )
+}
+
+fn front(chart: &Chart) -> Vec<String> {
+    let rows = chart.rows.iter().filter(|row| row.pareto);
+    let rows = rows.filter_map(|row| {
+        let point = row.point()?;
+        Some((
+            point,
+            entry(point, contender(row.contender), &row.knob.to_string()),
+        ))
+    });
+    let peers = chart.peers.iter().filter(|peer| peer.pareto);
+    let peers = peers.filter_map(|peer| {
+        let point = peer.point()?;
+        Some((point, entry(point, &peer.name, &peer.knob)))
+    });
+    let mut entries: Vec<_> = rows.chain(peers).collect();
+    entries.sort_by(|(a, _), (b, _)| a.0.total_cmp(&b.0));
+    entries.into_iter().map(|(_, line)| line).collect()
+}
+
+fn fastest(chart: &Chart) -> Vec<String> {
+    let line = |decade: &Decade| -> Option<String> {
+        let row = &chart.rows[decade.fastest?];
+        let time = row.seconds?.median;
+        let default = match (decade.factor, decade.default) {
+            (Some(1.0), _) => "the default".to_string(),
+            (Some(factor), Some(default)) => {
+                let knob = &chart.rows[default].knob;
+                format!("the default ({knob}) takes {factor:.2} times as long")
+            }
+            _ => "the default does not get there".to_string(),
+        };
+        Some(format!(
+            "{:>10}  to {:<7} {}, {}; {default}",
+            seconds(time),
+            format!("{:e}", decade.error),
+            contender(row.contender),
+            row.knob
+        ))
+    };
+    let decades = chart.decades();
+    decades.iter().filter_map(line).collect()
+}
+
+/// Failures, one line for each contender and way to fail.
+fn failed(chart: &Chart) -> Vec<String> {
+    let mut kinds: Vec<(&Row, Vec<String>)> = Vec::new();
+    for row in chart.rows.iter().filter(|row| !row.ending.is_success()) {
+        let same = kinds
+            .iter_mut()
+            .find(|(other, _)| other.contender == row.contender && other.ending == row.ending);
+        match same {
+            Some((_, knobs)) => knobs.push(row.knob.to_string()),
+            None => kinds.push((row, vec![row.knob.to_string()])),
+        }
+    }
+    let line = |(row, knobs): (&Row, Vec<String>)| {
+        let why = row
+            .remark
+            .as_ref()
+            .map_or(String::new(), |why| format!(": {why}"));
+        format!(
+            "{}, {}, {}{why}",
+            contender(row.contender),
+            listed(&knobs),
+            row.ending.word()
+        )
+    };
+    kinds.into_iter().map(line).collect()
+}
+
+/// Settings of one knob, its name only once.
+fn listed(knobs: &[String]) -> String {
+    let values = knobs.iter().map(|knob| match knob.split_once('=') {
+        Some((_, value)) => value,
+        None => knob,
+    });
+    let values: Vec<&str> = values.collect();
+    let name = knobs.first().and_then(|knob| knob.split_once('='));
+    match name {
+        Some((name, _)) => format!("{name}={}", values.join(",")),
+        None => values.join(","),
+    }
+}
+
+/// How many times longer each peer takes, from its largest error to its smallest.
+fn peers(chart: &Chart) -> Vec<String> {
+    let mut names: Vec<&str> = Vec::new();
+    for peer in &chart.peers {
+        if !names.contains(&peer.name.as_str()) {
+            names.push(&peer.name);
+        }
+    }
+    let mut lines = Vec::new();
+    for name in names {
+        let of_it = || chart.peers.iter().filter(|peer| peer.name == name);
+        let mut measured: Vec<(&Peer, f64)> = of_it()
+            .filter_map(|peer| Some((peer, peer.true_error?)))
+            .collect();
+        measured.sort_by(|a, b| b.1.total_cmp(&a.1));
+        for (peer, error) in measured {
+            let ratio = match chart.ratio(peer) {
+                Some(ratio) => format!("{} times the default's time", rounded(ratio)),
+                None => "the default is nowhere as accurate".into(),
+            };
+            let line = entry((peer.seconds.median, error), name, &peer.knob);
+            lines.push(format!("{line}: {ratio}"));
+        }
+        for peer in of_it().filter(|peer| peer.true_error.is_none()) {
+            let time = seconds(peer.seconds.median);
+            lines.push(format!(
+                "{time:>10}  {name}, {}, {}",
+                peer.knob, peer.outcome
+            ));
+        }
+    }
+    lines
+}
+
+/// Two digits, or all before the point.
+fn rounded(ratio: f64) -> String {
+    match ratio {
+        ratio if ratio >= 10.0 => format!("{ratio:.0}"),
+        ratio => format!("{ratio:.1}"),
+    }
+}
+
+/// The time of each contender on each leaf.
+fn veins(scaling: &Scaling) -> Vec<String> {
+    let mut lines = vec![format!("to a tolerance of {:e}", scaling.tolerance)];
+    if !scaling.unconfirmed.is_empty() {
+        let rods: Vec<String> = scaling.unconfirmed.iter().map(usize::to_string).collect();
+        lines.push(format!(
+            "reference NOT CONFIRMED for N = {}",
+            rods.join(", ")
+        ));
+    }
+    let mut last = None;
+    for found in &scaling.rows {
+        let row = &found.row;
+        let what = match (row.point(), row.seconds) {
+            (Some((time, _)), _) => seconds(time),
+            (None, _) => row.ending.word().to_string(),
+        };
+        let cell = format!("N = {}: {what}", found.rods);
+        match lines.last_mut().filter(|_| last == Some(row.contender)) {
+            Some(line) => *line = format!("{line}, {cell}"),
+            None => lines.push(format!("{}, {cell}", contender(row.contender))),
+        }
+        last = Some(row.contender);
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scenario::Scenario;
+    use crate::study::{ChartOptions, Contender, Ending, PeerRow, chart, scaling};
+
+    use super::*;
+
+    fn cantilever() -> Chart {
+        let scenario = r#"
+            name = "cantilever"
+            leaf = { rods = 1, length = 2.0, fan = [0.0] }
+            stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }
+            load = { gravity = [0.0, 0.0, -0.1] }
+        "#;
+        let scenario = Scenario::from_toml(scenario).unwrap();
+        let peer = |rods: usize, error: Option<f64>, outcome: &str| PeerRow {
+            program: "peer".into(),
+            scenario: "cantilever".into(),
+            rods,
+            knob: "n=10".into(),
+            seconds: 100.0,
+            error,
+            outcome: outcome.into(),
+        };
+        let options = ChartOptions {
+            seconds: 0.01,
+            contenders: vec![Contender::SemiImplicit, Contender::SemiImplicitGrid],
+            peers: vec![
+                peer(1, Some(2e-3), "converged"),
+                peer(1, None, "diverged"),
+                peer(7, Some(2e-3), "converged"),
+            ],
+        };
+        let mut found = chart(&scenario, &options, &mut |_| {}).unwrap();
+        found.scaling = Some(scaling(&[scenario], 1e-4, &options, &mut |_| {}).unwrap());
+        found
+    }
+
+    #[track_caller]
+    fn says(chart: &Chart, parts: &[&str]) {
+        let report = report(chart, None);
+        for part in parts {
+            assert!(report.contains(part), "{part} in {report}");
+        }
+        assert!(!report.contains("NaN"), "{report}");
+    }
+
+    #[test]
+    fn everything_is_told() {
+        says(
+            &cantilever(),
+            &[
+                "cantilever: 1 vein, speed against accuracy\n",
+                "  errors   against a solution known within ",
+                "relaxation and shooting agree within their error estimates; they differ by ",
+                "  measured ",
+                " runs of 18 settings in turns, ",
+                " one thread",
+                "  front    ",
+                "  fastest  ",
+                " to 1e-10   semi-implicit, extrapolated, tolerance=",
+                "  peers    ",
+                "  1.0×10⁻³  peer, n=10: ",
+                " times the default's time\n",
+                "100.00 s  peer, n=10, diverged\n",
+                "  veins    to a tolerance of 1e-4\n",
+                "semi-implicit, extrapolated, N = 1: ",
+                "  remark   1 row of --peers is about another leaf, and left out\n",
+            ],
+        );
+    }
+
+    #[test]
+    fn what_is_not_confirmed_or_failed_is_told() {
+        let mut chart = cantilever();
+        if let Some(reference) = &mut chart.reference {
+            reference.confirmed = false;
+        }
+        for row in chart.rows.iter_mut().take(3) {
+            row.ending = Ending::OtherEquilibrium;
+        }
+        chart.rows[3].ending = Ending::NotRun;
+        says(
+            &chart,
+            &[
+                "that is NOT CONFIRMED",
+                "  failed   semi-implicit, extrapolated, tolerance=1e-2,1e-3,1e-4, other-equilibrium\n",
+                "           semi-implicit, extrapolated, tolerance=1e-5, not-run\n",
+            ],
+        );
+        chart.reference = None;
+        says(&chart, &["  errors   not known: no equilibrium was found"]);
+    }
+}

@@ -1,0 +1,290 @@
+//! The summary of a check that people read.
+
+use std::path::Path;
+
+use crate::report::numbers::power_of_ten;
+use crate::report::words::{equilibrium_of_index, headline, shooting};
+use crate::study::{Check, Place, Quantity, Shot, Verdict};
+
+use super::numbers::{bound, decimals, eigenvalues, grids, point, seconds, significant, veins};
+use super::relax::found;
+use super::table::{lay_out, written};
+
+/// The verdict, what both methods found, and how far they are apart.
+pub fn report(check: &Check, folder: Option<&Path>) -> String {
+    let mut lines = vec![("verdict", judgement(check))];
+    lines.extend(both(check));
+    lines.extend(differences(check));
+    lines.extend(errors(check));
+    if let Some(shot) = check.solution() {
+        lines.extend(shooting_itself(shot));
+    }
+    // Why the leaf is not at rest is in the verdict.
+    if let (Some(remark), true) = (&check.relaxed.remark, check.shot.is_some()) {
+        lines.push(("remark", remark.clone()));
+    }
+    if let Some(folder) = folder {
+        lines.push(("written", written(check, folder)));
+    }
+    let relaxed = &check.relaxed;
+    let heading = format!(
+        "{}: {}, relaxed and by shooting",
+        relaxed.scenario,
+        veins(relaxed)
+    );
+    lay_out(&heading, &lines)
+}
+
+fn judgement(check: &Check) -> String {
+    let allowed = format!(
+        "positions within {}, rotations within {} rad",
+        power_of_ten(check.allowed()),
+        power_of_ten(check.allowed_rotation())
+    );
+    let headline = headline(&check.verdict);
+    match &check.verdict {
+        Verdict::Agree => format!("{headline}: {allowed}"),
+        Verdict::Differ => format!("{headline}: to agree, {allowed}"),
+        Verdict::NotCompared(reason) => format!("{headline}: {reason}"),
+    }
+}
+
+/// What each method found, and when.
+fn both(check: &Check) -> Vec<(&'static str, String)> {
+    let relaxed = &check.relaxed;
+    let mut lines = vec![(
+        "relaxed",
+        format!("{} in {}", found(relaxed), seconds(relaxed.wall_seconds)),
+    )];
+    let time = check.shot_seconds.map(seconds).unwrap_or_default();
+    lines.push((
+        "shooting",
+        match &check.shot {
+            Some(Ok(shot)) => format!(
+                "{}{} in {time}",
+                equilibrium_of_index(shot.negative_eigenvalues),
+                eigenvalues(shot.negative_eigenvalues)
+            ),
+            Some(Err(_)) => format!("no solution in {time}"),
+            None => "not tried".into(),
+        },
+    ));
+    if let [tip] = relaxed.tips.as_slice() {
+        let tip = point(tip.to_array(), decimals(relaxed));
+        lines.push(("tip", format!("{tip} relaxed")));
+        let shot = check.solution().map(|shot| &shot.solution.rods[0]);
+        if let Some(node) = shot.and_then(|rod| rod.nodes.last()) {
+            let tip = point(node.position.to_array(), decimals(relaxed));
+            lines.push(("", format!("{tip} by shooting")));
+        }
+    }
+    let relaxed = significant(relaxed.energy);
+    lines.push((
+        "energy",
+        match check.solution() {
+            Some(shot) => format!(
+                "{relaxed} relaxed, {} by shooting",
+                significant(shot.solution.energy)
+            ),
+            None => format!("{relaxed} relaxed"),
+        },
+    ));
+    lines
+}
+
+/// The largest differences, and where they are.
+fn differences(check: &Check) -> Vec<(&'static str, String)> {
+    let Some(difference) = &check.difference else {
+        return Vec::new();
+    };
+    let mut lines: Vec<(&str, String)> = Quantity::ALL
+        .into_iter()
+        .map(|quantity| {
+            let found = quantity.of(difference);
+            let unit = match quantity {
+                Quantity::Rotation => " rad",
+                _ => "",
+            };
+            let word = quantity.word();
+            let line = match check.farthest(quantity) {
+                Some(place) if found > 0.0 => format!(
+                    "{word}s by {}{unit} at most, {}",
+                    power_of_ten(found),
+                    whereabouts(place, check.relaxed.rods.len())
+                ),
+                _ => format!("{word}s not at all"),
+            };
+            ("", line)
+        })
+        .collect();
+    lines[0].0 = "differ";
+    lines
+}
+
+fn whereabouts(place: Place, rods: usize) -> String {
+    let Place { rod, sigma } = place;
+    match rods {
+        1 => format!("at {sigma:.3} of the length"),
+        _ => format!("in vein {} at {sigma:.3} of its length", rod + 1),
+    }
+}
+
+/// What both methods say about their own errors.
+fn errors(check: &Check) -> Vec<(&'static str, String)> {
+    let relaxed = &check.relaxed;
+    let mut lines = vec![(
+        "error",
+        match relaxed.error_estimate {
+            Some(error) => format!(
+                "relaxed: positions within {}, from {}",
+                bound(error),
+                grids(relaxed)
+            ),
+            None => "relaxed: not known".into(),
+        },
+    )];
+    if let Some(shot) = check.solution() {
+        let error = &shot.solution.error;
+        lines.push((
+            "",
+            format!(
+                "shooting: positions within {}, rotations {}, forces {}, moments {}",
+                bound(error.position),
+                match error.rotation {
+                    0.0 => bound(0.0),
+                    rotation => format!("{} rad", bound(rotation)),
+                },
+                bound(error.force),
+                bound(error.moment)
+            ),
+        ));
+    }
+    match check.within_estimates() {
+        Some(true) => lines.push(("", "positions differ by no more than both errors".into())),
+        Some(false) => lines.push(("", "positions differ by more than both errors".into())),
+        None => (),
+    }
+    lines
+}
+
+/// How the shooting went.
+fn shooting_itself(shot: &Shot) -> Vec<(&'static str, String)> {
+    let solution = &shot.solution;
+    let mut lines = vec![
+        (
+            "growth",
+            format!(
+                "perturbations grow 10^{:.1} times from base to tip: {}",
+                solution.growth,
+                shooting(solution.intervals.len() - 1)
+            ),
+        ),
+        (
+            "defect",
+            format!(
+                "{}, ratio of singular values {:.1e}",
+                power_of_ten(solution.defect),
+                solution.condition
+            ),
+        ),
+    ];
+    if let Some(neutral) = &solution.neutral {
+        lines.push(("neutral", neutral.to_string()));
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::bvp::Neutral;
+    use crate::scenario::Scenario;
+    use crate::study::{CheckOptions, check};
+
+    use super::*;
+
+    fn cantilever() -> Check {
+        let scenario = r#"
+            name = "cantilever"
+            leaf = { rods = 1, length = 2.0, fan = [0.0] }
+            stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }
+            load = { gravity = [0.0, 0.0, -0.1] }
+        "#;
+        let scenario = Scenario::from_toml(scenario).unwrap();
+        check(&scenario, &CheckOptions::default(), &mut |_| {}).unwrap()
+    }
+
+    #[track_caller]
+    fn says(check: &Check, parts: &[&str]) {
+        let report = report(check, None);
+        for part in parts {
+            assert!(report.contains(part), "{part} in {report}");
+        }
+        assert!(
+            !report.contains("NaN") && !report.contains("inf"),
+            "{report}"
+        );
+    }
+
+    #[test]
+    fn agreement() {
+        says(
+            &cantilever(),
+            &[
+                "cantilever: 1 vein, relaxed and by shooting\n",
+                "  verdict  both methods agree: positions within 2.0×10⁻⁶, rotations within 1.0×10⁻⁴ rad\n",
+                "  relaxed  stable equilibrium (0 negative eigenvalues) in ",
+                "  shooting stable equilibrium (0 negative eigenvalues) in ",
+                "  differ   positions by ",
+                " of the length\n           rotations by ",
+                "  error    relaxed: positions within ",
+                "\n           shooting: positions within ",
+                "  growth   perturbations grow 10^",
+                ": single shooting\n",
+            ],
+        );
+    }
+
+    #[test]
+    fn another_equilibrium_is_called_unstable() {
+        let mut check = cantilever();
+        check.verdict = Verdict::Differ;
+        if let Some(Ok(shot)) = &mut check.shot {
+            shot.negative_eigenvalues = Some(2);
+            shot.solution.neutral = Some(Neutral {
+                ratio: 1e-12,
+                displacement: shot
+                    .solution
+                    .rods
+                    .iter()
+                    .map(|_| vec![glam::DVec3::Y])
+                    .collect(),
+            });
+        }
+        says(
+            &check,
+            &[
+                "  verdict  the methods differ: to agree, positions within 2.0×10⁻⁶",
+                "  shooting unstable equilibrium of index 2 (2 negative eigenvalues)",
+                "  neutral  a bifurcation is near",
+            ],
+        );
+    }
+
+    #[test]
+    fn equal_shapes_and_no_second_shape() {
+        let mut check = cantilever();
+        check.difference = Some(Default::default());
+        says(&check, &["  differ   positions not at all\n"]);
+
+        check.difference = None;
+        check.shot = None;
+        check.verdict = Verdict::NotCompared("the leaf is not at rest".into());
+        says(
+            &check,
+            &[
+                "  verdict  could not be compared: the leaf is not at rest\n",
+                "  shooting not tried\n",
+            ],
+        );
+    }
+}

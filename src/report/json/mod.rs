@@ -1,0 +1,96 @@
+//! JSON, for scripts: compact, numbers that are not finite as null.
+
+mod all;
+mod chart;
+mod check;
+mod map;
+mod motion;
+mod summary;
+mod trace;
+
+use std::io::{self, Write};
+
+use glam::DVec3;
+use serde::Serialize;
+use serde_json::ser::Formatter;
+
+pub use all::AllSummary;
+pub use chart::ChartSummary;
+pub use check::CheckSummary;
+pub use map::MapSummary;
+pub use motion::MotionSummary;
+pub use summary::Summary;
+pub use trace::TraceSummary;
+
+type Point = [f64; 3];
+
+fn points(points: impl IntoIterator<Item = DVec3>) -> Vec<Point> {
+    points.into_iter().map(|point| point.to_array()).collect()
+}
+
+/// The only tip, or else all of them.
+fn tips(tips: &[DVec3]) -> (Option<Point>, Option<Vec<Point>>) {
+    match tips {
+        [only] => (Some(only.to_array()), None),
+        tips => (None, Some(points(tips.iter().copied()))),
+    }
+}
+
+/// Writes the whole file.
+pub fn write(object: &impl Serialize, out: &mut dyn Write) -> io::Result<()> {
+    let mut serializer = serde_json::Serializer::with_formatter(&mut *out, Layout::default());
+    object.serialize(&mut serializer)?;
+    out.write_all(b"\n")
+}
+
+/// Compact JSON with each key of the outermost object on its own line.
+#[derive(Default)]
+struct Layout {
+    depth: usize,
+}
+
+impl Formatter for Layout {
+    fn begin_object<W: ?Sized + Write>(&mut self, out: &mut W) -> io::Result<()> {
+        self.depth += 1;
+        out.write_all(b"{")
+    }
+
+    fn end_object<W: ?Sized + Write>(&mut self, out: &mut W) -> io::Result<()> {
+        self.depth -= 1;
+        out.write_all(if self.depth == 0 { b"\n}" } else { b"}" })
+    }
+
+    fn begin_object_key<W: ?Sized + Write>(&mut self, out: &mut W, first: bool) -> io::Result<()> {
+        if !first {
+            out.write_all(b",")?;
+        }
+        out.write_all(match (self.depth, first) {
+            (1, _) => b"\n  ",
+            (_, true) => b"",
+            (_, false) => b" ",
+        })
+    }
+
+    fn begin_object_value<W: ?Sized + Write>(&mut self, out: &mut W) -> io::Result<()> {
+        out.write_all(b": ")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::report::Format;
+
+    pub fn text<R>(format: &dyn Format<R>, result: &R) -> String {
+        let mut bytes = Vec::new();
+        format.write(result, &mut bytes).unwrap();
+        String::from_utf8(bytes).unwrap()
+    }
+
+    /// Keys of the outermost object, in the order written.
+    pub fn keys(text: &str) -> Vec<&str> {
+        text.lines()
+            .filter_map(|line| line.strip_prefix("  \""))
+            .map(|line| line.split('"').next().unwrap())
+            .collect()
+    }
+}

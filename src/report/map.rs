@@ -1,0 +1,90 @@
+//! The summary of a map that people read.
+
+use std::fmt::Write;
+
+use crate::study::{Confidence, Map, MapOutcome};
+
+use super::numbers::seconds;
+use super::table::lay_out;
+
+/// What was done for it.
+#[derive(Clone, Copy)]
+pub struct Told {
+    /// Rows that were there.
+    pub known: usize,
+    /// Rows that were computed.
+    pub computed: usize,
+    /// Time of all.
+    pub seconds: f64,
+}
+
+/// What varies, what was done, and how often each method had each outcome.
+pub fn report(map: &Map, told: Told, files: &str) -> String {
+    let request = &map.request;
+    let mut lines: Vec<(&str, String)> = Vec::new();
+    for axis in &request.axes {
+        let ends = [axis.values.first(), axis.values.last()];
+        let [from, to] = ends.map(|end| end.map_or(String::new(), |&v| axis.keys.text(v)));
+        let spacing = if axis.log { ", logarithmic" } else { "" };
+        let count = axis.values.len();
+        let text = format!("{} from {from} to {to}: {count} values{spacing}", axis.keys);
+        lines.push(("vary", text));
+    }
+    let mut cells: Vec<_> = (map.rows.iter())
+        .map(|row| (row.cell, row.reference))
+        .collect();
+    cells.dedup_by_key(|(cell, _)| *cell);
+    let confirmed = |(_, reference): &&(usize, Confidence)| *reference == Confidence::Confirmed;
+    lines.push((
+        "cells",
+        format!(
+            "{} of {}, reference confirmed in {}",
+            cells.len(),
+            request.cells(),
+            cells.iter().filter(confirmed).count()
+        ),
+    ));
+    lines.push((
+        "rows",
+        format!(
+            "{} were there, {} computed in {}",
+            told.known,
+            told.computed,
+            seconds(told.seconds)
+        ),
+    ));
+    for (i, line) in counts(map).into_iter().enumerate() {
+        lines.push((if i == 0 { "found" } else { "" }, line));
+    }
+    if !files.is_empty() {
+        lines.push(("written", files.into()));
+    }
+    lay_out(
+        &format!("{}: where methods fail", request.base.scenario().name),
+        &lines,
+    )
+}
+
+/// A table with the outcomes that occur.
+fn counts(map: &Map) -> Vec<String> {
+    let outcomes: Vec<MapOutcome> = (MapOutcome::ALL.into_iter())
+        .filter(|&outcome| map.rows.iter().any(|row| row.outcome == outcome))
+        .collect();
+    let mut lines = vec![format!("{:<18}", "")];
+    for outcome in &outcomes {
+        // Writing to a string cannot fail.
+        let _ = write!(lines[0], "  {outcome}");
+    }
+    for &method in &map.request.methods {
+        let mut line = format!("{:<18}", method.word());
+        for &outcome in &outcomes {
+            let count = match map.count(method, outcome) {
+                0 => "-".into(),
+                count => count.to_string(),
+            };
+            let _ = write!(line, "  {count:>0$}", outcome.word().len());
+        }
+        lines.push(line);
+    }
+    lines
+}

@@ -1,0 +1,164 @@
+//! The summary of a relaxation that people read.
+
+use std::path::Path;
+
+use crate::relax::{Equilibrium, Method, Mode, Outcome};
+use crate::report::words::{model, shooting, verdict};
+
+use super::numbers::{
+    bound, brief, decimals, eigenvalues, grids, longest_rod, point, seconds, significant, veins,
+};
+use super::table::{lay_out, written};
+
+/// Modes whose numbers are told.
+const MODES_TOLD: usize = 6;
+
+/// What was solved, what was found, how well, and where the files are.
+pub fn report(equilibrium: &Equilibrium, folder: Option<&Path>) -> String {
+    let mut lines = vec![("found", found(equilibrium))];
+    if let Some(saddle) = &equilibrium.saddle {
+        lines.push((
+            "left",
+            format!(
+                "a saddle of index {} with energy {} and tip {}",
+                saddle.negative_eigenvalues,
+                significant(saddle.energy),
+                point(saddle.tip.to_array(), decimals(equilibrium)),
+            ),
+        ));
+    }
+    // Where shooting came no further, the shape is not yet this leaf's: it has
+    // no energy, and its tip says nothing.
+    if equilibrium.energy.is_finite() {
+        if let [tip] = equilibrium.tips.as_slice() {
+            lines.push(("tip", point(tip.to_array(), decimals(equilibrium))));
+        }
+        lines.push(("energy", significant(equilibrium.energy)));
+    }
+    if let Some(waves) = waves(equilibrium) {
+        lines.push(("waves", waves));
+    }
+    lines.push(("error", error(equilibrium)));
+    if let Some(modes) = modes(equilibrium) {
+        lines.push(("modes", modes));
+    }
+    if !equilibrium.segments.is_empty() {
+        lines.push(("model", model(equilibrium)));
+    }
+    lines.push(("work", work(equilibrium)));
+    if let Some(folder) = folder {
+        lines.push(("written", written(equilibrium, folder)));
+    }
+    if let Some(remark) = &equilibrium.remark {
+        lines.push(("remark", remark.clone()));
+    }
+    let heading = format!(
+        "{}: {}, method {}",
+        equilibrium.scenario,
+        veins(equilibrium),
+        equilibrium.method
+    );
+    lay_out(&heading, &lines)
+}
+
+/// The kind of equilibrium, or how far from one.
+pub fn found(equilibrium: &Equilibrium) -> String {
+    let verdict = verdict(equilibrium);
+    match equilibrium.outcome {
+        Outcome::NotAtRest | Outcome::Diverged | Outcome::Singular
+            if equilibrium.residual.is_finite() =>
+        {
+            format!("{verdict} (residual {:.1e})", equilibrium.residual)
+        }
+        _ => verdict + &eigenvalues(equilibrium.negative_eigenvalues),
+    }
+}
+
+fn error(equilibrium: &Equilibrium) -> String {
+    let source = match equilibrium.intervals {
+        Some(count) => format!("by {}", shooting(count)),
+        None => format!("from {}", grids(equilibrium)),
+    };
+    let wanted = bound(equilibrium.tolerance * longest_rod(equilibrium));
+    match equilibrium.error_estimate {
+        Some(error) => format!(
+            "positions within {} (wanted {wanted}), {source}",
+            bound(error)
+        ),
+        None => match equilibrium.segments.as_slice() {
+            [segments] => format!("not estimated on a single grid of {segments} segments a vein"),
+            _ => "not known".into(),
+        },
+    }
+}
+
+/// What the margins do, where some vein waves.
+fn waves(equilibrium: &Equilibrium) -> Option<String> {
+    let undulation = &equilibrium.undulation;
+    let margin = undulation.margin()?;
+    if undulation.veins.iter().all(|vein| vein.waves() == 0.0) {
+        return None;
+    }
+    let predicted = format!(
+        "linear theory: {:.1} at |T| L²/A2 = {:.1} of {}",
+        margin.predicted_waves(),
+        margin.load_number,
+        match margin.tension < 0.0 {
+            true => "compression",
+            false => "tension",
+        }
+    );
+    Some(match margin.wavelength {
+        Some(length) => format!(
+            "{} along the margins, {:.4} high and {:.3} long; {predicted}",
+            margin.waves(),
+            margin.amplitude,
+            length
+        ),
+        None => format!("none along the margins; {predicted}"),
+    })
+}
+
+/// The lowest eigenvalues, as growth rates and frequencies.
+fn modes(equilibrium: &Equilibrium) -> Option<String> {
+    let Some(modes) = &equilibrium.modes else {
+        return equilibrium.mode_shapes.then(|| "not known".into());
+    };
+    let unstable = |mode: &&Mode| mode.growth().is_some() && !mode.is_neutral();
+    let list = |values: &mut dyn Iterator<Item = f64>| {
+        let told: Vec<String> = values.take(MODES_TOLD).map(brief).collect();
+        told.join(", ")
+    };
+    let growth = list(&mut modes.iter().filter(unstable).filter_map(Mode::growth));
+    let frequencies = modes.iter().filter(|mode| !unstable(mode));
+    let frequencies = list(&mut frequencies.map(|mode| match mode.is_neutral() {
+        true => 0.0,
+        false => mode.frequency().unwrap_or_default(),
+    }));
+    let phrases = [
+        ("growth rates", growth),
+        ("lowest frequencies", frequencies),
+    ];
+    let phrases = phrases.iter().filter(|(_, list)| !list.is_empty());
+    let told: Vec<String> = phrases
+        .map(|(what, list)| format!("{what} {list}"))
+        .collect();
+    let unjudged = modes.iter().any(|mode| mode.error.is_none());
+    let roughly = if unjudged { " (on one grid)" } else { "" };
+    (!told.is_empty()).then(|| told.join("; ") + roughly)
+}
+
+fn work(equilibrium: &Equilibrium) -> String {
+    let work = equilibrium.work;
+    let (steps, factorizations, evaluations) =
+        (work.steps, work.factorizations, work.force_evaluations);
+    let time = seconds(equilibrium.wall_seconds);
+    if equilibrium.method == Method::Shooting.name() {
+        return format!(
+            "{steps} corrections, {factorizations} linearisations, {evaluations} evaluations of all slopes in {time}"
+        );
+    }
+    format!(
+        "{steps} steps, {factorizations} factorisations, {evaluations} force evaluations in {time}"
+    )
+}

@@ -1,0 +1,129 @@
+//! Sentences about a result that the figure and the command line share.
+
+use super::numbers::power_of_ten;
+use crate::relax::{Equilibrium, Method, Outcome};
+use crate::study::{Contender, TraceEnd, Verdict};
+
+/// How the run ended and what was found, in one phrase.
+pub fn verdict(equilibrium: &Equilibrium) -> String {
+    match equilibrium.outcome {
+        Outcome::Converged => at_rest(equilibrium),
+        Outcome::ConvergedAfterSaddle => match &equilibrium.saddle {
+            Some(saddle) => format!(
+                "{}, after leaving a saddle of index {}",
+                at_rest(equilibrium),
+                saddle.negative_eigenvalues
+            ),
+            None => format!("{}, after leaving a saddle", at_rest(equilibrium)),
+        },
+        Outcome::Saddle => at_rest(equilibrium),
+        Outcome::ToleranceNotReached => {
+            format!("{}, tolerance not reached", at_rest(equilibrium))
+        }
+        Outcome::NotAtRest if equilibrium.method == Method::Shooting.name() => {
+            "no equilibrium".into()
+        }
+        Outcome::NotAtRest => "not at rest".into(),
+        Outcome::Singular => "singular equations".into(),
+        Outcome::Diverged => "diverged".into(),
+    }
+}
+
+fn at_rest(equilibrium: &Equilibrium) -> String {
+    equilibrium_of_index(equilibrium.negative_eigenvalues)
+}
+
+/// What kind of equilibrium has so many negative eigenvalues.
+pub fn equilibrium_of_index(negative_eigenvalues: Option<usize>) -> String {
+    match negative_eigenvalues {
+        Some(0) => "stable equilibrium".into(),
+        Some(index) => format!("unstable equilibrium of index {index}"),
+        None => "equilibrium of unknown stability".into(),
+    }
+}
+
+/// What was solved, and what of it matters: in one phrase.
+pub fn model(equilibrium: &Equilibrium) -> String {
+    let (model, veins) = (&equilibrium.model, equilibrium.rods.len());
+    let mut phrases = vec![match model.rods < veins {
+        true => format!(
+            "{} of {veins} veins, the others are their mirror images",
+            model.rods
+        ),
+        false if veins == 1 => "1 vein".into(),
+        false => format!("all {veins} veins"),
+    }];
+    if model.planar {
+        phrases.push("planar".into());
+    }
+    if !equilibrium.segments.is_empty() {
+        let grids: Vec<String> = equilibrium.segments.iter().map(usize::to_string).collect();
+        phrases.push(format!("{} segments", grids.join("+")));
+    }
+    if model.rods < veins {
+        phrases.push("stable against breaking the mirror".into());
+    }
+    if model.planar {
+        phrases.push("stable out of the plane".into());
+    }
+    for (effect, what) in [(model.shear, "shear"), (model.stretch, "stretch")] {
+        if let Some(effect) = effect {
+            phrases.push(format!("{what} matters by {}", power_of_ten(effect)));
+        }
+    }
+    phrases.join("; ")
+}
+
+/// The kind of shooting.
+pub fn shooting(intervals: usize) -> String {
+    match intervals {
+        1 => "single shooting".into(),
+        count => format!("multiple shooting over {count} intervals"),
+    }
+}
+
+/// What a check says, in one phrase.
+pub fn headline(verdict: &Verdict) -> &'static str {
+    match verdict {
+        Verdict::Agree => "both methods agree",
+        Verdict::Differ => "the methods differ",
+        Verdict::NotCompared(_) => "could not be compared",
+    }
+}
+
+/// A way to bring a leaf to rest, as a chart names it.
+pub fn contender(contender: Contender) -> &'static str {
+    match contender {
+        Contender::SemiImplicit => "semi-implicit, extrapolated",
+        Contender::SemiImplicitGrid => "semi-implicit, single grids",
+        Contender::Explicit => "explicit, extrapolated",
+        Contender::ExplicitGrid => "explicit, single grids",
+        Contender::SingleShooting => "single shooting",
+        Contender::MultipleShooting => "multiple shooting",
+        Contender::RelaxedShooting => "shooting from the relaxed leaf",
+    }
+}
+
+/// How a branch ended, in a phrase.
+pub fn branch_end(end: TraceEnd) -> &'static str {
+    match end {
+        TraceEnd::Reached => "to the end of the range",
+        TraceEnd::Returned => "back to its start",
+        TraceEnd::Closed => "closed",
+        TraceEnd::MostPoints => "goes on",
+        TraceEnd::OutOfRange => "ends where no leaf is",
+        TraceEnd::Unresolved => "ends: grid too coarse",
+        TraceEnd::Stuck => "lost",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_number_of_intervals_is_told_where_there_are_several() {
+        assert_eq!(shooting(1), "single shooting");
+        assert_eq!(shooting(12), "multiple shooting over 12 intervals");
+    }
+}
