@@ -190,12 +190,15 @@
 
 pub mod branch;
 pub mod bvp;
+#[cfg(feature = "cli")]
 pub mod figure;
+#[cfg(feature = "cli")]
 pub mod files;
 pub mod leaf;
 pub mod modes;
 pub mod motion;
 pub mod relax;
+#[cfg(feature = "cli")]
 pub mod report;
 pub mod rod;
 pub mod rotation;

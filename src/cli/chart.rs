@@ -83,7 +83,7 @@ impl Chart {
             options.contenders.retain(wanted);
         }
         for file in &self.peers {
-            options.peers.extend(study::read_peers(file)?);
+            options.peers.extend(files::read_peers(file)?);
         }
         let mut line = ProgressLine::new(&scenario.name);
         let mut progress = |turn: &Turn| {

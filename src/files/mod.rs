@@ -4,6 +4,7 @@ mod atomic;
 mod checksum;
 mod journal;
 mod part;
+mod peers;
 mod recording;
 
 use std::fs;
@@ -11,6 +12,7 @@ use std::path::{Path, PathBuf};
 
 pub use atomic::{abandon_unfinished, check_writable};
 pub use journal::{Journal, belongs, claim, write_rows};
+pub use peers::{PeersError, read_peers};
 pub use recording::{CannotResume, Keeper, Recording};
 
 use crate::figure::{FigurePng, FigureSvg, ModesFigure, MotionFigure};

@@ -9,8 +9,8 @@ mod vary;
 
 pub use all::{All, Found, all};
 pub use chart::{
-    Chart, ChartError, ChartOptions, Contender, Decade, Ending, Peer, PeerRow, PeersError,
-    Reference, Row, Scaling, ScalingRow, Setting, Spread, Turn, chart, read_peers, scaling,
+    Chart, ChartError, ChartOptions, Contender, Decade, Ending, Peer, PeerRow, Reference, Row,
+    Scaling, ScalingRow, Setting, Spread, Turn, chart, scaling,
 };
 pub use check::{Check, CheckOptions, Place, Quantity, Shot, Verdict, check};
 pub use map::{

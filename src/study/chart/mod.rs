@@ -12,7 +12,7 @@ mod timing;
 
 use thiserror::Error;
 
-pub use peers::{Peer, PeerRow, PeersError, read_peers};
+pub use peers::{Peer, PeerRow};
 pub use plan::{Contender, Setting};
 pub use reference::Reference;
 pub use scaling::{Scaling, ScalingRow, scaling};

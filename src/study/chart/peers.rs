@@ -1,20 +1,6 @@
-//! Measurements of other programs, as `benches/peers` writes them.
-
-use std::fs::File;
-use std::io::{self, Read};
-use std::path::{Path, PathBuf};
-
-use thiserror::Error;
+//! Measurements of other programs, beside ours.
 
 use super::timing::Spread;
-
-/// Columns that a table must have, in any order.
-const COLUMNS: [&str; 7] = [
-    "program", "scenario", "rods", "knob", "seconds", "error", "outcome",
-];
-
-/// Most bytes of a table.
-const MOST_BYTES: u64 = 16 << 20;
 
 /// First words of outcomes that are solutions.
 const AT_REST: [&str; 2] = ["converged", "at-rest"];
@@ -22,36 +8,7 @@ const AT_REST: [&str; 2] = ["converged", "at-rest"];
 /// First word of a measurement that was not meant to come to rest.
 const COMPLETED: &str = "completed";
 
-/// A table that cannot be read.
-#[derive(Debug, Error)]
-pub enum PeersError {
-    /// The file cannot be read.
-    #[error("--peers: cannot read {}: {reason}", file.display())]
-    Unreadable {
-        /// The file.
-        file: PathBuf,
-        /// What the system says.
-        reason: io::Error,
-    },
-    /// The file is larger than any table of measurements.
-    #[error("--peers: {} is larger than {} MB: it is no table of measurements", file.display(), MOST_BYTES >> 20)]
-    TooLarge {
-        /// The file.
-        file: PathBuf,
-    },
-    /// A line is not as it should be.
-    #[error("--peers: {}:{line}: {problem}", file.display())]
-    Malformed {
-        /// The file.
-        file: PathBuf,
-        /// Its line, counted from 1.
-        line: u64,
-        /// What is wrong, and what is allowed.
-        problem: String,
-    },
-}
-
-/// One row of such a table.
+/// One measurement of another program.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PeerRow {
     /// The program.
@@ -68,120 +25,6 @@ pub struct PeerRow {
     pub error: Option<f64>,
     /// How it ended.
     pub outcome: String,
-}
-
-/// Reads a table.
-///
-/// # Errors
-/// If it is not one, with the line.
-pub fn read_peers(file: &Path) -> Result<Vec<PeerRow>, PeersError> {
-    let unreadable = |reason| PeersError::Unreadable {
-        file: file.into(),
-        reason,
-    };
-    let mut bytes = Vec::new();
-    File::open(file)
-        .and_then(|open| open.take(MOST_BYTES + 1).read_to_end(&mut bytes))
-        .map_err(unreadable)?;
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(PeersError::TooLarge { file: file.into() });
-    }
-    parse(&bytes).map_err(|(line, problem)| PeersError::Malformed {
-        file: file.into(),
-        line,
-        problem,
-    })
-}
-
-/// Rows, or a line and what is wrong with it.
-fn parse(bytes: &[u8]) -> Result<Vec<PeerRow>, (u64, String)> {
-    let mut table = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
-    let header = match table.headers() {
-        Ok(header) => header.clone(),
-        Err(error) => return Err((1, said(&error))),
-    };
-    let mut columns = [0; COLUMNS.len()];
-    for (column, name) in columns.iter_mut().zip(COLUMNS) {
-        let mut places = (0..header.len()).filter(|&i| header[i].trim() == name);
-        *column = match (places.next(), places.next()) {
-            (Some(place), None) => place,
-            _ => {
-                let wanted = COLUMNS.join(", ");
-                return Err((
-                    1,
-                    format!("the first line must name the columns {wanted}, each once"),
-                ));
-            }
-        };
-    }
-    let mut rows = Vec::new();
-    for record in table.records() {
-        let record = record.map_err(|error| {
-            let line = error.position().map_or(0, csv::Position::line);
-            (line, said(&error))
-        })?;
-        let line = record.position().map_or(0, csv::Position::line);
-        if record.len() != header.len() {
-            let (found, wanted) = (record.len(), header.len());
-            return Err((
-                line,
-                format!("{found} cells, not {wanted} as in the first line"),
-            ));
-        }
-        let cell = columns.map(|column| record[column].trim());
-        rows.push(row(cell).map_err(|problem| (line, problem))?);
-    }
-    Ok(rows)
-}
-
-/// An error of the table without its own idea of the place.
-fn said(error: &csv::Error) -> String {
-    match error.kind() {
-        csv::ErrorKind::Utf8 { .. } => "not UTF-8".into(),
-        _ => error.to_string(),
-    }
-}
-
-fn row(
-    [program, scenario, rods, knob, seconds, error, outcome]: [&str; 7],
-) -> Result<PeerRow, String> {
-    let named = |name: &str, cell: &str| match cell {
-        "" => Err(format!("{name}: must not be empty")),
-        cell => Ok(cell.to_string()),
-    };
-    let number = |name: &str, cell: &str, allowed: &str, good: fn(f64) -> bool| {
-        let value = cell
-            .parse()
-            .ok()
-            .filter(|&value: &f64| value.is_finite() && good(value));
-        value.ok_or_else(|| format!("{name} = {cell:?}: must be {allowed}"))
-    };
-    Ok(PeerRow {
-        program: named("program", program)?,
-        scenario: named("scenario", scenario)?,
-        rods: match rods.parse() {
-            Ok(rods @ 1..) => rods,
-            _ => {
-                return Err(format!(
-                    "rods = {rods:?}: must be a whole number, at least 1"
-                ));
-            }
-        },
-        knob: knob.into(),
-        seconds: number("seconds", seconds, "a number greater than 0", |value| {
-            value > 0.0
-        })?,
-        error: match error {
-            "" => None,
-            error => Some(number(
-                "error",
-                error,
-                "empty, or a number not below 0",
-                |value| value >= 0.0,
-            )?),
-        },
-        outcome: named("outcome", outcome)?,
-    })
 }
 
 /// A peer's measurements at one setting.
@@ -283,88 +126,40 @@ pub fn about(
 mod tests {
     use super::*;
 
-    const HEADER: &str = "program,scenario,rods,knob,seconds,error,outcome\n";
-
-    fn rows(lines: &str) -> Vec<PeerRow> {
-        parse(format!("{HEADER}{lines}").as_bytes()).unwrap()
-    }
-
-    #[track_caller]
-    fn refused(text: &[u8], line: u64, part: &str) {
-        let (at, problem) = parse(text).unwrap_err();
-        assert_eq!(at, line, "{problem}");
-        assert!(problem.contains(part), "{part} in {problem}");
-    }
-
-    #[test]
-    fn rows_are_read_as_they_are_written() {
-        let rows = rows("solve_bvp,fig04,5,tol=0.001,0.2671,5.487e-06,converged\n");
-        assert_eq!(
-            rows,
-            [PeerRow {
-                program: "solve_bvp".into(),
-                scenario: "fig04".into(),
-                rods: 5,
-                knob: "tol=0.001".into(),
-                seconds: 0.2671,
-                error: Some(5.487e-6),
-                outcome: "converged".into(),
-            }]
-        );
-        assert!(parse(HEADER.as_bytes()).unwrap().is_empty());
-    }
-
-    #[test]
-    fn columns_may_be_in_any_order_with_others_between() {
-        let text = "outcome,date,error,seconds,knob,rods,scenario,program\nat-rest,today,,2,n=1,3,leaf,p\n";
-        let rows = parse(text.as_bytes()).unwrap();
-        assert_eq!((rows[0].rods, rows[0].error), (3, None));
-    }
-
-    #[test]
-    fn what_is_malformed_is_refused_with_its_line() {
-        let good = "solve_bvp,fig04,5,tol=0.001,0.2671,5.487e-06,converged\n";
-        for (bad, part) in [
-            ("p,s,5,k,0.1,1e-3", "6 cells, not 7"),
-            ("p,s,5,k,0.1,1e-3,converged,more", "8 cells"),
-            ("p,s,0,k,0.1,1e-3,converged", "rods = \"0\""),
-            ("p,s,2.5,k,0.1,1e-3,converged", "rods"),
-            ("p,s,5,k,0,1e-3,converged", "seconds = \"0\""),
-            ("p,s,5,k,inf,1e-3,converged", "seconds"),
-            ("p,s,5,k,fast,1e-3,converged", "seconds = \"fast\""),
-            ("p,s,5,k,,1e-3,converged", "seconds"),
-            ("p,s,5,k,0.1,-1,converged", "error"),
-            ("p,s,5,k,0.1,nan,converged", "error"),
-            (",s,5,k,0.1,1e-3,converged", "program"),
-            ("p,,5,k,0.1,1e-3,converged", "scenario"),
-            ("p,s,5,k,0.1,1e-3,", "outcome"),
-        ] {
-            refused(format!("{HEADER}{good}{bad}\n{good}").as_bytes(), 3, part);
+    fn row(
+        program: &str,
+        scenario: &str,
+        rods: usize,
+        knob: &str,
+        seconds: f64,
+        error: Option<f64>,
+        outcome: &str,
+    ) -> PeerRow {
+        PeerRow {
+            program: program.into(),
+            scenario: scenario.into(),
+            rods,
+            knob: knob.into(),
+            seconds,
+            error,
+            outcome: outcome.into(),
         }
-        refused(b"", 1, "must name the columns program,");
-        refused(b"program,scenario\n", 1, "must name the columns");
-        refused(format!("program,{HEADER}").as_bytes(), 1, "each once");
-        refused(
-            &[HEADER.as_bytes(), b"p,\xff,5,k,0.1,,c\n"].concat(),
-            2,
-            "UTF-8",
-        );
     }
 
     #[test]
     fn equal_rows_are_taken_together_and_others_counted() {
-        let rows = rows(
-            "a,leaf,5,n=10,3,4e-3,converged\n\
-             a,leaf,5,n=10,1,4e-3,converged\n\
-             a,leaf,5,n=10,2,4e-3,converged\n\
-             a,leaf,5,n=10 own-law,2,6e-3,at-rest\n\
-             a,leaf,5,n=20,2,,not-converged newton\n\
-             a,leaf,5,n=30,2,,converged\n\
-             a,leaf,5,n=30 steps=9,2,,completed\n\
-             a,leaf,7,n=10,2,1e-3,converged\n\
-             a,tree,5,n=10,2,1e-3,converged\n\
-             a,tree,5,n=20,2,1e-3,converged\n",
-        );
+        let rows = [
+            row("a", "leaf", 5, "n=10", 3.0, Some(4e-3), "converged"),
+            row("a", "leaf", 5, "n=10", 1.0, Some(4e-3), "converged"),
+            row("a", "leaf", 5, "n=10", 2.0, Some(4e-3), "converged"),
+            row("a", "leaf", 5, "n=10 own-law", 2.0, Some(6e-3), "at-rest"),
+            row("a", "leaf", 5, "n=20", 2.0, None, "not-converged newton"),
+            row("a", "leaf", 5, "n=30", 2.0, None, "converged"),
+            row("a", "leaf", 5, "n=30 steps=9", 2.0, None, "completed"),
+            row("a", "leaf", 7, "n=10", 2.0, Some(1e-3), "converged"),
+            row("a", "tree", 5, "n=10", 2.0, Some(1e-3), "converged"),
+            row("a", "tree", 5, "n=20", 2.0, Some(1e-3), "converged"),
+        ];
         let (peers, remarks) = about(&rows, "leaf", 5, 2.0);
         let names: Vec<(&str, &str)> = peers
             .iter()
