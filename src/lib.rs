@@ -191,6 +191,8 @@
 pub mod branch;
 pub mod bvp;
 #[cfg(feature = "cli")]
+pub mod cli;
+#[cfg(feature = "cli")]
 pub mod figure;
 #[cfg(feature = "cli")]
 pub mod files;

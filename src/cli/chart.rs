@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum, ValueHint};
 
-use leafdyn::files;
-use leafdyn::report::words::contender;
-use leafdyn::scenario::Scenario;
-use leafdyn::study::{self, ChartOptions, Contender, Scaling, Turn};
+use crate::files;
+use crate::report::words::contender;
+use crate::scenario::Scenario;
+use crate::study::{self, ChartOptions, Contender, Scaling, Turn};
 
-use leafdyn::report;
+use crate::report;
 
 use super::progress::ProgressLine;
 use super::request::Request;
@@ -101,7 +101,7 @@ impl Chart {
         };
         // What is asked of the second is looked at before the first is made.
         let tolerance = self.request.tolerance.unwrap_or(scenario.tolerance);
-        leafdyn::relax::check_tolerance(tolerance)?;
+        crate::relax::check_tolerance(tolerance)?;
         let mut chart = study::chart(&scenario, &options, &mut progress)?;
         if !leaves.is_empty() {
             chart.scaling = Some(study::scaling(&leaves, tolerance, &options, &mut progress)?);

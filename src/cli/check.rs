@@ -2,9 +2,9 @@
 
 use clap::Args;
 
-use leafdyn::study::{self, CheckOptions, Verdict};
+use crate::study::{self, CheckOptions, Verdict};
 
-use leafdyn::report;
+use crate::report;
 
 use super::progress::ProgressLine;
 use super::request::Request;

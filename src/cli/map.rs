@@ -7,14 +7,14 @@ use std::time::Instant;
 
 use clap::{Args, ValueHint};
 
-use leafdyn::files;
-use leafdyn::files::Journal;
-use leafdyn::report::OutputError;
-use leafdyn::study::{
+use crate::files;
+use crate::files::Journal;
+use crate::report::OutputError;
+use crate::study::{
     self, CELL_SECONDS, Map as Cells, MapMethod, MapRequest, MapRow, MapShow, Vary,
 };
 
-use leafdyn::report;
+use crate::report;
 
 use super::progress::ProgressLine;
 use super::request::Request;

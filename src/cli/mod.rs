@@ -16,14 +16,14 @@ use std::sync::OnceLock;
 
 use clap::{Parser, Subcommand};
 
-use leafdyn::files;
-use leafdyn::files::Keeper;
-use leafdyn::report::OutputError;
+use crate::files;
+use crate::files::Keeper;
+use crate::report::OutputError;
 
 /// How a leaf of coupled elastic veins comes to rest, with an error bar and a statement of stability, and how it moves.
 #[derive(Debug, Parser)]
 #[command(name = "leafdyn", version, about, arg_required_else_help = true)]
-pub struct Cli {
+struct Cli {
     #[command(subcommand)]
     verb: Verb,
 }
@@ -40,7 +40,7 @@ enum Verb {
 
 impl Cli {
     /// Does what was asked for.
-    pub fn run(self) -> Result<Status, Refusal> {
+    fn run(self) -> Result<Status, Refusal> {
         match self.verb {
             Verb::Relax(relax) => relax.run(),
             Verb::Check(check) => check.run(),
@@ -52,12 +52,25 @@ impl Cli {
     }
 }
 
+/// The program: does what the process was asked for, and returns its exit status.
+pub fn main() -> ExitCode {
+    let command_line = Cli::parse();
+    let interrupted = stop_at_once_on_interrupt();
+    match interrupted.and_then(|()| command_line.run()) {
+        Ok(status) => status.into(),
+        Err(refusal) => {
+            note(&format!("error: {refusal}"));
+            Status::Refused.into()
+        }
+    }
+}
+
 /// Why something was not done: a message that says what to change.
-pub type Refusal = Box<dyn Error>;
+type Refusal = Box<dyn Error>;
 
 /// What the process tells its caller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Status {
+enum Status {
     /// At rest within the tolerance; of a check: both methods agree; of a
     /// simulation: followed to its end; of a chart: its reference is confirmed.
     Success = 0,
@@ -84,7 +97,7 @@ static KEEPER: OnceLock<Keeper> = OnceLock::new();
 
 /// Lets Ctrl-C end the process at once, with no file half written, and a
 /// simulation kept.
-pub fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
+fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     ctrlc::set_handler(|| {
         let kept = KEEPER.get().and_then(Keeper::keep_for_good);
         files::abandon_unfinished();
@@ -111,7 +124,7 @@ fn keep_on_interrupt(keeper: Keeper) {
 fn tell_kept(kept: &Result<f64, OutputError>) -> Status {
     match kept {
         Ok(time) => {
-            let time = leafdyn::report::numbers::brief(*time);
+            let time = crate::report::numbers::brief(*time);
             note(&format!("stopped at t = {time}; go on with --resume"));
             Status::Success
         }
@@ -123,7 +136,7 @@ fn tell_kept(kept: &Result<f64, OutputError>) -> Status {
 }
 
 /// A line on standard error; if nobody can read it, nothing is lost.
-pub fn note(line: &str) {
+fn note(line: &str) {
     let _ = writeln!(io::stderr(), "{line}");
 }
 

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use leafdyn::relax::Progress;
+use crate::relax::Progress;
 
 /// Shorter runs show no line: it would only flicker.
 const LONG_RUN: Duration = Duration::from_millis(500);

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use clap::{Args, ValueEnum};
 
-use leafdyn::relax::{self, Equilibrium, Method, Options};
-use leafdyn::report;
-use leafdyn::scenario::Scenario;
-use leafdyn::study;
+use crate::relax::{self, Equilibrium, Method, Options};
+use crate::report;
+use crate::scenario::Scenario;
+use crate::study;
 
 use super::progress::ProgressLine;
 use super::request::Request;

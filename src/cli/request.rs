@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueHint};
 
-use leafdyn::files;
-use leafdyn::report::Written;
-use leafdyn::scenario::Scenario;
-use leafdyn::study::Base;
+use crate::files;
+use crate::report::Written;
+use crate::scenario::Scenario;
+use crate::study::Base;
 
 use super::{Refusal, show};
 

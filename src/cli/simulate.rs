@@ -5,17 +5,17 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
-use leafdyn::files::Recording;
-use leafdyn::leaf::Leaf;
-use leafdyn::report::OutputError;
-use leafdyn::simulate::{Options, Scheme, Simulation, Stopped};
+use crate::files::Recording;
+use crate::leaf::Leaf;
+use crate::report::OutputError;
+use crate::simulate::{Options, Scheme, Simulation, Stopped};
 
-use leafdyn::report;
+use crate::report;
 
 use super::progress::ProgressLine;
 use super::request::Request;
 use super::{Refusal, Status, keep_on_interrupt, note, tell_kept};
-use leafdyn::report::numbers::brief;
+use crate::report::numbers::brief;
 
 /// Follow a leaf as it moves: its shape, velocities and energies in time.
 ///

@@ -2,9 +2,9 @@
 
 use clap::Args;
 
-use leafdyn::study::{self, MOST_POINTS, TraceRequest, Vary};
+use crate::study::{self, MOST_POINTS, TraceRequest, Vary};
 
-use leafdyn::report;
+use crate::report;
 
 use super::progress::ProgressLine;
 use super::request::Request;
