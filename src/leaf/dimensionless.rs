@@ -1,7 +1,5 @@
 //! A scenario in dimensionless form.
 
-use super::mirror::is_mirrored;
-use super::planar::is_planar;
 use crate::rod::Section;
 use crate::rotation;
 use crate::scenario::{Rod, Scenario, longest, mean_bending};
@@ -113,16 +111,6 @@ impl<'a> Leaf<'a> {
         }
     }
 
-    /// The leaf with no more unknowns than its symmetries leave it, if it has
-    /// any: half of it if it is its own mirror image, that in its plane if
-    /// nothing acts out of it.
-    pub fn reduced(&self) -> Option<Leaf<'a>> {
-        let mut reduced = self.clone();
-        reduced.mirrored = is_mirrored(self.scenario);
-        reduced.planar = is_planar(self.scenario);
-        (reduced.mirrored || reduced.planar).then_some(reduced)
-    }
-
     /// The scenario it was made from.
     pub fn scenario(&self) -> &'a Scenario {
         self.scenario
@@ -136,6 +124,27 @@ impl<'a> Leaf<'a> {
         } else {
             rods
         }
+    }
+
+    /// Whether it is solved in its plane.
+    pub fn planar(&self) -> bool {
+        self.planar
+    }
+
+    /// Part of rod `j` that belongs to the leaf, or to its half.
+    pub fn share(&self, j: usize) -> f64 {
+        if self.in_plane(j) { 0.5 } else { 1.0 }
+    }
+
+    /// Whether rod `j` is the midrib of half a leaf.
+    pub fn in_plane(&self, j: usize) -> bool {
+        let count = self.scenario.rods.len();
+        self.mirrored && count % 2 == 1 && 2 * j + 1 == count
+    }
+
+    /// Whether rod `j` of half a leaf has its image for a neighbour.
+    pub fn beside_image(&self, j: usize) -> bool {
+        self.mirrored && 2 * (j + 1) == self.scenario.rods.len()
     }
 
     /// Whether all tips share one point.

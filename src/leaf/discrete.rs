@@ -1,5 +1,6 @@
 //! The discretised leaf: its segments, loads and coupling.
 
+use super::chain::{Block, turns};
 use super::dimensionless::Leaf;
 use super::grid::Grid;
 use super::state::State;
@@ -29,8 +30,6 @@ pub struct DiscreteLeaf<'a> {
     pub load_factor: f64,
     /// The loads.
     pub loads: Loads,
-    /// Whether this is half of a leaf that is its own mirror image.
-    pub(super) mirrored: bool,
     /// Whether it is solved in its plane.
     pub(super) planar: bool,
 }
@@ -69,7 +68,6 @@ impl<'a> DiscreteLeaf<'a> {
                 tip_force: leaf.tip_force,
                 tip_moment: leaf.tip_moment,
             },
-            mirrored: leaf.mirrored,
             planar: leaf.planar,
         }
     }
@@ -89,6 +87,11 @@ impl<'a> DiscreteLeaf<'a> {
             planar: false,
             ..self.clone()
         }
+    }
+
+    /// Whether it is solved in its plane.
+    pub fn planar(&self) -> bool {
+        self.planar
     }
 
     /// The smallest compliance of any segment, in units of L^2/A.
@@ -153,6 +156,29 @@ impl<'a> DiscreteLeaf<'a> {
         }
     }
 
+    /// Adds the stiffness of the coupling of node `i` of rod `j` to its block.
+    #[inline]
+    pub(super) fn add_coupling_stiffness<const B: usize>(
+        &self,
+        j: usize,
+        i: usize,
+        block: &mut Block<B>,
+    ) {
+        let turns = turns(B);
+        for g in [j.wrapping_sub(1), j] {
+            if g < self.rods() - 1 {
+                let spring = self.spring(g, i);
+                for c in 0..B - turns {
+                    block[turns + c][turns + c] += spring[c];
+                }
+            }
+        }
+        if self.leaf.beside_image(j) {
+            let across = turns + 1;
+            block[across][across] += 2.0 * self.spring(j, i).y;
+        }
+    }
+
     /// Dead moment on the tip of a single rod.
     pub fn tip_moment(&self) -> DVec3 {
         if self.rods() == 1 {
@@ -195,7 +221,7 @@ impl<'a> DiscreteLeaf<'a> {
         let weight = self.load_factor * self.weights[i] * self.leaf.length(j) * share;
         let mut force = self.loads.gravity * weight;
         if i == self.segments() && (j == 0 || !self.leaf.joined()) {
-            let share = match self.leaf.joined() && self.mirrored {
+            let share = match self.leaf.joined() && self.leaf.mirrored {
                 true => 0.5,
                 false => share,
             };

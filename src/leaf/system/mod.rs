@@ -9,7 +9,6 @@ mod solve;
 
 pub use solve::Solved;
 
-use super::assembly::Sums;
 use super::chain::{RodMatrix, TipFactor};
 use super::discrete::DiscreteLeaf;
 use super::state::{Field, Increment, shift, turn};
@@ -19,6 +18,15 @@ use rayon::prelude::*;
 /// From this many nodes on, rods are shared out among threads. Measured: below
 /// it waking the threads costs more than they bring.
 const PARALLEL_NODES: usize = 8192;
+
+/// What an assembly sums up over all rods.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sums {
+    /// Potential energy: of the strains, the coupling and the loads.
+    pub energy: f64,
+    /// Largest rotation between the ends of a segment.
+    pub turn: f64,
+}
 
 /// All that belongs to one rod.
 #[derive(Clone, Debug)]

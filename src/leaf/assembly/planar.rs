@@ -1,44 +1,13 @@
-//! Leaves that nothing pulls or bends out of their plane z = 0.
-//!
-//! Such a leaf has an equilibrium in the plane, for which a node has three
-//! unknowns: its turn about z and its shifts along x and y. Whether it stays
-//! there is for the full matrix to say. Coupling along z, torsion, and bending
-//! about d2 do nothing as long as it does.
+//! The equations of a leaf in its plane z = 0, three unknowns a node.
 
-use super::assembly::Sums;
-use super::chain::{Block, Chain, PLANAR};
-use super::dimensionless::Leaf;
-use super::discrete::DiscreteLeaf;
-use super::state::{Increment, State, shift};
-use super::system::System;
+use crate::leaf::chain::{Block, Chain, PLANAR};
+use crate::leaf::discrete::DiscreteLeaf;
+use crate::leaf::state::{Increment, State, shift};
+use crate::leaf::system::{Sums, System};
 use crate::rod::{PlanarBlocks, PlanarGradient, PlanarSegment};
-use crate::scenario::Scenario;
 use glam::{DQuat, DVec2, DVec3};
 
-/// Whether no load, rest curvature or coupling acts out of the plane.
-pub(super) fn is_planar(scenario: &Scenario) -> bool {
-    let in_plane = |load: &[f64; 3]| load[2] == 0.0;
-    in_plane(&scenario.gravity)
-        && in_plane(&scenario.tip_force)
-        && scenario.tip_moment == [0.0; 3]
-        && (scenario.rods.iter())
-            .flat_map(|rod| &rod.rest_curvature[..2])
-            .all(|curvature| curvature.max_abs() == 0.0)
-}
-
-impl Leaf<'_> {
-    /// Whether the leaf is solved in its plane.
-    pub fn planar(&self) -> bool {
-        self.planar
-    }
-}
-
 impl DiscreteLeaf<'_> {
-    /// Whether it is solved in its plane.
-    pub fn planar(&self) -> bool {
-        self.planar
-    }
-
     /// Segment `i` of rod `j` of a leaf in the plane.
     fn planar_segment(&self, state: &State, j: usize, i: usize) -> PlanarSegment {
         let k = state.base(j) + i;
@@ -68,7 +37,8 @@ impl DiscreteLeaf<'_> {
                 pull_left(&mut rhs[i - 1], &gradient);
             }
             set_right(&mut chain.diagonal[i], &blocks);
-            let (load, potential) = self.bear(state, j, i + 1, &mut chain.diagonal[i]);
+            self.add_coupling_stiffness(j, i + 1, &mut chain.diagonal[i]);
+            let (load, potential) = self.load(state, j, i + 1);
             sums.energy += potential;
             rhs[i] = [0.0, 0.0, 0.0, load.x, load.y, 0.0];
             pull_right(&mut rhs[i], &gradient);
@@ -178,37 +148,6 @@ fn couple(block: &mut Block<PLANAR>, k: &PlanarBlocks) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const LEAF: &str = r#"
-        name = "leaf"
-        leaf = { rods = 3, length = 1.0, fan = "paper" }
-        stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }
-        coupling = { x = 1.0, y = 1.0, z = 1.0 }
-    "#;
-
-    #[test]
-    fn planar_leaves_are_known() {
-        let planar = |entry: &str| {
-            let scenario = Scenario::from_toml_with(LEAF, "leaf", &[entry.into()]).unwrap();
-            is_planar(&scenario)
-        };
-        for entry in [
-            "load.gravity=[1.0, -2.0, 0.0]",
-            "load.tip_force=[1.0, -2.0, 0.0]",
-            "rest.bend_3=[1.0, 2.0, -3.0]",
-            "rest.stretch=[1.0, 1.1, 1.0]",
-        ] {
-            assert!(planar(entry), "{entry}");
-        }
-        for entry in [
-            "load.gravity=[0.0, 0.0, 1e-9]",
-            "load.tip_force=[0.0, 0.0, 1e-9]",
-            "rest.twist=[0.0, 0.0, 1e-9]",
-            "rest.bend_2=[0.0, 1e-9, 0.0]",
-        ] {
-            assert!(!planar(entry), "{entry}");
-        }
-    }
 
     #[test]
     fn turns_add() {

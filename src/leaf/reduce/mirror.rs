@@ -6,95 +6,13 @@
 //! about the plane's normal. A joint tip stays in the plane, too. Of the gap
 //! across the plane, if N is even, only the coupling along y is ever stretched.
 
-use super::chain::{Chain, first};
-use super::dimensionless::Leaf;
-use super::discrete::DiscreteLeaf;
-use super::state::{Increment, State};
+use crate::leaf::dimensionless::Leaf;
+use crate::leaf::state::State;
 use crate::scenario::{Profile, Rod, Scenario};
 use glam::{DQuat, DVec3};
 
-/// Components of a node's increment (turn, shift) that the mirror forbids a
-/// node in its plane: turns about x and z, the shift along y.
-const FORBIDDEN: [usize; 3] = [0, 2, 4];
-
-impl Leaf<'_> {
-    /// Part of rod `j` that belongs to the leaf, or to its half.
-    pub fn share(&self, j: usize) -> f64 {
-        if self.in_plane(j) { 0.5 } else { 1.0 }
-    }
-
-    /// Whether rod `j` is the midrib of half a leaf.
-    pub fn in_plane(&self, j: usize) -> bool {
-        let count = self.scenario().rods.len();
-        self.mirrored && count % 2 == 1 && 2 * j + 1 == count
-    }
-
-    /// Whether rod `j` of half a leaf has its image for a neighbour.
-    pub fn beside_image(&self, j: usize) -> bool {
-        self.mirrored && 2 * (j + 1) == self.scenario().rods.len()
-    }
-}
-
-impl DiscreteLeaf<'_> {
-    /// What the increments of node `i` (from 1) of rod `j` of half a leaf must
-    /// not have.
-    pub(super) fn forbidden(&self, j: usize, i: usize) -> &'static [usize] {
-        if self.leaf.in_plane(j) {
-            &FORBIDDEN
-        } else if self.leaf.joined() && i == self.segments() {
-            &FORBIDDEN[2..]
-        } else {
-            &[]
-        }
-    }
-
-    /// Keeps what lies in the plane of the mirror there: the increments that
-    /// would leave it have equations of their own, which make them zero.
-    pub(super) fn confine<const B: usize>(
-        &self,
-        j: usize,
-        chain: &mut Chain<B>,
-        rhs: &mut [Increment],
-    ) {
-        if !self.mirrored {
-            return;
-        }
-        for i in 0..self.segments() {
-            for &forbidden in self.forbidden(j, i + 1) {
-                rhs[i][forbidden] = 0.0;
-                let Some(c) = forbidden.checked_sub(first(B)) else {
-                    continue;
-                };
-                let block = &mut chain.diagonal[i];
-                for k in 0..B {
-                    block[c][k] = 0.0;
-                    block[k][c] = 0.0;
-                }
-                block[c][c] = 1.0;
-                if i > 0 {
-                    for row in &mut chain.off[i - 1] {
-                        row[c] = 0.0;
-                    }
-                }
-                if let Some(off) = chain.off.get_mut(i) {
-                    off[c] = [0.0; B];
-                }
-            }
-        }
-    }
-
-    /// The largest components of an unbalanced force and moment on a node of
-    /// rod `j` that the mirror does not balance.
-    pub(super) fn felt(&self, j: usize, force: DVec3, moment: DVec3) -> (f64, f64) {
-        match self.leaf.in_plane(j) {
-            true => (force.x.abs().max(force.z.abs()), moment.y.abs()),
-            false => (force.abs().max_element(), moment.abs().max_element()),
-        }
-    }
-}
-
 /// Whether every rod, coupling and load is its own mirror image.
-pub(super) fn is_mirrored(scenario: &Scenario) -> bool {
+pub fn is_mirrored(scenario: &Scenario) -> bool {
     let Scenario {
         rods,
         coupling,

@@ -1,0 +1,80 @@
+//! Components of increments that the plane of a mirrored half leaf holds.
+
+use crate::leaf::chain::{Chain, first};
+use crate::leaf::discrete::DiscreteLeaf;
+use crate::leaf::state::Increment;
+use glam::DVec3;
+
+/// Components of a node's increment (turn, shift) that are zero for a node in
+/// the plane of the mirror: turns about x and z, the shift along y.
+const ACROSS_THE_PLANE: [usize; 3] = [0, 2, 4];
+
+impl DiscreteLeaf<'_> {
+    /// The components that are zero in the increments of node `i` (from 1) of
+    /// rod `j`.
+    pub(super) fn held_components(&self, j: usize, i: usize) -> &'static [usize] {
+        if self.leaf.in_plane(j) {
+            &ACROSS_THE_PLANE
+        } else if self.leaf.mirrored && self.leaf.joined() && i == self.segments() {
+            &ACROSS_THE_PLANE[2..]
+        } else {
+            &[]
+        }
+    }
+
+    /// Sets the held components of rod `j` to zero in a right-hand side.
+    pub(super) fn clear_held_components(&self, j: usize, rhs: &mut [Increment]) {
+        if !self.leaf.mirrored {
+            return;
+        }
+        for (i, rhs) in rhs.iter_mut().enumerate() {
+            for &c in self.held_components(j, i + 1) {
+                rhs[c] = 0.0;
+            }
+        }
+    }
+
+    /// Replaces the equations of the held components of rod `j` by ones of their
+    /// own, which make them zero.
+    pub(super) fn hold_components<const B: usize>(
+        &self,
+        j: usize,
+        chain: &mut Chain<B>,
+        rhs: &mut [Increment],
+    ) {
+        if !self.leaf.mirrored {
+            return;
+        }
+        self.clear_held_components(j, rhs);
+        for i in 0..self.segments() {
+            for &held in self.held_components(j, i + 1) {
+                let Some(c) = held.checked_sub(first(B)) else {
+                    continue;
+                };
+                let block = &mut chain.diagonal[i];
+                for k in 0..B {
+                    block[c][k] = 0.0;
+                    block[k][c] = 0.0;
+                }
+                block[c][c] = 1.0;
+                if i > 0 {
+                    for row in &mut chain.off[i - 1] {
+                        row[c] = 0.0;
+                    }
+                }
+                if let Some(off) = chain.off.get_mut(i) {
+                    off[c] = [0.0; B];
+                }
+            }
+        }
+    }
+
+    /// The largest components of an unbalanced force and moment on a node of
+    /// rod `j`, without those that the mirror image balances.
+    pub(super) fn unbalanced_residual(&self, j: usize, force: DVec3, moment: DVec3) -> (f64, f64) {
+        match self.leaf.in_plane(j) {
+            true => (force.x.abs().max(force.z.abs()), moment.y.abs()),
+            false => (force.abs().max_element(), moment.abs().max_element()),
+        }
+    }
+}
