@@ -1,6 +1,7 @@
 //! The state of rods at stations along them: what every method returns.
 
 use glam::{DQuat, DVec3};
+use serde::{Serialize, Serializer};
 
 /// The state of one rod at one station. Strains and stress resultants are
 /// components along the directors (d1, d2, d3).
@@ -80,4 +81,36 @@ impl Difference {
             moment: larger(self.moment, other.moment),
         }
     }
+}
+
+/// Serializes tips as the key `tip`, which is null if there are several, and
+/// then `tips`.
+///
+/// # Errors
+/// Those of the serializer.
+pub fn serialize_tips<S: Serializer>(tips: &[DVec3], serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Keys<'a> {
+        tip: Option<&'a DVec3>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        tips: Option<&'a [DVec3]>,
+    }
+    let (tip, tips) = match tips {
+        [only] => (Some(only), None),
+        several => (None, Some(several)),
+    };
+    Keys { tip, tips }.serialize(serializer)
+}
+
+/// Serializes the positions at all stations, a list per rod.
+///
+/// # Errors
+/// Those of the serializer.
+pub fn serialize_positions<S: Serializer>(
+    rods: &[RodShape],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    let positions =
+        |rod: &RodShape| -> Vec<DVec3> { rod.nodes.iter().map(|node| node.position).collect() };
+    serializer.collect_seq(rods.iter().map(positions))
 }

@@ -18,7 +18,7 @@ pub use recording::{CannotResume, Keeper, Recording};
 use crate::figure::{FigurePng, FigureSvg, ModesFigure, MotionFigure};
 use crate::relax::Equilibrium;
 use crate::report::{
-    AllSummary, Centerlines, ChartSummary, ChartTable, CheckSummary, Format, MapSummary, MapTable,
+    Centerlines, ChartSummary, ChartTable, CheckSummary, Format, Json, MapSummary, MapTable,
     ModesTable, MotionSummary, OutputError, ScalingTable, Summary, TraceSummary, TraceTable,
     Written,
 };
@@ -47,7 +47,8 @@ impl Written for Map {
 }
 
 impl Written for All {
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[&AllSummary, &FigureSvg, &FigurePng];
+    const FORMATS: &'static [&'static dyn Format<Self>] =
+        &[&Json("equilibria.json"), &FigureSvg, &FigurePng];
 }
 
 impl Written for Trace {

@@ -28,7 +28,7 @@ pub use chart_table::{ChartTable, ScalingTable};
 pub use check::report as check_report;
 pub use error::{MapFileError, OutputError};
 pub use json::{
-    AllSummary, ChartSummary, CheckSummary, MapSummary, MotionSummary, Summary, TraceSummary,
+    ChartSummary, CheckSummary, Json, MapSummary, MotionSummary, Summary, TraceSummary,
 };
 pub use map::{Told as MapTold, report as map_report};
 pub use map_table::{MapTable, lines, read_rows, table};

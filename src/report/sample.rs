@@ -11,9 +11,9 @@ use crate::scenario::Units;
 use crate::shape::Difference;
 use crate::simulate::{Frame, Moment, Record, Scheme, Still};
 use crate::study::{
-    All, Base, Chart, Check, Confidence, Contender, Ending, Found, Law, Map, MapMethod, MapOutcome,
-    MapRequest, MapRow, Peer, PointKind, Reference, Row, Scaling, ScalingRow, Setting, Shot,
-    Spread, Trace, TraceBranch, TraceEnd, TracePoint, Verdict,
+    Base, Chart, Check, Confidence, Contender, Ending, Law, Map, MapMethod, MapOutcome, MapRequest,
+    MapRow, Peer, PointKind, Reference, Row, Scaling, ScalingRow, Setting, Shot, Spread, Trace,
+    TraceBranch, TraceEnd, TracePoint, Verdict,
 };
 use crate::undulation::{Undulation, Vein};
 
@@ -197,25 +197,6 @@ pub fn map() -> Map {
     };
     let rows = (0..8).flat_map(|cell| MapMethod::ALL.map(|method| row(cell, method)));
     Map::new(request, rows.collect())
-}
-
-/// Two shapes of a leaf.
-pub fn all() -> All {
-    let one = |energy: f64, starts: usize, plain: bool| Found {
-        equilibrium: Equilibrium {
-            energy,
-            ..fan(3, 4)
-        },
-        starts,
-        plain,
-    };
-    All {
-        scenario: "fan".into(),
-        found: vec![one(0.5, 3, true), one(0.7, 1, false)],
-        starts: 5,
-        failed: 1,
-        wall_seconds: 0.1,
-    }
 }
 
 /// A branch that loses its stability where another leaves it.

@@ -1,11 +1,14 @@
 //! All shapes of a leaf, as far as many starts find them.
 
+use glam::DVec3;
 use rayon::prelude::*;
+use serde::{Serialize, Serializer};
 
 use crate::relax::{Equilibrium, Options, RelaxError, relax};
 use crate::scenario::Scenario;
+use crate::shape::{RodShape, serialize_positions, serialize_tips};
 
-/// Starts that are made at once, between two looks at what is new.
+/// Starts that are relaxed at once, between two looks at what is new.
 const BATCH: usize = 16;
 
 /// The search ends when so many starts in a row have found nothing new, or all
@@ -17,17 +20,19 @@ const MOST: usize = 160;
 /// their error estimates, are one.
 const SAME: f64 = 1e-3;
 
-/// The equilibria of a leaf that many starts have found.
-#[derive(Clone, Debug)]
+/// The equilibria of a leaf that many starts have found. As JSON it is
+/// `equilibria.json`.
+#[derive(Clone, Debug, Serialize)]
 pub struct All {
     /// Name of the scenario.
     pub scenario: String,
-    /// The equilibria, lowest energy first.
-    pub found: Vec<Found>,
     /// Starts that were made.
     pub starts: usize,
     /// Those that did not come to rest within the tolerance.
     pub failed: usize,
+    /// The equilibria, lowest energy first.
+    #[serde(rename = "equilibria")]
+    pub found: Vec<Found>,
     /// Time of all, in seconds.
     pub wall_seconds: f64,
 }
@@ -39,8 +44,43 @@ pub struct Found {
     pub equilibrium: Equilibrium,
     /// Starts that ended in it.
     pub starts: usize,
-    /// Whether the plain start, that of a relaxation, is one of them.
+    /// Whether the undisturbed start, that of a relaxation, is one of them.
     pub plain: bool,
+}
+
+/// Of the equilibrium: what tells it from others, and its shape.
+impl Serialize for Found {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Keys<'a> {
+            energy: f64,
+            stable: Option<bool>,
+            negative_eigenvalues: Option<usize>,
+            #[serde(flatten, serialize_with = "serialize_tips")]
+            tips: &'a [DVec3],
+            error_estimate: Option<f64>,
+            segments: &'a [usize],
+            starts: usize,
+            plain: bool,
+            stations: &'a [f64],
+            #[serde(serialize_with = "serialize_positions")]
+            positions: &'a [RodShape],
+        }
+        let leaf = &self.equilibrium;
+        Keys {
+            energy: leaf.energy,
+            stable: leaf.stable(),
+            negative_eigenvalues: leaf.negative_eigenvalues,
+            tips: &leaf.tips,
+            error_estimate: leaf.error_estimate,
+            segments: &leaf.segments,
+            starts: self.starts,
+            plain: self.plain,
+            stations: &leaf.stations,
+            positions: &leaf.rods,
+        }
+        .serialize(serializer)
+    }
 }
 
 /// Lets the leaf come to rest from its plain start, from many disturbed ones,

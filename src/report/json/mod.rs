@@ -1,6 +1,5 @@
 //! JSON, for scripts: compact, numbers that are not finite as null.
 
-mod all;
 mod chart;
 mod check;
 mod map;
@@ -14,7 +13,8 @@ use glam::DVec3;
 use serde::Serialize;
 use serde_json::ser::Formatter;
 
-pub use all::AllSummary;
+use super::Format;
+
 pub use chart::ChartSummary;
 pub use check::CheckSummary;
 pub use map::MapSummary;
@@ -36,7 +36,20 @@ fn tips(tips: &[DVec3]) -> (Option<Point>, Option<Vec<Point>>) {
     }
 }
 
-/// Writes the whole file.
+/// A result as it serializes, in a file of this name: also what `--json` prints.
+pub struct Json(pub &'static str);
+
+impl<R: Serialize> Format<R> for Json {
+    fn file_name(&self) -> &'static str {
+        self.0
+    }
+
+    fn write(&self, result: &R, out: &mut dyn Write) -> io::Result<()> {
+        write(result, out)
+    }
+}
+
+/// Writes the whole file. Numbers that are not finite are null.
 pub fn write(object: &impl Serialize, out: &mut dyn Write) -> io::Result<()> {
     let mut serializer = serde_json::Serializer::with_formatter(&mut *out, Layout::default());
     object.serialize(&mut serializer)?;
