@@ -108,8 +108,8 @@ fn main() {
         "fig04", "fig05", "fig06", "fig08", "fig09", "fig10", "fig13",
     ] {
         let scenario = read(figure, 5);
-        let (semi_implicit, few) = milliseconds(&scenario, relax::Method::SemiImplicit);
-        let (explicit, many) = milliseconds(&scenario, relax::Method::Explicit);
+        let (semi_implicit, few) = milliseconds(&scenario, relax::Method::default());
+        let (explicit, many) = milliseconds(&scenario, relax::Method::Explicit { segments: None });
         println!("| {figure} | {semi_implicit:.1} | {few} | {explicit:.0} | {many} |");
     }
 }

@@ -56,7 +56,7 @@ fn main() {
         let leaf = Scenario::read(Path::new("scenarios/paper/fig04.toml"), &entry)
             .expect("the scenario is valid");
         let (one, all) = (fastest(&leaf, 1), fastest(&leaf, threads));
-        let unknowns = 6 * rods * one.segments.last().expect("at least one grid");
+        let unknowns = 6 * rods * one.accuracy.segments.last().expect("at least one grid");
         let each = 1e6 * one.wall_seconds / unknowns as f64;
         let ratio = each / *smallest.get_or_insert(each);
         let memory = peak_memory().map_or("-".into(), |mb| format!("{mb:.0}"));

@@ -23,14 +23,15 @@ fn fastest(leaf: &Scenario, relaxed: &Equilibrium, threads: usize) -> (f64, Solu
         .build()
         .expect("threads can be started");
     let start = Start::Leaf {
-        stations: &relaxed.stations,
-        rods: &relaxed.rods,
+        stations: &relaxed.shape.stations,
+        rods: &relaxed.shape.rods,
     };
     (0..2 + RODS_IN_ALL / leaf.rods.len())
         .map(|_| {
             let clock = Instant::now();
-            let solution =
-                pool.install(|| bvp::solve_within(leaf, start, ACCURACY, None, &relaxed.stations));
+            let solution = pool.install(|| {
+                bvp::solve_within(leaf, start, ACCURACY, None, &relaxed.shape.stations)
+            });
             let milliseconds = 1e3 * clock.elapsed().as_secs_f64();
             (milliseconds, solution.expect("the leaf has a solution"))
         })
@@ -60,7 +61,7 @@ fn main() {
         let relaxed = relax(&leaf, &options, &mut |_| {}).expect("a valid request");
         let (one, solution) = fastest(&leaf, &relaxed, 1);
         let (all, _) = fastest(&leaf, &relaxed, threads);
-        let difference = Difference::between(&relaxed.rods, &solution.rods);
+        let difference = Difference::between(&relaxed.shape.rods, &solution.rods);
         println!(
             "| {rods} | {} | {:.1} | {one:.1} | {all:.1} | {} | {} | {:.0e} | {:.0e} |",
             6 * rods,

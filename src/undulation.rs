@@ -30,6 +30,7 @@
 use std::f64::consts::PI;
 
 use glam::{DQuat, DVec2, DVec3};
+use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use crate::rotation;
 use crate::scenario::Scenario;
@@ -113,11 +114,50 @@ impl Vein {
     }
 }
 
+impl Serialize for Vein {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut object = serializer.serialize_struct("Vein", 7)?;
+        object.serialize_field("waves", &self.waves())?;
+        object.serialize_field("amplitude", &self.amplitude)?;
+        object.serialize_field("wavelength", &self.wavelength)?;
+        object.serialize_field("twist", &self.twist)?;
+        object.serialize_field("tension", &self.tension)?;
+        object.serialize_field("load_number", &self.load_number)?;
+        object.serialize_field("predicted_waves", &self.predicted_waves())?;
+        object.end()
+    }
+}
+
 /// What all veins do, from one edge of the leaf to the other.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Undulation {
     /// One entry per vein.
     pub veins: Vec<Vein>,
+}
+
+/// Of the margin that has more waves, or higher ones, in JSON.
+struct Margin<'a>(&'a Vein);
+
+impl Serialize for Margin<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut object = serializer.serialize_struct("Margin", 4)?;
+        object.serialize_field("waves", &self.0.waves())?;
+        object.serialize_field("amplitude", &self.0.amplitude)?;
+        object.serialize_field("wavelength", &self.0.wavelength)?;
+        object.serialize_field("predicted_waves", &self.0.predicted_waves())?;
+        object.end()
+    }
+}
+
+impl Serialize for Undulation {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut object = serializer.serialize_struct("Undulation", 4)?;
+        object.serialize_field("handedness", self.hand().word())?;
+        object.serialize_field("twist", &self.twist())?;
+        object.serialize_field("margins", &self.margin().map(Margin))?;
+        object.serialize_field("veins", &self.veins)?;
+        object.end()
+    }
 }
 
 /// A centerline with the directors along it, base to tip.

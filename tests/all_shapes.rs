@@ -3,7 +3,7 @@
 mod common;
 mod workplace;
 
-use leafdyn::relax::Options;
+use leafdyn::relax::SemiImplicit;
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{All, all};
 use serde_json::Value;
@@ -15,11 +15,13 @@ fn fig10(set: &[&str]) -> Scenario {
 }
 
 fn search(scenario: &Scenario) -> All {
-    let options = Options {
-        tolerance: Some(1e-5),
-        ..Options::default()
-    };
-    all(scenario, &options, &mut |_, _| {}).unwrap()
+    all(
+        scenario,
+        SemiImplicit::default(),
+        Some(1e-5),
+        &mut |_, _| {},
+    )
+    .unwrap()
 }
 
 /// The paper's Fig. 10 with five veins has several places to rest, those with
@@ -39,18 +41,18 @@ fn soft_leaf_with_many() {
     let energies: Vec<f64> = found
         .found
         .iter()
-        .map(|one| one.equilibrium.energy)
+        .map(|one| one.equilibrium.energy.unwrap())
         .collect();
     assert!(energies.is_sorted(), "lowest first");
     let saddle = found.found.last().unwrap();
-    assert_eq!(saddle.equilibrium.negative_eigenvalues, Some(18));
+    assert_eq!(saddle.equilibrium.stability.negative_eigenvalues, Some(18));
     let plain = found.found.iter().filter(|one| one.plain).count();
     assert_eq!(plain, 1, "the plain start is told");
     for one in &found.found {
         assert!(
-            one.equilibrium.residual < 1e-7,
-            "{}",
-            one.equilibrium.residual
+            one.equilibrium.accuracy.residual.unwrap() < 1e-7,
+            "{:?}",
+            one.equilibrium.accuracy.residual
         );
     }
 }
@@ -66,10 +68,10 @@ fn mirror_images() {
     assert!(stable.len() >= 2);
     let mut paired = 0;
     for one in &stable {
-        let [tip, energy] = [one.equilibrium.tips[0].z, one.equilibrium.energy];
+        let [tip, energy] = [one.equilibrium.tips[0].z, one.equilibrium.energy.unwrap()];
         let image = stable.iter().any(|other| {
             let other = &other.equilibrium;
-            (other.tips[0].z + tip).abs() < 1e-4 && (other.energy - energy).abs() < 1e-7
+            (other.tips[0].z + tip).abs() < 1e-4 && (other.energy.unwrap() - energy).abs() < 1e-7
         });
         paired += usize::from(image);
     }

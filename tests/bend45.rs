@@ -96,7 +96,7 @@ fn the_scenario_files_state_the_first_variant() {
         let scenario = common::scenario(name, &[]);
         let leaf = settle(&scenario, scenario.tolerance);
         let error = (tip(&leaf) - DVec3::from_array(wanted)).length();
-        assert!(error <= leaf.error_estimate.unwrap() + DIGITS);
+        assert!(error <= leaf.accuracy.error_estimate.unwrap() + DIGITS);
         assert!(error <= scenario.tolerance * scenario.rods[0].length);
     }
 }

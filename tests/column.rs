@@ -36,7 +36,7 @@ const STRIP: f64 = 1000.0;
 fn index(column: &Scenario, segments: usize) -> usize {
     let leaf = settle_on(column, segments, true);
     assert!(tip(&leaf).y.abs() + tip(&leaf).z.abs() < 1e-12);
-    leaf.negative_eigenvalues.unwrap()
+    leaf.stability.negative_eigenvalues.unwrap()
 }
 
 /// P_k = (2k - 1)^2 pi^2/4 EI/L^2 of the clamped-free column.

@@ -30,7 +30,7 @@ fn an_inextensible_cantilever_follows_the_closed_form() {
         tip_is(&what, &leaf, DVec3::new(x, 0.0, -y), 2e-14, TIGHT);
         close(&what, tip_angle(&leaf, 0, DVec3::NEG_Z), slope, TIGHT);
         // The clamp's moment is P x; it acts about -e2 on the part before it.
-        let base = leaf.rods[0].nodes[0];
+        let base = leaf.shape.rods[0].nodes[0];
         close(&what, base.m.length(), alpha * x, alpha * TIGHT);
         assert_eq!(leaf.stable(), Some(true));
     }
@@ -105,6 +105,6 @@ fn a_column_beyond_its_buckling_load_follows_the_closed_form() {
         tip_is(&what, &leaf, DVec3::new(x, side * y, 0.0), digits, TIGHT);
         let angle = tip_angle(&leaf, 0, DVec3::Y) * side;
         close(&what, angle, slope.to_radians(), TIGHT);
-        assert_eq!(leaf.negative_eigenvalues, Some(0), "{what}");
+        assert_eq!(leaf.stability.negative_eigenvalues, Some(0), "{what}");
     }
 }

@@ -6,7 +6,7 @@ mod common;
 mod random;
 
 use common::{distance, paper_leaf, path};
-use leafdyn::relax::{Equilibrium, Options, relax};
+use leafdyn::relax::{Equilibrium, Options, SemiImplicit, relax};
 use leafdyn::scenario::Scenario;
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::TestRunner;
@@ -41,7 +41,7 @@ impl Verdict {
         }
         let lengths = scenario.rods.iter().map(|rod| rod.length);
         let length = lengths.fold(0.0, f64::max);
-        let uncertain = truth.error_estimate.unwrap();
+        let uncertain = truth.accuracy.error_estimate.unwrap();
         for tolerance in TOLERANCES {
             let leaf = solve(scenario, tolerance);
             if !leaf.outcome.is_success() {
@@ -50,12 +50,12 @@ impl Verdict {
                     .push(format!("{name} at {tolerance:e}: {outcome:?}"));
                 continue;
             }
-            let estimate = leaf.error_estimate.unwrap();
+            let estimate = leaf.accuracy.error_estimate.unwrap();
             let error = distance(&leaf, &truth);
             if error > estimate + uncertain || estimate > tolerance * length {
                 self.wrong.push(format!(
                     "{name} at {tolerance:e}, length {length:.3}: error {error:.1e}, estimate {estimate:.3e} on {:?}",
-                    leaf.segments
+                    leaf.accuracy.segments
                 ));
             }
             if error > 10.0 * uncertain {
@@ -167,16 +167,21 @@ fn of_a_saddle_that_is_kept() {
         let scenario = Scenario::read(&path("classic/lens_30"), &pushed(k)).unwrap();
         let solve = |tolerance| {
             let options = Options {
+                method: SemiImplicit {
+                    keep_unstable: true,
+                    ..SemiImplicit::default()
+                }
+                .into(),
                 tolerance: Some(tolerance),
-                keep_unstable: true,
                 ..Options::default()
             };
             relax(&scenario, &options, &mut |_| {}).unwrap()
         };
         let (truth, saddle) = (solve(1e-10), solve(tolerance));
-        let grids = &saddle.segments;
+        let grids = &saddle.accuracy.segments;
         assert!(grids.is_sorted(), "{k}, {tolerance:e}: {grids:?}");
-        let [estimate, uncertain] = [&saddle, &truth].map(|leaf| leaf.error_estimate.unwrap());
+        let [estimate, uncertain] =
+            [&saddle, &truth].map(|leaf| leaf.accuracy.error_estimate.unwrap());
         let error = distance(&saddle, &truth);
         assert!(
             error <= estimate + uncertain,

@@ -16,10 +16,11 @@ use proptest::test_runner::TestRunner;
 /// Of positions, in lengths of the leaf.
 const CLOSE: f64 = 1e-8;
 
+const EXPLICIT: Method = Method::Explicit { segments: None };
+
 fn rest(scenario: &Scenario, method: Method, segments: Option<usize>) -> Equilibrium {
     let options = Options {
-        method,
-        segments,
+        method: method.on_grid(segments),
         ..Options::default()
     };
     let leaf = relax(scenario, &options, &mut |_| {}).unwrap();
@@ -29,16 +30,16 @@ fn rest(scenario: &Scenario, method: Method, segments: Option<usize>) -> Equilib
 
 #[track_caller]
 fn agree_on(scenario: &Scenario, segments: usize) {
-    let explicit = rest(scenario, Method::Explicit, Some(segments));
-    let semi_implicit = rest(scenario, Method::SemiImplicit, Some(segments));
-    let apart = common::apart(scenario, &explicit.rods, &semi_implicit.rods).position;
+    let explicit = rest(scenario, EXPLICIT, Some(segments));
+    let semi_implicit = rest(scenario, Method::default(), Some(segments));
+    let apart = common::apart(scenario, &explicit.shape.rods, &semi_implicit.shape.rods).position;
     assert!(apart < CLOSE, "{}: {apart:.1e}", scenario.name);
     assert_eq!(
-        explicit.negative_eigenvalues,
-        semi_implicit.negative_eigenvalues
+        explicit.stability.negative_eigenvalues,
+        semi_implicit.stability.negative_eigenvalues
     );
-    let energies = explicit.energy - semi_implicit.energy;
-    assert!(energies.abs() < 1e-9 * semi_implicit.energy.abs().max(1.0));
+    let energies = explicit.energy.unwrap() - semi_implicit.energy.unwrap();
+    assert!(energies.abs() < 1e-9 * semi_implicit.energy.unwrap().abs().max(1.0));
 }
 
 #[test]
@@ -60,15 +61,16 @@ fn on_the_classic_problems_it_can_do() {
     for file in files("classic") {
         let scenario = Scenario::read(&file, &[]).unwrap();
         let options = Options {
-            method: Method::Explicit,
+            method: EXPLICIT,
             ..Options::default()
         };
         match relax(&scenario, &options, &mut |_| {}) {
             Ok(explicit) => {
                 done += 1;
                 assert_eq!(explicit.outcome, Outcome::Converged, "{}", scenario.name);
-                let other = rest(&scenario, Method::SemiImplicit, None);
-                let both = explicit.error_estimate.unwrap() + other.error_estimate.unwrap();
+                let other = rest(&scenario, Method::default(), None);
+                let both = explicit.accuracy.error_estimate.unwrap()
+                    + other.accuracy.error_estimate.unwrap();
                 for (a, b) in explicit.tips.iter().zip(&other.tips) {
                     assert!((*a - *b).length() <= both, "{}", scenario.name);
                 }
@@ -87,7 +89,7 @@ fn on_leaves_nobody_has_thought_of() {
     for case in 0..25 {
         let scenario = random::leaves().new_tree(&mut runner).unwrap().current();
         let options = Options {
-            method: Method::Explicit,
+            method: EXPLICIT,
             tolerance: Some(1e-5),
             ..Options::default()
         };
@@ -125,7 +127,7 @@ fn the_damped_motion_ends_there() {
             simulation.next_frame().unwrap();
         }
         let end = simulation.frame().tips(true)[0];
-        for method in [Method::Explicit, Method::SemiImplicit] {
+        for method in [EXPLICIT, Method::default()] {
             let tip = rest(&leaf_scenario, method, Some(64)).tips[0];
             assert!((tip - end).length() < 0.01, "{figure}: {tip} or {end}");
         }
@@ -137,7 +139,7 @@ fn the_damped_motion_ends_there() {
 fn its_work_is_known() {
     for (figure, most) in [("fig04", 4000), ("fig06", 3000), ("fig10", 25_000)] {
         let scenario = scenario(&format!("paper/{figure}"), &["leaf.rods=5".into()]);
-        let leaf = rest(&scenario, Method::Explicit, Some(32));
+        let leaf = rest(&scenario, EXPLICIT, Some(32));
         assert!(leaf.work.steps < most, "{figure}: {:?}", leaf.work);
         assert!(leaf.work.steps > most / 2, "{figure}: {:?}", leaf.work);
         assert!(leaf.work.factorizations < 60);
@@ -146,20 +148,18 @@ fn its_work_is_known() {
 
 #[test]
 fn what_it_cannot_do_is_refused() {
-    let explicit = |name: &str, keep_unstable| {
+    let explicit = |name: &str| {
         let options = Options {
-            method: Method::Explicit,
-            keep_unstable,
+            method: EXPLICIT,
             ..Options::default()
         };
         relax(&scenario(name, &[]), &options, &mut |_| {}).unwrap_err()
     };
-    for (name, keep, part) in [
-        ("classic/lens_30", false, "a stiffness is inf"),
-        ("classic/rollup", false, "load.tip_moment"),
-        ("paper/fig04", true, "--keep-unstable"),
+    for (name, part) in [
+        ("classic/lens_30", "a stiffness is inf"),
+        ("classic/rollup", "load.tip_moment"),
     ] {
-        let message = explicit(name, keep).to_string();
+        let message = explicit(name).to_string();
         assert!(message.contains(part), "{message}");
         assert!(message.contains("semi-implicit"), "{message}");
     }

@@ -18,12 +18,17 @@ fn strings(overrides: &[&str]) -> Vec<String> {
 #[track_caller]
 fn fan_is(what: &str, leaf: &Equilibrium, x: f64, z: f64) {
     tip_is(what, leaf, DVec3::new(x, 0.0, z), 2e-14, TIGHT);
-    let weight: f64 = leaf.rods.iter().map(|rod| 2.0 * rod.length).sum();
-    let carried: DVec3 = leaf.rods.iter().map(|rod| in_lab(&rod.nodes[0]).0).sum();
+    let weight: f64 = leaf.shape.rods.iter().map(|rod| 2.0 * rod.length).sum();
+    let carried: DVec3 = leaf
+        .shape
+        .rods
+        .iter()
+        .map(|rod| in_lab(&rod.nodes[0]).0)
+        .sum();
     // n is the force on the side towards the base: it pulls the base down.
     let balance = carried - DVec3::new(0.0, 0.0, -weight);
     assert!(balance.length() < 1e-9, "{what}: {balance}");
-    assert_eq!(leaf.negative_eigenvalues, Some(0), "{what}");
+    assert_eq!(leaf.stability.negative_eigenvalues, Some(0), "{what}");
 }
 
 /// Collocation on the boundary-value problem; re-integrated by DOP853.
@@ -49,12 +54,17 @@ fn the_tips_are_those_of_the_boundary_value_problem() {
 #[test]
 fn force_and_moment_at_the_base_are_those_of_the_boundary_value_problem() {
     let leaf = solve("classic/fan_5", &[]);
-    let (n, m) = in_lab(&leaf.rods[0].nodes[0]);
+    let (n, m) = in_lab(&leaf.shape.rods[0].nodes[0]);
     let force = DVec3::new(-0.346390655515, 0.071950238440, -2.023136799373);
     let moment = DVec3::new(0.420128081676, 0.906963028790, -0.070957964861);
     assert!((n - force).length() < 2e-11, "{}", n - force);
     assert!((m - moment).length() < 2e-11, "{}", m - moment);
-    let sum: f64 = leaf.rods.iter().map(|rod| in_lab(&rod.nodes[0]).0.z).sum();
+    let sum: f64 = leaf
+        .shape
+        .rods
+        .iter()
+        .map(|rod| in_lab(&rod.nodes[0]).0.z)
+        .sum();
     close("sum of n_z", -sum, 11.025588509411, 1e-11);
 }
 
@@ -66,8 +76,12 @@ fn no_stability_is_lost_up_to_five_times_the_load() {
         for weight in [0.5, 2.0, 5.0, 10.0] {
             let gravity = set_vector("load.gravity", DVec3::new(0.0, 0.0, -weight));
             let leaf = solve(name, &[gravity]);
-            assert_eq!(leaf.negative_eigenvalues, Some(0), "{name}, {weight}");
-            assert!(leaf.saddle.is_none(), "{name}, {weight}");
+            assert_eq!(
+                leaf.stability.negative_eigenvalues,
+                Some(0),
+                "{name}, {weight}"
+            );
+            assert!(leaf.stability.saddle.is_none(), "{name}, {weight}");
         }
     }
 }

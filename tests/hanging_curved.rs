@@ -34,7 +34,7 @@ fn the_planar_state_loses_its_stability_where_the_boundary_value_problem_says() 
                 let rod = with_stiffness(curvature, weight, stiffness);
                 let leaf = settle_on(&rod, segments, true);
                 assert_eq!(tip(&leaf).z, 0.0, "it has left its plane");
-                leaf.negative_eigenvalues.unwrap() > 0
+                leaf.stability.negative_eigenvalues.unwrap() > 0
             },
         );
         close(&format!("kL = {curvature}"), found / wanted, 1.0, NEUTRAL);
@@ -45,7 +45,7 @@ fn the_planar_state_loses_its_stability_where_the_boundary_value_problem_says() 
 fn below_it_the_rod_rests_in_its_plane_and_above_beside_it() {
     for (weight, planar) in [(11.0, true), (11.8, true), (12.0, false), (12.5, false)] {
         let leaf = settle(&hanging(6.0, weight), 1e-8);
-        assert_eq!(leaf.negative_eigenvalues, Some(0));
+        assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
         assert_eq!(
             tip(&leaf).z.abs() < 1e-8,
             planar,
@@ -62,8 +62,8 @@ fn a_less_curved_rod_stays_in_its_plane() {
         let most = 3.0 * curvature.powi(3) + 50.0;
         for part in [0.02, 0.1, 0.3, 0.6, 1.0] {
             let leaf = settle(&hanging(curvature, part * most), 1e-8);
-            assert_eq!(leaf.negative_eigenvalues, Some(0));
-            assert!(leaf.saddle.is_none(), "kL = {curvature}, {part}");
+            assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
+            assert!(leaf.stability.saddle.is_none(), "kL = {curvature}, {part}");
             assert!(tip(&leaf).z.abs() < 1e-8);
         }
     }

@@ -36,6 +36,6 @@ fn one_coil_and_ten_end_where_the_boundary_value_problem_says() {
         let wanted = LENGTH * DVec3::from_array(wanted);
         tip_is(&what, &leaf, wanted, LENGTH * digits, LENGTH * 1e-11);
         // No potential, so no count of eigenvalues: nothing is claimed.
-        assert_eq!(leaf.negative_eigenvalues, None);
+        assert_eq!(leaf.stability.negative_eigenvalues, None);
     }
 }

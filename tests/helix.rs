@@ -86,11 +86,11 @@ fn a_wrench_about_the_axis_holds_a_straight_rod_in_a_helix() {
             let moment = moment * helix.axis + (helix.centre - tip).cross(force);
             let leaf = settle(&rod(length, force, moment), 1e-11);
             let what = format!("twist {twist}, length {length}");
-            for (&sigma, node) in leaf.stations.iter().zip(&leaf.rods[0].nodes) {
+            for (&sigma, node) in leaf.shape.stations.iter().zip(&leaf.shape.rods[0].nodes) {
                 let exact = helix.at(sigma * length);
                 let error = (node.position - exact).length();
                 assert!(error < 2e-11, "{what}: {error:.1e} at {sigma}");
-                let estimate = leaf.error_estimate.unwrap();
+                let estimate = leaf.accuracy.error_estimate.unwrap();
                 assert!(error <= estimate, "{what}: {error:.1e} > {estimate:.1e}");
                 // The material twists as it must, and the bend is kappa.
                 close(&what, node.u.x, twist, 1e-9);

@@ -7,7 +7,7 @@ mod common;
 use std::fs;
 use std::process::{Command, Output};
 
-use leafdyn::relax::{Options, Outcome, RelaxError, relax};
+use leafdyn::relax::{Options, Outcome, RelaxError, SemiImplicit, relax};
 use leafdyn::scenario::Scenario;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -134,7 +134,11 @@ fn the_library_refuses_alike() {
     let leaf = Scenario::from_toml(LEAF).unwrap();
     let ask = |segments, tolerance| {
         let options = Options {
-            segments,
+            method: SemiImplicit {
+                segments,
+                ..SemiImplicit::default()
+            }
+            .into(),
             tolerance,
             ..Options::default()
         };
@@ -196,12 +200,12 @@ fn hard_scenes_end_in_an_outcome_after_bounded_work() {
         let leaf = relax(&leaf, &Options::default(), &mut |_| {}).unwrap();
         let work = leaf.work.force_evaluations;
         // Some seconds, whatever the machine; the heaviest needs half of this.
-        let finest = leaf.segments.last().unwrap();
+        let finest = leaf.accuracy.segments.last().unwrap();
         assert!(work * finest < 5_000_000, "{what}: {work} on {finest}");
         if leaf.outcome.is_success() {
-            assert_eq!(leaf.negative_eigenvalues, Some(0), "{what}");
+            assert_eq!(leaf.stability.negative_eigenvalues, Some(0), "{what}");
             assert!(
-                leaf.error_estimate.unwrap() <= 2.0 * leaf.tolerance,
+                leaf.accuracy.error_estimate.unwrap() <= 2.0 * leaf.accuracy.tolerance,
                 "{what}"
             );
         } else {
@@ -209,7 +213,7 @@ fn hard_scenes_end_in_an_outcome_after_bounded_work() {
             assert!(leaf.remark.is_some(), "{what}: no remark");
         }
         // Whatever it is, it is numbers.
-        for node in leaf.rods.iter().flat_map(|rod| &rod.nodes) {
+        for node in leaf.shape.rods.iter().flat_map(|rod| &rod.nodes) {
             assert!(
                 node.position.is_finite() && node.rotation.is_finite(),
                 "{what}"

@@ -50,7 +50,7 @@ fn the_critical_loads_are_those_of_the_boundary_value_problem() {
             let strip = strip(strong, torsion, stiffness, loads, load);
             let leaf = settle_on(&strip, segments, true);
             assert_eq!(tip(&leaf).y, 0.0, "it has left its plane");
-            leaf.negative_eigenvalues.unwrap() > 0
+            leaf.stability.negative_eigenvalues.unwrap() > 0
         });
         let what = format!("{}, EI_strong = {strong}", loads[1]);
         close(&what, found / unit / wanted, 1.0, NEUTRAL);
@@ -64,7 +64,7 @@ fn the_strip_leaves_its_plane_and_comes_to_rest_stable() {
         for (part, planar) in [(0.98, true), (1.05, false)] {
             let load = part * ratio * torsion.sqrt();
             let leaf = common::settle(&strip(strong, torsion, f64::INFINITY, loads, load), 1e-8);
-            assert_eq!(leaf.negative_eigenvalues, Some(0));
+            assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
             assert_eq!(
                 tip(&leaf).y.abs() < 1e-8,
                 planar,

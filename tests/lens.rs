@@ -8,7 +8,7 @@ use common::{
     tip_angle, tip_is, tip_node,
 };
 use glam::DVec3;
-use leafdyn::relax::{Equilibrium, Options, relax};
+use leafdyn::relax::{Equilibrium, Options, SemiImplicit, relax};
 use leafdyn::scenario::Scenario;
 
 /// Slope of the tip, force along e2 at the tip and moment at the clamp of the
@@ -18,7 +18,7 @@ fn second_rod_is(what: &str, leaf: &Equilibrium, slope: f64, force: f64, moment:
     for (rod, sign) in [(1, 1.0), (0, -1.0)] {
         let (n, m) = (
             in_lab(&tip_node(leaf, rod)).0,
-            in_lab(&leaf.rods[rod].nodes[0]).1,
+            in_lab(&leaf.shape.rods[rod].nodes[0]).1,
         );
         close(what, sign * tip_angle(leaf, rod, DVec3::Y), slope, TIGHT);
         close(what, sign * n.y, force, 1e-10);
@@ -133,13 +133,17 @@ fn a_longer_midrib_buckles_out_of_the_plane() {
         let found = critical(wanted - 0.01, wanted + 0.01, 8, |length, segments| {
             let leaf = settle_on(&with_midrib(axial, shear, length), segments, true);
             assert!(tip(&leaf).z.abs() < 1e-12, "it has left its plane");
-            leaf.negative_eigenvalues.unwrap() > 0
+            leaf.stability.negative_eigenvalues.unwrap() > 0
         });
         close("critical length", found, wanted, 1e-8);
         // The flat leaf of that length has that thrust in its midrib.
         let options = Options {
+            method: SemiImplicit {
+                keep_unstable: true,
+                ..SemiImplicit::default()
+            }
+            .into(),
             tolerance: Some(TIGHT),
-            keep_unstable: true,
             ..Options::default()
         };
         let leaf = relax(&with_midrib(axial, shear, wanted), &options, &mut |_| {}).unwrap();
@@ -148,14 +152,15 @@ fn a_longer_midrib_buckles_out_of_the_plane() {
         close("thrust", found, thrust, 5e-12 * axial + 1e-9);
         // A little below, it rests flat.
         let leaf = settle(&with_midrib(axial, shear, wanted - 1e-3), 1e-8);
-        assert_eq!(leaf.negative_eigenvalues, Some(0));
-        assert!(leaf.saddle.is_none());
+        assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
+        assert!(leaf.stability.saddle.is_none());
         assert!(tip(&leaf).z.abs() < 1e-8);
         // A little above, it does not.
         let leaf = settle(&with_midrib(axial, shear, wanted + 0.005), 1e-8);
-        assert_eq!(leaf.negative_eigenvalues, Some(0));
+        assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
         assert!(
-            leaf.saddle
+            leaf.stability
+                .saddle
                 .is_some_and(|saddle| saddle.negative_eigenvalues > 0)
         );
         assert!(tip(&leaf).z.abs() > 1e-3);

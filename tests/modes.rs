@@ -15,7 +15,7 @@ use common::{TIMOSHENKO, close, extrapolate, fig04, paper_leaf, scenario};
 use leafdyn::leaf::{Leaf, State};
 use leafdyn::modes;
 use leafdyn::motion::{Inertia, Physics};
-use leafdyn::relax::{Equilibrium, Method, Mode, Options, relax};
+use leafdyn::relax::{Equilibrium, Method, Mode, Options, SemiImplicit, relax};
 use leafdyn::scenario::{Profile, Scenario, Schedule};
 use linear::Linear;
 use motion::{Scheme, discrete, method as moving_by, rest, three_veins};
@@ -40,7 +40,7 @@ fn solve(scenario: &Scenario, options: &Options) -> Equilibrium {
 
 #[track_caller]
 fn modes_of(leaf: &Equilibrium) -> &[Mode] {
-    leaf.modes.as_deref().expect("modes are found")
+    leaf.stability.modes.as_deref().expect("modes are found")
 }
 
 /// Frequencies must be those known to 1e-6 of them, and the estimates of the
@@ -123,7 +123,7 @@ fn a_hanging_chain() {
         rod.rods[0].couple_stiffness[0] = Profile::Linear { at, value };
         let leaf = solve(&rod, &with(4));
         let found: Vec<f64> = modes_of(&leaf).iter().filter_map(Mode::frequency).collect();
-        println!("bending {part}: {found:?} on {:?}", leaf.segments);
+        println!("bending {part}: {found:?} on {:?}", leaf.accuracy.segments);
         close("twice", found[1] / found[0], 1.0, 1e-8);
         close("twice", found[3] / found[2], 1.0, 1e-8);
         [found[0], found[2]]
@@ -154,9 +154,9 @@ fn dense(scenario: &Scenario, state: &State) -> Vec<f64> {
 /// The state of a result on one grid.
 fn state_of(scenario: &Scenario, leaf: &Equilibrium) -> State {
     let scale = Leaf::new(scenario).scale;
-    let nodes = || leaf.rods.iter().flat_map(|rod| &rod.nodes);
+    let nodes = || leaf.shape.rods.iter().flat_map(|rod| &rod.nodes);
     State::new(
-        leaf.stations.len() - 1,
+        leaf.shape.stations.len() - 1,
         nodes().map(|node| node.position / scale.length).collect(),
         nodes().map(|node| node.rotation).collect(),
     )
@@ -181,8 +181,12 @@ fn assert_as_dense(name: &str, scenario: &Scenario, options: &Options) {
 #[test]
 fn eigenvalues_are_those_of_a_dense_method() {
     let on = |segments, count, keep_unstable| Options {
-        segments: Some(segments),
-        keep_unstable,
+        method: SemiImplicit {
+            segments: Some(segments),
+            keep_unstable,
+            ..SemiImplicit::default()
+        }
+        .into(),
         tolerance: Some(1e-12),
         ..with(count)
     };
@@ -214,7 +218,7 @@ fn eigenvalues_are_those_of_a_dense_method() {
 #[test]
 fn the_explicit_method_tells_the_same_modes() {
     let explicit = Options {
-        method: Method::Explicit,
+        method: Method::Explicit { segments: None },
         ..with(4)
     };
     let leaf = fig04(3);
@@ -233,7 +237,11 @@ fn half_of_a_leaf_tells_the_modes_of_the_whole() {
     let half = solve(&leaf, &with(6));
     assert_eq!(half.model.rods, 2);
     let whole = Options {
-        full_model: true,
+        method: SemiImplicit {
+            full_model: true,
+            ..SemiImplicit::default()
+        }
+        .into(),
         ..with(6)
     };
     let whole = solve(&leaf, &whole);
@@ -258,12 +266,16 @@ fn saddles_have_as_many_negative_eigenvalues_as_their_index() {
     let flat = scenario("paper/fig10", &["leaf.rods=5".into()]);
     for (segments, index) in [(10, 14), (20, 16), (40, 18)] {
         let options = Options {
-            segments: Some(segments),
-            keep_unstable: true,
+            method: SemiImplicit {
+                segments: Some(segments),
+                keep_unstable: true,
+                ..SemiImplicit::default()
+            }
+            .into(),
             ..with(24)
         };
         let leaf = solve(&flat, &options);
-        assert_eq!(leaf.negative_eigenvalues, Some(index));
+        assert_eq!(leaf.stability.negative_eigenvalues, Some(index));
         assert_eq!(negative(&leaf), index, "{segments} segments");
         assert!(modes_of(&leaf).is_sorted_by_key(|mode| mode.eigenvalue));
         assert!(modes_of(&leaf)[0].frequency().is_none());
@@ -277,11 +289,15 @@ fn a_round_column_leaves_its_saddle_in_pairs_of_ways() {
     let mut column = beam(1e-4, [1e4, 1e4]);
     column.tip_force = [-4.5 * PI * PI, 0.0, 0.0];
     let options = Options {
-        keep_unstable: true,
+        method: SemiImplicit {
+            keep_unstable: true,
+            ..SemiImplicit::default()
+        }
+        .into(),
         ..with(6)
     };
     let leaf = solve(&column, &options);
-    assert_eq!(leaf.negative_eigenvalues, Some(4));
+    assert_eq!(leaf.stability.negative_eigenvalues, Some(4));
     assert_eq!(negative(&leaf), 4);
     for pair in modes_of(&leaf).chunks(2) {
         close("twice", pair[1].eigenvalue / pair[0].eigenvalue, 1.0, 1e-7);
@@ -296,13 +312,17 @@ proptest! {
         leaf in random::leaves(), keep_unstable: bool,
     ) {
         let options = Options {
+method: SemiImplicit {
             segments: Some(12.max(Leaf::new(&leaf).kinks().len() + 1)),
             keep_unstable,
+..SemiImplicit::default()
+}
+.into(),
             ..with(12)
         };
         let found = relax(&leaf, &options, &mut |_| {}).unwrap();
         if found.outcome.is_success() {
-            let index = found.negative_eigenvalues.unwrap();
+            let index = found.stability.negative_eigenvalues.unwrap();
             let negative = negative(&found);
             prop_assert_eq!(index.min(12), negative);
             prop_assert!(modes_of(&found).is_sorted_by_key(|mode| mode.eigenvalue));
@@ -414,7 +434,11 @@ fn modes_are_equal_bit_by_bit_on_any_number_of_threads() {
             .unwrap();
         pool.install(|| {
             let options = Options {
-                segments: Some(32),
+                method: SemiImplicit {
+                    segments: Some(32),
+                    ..SemiImplicit::default()
+                }
+                .into(),
                 ..with(2)
             };
             solve(&fig04(300), &options)
@@ -422,7 +446,7 @@ fn modes_are_equal_bit_by_bit_on_any_number_of_threads() {
     };
     let alone = on(1);
     assert!(
-        alone.segments.last().unwrap() * 300 >= 8192,
+        alone.accuracy.segments.last().unwrap() * 300 >= 8192,
         "too small to be shared out"
     );
     for threads in [1, 2] {
@@ -435,8 +459,13 @@ fn modes_are_equal_bit_by_bit_on_any_number_of_threads() {
 fn no_modes_without_a_potential_or_rest_or_request() {
     let mut rollup = fig04(1);
     rollup.tip_moment = [0.0, 1.0, 0.0];
-    assert!(solve(&rollup, &with(3)).modes.is_none());
-    assert!(solve(&fig04(2), &Options::default()).modes.is_none());
+    assert!(solve(&rollup, &with(3)).stability.modes.is_none());
+    assert!(
+        solve(&fig04(2), &Options::default())
+            .stability
+            .modes
+            .is_none()
+    );
     let options = Options {
         modes: 3,
         ..Options::default()
@@ -444,7 +473,7 @@ fn no_modes_without_a_potential_or_rest_or_request() {
     let leaf = solve(&fig04(3), &options);
     assert_eq!(modes_of(&leaf).len(), 3);
     let many = relax(&fig04(1), &with(101), &mut |_| {});
-    assert!(many.unwrap_err().to_string().contains("--modes 101"));
+    assert!(many.unwrap_err().to_string().contains("modes = 101"));
 }
 
 /// Other units, the same leaf.

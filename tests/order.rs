@@ -5,13 +5,17 @@ mod common;
 
 use common::{fig04, paper_leaf};
 use glam::DVec3;
-use leafdyn::relax::{Options, relax};
+use leafdyn::relax::{Options, SemiImplicit, relax};
 use leafdyn::scenario::{Profile, Scenario};
 
 /// Positions at the stations of the coarsest grid, solved on one grid.
 fn positions(scenario: &Scenario, coarsest: usize, times: usize) -> Vec<DVec3> {
     let options = Options {
-        segments: Some(coarsest * times),
+        method: SemiImplicit {
+            segments: Some(coarsest * times),
+            ..SemiImplicit::default()
+        }
+        .into(),
         // Iterated to rounding.
         tolerance: Some(1e-12),
         ..Options::default()
@@ -19,10 +23,11 @@ fn positions(scenario: &Scenario, coarsest: usize, times: usize) -> Vec<DVec3> {
     let leaf = relax(scenario, &options, &mut |_| {}).unwrap();
     assert!(leaf.outcome.is_success());
     // Every grid halves the one before, kinks or not.
-    for (i, sigma) in leaf.stations.iter().step_by(times).enumerate() {
+    for (i, sigma) in leaf.shape.stations.iter().step_by(times).enumerate() {
         assert!((sigma - i as f64 / coarsest as f64).abs() < 1e-15);
     }
     let nodes = leaf
+        .shape
         .rods
         .iter()
         .flat_map(|rod| rod.nodes.iter().step_by(times));

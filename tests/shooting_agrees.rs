@@ -77,7 +77,7 @@ fn from_rough_starts_too() {
         let leaf = scenario(&format!("paper/{figure}"), &["leaf.rods=5".into()]);
         let (rough, fine) = (settle(&leaf, 0.1), settle(&leaf, TIGHT));
         let mut start = rough.clone();
-        for rod in &mut start.rods {
+        for rod in &mut start.shape.rods {
             for node in &mut rod.nodes {
                 node.position.z += 0.01;
                 node.n.x += 0.1;
@@ -85,7 +85,7 @@ fn from_rough_starts_too() {
             }
         }
         let shot = shoot_near(&leaf, &start).unwrap();
-        assert_eq!(rough.stations, fine.stations);
+        assert_eq!(rough.shape.stations, fine.shape.stations);
         agree(figure, &leaf, &fine, &shot, CLOSE);
     }
 }

@@ -35,7 +35,7 @@ fn it_finds_the_relaxed_leaf() {
             let leaf = scenario(&format!("paper/{figure}"), &[format!("leaf.rods={rods}")]);
             let relaxed = settle(&leaf, TIGHT);
             let what = format!("{figure}, {rods} veins");
-            let alone = solution(&what, &leaf, &relaxed.stations);
+            let alone = solution(&what, &leaf, &relaxed.shape.stations);
             agree(&what, &leaf, &relaxed, &alone, 1e-9);
         }
     }
@@ -45,7 +45,7 @@ fn it_finds_the_relaxed_leaf() {
         }
         let leaf = Scenario::read(&file, &[]).unwrap();
         let relaxed = settle(&leaf, TIGHT);
-        let alone = solution(&leaf.name, &leaf, &relaxed.stations);
+        let alone = solution(&leaf.name, &leaf, &relaxed.shape.stations);
         agree(&leaf.name, &leaf, &relaxed, &alone, 1e-9);
     }
 }

@@ -111,6 +111,10 @@ fn options_of_another_method_are_refused() {
             vec!["--method", "shooting", "--intervals", "0"],
             "--intervals 0: allowed are 1 to 4096",
         ),
+        (
+            vec!["--method", "explicit", "--keep-unstable"],
+            "--keep-unstable: explicit motion leaves unstable equilibria; use --method semi-implicit",
+        ),
     ] {
         let place = Workplace::new();
         let output = place.run(&[&["relax", "leaf.toml"], &arguments[..]].concat());

@@ -26,8 +26,8 @@ fn scenes() -> Vec<Scenario> {
 
 fn start(leaf: &Equilibrium) -> Start<'_> {
     Start::Leaf {
-        stations: &leaf.stations,
-        rods: &leaf.rods,
+        stations: &leaf.shape.stations,
+        rods: &leaf.shape.rods,
     }
 }
 
@@ -61,7 +61,7 @@ fn at_all_tolerances(scenes: &[Scenario], tolerances: &[f64]) -> Vec<f64> {
             let options = Options {
                 tolerance,
                 intervals: None,
-                stations: relaxed.stations.clone(),
+                stations: relaxed.shape.stations.clone(),
             };
             let what = format!("{} at {tolerance:e}", scenario.name);
             let rough = solve(scenario, start(&relaxed), &options)
@@ -109,7 +109,7 @@ fn within_the_accuracy_asked_for() {
                 start(&relaxed),
                 accuracy,
                 None,
-                &relaxed.stations,
+                &relaxed.shape.stations,
             )
             .unwrap();
             let what = format!("{} within {accuracy:e}", scenario.name);

@@ -20,8 +20,8 @@ fn all_agree(what: &str, leaf: &Scenario) {
     let relaxed = settle(leaf, TIGHT);
     let near = shoot_near(leaf, &relaxed).unwrap_or_else(|f| panic!("{what}: {}", f.reason));
     agree(what, leaf, &relaxed, &near, 1e-9);
-    let alone =
-        shoot_alone(leaf, &relaxed.stations).unwrap_or_else(|f| panic!("{what}: {}", f.reason));
+    let alone = shoot_alone(leaf, &relaxed.shape.stations)
+        .unwrap_or_else(|f| panic!("{what}: {}", f.reason));
     agree(what, leaf, &relaxed, &alone, 1e-9);
 }
 
@@ -96,7 +96,7 @@ fn angles_beyond_a_turn() {
     all_agree("wound", &leaf);
     let relaxed = settle(&leaf, 1e-8);
     let shot = shoot_near(&leaf, &relaxed).unwrap();
-    for (a, b) in relaxed.rods.iter().zip(&shot.rods) {
+    for (a, b) in relaxed.shape.rods.iter().zip(&shot.rods) {
         for (a, b) in a.nodes.iter().zip(&b.nodes) {
             assert!(a.rotation.dot(b.rotation) > 0.0);
         }
@@ -166,8 +166,8 @@ fn starts_known_at_few_stations() {
             let relaxed = settle(&leaf, tolerance);
             let shot = shoot_near(&leaf, &relaxed)
                 .unwrap_or_else(|failure| panic!("{name} {tolerance:e}: {}", failure.reason));
-            let off = common::apart(&leaf, &relaxed.rods, &shot.rods).position;
-            let estimate = relaxed.error_estimate.unwrap() / relaxed.rods[0].length;
+            let off = common::apart(&leaf, &relaxed.shape.rods, &shot.rods).position;
+            let estimate = relaxed.accuracy.error_estimate.unwrap() / relaxed.shape.rods[0].length;
             assert!(off <= estimate, "{name}: {off:.1e}, {estimate:.1e}");
         }
     }
@@ -182,8 +182,8 @@ fn strong_coupling() {
         leaf.coupling = vec![[coupling; 3]; 4];
         let relaxed = settle(&leaf, 1e-8);
         let shot = shoot_near(&leaf, &relaxed).unwrap();
-        let off = common::apart(&leaf, &relaxed.rods, &shot.rods).position;
-        let estimate = relaxed.error_estimate.unwrap();
+        let off = common::apart(&leaf, &relaxed.shape.rods, &shot.rods).position;
+        let estimate = relaxed.accuracy.error_estimate.unwrap();
         assert!(off <= estimate, "{coupling:e}: {off:.1e}, {estimate:.1e}");
         assert!(shot.error.position < 1e-10);
     }

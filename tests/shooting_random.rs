@@ -79,10 +79,10 @@ fn from_arcs_nearly_always() {
     let mut other = 0;
     for (case, scenario) in leaves.iter().enumerate() {
         let leaf = settle(scenario, 1e-8);
-        match shoot_alone(scenario, &leaf.stations) {
+        match shoot_alone(scenario, &leaf.shape.stations) {
             Ok(alone) => {
                 assert!(alone.defect < 1e-10, "leaf {case}: {:.1e}", alone.defect);
-                let off = common::apart(scenario, &leaf.rods, &alone.rods);
+                let off = common::apart(scenario, &leaf.shape.rods, &alone.rods);
                 other += usize::from(off.position > 1e-7);
             }
             Err(failure) => {

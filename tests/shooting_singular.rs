@@ -11,7 +11,7 @@ use common::{
 };
 use glam::DVec3;
 use leafdyn::bvp::{Neutral, Reason, Solution};
-use leafdyn::relax::{Equilibrium, Options, relax};
+use leafdyn::relax::{Equilibrium, Options, SemiImplicit, relax};
 use leafdyn::scenario::Scenario;
 
 const STATIONS: [f64; 9] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
@@ -45,8 +45,12 @@ fn neutral(solution: Solution) -> Neutral {
 /// An equilibrium, kept if it is unstable.
 fn kept(scenario: &Scenario) -> Equilibrium {
     let options = Options {
+        method: SemiImplicit {
+            keep_unstable: true,
+            ..SemiImplicit::default()
+        }
+        .into(),
         tolerance: Some(1e-10),
-        keep_unstable: true,
         ..Options::default()
     };
     let leaf = relax(scenario, &options, &mut |_| {}).unwrap();

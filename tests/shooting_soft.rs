@@ -68,7 +68,7 @@ fn a_success_is_never_false() {
     for intervals in [1, 2, 4, 6, 8, 16] {
         for push in [0.0, 1e-5] {
             let mut start = relaxed.clone();
-            for node in start.rods.iter_mut().flat_map(|rod| &mut rod.nodes) {
+            for node in start.shape.rods.iter_mut().flat_map(|rod| &mut rod.nodes) {
                 node.position.z += push;
                 node.m.y += push;
             }
@@ -95,14 +95,14 @@ fn the_accuracy_asked_for_is_reached() {
         let relaxed = settle(&leaf, 1e-10);
         for accuracy in [1e-4, 1e-7, 1e-10] {
             let start = Start::Leaf {
-                stations: &relaxed.stations,
-                rods: &relaxed.rods,
+                stations: &relaxed.shape.stations,
+                rods: &relaxed.shape.rods,
             };
-            let shot = solve_within(&leaf, start, accuracy, None, &relaxed.stations)
+            let shot = solve_within(&leaf, start, accuracy, None, &relaxed.shape.stations)
                 .unwrap_or_else(|failure| panic!("{figure}, {load}: {}", failure.reason));
             assert!(shot.error.position <= accuracy);
-            let off = apart(&leaf, &relaxed.rods, &shot.rods);
-            let both = accuracy + relaxed.error_estimate.unwrap();
+            let off = apart(&leaf, &relaxed.shape.rods, &shot.rods);
+            let both = accuracy + relaxed.accuracy.error_estimate.unwrap();
             assert!(off.position <= both, "{figure}, {load}: {off:?}");
         }
     }

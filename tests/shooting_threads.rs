@@ -17,8 +17,8 @@ fn with_threads(threads: usize, leaf: &Scenario, relaxed: Option<&Equilibrium>) 
     let start = match relaxed {
         None => Start::Arcs,
         Some(leaf) => Start::Leaf {
-            stations: &leaf.stations,
-            rods: &leaf.rods,
+            stations: &leaf.shape.stations,
+            rods: &leaf.shape.rods,
         },
     };
     let options = bvp::Options {

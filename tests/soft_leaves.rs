@@ -9,7 +9,7 @@ mod common;
 
 use common::{close, path, settle, tip};
 use glam::DVec3;
-use leafdyn::relax::{Options, Outcome, relax};
+use leafdyn::relax::{Options, Outcome, SemiImplicit, relax};
 use leafdyn::scenario::Scenario;
 
 fn figure(name: &str, rods: usize) -> Scenario {
@@ -63,13 +63,13 @@ fn each_comes_to_rest_in_the_stable_equilibrium_recorded() {
     for (name, rods, energy, recorded) in RECORDED {
         let leaf = settle(&figure(name, rods), 1e-7);
         let what = format!("{name}, {rods} veins");
-        assert_eq!(leaf.negative_eigenvalues, Some(0), "{what}");
-        assert!(leaf.error_estimate.unwrap() <= 1e-7, "{what}");
+        assert_eq!(leaf.stability.negative_eigenvalues, Some(0), "{what}");
+        assert!(leaf.accuracy.error_estimate.unwrap() <= 1e-7, "{what}");
         let off = (tip(&leaf) - DVec3::from_array(recorded)).length();
-        if off > 1e-7 || (leaf.energy - energy).abs() > 1e-7 {
+        if off > 1e-7 || (leaf.energy.unwrap() - energy).abs() > 1e-7 {
             wrong.push(format!(
                 "{what}: energy {:.9}, tip {:.9}",
-                leaf.energy,
+                leaf.energy.unwrap(),
                 tip(&leaf)
             ));
         }
@@ -86,11 +86,11 @@ fn every_tolerance_ends_in_the_same_equilibrium() {
             let off = (tip(&leaf) - DVec3::from_array(recorded)).length();
             let what = format!("{name}, {rods} veins at {tolerance:e}");
             assert!(
-                off <= leaf.error_estimate.unwrap() + 1e-7,
+                off <= leaf.accuracy.error_estimate.unwrap() + 1e-7,
                 "{what}: tip {}",
                 tip(&leaf)
             );
-            close(&what, leaf.energy, energy, 20.0 * tolerance);
+            close(&what, leaf.energy.unwrap(), energy, 20.0 * tolerance);
         }
     }
 }
@@ -102,14 +102,18 @@ fn the_flat_leaf_of_fig_10_is_a_saddle_and_kept_only_on_request() {
     let flat = figure("fig10", 5);
     for (segments, index) in [(10, 14), (20, 16), (40, 18), (80, 18)] {
         let options = Options {
-            segments: Some(segments),
-            keep_unstable: true,
+            method: SemiImplicit {
+                segments: Some(segments),
+                keep_unstable: true,
+                ..SemiImplicit::default()
+            }
+            .into(),
             ..Options::default()
         };
         let leaf = relax(&flat, &options, &mut |_| {}).unwrap();
         assert_eq!(leaf.outcome, Outcome::Saddle, "{segments} segments");
         assert_eq!(
-            leaf.negative_eigenvalues,
+            leaf.stability.negative_eigenvalues,
             Some(index),
             "{segments} segments"
         );
@@ -129,14 +133,18 @@ fn the_flat_leaf_of_fig_10_is_a_saddle_and_kept_only_on_request() {
 #[test]
 fn a_saddle_on_nested_grids_has_the_index_of_the_finest() {
     let options = Options {
+        method: SemiImplicit {
+            keep_unstable: true,
+            ..SemiImplicit::default()
+        }
+        .into(),
         tolerance: Some(1e-6),
-        keep_unstable: true,
         ..Options::default()
     };
     let leaf = relax(&figure("fig10", 5), &options, &mut |_| {}).unwrap();
     assert_eq!(leaf.outcome, Outcome::Saddle);
-    assert_eq!(leaf.negative_eigenvalues, Some(18));
+    assert_eq!(leaf.stability.negative_eigenvalues, Some(18));
     assert_eq!(leaf.stable(), Some(false));
     close("tip z", tip(&leaf).z, -0.0015, 5e-5);
-    assert!(leaf.error_estimate.unwrap() <= 1e-6);
+    assert!(leaf.accuracy.error_estimate.unwrap() <= 1e-6);
 }

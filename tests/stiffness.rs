@@ -4,7 +4,7 @@
 mod common;
 
 use common::{close, paper_leaf, settle, tip};
-use leafdyn::relax::{Options, relax};
+use leafdyn::relax::{Options, SemiImplicit, relax};
 
 const STIFFNESSES: [f64; 5] = [1e2, 1e4, 1e6, 1e8, f64::INFINITY];
 
@@ -15,7 +15,11 @@ fn at_most_twelve_steps_on_the_first_grid_and_the_work_is_pinned() {
         for rods in [5, 21] {
             let leaf = paper_leaf(rods, [1.0; 3], [stiffness; 3], 1.0);
             let options = Options {
-                segments: Some(8),
+                method: SemiImplicit {
+                    segments: Some(8),
+                    ..SemiImplicit::default()
+                }
+                .into(),
                 tolerance: Some(1e-6),
                 ..Options::default()
             };

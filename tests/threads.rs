@@ -22,7 +22,7 @@ fn with_threads(threads: usize, scenario: &Scenario) -> Equilibrium {
 }
 
 fn bits(leaf: &Equilibrium) -> Vec<u64> {
-    let nodes = leaf.rods.iter().flat_map(|rod| &rod.nodes);
+    let nodes = leaf.shape.rods.iter().flat_map(|rod| &rod.nodes);
     nodes
         .flat_map(|node| {
             let mut values = node.rotation.to_array().to_vec();
@@ -31,8 +31,8 @@ fn bits(leaf: &Equilibrium) -> Vec<u64> {
             }
             values
         })
-        .chain(leaf.error_estimate)
-        .chain([leaf.energy, leaf.residual])
+        .chain(leaf.accuracy.error_estimate)
+        .chain([leaf.energy.unwrap(), leaf.accuracy.residual.unwrap()])
         .map(f64::to_bits)
         .collect()
 }
@@ -47,7 +47,7 @@ fn large_leaves_are_equal_bit_by_bit_on_one_two_and_five_threads() {
     }
     for leaf in [fig04(300), soft] {
         let alone = with_threads(1, &leaf);
-        let finest = alone.segments.last().unwrap();
+        let finest = alone.accuracy.segments.last().unwrap();
         assert!(
             finest * leaf.rods.len() >= 4096,
             "too small to be shared out"

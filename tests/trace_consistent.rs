@@ -32,8 +32,8 @@ fn begin(scenario: &Scenario, equations: &mut Equations) -> Option<Point> {
     };
     let rest = relax(scenario, &options, &mut |_| {}).unwrap();
     let leaf = Leaf::new(scenario);
-    let grid = Grid::new(rest.stations.len() - 1, leaf.kinks());
-    let state = project(&leaf, &DiscreteLeaf::new(&leaf, grid), &rest.rods);
+    let grid = Grid::new(rest.shape.stations.len() - 1, leaf.kinks());
+    let state = project(&leaf, &DiscreteLeaf::new(&leaf, grid), &rest.shape.rods);
     let (mut point, _) = equations.correct(&state, 0.0, None).ok()?;
     point.tangent = point.tangent.towards(true);
     Some(point)

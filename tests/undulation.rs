@@ -245,7 +245,7 @@ fn the_papers_soft_leaves_are_saddles_when_flat() {
         let flat = scenario(&format!("paper/{figure}"), &entries);
         for segments in [160, 320] {
             let leaf = common::settle_on(&flat, segments, true);
-            assert_eq!(leaf.negative_eigenvalues, Some(index), "{figure}");
+            assert_eq!(leaf.stability.negative_eigenvalues, Some(index), "{figure}");
             assert!(leaf.tips[0].z.abs() < 1e-12);
         }
     }

@@ -41,14 +41,27 @@ enum Verb {
 impl Cli {
     /// Does what was asked for.
     fn run(self) -> Result<Status, Refusal> {
-        match self.verb {
+        let done = match self.verb {
             Verb::Relax(relax) => relax.run(),
             Verb::Check(check) => check.run(),
             Verb::Chart(chart) => chart.run(),
             Verb::Map(map) => map.run(),
             Verb::Simulate(simulate) => simulate.run(),
             Verb::Trace(trace) => trace.run(),
+        };
+        done.map_err(as_typed)
+    }
+}
+
+/// The options of a relaxation as they are typed: a message of the library about
+/// `segments = 2` is one about `--segments 2`.
+fn as_typed(refusal: Refusal) -> Refusal {
+    let text = refusal.to_string();
+    match text.split_once(" = ") {
+        Some((option @ ("segments" | "intervals" | "modes" | "method"), rest)) => {
+            format!("--{option} {rest}").into()
         }
+        _ => refusal,
     }
 }
 

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
-use crate::relax::{self, Equilibrium, Method, Options};
+use crate::relax::{self, Equilibrium, Method, Options, SemiImplicit};
 use crate::report;
 use crate::scenario::Scenario;
 use crate::study;
@@ -26,8 +27,8 @@ pub struct Relax {
     request: Request,
 
     /// How the leaf is brought to rest
-    #[arg(long, value_name = "NAME", value_enum, default_value_t = MethodName::SemiImplicit)]
-    method: MethodName,
+    #[arg(long, value_name = "NAME", value_parser = method_parser(), default_value_t)]
+    method: Method,
 
     /// One fixed grid of N segments a rod, without extrapolation; left out: as fine as the tolerance needs
     #[arg(long, value_name = "N")]
@@ -54,22 +55,17 @@ pub struct Relax {
     full_model: bool,
 }
 
-/// The methods by the names users type.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum MethodName {
-    SemiImplicit,
-    Explicit,
-    Shooting,
-}
-
-impl From<MethodName> for Method {
-    fn from(name: MethodName) -> Self {
-        match name {
-            MethodName::SemiImplicit => Method::SemiImplicit,
-            MethodName::Explicit => Method::Explicit,
-            MethodName::Shooting => Method::Shooting,
+/// Methods by their words; those of earlier releases are hidden.
+fn method_parser() -> impl TypedValueParser<Value = Method> {
+    let words = Method::ALL.map(|method| {
+        let word = PossibleValue::new(method.word());
+        match method {
+            Method::Shooting { .. } => word.alias("multiple-shooting"),
+            Method::ShootingFromRest { .. } => word.alias("relaxed-shooting"),
+            _ => word,
         }
-    }
+    });
+    PossibleValuesParser::new(words).try_map(|word| word.parse::<Method>())
 }
 
 impl Relax {
@@ -91,42 +87,70 @@ impl Relax {
         })
     }
 
-    fn options(&self) -> Options {
-        Options {
-            method: self.method.into(),
-            segments: self.segments,
-            tolerance: self.request.tolerance,
-            keep_unstable: self.keep_unstable,
-            full_model: self.full_model,
-            intervals: self.intervals,
-            modes: self.modes.unwrap_or(MODES),
-            mode_shapes: self.modes.is_some_and(|count| count > 0),
-            ..Options::default()
+    /// The method with its own options; refused where they do not fit each other.
+    fn method(&self) -> Result<Method, Refusal> {
+        let (segments, intervals) = (self.segments, self.intervals);
+        if let Some(found) = intervals
+            && !matches!(
+                self.method,
+                Method::Shooting { .. } | Method::ShootingFromRest { .. }
+            )
+        {
+            let why = "only shooting has intervals; add --method shooting";
+            return Err(format!("--intervals {found}: {why}").into());
         }
+        if let (Some(found), true) = (segments, self.method.is_shooting()) {
+            let why = "shooting has no grid; leave it out, or set the number of intervals with --intervals";
+            return Err(format!("--segments {found}: {why}").into());
+        }
+        Ok(match self.method {
+            Method::SemiImplicit(how) => Method::SemiImplicit(SemiImplicit {
+                segments,
+                keep_unstable: self.keep_unstable,
+                full_model: self.full_model,
+                ..how
+            }),
+            Method::Explicit { .. } if self.keep_unstable => {
+                let why = "explicit motion leaves unstable equilibria; use --method semi-implicit or shooting";
+                return Err(format!("--keep-unstable: {why}").into());
+            }
+            Method::Explicit { .. } => Method::Explicit { segments },
+            Method::SingleShooting => Method::SingleShooting,
+            Method::Shooting { .. } => Method::Shooting { intervals },
+            Method::ShootingFromRest { .. } => Method::ShootingFromRest { intervals },
+        })
     }
 
     fn solve(&self, scenario: &Scenario) -> Result<Equilibrium, Refusal> {
+        let options = Options {
+            method: self.method()?,
+            tolerance: self.request.tolerance,
+            modes: self.modes.unwrap_or(MODES),
+            mode_shapes: self.modes.is_some_and(|count| count > 0),
+            deadline: None,
+        };
         let mut line = ProgressLine::new(&scenario.name);
-        Ok(relax::relax(scenario, &self.options(), &mut |progress| {
+        Ok(relax::relax(scenario, &options, &mut |progress| {
             line.update(progress)
         })?)
     }
 
     fn all(&self, scenario: &Scenario, folder: &Path) -> Result<Status, Refusal> {
-        if !matches!(self.method, MethodName::SemiImplicit) {
+        let Method::SemiImplicit(how) = self.method()? else {
             return Err("--all: only with the method semi-implicit".into());
-        }
-        let options = Options {
-            modes: 0,
-            ..self.options()
         };
         let mut line = ProgressLine::new(&scenario.name);
-        let all = study::all(scenario, &options, &mut |starts, found| {
-            line.say(|elapsed| {
-                let seconds = elapsed.as_secs_f64();
-                format!("{starts} starts, {found} equilibria, {seconds:.0} s")
-            });
-        })?;
+        let all = study::all(
+            scenario,
+            how,
+            self.request.tolerance,
+            &mut |starts, found| {
+                line.say(|elapsed| {
+                    let seconds = elapsed.as_secs_f64();
+                    format!("{starts} starts, {found} equilibria, {seconds:.0} s")
+                });
+            },
+        )?;
         drop(line);
         self.request
             .deliver(&all, folder, |folder| report::all_report(&all, folder))?;

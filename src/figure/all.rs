@@ -18,16 +18,19 @@ impl Pictured for All {
 
     fn draw(&self) -> Drawing {
         let leaf = |found: &'_ crate::study::Found| {
-            let index = match found.equilibrium.negative_eigenvalues {
+            let index = match found.equilibrium.stability.negative_eigenvalues {
                 Some(0) => "stable".into(),
                 Some(index) => format!("index {index}"),
                 None => String::new(),
             };
-            format!("energy {:.7}, {index}", found.equilibrium.energy)
+            format!(
+                "energy {:.7}, {index}",
+                found.equilibrium.energy.unwrap_or(f64::NAN)
+            )
         };
         let shown: Vec<SmallLeaf> = (self.found.iter().take(MOST))
             .map(|found| SmallLeaf {
-                curves: &found.equilibrium.curves,
+                curves: &found.equilibrium.shape.curves,
                 tips: &found.equilibrium.tips,
                 title: leaf(found),
             })

@@ -170,7 +170,7 @@ mod tests {
             svg(&check);
             let wildest = check.along[0];
             check.along.fill(wildest);
-            check.relaxed.tolerance = wild;
+            check.relaxed.accuracy.tolerance = wild;
             let svg = svg(&check);
             assert!(!svg.contains("NaN") && !svg.contains("inf"), "{wild}");
         }

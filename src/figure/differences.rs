@@ -98,8 +98,8 @@ pub fn draw(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
         draw_allowed(page, &axis, curve);
     }
     for curve in &curves {
-        draw_curve(page, &axis, curve, &check.relaxed.stations);
-        draw_zeros(page, &axis, curve, &check.relaxed.stations);
+        draw_curve(page, &axis, curve, &check.relaxed.shape.stations);
+        draw_zeros(page, &axis, curve, &check.relaxed.shape.stations);
     }
     draw_key(page, &curves, cell);
 }

@@ -5,7 +5,7 @@ use super::drawing::Drawing;
 use super::header::{self, HEADER};
 use super::page::{Panels, WIDTH};
 use super::veins::Veins;
-use crate::relax::{Equilibrium, Method};
+use crate::relax::Equilibrium;
 use crate::report::numbers::power_of_ten;
 use crate::report::words::{shooting, verdict};
 
@@ -32,14 +32,14 @@ impl Pictured for Equilibrium {
 
 fn notes(equilibrium: &Equilibrium, veins: &Veins) -> Vec<String> {
     let mut notes = vec![format!("N = {}", veins.count), verdict(equilibrium)];
-    match equilibrium.intervals {
+    match equilibrium.accuracy.intervals {
         Some(count) => notes.push(format!("by {}", shooting(count))),
-        None if equilibrium.method == Method::Shooting.name() => {
+        None if equilibrium.method.is_shooting() => {
             notes.push("shown is how far shooting came".into());
         }
         None => (),
     }
-    if let Some(error) = equilibrium.error_estimate {
+    if let Some(error) = equilibrium.accuracy.error_estimate {
         let bound = power_of_ten(error / veins.unit);
         notes.push(format!("error of positions ≤ {bound} L"));
     }
@@ -58,16 +58,17 @@ mod tests {
     fn shapes_gone_wild_are_drawn_without_a_panic() {
         for wild in [f64::NAN, f64::INFINITY, 1e300, -1e-300] {
             let mut leaf = sample::fan(3, 8);
-            for curve in &mut leaf.curves {
+            for curve in &mut leaf.shape.curves {
                 curve[4].z = wild;
             }
             leaf.tips[0].x = wild;
             leaf.draw();
-            leaf.curves
+            leaf.shape
+                .curves
                 .iter_mut()
                 .for_each(|curve| curve.fill(DVec3::splat(wild)));
             leaf.draw();
-            leaf.curves.clear();
+            leaf.shape.curves.clear();
             leaf.draw();
         }
     }

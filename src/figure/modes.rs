@@ -58,7 +58,7 @@ impl Format<Equilibrium> for ModesFigure {
 fn draw(equilibrium: &Equilibrium) -> Drawing {
     let name = format!("{}: modes", equilibrium.scenario);
     let rest = Veins::of(equilibrium);
-    let modes = equilibrium.modes.as_deref().unwrap_or_default();
+    let modes = equilibrium.stability.modes.as_deref().unwrap_or_default();
     let drawn = &modes[..modes.len().min(MOST)];
     let shapes: Vec<Veins> = drawn
         .iter()
@@ -134,12 +134,17 @@ fn displaced(equilibrium: &Equilibrium, rest: &Veins, mode: &Mode) -> Veins {
         false => 0.0,
     };
     let curves: Vec<Vec<DVec3>> = equilibrium
+        .shape
         .curves
         .iter()
         .zip(&mode.displacement)
         .map(|(curve, by)| curve.iter().zip(by).map(|(x, d)| x + size * d).collect())
         .collect();
-    let joined = if equilibrium.joined { 1 } else { curves.len() };
+    let joined = if equilibrium.shape.joined {
+        1
+    } else {
+        curves.len()
+    };
     let ends = curves.iter().take(joined);
     let tips: Vec<DVec3> = ends.filter_map(|curve| curve.last()).copied().collect();
     Veins::through(&curves, &tips, rest.unit)
@@ -159,8 +164,8 @@ mod tests {
             displacement: shape.clone(),
             rotation: shape,
         };
-        leaf.modes = Some(vec![mode; 14]);
-        leaf.mode_shapes = true;
+        leaf.stability.modes = Some(vec![mode; 14]);
+        leaf.stability.mode_shapes = true;
         leaf
     }
 

@@ -53,9 +53,9 @@ pub struct Veins {
 
 impl Veins {
     pub fn of(equilibrium: &Equilibrium) -> Self {
-        let lengths = equilibrium.rods.iter().map(|rod| rod.length);
+        let lengths = equilibrium.shape.rods.iter().map(|rod| rod.length);
         let longest = lengths.fold(0.0, f64::max);
-        Veins::through(&equilibrium.curves, &equilibrium.tips, longest)
+        Veins::through(&equilibrium.shape.curves, &equilibrium.tips, longest)
     }
 
     /// Veins through these points, with the longest rod as the unit.
@@ -265,7 +265,7 @@ mod tests {
         for (rods, dots) in [(1, 14), (5, 5 * 14), (21, 21 * 8), (200, 23 * 8)] {
             let leaf = sample::fan(rods, 64);
             let mut veins = Veins::of(&leaf);
-            veins.dot(&leaf.rods);
+            veins.dot(&leaf.shape.rods);
             assert!(veins.dots.len() <= dots, "{rods}: {}", veins.dots.len());
             assert!(veins.dots.len() > dots / 2, "{rods}: {}", veins.dots.len());
         }
@@ -275,7 +275,7 @@ mod tests {
     fn dots_beside_the_leaf_are_in_the_box() {
         let leaf = sample::fan(3, 8);
         let mut veins = Veins::of(&leaf);
-        let mut rods = leaf.rods.clone();
+        let mut rods = leaf.shape.rods.clone();
         rods[1].nodes[8].position.z = 3.0;
         veins.dot(&rods);
         assert_eq!(veins.high.z, 3.0);

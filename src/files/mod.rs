@@ -19,21 +19,25 @@ use crate::figure::{FigurePng, FigureSvg, ModesFigure, MotionFigure};
 use crate::relax::Equilibrium;
 use crate::report::{
     Centerlines, ChartSummary, ChartTable, CheckSummary, Format, Json, MapSummary, MapTable,
-    ModesTable, MotionSummary, OutputError, ScalingTable, Summary, TraceSummary, TraceTable,
-    Written,
+    ModesTable, MotionSummary, OutputError, ScalingTable, TraceSummary, TraceTable, Written,
 };
 use crate::simulate::Record;
 use crate::study::{All, Chart, Check, Map, Scaling, Trace};
 
 impl Written for Equilibrium {
     const FORMATS: &'static [&'static dyn Format<Self>] =
-        &[&Summary, &Centerlines, &FigureSvg, &FigurePng];
+        &[&Json("summary.json"), &Centerlines, &FigureSvg, &FigurePng];
 
     const MORE: &'static [&'static dyn Format<Self>] =
         &[&ModesTable, &ModesFigure::SVG, &ModesFigure::PNG];
 
     fn has_more(&self) -> bool {
-        self.mode_shapes && self.modes.as_ref().is_some_and(|modes| !modes.is_empty())
+        let stability = &self.stability;
+        stability.mode_shapes
+            && stability
+                .modes
+                .as_ref()
+                .is_some_and(|modes| !modes.is_empty())
     }
 }
 

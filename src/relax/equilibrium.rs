@@ -1,8 +1,11 @@
 //! What a relaxation returns: the shape, and everything that judges it.
 
-use crate::shape::RodShape;
+use crate::numbers::power_of_ten;
+use crate::relax::method::Method;
+use crate::shape::{self, RodShape};
 use crate::undulation::Undulation;
 use glam::DVec3;
+use serde::{Serialize, Serializer};
 
 /// How a run ended: one word per way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,8 +52,14 @@ impl Outcome {
     }
 }
 
+impl Serialize for Outcome {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.word())
+    }
+}
+
 /// Work done by a solver, counted so that tests can pin it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Work {
     /// Accepted steps (time steps or Newton iterations).
     pub steps: usize,
@@ -63,7 +72,7 @@ pub struct Work {
 }
 
 /// A saddle that was met on the way to rest, and left.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Saddle {
     /// Its energy.
     pub energy: f64,
@@ -74,17 +83,65 @@ pub struct Saddle {
 }
 
 /// What was solved, and what it shows to be dispensable.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Model {
     /// Rods solved for; the others are their mirror images.
+    #[serde(skip)]
     pub rods: usize,
     /// Whether in their plane, which the leaf does not leave.
+    #[serde(skip)]
     pub planar: bool,
+    /// All of it in words, with the grids.
+    #[serde(rename = "model")]
+    pub description: String,
     /// Largest displacement, in units of length, that would follow from
     /// neglecting shear, to first order, on the coarsest grid.
-    pub shear: Option<f64>,
+    pub shear_effect: Option<f64>,
     /// The same of stretch.
-    pub stretch: Option<f64>,
+    pub stretch_effect: Option<f64>,
+}
+
+impl Model {
+    /// Of a leaf of `veins` rods, solved for `rods` of them, in their plane or not,
+    /// on grids of so many segments; `effects` are those of shear and stretch.
+    pub fn new(
+        veins: usize,
+        (rods, planar): (usize, bool),
+        segments: &[usize],
+        [shear_effect, stretch_effect]: [Option<f64>; 2],
+    ) -> Self {
+        let mirrored = rods < veins;
+        let mut phrases = vec![match mirrored {
+            true => format!("{rods} of {veins} veins, the others are their mirror images"),
+            false if veins == 1 => "1 vein".into(),
+            false => format!("all {veins} veins"),
+        }];
+        if planar {
+            phrases.push("planar".into());
+        }
+        if !segments.is_empty() {
+            let grids: Vec<String> = segments.iter().map(usize::to_string).collect();
+            phrases.push(format!("{} segments", grids.join("+")));
+        }
+        if mirrored {
+            phrases.push("stable against breaking the mirror".into());
+        }
+        if planar {
+            phrases.push("stable out of the plane".into());
+        }
+        for (effect, what) in [(shear_effect, "shear"), (stretch_effect, "stretch")] {
+            if let Some(effect) = effect {
+                phrases.push(format!("{what} matters by {}", power_of_ten(effect)));
+            }
+        }
+        Model {
+            rods,
+            planar,
+            description: phrases.join("; "),
+            shear_effect,
+            stretch_effect,
+        }
+    }
 }
 
 /// A way in which the leaf moves by itself, without damping and by so little
@@ -97,7 +154,7 @@ pub struct Mode {
     pub eigenvalue: f64,
     /// Bound on its error; `None` on a single grid.
     pub error: Option<f64>,
-    /// Displacement of the nodes of [`Equilibrium::curves`], one list per rod.
+    /// Displacement of the nodes of [`Shape::curves`], one list per rod.
     /// The largest is as long as the longest rod, but of a mode that turns the
     /// rods without displacing them, of which the largest rotation is 1.
     pub displacement: Vec<Vec<DVec3>>,
@@ -123,67 +180,151 @@ impl Mode {
     }
 }
 
-/// A leaf at rest (or as far as it came), in the units of its scenario.
-#[derive(Clone, Debug)]
-pub struct Equilibrium {
-    /// Name of the scenario.
-    pub scenario: String,
-    /// Name of the method.
-    pub method: &'static str,
-    /// How the run ended.
-    pub outcome: Outcome,
-    /// What would help, when the run did not succeed: one sentence for the user.
-    pub remark: Option<String>,
+/// How accurate a result is, and what was asked.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Accuracy {
     /// Segments per rod of each grid used, coarse to fine; none if shot.
     pub segments: Vec<usize>,
     /// Intervals of the shooting.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub intervals: Option<usize>,
     /// Wanted accuracy, relative to the largest rod length.
     pub tolerance: f64,
     /// Largest unbalanced nodal force or moment, in units of A/L^2 and A/L
     /// (A: the leaf's mean bending stiffness, L: largest rod length). Of the
-    /// shooting: the largest defect ([`crate::bvp::Solution::defect`]).
-    pub residual: f64,
+    /// shooting: the largest defect ([`crate::bvp::Solution::defect`]), if it found
+    /// a solution.
+    pub residual: Option<f64>,
     /// Bound on the error of the positions, in units of length; `None` on a
     /// single grid, which has nothing to compare with.
     pub error_estimate: Option<f64>,
-    /// Total potential energy.
-    pub energy: f64,
-    /// Whether the tips share one point.
-    pub joined: bool,
-    /// The joint tip alone, or one tip per rod.
-    pub tips: Vec<DVec3>,
-    /// Sum over the rods of the force each passes to its tip.
-    pub tip_force_sum: DVec3,
+}
+
+/// Whether an equilibrium is stable, as far as that is known.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Stability {
     /// Morse index: negative eigenvalues of the energy's Hessian. `None` if
     /// the leaf is not at rest.
+    #[serde(flatten, serialize_with = "serialize_index")]
     pub negative_eigenvalues: Option<usize>,
     /// The lowest modes, ascending, none left out. `None` if they were not asked
     /// for or not found, the leaf is not at rest, or it was shot.
+    #[serde(flatten, serialize_with = "serialize_eigenvalues")]
     pub modes: Option<Vec<Mode>>,
     /// Whether the shapes of the modes were asked for.
+    #[serde(skip)]
     pub mode_shapes: bool,
     /// A saddle that was met and left.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub saddle: Option<Saddle>,
+}
+
+/// The shape of a leaf.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Shape {
+    /// Fractions of the length at which `rods` are given, base to tip.
+    pub stations: Vec<f64>,
+    /// Best values at the stations, extrapolated where several grids were used.
+    #[serde(rename = "positions", serialize_with = "shape::serialize_positions")]
+    pub rods: Vec<RodShape>,
+    /// Whether the tips share one point.
+    #[serde(skip)]
+    pub joined: bool,
+    /// Centerlines on the finest grid, one per rod, for drawing.
+    #[serde(skip)]
+    pub curves: Vec<Vec<DVec3>>,
+}
+
+impl Shape {
+    /// Length of the longest rod.
+    pub fn longest(&self) -> f64 {
+        self.rods.iter().map(|rod| rod.length).fold(0.0, f64::max)
+    }
+}
+
+/// A leaf at rest (or as far as it came), in the units of its scenario. As JSON
+/// it is `summary.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Equilibrium {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// The method.
+    pub method: Method,
+    /// How the run ended.
+    pub outcome: Outcome,
+    /// What would help, when the run did not succeed: one sentence for the user.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remark: Option<String>,
+    /// Number of rods.
+    #[serde(rename = "rods")]
+    pub rod_count: usize,
+    /// How accurate it is.
+    #[serde(flatten)]
+    pub accuracy: Accuracy,
+    /// Total potential energy; `None` where shooting found no solution.
+    pub energy: Option<f64>,
+    /// The joint tip alone, or one tip per rod.
+    #[serde(flatten, serialize_with = "shape::serialize_tips")]
+    pub tips: Vec<DVec3>,
+    /// Sum over the rods of the force each passes to its tip.
+    pub tip_force_sum: DVec3,
+    /// Whether it is stable.
+    #[serde(flatten)]
+    pub stability: Stability,
+    /// Waves and twist of the veins on the finest grid.
+    pub undulation: Undulation,
     /// What was solved.
+    #[serde(flatten)]
     pub model: Model,
     /// Work done.
     pub work: Work,
     /// Time of the solve alone, in seconds.
     pub wall_seconds: f64,
-    /// Fractions of the length at which `rods` are given, base to tip.
-    pub stations: Vec<f64>,
-    /// Best values at the stations, extrapolated where several grids were used.
-    pub rods: Vec<RodShape>,
-    /// Centerlines on the finest grid, one per rod, for drawing.
-    pub curves: Vec<Vec<DVec3>>,
-    /// Waves and twist of the veins on the finest grid.
-    pub undulation: Undulation,
+    /// The shape.
+    #[serde(flatten)]
+    pub shape: Shape,
 }
 
 impl Equilibrium {
     /// Whether the equilibrium is stable: no negative eigenvalue.
     pub fn stable(&self) -> Option<bool> {
-        self.negative_eigenvalues.map(|count| count == 0)
+        let index = self.stability.negative_eigenvalues;
+        index.map(|count| count == 0)
     }
+}
+
+/// A Morse index as the keys `stable` and `negative_eigenvalues`.
+pub fn serialize_index<S: Serializer>(
+    index: &Option<usize>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Keys {
+        stable: Option<bool>,
+        negative_eigenvalues: Option<usize>,
+    }
+    Keys {
+        stable: index.map(|count| count == 0),
+        negative_eigenvalues: *index,
+    }
+    .serialize(serializer)
+}
+
+/// Modes as the keys `lowest_eigenvalues` and `eigenvalue_errors`, which are given
+/// only all together.
+fn serialize_eigenvalues<S: Serializer>(
+    modes: &Option<Vec<Mode>>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Keys {
+        lowest_eigenvalues: Option<Vec<f64>>,
+        eigenvalue_errors: Option<Vec<f64>>,
+    }
+    let modes = modes.as_deref();
+    Keys {
+        lowest_eigenvalues: modes.map(|modes| modes.iter().map(|mode| mode.eigenvalue).collect()),
+        eigenvalue_errors: modes.and_then(|modes| modes.iter().map(|mode| mode.error).collect()),
+    }
+    .serialize(serializer)
 }

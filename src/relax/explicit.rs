@@ -15,7 +15,7 @@
 use crate::leaf::{DiscreteLeaf, Leaf, SparsePattern, State, System};
 use crate::motion::{Broken, Explicit, Method, Physics};
 use crate::relax::equilibrium::Work;
-use crate::relax::options::{Options, RelaxError, past};
+use crate::relax::options::{RelaxError, past};
 use crate::relax::saddle;
 use crate::relax::semi_implicit::Settled;
 use crate::scenario::Rod;
@@ -75,7 +75,7 @@ pub struct Request<'a> {
 }
 
 /// Refuses what explicit motion cannot do.
-pub fn check(leaf: &Leaf, options: &Options) -> Result<(), RelaxError> {
+pub fn check(leaf: &Leaf) -> Result<(), RelaxError> {
     let rigid = |rod: &Rod| {
         let stiffness = rod.force_stiffness.iter();
         stiffness
@@ -87,9 +87,6 @@ pub fn check(leaf: &Leaf, options: &Options) -> Result<(), RelaxError> {
     }
     if leaf.tip_moment != DVec3::ZERO {
         return Err(RelaxError::Follows);
-    }
-    if options.keep_unstable {
-        return Err(RelaxError::Leaves);
     }
     Ok(())
 }

@@ -8,9 +8,10 @@ mod stability;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
 use crate::relax::equilibrium::{Equilibrium, Saddle, Work};
 use crate::relax::explicit;
+use crate::relax::method::Method;
 use crate::relax::modes;
 use crate::relax::options::{
-    MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError, check_tolerance, past,
+    MAX_NODES, MOST_MODES, Options, Progress, RelaxError, check_tolerance, past,
 };
 use crate::relax::prolong::{predict, prolong};
 use crate::relax::report;
@@ -82,19 +83,43 @@ pub fn relax(
             found: options.modes,
         });
     }
-    if options.method == Method::Shooting {
-        return shooting::relax(scenario, options, tolerance);
+    match options.method {
+        Method::SemiImplicit(_) | Method::Explicit { .. } => {
+            relax_on_grids(scenario, options, tolerance, progress)
+        }
+        Method::SingleShooting => shooting::from_arcs(scenario, options, Some(1), tolerance),
+        Method::Shooting { intervals } => {
+            shooting::from_arcs(scenario, options, intervals, tolerance)
+        }
+        Method::ShootingFromRest { intervals } => {
+            shooting::check_intervals(intervals)?;
+            let rest = Options {
+                method: Method::default(),
+                tolerance: Some(shooting::START),
+                modes: 0,
+                ..options.clone()
+            };
+            let rest = relax(scenario, &rest, progress)?;
+            shooting::from_rest(scenario, options, intervals, tolerance, rest)
+        }
     }
-    if let Some(found) = options.intervals {
-        return Err(RelaxError::NoIntervals { found });
-    }
+}
+
+/// Relaxes on nested grids.
+fn relax_on_grids(
+    scenario: &Scenario,
+    options: &Options,
+    tolerance: f64,
+    progress: &mut dyn FnMut(&Progress),
+) -> Result<Equilibrium, RelaxError> {
     let clock = Instant::now();
     let leaf = Leaf::new(scenario);
-    if options.method == Method::Explicit {
-        explicit::check(&leaf, options)?;
+    if let Method::Explicit { .. } = options.method {
+        explicit::check(&leaf)?;
     }
-    let first = check_segments(&leaf, options.segments, least(options, tolerance))?;
-    let reduced = match reducible(options) {
+    let (method, segments) = (options.method, options.method.segments());
+    let first = check_segments(&leaf, segments, least(method, tolerance))?;
+    let reduced = match reducible(method) {
         true => leaf.reduced(),
         false => None,
     };
@@ -125,10 +150,9 @@ fn finished(run: Run, end: End, clock: Instant) -> Equilibrium {
     let (outcome, remark) = report::outcome(&run, end);
     let seconds = clock.elapsed().as_secs_f64();
     let modes = if at_rest { modes::lowest(&run) } else { None };
-    Equilibrium {
-        modes,
-        ..report::equilibrium(run, outcome, remark, seconds)
-    }
+    let mut found = report::equilibrium(run, outcome, remark, seconds);
+    found.stability.modes = modes;
+    found
 }
 
 /// How a run over the grids ended.
@@ -234,7 +258,7 @@ impl<'a, 'o> Run<'a, 'o> {
             let level = self.levels.last().expect("the leaf has landed");
             let finer = level.leaf.grid.refined();
             let nodes = self.leaf.rods() * finer.segments();
-            if self.options.segments.is_some()
+            if self.segments().is_some()
                 || finer.segments() > FINEST
                 || nodes > MAX_NODES
                 || self.beyond_rounding(finer.segments())
@@ -256,6 +280,16 @@ impl<'a, 'o> Run<'a, 'o> {
         }
     }
 
+    /// Segments of the only grid, if there is to be one.
+    fn segments(&self) -> Option<usize> {
+        self.options.method.segments()
+    }
+
+    /// Whether an unstable equilibrium is wanted as much as a stable one.
+    fn keeps_unstable(&self) -> bool {
+        matches!(self.options.method, Method::SemiImplicit(how) if how.keep_unstable)
+    }
+
     /// Whether the time allowed is over.
     pub fn late(&self) -> bool {
         past(self.options.deadline)
@@ -263,7 +297,7 @@ impl<'a, 'o> Run<'a, 'o> {
 
     /// Whether the tolerance is reached; a fixed grid always is.
     fn accurate(&self) -> bool {
-        self.options.segments.is_some() || self.error().is_some_and(|error| error <= self.tolerance)
+        self.segments().is_some() || self.error().is_some_and(|error| error <= self.tolerance)
     }
 
     /// Estimate of the error of the best values, relative to the leaf's length:
@@ -297,7 +331,7 @@ impl<'a, 'o> Run<'a, 'o> {
         loop {
             let (level, settled, moved) = self.settle(grid.clone(), From::Start);
             let finer = grid.refined();
-            let fixed = self.options.segments.is_some();
+            let fixed = self.segments().is_some();
             let last = fixed || finer.segments() > FINEST_LANDING || self.late();
             match settled {
                 // Where a leaf that moves lands is not for so coarse a grid to say.
@@ -343,7 +377,7 @@ impl<'a, 'o> Run<'a, 'o> {
 
     /// Whether a grid is one for leaves only that settle where they start.
     fn too_coarse(&self, segments: usize) -> bool {
-        self.options.segments.is_none() && segments < COARSEST
+        self.segments().is_none() && segments < COARSEST
     }
 
     /// Adds the next finer grid.

@@ -5,6 +5,7 @@ mod equilibrium;
 mod explicit;
 mod grids;
 mod index;
+mod method;
 mod modes;
 mod moment;
 mod options;
@@ -18,12 +19,15 @@ mod shooting;
 mod start;
 
 pub use crate::shape::{NodeState, RodShape};
-pub use equilibrium::{Equilibrium, Mode, Model, Outcome, Saddle, Work};
+pub use equilibrium::{
+    Accuracy, Equilibrium, Mode, Model, Outcome, Saddle, Shape, Stability, Work, serialize_index,
+};
 pub use grids::{check_segments, relax};
 pub use index::{index_near, project};
+pub use method::{Method, SemiImplicit, UnknownMethod};
 pub use options::{
-    LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError,
-    SMALLEST_TOLERANCE, check_tolerance,
+    LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
+    check_tolerance,
 };
 pub(crate) use shape::node as node_state;
 pub use shooting::check_intervals;

@@ -69,7 +69,7 @@ pub fn lowest(run: &Run) -> Option<Vec<Mode>> {
     }
     series.push(&pairs);
     let shapes = shapes(finest, &pairs);
-    if options.segments.is_none() && options.mode_shapes {
+    if options.method.segments().is_none() && options.mode_shapes {
         refine(run, &mut series, on);
     }
     let rounding = modes::rounding(&finest.leaf);

@@ -1,61 +1,21 @@
 //! What is asked of a relaxation, and what cannot be asked.
 
+use crate::relax::method::Method;
 use std::time::Instant;
-
-/// How a leaf is brought to rest.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Method {
-    /// Linearly implicit damped motion that turns into Newton's method.
-    #[default]
-    SemiImplicit,
-    /// Explicit damped motion, then with masses and damping chosen for speed.
-    /// Not for rigid rods.
-    Explicit,
-    /// The boundary-value problem by multiple shooting ([`crate::bvp`]), from
-    /// arcs by continuation. Finds equilibria, stable or not.
-    Shooting,
-}
-
-impl Method {
-    /// The name used on the command line and in `summary.json`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Method::SemiImplicit => "semi-implicit",
-            Method::Explicit => "explicit",
-            Method::Shooting => "shooting",
-        }
-    }
-}
 
 /// What is asked of a relaxation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// The method.
     pub method: Method,
-    /// One fixed grid of so many segments a rod, without extrapolation;
-    /// `None`: as fine as the tolerance needs.
-    pub segments: Option<usize>,
     /// Replaces the scenario's tolerance.
     pub tolerance: Option<f64>,
-    /// Whether to stop at a saddle instead of leaving it. Newton's method is
-    /// then not steered towards stable equilibria at all.
-    pub keep_unstable: bool,
-    /// Whether to solve for the whole leaf, in space, where half of it or its
-    /// plane would do.
-    pub full_model: bool,
-    /// Shooting only: over so many intervals; `None`: as many as the growth of
-    /// perturbations needs.
-    pub intervals: Option<usize>,
     /// How many of the lowest modes are looked for once the leaf is at rest, at
     /// most [`MOST_MODES`]; that is no part of the time told. 0: none.
     pub modes: usize,
     /// Whether their shapes are wanted. Without them modes are left out where
     /// the leaf is large, and are known a little less accurately.
     pub mode_shapes: bool,
-    /// Begin not in the plain start but in the one of this number in an endless
-    /// series of disturbed ones: the leaf thrown out of its plane, each in its own
-    /// way, a number and the next to opposite sides.
-    pub disturbance: Option<usize>,
     /// When to give up, at rest or not: the leaf is then not at rest. Looked at
     /// where progress is told and between grids, so that a run may end a little
     /// later.
@@ -119,7 +79,7 @@ pub enum RelaxError {
     },
     /// Too few segments for the panels of the profiles.
     #[error(
-        "--segments {found}: at least {least} are needed, one for every piece between the knots of the profiles"
+        "segments = {found}: at least {least} are needed, one for every piece between the knots of the profiles"
     )]
     TooFewSegments {
         /// Segments asked for.
@@ -141,42 +101,23 @@ pub enum RelaxError {
     },
     /// The explicit method has no stable time step for rigid rods.
     #[error(
-        "--method explicit: a stiffness is inf, and no time step is short enough for rigid rods; give a number, or use semi-implicit"
+        "method = explicit: a stiffness is inf, and no time step is short enough for rigid rods; give a number, or use semi-implicit"
     )]
     Rigid,
     /// The explicit method follows forces, and a dead moment may feed a motion
     /// without end.
     #[error(
-        "--method explicit: under load.tip_moment, which has no potential, motion need not come to rest; use semi-implicit, or shooting"
+        "method = explicit: under load.tip_moment, which has no potential, motion need not come to rest; use semi-implicit, or shooting"
     )]
     Follows,
-    /// Unstable equilibria were asked of a method that leaves them.
-    #[error(
-        "--keep-unstable: explicit motion leaves unstable equilibria; use --method semi-implicit or shooting"
-    )]
-    Leaves,
-    /// A grid was asked for where there is none.
-    #[error(
-        "--segments {found}: shooting has no grid; leave it out, or set the number of intervals with --intervals"
-    )]
-    NoGrid {
-        /// Segments asked for.
-        found: usize,
-    },
-    /// Intervals were asked for where there are none.
-    #[error("--intervals {found}: only shooting has intervals; add --method shooting")]
-    NoIntervals {
-        /// Intervals asked for.
-        found: usize,
-    },
     /// Too many modes.
-    #[error("--modes {found}: allowed are 0 to {MOST_MODES}")]
+    #[error("modes = {found}: allowed are 0 to {MOST_MODES}")]
     Modes {
         /// Modes asked for.
         found: usize,
     },
     /// The number of intervals is out of range.
-    #[error("--intervals {found}: allowed are 1 to {MAX_INTERVALS}")]
+    #[error("intervals = {found}: allowed are 1 to {MAX_INTERVALS}")]
     Intervals {
         /// Intervals asked for.
         found: usize,

@@ -1,9 +1,9 @@
 //! From the settled grids to the result in the units of the scenario.
 
 use crate::leaf::DiscreteLeaf;
-use crate::relax::equilibrium::{Equilibrium, Model, Outcome};
+use crate::relax::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability};
 use crate::relax::grids::{End, Level, Run};
-use crate::relax::options::Method;
+use crate::relax::method::Method;
 use crate::relax::prolong::lagrange;
 use crate::relax::richardson::Richardson;
 use crate::relax::semi_implicit::Settled;
@@ -49,35 +49,25 @@ pub fn equilibrium(
     let error_estimate = run.error().map(|error| error * scale.length);
     let lines = centerlines(finest);
     let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
+    let segments: Vec<usize> = series.iter().map(|level| level.leaf.segments()).collect();
     Equilibrium {
         scenario: run.leaf.scenario().name.clone(),
-        method: run.options.method.name(),
+        method: run.options.method,
         outcome,
         remark,
-        segments: series.iter().map(|level| level.leaf.segments()).collect(),
-        intervals: None,
-        tolerance: run.tolerance,
-        residual: finest.leaf.residual(&finest.state),
-        error_estimate,
-        energy: energies.column(columns)[0] * scale.moment(),
-        joined,
+        rod_count: rods.len(),
+        energy: Some(energies.column(columns)[0] * scale.moment()),
         tips: tips
             .filter_map(|rod| rod.nodes.last())
             .map(|node| node.position)
             .collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
-        negative_eigenvalues: run.index,
-        modes: None,
-        mode_shapes: run.options.mode_shapes,
-        saddle: run.saddle,
-        model: Model {
-            rods: run.solved,
-            planar: run.planar,
-            shear: run.effects[0].map(|effect| effect * scale.length),
-            stretch: run.effects[1].map(|effect| effect * scale.length),
+        stability: Stability {
+            negative_eigenvalues: run.index,
+            modes: None,
+            mode_shapes: run.options.mode_shapes,
+            saddle: run.saddle,
         },
-        work: run.work,
-        wall_seconds,
         undulation: Undulation::of(
             run.leaf.scenario(),
             &lines,
@@ -85,11 +75,29 @@ pub fn equilibrium(
             &rods,
             error_estimate,
         ),
-        stations,
-        rods,
-        curves: (lines.iter())
-            .map(|line| line.iter().map(|(x, _)| *x).collect())
-            .collect(),
+        model: Model::new(
+            rods.len(),
+            (run.solved, run.planar),
+            &segments,
+            (run.effects).map(|effect| effect.map(|effect| effect * scale.length)),
+        ),
+        accuracy: Accuracy {
+            segments,
+            intervals: None,
+            tolerance: run.tolerance,
+            residual: Some(finest.leaf.residual(&finest.state)),
+            error_estimate,
+        },
+        work: run.work,
+        wall_seconds,
+        shape: Shape {
+            stations,
+            rods,
+            joined,
+            curves: (lines.iter())
+                .map(|line| line.iter().map(|(x, _)| *x).collect())
+                .collect(),
+        },
     }
 }
 
@@ -261,7 +269,7 @@ pub fn outcome(run: &Run, end: End) -> (Outcome, Option<String>) {
                 Settled::StepLimit if run.late() => format!(
                     "the time allowed was over before rest on {finest} segments: allow more"
                 ),
-                Settled::StepLimit if run.options.method == Method::Explicit => format!(
+                Settled::StepLimit if matches!(run.options.method, Method::Explicit { .. }) => format!(
                     "the step limit came before rest on {finest} segments: use fewer, or the semi-implicit method"
                 ),
                 Settled::Unresolved => format!(

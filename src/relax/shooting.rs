@@ -2,7 +2,7 @@
 
 use crate::bvp::{self, Reason, Solution, Start};
 use crate::leaf::{Grid, Leaf};
-use crate::relax::equilibrium::{Equilibrium, Model, Outcome, Work};
+use crate::relax::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability, Work};
 use crate::relax::grids::coarsest;
 use crate::relax::index::index_near;
 use crate::relax::options::{MAX_INTERVALS, Options, RelaxError};
@@ -14,6 +14,10 @@ use std::time::Instant;
 
 /// Segments between stations, at least.
 const SEGMENTS: usize = 32;
+
+/// Tolerance to which a leaf is relaxed that shooting starts from: the coarsest
+/// grids do, and Newton's method does the rest faster than finer ones.
+pub const START: f64 = 1e-3;
 
 /// The grid at whose nodes a boundary-value solution is given.
 fn station_grid(scenario: &Scenario) -> Grid {
@@ -33,27 +37,59 @@ pub fn check_intervals(intervals: Option<usize>) -> Result<(), RelaxError> {
 }
 
 /// Solves the boundary-value problem from arcs.
-pub fn relax(
+pub fn from_arcs(
     scenario: &Scenario,
     options: &Options,
+    intervals: Option<usize>,
     tolerance: f64,
 ) -> Result<Equilibrium, RelaxError> {
-    if let Some(found) = options.segments {
-        return Err(RelaxError::NoGrid { found });
+    check_intervals(intervals)?;
+    Ok(shoot(scenario, options, intervals, tolerance, Start::Arcs))
+}
+
+/// Solves the boundary-value problem from a leaf that is roughly at `rest`; where
+/// it is not, that is the result.
+pub fn from_rest(
+    scenario: &Scenario,
+    options: &Options,
+    intervals: Option<usize>,
+    tolerance: f64,
+    rest: Equilibrium,
+) -> Result<Equilibrium, RelaxError> {
+    if matches!(rest.outcome, Outcome::NotAtRest | Outcome::Diverged) {
+        return Ok(Equilibrium {
+            method: options.method,
+            ..rest
+        });
     }
-    check_intervals(options.intervals)?;
+    let start = Start::Leaf {
+        stations: &rest.shape.stations,
+        rods: &rest.shape.rods,
+    };
+    let mut found = shoot(scenario, options, intervals, tolerance, start);
+    found.stability.saddle = rest.stability.saddle;
+    found.work.steps += rest.work.steps;
+    found.work.factorizations += rest.work.factorizations;
+    found.work.force_evaluations += rest.work.force_evaluations;
+    found.work.cg_iterations += rest.work.cg_iterations;
+    found.wall_seconds += rest.wall_seconds;
+    Ok(found)
+}
+
+fn shoot(
+    scenario: &Scenario,
+    options: &Options,
+    intervals: Option<usize>,
+    tolerance: f64,
+    start: Start,
+) -> Equilibrium {
     let clock = Instant::now();
     let grid = station_grid(scenario);
-    let longest = scenario
-        .rods
-        .iter()
-        .map(|rod| rod.length)
-        .fold(0.0, f64::max);
     let found = bvp::solve_before(
         scenario,
-        Start::Arcs,
+        start,
         tolerance,
-        options.intervals,
+        intervals,
         grid.sigma(),
         options.deadline,
     );
@@ -61,37 +97,80 @@ pub fn relax(
         Ok(solution) => solution.work,
         Err(failure) => failure.work,
     };
-    let mut result = match found {
-        Ok(solution) => solved(scenario, &grid, solution, tolerance * longest),
-        Err(failure) => lost(scenario, failure),
+    let accuracy = Accuracy {
+        segments: Vec::new(),
+        intervals: None,
+        tolerance,
+        residual: None,
+        error_estimate: None,
     };
-    result.tolerance = tolerance;
-    result.mode_shapes = options.mode_shapes;
-    result.stations = grid.sigma().to_vec();
-    result.curves = (result.rods.iter())
-        .map(|rod| rod.nodes.iter().map(|node| node.position).collect())
+    let found = match found {
+        Ok(solution) => solved(scenario, &grid, solution, accuracy),
+        Err(failure) => lost(failure, accuracy),
+    };
+    let stations = grid.sigma().to_vec();
+    let error = found.accuracy.error_estimate;
+    let tips: Vec<_> = found
+        .rods
+        .iter()
+        .filter_map(|rod| rod.nodes.last())
         .collect();
-    result.undulation = Undulation::at_stations(
-        scenario,
-        &result.stations,
-        &result.rods,
-        result.error_estimate,
-    );
-    result.work = Work {
-        steps: work.iterations,
-        factorizations: work.linearizations,
-        force_evaluations: work.slopes,
-        cg_iterations: 0,
-    };
-    result.wall_seconds = clock.elapsed().as_secs_f64();
-    Ok(result)
+    let listed = if scenario.joined { 1 } else { tips.len() };
+    let veins = found.rods.len();
+    Equilibrium {
+        scenario: scenario.name.clone(),
+        method: options.method,
+        outcome: found.outcome,
+        remark: found.remark,
+        rod_count: veins,
+        accuracy: found.accuracy,
+        energy: found.energy,
+        tips: tips.iter().take(listed).map(|node| node.position).collect(),
+        tip_force_sum: tips
+            .iter()
+            .map(|node| node.rotation * node.n)
+            .sum::<DVec3>(),
+        stability: Stability {
+            negative_eigenvalues: found.index,
+            mode_shapes: options.mode_shapes,
+            ..Stability::default()
+        },
+        undulation: Undulation::at_stations(scenario, &stations, &found.rods, error),
+        model: Model::new(veins, (veins, false), &[], [None; 2]),
+        work: Work {
+            steps: work.iterations,
+            factorizations: work.linearizations,
+            force_evaluations: work.slopes,
+            cg_iterations: 0,
+        },
+        wall_seconds: clock.elapsed().as_secs_f64(),
+        shape: Shape {
+            stations,
+            joined: scenario.joined,
+            curves: (found.rods.iter())
+                .map(|rod| rod.nodes.iter().map(|node| node.position).collect())
+                .collect(),
+            rods: found.rods,
+        },
+    }
+}
+
+/// What a boundary-value solver found, solved or not.
+struct Found {
+    outcome: Outcome,
+    remark: Option<String>,
+    accuracy: Accuracy,
+    energy: Option<f64>,
+    index: Option<usize>,
+    rods: Vec<RodShape>,
 }
 
 /// What a solution says.
-fn solved(scenario: &Scenario, grid: &Grid, solution: Solution, wanted: f64) -> Equilibrium {
+fn solved(scenario: &Scenario, grid: &Grid, solution: Solution, asked: Accuracy) -> Found {
+    let longest = (scenario.rods.iter().map(|rod| rod.length)).fold(0.0, f64::max);
     let index = index_near(scenario, grid.clone(), &solution.rods);
     let (outcome, remark) = match index {
-        _ if solution.error.position > wanted => (
+        _ if solution.error.position > asked.tolerance * longest => (
             Outcome::ToleranceNotReached,
             Some("double precision does not carry more through this leaf: ask for a larger tolerance".into()),
         ),
@@ -105,68 +184,36 @@ fn solved(scenario: &Scenario, grid: &Grid, solution: Solution, wanted: f64) -> 
             Some("the number of negative eigenvalues is not known: a dead moment has no energy, or the leaf is too fine to count them".into()),
         ),
     };
-    Equilibrium {
+    Found {
         outcome,
         remark: remark.or(solution.neutral.as_ref().map(|neutral| neutral.to_string())),
-        intervals: Some(solution.intervals.len() - 1),
-        residual: solution.defect,
-        error_estimate: Some(solution.error.position),
-        energy: solution.energy,
-        negative_eigenvalues: index,
-        ..blank(scenario, solution.rods)
+        accuracy: Accuracy {
+            intervals: Some(solution.intervals.len() - 1),
+            residual: Some(solution.defect),
+            error_estimate: Some(solution.error.position),
+            ..asked
+        },
+        energy: Some(solution.energy),
+        index,
+        rods: solution.rods,
     }
 }
 
 /// What a failure says: how far it came, and why not further.
-fn lost(scenario: &Scenario, failure: bvp::Failure) -> Equilibrium {
-    let outcome = match failure.reason {
-        Reason::Singular(_) => Outcome::Singular,
-        _ => Outcome::NotAtRest,
-    };
+fn lost(failure: bvp::Failure, accuracy: Accuracy) -> Found {
     let way = match failure.part {
         part if part < 1.0 => format!(" (at {part:.4} of the way from arcs to this leaf)"),
         _ => String::new(),
     };
-    Equilibrium {
-        outcome,
-        remark: Some(format!("{}{way}", failure.reason)),
-        ..blank(scenario, failure.rods)
-    }
-}
-
-fn blank(scenario: &Scenario, rods: Vec<RodShape>) -> Equilibrium {
-    let tips: Vec<_> = rods.iter().filter_map(|rod| rod.nodes.last()).collect();
-    let listed = if scenario.joined { 1 } else { tips.len() };
-    Equilibrium {
-        scenario: scenario.name.clone(),
-        method: "shooting",
-        outcome: Outcome::NotAtRest,
-        remark: None,
-        segments: Vec::new(),
-        intervals: None,
-        tolerance: f64::NAN,
-        residual: f64::NAN,
-        error_estimate: None,
-        energy: f64::NAN,
-        joined: scenario.joined,
-        tips: tips.iter().take(listed).map(|node| node.position).collect(),
-        tip_force_sum: tips
-            .iter()
-            .map(|node| node.rotation * node.n)
-            .sum::<DVec3>(),
-        negative_eigenvalues: None,
-        modes: None,
-        mode_shapes: false,
-        saddle: None,
-        model: Model {
-            rods: scenario.rods.len(),
-            ..Model::default()
+    Found {
+        outcome: match failure.reason {
+            Reason::Singular(_) => Outcome::Singular,
+            _ => Outcome::NotAtRest,
         },
-        work: Work::default(),
-        wall_seconds: 0.0,
-        stations: Vec::new(),
-        rods,
-        curves: Vec::new(),
-        undulation: Undulation::default(),
+        remark: Some(format!("{}{way}", failure.reason)),
+        accuracy,
+        energy: None,
+        index: None,
+        rods: failure.rods,
     }
 }

@@ -42,7 +42,7 @@ pub fn report(all: &All, folder: Option<&Path>) -> String {
 
 fn line(number: usize, found: &Found) -> String {
     let leaf = &found.equilibrium;
-    let stability = match leaf.negative_eigenvalues {
+    let stability = match leaf.stability.negative_eigenvalues {
         Some(0) => "stable".into(),
         Some(index) => format!("index {index}"),
         None => "of unknown stability".into(),
@@ -51,7 +51,7 @@ fn line(number: usize, found: &Found) -> String {
         [tip] => format!(", tip ({:.6}, {:.6}, {:.6})", tip.x, tip.y, tip.z),
         _ => String::new(),
     };
-    let within = match leaf.error_estimate {
+    let within = match leaf.accuracy.error_estimate {
         Some(error) => format!(", within {}", power_of_ten(error)),
         None => String::new(),
     };
@@ -67,6 +67,6 @@ fn line(number: usize, found: &Found) -> String {
     format!(
         "{:>2}. energy {:.10}: {stability}{tip}{within} ({starts}{plain})",
         number + 1,
-        leaf.energy
+        leaf.energy.unwrap_or(f64::NAN)
     )
 }

@@ -26,8 +26,8 @@ impl Format<Equilibrium> for Centerlines {
             .has_headers(false)
             .from_writer(out);
         table.write_record(HEADER)?;
-        for (index, rod) in equilibrium.rods.iter().enumerate() {
-            for (&sigma, node) in equilibrium.stations.iter().zip(&rod.nodes) {
+        for (index, rod) in equilibrium.shape.rods.iter().enumerate() {
+            for (&sigma, node) in equilibrium.shape.stations.iter().zip(&rod.nodes) {
                 table.serialize((index + 1, sigma, sigma * rod.length, columns(node)))?;
             }
         }
@@ -65,8 +65,8 @@ impl Format<Equilibrium> for ModesTable {
             .has_headers(false)
             .from_writer(out);
         table.write_record(MODES_HEADER)?;
-        let stations = &equilibrium.stations;
-        for (index, mode) in equilibrium.modes.iter().flatten().enumerate() {
+        let stations = &equilibrium.shape.stations;
+        for (index, mode) in equilibrium.stability.modes.iter().flatten().enumerate() {
             let of_mode = (index + 1, mode.eigenvalue, mode.error, mode.frequency());
             let rods = mode.displacement.iter().zip(&mode.rotation);
             for (rod, (displacement, rotation)) in rods.enumerate() {
@@ -110,8 +110,8 @@ mod tests {
     #[test]
     fn header_and_rows() {
         let mut leaf = sample::fan(3, 4);
-        leaf.rods[2].length = 2.0;
-        leaf.rods[2].nodes[4].m.z = 1e-7 / 3.0;
+        leaf.shape.rods[2].length = 2.0;
+        leaf.shape.rods[2].nodes[4].m.z = 1e-7 / 3.0;
         let mut bytes = Vec::new();
         Centerlines.write(&leaf, &mut bytes).unwrap();
         let text = String::from_utf8(bytes).unwrap();
@@ -124,7 +124,7 @@ mod tests {
         assert!(lines[1].starts_with("1,0.0,0.0,0.0,0.0,"), "{}", lines[1]);
 
         let last: Vec<&str> = lines[15].split(',').collect();
-        let node = &leaf.rods[2].nodes[4];
+        let node = &leaf.shape.rods[2].nodes[4];
         assert_eq!(last.len(), HEADER.len());
         assert_eq!(last[..3], ["3", "1.0", "2.0"]);
         let numbers: Vec<f64> = last[3..].iter().map(|cell| cell.parse().unwrap()).collect();

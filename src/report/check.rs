@@ -78,7 +78,7 @@ fn both(check: &Check) -> Vec<(&'static str, String)> {
             lines.push(("", format!("{tip} by shooting")));
         }
     }
-    let relaxed = significant(relaxed.energy);
+    let relaxed = significant(relaxed.energy.unwrap_or(f64::NAN));
     lines.push((
         "energy",
         match check.solution() {
@@ -110,7 +110,7 @@ fn differences(check: &Check) -> Vec<(&'static str, String)> {
                 Some(place) if found > 0.0 => format!(
                     "{word}s by {}{unit} at most, {}",
                     power_of_ten(found),
-                    whereabouts(place, check.relaxed.rods.len())
+                    whereabouts(place, check.relaxed.shape.rods.len())
                 ),
                 _ => format!("{word}s not at all"),
             };
@@ -134,7 +134,7 @@ fn errors(check: &Check) -> Vec<(&'static str, String)> {
     let relaxed = &check.relaxed;
     let mut lines = vec![(
         "error",
-        match relaxed.error_estimate {
+        match relaxed.accuracy.error_estimate {
             Some(error) => format!(
                 "relaxed: positions within {}, from {}",
                 bound(error),

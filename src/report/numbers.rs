@@ -1,5 +1,6 @@
-//! The only place that writes numbers for people to read.
+//! The only place that writes numbers for people to read, with [`crate::numbers`].
 
+pub use crate::numbers::{power_of_ten, superscript};
 use crate::relax::Equilibrium;
 
 /// Digits after the first that a result without an error estimate shows.
@@ -7,7 +8,7 @@ const DIGITS: i32 = 9;
 
 /// How many veins, and how their tips are.
 pub fn veins(equilibrium: &Equilibrium) -> String {
-    veins_of(equilibrium.rods.len(), equilibrium.joined)
+    veins_of(equilibrium.shape.rods.len(), equilibrium.shape.joined)
 }
 
 /// The same, of any leaf.
@@ -30,7 +31,12 @@ pub fn eigenvalues(count: Option<usize>) -> String {
 
 /// The grids of a relaxation.
 pub fn grids(equilibrium: &Equilibrium) -> String {
-    let grids: Vec<String> = equilibrium.segments.iter().map(usize::to_string).collect();
+    let grids: Vec<String> = equilibrium
+        .accuracy
+        .segments
+        .iter()
+        .map(usize::to_string)
+        .collect();
     format!("grids of {} segments a vein", grids.join(", "))
 }
 
@@ -53,6 +59,7 @@ pub fn seconds(time: f64) -> String {
 /// Length of the longest rod.
 pub fn longest_rod(equilibrium: &Equilibrium) -> f64 {
     equilibrium
+        .shape
         .rods
         .iter()
         .map(|rod| rod.length)
@@ -62,7 +69,11 @@ pub fn longest_rod(equilibrium: &Equilibrium) -> f64 {
 /// As many decimals of a position as the error leaves, and one more.
 pub fn decimals(equilibrium: &Equilibrium) -> usize {
     let relative = 10f64.powi(-DIGITS) * longest_rod(equilibrium);
-    let error = equilibrium.error_estimate.unwrap_or(relative).max(1e-16);
+    let error = equilibrium
+        .accuracy
+        .error_estimate
+        .unwrap_or(relative)
+        .max(1e-16);
     (1.0 - error.log10().ceil()).clamp(0.0, 15.0) as usize
 }
 
@@ -109,51 +120,9 @@ fn without_idle_zeros(digits: &str) -> &str {
     }
 }
 
-/// An upper bound for reading: two digits, rounded up so that it stays a
-/// bound, as in `3.1×10⁻⁹`.
-pub fn power_of_ten(bound: f64) -> String {
-    if bound.is_nan() || bound.is_infinite() {
-        return "∞".into();
-    }
-    if bound < f64::MIN_POSITIVE {
-        return "0".into();
-    }
-    let mut exponent = bound.log10().floor() as i32;
-    // A hair less, so that 3.0 stored as 3.0000000000000004 is not 3.1.
-    let mut tenths = (bound / 10f64.powi(exponent) * 10.0 * (1.0 - 1e-12)).ceil();
-    if tenths >= 100.0 {
-        tenths /= 10.0;
-        exponent += 1;
-    }
-    let mantissa = tenths / 10.0;
-    format!("{mantissa:.1}×10{}", superscript(exponent))
-}
-
-/// A power, as in `⁻⁹`.
-pub fn superscript(exponent: i32) -> String {
-    let raised = |c: char| match c {
-        '-' => '⁻',
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        digit => char::from_u32('⁰' as u32 + digit as u32 - '0' as u32).unwrap_or(digit),
-    };
-    exponent.to_string().chars().map(raised).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn bounds_are_rounded_up() {
-        assert_eq!(power_of_ten(3.01e-9), "3.1×10⁻⁹");
-        assert_eq!(power_of_ten(9.99e-12), "1.0×10⁻¹¹");
-        assert_eq!(power_of_ten(2.0), "2.0×10⁰");
-        assert_eq!(power_of_ten(3e-9), "3.0×10⁻⁹");
-        assert_eq!(power_of_ten(f64::INFINITY), "∞");
-        assert_eq!(power_of_ten(0.0), "0");
-    }
 
     #[test]
     fn numbers_keep_ten_digits() {

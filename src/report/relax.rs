@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use crate::relax::{Equilibrium, Method, Mode, Outcome};
-use crate::report::words::{model, shooting, verdict};
+use crate::relax::{Equilibrium, Mode, Outcome};
+use crate::report::words::{shooting, verdict};
 
 use super::numbers::{
     bound, brief, decimals, eigenvalues, grids, longest_rod, point, seconds, significant, veins,
@@ -16,7 +16,7 @@ const MODES_TOLD: usize = 6;
 /// What was solved, what was found, how well, and where the files are.
 pub fn report(equilibrium: &Equilibrium, folder: Option<&Path>) -> String {
     let mut lines = vec![("found", found(equilibrium))];
-    if let Some(saddle) = &equilibrium.saddle {
+    if let Some(saddle) = &equilibrium.stability.saddle {
         lines.push((
             "left",
             format!(
@@ -29,11 +29,11 @@ pub fn report(equilibrium: &Equilibrium, folder: Option<&Path>) -> String {
     }
     // Where shooting came no further, the shape is not yet this leaf's: it has
     // no energy, and its tip says nothing.
-    if equilibrium.energy.is_finite() {
+    if let Some(energy) = equilibrium.energy.filter(|energy| energy.is_finite()) {
         if let [tip] = equilibrium.tips.as_slice() {
             lines.push(("tip", point(tip.to_array(), decimals(equilibrium))));
         }
-        lines.push(("energy", significant(equilibrium.energy)));
+        lines.push(("energy", significant(energy)));
     }
     if let Some(waves) = waves(equilibrium) {
         lines.push(("waves", waves));
@@ -42,8 +42,8 @@ pub fn report(equilibrium: &Equilibrium, folder: Option<&Path>) -> String {
     if let Some(modes) = modes(equilibrium) {
         lines.push(("modes", modes));
     }
-    if !equilibrium.segments.is_empty() {
-        lines.push(("model", model(equilibrium)));
+    if !equilibrium.accuracy.segments.is_empty() {
+        lines.push(("model", equilibrium.model.description.clone()));
     }
     lines.push(("work", work(equilibrium)));
     if let Some(folder) = folder {
@@ -64,28 +64,27 @@ pub fn report(equilibrium: &Equilibrium, folder: Option<&Path>) -> String {
 /// The kind of equilibrium, or how far from one.
 pub fn found(equilibrium: &Equilibrium) -> String {
     let verdict = verdict(equilibrium);
-    match equilibrium.outcome {
-        Outcome::NotAtRest | Outcome::Diverged | Outcome::Singular
-            if equilibrium.residual.is_finite() =>
-        {
-            format!("{verdict} (residual {:.1e})", equilibrium.residual)
+    let residual = equilibrium.accuracy.residual.filter(|it| it.is_finite());
+    match (equilibrium.outcome, residual) {
+        (Outcome::NotAtRest | Outcome::Diverged | Outcome::Singular, Some(residual)) => {
+            format!("{verdict} (residual {residual:.1e})")
         }
-        _ => verdict + &eigenvalues(equilibrium.negative_eigenvalues),
+        _ => verdict + &eigenvalues(equilibrium.stability.negative_eigenvalues),
     }
 }
 
 fn error(equilibrium: &Equilibrium) -> String {
-    let source = match equilibrium.intervals {
+    let source = match equilibrium.accuracy.intervals {
         Some(count) => format!("by {}", shooting(count)),
         None => format!("from {}", grids(equilibrium)),
     };
-    let wanted = bound(equilibrium.tolerance * longest_rod(equilibrium));
-    match equilibrium.error_estimate {
+    let wanted = bound(equilibrium.accuracy.tolerance * longest_rod(equilibrium));
+    match equilibrium.accuracy.error_estimate {
         Some(error) => format!(
             "positions within {} (wanted {wanted}), {source}",
             bound(error)
         ),
-        None => match equilibrium.segments.as_slice() {
+        None => match equilibrium.accuracy.segments.as_slice() {
             [segments] => format!("not estimated on a single grid of {segments} segments a vein"),
             _ => "not known".into(),
         },
@@ -121,8 +120,11 @@ fn waves(equilibrium: &Equilibrium) -> Option<String> {
 
 /// The lowest eigenvalues, as growth rates and frequencies.
 fn modes(equilibrium: &Equilibrium) -> Option<String> {
-    let Some(modes) = &equilibrium.modes else {
-        return equilibrium.mode_shapes.then(|| "not known".into());
+    let Some(modes) = &equilibrium.stability.modes else {
+        return equilibrium
+            .stability
+            .mode_shapes
+            .then(|| "not known".into());
     };
     let unstable = |mode: &&Mode| mode.growth().is_some() && !mode.is_neutral();
     let list = |values: &mut dyn Iterator<Item = f64>| {
@@ -153,7 +155,7 @@ fn work(equilibrium: &Equilibrium) -> String {
     let (steps, factorizations, evaluations) =
         (work.steps, work.factorizations, work.force_evaluations);
     let time = seconds(equilibrium.wall_seconds);
-    if equilibrium.method == Method::Shooting.name() {
+    if equilibrium.method.is_shooting() {
         return format!(
             "{steps} corrections, {factorizations} linearisations, {evaluations} evaluations of all slopes in {time}"
         );

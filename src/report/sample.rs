@@ -6,7 +6,9 @@ use glam::{DQuat, DVec3};
 
 use crate::bvp::{self, Neutral, Solution};
 use crate::motion::{Energy, StableStep, Velocity};
-use crate::relax::{Equilibrium, Model, NodeState, Outcome, RodShape, Work};
+use crate::relax::{
+    self, Accuracy, Equilibrium, Method, Model, NodeState, Outcome, RodShape, Stability, Work,
+};
 use crate::scenario::Units;
 use crate::shape::Difference;
 use crate::simulate::{Frame, Moment, Record, Scheme, Still};
@@ -49,23 +51,28 @@ pub fn fan(rods: usize, segments: usize) -> Equilibrium {
         .collect();
     Equilibrium {
         scenario: "fan".into(),
-        method: "semi-implicit",
+        method: Method::default(),
         outcome: Outcome::Converged,
         remark: None,
-        model: Model::default(),
-        segments: vec![segments],
-        intervals: None,
-        tolerance: 1e-6,
-        residual: 1e-13,
-        error_estimate: Some(3e-9),
-        energy: 11.07,
-        joined: true,
+        rod_count: rods,
+        accuracy: Accuracy {
+            segments: vec![segments],
+            intervals: None,
+            tolerance: 1e-6,
+            residual: Some(1e-13),
+            error_estimate: Some(3e-9),
+        },
+        energy: Some(11.07),
         tips: vec![point(0, 1.0)],
         tip_force_sum: DVec3::ZERO,
-        negative_eigenvalues: Some(0),
-        modes: None,
-        mode_shapes: false,
-        saddle: None,
+        stability: Stability {
+            negative_eigenvalues: Some(0),
+            ..Stability::default()
+        },
+        undulation: Undulation {
+            veins: vec![Vein::default(); rods],
+        },
+        model: Model::default(),
         work: Work {
             steps: 8,
             factorizations: 9,
@@ -73,11 +80,11 @@ pub fn fan(rods: usize, segments: usize) -> Equilibrium {
             cg_iterations: 40,
         },
         wall_seconds: 0.01,
-        stations,
-        rods: shapes,
-        curves,
-        undulation: Undulation {
-            veins: vec![Vein::default(); rods],
+        shape: relax::Shape {
+            stations,
+            rods: shapes,
+            joined: true,
+            curves,
         },
     }
 }
@@ -87,13 +94,13 @@ pub fn fan(rods: usize, segments: usize) -> Equilibrium {
 pub fn check(rods: usize, segments: usize, angle: f64) -> Check {
     let relaxed = fan(rods, segments);
     let turn = DQuat::from_rotation_x(angle);
-    let mut shapes = relaxed.rods.clone();
+    let mut shapes = relaxed.shape.rods.clone();
     for node in shapes.iter_mut().flat_map(|rod| &mut rod.nodes) {
         node.position = turn * node.position;
         node.rotation = turn * node.rotation;
     }
     let at = |i: usize| {
-        let pairs = relaxed.rods.iter().zip(&shapes);
+        let pairs = relaxed.shape.rods.iter().zip(&shapes);
         pairs
             .map(|(a, b)| Difference::of(&a.nodes[i], &b.nodes[i]))
             .fold(Difference::default(), Difference::max)
@@ -102,7 +109,7 @@ pub fn check(rods: usize, segments: usize, angle: f64) -> Check {
     let difference = along.iter().copied().reduce(Difference::max);
     let still = vec![DVec3::ZERO; segments + 1];
     let solution = Solution {
-        stations: relaxed.stations.clone(),
+        stations: relaxed.shape.stations.clone(),
         rods: shapes,
         energy: 11.08,
         error: Difference {
@@ -211,7 +218,7 @@ pub fn trace() -> Trace {
         energy: 0.1 * value,
         index,
         undulation: Undulation::default(),
-        curves: leaf.curves.clone(),
+        curves: leaf.shape.curves.clone(),
     };
     let mut points: Vec<TracePoint> = (0..10)
         .map(|k| point(0.1 * f64::from(k), 0.0, usize::from(k >= 5)))
@@ -263,7 +270,7 @@ pub fn trace() -> Trace {
 /// That fan at a time, swinging up and down.
 pub fn frame(rods: usize, segments: usize, time: f64) -> Frame {
     let leaf = fan(rods, segments);
-    let nodes = || leaf.rods.iter().flat_map(|rod| &rod.nodes);
+    let nodes = || leaf.shape.rods.iter().flat_map(|rod| &rod.nodes);
     let swing = DVec3::new(1.0, 1.0, 2.0 * time.cos());
     let turn = DQuat::from_rotation_y(0.1 * time.sin());
     let positions: Vec<DVec3> = nodes().map(|node| node.position * swing).collect();

@@ -1,14 +1,13 @@
 //! Sentences about a result that the figure and the command line share.
 
-use super::numbers::power_of_ten;
-use crate::relax::{Equilibrium, Method, Outcome};
+use crate::relax::{Equilibrium, Outcome};
 use crate::study::{Contender, TraceEnd, Verdict};
 
 /// How the run ended and what was found, in one phrase.
 pub fn verdict(equilibrium: &Equilibrium) -> String {
     match equilibrium.outcome {
         Outcome::Converged => at_rest(equilibrium),
-        Outcome::ConvergedAfterSaddle => match &equilibrium.saddle {
+        Outcome::ConvergedAfterSaddle => match &equilibrium.stability.saddle {
             Some(saddle) => format!(
                 "{}, after leaving a saddle of index {}",
                 at_rest(equilibrium),
@@ -20,9 +19,7 @@ pub fn verdict(equilibrium: &Equilibrium) -> String {
         Outcome::ToleranceNotReached => {
             format!("{}, tolerance not reached", at_rest(equilibrium))
         }
-        Outcome::NotAtRest if equilibrium.method == Method::Shooting.name() => {
-            "no equilibrium".into()
-        }
+        Outcome::NotAtRest if equilibrium.method.is_shooting() => "no equilibrium".into(),
         Outcome::NotAtRest => "not at rest".into(),
         Outcome::Singular => "singular equations".into(),
         Outcome::Diverged => "diverged".into(),
@@ -30,7 +27,7 @@ pub fn verdict(equilibrium: &Equilibrium) -> String {
 }
 
 fn at_rest(equilibrium: &Equilibrium) -> String {
-    equilibrium_of_index(equilibrium.negative_eigenvalues)
+    equilibrium_of_index(equilibrium.stability.negative_eigenvalues)
 }
 
 /// What kind of equilibrium has so many negative eigenvalues.
@@ -40,38 +37,6 @@ pub fn equilibrium_of_index(negative_eigenvalues: Option<usize>) -> String {
         Some(index) => format!("unstable equilibrium of index {index}"),
         None => "equilibrium of unknown stability".into(),
     }
-}
-
-/// What was solved, and what of it matters: in one phrase.
-pub fn model(equilibrium: &Equilibrium) -> String {
-    let (model, veins) = (&equilibrium.model, equilibrium.rods.len());
-    let mut phrases = vec![match model.rods < veins {
-        true => format!(
-            "{} of {veins} veins, the others are their mirror images",
-            model.rods
-        ),
-        false if veins == 1 => "1 vein".into(),
-        false => format!("all {veins} veins"),
-    }];
-    if model.planar {
-        phrases.push("planar".into());
-    }
-    if !equilibrium.segments.is_empty() {
-        let grids: Vec<String> = equilibrium.segments.iter().map(usize::to_string).collect();
-        phrases.push(format!("{} segments", grids.join("+")));
-    }
-    if model.rods < veins {
-        phrases.push("stable against breaking the mirror".into());
-    }
-    if model.planar {
-        phrases.push("stable out of the plane".into());
-    }
-    for (effect, what) in [(model.shear, "shear"), (model.stretch, "stretch")] {
-        if let Some(effect) = effect {
-            phrases.push(format!("{what} matters by {}", power_of_ten(effect)));
-        }
-    }
-    phrases.join("; ")
 }
 
 /// The kind of shooting.

@@ -318,7 +318,7 @@ impl<'a> Simulation<'a> {
 fn at_rest(leaf: &Leaf, physics: &Physics, grid: &Grid, tolerance: f64) -> Result<State, Refused> {
     let scenario = at_beginning(leaf.scenario());
     let options = relax::Options {
-        segments: Some(grid.segments()),
+        method: relax::Method::default().on_grid(Some(grid.segments())),
         tolerance: Some(tolerance),
         ..relax::Options::default()
     };
@@ -328,7 +328,7 @@ fn at_rest(leaf: &Leaf, physics: &Physics, grid: &Grid, tolerance: f64) -> Resul
             outcome: found.outcome.word(),
         });
     }
-    let nodes = || found.rods.iter().flat_map(|rod| &rod.nodes);
+    let nodes = || found.shape.rods.iter().flat_map(|rod| &rod.nodes);
     Ok(State::new(
         grid.segments(),
         nodes()

@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
-use crate::relax::{Equilibrium, Options, RelaxError, relax};
+use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, relax};
 use crate::scenario::Scenario;
 use crate::shape::{RodShape, serialize_positions, serialize_tips};
 
@@ -53,7 +53,7 @@ impl Serialize for Found {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
         struct Keys<'a> {
-            energy: f64,
+            energy: Option<f64>,
             stable: Option<bool>,
             negative_eigenvalues: Option<usize>,
             #[serde(flatten, serialize_with = "serialize_tips")]
@@ -70,14 +70,14 @@ impl Serialize for Found {
         Keys {
             energy: leaf.energy,
             stable: leaf.stable(),
-            negative_eigenvalues: leaf.negative_eigenvalues,
+            negative_eigenvalues: leaf.stability.negative_eigenvalues,
             tips: &leaf.tips,
-            error_estimate: leaf.error_estimate,
-            segments: &leaf.segments,
+            error_estimate: leaf.accuracy.error_estimate,
+            segments: &leaf.accuracy.segments,
             starts: self.starts,
             plain: self.plain,
-            stations: &leaf.stations,
-            positions: &leaf.rods,
+            stations: &leaf.shape.stations,
+            positions: &leaf.shape.rods,
         }
         .serialize(serializer)
     }
@@ -91,7 +91,8 @@ impl Serialize for Found {
 /// Requests that cannot be met.
 pub fn all(
     scenario: &Scenario,
-    options: &Options,
+    how: SemiImplicit,
+    tolerance: Option<f64>,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<All, RelaxError> {
     let clock = std::time::Instant::now();
@@ -102,12 +103,19 @@ pub fn all(
         failed: 0,
         wall_seconds: 0.0,
     };
-    let plain = relax(scenario, options, &mut |_| {})?;
-    let any = Options {
-        keep_unstable: true,
-        ..options.clone()
+    let find = |how: SemiImplicit| {
+        let options = Options {
+            method: how.into(),
+            tolerance,
+            ..Options::default()
+        };
+        relax(scenario, &options, &mut |_| {})
     };
-    let any = relax(scenario, &any, &mut |_| {})?;
+    let plain = find(how)?;
+    let any = find(SemiImplicit {
+        keep_unstable: true,
+        ..how
+    })?;
     all.take(plain, true);
     all.take(any, false);
     let mut in_vain = 0;
@@ -116,11 +124,10 @@ pub fn all(
         let batch: Vec<Result<Equilibrium, RelaxError>> = (next..next + BATCH)
             .into_par_iter()
             .map(|number| {
-                let disturbed = Options {
+                find(SemiImplicit {
                     disturbance: Some(number),
-                    ..options.clone()
-                };
-                relax(scenario, &disturbed, &mut |_| {})
+                    ..how
+                })
             })
             .collect();
         next += BATCH;
@@ -136,7 +143,7 @@ pub fn all(
         progress(all.starts, all.found.len());
     }
     all.found.sort_by(|a, b| {
-        let [a, b] = [a, b].map(|found| found.equilibrium.energy);
+        let [a, b] = [a, b].map(|found| found.equilibrium.energy.unwrap_or(f64::NAN));
         a.total_cmp(&b)
     });
     all.wall_seconds = clock.elapsed().as_secs_f64();
@@ -166,17 +173,21 @@ impl All {
 }
 
 fn same(a: &Equilibrium, b: &Equilibrium) -> bool {
-    let longest = a.rods.iter().fold(0.0_f64, |m, rod| m.max(rod.length));
-    let errors = [a, b].map(|leaf| leaf.error_estimate.unwrap_or(0.0));
+    let longest = a
+        .shape
+        .rods
+        .iter()
+        .fold(0.0_f64, |m, rod| m.max(rod.length));
+    let errors = [a, b].map(|leaf| leaf.accuracy.error_estimate.unwrap_or(0.0));
     let within = (SAME * longest).max(2.0 * (errors[0] + errors[1]));
     // Their grids may differ: compared at the stations that both have.
-    let both: Vec<(usize, usize)> = (a.stations.iter().enumerate())
+    let both: Vec<(usize, usize)> = (a.shape.stations.iter().enumerate())
         .filter_map(|(i, sigma)| {
             let near = |other: &f64| (other - sigma).abs() < 1e-12;
-            Some((i, b.stations.iter().position(near)?))
+            Some((i, b.shape.stations.iter().position(near)?))
         })
         .collect();
-    a.rods.iter().zip(&b.rods).all(|(a, b)| {
+    a.shape.rods.iter().zip(&b.shape.rods).all(|(a, b)| {
         both.iter()
             .all(|&(i, j)| a.nodes[i].position.distance(b.nodes[j].position) < within)
     })

@@ -4,7 +4,9 @@ use std::time::Instant;
 
 use crate::bvp::{self, Failure, Solution, Start};
 use crate::leaf::{Grid, Leaf};
-use crate::relax::{self, Equilibrium, Options, Outcome, Progress, RelaxError, index_near};
+use crate::relax::{
+    self, Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit, index_near,
+};
 use crate::scenario::Scenario;
 use crate::shape::{Difference, RodShape};
 
@@ -146,16 +148,23 @@ impl Check {
     /// Whether the positions differ by no more than both error estimates
     /// together allow.
     pub fn within_estimates(&self) -> Option<bool> {
-        let estimate = self.relaxed.error_estimate? + self.solution()?.solution.error.position;
+        let estimate =
+            self.relaxed.accuracy.error_estimate? + self.solution()?.solution.error.position;
         Some(self.difference?.position <= estimate)
     }
 
     /// Where a quantity differs most.
     pub fn farthest(&self, quantity: Quantity) -> Option<Place> {
         let solution = &self.solution()?.solution;
-        let stations = &self.relaxed.stations;
+        let stations = &self.relaxed.shape.stations;
         let stride = (solution.stations.len() - 1) / (stations.len() - 1);
-        let rods = self.relaxed.rods.iter().zip(&solution.rods).enumerate();
+        let rods = self
+            .relaxed
+            .shape
+            .rods
+            .iter()
+            .zip(&solution.rods)
+            .enumerate();
         let found = rods.flat_map(|(rod, (a, b))| {
             let nodes = a.nodes.iter().zip(b.nodes.iter().step_by(stride));
             nodes.zip(stations).map(move |((a, b), &sigma)| {
@@ -170,12 +179,12 @@ impl Check {
     /// Distance of positions up to which the shapes are called the same, in
     /// units of length.
     pub fn allowed(&self) -> f64 {
-        self.relaxed.tolerance * longest(&self.relaxed)
+        self.relaxed.accuracy.tolerance * longest(&self.relaxed)
     }
 
     /// Angle between directors up to which the shapes are called the same.
     pub fn allowed_rotation(&self) -> f64 {
-        ROTATION_PART * self.relaxed.tolerance
+        ROTATION_PART * self.relaxed.accuracy.tolerance
     }
 }
 
@@ -191,7 +200,11 @@ pub fn check(
     relax::check_intervals(options.intervals)?;
     let asked = Options {
         tolerance: options.tolerance,
-        keep_unstable: options.keep_unstable,
+        method: SemiImplicit {
+            keep_unstable: options.keep_unstable,
+            ..SemiImplicit::default()
+        }
+        .into(),
         ..Options::default()
     };
     let relaxed = relax::relax(scenario, &asked, progress)?;
@@ -209,20 +222,23 @@ pub fn check(
             verdict: Verdict::NotCompared(why),
         });
     }
-    let stations = Grid::new(relaxed.stations.len() - 1, Leaf::new(scenario).kinks());
+    let stations = Grid::new(
+        relaxed.shape.stations.len() - 1,
+        Leaf::new(scenario).kinks(),
+    );
     let mut fine = stations.clone();
     while fine.segments() < SEGMENTS {
         fine = fine.refined();
     }
     let clock = Instant::now();
     let start = Start::Leaf {
-        stations: &relaxed.stations,
-        rods: &relaxed.rods,
+        stations: &relaxed.shape.stations,
+        rods: &relaxed.shape.rods,
     };
     let found = bvp::solve_within(
         scenario,
         start,
-        relaxed.tolerance,
+        relaxed.accuracy.tolerance,
         options.intervals,
         fine.sigma(),
     );
@@ -233,7 +249,7 @@ pub fn check(
     });
     let stride = fine.segments() / stations.segments();
     let along = match &shot {
-        Ok(shot) => differences(&relaxed.rods, &shot.solution.rods, stride),
+        Ok(shot) => differences(&relaxed.shape.rods, &shot.solution.rods, stride),
         Err(_) => Vec::new(),
     };
     let difference = along.iter().copied().reduce(Difference::max);
@@ -262,7 +278,11 @@ fn differences(coarse: &[RodShape], fine: &[RodShape], stride: usize) -> Vec<Dif
 }
 
 fn longest(leaf: &Equilibrium) -> f64 {
-    leaf.rods.iter().map(|rod| rod.length).fold(0.0, f64::max)
+    leaf.shape
+        .rods
+        .iter()
+        .map(|rod| rod.length)
+        .fold(0.0, f64::max)
 }
 
 fn judge(
@@ -270,7 +290,7 @@ fn judge(
     shot: &Result<Shot, Failure>,
     difference: Option<Difference>,
 ) -> Verdict {
-    let wanted = relaxed.tolerance * longest(relaxed);
+    let wanted = relaxed.accuracy.tolerance * longest(relaxed);
     match (shot, difference) {
         (Err(failure), _) => Verdict::NotCompared(failure.reason.to_string()),
         (Ok(shot), _) if shot.solution.error.position > wanted => Verdict::NotCompared(format!(
@@ -278,7 +298,8 @@ fn judge(
             shot.solution.error.position
         )),
         (_, Some(found))
-            if found.position <= wanted && found.rotation <= ROTATION_PART * relaxed.tolerance =>
+            if found.position <= wanted
+                && found.rotation <= ROTATION_PART * relaxed.accuracy.tolerance =>
         {
             Verdict::Agree
         }
@@ -307,8 +328,8 @@ mod tests {
     fn changed(mut check: Check, change: impl Fn(&mut Solution)) -> Check {
         let mut shot = check.shot.take().unwrap().unwrap();
         change(&mut shot.solution);
-        let stride = (shot.solution.stations.len() - 1) / (check.relaxed.stations.len() - 1);
-        check.along = differences(&check.relaxed.rods, &shot.solution.rods, stride);
+        let stride = (shot.solution.stations.len() - 1) / (check.relaxed.shape.stations.len() - 1);
+        check.along = differences(&check.relaxed.shape.rods, &shot.solution.rods, stride);
         check.difference = check.along.iter().copied().reduce(Difference::max);
         let shot = Ok(shot);
         check.verdict = judge(&check.relaxed, &shot, check.difference);
@@ -321,7 +342,7 @@ mod tests {
         let check = fan();
         assert_eq!(check.verdict, Verdict::Agree);
         assert_eq!(check.within_estimates(), Some(true));
-        assert_eq!(check.allowed(), 2.0 * check.relaxed.tolerance);
+        assert_eq!(check.allowed(), 2.0 * check.relaxed.accuracy.tolerance);
     }
 
     #[test]

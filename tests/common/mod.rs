@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use leafdyn::bvp::{self, Failure, Solution, Start};
 use leafdyn::leaf::{Leaf, Scale};
-use leafdyn::relax::{Equilibrium, NodeState, Options, RodShape, relax};
+use leafdyn::relax::{Equilibrium, NodeState, Options, RodShape, SemiImplicit, relax};
 use leafdyn::scenario::{Dynamics, Profile, Rod, Scenario, Units};
 use leafdyn::shape::Difference;
 
@@ -74,9 +74,13 @@ pub fn settle(scenario: &Scenario, tolerance: f64) -> Equilibrium {
 #[track_caller]
 pub fn settle_on(scenario: &Scenario, segments: usize, keep_unstable: bool) -> Equilibrium {
     let options = Options {
-        segments: Some(segments),
+        method: SemiImplicit {
+            segments: Some(segments),
+            keep_unstable,
+            ..SemiImplicit::default()
+        }
+        .into(),
         tolerance: Some(1e-9),
-        keep_unstable,
         ..Options::default()
     };
     let leaf = relax(scenario, &options, &mut |_| {}).unwrap();
@@ -93,8 +97,12 @@ pub fn settle_on(scenario: &Scenario, segments: usize, keep_unstable: bool) -> E
 /// An equilibrium as it is found by default, or by the full model.
 pub fn rest(scenario: &Scenario, full_model: bool, segments: Option<usize>) -> Equilibrium {
     let options = Options {
-        full_model,
-        segments,
+        method: SemiImplicit {
+            full_model,
+            segments,
+            ..SemiImplicit::default()
+        }
+        .into(),
         ..Options::default()
     };
     relax(scenario, &options, &mut |_| {}).unwrap()
@@ -113,7 +121,7 @@ pub fn tip(leaf: &Equilibrium) -> DVec3 {
 
 /// The last node of a rod.
 pub fn tip_node(leaf: &Equilibrium, rod: usize) -> NodeState {
-    *leaf.rods[rod].nodes.last().unwrap()
+    *leaf.shape.rods[rod].nodes.last().unwrap()
 }
 
 /// The angle by which the tip's tangent is turned from e1 towards `axis`.
@@ -148,7 +156,7 @@ pub fn tip_is(what: &str, leaf: &Equilibrium, wanted: DVec3, digits: f64, tolera
         "{what}: tip {} is {error:.1e} from {wanted}, allowed {tolerance:.1e}",
         tip(leaf)
     );
-    let estimate = leaf.error_estimate.unwrap();
+    let estimate = leaf.accuracy.error_estimate.unwrap();
     assert!(
         error <= estimate + digits,
         "{what}: the error {error:.1e} is more than its estimate {estimate:.1e}"
@@ -276,12 +284,17 @@ pub fn fig04(rods: usize) -> Scenario {
 pub fn distance(a: &Equilibrium, b: &Equilibrium) -> f64 {
     let mut largest = 0.0_f64;
     let mut shared = 0;
-    for (i, sigma) in a.stations.iter().enumerate() {
-        let Some(k) = b.stations.iter().position(|s| (s - sigma).abs() < 1e-12) else {
+    for (i, sigma) in a.shape.stations.iter().enumerate() {
+        let Some(k) = b
+            .shape
+            .stations
+            .iter()
+            .position(|s| (s - sigma).abs() < 1e-12)
+        else {
             continue;
         };
         shared += 1;
-        for (p, q) in a.rods.iter().zip(&b.rods) {
+        for (p, q) in a.shape.rods.iter().zip(&b.shape.rods) {
             largest = largest.max((p.nodes[i].position - q.nodes[k].position).length());
         }
     }
@@ -301,13 +314,13 @@ pub fn shoot_over(
     leaf: &Equilibrium,
 ) -> Result<Solution, Failure> {
     let start = Start::Leaf {
-        stations: &leaf.stations,
-        rods: &leaf.rods,
+        stations: &leaf.shape.stations,
+        rods: &leaf.shape.rods,
     };
     let options = bvp::Options {
         tolerance: SHARP,
         intervals,
-        stations: leaf.stations.clone(),
+        stations: leaf.shape.stations.clone(),
     };
     bvp::solve(scenario, start, &options)
 }
@@ -346,8 +359,8 @@ pub fn apart(scenario: &Scenario, a: &[RodShape], b: &[RodShape]) -> Difference 
 /// `position`, and to ten times that in rotation, force, moment, and energy.
 #[track_caller]
 pub fn agree(what: &str, scenario: &Scenario, leaf: &Equilibrium, shot: &Solution, position: f64) {
-    let found = apart(scenario, &leaf.rods, &shot.rods);
-    let energy = (leaf.energy - shot.energy).abs() / scale(scenario).moment();
+    let found = apart(scenario, &leaf.shape.rods, &shot.rods);
+    let energy = (leaf.energy.unwrap() - shot.energy).abs() / scale(scenario).moment();
     let others = [found.rotation, found.force, found.moment, energy];
     assert!(
         found.position <= position && others.iter().all(|value| *value <= 10.0 * position),

@@ -4,7 +4,7 @@
 use glam::DVec3;
 use leafdyn::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use leafdyn::motion::{Explicit, Method, Physics, SemiImplicit, Snapshot, Steps};
-use leafdyn::relax::{Options, relax, start};
+use leafdyn::relax::{self, Options, relax, start};
 use leafdyn::scenario::{Profile, Rod, Scenario, Schedule};
 
 use crate::common::paper_leaf;
@@ -84,16 +84,16 @@ pub fn discrete<'a>(leaf: &'a Leaf<'a>, segments: usize) -> DiscreteLeaf<'a> {
 pub fn rest(scenario: &Scenario, segments: usize) -> State {
     let resting = at_beginning(scenario);
     let options = Options {
-        segments: Some(segments),
+        method: relax::Method::default().on_grid(Some(segments)),
         tolerance: Some(1e-12),
         ..Options::default()
     };
     let found = relax(&resting, &options, &mut |_| {}).unwrap();
     assert!(found.outcome.is_success(), "{:?}", found.outcome);
     let length = Leaf::new(scenario).scale.length;
-    let nodes = || found.rods.iter().flat_map(|rod| &rod.nodes);
+    let nodes = || found.shape.rods.iter().flat_map(|rod| &rod.nodes);
     State::new(
-        found.stations.len() - 1,
+        found.shape.stations.len() - 1,
         nodes().map(|node| node.position / length).collect(),
         nodes().map(|node| node.rotation).collect(),
     )

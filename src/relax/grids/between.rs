@@ -2,7 +2,7 @@
 
 use super::settle::From;
 use super::{Level, Run};
-use crate::relax::options::Method;
+use crate::relax::method::Method;
 use crate::relax::prolong::{between, predict};
 use crate::relax::report;
 use crate::relax::richardson::Richardson;
@@ -24,7 +24,7 @@ impl<'a> Run<'a, '_> {
             .error()
             .is_some_and(|error| error <= BETWEEN * self.tolerance);
         let clean = (self.table.best()).is_some_and(|best| best.columns + 1 == self.levels.len());
-        if !near || !clean || self.options.method != Method::SemiImplicit {
+        if !near || !clean || !matches!(self.options.method, Method::SemiImplicit(_)) {
             return false;
         }
         let mut state = between(&fine.state);

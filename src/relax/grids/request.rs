@@ -2,7 +2,8 @@
 
 use super::{COARSEST, FINEST};
 use crate::leaf::Leaf;
-use crate::relax::options::{MAX_NODES, Method, Options, RelaxError};
+use crate::relax::method::Method;
+use crate::relax::options::{MAX_NODES, RelaxError};
 
 /// Segments of the coarsest grid if the tolerance is loose, that is if it is at
 /// least so large, and the leaf settles in the valley it starts in.
@@ -16,21 +17,20 @@ pub const COARSEST_TURN: f64 = 0.8;
 
 /// Whether the leaf settles in the valley it starts in: where the way to rest is
 /// Newton's, nothing keeps it from leaving saddles, and nothing disturbs it.
-fn settles_where_it_starts(options: &Options) -> bool {
-    options.method == Method::SemiImplicit
-        && !options.keep_unstable
-        && options.disturbance.is_none()
+fn settles_where_it_starts(method: Method) -> bool {
+    matches!(method, Method::SemiImplicit(how) if !how.keep_unstable && how.disturbance.is_none())
 }
 
 /// Whether half of a leaf, or the leaf in its plane, may be solved for the
 /// whole.
-pub fn reducible(options: &Options) -> bool {
-    settles_where_it_starts(options) && !options.full_model
+pub fn reducible(method: Method) -> bool {
+    settles_where_it_starts(method)
+        && matches!(method, Method::SemiImplicit(how) if !how.full_model)
 }
 
 /// Segments of the coarsest grid, unless a leaf needs more.
-pub fn least(options: &Options, tolerance: f64) -> usize {
-    match settles_where_it_starts(options) && tolerance >= LOOSE {
+pub fn least(method: Method, tolerance: f64) -> usize {
+    match settles_where_it_starts(method) && tolerance >= LOOSE {
         true => COARSEST_OF_LOOSE,
         false => COARSEST,
     }

@@ -4,8 +4,9 @@ use super::stability::saddle_of;
 use super::{BUDGET, Level, MAX_SADDLES, Run};
 use crate::leaf::{DiscreteLeaf, Grid, Solved, State, System, half_of};
 use crate::relax::explicit;
+use crate::relax::method::{Method, SemiImplicit};
 use crate::relax::moment;
-use crate::relax::options::{Method, Progress};
+use crate::relax::options::Progress;
 use crate::relax::saddle;
 use crate::relax::semi_implicit::{Relaxation, Settled};
 use crate::relax::start::{disturb, start};
@@ -59,7 +60,11 @@ impl<'a> Run<'a, '_> {
             From::Start => match self.whole {
                 None => {
                     let mut state = start(&leaf);
-                    if let Some(number) = self.options.disturbance {
+                    if let Method::SemiImplicit(SemiImplicit {
+                        disturbance: Some(number),
+                        ..
+                    }) = self.options.method
+                    {
                         disturb(&leaf, number, &mut state);
                     }
                     state
@@ -74,11 +79,12 @@ impl<'a> Run<'a, '_> {
         let mut system = System::new(&leaf);
         let segments = leaf.segments();
         let first = (self.levels.first()).map_or(segments, |first| first.leaf.segments());
-        let accuracy = match self.options.segments {
+        let accuracy = match self.segments() {
             Some(_) => FIXED_ACCURACY,
             None if self.too_coarse(first) => ITERATION_PART_FROM_COARSE * self.tolerance,
             None => ITERATION_PART * self.tolerance,
         };
+        let keeps_unstable = self.keeps_unstable();
         let convex_only = self.whole.is_some() || self.too_coarse(segments);
         let progress = &mut *self.progress;
         let mut tell = |step: usize, residual: f64| {
@@ -88,7 +94,7 @@ impl<'a> Run<'a, '_> {
                 residual,
             });
         };
-        if self.options.method == Method::Explicit {
+        if let Method::Explicit { .. } = self.options.method {
             let mut request = explicit::Request {
                 accuracy,
                 near_rest,
@@ -116,7 +122,7 @@ impl<'a> Run<'a, '_> {
             );
             return (Level { leaf, state }, settled, false);
         }
-        if self.options.keep_unstable {
+        if keeps_unstable {
             let settled = saddle::newton(
                 &leaf,
                 &mut state,

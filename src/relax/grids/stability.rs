@@ -46,8 +46,8 @@ impl<'a> Run<'a, '_> {
         if !matches!(self.index, Some(1..)) {
             return Ok(());
         }
-        if self.options.keep_unstable {
-            return if before == self.index || self.options.segments.is_some() {
+        if self.keeps_unstable() {
+            return if before == self.index || self.segments().is_some() {
                 Ok(())
             } else {
                 Err(None)
@@ -73,7 +73,7 @@ impl<'a> Run<'a, '_> {
         self.table = Richardson::default();
         self.push(level);
         match settled {
-            Settled::Rest(_) if self.options.segments.is_some() => self.judge_stability(),
+            Settled::Rest(_) if self.segments().is_some() => self.judge_stability(),
             Settled::Rest(_) => Err(None),
             _ => Err(Some(settled)),
         }

@@ -57,8 +57,8 @@ struct Relaxation<'a> {
     remark: Option<&'a str>,
     segments: &'a [usize],
     error_estimate: Option<f64>,
-    residual: f64,
-    energy: f64,
+    residual: Option<f64>,
+    energy: Option<f64>,
     tip: Option<Point>,
     #[serde(skip_serializing_if = "Option::is_none")]
     tips: Option<Vec<Point>>,
@@ -113,14 +113,14 @@ impl<'a> From<&'a Check> for Object<'a> {
                 Verdict::NotCompared(reason) => Some(reason),
                 _ => None,
             },
-            rods: relaxed.rods.len(),
-            tolerance: relaxed.tolerance,
+            rods: relaxed.shape.rods.len(),
+            tolerance: relaxed.accuracy.tolerance,
             difference: check.difference.map(Differences::from),
             within_estimates: check.within_estimates(),
             relaxation: Relaxation::from(relaxed),
             shooting: check.shot.as_ref().map(|shot| {
                 let shooting = match shot {
-                    Ok(shot) => Shooting::solved(shot, relaxed.joined),
+                    Ok(shot) => Shooting::solved(shot, relaxed.shape.joined),
                     Err(failure) => Shooting::failed(failure),
                 };
                 Shooting {
@@ -128,7 +128,7 @@ impl<'a> From<&'a Check> for Object<'a> {
                     ..shooting
                 }
             }),
-            stations: &relaxed.stations,
+            stations: &relaxed.shape.stations,
             differences: check.along.iter().copied().map(Differences::from).collect(),
         }
     }
@@ -157,14 +157,14 @@ impl<'a> From<&'a Equilibrium> for Relaxation<'a> {
         Relaxation {
             outcome: relaxed.outcome.word(),
             remark: relaxed.remark.as_deref(),
-            segments: &relaxed.segments,
-            error_estimate: relaxed.error_estimate,
-            residual: relaxed.residual,
+            segments: &relaxed.accuracy.segments,
+            error_estimate: relaxed.accuracy.error_estimate,
+            residual: relaxed.accuracy.residual,
             energy: relaxed.energy,
             tip,
             tips,
             stable: relaxed.stable(),
-            negative_eigenvalues: relaxed.negative_eigenvalues,
+            negative_eigenvalues: relaxed.stability.negative_eigenvalues,
             wall_seconds: relaxed.wall_seconds,
         }
     }
@@ -263,7 +263,7 @@ mod tests {
         check.shot = Some(Err(Failure {
             reason,
             part: 1.0,
-            rods: check.relaxed.rods.clone(),
+            rods: check.relaxed.shape.rods.clone(),
             work: bvp::Work::default(),
         }));
         check.difference = None;
@@ -366,7 +366,7 @@ mod tests {
     #[test]
     fn free_tips_are_listed() {
         let mut check = sample::check(3, 4, 0.0);
-        check.relaxed.joined = false;
+        check.relaxed.shape.joined = false;
         check.relaxed.tips = vec![check.relaxed.tips[0]; 3];
         let check = value(&check);
         for method in ["relaxation", "shooting"] {

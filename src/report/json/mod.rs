@@ -4,6 +4,7 @@ mod chart;
 mod check;
 mod map;
 mod motion;
+#[cfg(test)]
 mod summary;
 mod trace;
 
@@ -19,7 +20,6 @@ pub use chart::ChartSummary;
 pub use check::CheckSummary;
 pub use map::MapSummary;
 pub use motion::MotionSummary;
-pub use summary::Summary;
 pub use trace::TraceSummary;
 
 type Point = [f64; 3];

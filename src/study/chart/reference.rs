@@ -43,12 +43,12 @@ pub fn find(
     wanted: Vec<f64>,
 ) -> Result<Option<(Reference, Shape)>, RelaxError> {
     let relaxed = best_relaxed(scenario)?;
-    let stations = relaxed.iter().flat_map(|leaf| &leaf.stations);
+    let stations = relaxed.iter().flat_map(|leaf| &leaf.shape.stations);
     let stations = union(wanted.into_iter().chain(stations.copied()).collect());
     let start = match &relaxed {
         Some(leaf) => Start::Leaf {
-            stations: &leaf.stations,
-            rods: &leaf.rods,
+            stations: &leaf.shape.stations,
+            rods: &leaf.shape.rods,
         },
         None => Start::Arcs,
     };
@@ -69,7 +69,7 @@ pub fn find(
                 difference: None,
                 neutral: None,
             };
-            Some((reference, Shape::new(leaf.stations, &leaf.rods)))
+            Some((reference, Shape::new(leaf.shape.stations, &leaf.shape.rods)))
         }
         (None, Ok(solution)) => {
             let error = solution.error.position / unit;
@@ -90,7 +90,8 @@ pub fn find(
 }
 
 fn estimate(leaf: &Equilibrium, unit: f64) -> f64 {
-    leaf.error_estimate
+    leaf.accuracy
+        .error_estimate
         .map_or(f64::INFINITY, |error| error / unit)
 }
 
@@ -113,7 +114,7 @@ fn best_relaxed(scenario: &Scenario) -> Result<Option<Equilibrium>, RelaxError> 
     }
     let better = at(SMALLEST_TOLERANCE)?;
     Ok(better
-        .filter(|leaf| leaf.error_estimate <= first.error_estimate)
+        .filter(|leaf| leaf.accuracy.error_estimate <= first.accuracy.error_estimate)
         .or(Some(first)))
 }
 
@@ -121,7 +122,7 @@ fn best_relaxed(scenario: &Scenario) -> Result<Option<Equilibrium>, RelaxError> 
 /// otherwise the one that claims to be better.
 fn both(leaf: Equilibrium, solution: Solution, unit: f64) -> (Reference, Shape) {
     let (relaxed, shot) = (estimate(&leaf, unit), solution.error.position / unit);
-    let leaf = Shape::new(leaf.stations, &leaf.rods);
+    let leaf = Shape::new(leaf.shape.stations, &leaf.shape.rods);
     let neutral = solution.neutral.as_ref().map(Neutral::to_string);
     let solution = Shape::new(solution.stations, &solution.rods);
     let difference = leaf.distance(&solution).map(|distance| distance / unit);
@@ -178,10 +179,11 @@ mod tests {
         let scenario = leaf();
         let relaxed = best_relaxed(&scenario).unwrap().unwrap();
         let start = Start::Leaf {
-            stations: &relaxed.stations,
-            rods: &relaxed.rods,
+            stations: &relaxed.shape.stations,
+            rods: &relaxed.shape.rods,
         };
-        let solution = bvp::solve_within(&scenario, start, 1e-12, None, &relaxed.stations).unwrap();
+        let solution =
+            bvp::solve_within(&scenario, start, 1e-12, None, &relaxed.shape.stations).unwrap();
         let mut elsewhere = solution.clone();
         for rod in &mut elsewhere.rods {
             for node in &mut rod.nodes {

@@ -125,11 +125,13 @@ pub fn run(cell: &Cell) -> Result<(Run, f64), RelaxError> {
         Setting::Tolerance(tolerance) => (Some(tolerance), None),
         Setting::Segments(segments) => (None, Some(segments)),
     };
-    let (method, intervals) = match contender {
-        Contender::SemiImplicit | Contender::SemiImplicitGrid => (Method::SemiImplicit, None),
-        Contender::Explicit | Contender::ExplicitGrid => (Method::Explicit, None),
-        Contender::SingleShooting => (Method::Shooting, Some(1)),
-        Contender::MultipleShooting => (Method::Shooting, None),
+    let method = match contender {
+        Contender::SemiImplicit | Contender::SemiImplicitGrid => {
+            Method::default().on_grid(segments)
+        }
+        Contender::Explicit | Contender::ExplicitGrid => Method::Explicit { segments },
+        Contender::SingleShooting => Method::SingleShooting,
+        Contender::MultipleShooting => Method::Shooting { intervals: None },
         Contender::RelaxedShooting => {
             let accuracy = tolerance.unwrap_or(scenario.tolerance);
             let clock = Instant::now();
@@ -141,8 +143,6 @@ pub fn run(cell: &Cell) -> Result<(Run, f64), RelaxError> {
     let options = Options {
         method,
         tolerance,
-        segments,
-        intervals,
         ..Options::default()
     };
     let clock = Instant::now();
@@ -155,9 +155,12 @@ fn relaxed_run(scenario: &Scenario, leaf: Equilibrium) -> Run {
     Run {
         outcome: leaf.outcome,
         remark: leaf.remark,
-        estimate: leaf.error_estimate.map(|error| error / longest(scenario)),
+        estimate: leaf
+            .accuracy
+            .error_estimate
+            .map(|error| error / longest(scenario)),
         work: leaf.work,
-        shape: Shape::new(leaf.stations, &leaf.rods),
+        shape: Shape::new(leaf.shape.stations, &leaf.shape.rods),
     }
 }
 
@@ -175,10 +178,10 @@ fn shoot_from_relaxed(
     let at_rest = relaxed.outcome.is_success() || relaxed.outcome == Outcome::ToleranceNotReached;
     let shot = at_rest.then(|| {
         let start = Start::Leaf {
-            stations: &relaxed.stations,
-            rods: &relaxed.rods,
+            stations: &relaxed.shape.stations,
+            rods: &relaxed.shape.rods,
         };
-        bvp::solve_within(scenario, start, accuracy, None, &relaxed.stations)
+        bvp::solve_within(scenario, start, accuracy, None, &relaxed.shape.stations)
     });
     Ok((relaxed, shot))
 }

@@ -112,9 +112,9 @@ pub fn relaxed(scenario: &Scenario, options: &Options) -> Found {
     if let Some(outcome) = outcome {
         return Found::Failed(outcome, remark);
     }
-    let estimate = match leaf.error_estimate {
+    let estimate = match leaf.accuracy.error_estimate {
         Some(estimate) => Some(estimate),
-        None => grid_error(scenario, options).map(|error| error + leaf.tolerance),
+        None => grid_error(scenario, options).map(|error| error + leaf.accuracy.tolerance),
     };
     let Some(estimate) = estimate else {
         let why = "the error of the grid cannot be told: a finer one finds no rest";
@@ -122,12 +122,12 @@ pub fn relaxed(scenario: &Scenario, options: &Options) -> Found {
     };
     Found::Rest(Box::new(Answer {
         undulation: leaf.undulation,
-        stations: leaf.stations,
-        rods: leaf.rods,
-        energy: leaf.energy,
-        index: leaf.negative_eigenvalues,
+        stations: leaf.shape.stations,
+        rods: leaf.shape.rods,
+        energy: leaf.energy.unwrap_or(f64::NAN),
+        index: leaf.stability.negative_eigenvalues,
         estimate,
-        note: match leaf.saddle {
+        note: match leaf.stability.saddle {
             Some(saddle) => format!("left a saddle of index {}", saddle.negative_eigenvalues),
             None => remark,
         },
@@ -142,11 +142,10 @@ pub const SAME_PLACE: f64 = 0.05;
 /// grids are fine enough for their series.
 pub fn grid_error(scenario: &Scenario, options: &Options) -> Option<f64> {
     const SAFETY: f64 = 2.0;
-    let segments = options.segments?;
+    let segments = options.method.segments()?;
     let on = |segments: usize| {
         let options = Options {
-            segments: Some(segments),
-            method: relax::Method::SemiImplicit,
+            method: relax::Method::default().on_grid(Some(segments)),
             ..options.clone()
         };
         let leaf = relax::relax(scenario, &options, &mut |_| {}).ok()?;
@@ -154,8 +153,8 @@ pub fn grid_error(scenario: &Scenario, options: &Options) -> Option<f64> {
     };
     let (coarse, fine) = (on(segments)?, on(2 * segments)?);
     let apart = distance(
-        (&coarse.stations, &coarse.rods),
-        (&fine.stations, &fine.rods),
+        (&coarse.shape.stations, &coarse.shape.rods),
+        (&fine.shape.stations, &fine.shape.rods),
     );
     Some((SAFETY * apart).min(SAME_PLACE * longest(scenario)))
 }

@@ -129,8 +129,7 @@ impl<'a> Cell<'a> {
         let relaxation = |method: Method| {
             timed(self.limit, |deadline| {
                 let options = Options {
-                    method,
-                    segments: self.knobs.segments,
+                    method: method.on_grid(self.knobs.segments),
                     tolerance: Some(self.tolerance),
                     deadline: Some(deadline),
                     ..Options::default()
@@ -147,8 +146,8 @@ impl<'a> Cell<'a> {
         };
         match method {
             MapMethod::SemiImplicit if self.knobs.segments.is_none() => self.relaxed.clone(),
-            MapMethod::SemiImplicit => relaxation(Method::SemiImplicit),
-            MapMethod::Explicit => relaxation(Method::Explicit),
+            MapMethod::SemiImplicit => relaxation(Method::default()),
+            MapMethod::Explicit => relaxation(Method::Explicit { segments: None }),
             MapMethod::ExplicitMotion => timed(self.limit, |deadline| {
                 motion::answer(self.scenario, self.knobs, self.tolerance, deadline)
             }),

@@ -90,7 +90,7 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, deadline: Insta
         index => index,
     };
     let options = Options {
-        segments: Some(segments),
+        method: relax::Method::default().on_grid(Some(segments)),
         tolerance: Some(tolerance),
         deadline: Some(deadline),
         ..Options::default()

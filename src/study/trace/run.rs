@@ -13,7 +13,7 @@ use crate::branch::{
     refine_critical, switch, walk,
 };
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
-use crate::relax::{Equilibrium, Options, node_state, project, relax};
+use crate::relax::{Equilibrium, Options, SemiImplicit, node_state, project, relax};
 use crate::scenario::Scenario;
 use crate::shape::RodShape;
 use crate::undulation::Undulation;
@@ -53,7 +53,11 @@ pub fn trace(
     let tolerance = request.tolerance.unwrap_or(scenario.tolerance);
     let options = Options {
         tolerance: Some(tolerance),
-        keep_unstable: request.keep_unstable,
+        method: SemiImplicit {
+            keep_unstable: request.keep_unstable,
+            ..SemiImplicit::default()
+        }
+        .into(),
         ..Options::default()
     };
     let first = relax(&scenario, &options, &mut |_| {})?;
@@ -74,7 +78,7 @@ pub fn trace(
         factorizations: 0,
         wall_seconds: 0.0,
     };
-    if first.negative_eigenvalues.is_none() {
+    if first.stability.negative_eigenvalues.is_none() {
         trace.remark = Some(format!(
             "no equilibrium to begin with at {keys} = {}: {}",
             keys.text(ends[0]),
@@ -110,10 +114,10 @@ fn beginning(
     first: &Equilibrium,
     segments: Option<usize>,
 ) -> Result<(Grid, State), TraceError> {
-    let coarse = Grid::new(first.stations.len() - 1, leaf.kinks());
+    let coarse = Grid::new(first.shape.stations.len() - 1, leaf.kinks());
     let discrete = DiscreteLeaf::new(leaf, coarse);
     let mut grid = discrete.grid.clone();
-    let mut state = project(leaf, &discrete, &first.rods);
+    let mut state = project(leaf, &discrete, &first.shape.rods);
     let wanted = match segments {
         None => 2 * grid.segments(),
         Some(wanted) => crate::relax::check_segments(leaf, Some(wanted), wanted)?,
@@ -135,7 +139,7 @@ fn unsettled(family: &Family, grid: &Grid, state: &State, first: &Equilibrium) -
     let found = Equations::new(family, grid.clone())
         .ok()
         .and_then(|mut equations| equations.correct(state, 0.0, None).ok());
-    found.is_none_or(|(point, _)| Some(point.index) != first.negative_eigenvalues)
+    found.is_none_or(|(point, _)| Some(point.index) != first.stability.negative_eigenvalues)
 }
 
 /// A place where another branch begins.

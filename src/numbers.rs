@@ -1,0 +1,48 @@
+//! Numbers as people read them.
+
+/// An upper bound for reading: two digits, rounded up so that it stays a
+/// bound, as in `3.1×10⁻⁹`.
+pub fn power_of_ten(bound: f64) -> String {
+    if bound.is_nan() || bound.is_infinite() {
+        return "∞".into();
+    }
+    if bound < f64::MIN_POSITIVE {
+        return "0".into();
+    }
+    let mut exponent = bound.log10().floor() as i32;
+    // A hair less, so that 3.0 stored as 3.0000000000000004 is not 3.1.
+    let mut tenths = (bound / 10f64.powi(exponent) * 10.0 * (1.0 - 1e-12)).ceil();
+    if tenths >= 100.0 {
+        tenths /= 10.0;
+        exponent += 1;
+    }
+    let mantissa = tenths / 10.0;
+    format!("{mantissa:.1}×10{}", superscript(exponent))
+}
+
+/// A power, as in `⁻⁹`.
+pub fn superscript(exponent: i32) -> String {
+    let raised = |c: char| match c {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        digit => char::from_u32('⁰' as u32 + digit as u32 - '0' as u32).unwrap_or(digit),
+    };
+    exponent.to_string().chars().map(raised).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_are_rounded_up() {
+        assert_eq!(power_of_ten(3.01e-9), "3.1×10⁻⁹");
+        assert_eq!(power_of_ten(9.99e-12), "1.0×10⁻¹¹");
+        assert_eq!(power_of_ten(2.0), "2.0×10⁰");
+        assert_eq!(power_of_ten(3e-9), "3.0×10⁻⁹");
+        assert_eq!(power_of_ten(f64::INFINITY), "∞");
+        assert_eq!(power_of_ten(0.0), "0");
+    }
+}

@@ -1,0 +1,179 @@
+//! The methods by which a leaf is brought to rest, each with its own options.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Serialize, Serializer};
+
+/// How a leaf is brought to rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Method {
+    /// Linearly implicit damped motion that turns into Newton's method.
+    SemiImplicit(SemiImplicit),
+    /// Explicit damped motion, then with masses and damping chosen for speed.
+    /// Not for rigid rods.
+    Explicit {
+        /// One grid of so many segments a rod, without extrapolation; `None`: as
+        /// fine as the tolerance needs.
+        segments: Option<usize>,
+    },
+    /// The boundary-value problem in one piece ([`crate::bvp`]), from arcs by
+    /// continuation. Finds equilibria, stable or not.
+    SingleShooting,
+    /// The boundary-value problem by multiple shooting, from arcs by continuation.
+    /// Finds equilibria, stable or not.
+    Shooting {
+        /// Number of intervals; `None`: as many as the growth of perturbations
+        /// needs.
+        intervals: Option<usize>,
+    },
+    /// The boundary-value problem by multiple shooting, from the leaf relaxed to a
+    /// coarse tolerance.
+    ShootingFromRest {
+        /// Number of intervals; `None`: as many as the growth of perturbations
+        /// needs.
+        intervals: Option<usize>,
+    },
+}
+
+/// Options of the semi-implicit method.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SemiImplicit {
+    /// One grid of so many segments a rod, without extrapolation; `None`: as fine
+    /// as the tolerance needs.
+    pub segments: Option<usize>,
+    /// Whether to stop at a saddle instead of leaving it. Newton's method is
+    /// then not steered towards stable equilibria at all.
+    pub keep_unstable: bool,
+    /// Whether to solve for the whole leaf, in space, where half of it or its
+    /// plane would do.
+    pub full_model: bool,
+    /// Begin not in the plain start but in the one of this number in an endless
+    /// series of disturbed ones: the leaf thrown out of its plane, each in its own
+    /// way, a number and the next to opposite sides.
+    pub disturbance: Option<usize>,
+}
+
+impl Default for Method {
+    fn default() -> Self {
+        Method::SemiImplicit(SemiImplicit::default())
+    }
+}
+
+impl Method {
+    /// All of them, with nothing special asked of them.
+    pub const ALL: [Method; 5] = [
+        Method::SemiImplicit(SemiImplicit {
+            segments: None,
+            keep_unstable: false,
+            full_model: false,
+            disturbance: None,
+        }),
+        Method::Explicit { segments: None },
+        Method::SingleShooting,
+        Method::Shooting { intervals: None },
+        Method::ShootingFromRest { intervals: None },
+    ];
+
+    /// The word for it on the command line and in files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Method::SemiImplicit(_) => "semi-implicit",
+            Method::Explicit { .. } => "explicit",
+            Method::SingleShooting => "single-shooting",
+            Method::Shooting { .. } => "shooting",
+            Method::ShootingFromRest { .. } => "shooting-from-rest",
+        }
+    }
+
+    /// The method of this word, with nothing special asked of it. Words that
+    /// earlier releases used are understood too.
+    pub fn named(word: &str) -> Option<Method> {
+        let word = match word {
+            "multiple-shooting" => "shooting",
+            "relaxed-shooting" => "shooting-from-rest",
+            word => word,
+        };
+        Method::ALL.into_iter().find(|method| method.word() == word)
+    }
+
+    /// The only grid of a method that is to use one, in segments a rod.
+    pub fn segments(self) -> Option<usize> {
+        match self {
+            Method::SemiImplicit(SemiImplicit { segments, .. }) | Method::Explicit { segments } => {
+                segments
+            }
+            _ => None,
+        }
+    }
+
+    /// The same method on one grid of so many segments a rod, or on as many grids
+    /// as it needs; nothing changes for a method without grids.
+    pub fn on_grid(self, segments: Option<usize>) -> Method {
+        match self {
+            Method::SemiImplicit(how) => Method::SemiImplicit(SemiImplicit { segments, ..how }),
+            Method::Explicit { .. } => Method::Explicit { segments },
+            shooting => shooting,
+        }
+    }
+
+    /// Whether it solves the boundary-value problem.
+    pub fn is_shooting(self) -> bool {
+        !matches!(self, Method::SemiImplicit(_) | Method::Explicit { .. })
+    }
+}
+
+impl From<SemiImplicit> for Method {
+    fn from(how: SemiImplicit) -> Self {
+        Method::SemiImplicit(how)
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(self.word())
+    }
+}
+
+impl Serialize for Method {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.word())
+    }
+}
+
+/// A word that names no method.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{found}: must be one of {}", Method::ALL.map(Method::word).join(", "))]
+pub struct UnknownMethod {
+    /// The word.
+    pub found: String,
+}
+
+impl FromStr for Method {
+    type Err = UnknownMethod;
+
+    fn from_str(text: &str) -> Result<Self, UnknownMethod> {
+        Method::named(text).ok_or_else(|| UnknownMethod { found: text.into() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_method_has_its_own_word_and_old_words_are_understood() {
+        for method in Method::ALL {
+            assert_eq!(method.word().parse(), Ok(method));
+        }
+        let old = ["multiple-shooting", "relaxed-shooting"].map(|word| word.parse());
+        let new = Method::ALL[3..].iter().copied().map(Ok);
+        assert!(new.eq(old));
+        let error = "newton".parse::<Method>().unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .starts_with("newton: must be one of semi-implicit, ")
+        );
+    }
+}
