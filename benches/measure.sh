@@ -1,0 +1,63 @@
+#!/usr/bin/env bash
+# Measures the tables of docs/speed.md and the error estimates of
+# docs/how-to-read.md, and draws the two charts. Hours on two cores, and worth
+# little on a busy machine. Needs Python 3.11 and what pip installs below.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+export CARGO_INSTALL_ROOT="$PWD/target/docs"
+cargo install --path .
+export PATH="$CARGO_INSTALL_ROOT/bin:$PATH"
+python -m venv target/peers
+source target/peers/bin/activate
+pip install scipy
+pip install pyelastica exudyn
+
+cargo test --release --test error_estimate -- --nocapture
+cargo bench --bench relax
+cargo bench --bench growth
+cargo bench --bench linear_solvers
+cargo bench --bench shooting
+cargo bench --bench explicit
+
+# The paper's own route.
+leafdyn relax scenarios/paper/fig04.toml --set leaf.rods=5 --tolerance 1e-12 --out out/fig04-5
+OMP_NUM_THREADS=1 python benches/peers/solve_bvp.py scenarios/paper/fig04.toml --set leaf.rods=5 --tol 1e-8 --compare out/fig04-5
+for figure in 05 06 08 09 10 13; do
+  leaf="scenarios/paper/fig$figure.toml"
+  leafdyn relax "$leaf" --set leaf.rods=5 --tolerance 1e-10 --out "out/fig$figure-5"
+  # A run that does not converge is a result.
+  OMP_NUM_THREADS=1 python benches/peers/solve_bvp.py "$leaf" --set leaf.rods=5 --tol 1e-3 --compare "out/fig$figure-5" || true
+done
+
+# PyElastica and exudyn.
+cargo build --release
+export OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1
+leafdyn relax scenarios/paper/fig04.toml --set leaf.rods=5 --tolerance 1e-10 --out out/fig04-5
+python benches/peers/pyelastica.py scenarios/paper/fig04.toml --leafdyn target/release/leafdyn
+python benches/peers/pyelastica.py scenarios/paper/fig04.toml --set leaf.rods=5 --relax --segments 20 --compare out/fig04-5
+python benches/peers/exudyn.py scenarios/paper/fig04.toml --set leaf.rods=5 --segments 20 --compare out/fig04-5
+for figure in 05 06 08 09 10 13; do
+  python benches/peers/exudyn.py "scenarios/paper/fig$figure.toml" --set leaf.rods=5 --segments 20 --compare "out/fig$figure-5" || true
+done
+
+# The charts: three runs of every other program, then all methods.
+rm -f out/peers.csv
+python benches/peers/solve_bvp.py scenarios/paper/fig04.toml --set leaf.rods=5 --tol 1e-6 --compare out/fig04-5 --csv out/peers.csv
+peer() { python "benches/peers/$1.py" scenarios/paper/fig04.toml --set "leaf.rods=$2" "${@:3}" --compare "out/fig04-$2" --csv out/peers.csv; }
+for rods in 21 35; do
+  leafdyn relax scenarios/paper/fig04.toml --set "leaf.rods=$rods" --tolerance 1e-10 --out "out/fig04-$rods"
+done
+for run in 1 2 3; do
+  for tolerance in 1e-3 1e-4 1e-5 1e-6 1e-8; do peer solve_bvp 5 --tol "$tolerance"; done
+  for segments in 10 20 40; do
+    peer exudyn 5 --segments "$segments"
+    peer pyelastica 5 --relax --segments "$segments"
+  done
+  peer solve_bvp 21 --tol 1e-3
+  peer solve_bvp 35 --tol 1e-3
+  peer exudyn 35 --segments 50
+done
+leafdyn chart scenarios/paper/fig04.toml --set leaf.rods=5 --seconds 20 --peers out/peers.csv
+cp out/fig04/chart.svg docs/chart_fig04_5.svg
+leafdyn chart scenarios/paper/fig04.toml --set leaf.rods=35 --seconds 20 --peers out/peers.csv
+cp out/fig04/chart.svg docs/chart_fig04_35.svg

@@ -1,0 +1,285 @@
+//! What the README and the pages of `docs` show can be done: every command runs,
+//! here or in one of two scripts, prints what the page says, and links lead
+//! somewhere.
+
+use std::collections::HashSet;
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use tempfile::TempDir;
+
+/// Scripts that run what takes long or needs other programs.
+const SCRIPTS: [&str; 2] = ["docs/draw.sh", "benches/measure.sh"];
+
+/// The command of which this test is a part.
+const TESTS: &str = "cargo test --release";
+
+/// Lines of a report that hold nothing but times and counts of work.
+const TIMES: [&str; 2] = ["speed", "work"];
+
+/// A fenced block: its language and its lines.
+struct Block {
+    language: String,
+    lines: Vec<String>,
+}
+
+struct Page {
+    path: PathBuf,
+    blocks: Vec<Block>,
+    /// What stands outside the blocks.
+    prose: Vec<String>,
+}
+
+fn top() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn read(path: &Path) -> Page {
+    let (mut blocks, mut prose) = (Vec::<Block>::new(), Vec::new());
+    let mut inside = false;
+    for line in fs::read_to_string(path).unwrap().lines() {
+        match line.strip_prefix("```") {
+            Some(language) if !inside => {
+                inside = true;
+                blocks.push(Block {
+                    language: language.to_owned(),
+                    lines: Vec::new(),
+                });
+            }
+            Some(_) => inside = false,
+            None if inside => blocks.last_mut().unwrap().lines.push(line.to_owned()),
+            None => prose.push(line.to_owned()),
+        }
+    }
+    Page {
+        path: path.to_owned(),
+        blocks,
+        prose,
+    }
+}
+
+fn pages() -> Vec<Page> {
+    let mut paths: Vec<_> = fs::read_dir(top().join("docs"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "md"))
+        .collect();
+    paths.push(top().join("README.md"));
+    paths.sort();
+    paths.iter().map(|path| read(path)).collect()
+}
+
+/// Commands of a script or a block: lines joined where they end in a backslash,
+/// single spaces, without comments.
+fn commands<'a>(lines: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let joined = lines.collect::<Vec<_>>().join("\n").replace("\\\n", " ");
+    joined
+        .lines()
+        .map(|line| line.split_whitespace().collect::<Vec<_>>().join(" "))
+        .filter(|line| !line.is_empty() && !line.starts_with('#'))
+        .collect()
+}
+
+fn of_block(block: &Block) -> Vec<String> {
+    commands(block.lines.iter().map(String::as_str))
+}
+
+fn of_scripts() -> HashSet<String> {
+    SCRIPTS
+        .iter()
+        .map(|script| fs::read_to_string(top().join(script)).unwrap())
+        .flat_map(|text| commands(text.lines()))
+        .collect()
+}
+
+/// What a shell is given to run a command with the program that was built.
+fn with_program(command: &str) -> Option<String> {
+    let command = command.replace("cargo run --release -- ", "leafdyn ");
+    command.starts_with("leafdyn ").then_some(command)
+}
+
+/// A folder with the scenarios that come with the program and those of a page.
+fn workplace(page: &Page) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for kind in fs::read_dir(top().join("scenarios")).unwrap() {
+        let kind = kind.unwrap().path();
+        let copies = folder
+            .path()
+            .join("scenarios")
+            .join(kind.file_name().unwrap());
+        fs::create_dir_all(&copies).unwrap();
+        for file in fs::read_dir(kind).unwrap() {
+            let file = file.unwrap().path();
+            fs::copy(&file, copies.join(file.file_name().unwrap())).unwrap();
+        }
+    }
+    for block in page.blocks.iter().filter(|block| block.language == "toml") {
+        if let Some(name) = block.lines[0].strip_prefix("# ") {
+            fs::write(folder.path().join(name), block.lines.join("\n")).unwrap();
+        }
+    }
+    folder
+}
+
+/// What a command prints; it must succeed.
+fn run(command: &str, folder: &Path) -> String {
+    let program = Path::new(env!("CARGO_BIN_EXE_leafdyn"));
+    let mut path = vec![program.parent().unwrap().to_owned()];
+    path.extend(env::split_paths(&env::var_os("PATH").unwrap()));
+    let output = Command::new("sh")
+        .args(["-c", command])
+        .env("PATH", env::join_paths(path).unwrap())
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{command}\n{errors}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Whether two words of a report say the same: bounds on errors and the last
+/// digits of numbers depend on the processor.
+fn agree(shown: &str, printed: &str) -> bool {
+    let number = |word: &str| word.trim_matches(['(', ')', ',', ';', ':']).parse::<f64>();
+    let bound = |word: &str| word.contains("×10");
+    match (number(shown), number(printed)) {
+        (Ok(a), Ok(b)) => (a - b).abs() <= 1e-5 * a.abs() + 1e-6,
+        _ => shown == printed || bound(shown) && bound(printed),
+    }
+}
+
+/// Its words, with times left out.
+fn words(line: &str) -> Vec<&str> {
+    let mut words = Vec::new();
+    for word in line.split_whitespace() {
+        if ["s", "ms", "µs"].contains(&word) {
+            words.pop();
+        } else {
+            words.push(word);
+        }
+    }
+    words
+}
+
+fn assert_same_report(shown: &[String], printed: &str, command: &str) {
+    let printed: Vec<_> = printed.lines().collect();
+    assert_eq!(
+        shown.len(),
+        printed.len(),
+        "{command}\n{}",
+        printed.join("\n")
+    );
+    for (shown, printed) in shown.iter().zip(printed) {
+        let (a, b) = (words(shown), words(printed));
+        let timed = TIMES.contains(&a[0]) && a[0] == b[0];
+        let same = a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| agree(a, b));
+        assert!(
+            timed || same,
+            "{command}\nshown   {shown}\nprinted {printed}"
+        );
+    }
+}
+
+#[test]
+fn every_command_runs_here_or_in_a_script() {
+    let scripts = of_scripts();
+    for page in pages() {
+        let place = page.path.display();
+        for block in &page.blocks {
+            let known = ["sh", "text", "toml", "python", "rust"];
+            assert!(
+                known.contains(&block.language.as_str()),
+                "{place}: {}",
+                block.lines[0]
+            );
+            if block.language != "sh" {
+                continue;
+            }
+            for command in of_block(block) {
+                let runs = scripts.contains(&command)
+                    || command == TESTS
+                    || with_program(&command).is_some();
+                assert!(runs, "{place}: {command} runs nowhere");
+            }
+        }
+        let hidden = page
+            .prose
+            .iter()
+            .find(|line| line.contains("`leafdyn") && line.contains(".toml"));
+        assert_eq!(
+            hidden, None,
+            "{place}: a command that is not in a block of its own"
+        );
+    }
+}
+
+#[test]
+fn quick_commands_print_what_the_pages_show() {
+    let scripts = of_scripts();
+    let mut compared = 0;
+    for page in pages() {
+        let folder = workplace(&page);
+        for (i, block) in page.blocks.iter().enumerate() {
+            if block.language != "sh" {
+                continue;
+            }
+            let commands = of_block(block);
+            let shown = page
+                .blocks
+                .get(i + 1)
+                .filter(|next| next.language == "text" && commands.len() == 1);
+            for command in &commands {
+                let Some(runnable) = with_program(command) else {
+                    continue;
+                };
+                if shown.is_none() && scripts.contains(command) {
+                    continue;
+                }
+                let printed = run(&runnable, folder.path());
+                if let Some(shown) = shown {
+                    assert_same_report(&shown.lines, &printed, command);
+                    compared += 1;
+                }
+            }
+        }
+    }
+    assert!(compared >= 8, "only {compared} reports were compared");
+}
+
+/// The name by which a heading is linked to.
+fn anchor(heading: &str) -> String {
+    let kept = heading.trim_start_matches('#').trim().to_lowercase();
+    kept.chars()
+        .filter(|c| c.is_alphanumeric() || "-_ ".contains(*c))
+        .map(|c| if c == ' ' { '-' } else { c })
+        .collect()
+}
+
+#[test]
+fn links_lead_to_files_and_headings() {
+    for page in pages() {
+        let text = page.prose.join("\n");
+        for link in text.split("](").skip(1) {
+            let link = link.split(')').next().unwrap();
+            if link.starts_with("http") {
+                continue;
+            }
+            let (file, heading) = link.split_once('#').unwrap_or((link, ""));
+            let target = match file {
+                "" => page.path.clone(),
+                file => page.path.parent().unwrap().join(file),
+            };
+            let place = page.path.display();
+            assert!(target.exists(), "{place}: {link}");
+            if !heading.is_empty() {
+                let headings = read(&target).prose;
+                let found = headings
+                    .iter()
+                    .any(|line| line.starts_with('#') && anchor(line) == heading);
+                assert!(found, "{place}: {link}");
+            }
+        }
+    }
+}
