@@ -2,7 +2,7 @@
 
 use crate::rod::Section;
 use crate::rotation;
-use crate::scenario::{Rod, Scenario, longest, mean_bending};
+use crate::scenario::{Rod, Scale, Scenario};
 use glam::{DQuat, DVec3};
 
 /// Stiffness in stretch and shear beyond which segment forces are condensed
@@ -12,29 +12,6 @@ const CONDENSING_STIFFNESS: f64 = 1e7;
 
 /// But never with less than this, in units of the mean A/L^2.
 const LEAST_CONDENSING: f64 = 1e5;
-
-/// Units in which a [`Leaf`] is dimensionless: lengths in units of `length`,
-/// couple stiffnesses in units of `stiffness`, hence forces in A/L^2, moments
-/// and energies in A/L and A/L.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scale {
-    /// L: the largest rod length.
-    pub length: f64,
-    /// A: geometric mean of the bending stiffnesses of all rods, mid-rod.
-    pub stiffness: f64,
-}
-
-impl Scale {
-    /// Unit of force, A/L^2.
-    pub fn force(&self) -> f64 {
-        self.stiffness / (self.length * self.length)
-    }
-
-    /// Unit of moment and of energy, A/L.
-    pub fn moment(&self) -> f64 {
-        self.stiffness / self.length
-    }
-}
 
 /// A leaf with all quantities dimensionless, not yet discretised.
 #[derive(Clone, Debug)]
@@ -60,11 +37,7 @@ pub struct Leaf<'a> {
 impl<'a> Leaf<'a> {
     /// Scales a checked scenario.
     pub fn new(scenario: &'a Scenario) -> Self {
-        let scale = Scale {
-            length: longest(&scenario.rods),
-            stiffness: mean_bending(&scenario.rods),
-        };
-        Leaf::in_units(scenario, scale)
+        Leaf::in_units(scenario, scenario.scale())
     }
 
     /// The same in given units, in which leaves that differ in length or

@@ -11,7 +11,8 @@ mod sparse;
 mod state;
 mod system;
 
-pub use dimensionless::{Leaf, Scale};
+pub use crate::scenario::Scale;
+pub use dimensionless::Leaf;
 pub use discrete::{DiscreteLeaf, Loads};
 pub use grid::Grid;
 pub use reduce::{half_of, whole_of};

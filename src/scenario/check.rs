@@ -1,21 +1,19 @@
-//! From the scenario as written to a scenario that can be trusted: the type
-//! and the meaning of every value. Limits that several values set together
-//! are in `limits`, and what concerns motion is in `dynamics`.
+//! From the scenario as written to a scenario that can be trusted: the
+//! meaning of every value. Limits that several values set together are in
+//! `limits`.
 
 use std::f64::consts::PI;
 
 use toml::de::DeValue;
 
-use super::error::{Because, Needed, Problem, ScenarioError, Spot};
+use super::dynamics::{OUTPUTS, round_inertia};
+use super::error::ScenarioError;
 use super::key::Key;
 use super::raw::{Item, Raw};
-use super::{Profile, Rod, Scenario, Units, dynamics, limits, quantity};
+use super::{Dynamics, Profile, Rod, Scenario, Schedule, Start, Units, limits};
 
 type Result<T> = std::result::Result<T, ScenarioError>;
 
-/// Lengths and stiffnesses lie between these: fourth powers of lengths and
-/// quotients of stiffnesses must not overflow.
-pub(super) const MAGNITUDES: (f64, f64) = (1e-50, 1e50);
 /// Most rods: a leaf of 100,000 rods and eight segments already has five
 /// million unknowns.
 const MOST_RODS: usize = 100_000;
@@ -23,36 +21,29 @@ const MOST_RODS: usize = 100_000;
 const LONGEST_NAME: usize = 100;
 /// Longest name of a unit: it stands beside axes.
 const LONGEST_UNIT: usize = 20;
-const TOLERANCE_DEFAULT: f64 = 1e-6;
 /// What is left of double precision after a solve on a fine grid.
 const TOLERANCE_LEAST: f64 = 1e-12;
 /// A tenth of the length is no longer an accuracy.
 const TOLERANCE_MOST: f64 = 0.1;
 
-/// Which numbers a key allows; never NaN.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Range {
-    Finite,
-    NotNegative,
-    Positive,
-    PositiveOrInfinite,
-}
-
 pub(super) fn check(raw: &Raw) -> Result<Scenario> {
-    let name = name(raw.required(Key::Name)?)?;
+    let name = name(raw.item(Key::Name)?)?;
     let units = Units {
-        length: raw.optional(Key::UnitLength).map(unit).transpose()?,
-        force: raw.optional(Key::UnitForce).map(unit).transpose()?,
+        length: raw.given(Key::UnitLength).map(unit).transpose()?,
+        force: raw.given(Key::UnitForce).map(unit).transpose()?,
     };
-    let rods = rods(raw.required(Key::Rods)?)?;
+    let rods = raw.item(Key::Rods)?.whole(MOST_RODS)?;
     let rods = veins(raw, rods)?;
-    let joined = raw.optional(Key::Joined).map_or(Ok(true), truth)?;
+    let joined = raw.item(Key::Joined)?.switch()?;
     let coupling = coupling(raw, rods.len() - 1)?;
-    let gravity = vector(raw, Key::Gravity)?;
-    let tip_force = vector(raw, Key::TipForce)?;
-    let tip_moment = tip_moment(raw, rods.len())?;
-    let tolerance = tolerance(raw)?;
-    let dynamics = dynamics::check::read(raw, &rods, [gravity, tip_force, tip_moment])?;
+    let gravity = raw.item(Key::Gravity)?.vector()?;
+    let tip_force = raw.item(Key::TipForce)?.vector()?;
+    let tip_moment = raw.item(Key::TipMoment)?;
+    let tip_moment = on_one_rod(tip_moment, rods.len(), tip_moment.vector()?, |moment| {
+        *moment != [0.0; 3]
+    })?;
+    let tolerance = tolerance(raw.item(Key::Tolerance)?)?;
+    let dynamics = dynamics(raw, &rods, [gravity, tip_force, tip_moment])?;
     let scenario = Scenario {
         name,
         units,
@@ -70,97 +61,51 @@ pub(super) fn check(raw: &Raw) -> Result<Scenario> {
 }
 
 fn name(item: Item) -> Result<String> {
-    let DeValue::String(name) = item.value() else {
-        return Err(item.refuse(Problem::WrongType {
-            needed: Needed::Text,
-        }));
-    };
+    let name = item.text()?;
     let allowed = |c: char| c.is_alphanumeric() || "_-.+".contains(c);
     let starts_well = name.starts_with(|c: char| c.is_alphanumeric() || c == '_');
     if starts_well && name.len() <= LONGEST_NAME && name.chars().all(allowed) {
-        Ok(name.to_string())
-    } else {
-        Err(item.refuse(Problem::Name { most: LONGEST_NAME }))
+        return Ok(name.to_string());
     }
+    Err(item.refuse(format_args!(
+        "must be usable as a folder name: 1 to {LONGEST_NAME} letters, digits and the signs \
+         _ - . + with a letter, digit or _ first"
+    )))
 }
 
 fn unit(item: Item) -> Result<String> {
-    let DeValue::String(unit) = item.value() else {
-        return Err(item.refuse(Problem::WrongType {
-            needed: Needed::Text,
-        }));
-    };
+    let unit = item.text()?;
     let printed = !unit.trim().is_empty() && !unit.chars().any(char::is_control);
-    match printed && unit.chars().count() <= LONGEST_UNIT {
-        true => Ok(unit.trim().to_string()),
-        false => Err(item.refuse(Problem::Unit { most: LONGEST_UNIT })),
+    if printed && unit.chars().count() <= LONGEST_UNIT {
+        return Ok(unit.trim().to_string());
     }
-}
-
-fn rods(item: Item) -> Result<usize> {
-    match item.value() {
-        DeValue::Integer(integer) => usize::from_str_radix(integer.as_str(), integer.radix()).ok(),
-        _ => None,
-    }
-    .filter(|rods| (1..=MOST_RODS).contains(rods))
-    .ok_or_else(|| item.refuse(Problem::Rods { most: MOST_RODS }))
-}
-
-pub(super) fn truth(item: Item) -> Result<bool> {
-    match item.value() {
-        DeValue::Boolean(value) => Ok(*value),
-        _ => Err(item.refuse(Problem::WrongType {
-            needed: Needed::TrueOrFalse,
-        })),
-    }
+    Err(item.refuse(format_args!(
+        "must be 1 to {LONGEST_UNIT} characters that can be printed"
+    )))
 }
 
 fn veins(raw: &Raw, rods: usize) -> Result<Vec<Rod>> {
-    let length = lengths(raw.required(Key::Length)?, rods)?;
-    let angle = angles(raw.required(Key::Fan)?, rods)?;
-    let required = |key, range| quantity::read(raw.required(key)?, rods, range);
-    let or_zero = |key| match raw.optional(key) {
-        Some(item) => quantity::read(item, rods, Range::Finite),
-        None => Ok(vec![Profile::Constant(0.0); rods]),
+    let length = raw.item(Key::Length)?.one_each(rods)?;
+    let angle = angles(raw.item(Key::Fan)?, rods)?;
+    let quantity = |key| raw.item(key)?.quantity(rods);
+    let triple = |[first, second, third]: [Key; 3]| -> Result<[Vec<Profile>; 3]> {
+        Ok([quantity(first)?, quantity(second)?, quantity(third)?])
     };
-    let mut stretch = match raw.optional(Key::RestStretch) {
-        Some(item) => quantity::read(item, rods, Range::Positive)?,
-        None => vec![Profile::Constant(1.0); rods],
-    };
-    let mut couple = [
-        required(Key::Torsion, Range::Positive)?,
-        required(Key::Bending2, Range::Positive)?,
-        required(Key::Bending3, Range::Positive)?,
-    ];
-    let mut force = [
-        required(Key::Axial, Range::PositiveOrInfinite)?,
-        required(Key::Shear2, Range::PositiveOrInfinite)?,
-        required(Key::Shear3, Range::PositiveOrInfinite)?,
-    ];
-    let mut rest = [
-        or_zero(Key::RestTwist)?,
-        or_zero(Key::RestBend2)?,
-        or_zero(Key::RestBend3)?,
-    ];
-    let one =
-        |of: &mut Vec<Profile>, rod: usize| std::mem::replace(&mut of[rod], Profile::Constant(0.0));
-    let take =
-        |of: &mut [Vec<Profile>; 3], rod: usize| of.each_mut().map(|profiles| one(profiles, rod));
+    let stretch = quantity(Key::RestStretch)?;
+    let couple = triple(limits::COUPLE)?;
+    let force = triple(limits::FORCE)?;
+    let rest = triple(limits::REST)?;
+    let of = |all: &[Vec<Profile>; 3], rod: usize| all.each_ref().map(|one| one[rod].clone());
     Ok((0..rods)
         .map(|rod| Rod {
             length: length[rod],
             angle: angle[rod],
-            couple_stiffness: take(&mut couple, rod),
-            force_stiffness: take(&mut force, rod),
-            rest_curvature: take(&mut rest, rod),
-            rest_stretch: one(&mut stretch, rod),
+            couple_stiffness: of(&couple, rod),
+            force_stiffness: of(&force, rod),
+            rest_curvature: of(&rest, rod),
+            rest_stretch: stretch[rod].clone(),
         })
         .collect())
-}
-
-fn lengths(item: Item, rods: usize) -> Result<Vec<f64>> {
-    let needed = Needed::LengthOf(rods);
-    number_or_list(item, rods, Range::Positive, needed, Because::OnePerRod)
 }
 
 /// Base angles phi_n of the rods n = 1..N (paper, section 2.4 (c)).
@@ -175,28 +120,17 @@ fn angles(item: Item, rods: usize) -> Result<Vec<f64>> {
     match item.value() {
         DeValue::String(text) if text == "paper" => Ok(fan(0.0)),
         DeValue::String(text) if text == "symmetric" => Ok(fan(1.0)),
-        DeValue::Array(_) => number_or_list(
-            item,
-            rods,
-            Range::Finite,
-            Needed::ListOfNumbers,
-            Because::OnePerRod,
-        ),
-        _ => Err(item.refuse(Problem::Fan { rods })),
+        DeValue::Array(_) => item.one_each(rods),
+        _ => Err(item.refuse(format_args!(
+            "must be \"paper\" or \"symmetric\", or a list of {rods} angles in radians, one per rod"
+        ))),
     }
 }
 
 fn coupling(raw: &Raw, gaps: usize) -> Result<Vec<[f64; 3]>> {
     let mut coupling = vec![[0.0; 3]; gaps];
-    for (axis, key) in [Key::CouplingX, Key::CouplingY, Key::CouplingZ]
-        .into_iter()
-        .enumerate()
-    {
-        let Some(item) = raw.optional(key) else {
-            continue;
-        };
-        let needed = Needed::PerGap(gaps);
-        let stiffness = number_or_list(item, gaps, Range::NotNegative, needed, Because::OnePerGap)?;
+    for (axis, key) in limits::COUPLING.into_iter().enumerate() {
+        let stiffness = raw.item(key)?.one_each(gaps)?;
         for (gap, stiffness) in coupling.iter_mut().zip(stiffness) {
             gap[axis] = stiffness;
         }
@@ -204,121 +138,131 @@ fn coupling(raw: &Raw, gaps: usize) -> Result<Vec<[f64; 3]>> {
     Ok(coupling)
 }
 
-fn number_or_list(
-    item: Item,
-    count: usize,
-    range: Range,
-    needed: Needed,
-    because: Because,
-) -> Result<Vec<f64>> {
-    match item.value() {
-        DeValue::Integer(_) | DeValue::Float(_) => Ok(vec![number(item, range)?; count]),
-        _ => {
-            let array = item.array(needed)?;
-            entries(item, array.len(), count, because)?;
-            (0..count)
-                .map(|index| number(item.entry(index), range))
-                .collect()
-        }
+/// A moment at the tip, if it acts on one rod or `acts` not at all.
+fn on_one_rod<T>(item: Item, rods: usize, moment: T, acts: impl Fn(&T) -> bool) -> Result<T> {
+    if rods > 1 && acts(&moment) {
+        return Err(item.refuse(format_args!(
+            "a moment at the tip needs leaf.rods = 1 (here {rods}): joined tips pass on no moment"
+        )));
     }
+    Ok(moment)
 }
 
-fn vector(raw: &Raw, key: Key) -> Result<[f64; 3]> {
-    let Some(item) = raw.optional(key) else {
-        return Ok([0.0; 3]);
-    };
-    components(item, Spot::Entry)
-}
-
-/// Three numbers, each at its own spot.
-pub(super) fn components(item: Item, spot: impl Fn(usize) -> Spot) -> Result<[f64; 3]> {
-    let array = item.array(Needed::Vector)?;
-    entries(item, array.len(), 3, Because::Axes)?;
-    let mut vector = [0.0; 3];
-    for (axis, component) in vector.iter_mut().enumerate() {
-        *component = number(item.part(spot(axis), &array[axis]), Range::Finite)?;
-    }
-    Ok(vector)
-}
-
-fn tip_moment(raw: &Raw, rods: usize) -> Result<[f64; 3]> {
-    let moment = vector(raw, Key::TipMoment)?;
-    match raw.optional(Key::TipMoment) {
-        Some(item) if rods > 1 && moment != [0.0; 3] => {
-            Err(item.refuse(Problem::MomentOnManyRods { rods }))
-        }
-        _ => Ok(moment),
-    }
-}
-
-fn tolerance(raw: &Raw) -> Result<f64> {
-    let Some(item) = raw.optional(Key::Tolerance) else {
-        return Ok(TOLERANCE_DEFAULT);
-    };
-    let tolerance = number(item, Range::Finite)?;
+fn tolerance(item: Item) -> Result<f64> {
+    let tolerance = item.number()?;
     if tolerance <= 0.0 || tolerance > TOLERANCE_MOST {
-        Err(item.refuse(Problem::Tolerance {
-            most: TOLERANCE_MOST,
-        }))
-    } else if tolerance < TOLERANCE_LEAST {
-        Err(item.refuse(Problem::ToleranceTooSmall {
-            least: TOLERANCE_LEAST,
-        }))
-    } else {
-        Ok(tolerance)
+        return Err(item.refuse(format_args!(
+            "must be greater than 0 and at most {TOLERANCE_MOST}: \
+             it is the error of the centerlines relative to the length of a rod"
+        )));
+    }
+    if tolerance < TOLERANCE_LEAST {
+        return Err(item.refuse(format_args!(
+            "must be at least {TOLERANCE_LEAST:e}: double precision carries 16 digits, \
+             and rounding in the solve takes about four of them"
+        )));
+    }
+    Ok(tolerance)
+}
+
+/// The table `[dynamics]`, for rods under the loads `[gravity, tip_force, tip_moment]`.
+fn dynamics(raw: &Raw, rods: &[Rod], loads: [[f64; 3]; 3]) -> Result<Dynamics> {
+    let [gravity, tip_force, tip_moment] = loads;
+    let preset = match raw.given(Key::Density) {
+        Some(density) => Dynamics::of_density(rods, density.quantity(rods.len())?),
+        None => Dynamics::default_for(rods),
+    }
+    .with_loads(gravity, tip_force, tip_moment);
+    let number = |key, otherwise| raw.given(key).map_or(Ok(otherwise), |item| item.number());
+    let load = |key, otherwise| match raw.given(key) {
+        Some(item) => item.vectors_in_time(),
+        None => Ok(otherwise),
+    };
+    let duration = number(Key::Duration, preset.duration)?;
+    let section = rotary_inertia(raw, &preset.density)?;
+    let external_damping = number(Key::ExternalDamping, preset.external_damping)?;
+    let internal_damping = raw.item(Key::InternalDamping)?.number()?;
+    let output_interval = match raw.given(Key::OutputInterval) {
+        Some(item) => output_interval(item, duration)?,
+        None => duration / OUTPUTS,
+    };
+    let clamped = clamped(raw.item(Key::Clamped)?, rods.len())?;
+    Ok(Dynamics {
+        polar_excess: if section.is_some() { 1.0 } else { 0.0 },
+        rotary_inertia: section.unwrap_or(preset.rotary_inertia),
+        external_damping,
+        internal_damping,
+        duration,
+        output_interval,
+        clamped,
+        start: start(raw.item(Key::Start)?, clamped)?,
+        gravity: load(Key::GravityInTime, preset.gravity)?,
+        tip_force: load(Key::TipForceInTime, preset.tip_force)?,
+        tip_moment: match raw.given(Key::TipMomentInTime) {
+            Some(item) => on_one_rod(item, rods.len(), item.vectors_in_time()?, acts)?,
+            None => preset.tip_moment,
+        },
+        rest: match raw.given(Key::RestInTime) {
+            Some(item) => item.factors_in_time()?,
+            None => preset.rest,
+        },
+        density: preset.density,
+    })
+}
+
+fn acts(moment: &Schedule<[f64; 3]>) -> bool {
+    moment.value.iter().any(|moment| *moment != [0.0; 3])
+}
+
+fn rotary_inertia(raw: &Raw, density: &[Profile]) -> Result<Option<Vec<Profile>>> {
+    let quantity = |item: Item| item.quantity(density.len());
+    let inertia = raw.given(Key::RotaryInertia).map(quantity).transpose()?;
+    let Some(item) = raw.given(Key::SectionRadius) else {
+        return Ok(inertia);
+    };
+    if inertia.is_some() {
+        return Err(item.refuse(
+            "dynamics.rotary_inertia is given, too, and is density section_radius^2/4: \
+             leave one of them out",
+        ));
+    }
+    let radius = quantity(item)?;
+    let round = density.iter().zip(&radius);
+    Ok(Some(
+        round
+            .map(|(density, radius)| round_inertia(density, radius))
+            .collect(),
+    ))
+}
+
+fn output_interval(item: Item, duration: f64) -> Result<f64> {
+    let interval = item.number()?;
+    if interval > duration {
+        return Err(item.refuse(format_args!(
+            "must be at most dynamics.duration, {duration} (left out: a hundredth of the duration)"
+        )));
+    }
+    Ok(interval)
+}
+
+fn clamped(item: Item, rods: usize) -> Result<bool> {
+    match item.switch()? {
+        false if rods > 1 => Err(item.refuse(format_args!(
+            "a free base needs leaf.rods = 1 (here {rods}): the rods of a leaf grow from one base"
+        ))),
+        clamped => Ok(clamped),
     }
 }
 
-/// Refuses a list whose length is not `needed`.
-pub(super) fn entries(item: Item, found: usize, needed: usize, because: Because) -> Result<()> {
-    if found == needed {
-        Ok(())
-    } else {
-        Err(item.refuse(Problem::Entries {
-            found,
-            needed,
-            because,
-        }))
+fn start(item: Item, clamped: bool) -> Result<Start> {
+    match item.value() {
+        DeValue::String(text) if text == "released" => Ok(Start::Released),
+        DeValue::String(text) if text == "at-rest" && clamped => Ok(Start::AtRest),
+        DeValue::String(text) if text == "at-rest" => Err(item
+            .refuse("a rod with a free base has no equilibrium to start from: use \"released\"")),
+        _ => Err(item.refuse(
+            "must be \"released\" (from the shape where a relaxation starts) or \"at-rest\" \
+             (in equilibrium under the loads at time 0)",
+        )),
     }
-}
-
-pub(super) fn number(item: Item, range: Range) -> Result<f64> {
-    let value = match item.value() {
-        DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str().parse().ok(),
-        DeValue::Integer(integer) => u128::from_str_radix(integer.as_str(), integer.radix())
-            .ok()
-            .map(|value| value as f64),
-        DeValue::Float(float) => float.as_str().parse().ok(),
-        _ => {
-            return Err(item.refuse(Problem::WrongType {
-                needed: Needed::Number,
-            }));
-        }
-    };
-    // 1e999 parses to infinity, which nobody wrote.
-    let says_infinite =
-        matches!(item.value(), DeValue::Float(float) if float.as_str().contains("inf"));
-    let value: f64 = match value {
-        Some(value) if says_infinite || !f64::is_infinite(value) => value,
-        _ => return Err(item.refuse(Problem::Overflow)),
-    };
-    let positive = matches!(range, Range::Positive | Range::PositiveOrInfinite);
-    let problem = if value.is_nan() || value == f64::NEG_INFINITY {
-        Problem::NotFinite
-    } else if positive && value <= 0.0 {
-        Problem::NotPositive
-    } else if value == f64::INFINITY {
-        match range {
-            Range::PositiveOrInfinite => return Ok(value),
-            Range::Positive => Problem::Infinite,
-            _ => Problem::NotFinite,
-        }
-    } else if positive && !(MAGNITUDES.0..=MAGNITUDES.1).contains(&value) {
-        Problem::Magnitude
-    } else if range == Range::NotNegative && value < 0.0 {
-        Problem::Negative
-    } else {
-        return Ok(value);
-    };
-    Err(item.refuse(problem))
 }

@@ -1,185 +1,240 @@
-//! The keys of the format, in one table: what may be written, and an example
-//! of each for messages.
+//! The table of keys: everything that a scenario may say, one row a key.
+//!
+//! A new key is a row here, a field of the checked scenario, and the line in
+//! `check` that reads the one into the other.
 
-/// A key of the scenario format.
+use Form::*;
+use LeftOut::*;
+use Range::*;
+
+/// What a key takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Key {
-    /// `name`: the leaf's name.
-    Name,
-    /// `units.length`: name of the unit of length.
-    UnitLength,
-    /// `units.force`: name of the unit of force.
-    UnitForce,
-    /// `leaf.rods`: number of rods.
-    Rods,
-    /// `leaf.length`: lengths.
-    Length,
-    /// `leaf.fan`: base angles.
+pub(crate) enum Form {
+    Text,
+    /// `true` or `false`.
+    Switch,
+    /// A whole number from 1.
+    Whole,
+    Number(Range),
+    /// A number for all rods, or a list with one for each.
+    PerRod(Range),
+    /// The same, or a profile along the rods.
+    Quantity(Range),
+    /// A number for all gaps between neighbouring rods, or a list.
+    PerGap(Range),
+    /// x, y, z.
+    Vector,
+    /// Base angles: a list, or a word.
     Fan,
-    /// `leaf.joined`: whether the tips share one point.
-    Joined,
-    /// `stiffness.torsion`: A1.
-    Torsion,
-    /// `stiffness.bending_2`: A2.
-    Bending2,
-    /// `stiffness.bending_3`: A3.
-    Bending3,
-    /// `stiffness.axial`: H1.
-    Axial,
-    /// `stiffness.shear_2`: H2.
-    Shear2,
-    /// `stiffness.shear_3`: H3.
-    Shear3,
-    /// `rest.twist`: u0 about d1.
-    RestTwist,
-    /// `rest.bend_2`: u0 about d2.
-    RestBend2,
-    /// `rest.bend_3`: u0 about d3.
-    RestBend3,
-    /// `rest.stretch`: growth of the rest length, a factor.
-    RestStretch,
-    /// `coupling.x`: coupling along e1.
-    CouplingX,
-    /// `coupling.y`: coupling along e2.
-    CouplingY,
-    /// `coupling.z`: coupling along e3.
-    CouplingZ,
-    /// `load.gravity`: force per unit length.
-    Gravity,
-    /// `load.tip_force`: dead force.
-    TipForce,
-    /// `load.tip_moment`: dead moment, one rod only.
-    TipMoment,
-    /// `solve.tolerance`: wanted accuracy.
-    Tolerance,
-    /// `dynamics.density`: mass per unit length.
-    Density,
-    /// `dynamics.rotary_inertia`: rho I.
-    RotaryInertia,
-    /// `dynamics.section_radius`: radius of the section, instead of rho I.
-    SectionRadius,
-    /// `dynamics.external_damping`: viscous force per unit length and velocity.
-    ExternalDamping,
-    /// `dynamics.internal_damping`: retardation time of the material.
-    InternalDamping,
-    /// `dynamics.duration`: how long the leaf is followed.
-    Duration,
-    /// `dynamics.output_interval`: time between two outputs.
-    OutputInterval,
-    /// `dynamics.clamped`: whether the base is held.
-    Clamped,
-    /// `dynamics.start`: where the motion begins.
-    Start,
-    /// `dynamics.gravity`: gravity in time.
-    GravityInTime,
-    /// `dynamics.tip_force`: dead force in time.
-    TipForceInTime,
-    /// `dynamics.tip_moment`: dead moment in time, one rod only.
-    TipMomentInTime,
-    /// `dynamics.rest`: factor of the rest curvatures in time.
-    RestInTime,
+    /// Vectors at given times.
+    VectorInTime,
+    /// Factors at given times.
+    FactorInTime,
 }
 
-const LOAD_IN_TIME: &str = "{ at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]] }";
+/// Which numbers a key allows; never NaN.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Range {
+    Finite,
+    NotNegative,
+    Positive,
+    PositiveOrInfinite,
+}
 
-/// Key, full path, and an example of its value; in the order of [`Key`].
-const FORMAT: [(Key, &str, &str); 37] = [
-    (Key::Name, "name", "\"my-leaf\""),
-    (Key::UnitLength, "units.length", "\"cm\""),
-    (Key::UnitForce, "units.force", "\"N\""),
-    (Key::Rods, "leaf.rods", "5"),
-    (Key::Length, "leaf.length", "1.0"),
-    (Key::Fan, "leaf.fan", "\"symmetric\""),
-    (Key::Joined, "leaf.joined", "true"),
-    (Key::Torsion, "stiffness.torsion", "1.0"),
-    (Key::Bending2, "stiffness.bending_2", "1.0"),
-    (Key::Bending3, "stiffness.bending_3", "1.0"),
-    (Key::Axial, "stiffness.axial", "100.0"),
-    (Key::Shear2, "stiffness.shear_2", "100.0"),
-    (Key::Shear3, "stiffness.shear_3", "100.0"),
-    (Key::RestTwist, "rest.twist", "0.0"),
-    (Key::RestBend2, "rest.bend_2", "0.0"),
-    (Key::RestBend3, "rest.bend_3", "0.0"),
-    (Key::RestStretch, "rest.stretch", "1.0"),
-    (Key::CouplingX, "coupling.x", "0.0"),
-    (Key::CouplingY, "coupling.y", "1.0"),
-    (Key::CouplingZ, "coupling.z", "1.0"),
-    (Key::Gravity, "load.gravity", "[0.0, 0.0, -1.0]"),
-    (Key::TipForce, "load.tip_force", "[0.0, 0.0, 0.0]"),
-    (Key::TipMoment, "load.tip_moment", "[0.0, 0.0, 0.0]"),
-    (Key::Tolerance, "solve.tolerance", "1e-6"),
-    (Key::Density, "dynamics.density", "1.0"),
-    (Key::RotaryInertia, "dynamics.rotary_inertia", "0.01"),
-    (Key::SectionRadius, "dynamics.section_radius", "0.2"),
-    (Key::ExternalDamping, "dynamics.external_damping", "1.0"),
-    (Key::InternalDamping, "dynamics.internal_damping", "0.0"),
-    (Key::Duration, "dynamics.duration", "10.0"),
-    (Key::OutputInterval, "dynamics.output_interval", "0.1"),
-    (Key::Clamped, "dynamics.clamped", "true"),
-    (Key::Start, "dynamics.start", "\"at-rest\""),
-    (Key::GravityInTime, "dynamics.gravity", LOAD_IN_TIME),
-    (Key::TipForceInTime, "dynamics.tip_force", LOAD_IN_TIME),
-    (Key::TipMomentInTime, "dynamics.tip_moment", LOAD_IN_TIME),
-    (
-        Key::RestInTime,
-        "dynamics.rest",
-        "{ at = [0.0, 1.0], factor = [1.0, 2.0] }",
-    ),
-];
+/// What holds where a key is left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum LeftOut {
+    /// It must not be; an example of its value for the message.
+    Refused(&'static str),
+    /// This value.
+    Means(&'static str),
+    /// What follows from other values, or nothing.
+    Follows,
+}
 
-/// The tables of the format.
-pub(super) const TABLES: [&str; 8] = [
-    "units",
-    "leaf",
-    "stiffness",
-    "rest",
-    "coupling",
-    "load",
-    "solve",
-    "dynamics",
-];
+impl Form {
+    /// Whether it is a number, or has entries that are numbers.
+    pub(crate) fn is_numeric(self) -> bool {
+        !matches!(self, Text | Switch | VectorInTime | FactorInTime)
+    }
+
+    /// What its numbers may be.
+    pub(super) fn range(self) -> Range {
+        match self {
+            Number(range) | PerRod(range) | Quantity(range) | PerGap(range) => range,
+            _ => Finite,
+        }
+    }
+}
+
+struct Row {
+    key: Key,
+    path: &'static str,
+    description: &'static str,
+    form: Form,
+    dimension: [i32; 3],
+    left_out: LeftOut,
+}
+
+/// Rows of `Key "path": form, [exponents of length, force, time], left out;`
+/// below the line that describes the key.
+macro_rules! keys {
+    ($($(#[doc = $doc:literal])+ $key:ident $path:literal: $form:expr, $dimension:expr, $left_out:expr;)+) => {
+        /// A key of the scenario format.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Key {
+            $(#[doc = concat!("`", $path, "`:", $($doc),+)] $key,)+
+        }
+
+        const FORMAT: &[Row] = &[$(Row {
+            key: Key::$key,
+            path: $path,
+            description: concat!($($doc),+),
+            form: $form,
+            dimension: $dimension,
+            left_out: $left_out,
+        },)+];
+    };
+}
+
+keys! {
+    /// the leaf's name.
+    Name "name": Text, [0, 0, 0], Refused("\"my-leaf\"");
+    /// name of the unit of length.
+    UnitLength "units.length": Text, [0, 0, 0], Follows;
+    /// name of the unit of force.
+    UnitForce "units.force": Text, [0, 0, 0], Follows;
+    /// number of rods.
+    Rods "leaf.rods": Whole, [0, 0, 0], Refused("5");
+    /// lengths L of the rods.
+    Length "leaf.length": PerRod(Positive), [1, 0, 0], Refused("1.0");
+    /// angles of the rods at the base, in radians.
+    Fan "leaf.fan": Fan, [0, 0, 0], Refused("\"symmetric\"");
+    /// whether the tips share one point.
+    Joined "leaf.joined": Switch, [0, 0, 0], Means("true");
+    /// A1, against torsion.
+    Torsion "stiffness.torsion": Quantity(Positive), [2, 1, 0], Refused("1.0");
+    /// A2, against bending about d2: up and down, out of the leaf's surface.
+    Bending2 "stiffness.bending_2": Quantity(Positive), [2, 1, 0], Refused("1.0");
+    /// A3, against bending about d3: sideways, within the leaf's surface.
+    Bending3 "stiffness.bending_3": Quantity(Positive), [2, 1, 0], Refused("1.0");
+    /// H1, against stretch; `inf`: inextensible.
+    Axial "stiffness.axial": Quantity(PositiveOrInfinite), [0, 1, 0], Refused("100.0");
+    /// H2, against shear along d2; `inf`: unshearable.
+    Shear2 "stiffness.shear_2": Quantity(PositiveOrInfinite), [0, 1, 0], Refused("100.0");
+    /// H3, against shear along d3; `inf`: unshearable.
+    Shear3 "stiffness.shear_3": Quantity(PositiveOrInfinite), [0, 1, 0], Refused("100.0");
+    /// u0_1, twist at rest; positive turns d2 towards d3 on the way to the tip.
+    RestTwist "rest.twist": Quantity(Finite), [-1, 0, 0], Means("0.0");
+    /// u0_2, curvature at rest about d2; positive bends the rod down, towards -d3.
+    RestBend2 "rest.bend_2": Quantity(Finite), [-1, 0, 0], Means("0.0");
+    /// u0_3, curvature at rest about d3; positive bends the rod sideways, towards +d2.
+    RestBend3 "rest.bend_3": Quantity(Finite), [-1, 0, 0], Means("0.0");
+    /// growth of the rest length, a factor.
+    RestStretch "rest.stretch": Quantity(Positive), [0, 0, 0], Means("1.0");
+    /// coupling along e1: force per displacement and length of leaf.
+    CouplingX "coupling.x": PerGap(NotNegative), [-2, 1, 0], Means("0.0");
+    /// coupling along e2.
+    CouplingY "coupling.y": PerGap(NotNegative), [-2, 1, 0], Means("0.0");
+    /// coupling along e3.
+    CouplingZ "coupling.z": PerGap(NotNegative), [-2, 1, 0], Means("0.0");
+    /// force per length of rod.
+    Gravity "load.gravity": Vector, [-1, 1, 0], Means("[0.0, 0.0, 0.0]");
+    /// dead force on the joint tip, or on every tip.
+    TipForce "load.tip_force": Vector, [0, 1, 0], Means("[0.0, 0.0, 0.0]");
+    /// dead moment on the tip, one rod only.
+    TipMoment "load.tip_moment": Vector, [1, 1, 0], Means("[0.0, 0.0, 0.0]");
+    /// wanted accuracy, relative to the longest rod.
+    Tolerance "solve.tolerance": Number(Finite), [0, 0, 0], Means("1e-6");
+    /// rho, mass per length of rod.
+    Density "dynamics.density": Quantity(Positive), [-2, 1, 2], Follows;
+    /// rho I, moment of inertia per length about d2 and d3.
+    RotaryInertia "dynamics.rotary_inertia": Quantity(Positive), [0, 1, 2], Follows;
+    /// radius of the section, in place of rho I.
+    SectionRadius "dynamics.section_radius": Quantity(Positive), [1, 0, 0], Follows;
+    /// viscous force per length and velocity.
+    ExternalDamping "dynamics.external_damping": Number(NotNegative), [-2, 1, 1], Follows;
+    /// retardation time of the material.
+    InternalDamping "dynamics.internal_damping": Number(NotNegative), [0, 0, 1], Means("0.0");
+    /// how long the leaf is followed.
+    Duration "dynamics.duration": Number(Positive), [0, 0, 1], Follows;
+    /// time between two outputs.
+    OutputInterval "dynamics.output_interval": Number(Positive), [0, 0, 1], Follows;
+    /// whether the base is held.
+    Clamped "dynamics.clamped": Switch, [0, 0, 0], Means("true");
+    /// where the motion begins.
+    Start "dynamics.start": Text, [0, 0, 0], Means("\"released\"");
+    /// gravity in time.
+    GravityInTime "dynamics.gravity": VectorInTime, [-1, 1, 0], Follows;
+    /// dead force in time.
+    TipForceInTime "dynamics.tip_force": VectorInTime, [0, 1, 0], Follows;
+    /// dead moment in time, one rod only.
+    TipMomentInTime "dynamics.tip_moment": VectorInTime, [1, 1, 0], Follows;
+    /// factor of the rest curvatures in time.
+    RestInTime "dynamics.rest": FactorInTime, [0, 0, 0], Follows;
+}
 
 impl Key {
     pub(super) const COUNT: usize = FORMAT.len();
 
+    fn row(self) -> &'static Row {
+        &FORMAT[self as usize]
+    }
+
     /// As `--set` takes it: `table.key`, or `name`.
     pub fn path(self) -> &'static str {
-        FORMAT[self as usize].1
+        self.row().path
     }
 
-    /// The table it stands in; empty at the top.
-    pub(super) fn table(self) -> &'static str {
-        self.path().split_once('.').map_or("", |(table, _)| table)
+    /// What it is, in a few words.
+    pub fn description(self) -> &'static str {
+        self.row().description.trim()
     }
 
-    /// Its name within its table.
-    pub(super) fn short_name(self) -> &'static str {
-        self.path()
-            .split_once('.')
-            .map_or(self.path(), |(_, name)| name)
+    /// What it takes.
+    pub(crate) fn form(self) -> Form {
+        self.row().form
     }
 
-    /// A value that would be accepted.
-    pub(super) fn example(self) -> &'static str {
-        FORMAT[self as usize].2
+    /// Exponents of length, force and time in its unit.
+    pub(crate) fn dimension(self) -> [i32; 3] {
+        self.row().dimension
+    }
+
+    /// What holds where it is left out.
+    pub(crate) fn left_out(self) -> LeftOut {
+        self.row().left_out
+    }
+
+    /// The table it stands in, empty at the top, and its name within that.
+    pub(super) fn parts(self) -> (&'static str, &'static str) {
+        self.path().split_once('.').unwrap_or(("", self.path()))
     }
 
     pub(crate) fn all() -> impl Iterator<Item = Key> {
-        FORMAT.iter().map(|row| row.0)
+        FORMAT.iter().map(|row| row.key)
     }
 
     pub(crate) fn from_path(path: &str) -> Option<Key> {
         Key::all().find(|key| key.path() == path)
     }
 
+    /// The tables of the format, in its order.
+    pub(super) fn tables() -> Vec<&'static str> {
+        let mut tables: Vec<_> = Key::all().map(|key| key.parts().0).collect();
+        tables.dedup();
+        tables.retain(|table| !table.is_empty());
+        tables
+    }
+
     /// What may be written in `table`; at the top ("") the tables as well.
     pub(super) fn allowed_in(table: &str) -> Vec<&'static str> {
-        let tables = if table.is_empty() { &TABLES[..] } else { &[] };
-        Key::all()
-            .filter(|key| key.table() == table)
-            .map(Key::short_name)
-            .chain(tables.iter().copied())
-            .collect()
+        let keys = Key::all().map(Key::parts).filter(|parts| parts.0 == table);
+        let mut allowed: Vec<_> = keys.map(|parts| parts.1).collect();
+        if table.is_empty() {
+            allowed.extend(Key::tables());
+        }
+        allowed
     }
 }
 
@@ -187,35 +242,19 @@ impl Key {
 /// another table, or the nearest spelling.
 pub(crate) fn nearest(path: &str) -> Option<&'static str> {
     let name = path.rsplit('.').next().unwrap_or(path);
-    if let Some(key) = Key::all().find(|key| key.short_name() == name) {
+    if let Some(key) = Key::all().find(|key| key.parts().1 == name) {
         return Some(key.path());
     }
+    // No key is as long as this.
+    let path: String = path.chars().take(80).collect();
     let most = 1 + path.chars().count().min(40) / 5;
     Key::all()
         .map(Key::path)
-        .chain(TABLES)
-        .map(|candidate| (edits(path, candidate, most), candidate))
-        .filter(|(count, _)| *count <= most)
+        .chain(Key::tables())
+        .map(|candidate| (strsim::levenshtein(&path, candidate), candidate))
+        .filter(|(edits, _)| *edits <= most)
         .min()
         .map(|(_, candidate)| candidate)
-}
-
-/// Levenshtein distance, or more than `most` where it cannot be within it.
-fn edits(a: &str, b: &str, most: usize) -> usize {
-    let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(80).collect(), b.chars().collect());
-    if a.len().abs_diff(b.len()) > most {
-        return most + 1;
-    }
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.iter().enumerate() {
-        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
-        for (j, y) in b.iter().enumerate() {
-            let substituted = diagonal + usize::from(x != y);
-            diagonal = row[j + 1];
-            row[j + 1] = substituted.min(diagonal + 1).min(row[j] + 1);
-        }
-    }
-    row[b.len()]
 }
 
 #[cfg(test)]
@@ -223,11 +262,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_is_in_the_order_of_the_keys() {
-        for (index, (key, path, _)) in FORMAT.iter().enumerate() {
-            assert_eq!(*key as usize, index);
-            assert_eq!(Key::from_path(path), Some(*key));
+    fn every_key_is_found_by_its_path() {
+        for key in Key::all() {
+            assert_eq!(Key::from_path(key.path()), Some(key));
+            assert_eq!(key.row().key, key);
         }
+        assert_eq!(Key::tables().len(), 8);
     }
 
     #[test]

@@ -1,195 +1,287 @@
 //! Limits that several values set together, all free of units: beyond them
 //! the numbers of a scenario are a slip, or no grid could resolve its shape.
+//! Only what was given can be beyond them, never what was left out.
 
-use super::error::{Problem, ScenarioError};
-use super::key::Key;
-use super::raw::Raw;
-use super::{Rod, Scenario};
+use super::error::ScenarioError;
+use super::key::{Form, Key};
+use super::raw::{Item, Raw};
+use super::scale::longest;
+use super::{Rod, Scale, Scenario};
 
-/// |F| L^2/A, |g| L^3/A and |M| L/A. A rod in tension F turns within
-/// sqrt(A/F) of its ends: at this limit, within 1e-4 of its length.
-pub(super) const MOST_LOAD: f64 = 1e8;
-/// kappa L^4/A: two coupled rods join within (A/kappa)^(1/4), here 1e-3 of the length.
-const MOST_COUPLING: f64 = 1e12;
+type Result = std::result::Result<(), ScenarioError>;
+
+pub(super) const COUPLE: [Key; 3] = [Key::Torsion, Key::Bending2, Key::Bending3];
+pub(super) const FORCE: [Key; 3] = [Key::Axial, Key::Shear2, Key::Shear3];
+pub(super) const REST: [Key; 3] = [Key::RestTwist, Key::RestBend2, Key::RestBend3];
+pub(super) const COUPLING: [Key; 3] = [Key::CouplingX, Key::CouplingY, Key::CouplingZ];
+
+/// The range of a number free of units.
+struct Limit {
+    /// The number.
+    formula: &'static str,
+    least: f64,
+    most: f64,
+    /// What the symbols mean, why there is a limit, and what to change.
+    because: &'static str,
+}
+
+impl Limit {
+    fn check(&self, item: Item, value: f64) -> Result {
+        let limit = match value {
+            _ if value > self.most => self.most,
+            _ if value < self.least => self.least,
+            _ => return Ok(()),
+        };
+        let (formula, because) = (self.formula, self.because);
+        Err(item.refuse(format_args!(
+            "gives {formula} = {value:.3e}, the limit is {limit:e}: {because}"
+        )))
+    }
+}
+
+const fn most(formula: &'static str, most: f64, because: &'static str) -> Limit {
+    Limit {
+        formula,
+        least: 0.0,
+        most,
+        because,
+    }
+}
+
+/// Within a factor of `most` of 1.
+const fn near_one(formula: &'static str, most: f64, because: &'static str) -> Limit {
+    Limit {
+        formula,
+        least: 1.0 / most,
+        most,
+        because,
+    }
+}
+
+/// Longest to shortest rod.
+const LENGTHS: Limit = most("L_max/L", 1e3, SHORT);
 /// Largest to smallest torsion or bending stiffness: leaves four of the
 /// sixteen digits of double precision.
-const MOST_STIFFNESS_RATIO: f64 = 1e12;
-/// |u0| L, an angle in radians: 160 coils.
-pub(super) const MOST_REST_ANGLE: f64 = 1e3;
-/// H L^2/A: below, a rod is softer against stretch or shear than against
-/// bending into a curl a thousandth of its length.
-const LEAST_FORCE_STIFFNESS: f64 = 1e-6;
+const STIFFNESSES: Limit = most("A_max/A", 1e12, UNEVEN_STIFFNESS);
+/// An angle in radians: 160 coils.
+const REST_ANGLE: Limit = most("|u0| L", 1e3, CURLED);
 /// Growth of the rest length, and its inverse: as with lengths.
-const MOST_STRETCH: f64 = 1e3;
-/// Longest to shortest rod.
-const MOST_LENGTH_RATIO: f64 = 1e3;
+const STRETCH: Limit = near_one("v0", 1e3, GROWN);
+/// Below, a rod is softer against stretch or shear than against bending into
+/// a curl a thousandth of its length.
+const FORCE_STIFFNESS: Limit = Limit {
+    formula: "H L^2/A",
+    least: 1e-6,
+    most: f64::INFINITY,
+    because: SOFT,
+};
+/// Two coupled rods join within (A/kappa)^(1/4), at the limit 1e-3 of the length.
+const KAPPA: Limit = most("kappa L^4/A", 1e12, COUPLED);
+/// Loads at rest and in time. A rod in tension F turns within sqrt(A/F) of
+/// its ends: at the limit, within 1e-4 of its length.
+const GRAVITY: Limit = most("|g| L^3/A", 1e8, CONFINED);
+const TIP_FORCE: Limit = most("|F| L^2/A", 1e8, CONFINED);
+const TIP_MOMENT: Limit = most("|M| L/A", 1e8, WOUND);
+/// Masses, damping and times in their natural units: what is twelve orders
+/// apart hardly meets in double precision, which has 16. A radius enters by
+/// its square, and by itself: beside a small density its moment of inertia is
+/// small, too.
+const DYNAMICS: [(Key, Limit); 6] = [
+    (Key::Density, near_one("rho/rho_mean", 1e12, UNEVEN_DENSITY)),
+    (
+        Key::RotaryInertia,
+        near_one("rho I/(rho_mean L^2)", 1e12, STOUT),
+    ),
+    (Key::SectionRadius, near_one("r/L", 1e6, WIDE)),
+    (Key::ExternalDamping, most("c T/rho_mean", 1e12, UNIT)),
+    (Key::InternalDamping, most("t/T", 1e12, UNIT)),
+    (Key::Duration, near_one("t/T", 1e12, UNIT)),
+];
+/// Outputs after the first.
+const OUTPUTS: Limit = most("duration/output_interval", 1e6, TOO_MANY);
+/// Times of loads and factors.
+const TIME: Limit = most("|t|/T", 1e12, UNIT);
+/// Factor of the rest curvatures, and the same with the largest of them.
+const FACTOR: Limit = most("|factor|", 1e6, MULTIPLIED);
+const FACTOR_ANGLE: Limit = most("|factor u0| L", 1e3, CURLED);
 
-const COUPLE: [Key; 3] = [Key::Torsion, Key::Bending2, Key::Bending3];
-const FORCE: [Key; 3] = [Key::Axial, Key::Shear2, Key::Shear3];
-const REST: [Key; 3] = [Key::RestTwist, Key::RestBend2, Key::RestBend3];
-const COUPLING: [Key; 3] = [Key::CouplingX, Key::CouplingY, Key::CouplingZ];
-
-pub(super) const CONFINED: &str = "A is the smallest bending stiffness of a rod and L its length; \
-     beyond the limit bending is confined to less than 1e-4 of the length: lower the load or stiffen the rods";
-pub(super) const WOUND: &str = "A is the smallest bending stiffness of the rod and L its length; \
-     the rod would roll up by this many radians: lower the moment or stiffen the rod";
-const COUPLED: &str = "A is the smallest bending stiffness of the two rods and L the longer length; \
-     beyond the limit neighbours act as glued together: lower the coupling";
-const UNEVEN: &str = "the ratio of the largest to this smallest torsion or bending stiffness; \
-     double precision does not resolve more: raise this one or lower the largest";
-pub(super) const CURLED: &str =
-    "an angle in radians: the rod at rest would be wound up more than 150 times";
-const SOFT: &str = "A is the smallest bending stiffness of the rod and L its length; \
-     below the limit the rod is softer in stretch or shear than any beam: raise this stiffness";
-const GROWN: &str = "the factor of the rest length; beyond it or its inverse one grid \
-     of equal fractions of the length does not serve the leaf";
 const SHORT: &str = "the ratio of the longest rod to this shortest one: \
      one grid of equal fractions of the length does not serve both";
+const UNEVEN_STIFFNESS: &str = "the ratio of the largest to this smallest torsion or bending stiffness; \
+     double precision does not resolve more: raise this one or lower the largest";
+const CURLED: &str = "an angle in radians: the rod at rest would be wound up more than 150 times";
+const GROWN: &str = "the factor of the rest length; beyond it or its inverse one grid \
+     of equal fractions of the length does not serve the leaf";
+const SOFT: &str = "A is the smallest bending stiffness of the rod and L its length; \
+     below the limit the rod is softer in stretch or shear than any beam: raise this stiffness";
+const COUPLED: &str = "A is the smallest bending stiffness of the two rods and L the longer length; \
+     beyond the limit neighbours act as glued together: lower the coupling";
+const CONFINED: &str = "A is the smallest bending stiffness of a rod and L its length; \
+     beyond the limit bending is confined to less than 1e-4 of the length: lower the load or stiffen the rods";
+const WOUND: &str = "A is the smallest bending stiffness of the rod and L its length; \
+     the rod would roll up by this many radians: lower the moment or stiffen the rod";
+const UNEVEN_DENSITY: &str = "rho_mean is the mean of the densities mid-rod; \
+     beyond the limit one part weighs nothing beside another: choose densities closer to each other";
+const STOUT: &str = "rho_mean is the mean of the densities mid-rod and L the longest rod; \
+     it is r^2/(4 L^2) for a round section of radius r: choose one closer to that of a rod";
+const WIDE: &str =
+    "r is the radius of the section and L the longest rod: choose one closer to that of a rod";
+const UNIT: &str = "T = sqrt(rho_mean L^4/A) is the natural unit of time, with the longest rod L and \
+     the means rho_mean and A of the densities and bending stiffnesses mid-rod: \
+     choose a value, or a density, that brings this closer to 1";
+const TOO_MANY: &str =
+    "the number of outputs: choose a longer output_interval or a shorter duration";
+const MULTIPLIED: &str =
+    "rest curvatures are multiplied by it: choose larger ones in [rest], and a smaller factor";
 
-/// The smallest bending stiffness of a rod, anywhere along it.
-fn bending(rod: &Rod) -> f64 {
-    rod.couple_stiffness[1]
-        .min()
-        .min(rod.couple_stiffness[2].min())
-}
-
-pub(super) fn check(raw: &Raw, scenario: &Scenario) -> Result<(), ScenarioError> {
-    lengths(raw, scenario)?;
-    stiffness(raw, scenario)?;
-    loads(raw, scenario)?;
+pub(super) fn check(raw: &Raw, scenario: &Scenario) -> Result {
+    rods(raw, &scenario.rods)?;
+    for (key, load, limit) in [
+        (Key::Gravity, scenario.gravity, GRAVITY),
+        (Key::TipForce, scenario.tip_force, TIP_FORCE),
+        (Key::TipMoment, scenario.tip_moment, TIP_MOMENT),
+    ] {
+        if let Some(item) = raw.given(key) {
+            limit.check(item, norm(load) * longest_arm(key, &scenario.rods))?;
+        }
+    }
     coupling(raw, scenario)?;
-    super::dynamics::limits::check(raw, scenario)
+    dynamics(raw, scenario)?;
+    in_time(raw, scenario)
 }
 
-/// An error about `key`, at the entry of one rod or gap where there is one.
-fn beyond(
-    raw: &Raw,
-    key: Key,
-    index: Option<usize>,
-    (formula, value, limit, because): (&'static str, f64, f64, &'static str),
-) -> ScenarioError {
-    let problem = Problem::Limit {
-        formula,
-        value,
-        limit,
-        because,
-    };
-    match raw.required(key) {
-        Ok(item) => index
-            .map_or(item, |index| item.entry(index))
-            .refuse(problem),
-        Err(missing) => missing,
+/// The length of a rod and its smallest bending stiffness anywhere along it.
+fn softest(rod: &Rod) -> Scale {
+    let [_, second, third] = &rod.couple_stiffness;
+    Scale {
+        length: rod.length,
+        stiffness: second.min().min(third.min()),
     }
 }
 
-fn lengths(raw: &Raw, scenario: &Scenario) -> Result<(), ScenarioError> {
-    let longest = scenario
-        .rods
-        .iter()
-        .map(|rod| rod.length)
-        .fold(0.0, f64::max);
-    for (index, rod) in scenario.rods.iter().enumerate() {
-        let ratio = longest / rod.length;
-        if ratio > MOST_LENGTH_RATIO {
-            return Err(beyond(
-                raw,
-                Key::Length,
-                Some(index),
-                ("L_max/L", ratio, MOST_LENGTH_RATIO, SHORT),
-            ));
-        }
-    }
-    Ok(())
+/// A quantity of this key in these units is a number free of units if it is
+/// multiplied by this; times are in units of `time`.
+fn per(key: Key, scale: Scale, time: f64) -> f64 {
+    let [length, force, times] = key.dimension();
+    scale.per(length, force) / time.powi(times)
 }
 
-fn stiffness(raw: &Raw, scenario: &Scenario) -> Result<(), ScenarioError> {
-    let largest = scenario
-        .rods
-        .iter()
-        .flat_map(|rod| &rod.couple_stiffness)
-        .map(|stiffness| stiffness.max_abs())
-        .fold(0.0, f64::max);
-    for (index, rod) in scenario.rods.iter().enumerate() {
-        let refuse = |key, what| Err(beyond(raw, key, Some(index), what));
-        for (key, stiffness) in COUPLE.into_iter().zip(&rod.couple_stiffness) {
-            let ratio = largest / stiffness.min();
-            if ratio > MOST_STIFFNESS_RATIO {
-                return refuse(key, ("A_max/A", ratio, MOST_STIFFNESS_RATIO, UNEVEN));
-            }
-        }
-        for (key, stiffness) in FORCE.into_iter().zip(&rod.force_stiffness) {
-            let ratio = stiffness.min() * rod.length.powi(2) / bending(rod);
-            if ratio < LEAST_FORCE_STIFFNESS {
-                return refuse(key, ("H L^2/A", ratio, LEAST_FORCE_STIFFNESS, SOFT));
-            }
-        }
-        for (key, curvature) in REST.into_iter().zip(&rod.rest_curvature) {
-            let angle = curvature.max_abs() * rod.length;
-            if angle > MOST_REST_ANGLE {
-                return refuse(key, ("|u0| L", angle, MOST_REST_ANGLE, CURLED));
-            }
-        }
-        let (least, most) = (rod.rest_stretch.min(), rod.rest_stretch.max_abs());
-        for (found, limit, beyond) in [
-            (most, MOST_STRETCH, most > MOST_STRETCH),
-            (least, 1.0 / MOST_STRETCH, least < 1.0 / MOST_STRETCH),
-        ] {
-            if beyond {
-                return refuse(Key::RestStretch, ("v0", found, limit, GROWN));
-            }
-        }
-    }
-    Ok(())
+/// The same for the rod of which it is largest.
+fn longest_arm(key: Key, rods: &[Rod]) -> f64 {
+    let arms = rods.iter().map(|rod| per(key, softest(rod), 1.0));
+    arms.fold(0.0, f64::max)
 }
 
-fn loads(raw: &Raw, scenario: &Scenario) -> Result<(), ScenarioError> {
-    let loads = [
-        (Key::Gravity, scenario.gravity, "|g| L^3/A", 3, CONFINED),
-        (Key::TipForce, scenario.tip_force, "|F| L^2/A", 2, CONFINED),
-        (Key::TipMoment, scenario.tip_moment, "|M| L/A", 1, WOUND),
-    ];
-    for (key, load, formula, power, because) in loads {
-        let worst = norm(load) * longest_arm(scenario, power);
-        if worst > MOST_LOAD {
-            return Err(beyond(raw, key, None, (formula, worst, MOST_LOAD, because)));
-        }
-    }
-    Ok(())
-}
-
-pub(super) fn norm([x, y, z]: [f64; 3]) -> f64 {
+fn norm([x, y, z]: [f64; 3]) -> f64 {
     // hypot: squares of large components overflow.
     x.hypot(y).hypot(z)
 }
 
-/// The largest L^power/A of a rod: times a load, that load free of units.
-pub(super) fn longest_arm(scenario: &Scenario, power: i32) -> f64 {
-    scenario
-        .rods
-        .iter()
-        .map(|rod| rod.length.powi(power) / bending(rod))
-        .fold(0.0, f64::max)
+fn rods(raw: &Raw, rods: &[Rod]) -> Result {
+    let check = |key, index, limit: &Limit, value| match raw.given(key) {
+        Some(item) => limit.check(item.entry(index), value),
+        None => Ok(()),
+    };
+    let longest = longest(rods);
+    for (index, rod) in rods.iter().enumerate() {
+        check(Key::Length, index, &LENGTHS, longest / rod.length)?;
+    }
+    let stiffnesses = rods.iter().flat_map(|rod| &rod.couple_stiffness);
+    let stiffest = stiffnesses.fold(0.0, |most: f64, stiffness| most.max(stiffness.max_abs()));
+    for (index, rod) in rods.iter().enumerate() {
+        let natural = |key, value| value * per(key, softest(rod), 1.0);
+        for (key, stiffness) in COUPLE.into_iter().zip(&rod.couple_stiffness) {
+            check(key, index, &STIFFNESSES, stiffest / stiffness.min())?;
+        }
+        for (key, stiffness) in FORCE.into_iter().zip(&rod.force_stiffness) {
+            check(key, index, &FORCE_STIFFNESS, natural(key, stiffness.min()))?;
+        }
+        for (key, curvature) in REST.into_iter().zip(&rod.rest_curvature) {
+            check(key, index, &REST_ANGLE, natural(key, curvature.max_abs()))?;
+        }
+        let (least, most) = (rod.rest_stretch.min(), rod.rest_stretch.max_abs());
+        let extreme = if most > STRETCH.most { most } else { least };
+        check(Key::RestStretch, index, &STRETCH, extreme)?;
+    }
+    Ok(())
 }
 
-fn coupling(raw: &Raw, scenario: &Scenario) -> Result<(), ScenarioError> {
-    for (gap, (stiffness, rods)) in scenario
-        .coupling
-        .iter()
-        .zip(scenario.rods.windows(2))
-        .enumerate()
-    {
-        let length = rods[0].length.max(rods[1].length);
-        let softest = bending(&rods[0]).min(bending(&rods[1]));
+fn coupling(raw: &Raw, scenario: &Scenario) -> Result {
+    let gaps = scenario.coupling.iter().zip(scenario.rods.windows(2));
+    for (gap, (stiffness, rods)) in gaps.enumerate() {
+        let [one, other] = [softest(&rods[0]), softest(&rods[1])];
+        let both = Scale {
+            length: one.length.max(other.length),
+            stiffness: one.stiffness.min(other.stiffness),
+        };
         for (key, stiffness) in COUPLING.into_iter().zip(stiffness) {
-            let ratio = stiffness * (length.powi(4) / softest);
-            if ratio > MOST_COUPLING {
-                return Err(beyond(
-                    raw,
-                    key,
-                    Some(gap),
-                    ("kappa L^4/A", ratio, MOST_COUPLING, COUPLED),
-                ));
+            if let Some(item) = raw.given(key) {
+                KAPPA.check(item.entry(gap), stiffness * per(key, both, 1.0))?;
             }
+        }
+    }
+    Ok(())
+}
+
+fn dynamics(raw: &Raw, scenario: &Scenario) -> Result {
+    let (scale, time) = (scenario.scale(), scenario.time());
+    for (key, limit) in &DYNAMICS {
+        let Some(item) = raw.given(*key) else {
+            continue;
+        };
+        let natural = per(*key, scale, time);
+        let Form::Quantity(_) = key.form() else {
+            limit.check(item, item.number()? * natural)?;
+            continue;
+        };
+        for (index, profile) in item.quantity(scenario.rods.len())?.iter().enumerate() {
+            for value in [profile.min(), profile.max_abs()] {
+                limit.check(item.entry(index), value * natural)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn in_time(raw: &Raw, scenario: &Scenario) -> Result {
+    let (dynamics, rods, time) = (&scenario.dynamics, &scenario.rods, scenario.time());
+    if let Some(item) = raw.given(Key::OutputInterval) {
+        // What rounding adds to a quotient is no output.
+        let outputs = (dynamics.duration / dynamics.output_interval).floor();
+        OUTPUTS.check(item, outputs)?;
+    }
+    let list = |key, name| raw.given(key).and_then(|item: Item| item.list(name));
+    for (key, at) in [
+        (Key::GravityInTime, &dynamics.gravity.at),
+        (Key::TipForceInTime, &dynamics.tip_force.at),
+        (Key::TipMomentInTime, &dynamics.tip_moment.at),
+        (Key::RestInTime, &dynamics.rest.at),
+    ] {
+        if let Some(list) = list(key, "at") {
+            for (index, at) in at.iter().enumerate() {
+                TIME.check(list.entry(index), at.abs() / time)?;
+            }
+        }
+    }
+    for (key, load, limit) in [
+        (Key::GravityInTime, &dynamics.gravity, GRAVITY),
+        (Key::TipForceInTime, &dynamics.tip_force, TIP_FORCE),
+        (Key::TipMomentInTime, &dynamics.tip_moment, TIP_MOMENT),
+    ] {
+        if let Some(list) = list(key, "value") {
+            let arm = longest_arm(key, rods);
+            for (index, &value) in load.value.iter().enumerate() {
+                limit.check(list.entry(index), norm(value) * arm)?;
+            }
+        }
+    }
+    if let Some(list) = list(Key::RestInTime, "factor") {
+        let angles = (rods.iter())
+            .flat_map(|rod| rod.rest_curvature.iter().map(|u| u.max_abs() * rod.length));
+        let angle = angles.fold(0.0, f64::max);
+        for (index, factor) in dynamics.rest.value.iter().enumerate() {
+            FACTOR.check(list.entry(index), factor.abs())?;
+            FACTOR_ANGLE.check(list.entry(index), factor.abs() * angle)?;
         }
     }
     Ok(())

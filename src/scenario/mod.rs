@@ -6,22 +6,23 @@
 mod check;
 mod dynamics;
 mod error;
-mod in_time;
 mod key;
 mod limits;
 mod profile;
-mod quantity;
 mod raw;
 mod read;
+mod scale;
 mod schedule;
+mod value;
 
 pub use dynamics::{Dynamics, Start};
-pub(crate) use dynamics::{longest, mean_bending};
-pub use error::{Because, Form, Needed, Place, Problem, ScenarioError, Spot};
+pub use error::{Place, ScenarioError};
 pub use key::Key;
-pub(crate) use key::nearest;
+pub(crate) use key::{Form, LeftOut, nearest};
 pub use profile::Profile;
 pub(crate) use read::text;
+pub use scale::Scale;
+pub(crate) use scale::longest;
 pub use schedule::Schedule;
 
 /// A checked scenario. All quantities are in the units the file was written
@@ -52,6 +53,18 @@ pub struct Scenario {
     pub dynamics: Dynamics,
 }
 
+impl Scenario {
+    /// The units in which it is dimensionless.
+    pub fn scale(&self) -> Scale {
+        Scale::of(&self.rods)
+    }
+
+    /// T: the natural unit of time, sqrt(rho L^4/A).
+    fn time(&self) -> f64 {
+        dynamics::time(self.scale(), &self.dynamics.density)
+    }
+}
+
 /// Names of the units a scenario is written in.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Units {
@@ -74,7 +87,10 @@ pub struct Rod {
     pub couple_stiffness: [Profile; 3],
     /// H1, H2, H3 of eq. (6): a force; infinite means rigid.
     pub force_stiffness: [Profile; 3],
-    /// u0: twist, bend about d2, bend about d3; per length.
+    /// u0: twist, bend about d2, bend about d3; per length. Along the rod
+    /// d1' = u3 d2 - u2 d3 and d2' = u1 d3 - u3 d1: a positive bend about d2
+    /// curves the rod towards -d3, in a fan at rest downwards, one about d3
+    /// towards d2, and a positive twist turns d2 towards d3.
     pub rest_curvature: [Profile; 3],
     /// Growth of the rest length: an element ds rests at this factor times ds,
     /// v0 = (stretch, 0, 0); positive, 1 without growth.

@@ -1,11 +1,13 @@
 //! A scenario as written: which key has which value, and where it stands.
 //! Nothing here knows what the values mean.
 
+use std::fmt::Display;
+
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{Form, Needed, Place, Problem, ScenarioError, Spot, line_of, shorten, snippet};
-use super::key::{Key, TABLES, nearest};
+use super::error::{Place, ScenarioError, line_of, shorten, snippet};
+use super::key::{Form, Key, LeftOut, nearest};
 
 /// All entries of a scenario, those of `--set` in place of the file's.
 pub(super) struct Raw<'a> {
@@ -32,9 +34,11 @@ enum Origin<'a> {
     File(&'a str),
     /// The whole `KEY=VALUE`.
     Set(&'a str),
+    /// What holds where nothing is written.
+    LeftOut,
 }
 
-impl Source<'_> {
+impl<'a> Source<'a> {
     fn place(&self, at: usize) -> Place {
         match self.origin {
             Origin::File(file) => Place::Line {
@@ -44,6 +48,9 @@ impl Source<'_> {
             Origin::Set(given) => Place::Set {
                 given: shorten(given),
             },
+            Origin::LeftOut => Place::File {
+                file: "default".into(),
+            },
         }
     }
 
@@ -51,33 +58,43 @@ impl Source<'_> {
         shorten(self.text.get(value.span()).unwrap_or(""))
     }
 
-    fn syntax(&self, error: &toml::de::Error) -> ScenarioError {
-        let span = error.span().unwrap_or(0..0);
-        let snippet = match self.origin {
-            Origin::File(_) => snippet(self.text, span.clone()),
-            Origin::Set(_) => String::new(),
-        };
-        ScenarioError::Syntax {
-            place: self.place(span.start),
-            message: error.message().to_string(),
-            snippet,
+    /// The line around `span`, where the text has lines.
+    fn snippet(&self, span: std::ops::Range<usize>) -> String {
+        match self.origin {
+            Origin::File(_) => snippet(self.text, span),
+            _ => String::new(),
         }
     }
 
-    fn unknown_key(&self, key: &Spanned<std::borrow::Cow<'_, str>>, table: &str) -> ScenarioError {
-        let name = key.get_ref();
-        let path = if table.is_empty() {
-            name.to_string()
-        } else {
-            format!("{table}.{name}")
-        };
-        ScenarioError::UnknownKey {
-            place: self.place(key.span().start),
-            meant: nearest(&path),
-            key: shorten(&path),
-            allowed: Key::allowed_in(table),
-            snippet: snippet(self.text, key.span()),
+    /// A refusal of what is not the value of a key.
+    fn refuse(&self, at: usize, problem: String) -> ScenarioError {
+        ScenarioError {
+            place: self.place(at),
+            key: None,
+            problem,
         }
+    }
+
+    fn parse<T>(&self, parsed: Result<T, toml::de::Error>) -> Result<T, ScenarioError> {
+        parsed.map_err(|error| {
+            let span = error.span().unwrap_or(0..0);
+            let (start, message) = (span.start, error.message());
+            let snippet = self.snippet(span);
+            self.refuse(start, format!("not valid TOML: {message}{snippet}"))
+        })
+    }
+
+    fn unknown_key(
+        &self,
+        path: &str,
+        span: std::ops::Range<usize>,
+        allowed: Vec<&str>,
+    ) -> ScenarioError {
+        let meant = nearest(path).map_or(String::new(), |key| format!(" (did you mean {key}?)"));
+        let (key, allowed) = (shorten(path), allowed.join(", "));
+        let (start, snippet) = (span.start, self.snippet(span));
+        let problem = format!("unknown key {key}{meant}: allowed here: {allowed}{snippet}");
+        self.refuse(start, problem)
     }
 }
 
@@ -93,11 +110,20 @@ impl<'a> Raw<'a> {
             entries: [const { None }; Key::COUNT],
             tables: Vec::new(),
         };
-        let source = Source {
-            text,
-            origin: Origin::File(file),
-        };
-        let document = DeTable::parse(text).map_err(|error| source.syntax(&error))?;
+        for key in Key::all() {
+            if let LeftOut::Means(text) = key.left_out() {
+                let origin = Origin::LeftOut;
+                let value = DeValue::parse(text).ok();
+                let entry = |value| Entry {
+                    value,
+                    source: Source { text, origin },
+                };
+                raw.entries[key as usize] = value.map(entry);
+            }
+        }
+        let origin = Origin::File(file);
+        let source = Source { text, origin };
+        let document = source.parse(DeTable::parse(text))?;
         raw.read_table(document.into_inner(), "", source)?;
         for given in overrides {
             raw.set(given)?;
@@ -112,160 +138,185 @@ impl<'a> Raw<'a> {
         source: Source<'a>,
     ) -> Result<(), ScenarioError> {
         for (key, value) in table {
-            let here = |known: &&Key| {
-                known.table() == name && known.short_name() == key.get_ref().as_ref()
-            };
-            if let Some(known) = Key::all().find(|known| here(&known)) {
+            let here = (name, key.get_ref().as_ref());
+            if let Some(known) = Key::all().find(|known| known.parts() == here) {
                 self.entries[known as usize] = Some(Entry { value, source });
-            } else if let Some(inner) = TABLES
-                .into_iter()
-                .find(|table| name.is_empty() && table == key.get_ref())
-            {
-                let found = source.found(&value);
-                let DeValue::Table(table) = value.into_inner() else {
-                    return Err(ScenarioError::NotATable {
-                        place: source.place(key.span().start),
-                        table: inner,
-                        found,
-                        allowed: Key::allowed_in(inner),
-                    });
-                };
-                self.tables.push(inner);
-                self.read_table(table, inner, source)?;
-            } else {
-                return Err(source.unknown_key(&key, name));
+                continue;
             }
+            let inner = Key::tables().into_iter().find(|table| here == ("", table));
+            let Some(inner) = inner else {
+                let path = match here {
+                    ("", key) => key.to_string(),
+                    (table, key) => format!("{table}.{key}"),
+                };
+                return Err(source.unknown_key(&path, key.span(), Key::allowed_in(name)));
+            };
+            let found = source.found(&value);
+            let DeValue::Table(table) = value.into_inner() else {
+                let allowed = Key::allowed_in(inner).join(", ");
+                let problem = format!(
+                    "{inner} = {found}: must be a table: write [{inner}] on a line of its own, below it {allowed}"
+                );
+                return Err(source.refuse(key.span().start, problem));
+            };
+            self.tables.push(inner);
+            self.read_table(table, inner, source)?;
         }
         Ok(())
     }
 
     /// Takes one `KEY=VALUE`. The value is TOML; what cannot be is taken as text.
     fn set(&mut self, given: &'a str) -> Result<(), ScenarioError> {
-        let Some((path, text)) = given.split_once('=') else {
-            return Err(ScenarioError::NotAnOverride {
-                given: shorten(given),
-            });
-        };
+        let (path, text) = given.split_once('=').unwrap_or((given, ""));
         let (path, text) = (path.trim(), text.trim());
-        let source = Source {
-            text,
-            origin: Origin::Set(given),
-        };
+        let origin = Origin::Set(given);
+        let source = Source { text, origin };
+        if !given.contains('=') {
+            let problem = "must be KEY=VALUE, e.g. --set load.gravity=[0,0,-0.5]";
+            return Err(source.refuse(0, problem.into()));
+        }
         let Some(key) = Key::from_path(path) else {
-            return Err(ScenarioError::UnknownKey {
-                place: source.place(0),
-                meant: nearest(path),
-                key: shorten(path),
-                allowed: Key::all().map(Key::path).collect(),
-                snippet: String::new(),
-            });
+            return Err(source.unknown_key(path, 0..0, Key::all().map(Key::path).collect()));
         };
         let value = match DeValue::parse(text) {
-            Ok(value) => value,
-            Err(error) if text.is_empty() || text.starts_with(['[', '{', '"', '\'']) => {
-                return Err(source.syntax(&error));
+            Err(_) if !text.is_empty() && !text.starts_with(['[', '{', '"', '\'']) => {
+                Spanned::new(0..text.len(), DeValue::String(text.into()))
             }
-            Err(_) => Spanned::new(0..text.len(), DeValue::String(text.into())),
+            parsed => source.parse(parsed)?,
         };
         self.entries[key as usize] = Some(Entry { value, source });
         Ok(())
     }
 
-    /// The value of a key that may be left out.
-    pub(super) fn optional(&self, key: Key) -> Option<Item<'_>> {
+    /// The value of a key, if it is written.
+    pub(super) fn given(&self, key: Key) -> Option<Item<'_>> {
+        self.entry(key)
+            .filter(|item| !matches!(item.source.origin, Origin::LeftOut))
+    }
+
+    /// The value of a key as written, or the one that holds where it is left out.
+    pub(super) fn item(&self, key: Key) -> Result<Item<'_>, ScenarioError> {
+        self.entry(key).ok_or_else(|| {
+            let (table, name) = key.parts();
+            let example = match key.left_out() {
+                LeftOut::Refused(example) => example,
+                _ => "...",
+            };
+            let line = format!("a line such as `{name} = {example}`");
+            let how = match table {
+                "" => format!("add {line} at the top of the file"),
+                _ if self.tables.contains(&table) => format!("add {line} below [{table}]"),
+                _ => format!("add the table [{table}], and below it {line}"),
+            };
+            ScenarioError {
+                place: Place::File {
+                    file: self.file.to_string(),
+                },
+                key: Some(key),
+                problem: format!("{} is missing: {how}", key.path()),
+            }
+        })
+    }
+
+    fn entry(&self, key: Key) -> Option<Item<'_>> {
         let entry = self.entries[key as usize].as_ref()?;
         Some(Item {
             key,
-            spot: Spot::Whole,
+            list: "",
+            indices: [None; 2],
             value: &entry.value,
             source: entry.source,
         })
     }
-
-    /// The value of a key that must be there.
-    pub(super) fn required(&self, key: Key) -> Result<Item<'_>, ScenarioError> {
-        self.optional(key).ok_or_else(|| ScenarioError::Missing {
-            file: self.file.to_string(),
-            key,
-            has_table: self.tables.contains(&key.table()),
-        })
-    }
 }
 
-/// A value, or a part of one, that knows where it stands.
+/// The value of a key, or a part of one, that knows where it stands.
 #[derive(Clone, Copy)]
 pub(super) struct Item<'e> {
     key: Key,
-    spot: Spot,
+    /// Which list of a table: `at`, `value`, `factor`; otherwise empty.
+    list: &'static str,
+    /// Which entry of the list, and which of that, counted from 0.
+    indices: [Option<usize>; 2],
     value: &'e Spanned<DeValue<'e>>,
     source: Source<'e>,
 }
 
 impl<'e> Item<'e> {
+    pub(super) fn key(&self) -> Key {
+        self.key
+    }
+
     pub(super) fn value(&self) -> &'e DeValue<'e> {
         self.value.get_ref()
     }
 
-    /// A part of this value.
-    pub(super) fn part(&self, spot: Spot, value: &'e Spanned<DeValue<'e>>) -> Item<'e> {
+    /// One of the lists of a table, if this is a table that has it.
+    pub(super) fn list(&self, list: &'static str) -> Option<Item<'e>> {
+        let value = self.value().get(list)?;
+        Some(Item {
+            list,
+            value,
+            ..*self
+        })
+    }
+
+    /// An entry of a list; of what is no list, or too short, the whole.
+    pub(super) fn entry(&self, index: usize) -> Item<'e> {
+        let Some(value) = self.value().get(index) else {
+            return *self;
+        };
+        let indices = match self.indices {
+            [None, _] => [Some(index), None],
+            [first, _] => [first, Some(index)],
+        };
         Item {
-            spot,
+            indices,
             value,
             ..*self
         }
     }
 
-    /// The two parts of a table that has no others.
+    /// The two lists of a table that has no others, `at` and this one. `form`
+    /// describes such a table.
     pub(super) fn pair(
         &self,
-        names: [(&'static str, Spot); 2],
-        form: Form,
+        other: &'static str,
+        form: &str,
     ) -> Result<[Item<'e>; 2], ScenarioError> {
         let DeValue::Table(table) = self.value() else {
-            return Err(self.refuse(Problem::WrongType {
-                needed: Needed::Table(form),
-            }));
+            return Err(self.refuse(format_args!("must be a table: {form}")));
         };
-        if let Some(key) = table
-            .keys()
-            .find(|key| names.iter().all(|(name, _)| name != key.get_ref()))
-        {
-            let key = shorten(key.get_ref());
-            return Err(self.refuse(Problem::UnknownPart { key, form }));
+        let mut keys = table.keys().map(|key| key.get_ref());
+        if let Some(key) = keys.find(|key| *key != "at" && *key != other) {
+            let key = shorten(key);
+            return Err(self.refuse(format_args!("unknown key {key}: {form}")));
         }
-        let part = |(key, spot)| match table.get(key) {
-            Some(value) => Ok(self.part(spot, value)),
-            None => Err(self.refuse(Problem::MissingPart { key, form })),
+        let list = |name| {
+            self.list(name)
+                .ok_or_else(|| self.refuse(format_args!("{name} is missing: {form}")))
         };
-        let [first, second] = names;
-        Ok([part(first)?, part(second)?])
+        Ok([list("at")?, list(other)?])
     }
 
-    /// The part that belongs to one rod or gap, where there is one.
-    pub(super) fn entry(&self, index: usize) -> Item<'e> {
-        match self.value().get(index) {
-            Some(value) => self.part(Spot::Entry(index), value),
-            None => *self,
+    pub(super) fn refuse(&self, problem: impl Display) -> ScenarioError {
+        let mut part = String::new();
+        if !self.list.is_empty() {
+            part = format!(", {}", self.list);
         }
-    }
-
-    pub(super) fn array(
-        &self,
-        needed: Needed,
-    ) -> Result<&'e [Spanned<DeValue<'e>>], ScenarioError> {
-        match self.value() {
-            DeValue::Array(array) => Ok(array),
-            _ => Err(self.refuse(Problem::WrongType { needed })),
-        }
-    }
-
-    pub(super) fn refuse(&self, problem: Problem) -> ScenarioError {
-        ScenarioError::Value {
+        part += &match self.indices.map(|index| index.unwrap_or(0) + 1) {
+            _ if self.indices[0].is_none() => String::new(),
+            [i, _] if self.indices[1].is_none() => format!(", entry {i}"),
+            [i, j] if self.key.form() == Form::VectorInTime => {
+                format!(", entry {i}, component {j}")
+            }
+            [i, j] => format!(", list {i}, entry {j}"),
+        };
+        let (path, found) = (self.key.path(), self.source.found(self.value));
+        ScenarioError {
             place: self.source.place(self.value.span().start),
-            key: self.key,
-            spot: self.spot,
-            found: self.source.found(self.value),
-            problem: Box::new(problem),
+            key: Some(self.key),
+            problem: format!("{path}{part} = {found}: {problem}"),
         }
     }
 }

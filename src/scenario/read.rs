@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-use super::error::{ScenarioError, line_of};
+use super::error::{Place, ScenarioError, line_of};
 use super::raw::Raw;
 use super::{Scenario, check};
 
@@ -49,31 +49,38 @@ impl Scenario {
 
 /// The text of a scenario's file.
 pub(crate) fn text(path: &Path) -> Result<String, ScenarioError> {
+    let file = path.display().to_string();
+    let refuse = |line, problem| ScenarioError {
+        place: match line {
+            None => Place::File { file: file.clone() },
+            Some(line) => Place::Line {
+                file: file.clone(),
+                line,
+            },
+        },
+        key: None,
+        problem,
+    };
     let mut bytes = Vec::new();
     // Opening a folder succeeds on some systems, and reading it fails.
     File::open(path)
         .and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|reason| match reason.kind() {
-            ErrorKind::IsADirectory => ScenarioError::Folder { path: path.into() },
-            _ => ScenarioError::Unreadable {
-                path: path.into(),
-                reason,
-            },
+            ErrorKind::IsADirectory => {
+                refuse(None, "is a folder: give the TOML file itself".into())
+            }
+            _ => refuse(None, format!("cannot be read: {reason}")),
         })?;
     if bytes.len() as u64 > MOST_BYTES {
-        return Err(ScenarioError::TooLarge {
-            path: path.into(),
-            limit: MOST_BYTES,
-        });
+        let problem = format!("is larger than {MOST_BYTES} bytes: this is no scenario");
+        return Err(refuse(None, problem));
     }
     String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
         let bytes = error.as_bytes();
-        ScenarioError::NotUtf8 {
-            file: path.display().to_string(),
-            line: line_of(bytes, offset),
-            offset,
-            byte: bytes[offset],
-        }
+        let byte = bytes[offset];
+        let problem =
+            format!("is not text in UTF-8: byte {offset} is 0x{byte:02x}: save the file as UTF-8");
+        refuse(Some(line_of(bytes, offset)), problem)
     })
 }

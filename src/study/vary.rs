@@ -30,7 +30,7 @@ pub use base::{Base, Varied};
 use std::fmt;
 use std::str::FromStr;
 
-use crate::scenario::{Key, ScenarioError, nearest};
+use crate::scenario::{Form, Key, ScenarioError, nearest};
 
 /// Values where no count is given.
 const COUNT: usize = 11;
@@ -72,6 +72,29 @@ pub struct Knobs {
     pub segments: Option<usize>,
 }
 
+impl Knobs {
+    fn set(&mut self, knob: Knob, value: f64) -> Result<(), VaryError> {
+        let needed = match knob {
+            Knob::Step if value > 0.0 && value.is_finite() => {
+                self.step = Some(value);
+                return Ok(());
+            }
+            Knob::Segments if value >= 1.0 && value.fract() == 0.0 && value < 1e9 => {
+                self.segments = Some(value as usize);
+                return Ok(());
+            }
+            Knob::Step => "greater than 0",
+            Knob::Segments => "a whole number from 1",
+        };
+        let found = format!("{value:?}");
+        Err(VaryError::Knob {
+            knob,
+            found,
+            needed,
+        })
+    }
+}
+
 /// One number that can be set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
@@ -86,56 +109,10 @@ pub enum Target {
     Knob(Knob),
 }
 
-/// What a key takes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    Whole,
-    Number,
-    /// A number for all rods, or a list with one for each.
-    PerRod,
-    /// A number for all gaps, or a list.
-    PerGap,
-    /// x, y, z.
-    Vector,
-    /// Base angles: a list, or a word.
-    Angles,
-    NoNumber,
-}
-
-fn kind(key: Key) -> Kind {
-    match key {
-        Key::Rods => Kind::Whole,
-        Key::Tolerance
-        | Key::ExternalDamping
-        | Key::InternalDamping
-        | Key::Duration
-        | Key::OutputInterval => Kind::Number,
-        Key::Length
-        | Key::Torsion
-        | Key::Bending2
-        | Key::Bending3
-        | Key::Axial
-        | Key::Shear2
-        | Key::Shear3
-        | Key::RestTwist
-        | Key::RestBend2
-        | Key::RestBend3
-        | Key::RestStretch
-        | Key::Density
-        | Key::RotaryInertia
-        | Key::SectionRadius => Kind::PerRod,
-        Key::CouplingX | Key::CouplingY | Key::CouplingZ => Kind::PerGap,
-        Key::Gravity | Key::TipForce | Key::TipMoment => Kind::Vector,
-        Key::Fan => Kind::Angles,
-        // Texts, switches, and what is given in time.
-        _ => Kind::NoNumber,
-    }
-}
-
 impl Target {
     fn is_whole(self) -> bool {
         match self {
-            Target::Entry { key, .. } => kind(key) == Kind::Whole,
+            Target::Entry { key, .. } => key.form() == Form::Whole,
             Target::Knob(knob) => knob == Knob::Segments,
         }
     }
@@ -167,19 +144,21 @@ impl FromStr for Target {
             return Err(refuse(match nearest(path) {
                 Some(meant) => format!("unknown key; did you mean {meant}?"),
                 None => {
-                    let numbers = Key::all().filter(|&key| kind(key) != Kind::NoNumber);
+                    let numbers = Key::all().filter(|key| key.form().is_numeric());
                     let paths = numbers.map(Key::path).chain(Knob::ALL.map(Knob::path));
                     format!("unknown key: {}", paths.collect::<Vec<_>>().join(", "))
                 }
             }));
         };
-        match (kind(key), index) {
-            (Kind::NoNumber, _) => Err(refuse("takes no number that could vary".into())),
-            (Kind::Whole | Kind::Number, Some(_)) => {
+        match (key.form(), index) {
+            (form, _) if !form.is_numeric() => {
+                Err(refuse("takes no number that could vary".into()))
+            }
+            (Form::Whole | Form::Number(_), Some(_)) => {
                 Err(refuse("is one number: leave the index out".into()))
             }
-            (Kind::Vector, Some(3..)) => Err(refuse("x, y, z have the indices 0, 1, 2".into())),
-            (Kind::Vector | Kind::Angles, None) => {
+            (Form::Vector, Some(3..)) => Err(refuse("x, y, z have the indices 0, 1, 2".into())),
+            (Form::Vector | Form::Fan, None) => {
                 Err(refuse(format!("is a list: give an index, as in {path}[0]")))
             }
             _ => Ok(Target::Entry { key, index }),
@@ -190,12 +169,11 @@ impl FromStr for Target {
 impl fmt::Display for Target {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Target::Entry { key, index: None } => write!(f, "{}", key.path()),
-            Target::Entry {
-                key,
-                index: Some(index),
-            } => write!(f, "{}[{index}]", key.path()),
-            Target::Knob(knob) => write!(f, "{}", knob.path()),
+            Target::Entry { key, index } => {
+                f.write_str(key.path())?;
+                index.map_or(Ok(()), |index| write!(f, "[{index}]"))
+            }
+            Target::Knob(knob) => f.write_str(knob.path()),
         }
     }
 }

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use toml::Value;
 
-use super::{Keys, Kind, Knob, Knobs, Target, VaryError, kind};
-use crate::scenario::{self, Key, Scenario};
+use super::{Keys, Knob, Knobs, Target, VaryError};
+use crate::scenario::{self, Form, Key, LeftOut, Scenario};
 
 /// A scenario as text, with some entries replaced: what numbers are put into.
 #[derive(Clone, Debug)]
@@ -47,9 +47,12 @@ impl Base {
         let mut knobs = Knobs::default();
         let mut of_scenario = Vec::new();
         for given in overrides {
-            match knob(given)? {
-                Some((knob, value)) => set_knob(&mut knobs, knob, value)?,
-                None => of_scenario.push(given.clone()),
+            match given.split_once('=') {
+                Some((path, value)) if path.trim().starts_with("method.") => {
+                    let (knob, value) = setting(path.trim(), value.trim())?;
+                    knobs.set(knob, value)?;
+                }
+                _ => of_scenario.push(given.clone()),
             }
         }
         let scenario = Scenario::from_toml_with(&text, &file, &of_scenario)?;
@@ -93,7 +96,7 @@ impl Base {
         for (keys, value) in values {
             for &target in keys.targets() {
                 match target {
-                    Target::Knob(knob) => set_knob(&mut knobs, knob, *value)?,
+                    Target::Knob(knob) => knobs.set(knob, *value)?,
                     Target::Entry { key, index } => {
                         let entry = self.entry(&changed, key, index, *value)?;
                         changed.insert(key.path(), entry);
@@ -119,127 +122,94 @@ impl Base {
         index: Option<usize>,
         value: f64,
     ) -> Result<Value, VaryError> {
-        if kind(key) == Kind::Whole {
+        if key.form() == Form::Whole {
             return Ok(Value::Integer(value as i64));
         }
         let Some(index) = index else {
             return Ok(Value::Float(value));
         };
         let now = |key: Key| changed.get(key.path()).or(self.entries.get(key.path()));
-        let refuse = |why: String| VaryError::Key {
-            key: Target::Entry {
-                key,
-                index: Some(index),
-            }
-            .to_string(),
-            why,
+        let refuse = |why: String| {
+            let index = Some(index);
+            let key = Target::Entry { key, index }.to_string();
+            Err(VaryError::Key { key, why })
         };
         let rods = match now(Key::Rods) {
             Some(Value::Integer(rods)) => *rods as usize,
             _ => self.scenario.rods.len(),
         };
-        let count = match kind(key) {
-            Kind::Vector => 3,
-            Kind::PerGap => rods.saturating_sub(1),
+        let count = match key.form() {
+            Form::PerGap(_) => rods.saturating_sub(1),
             _ => rods,
         };
         let mut list = match now(key) {
             Some(Value::Array(list)) => list.clone(),
             Some(number @ (Value::Float(_) | Value::Integer(_))) => vec![number.clone(); count],
-            Some(_) => return Err(refuse("is no list in the scenario".into())),
-            None if has_default(key) => {
-                let ungrown = if key == Key::RestStretch { 1.0 } else { 0.0 };
-                vec![Value::Float(ungrown); count]
-            }
-            None => {
-                return Err(refuse(
-                    "is not in the scenario: write its list first".into(),
-                ));
-            }
+            Some(_) => return refuse("is no list in the scenario".into()),
+            None => return refuse("is not in the scenario: write its list first".into()),
         };
         let entries = list.len();
-        match list.get_mut(index) {
-            Some(entry) => *entry = Value::Float(value),
-            None => {
-                return Err(refuse(format!(
-                    "there are {entries} entries, and indices count from 0"
-                )));
-            }
-        }
+        let Some(entry) = list.get_mut(index) else {
+            return refuse(format!(
+                "there are {entries} entries, and indices count from 0"
+            ));
+        };
+        *entry = Value::Float(value);
         Ok(Value::Array(list))
     }
 }
 
-fn has_default(key: Key) -> bool {
-    let tables = ["rest.", "coupling.", "load."];
-    tables.iter().any(|table| key.path().starts_with(table))
-}
-
-/// The setting of a method in a `KEY=VALUE`, if it is one.
-fn knob(given: &str) -> Result<Option<(Knob, f64)>, VaryError> {
-    let Some((path, value)) = given.split_once('=') else {
-        return Ok(None);
-    };
-    if !path.trim().starts_with("method.") {
-        return Ok(None);
-    }
-    let Some(knob) = Knob::ALL
-        .into_iter()
-        .find(|knob| knob.path() == path.trim())
-    else {
+/// The setting of a method by its path, and its value.
+fn setting(path: &str, value: &str) -> Result<(Knob, f64), VaryError> {
+    let Some(knob) = Knob::ALL.into_iter().find(|knob| knob.path() == path) else {
         return Err(VaryError::Key {
-            key: path.trim().into(),
+            key: path.into(),
             why: format!("methods have {}", Knob::ALL.map(Knob::path).join(" and ")),
         });
     };
-    match value.trim().parse() {
-        Ok(number) => Ok(Some((knob, number))),
+    match value.parse() {
+        Ok(number) => Ok((knob, number)),
         Err(_) => Err(VaryError::Knob {
             knob,
-            found: value.trim().into(),
+            found: value.into(),
             needed: "a number",
         }),
     }
 }
 
-fn set_knob(knobs: &mut Knobs, knob: Knob, value: f64) -> Result<(), VaryError> {
-    let refuse = |needed| VaryError::Knob {
-        knob,
-        found: format!("{value:?}"),
-        needed,
-    };
-    match knob {
-        Knob::Step if value > 0.0 && value.is_finite() => knobs.step = Some(value),
-        Knob::Step => return Err(refuse("greater than 0")),
-        Knob::Segments if value >= 1.0 && value.fract() == 0.0 && value < 1e9 => {
-            knobs.segments = Some(value as usize)
-        }
-        Knob::Segments => return Err(refuse("a whole number from 1")),
-    }
-    Ok(())
-}
-
-/// Every entry of an accepted scenario by its path.
+/// Every entry of an accepted scenario by its path, those left out included
+/// where they have a value all the same.
 fn entries(text: &str, overrides: &[String]) -> BTreeMap<&'static str, Value> {
-    let parsed = |text: &str| text.parse::<toml::Table>().unwrap_or_default();
-    let document = parsed(text);
+    let table = |text: &str| text.parse::<toml::Table>().unwrap_or_default();
+    // What is no TOML is a text.
+    let value = |text: &str| {
+        let value = table(&format!("it = {text}")).remove("it");
+        value.unwrap_or_else(|| Value::String(text.trim().into()))
+    };
+    let document = table(text);
     let mut entries = BTreeMap::new();
     for key in Key::all() {
-        let value = match key.path().split_once('.') {
+        let written = match key.path().split_once('.') {
             Some((table, name)) => document.get(table).and_then(|table| table.get(name)),
             None => document.get(key.path()),
         };
-        entries.extend(value.map(|value| (key.path(), value.clone())));
+        let left_out = match key.left_out() {
+            LeftOut::Means(text) => Some(value(text)),
+            _ => None,
+        };
+        entries.extend(
+            written
+                .cloned()
+                .or(left_out)
+                .map(|value| (key.path(), value)),
+        );
     }
     for given in overrides {
         let Some((path, text)) = given.split_once('=') else {
             continue;
         };
         if let Some(key) = Key::from_path(path.trim()) {
-            let value = parsed(&format!("it = {text}")).remove("it");
-            // What is no TOML is a text.
-            let value = value.unwrap_or_else(|| Value::String(text.trim().into()));
-            entries.insert(key.path(), value);
+            entries.insert(key.path(), value(text));
         }
     }
     entries

@@ -1,11 +1,7 @@
 //! How a leaf moves: its mass, what damps it, how long it is followed, and
 //! what changes in time.
 
-pub(super) mod check;
-pub(super) mod limits;
-mod section;
-
-use super::{Profile, Rod, Schedule};
+use super::{Profile, Rod, Scale, Schedule};
 
 /// Radius of the section over the length of the longest rod: its radius of
 /// gyration, half of this, is the relaxation's.
@@ -14,7 +10,8 @@ const RADIUS: f64 = 0.2;
 const LOWEST_FREQUENCY: f64 = 3.516;
 /// Duration, in units of sqrt(rho L^4/A).
 const DURATION: f64 = 10.0;
-const OUTPUTS: f64 = 100.0;
+/// Outputs in that time.
+pub(super) const OUTPUTS: f64 = 100.0;
 
 /// Where a motion begins, at time 0 and without velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,8 +24,8 @@ pub enum Start {
 }
 
 /// How a leaf moves. All quantities are in the units of the scenario, with
-/// its unit of time. L is the longest rod, A the geometric mean of the bending
-/// stiffnesses mid-rod, rho the mean of the densities mid-rod.
+/// its unit of time. L is the longest rod, A the mean bending stiffness
+/// ([`Scale`]), rho the mean of the densities mid-rod.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dynamics {
     /// Mass per unit reference length, one per rod; positive.
@@ -87,7 +84,8 @@ impl Dynamics {
     /// assert_eq!(dynamics.gravity.at(3.0), weight);
     /// ```
     pub fn default_for(rods: &[Rod]) -> Self {
-        let density = mean_bending(rods) / longest(rods).powi(4);
+        let scale = Scale::of(rods);
+        let density = scale.stiffness / scale.length.powi(4);
         Dynamics::of_density(rods, vec![Profile::Constant(density); rods.len()])
     }
 
@@ -111,11 +109,17 @@ impl Dynamics {
         mean_of(&self.density)
     }
 
-    fn of_density(rods: &[Rod], density: Vec<Profile>) -> Dynamics {
-        let time = time(rods, &density);
+    /// The same for rods of these densities.
+    pub(super) fn of_density(rods: &[Rod], density: Vec<Profile>) -> Dynamics {
+        let scale = Scale::of(rods);
+        let time = time(scale, &density);
         let duration = DURATION * time;
+        let radius = Profile::Constant(RADIUS * scale.length);
+        let inertia = density
+            .iter()
+            .map(|density| round_inertia(density, &radius));
         Dynamics {
-            rotary_inertia: round(&density, RADIUS * longest(rods)),
+            rotary_inertia: inertia.collect(),
             polar_excess: 0.0,
             external_damping: 2.0 * LOWEST_FREQUENCY * mean_of(&density) / time,
             density,
@@ -132,21 +136,6 @@ impl Dynamics {
     }
 }
 
-/// L: the longest rod.
-pub(crate) fn longest(rods: &[Rod]) -> f64 {
-    rods.iter()
-        .fold(0.0, |longest, rod| longest.max(rod.length))
-}
-
-/// A: geometric mean of the bending stiffnesses of all rods, mid-rod.
-pub(crate) fn mean_bending(rods: &[Rod]) -> f64 {
-    let logs: f64 = rods
-        .iter()
-        .map(|rod| rod.couple_stiffness[1].at(0.5).ln() + rod.couple_stiffness[2].at(0.5).ln())
-        .sum();
-    (logs / (2 * rods.len()) as f64).exp()
-}
-
 /// Mean over the rods, mid-rod; exact where all are equal.
 fn mean_of(profiles: &[Profile]) -> f64 {
     profiles
@@ -158,17 +147,24 @@ fn mean_of(profiles: &[Profile]) -> f64 {
 }
 
 /// The unit of time sqrt(rho L^4/A); in this order nothing overflows.
-fn time(rods: &[Rod], density: &[Profile]) -> f64 {
-    (mean_of(density) / (mean_bending(rods) / longest(rods).powi(4))).sqrt()
+pub(super) fn time(scale: Scale, density: &[Profile]) -> f64 {
+    (mean_of(density) / (scale.stiffness / scale.length.powi(4))).sqrt()
 }
 
-/// rho I of rods with one round section.
-fn round(density: &[Profile], radius: f64) -> Vec<Profile> {
-    let radius = Profile::Constant(radius);
-    density
-        .iter()
-        .map(|density| section::inertia(density, &radius))
-        .collect()
+/// Moment of inertia of a round section: rho I = density radius^2/4 at all
+/// knots of both profiles, and linear between them. Where the radius varies
+/// this is a cubic along the rod, and more than it between knots: whoever
+/// minds gives the radius at more knots.
+pub(super) fn round_inertia(density: &Profile, radius: &Profile) -> Profile {
+    let at_fraction = |sigma: f64| density.at(sigma) * radius.at(sigma).powi(2) / 4.0;
+    if let (Profile::Constant(_), Profile::Constant(_)) = (density, radius) {
+        return Profile::Constant(at_fraction(0.0));
+    }
+    let mut at = [&[0.0], density.kinks(), radius.kinks(), &[1.0]].concat();
+    at.sort_by(f64::total_cmp);
+    at.dedup();
+    let value = at.iter().map(|&sigma| at_fraction(sigma)).collect();
+    Profile::Linear { at, value }
 }
 
 #[cfg(test)]
@@ -211,10 +207,31 @@ mod tests {
     #[test]
     fn the_mean_of_equal_densities_is_exact() {
         assert_eq!(mean_of(&vec![Profile::Constant(0.1); 7]), 0.1);
-        let taper = Profile::Linear {
-            at: vec![0.0, 1.0],
-            value: vec![4.0, 2.0],
-        };
+        let taper = linear(&[0.0, 1.0], &[4.0, 2.0]);
         assert_eq!(mean_of(&[taper, Profile::Constant(1.0)]), 2.0);
+    }
+
+    fn linear(at: &[f64], value: &[f64]) -> Profile {
+        Profile::Linear {
+            at: at.to_vec(),
+            value: value.to_vec(),
+        }
+    }
+
+    #[test]
+    fn the_inertia_of_a_round_section() {
+        let constant = round_inertia(&Profile::Constant(3.0), &Profile::Constant(0.2));
+        assert!(matches!(constant, Profile::Constant(i) if (i - 0.03).abs() < 1e-17));
+        // The product at the knots of both.
+        let density = linear(&[0.0, 0.5, 1.0], &[4.0, 2.0, 2.0]);
+        let radius = linear(&[0.0, 0.25, 1.0], &[2.0, 2.0, 1.0]);
+        let expected = linear(
+            &[0.0, 0.25, 0.5, 1.0],
+            &[4.0, 3.0, 0.5 * (5.0_f64 / 3.0).powi(2), 0.5],
+        );
+        assert_eq!(round_inertia(&density, &radius), expected);
+        // With one radius it is exact.
+        let density = linear(&[0.0, 1.0], &[4.0, 2.0]);
+        assert_eq!(round_inertia(&density, &Profile::Constant(2.0)), density);
     }
 }

@@ -1,0 +1,258 @@
+//! From a value as written to numbers: every form that a key can take.
+
+use toml::de::DeValue;
+
+use super::error::ScenarioError;
+use super::key::{Form, Range};
+use super::raw::Item;
+use super::{Profile, Schedule};
+
+type Result<T> = std::result::Result<T, ScenarioError>;
+
+/// Lengths and stiffnesses lie between these: fourth powers of lengths and
+/// quotients of stiffnesses must not overflow.
+const MAGNITUDES: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
+
+const PROFILE: &str = "a profile is { at = [0.0, 1.0], value = [1.0, 0.5] }";
+const LOAD_IN_TIME: &str =
+    "a load in time is { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
+const FACTOR_IN_TIME: &str = "a factor in time is { at = [0.0, 1.0], factor = [1.0, 2.0] }";
+
+impl<'e> Item<'e> {
+    pub(super) fn text(&self) -> Result<&'e str> {
+        match self.value() {
+            DeValue::String(text) => Ok(text),
+            _ => Err(self.refuse("must be text in quotes")),
+        }
+    }
+
+    pub(super) fn switch(&self) -> Result<bool> {
+        match self.value() {
+            DeValue::Boolean(value) => Ok(*value),
+            _ => Err(self.refuse("must be true or false")),
+        }
+    }
+
+    /// A whole number from 1 to `most`.
+    pub(super) fn whole(&self, most: usize) -> Result<usize> {
+        let whole = match self.value() {
+            DeValue::Integer(integer) => {
+                usize::from_str_radix(integer.as_str(), integer.radix()).ok()
+            }
+            _ => None,
+        };
+        whole
+            .filter(|whole| (1..=most).contains(whole))
+            .ok_or_else(|| {
+                self.refuse(format_args!(
+                    "must be a whole number from 1 to {most}, without a decimal point"
+                ))
+            })
+    }
+
+    /// A number in the range of its key.
+    pub(super) fn number(&self) -> Result<f64> {
+        self.number_in(self.key().form().range())
+    }
+
+    fn number_in(&self, range: Range) -> Result<f64> {
+        let value = match self.value() {
+            DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str().parse().ok(),
+            DeValue::Integer(integer) => u128::from_str_radix(integer.as_str(), integer.radix())
+                .ok()
+                .map(|value| value as f64),
+            DeValue::Float(float) => float.as_str().parse().ok(),
+            _ => return Err(self.refuse("must be a number")),
+        };
+        // 1e999 parses to infinity, which nobody wrote.
+        let says_infinite =
+            matches!(self.value(), DeValue::Float(float) if float.as_str().contains("inf"));
+        let value: f64 = match value {
+            Some(value) if says_infinite || !f64::is_infinite(value) => value,
+            _ => {
+                return Err(
+                    self.refuse("is not a number a computer can hold (the largest is 1.8e308)")
+                );
+            }
+        };
+        let positive = matches!(range, Range::Positive | Range::PositiveOrInfinite);
+        if value.is_nan() || value == f64::NEG_INFINITY {
+            Err(self.refuse("must be a finite number"))
+        } else if positive && value <= 0.0 {
+            Err(self.refuse("must be greater than 0"))
+        } else if value == f64::INFINITY {
+            match range {
+                Range::PositiveOrInfinite => Ok(value),
+                Range::Positive => Err(self.refuse(
+                    "must be a finite number; inf (rigid) is allowed for stiffness.axial, \
+                     shear_2 and shear_3 only, not in a profile",
+                )),
+                _ => Err(self.refuse("must be a finite number")),
+            }
+        } else if positive && !MAGNITUDES.contains(&value) {
+            let (least, most) = (MAGNITUDES.start(), MAGNITUDES.end());
+            Err(self.refuse(format_args!(
+                "must lie between {least:e} and {most:e}: choose other units"
+            )))
+        } else if range == Range::NotNegative && value < 0.0 {
+            Err(self.refuse("must not be negative"))
+        } else {
+            Ok(value)
+        }
+    }
+
+    /// Three numbers.
+    pub(super) fn vector(&self) -> Result<[f64; 3]> {
+        let needed = "a list of three numbers [x, y, z]";
+        let mut vector = [0.0; 3];
+        let components = self.list_of(3, "one per axis x, y, z", needed)?;
+        for (component, item) in vector.iter_mut().zip(components) {
+            *component = item.number_in(Range::Finite)?;
+        }
+        Ok(vector)
+    }
+
+    /// A number for each of `count` rods or gaps: one for all, or a list.
+    pub(super) fn one_each(&self, count: usize) -> Result<Vec<f64>> {
+        if let DeValue::Integer(_) | DeValue::Float(_) = self.value() {
+            return Ok(vec![self.number()?; count]);
+        }
+        let gaps = "one per gap between neighbouring rods";
+        let (because, needed) = match self.key().form() {
+            Form::PerGap(_) => (
+                format!("{gaps} (leaf.rods - 1)"),
+                format!("a number or a list of {count} ({gaps})"),
+            ),
+            Form::Quantity(_) => (
+                ONE_PER_ROD.into(),
+                format!(
+                    "a number, a list of {count} (one per rod), or a profile {{ at = [0.0, 1.0], value = [1.0, 0.5] }}"
+                ),
+            ),
+            _ => (
+                ONE_PER_ROD.into(),
+                format!("a number or a list of {count} (one per rod)"),
+            ),
+        };
+        let list = self.list_of(count, &because, &needed)?;
+        list.map(|item| item.number()).collect()
+    }
+
+    /// A profile for each of `rods` rods.
+    pub(super) fn quantity(&self, rods: usize) -> Result<Vec<Profile>> {
+        let DeValue::Table(_) = self.value() else {
+            let numbers = self.one_each(rods)?;
+            return Ok(numbers.into_iter().map(Profile::Constant).collect());
+        };
+        let [at, value] = self.pair("value", PROFILE)?;
+        let at = at.rising(true)?;
+        let needed = format!("a list of numbers, or a list of {rods} such lists (one per rod)");
+        let mut list = value.array(&needed)?;
+        if !list.next().is_some_and(|first| first.value().is_array()) {
+            return Ok(vec![value.linear(&at)?; rods]);
+        }
+        let lists = value.list_of(rods, ONE_PER_ROD, &needed)?;
+        lists.map(|list| list.linear(&at)).collect()
+    }
+
+    /// A profile that has these values at the knots `at`.
+    fn linear(&self, at: &[f64]) -> Result<Profile> {
+        // Infinite has no place between knots: it cannot be interpolated.
+        let range = match self.key().form().range() {
+            Range::PositiveOrInfinite => Range::Positive,
+            range => range,
+        };
+        let values = self.list_of(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
+        Ok(Profile::Linear {
+            at: at.to_vec(),
+            value: values
+                .map(|item| item.number_in(range))
+                .collect::<Result<_>>()?,
+        })
+    }
+
+    /// A load in time.
+    pub(super) fn vectors_in_time(&self) -> Result<Schedule<[f64; 3]>> {
+        let [at, value] = self.pair("value", LOAD_IN_TIME)?;
+        let at = at.rising(false)?;
+        let needed = "a list of lists of three numbers [x, y, z]";
+        let value = value.list_of(at.len(), ONE_PER_KNOT, needed)?;
+        let value = value.map(|item| item.vector()).collect::<Result<_>>()?;
+        Ok(Schedule { at, value })
+    }
+
+    /// A factor in time.
+    pub(super) fn factors_in_time(&self) -> Result<Schedule<f64>> {
+        let [at, factor] = self.pair("factor", FACTOR_IN_TIME)?;
+        let at = at.rising(false)?;
+        let value = factor.list_of(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
+        let value = value.map(|item| item.number()).collect::<Result<_>>()?;
+        Ok(Schedule { at, value })
+    }
+
+    /// Numbers that rise strictly: fractions of the length, from 0 to 1, or times.
+    fn rising(&self, fractions: bool) -> Result<Vec<f64>> {
+        let (what, least, too_few) = match fractions {
+            true => (
+                "knots",
+                2,
+                "at least two knots are needed, the first at 0 and the last at 1",
+            ),
+            false => ("times", 1, "at least one time is needed"),
+        };
+        let list = self.array(LIST_OF_NUMBERS)?;
+        let count = list.len();
+        if count < least {
+            return Err(self.refuse(too_few));
+        }
+        let mut at: Vec<f64> = Vec::with_capacity(count);
+        for item in list {
+            let next = item.number_in(Range::Finite)?;
+            match at.last() {
+                None if fractions && next != 0.0 => {
+                    return Err(item.refuse("must start at 0 (the base)"));
+                }
+                Some(before) if next <= *before => {
+                    return Err(item.refuse(format_args!(
+                        "must be greater than the entry before it, {before}: \
+                         {what} rise strictly (write a step as a steep ramp)"
+                    )));
+                }
+                _ => at.push(next),
+            }
+            if fractions && at.len() == count && next != 1.0 {
+                return Err(item.refuse("must end at 1 (the tip)"));
+            }
+        }
+        Ok(at)
+    }
+
+    /// The entries of a list; `needed` says what is refused for being none.
+    fn array(&self, needed: &str) -> Result<impl ExactSizeIterator<Item = Item<'e>> + use<'e>> {
+        let DeValue::Array(array) = self.value() else {
+            return Err(self.refuse(format_args!("must be {needed}")));
+        };
+        let whole = *self;
+        Ok((0..array.len()).map(move |index| whole.entry(index)))
+    }
+
+    /// The same of a list that must have `count` entries.
+    fn list_of(
+        &self,
+        count: usize,
+        because: &str,
+        needed: &str,
+    ) -> Result<impl ExactSizeIterator<Item = Item<'e>> + use<'e>> {
+        let list = self.array(needed)?;
+        match list.len() {
+            found if found != count => Err(self.refuse(format_args!(
+                "has {found} entries: must have {count}, {because}"
+            ))),
+            _ => Ok(list),
+        }
+    }
+}
+
+const LIST_OF_NUMBERS: &str = "a list of numbers";
+const ONE_PER_ROD: &str = "one per rod (leaf.rods)";
+const ONE_PER_KNOT: &str = "one per entry of at";
