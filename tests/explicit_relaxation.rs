@@ -6,7 +6,6 @@ mod common;
 mod random;
 
 use common::{files, scenario};
-use leafdyn::leaf::Leaf;
 use leafdyn::relax::{Equilibrium, Method, Options, Outcome, RelaxError, relax};
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{self, Scheme, Simulation};
@@ -116,13 +115,12 @@ fn the_damped_motion_ends_there() {
             format!("dynamics.duration={duration}"),
         ];
         let leaf_scenario = scenario(&format!("paper/{figure}"), &entries);
-        let leaf = Leaf::new(&leaf_scenario);
         let options = simulate::Options {
             scheme: Some(Scheme::Explicit),
             segments: Some(64),
             ..simulate::Options::default()
         };
-        let mut simulation = Simulation::new(&leaf, &options).unwrap();
+        let mut simulation = Simulation::new(&leaf_scenario, &options).unwrap();
         while !simulation.done() {
             simulation.next_frame().unwrap();
         }

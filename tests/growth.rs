@@ -5,7 +5,6 @@
 mod common;
 
 use common::{TIGHT, agree, parse, settle, shoot_near};
-use leafdyn::leaf::Leaf;
 use leafdyn::relax::{Method, Options, SemiImplicit, relax};
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{self, Scheme, Simulation};
@@ -136,14 +135,13 @@ fn and_moves_like_it() {
     for scheme in [Scheme::Explicit, Scheme::SemiImplicit] {
         let [a, b] = [true, false].map(|in_stretch| {
             let scenario = leaf(1.2, in_stretch);
-            let model = Leaf::new(&scenario);
             let options = simulate::Options {
                 scheme: Some(scheme),
                 segments: Some(12),
                 step: Some(1e-3),
                 ..simulate::Options::default()
             };
-            let mut simulation = Simulation::new(&model, &options).unwrap();
+            let mut simulation = Simulation::new(&scenario, &options).unwrap();
             while !simulation.done() {
                 simulation.next_frame().unwrap();
             }

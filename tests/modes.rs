@@ -401,7 +401,7 @@ fn shapes_are_orthonormal() {
                 for i in 1..=8 {
                     let node = state.base(j) + i;
                     let (p, q) = (first.shape[node], second.shape[node]);
-                    let inertia: Inertia = physics.inertia(&leaf, &grid.grid, j, i);
+                    let inertia: Inertia = physics.inertia(&grid, j, i);
                     let tensor = inertia.tensor(exact.q[node]);
                     let [p, q] = [p, q].map(|s| {
                         let (turn, shift) = (leafdyn::leaf::turn(&s), leafdyn::leaf::shift(&s));

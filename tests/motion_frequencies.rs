@@ -30,7 +30,7 @@ fn beam(r2: f64, s2: f64) -> Scenario {
 /// Frequencies of bending up and down of a straight rod along e1, in the
 /// scenario's units.
 fn bending(leaf: &DiscreteLeaf, state: &State) -> Vec<f64> {
-    let physics = Physics::new(leaf.leaf);
+    let physics = Physics::new(&leaf.leaf);
     let linear = Linear::new(leaf, &physics, state).only(&[1, 5]);
     let all = linear.lowest(4).into_iter();
     all.map(|frequency| frequency / physics.time).collect()

@@ -11,7 +11,7 @@ mod motion;
 
 use common::parse;
 use glam::DVec3;
-use leafdyn::leaf::{Grid, Leaf};
+use leafdyn::leaf::{DiscreteLeaf, Leaf};
 use leafdyn::motion::{Explicit, Method, Physics, Snapshot};
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Options, Refused, Scheme, Simulation};
@@ -47,10 +47,10 @@ const LOADED: usize = 2000;
 const ALL: usize = 6000;
 
 /// Linear and angular momentum about the origin.
-fn momentum(leaf: &Leaf, grid: &Grid, physics: &Physics, now: &Snapshot) -> [DVec3; 2] {
+fn momentum(leaf: &DiscreteLeaf, physics: &Physics, now: &Snapshot) -> [DVec3; 2] {
     let mut sum = [DVec3::ZERO; 2];
-    for i in 0..=grid.segments() {
-        let inertia = physics.inertia(leaf, grid, 0, i);
+    for i in 0..=leaf.segments() {
+        let inertia = physics.inertia(leaf, 0, i);
         let (velocity, x) = (now.velocity[i], now.state.x[i]);
         let linear = inertia.mass * velocity.linear;
         let d1 = now.state.q[i] * DVec3::X;
@@ -92,9 +92,7 @@ fn fly(scenario: &Scenario, steps: usize) -> Flight {
     }
     assert_eq!(method.steps(), steps);
     for now in &flight.snapshots {
-        flight
-            .momenta
-            .push(momentum(&leaf, &grid.grid, &physics, now));
+        flight.momenta.push(momentum(&grid, &physics, now));
         let loads = physics.loads(now.time);
         let moment = now.state.tip(0).cross(loads.tip_force) + loads.tip_moment;
         flight.loads.push([loads.tip_force, moment]);
@@ -198,13 +196,12 @@ fn damped_from_outside_both_decay_alike() {
 #[test]
 fn the_semi_implicit_method_does_not_fly() {
     let scenario = parse(SPAGHETTI);
-    let leaf = Leaf::new(&scenario);
     let of = |scheme| {
         let options = Options {
             scheme,
             ..Options::default()
         };
-        Simulation::new(&leaf, &options).map(|s| s.scheme())
+        Simulation::new(&scenario, &options).map(|s| s.scheme())
     };
     assert_eq!(of(None), Ok(Scheme::Explicit));
     assert_eq!(
@@ -213,7 +210,6 @@ fn the_semi_implicit_method_does_not_fly() {
     );
     let mut rigid = scenario.clone();
     rigid.rods[0].force_stiffness[0] = leafdyn::scenario::Profile::Constant(f64::INFINITY);
-    let leaf = Leaf::new(&rigid);
-    let refused = Simulation::new(&leaf, &Options::default()).map(|_| ());
+    let refused = Simulation::new(&rigid, &Options::default()).map(|_| ());
     assert_eq!(refused, Err(Refused::Held { rigid: true }));
 }

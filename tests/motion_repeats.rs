@@ -32,7 +32,7 @@ fn bits(state: &State) -> Vec<u64> {
     x.chain(q).chain(n).map(f64::to_bits).collect()
 }
 
-fn methods<'a>(leaf: &'a Leaf<'a>, segments: usize) -> [Box<dyn Method + 'a>; 2] {
+fn methods(leaf: &Leaf, segments: usize) -> [Box<dyn Method>; 2] {
     let discrete = DiscreteLeaf::new(leaf, Grid::new(segments, &[]));
     let state = start(&discrete);
     let physics = Physics::new(leaf);

@@ -228,13 +228,12 @@ fn what_begins_gently_or_suddenly_goes_on() {
 #[test]
 fn steps_beyond_the_limit_are_refused() {
     let rod = thick_rod();
-    let leaf = Leaf::new(&rod);
     let of = |step| {
         let options = Options {
             step,
             ..Options::default()
         };
-        Simulation::new(&leaf, &options).map(|s| s.stable_step().unwrap().step)
+        Simulation::new(&rod, &options).map(|s| s.stable_step().unwrap().step)
     };
     let stable = of(None).unwrap();
     assert_eq!(of(Some(0.999 * stable)), Ok(stable));

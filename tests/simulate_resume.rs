@@ -10,7 +10,6 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use leafdyn::files::Recording;
-use leafdyn::leaf::Leaf;
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Options, Scheme, Simulation};
 use workplace::{Workplace, leaf, text};
@@ -194,7 +193,6 @@ gravity = { at = [0.0, 1.0], value = [[0, 0, -1], [0, 1, -1]] }
         let scenario = Scenario::from_toml_with(&text, "leaf", &[set.into()]).unwrap();
         for scheme in [Scheme::Explicit, Scheme::SemiImplicit] {
             let place = Workplace::new();
-            let leaf = Leaf::new(&scenario);
             let options = Options {
                 scheme: Some(scheme),
                 tolerance: Some(1e-4),
@@ -203,7 +201,7 @@ gravity = { at = [0.0, 1.0], value = [[0, 0, -1], [0, 1, -1]] }
             // Runs to the end, or is kept after so many outputs.
             let run = |folder: &str, resume: bool, outputs: Option<usize>| {
                 let folder = place.path(folder);
-                let mut simulation = Simulation::new(&leaf, &options).unwrap();
+                let mut simulation = Simulation::new(&scenario, &options).unwrap();
                 let mut recording = match resume {
                     true => Recording::resume(&folder, &mut simulation).unwrap(),
                     false => Recording::begin(&folder, &mut simulation).unwrap(),

@@ -6,7 +6,6 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 
 use crate::files::Recording;
-use crate::leaf::Leaf;
 use crate::report::OutputError;
 use crate::simulate::{Options, Scheme, Simulation, Stopped};
 
@@ -63,14 +62,13 @@ impl From<MethodName> for Scheme {
 impl Simulate {
     pub fn run(self) -> Result<Status, Refusal> {
         let (scenario, folder) = self.request.open()?;
-        let leaf = Leaf::new(&scenario);
         let options = Options {
             scheme: self.method.map(Scheme::from),
             segments: self.segments,
             step: self.step,
             tolerance: self.request.tolerance,
         };
-        let mut simulation = Simulation::new(&leaf, &options)?;
+        let mut simulation = Simulation::new(&scenario, &options)?;
         let mut recording = match self.resume {
             true => Recording::resume(&folder, &mut simulation)?,
             false => Recording::begin(&folder, &mut simulation)?,

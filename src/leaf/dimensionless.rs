@@ -4,6 +4,7 @@ use crate::rod::Section;
 use crate::rotation;
 use crate::scenario::{Rod, Scale, Scenario};
 use glam::{DQuat, DVec3};
+use std::sync::Arc;
 
 /// Stiffness in stretch and shear beyond which segment forces are condensed
 /// out with this one, in units of A/L^2 with the softest A of the leaf. Larger
@@ -15,8 +16,8 @@ const LEAST_CONDENSING: f64 = 1e5;
 
 /// A leaf with all quantities dimensionless, not yet discretised.
 #[derive(Clone, Debug)]
-pub struct Leaf<'a> {
-    scenario: &'a Scenario,
+pub struct Leaf {
+    scenario: Arc<Scenario>,
     /// Whether this is half of a leaf that is its own mirror image.
     pub(super) mirrored: bool,
     /// Whether it is solved in its plane.
@@ -34,15 +35,15 @@ pub struct Leaf<'a> {
     softest: f64,
 }
 
-impl<'a> Leaf<'a> {
+impl Leaf {
     /// Scales a checked scenario.
-    pub fn new(scenario: &'a Scenario) -> Self {
+    pub fn new(scenario: &Scenario) -> Self {
         Leaf::in_units(scenario, scenario.scale())
     }
 
     /// The same in given units, in which leaves that differ in length or
     /// stiffness can be compared.
-    pub fn in_units(scenario: &'a Scenario, scale: Scale) -> Self {
+    pub fn in_units(scenario: &Scenario, scale: Scale) -> Self {
         let length = scale.length;
         let mut kinks: Vec<f64> = scenario
             .rods
@@ -72,7 +73,7 @@ impl<'a> Leaf<'a> {
             .fold(f64::INFINITY, |m, profile| m.min(profile.at(0.5)));
         let vector = |a: [f64; 3], unit: f64| DVec3::from_array(a) / unit;
         Leaf {
-            scenario,
+            scenario: Arc::new(scenario.clone()),
             mirrored: false,
             planar: false,
             scale,
@@ -85,8 +86,8 @@ impl<'a> Leaf<'a> {
     }
 
     /// The scenario it was made from.
-    pub fn scenario(&self) -> &'a Scenario {
-        self.scenario
+    pub fn scenario(&self) -> &Scenario {
+        &self.scenario
     }
 
     /// Number of rods: all, or those of the half.
@@ -172,7 +173,7 @@ impl<'a> Leaf<'a> {
             / self.scale.force()
     }
 
-    fn rod(&self, j: usize) -> &'a Rod {
+    fn rod(&self, j: usize) -> &Rod {
         &self.scenario.rods[j]
     }
 }

@@ -14,9 +14,9 @@ const RADIUS_OF_GYRATION: f64 = 0.1;
 
 /// A leaf on a grid.
 #[derive(Clone, Debug)]
-pub struct DiscreteLeaf<'a> {
+pub struct DiscreteLeaf {
     /// The leaf.
-    pub leaf: &'a Leaf<'a>,
+    pub leaf: Leaf,
     /// Its grid.
     pub grid: Grid,
     /// Sections of all segments, rod after rod.
@@ -45,9 +45,9 @@ pub struct Loads {
     pub tip_moment: DVec3,
 }
 
-impl<'a> DiscreteLeaf<'a> {
+impl DiscreteLeaf {
     /// Discretises `leaf` on `grid`.
-    pub fn new(leaf: &'a Leaf<'a>, grid: Grid) -> Self {
+    pub fn new(leaf: &Leaf, grid: Grid) -> Self {
         let n = grid.segments();
         let sections = (0..leaf.rods())
             .flat_map(|j| (0..n).map(move |i| (j, i)))
@@ -57,7 +57,7 @@ impl<'a> DiscreteLeaf<'a> {
         let coupling = (0..gaps).map(|g| leaf.coupling(g)).collect();
         let weights = (0..=n).map(|i| grid.weight(i)).collect();
         DiscreteLeaf {
-            leaf,
+            leaf: leaf.clone(),
             grid,
             sections,
             coupling,
@@ -73,9 +73,9 @@ impl<'a> DiscreteLeaf<'a> {
     }
 
     /// The same rods, all of them, seen as those of `leaf`.
-    pub fn seen_as(&self, leaf: &'a Leaf<'a>) -> Self {
+    pub fn seen_as(&self, leaf: &Leaf) -> Self {
         DiscreteLeaf {
-            leaf,
+            leaf: leaf.clone(),
             planar: leaf.planar,
             ..self.clone()
         }

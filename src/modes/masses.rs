@@ -30,7 +30,7 @@ impl Masses {
     ) -> Self {
         let nodes = (0..leaf.rods()).flat_map(|j| (1..=leaf.segments()).map(move |i| (j, i)));
         let node = |(j, i)| {
-            let inertia = physics.inertia(leaf.leaf, &leaf.grid, j, i);
+            let inertia = physics.inertia(leaf, j, i);
             Node {
                 rod: j,
                 node: i,

@@ -79,7 +79,7 @@ struct Missing {
 
 /// A leaf at rest, about to vibrate.
 struct Vibration<'a> {
-    leaf: &'a DiscreteLeaf<'a>,
+    leaf: &'a DiscreteLeaf,
     state: &'a State,
     system: System,
     pattern: SparsePattern,

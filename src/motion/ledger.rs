@@ -35,7 +35,7 @@ pub fn measure(
                 mass,
                 transverse,
                 excess,
-            } = physics.inertia(leaf.leaf, &leaf.grid, j, i);
+            } = physics.inertia(leaf, j, i);
             let Velocity { angular, linear } = velocity[k];
             let spin = angular.dot(state.q[k] * DVec3::X);
             energy.kinetic += 0.5 * mass * linear.length_squared();
@@ -73,7 +73,7 @@ fn kick(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) -> f64 {
         for i in 0..=n {
             let Inertia {
                 mass, transverse, ..
-            } = physics.inertia(leaf.leaf, &leaf.grid, j, i);
+            } = physics.inertia(leaf, j, i);
             let weight = leaf.grid.weight(i) * leaf.leaf.length(j);
             energy += (weight * loads.gravity).length_squared() / mass;
             if i == n {

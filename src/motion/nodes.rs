@@ -93,7 +93,7 @@ fn made_of(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> Node {
         ..Node::default()
     };
     if i > 0 || !physics.clamped() {
-        let inertia = physics.inertia(leaf.leaf, &leaf.grid, j, i);
+        let inertia = physics.inertia(leaf, j, i);
         node.per_inertia = 1.0 / inertia.transverse;
         node.per_spin = 1.0 / inertia.polar() - 1.0 / inertia.transverse;
         if i < n || !joined {

@@ -1,7 +1,7 @@
 //! What a leaf needs to move: masses, damping, and loads that change in time.
 //! Dimensionless: time in units of sqrt(rho L^4/A).
 
-use crate::leaf::{Grid, Leaf, Loads, Scale};
+use crate::leaf::{DiscreteLeaf, Leaf, Loads, Scale};
 use crate::rotation::outer;
 use crate::scenario::Dynamics;
 use glam::{DMat3, DQuat, DVec3};
@@ -96,8 +96,11 @@ impl Physics {
     }
 
     /// Inertia of node `i` of rod `j`.
-    pub fn inertia(&self, leaf: &Leaf, grid: &Grid, j: usize, i: usize) -> Inertia {
-        let (sigma, length) = (grid.sigma()[i], grid.weight(i) * leaf.length(j));
+    pub fn inertia(&self, leaf: &DiscreteLeaf, j: usize, i: usize) -> Inertia {
+        let (sigma, length) = (
+            leaf.grid.sigma()[i],
+            leaf.grid.weight(i) * leaf.leaf.length(j),
+        );
         let rotary = self.density * self.scale.length * self.scale.length;
         Inertia {
             mass: length * self.dynamics.density[j].at(sigma) / self.density,

@@ -84,7 +84,7 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
     // All rods hold a joint tip, along directors of their own: as one number.
     let tips = || (0..rods).map(|j| state.base(j) + n);
     let tip = tips().map(|node| held[node][0].max_element()).sum::<f64>();
-    let tip_mass = (0..rods).map(|j| physics.inertia(leaf.leaf, &leaf.grid, j, n).mass);
+    let tip_mass = (0..rods).map(|j| physics.inertia(leaf, j, n).mass);
     let tip_mass: f64 = tip_mass.sum();
 
     let (mut largest, mut fastest) = (0.0, None);
@@ -96,7 +96,7 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
                 return [DMat3::ZERO; 2];
             }
             let node = state.base(j) + i + end;
-            let inertia = physics.inertia(leaf.leaf, &leaf.grid, j, i + end);
+            let inertia = physics.inertia(leaf, j, i + end);
             let [shift, turn] = hold(&stiffness, end, state.q[node]);
             let moving = match joined && i + end == n {
                 true => DVec3::splat(tip_mass * shift.max_element() / tip),
@@ -189,7 +189,7 @@ fn coupling(leaf: &DiscreteLeaf, physics: &Physics) -> f64 {
             let gaps = [j.wrapping_sub(1), j];
             let inside = gaps.into_iter().filter(|&g| g < leaf.rods() - 1);
             let springs: DVec3 = inside.map(|g| leaf.spring(g, i)).sum();
-            springs / physics.inertia(leaf.leaf, &leaf.grid, j, i).mass
+            springs / physics.inertia(leaf, j, i).mass
         };
         for gap in 0..leaf.rods() - 1 {
             let tied = leaf.spring(gap, i).cmpgt(DVec3::ZERO);

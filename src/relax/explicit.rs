@@ -98,7 +98,7 @@ pub fn settle(
     system: &mut System,
     request: &mut Request,
 ) -> Settled {
-    let Ok(mut motion) = Explicit::new(leaf.clone(), Physics::at_rest(leaf.leaf), state, None)
+    let Ok(mut motion) = Explicit::new(leaf.clone(), Physics::at_rest(&leaf.leaf), state, None)
     else {
         return Settled::Stuck;
     };

@@ -61,8 +61,8 @@ const BUDGET: usize = 3_000_000;
 const MAX_SADDLES: i32 = 10;
 
 /// A leaf settled on one grid.
-pub(super) struct Level<'a> {
-    pub leaf: DiscreteLeaf<'a>,
+pub(super) struct Level {
+    pub leaf: DiscreteLeaf,
     pub state: State,
 }
 
@@ -166,9 +166,9 @@ pub(super) enum End {
 }
 
 pub(super) struct Run<'a, 'o> {
-    pub leaf: &'a Leaf<'a>,
+    pub leaf: &'a Leaf,
     /// The leaf with all of its unknowns, if `leaf` is half of it or in its plane.
-    whole: Option<&'a Leaf<'a>>,
+    whole: Option<&'a Leaf>,
     /// Rods solved for.
     pub solved: usize,
     /// Whether in their plane.
@@ -180,9 +180,9 @@ pub(super) struct Run<'a, 'o> {
     progress: &'o mut dyn FnMut(&Progress),
     pub work: Work,
     pub saddle: Option<Saddle>,
-    pub levels: Vec<Level<'a>>,
+    pub levels: Vec<Level>,
     /// The leaf on a grid between the finest two, if their extrapolation has it too.
-    pub between: Option<Level<'a>>,
+    pub between: Option<Level>,
     /// What that changed, times a safety factor: so near to the finest two, it may
     /// have gained nothing where layers are thin, and the last correction does
     /// not tell.
@@ -201,7 +201,7 @@ pub(super) struct Run<'a, 'o> {
 
 impl<'a, 'o> Run<'a, 'o> {
     fn new(
-        leaf: &'a Leaf<'a>,
+        leaf: &'a Leaf,
         options: &'o Options,
         tolerance: f64,
         progress: &'o mut dyn FnMut(&Progress),
@@ -230,9 +230,9 @@ impl<'a, 'o> Run<'a, 'o> {
     }
 
     /// The run as if it had been one of the whole leaf.
-    fn completed(mut self, whole: &'a Leaf<'a>) -> Self {
+    fn completed(mut self, whole: &'a Leaf) -> Self {
         let reduced = self.leaf;
-        let complete = |level: &Level<'a>| complete(reduced, whole, level);
+        let complete = |level: &Level| complete(reduced, whole, level);
         self.levels = self.levels.iter().map(complete).collect();
         self.between = self.between.as_ref().map(complete);
         self.leaf = whole;
@@ -381,7 +381,7 @@ impl<'a, 'o> Run<'a, 'o> {
     }
 
     /// Adds the next finer grid.
-    fn push(&mut self, level: Level<'a>) {
+    fn push(&mut self, level: Level) {
         self.drop_between();
         let segments = level.leaf.segments();
         let stride = match self.levels.first() {

@@ -88,7 +88,7 @@ pub fn lowest(run: &Run) -> Option<Vec<Mode>> {
 }
 
 /// The grids on which modes are looked for.
-fn levels<'r, 'a>(run: &'r Run<'a, '_>) -> Option<&'r [Level<'a>]> {
+fn levels<'r>(run: &'r Run) -> Option<&'r [Level]> {
     if run.options.mode_shapes || run.index != Some(0) {
         return Some(&run.levels);
     }
@@ -125,12 +125,12 @@ fn refine(run: &Run, series: &mut Series, on: impl Fn(&Level) -> Option<Vec<Eige
 }
 
 /// The same equilibrium on the next finer grid.
-fn settle<'a>(last: &Level<'a>, before: Option<&State>, tolerance: f64) -> Option<Level<'a>> {
+fn settle(last: &Level, before: Option<&State>, tolerance: f64) -> Option<Level> {
     let mut state = prolong(&last.leaf, &last.state);
     if let Some(before) = before {
         predict(before, &last.state, &mut state);
     }
-    let leaf = DiscreteLeaf::new(last.leaf.leaf, last.leaf.grid.refined());
+    let leaf = DiscreteLeaf::new(&last.leaf.leaf, last.leaf.grid.refined());
     let mut system = System::new(&leaf);
     let guess = state.clone();
     let accuracy = 1e-3 * tolerance;

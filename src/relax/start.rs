@@ -18,7 +18,7 @@ pub fn start(leaf: &DiscreteLeaf) -> State {
 /// Arcs in the plane of the fan, symmetric about the mean base direction. Their
 /// chords differ: what is missing to the mean chord is made up by stretching.
 fn arcs(leaf: &DiscreteLeaf) -> State {
-    let model = leaf.leaf;
+    let model = &leaf.leaf;
     let angles: Vec<f64> = (0..leaf.rods())
         .map(|j| model.scenario().rods[j].angle)
         .collect();

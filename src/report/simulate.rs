@@ -129,7 +129,6 @@ fn speed(record: &Record) -> String {
 #[cfg(test)]
 mod tests {
     use crate::files::Recording;
-    use crate::leaf::Leaf;
     use crate::scenario::Scenario;
     use crate::simulate::{Options, Scheme, Simulation, Stopped};
 
@@ -144,12 +143,11 @@ mod tests {
             dynamics = { duration = 0.3, output_interval = 0.1 }
         "#;
         let scenario = Scenario::from_toml(scenario).unwrap();
-        let leaf = Leaf::new(&scenario);
         let options = Options {
             scheme: Some(scheme),
             ..Options::default()
         };
-        let mut simulation = Simulation::new(&leaf, &options).unwrap();
+        let mut simulation = Simulation::new(&scenario, &options).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let mut recording = Recording::begin(folder.path(), &mut simulation).unwrap();
         while !simulation.done() {

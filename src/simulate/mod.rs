@@ -1,7 +1,6 @@
 //! A leaf followed in time: start, method, and the outputs on the way.
 //!
 //! ```
-//! use leafdyn::leaf::Leaf;
 //! use leafdyn::scenario::Scenario;
 //! use leafdyn::simulate::{Options, Simulation};
 //!
@@ -12,8 +11,7 @@
 //!     load = { gravity = [0.0, 0.0, -1.0] }
 //! "#;
 //! let scenario = Scenario::from_toml(cantilever)?;
-//! let leaf = Leaf::new(&scenario);
-//! let mut simulation = Simulation::new(&leaf, &Options::default())?;
+//! let mut simulation = Simulation::new(&scenario, &Options::default())?;
 //! while !simulation.done() {
 //!     let frame = simulation.next_frame()?;
 //!     println!("{} {}", frame.time, frame.tips(true)[0]);
@@ -78,45 +76,45 @@ pub struct Options {
 }
 
 /// A leaf that is followed in time.
-pub struct Simulation<'a> {
-    leaf: &'a Leaf<'a>,
+pub struct Simulation {
+    leaf: Leaf,
     grid: Grid,
     physics: Physics,
     scheme: Scheme,
     stable: Option<StableStep>,
     step: Option<f64>,
-    method: Box<dyn Method + Send + 'a>,
+    method: Box<dyn Method + Send>,
     tolerance: f64,
     outputs: usize,
     made: usize,
     moving: Duration,
 }
 
-impl<'a> Simulation<'a> {
+impl Simulation {
     /// The leaf at time 0.
     ///
     /// # Errors
     /// If a request cannot be met.
-    pub fn new(leaf: &'a Leaf<'a>, options: &Options) -> Result<Self, Refused> {
+    pub fn new(scenario: &Scenario, options: &Options) -> Result<Self, Refused> {
         if let Some(found) = options
             .step
             .filter(|step| !(step.is_finite() && *step > 0.0))
         {
             return Err(Refused::NotPositive { found });
         }
-        let scenario = leaf.scenario();
+        let leaf = Leaf::new(scenario);
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
         if !(SMALLEST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
             return Err(RelaxError::Tolerance { found: tolerance }.into());
         }
-        let segments = relax::check_segments(leaf, options.segments, SEGMENTS)?;
+        let segments = relax::check_segments(&leaf, options.segments, SEGMENTS)?;
         let grid = Grid::new(segments, leaf.kinks());
-        let physics = Physics::new(leaf);
+        let physics = Physics::new(&leaf);
         let state = match scenario.dynamics.start {
-            Start::Released => start(&DiscreteLeaf::new(leaf, grid.clone())),
-            Start::AtRest => at_rest(leaf, &physics, &grid, tolerance)?,
+            Start::Released => start(&DiscreteLeaf::new(&leaf, grid.clone())),
+            Start::AtRest => at_rest(&leaf, &physics, &grid, tolerance)?,
         };
-        let discrete = || DiscreteLeaf::new(leaf, grid.clone());
+        let discrete = || DiscreteLeaf::new(&leaf, grid.clone());
         let rigid = discrete().stiffest() == 0.0;
         let scheme = options.scheme.unwrap_or(match rigid {
             true => Scheme::SemiImplicit,
@@ -127,7 +125,7 @@ impl<'a> Simulation<'a> {
         }
         let step = options.step.map(|step| step / physics.time);
         let (mut stable, mut made) = (None, step);
-        let method: Box<dyn Method + Send + 'a> = match scheme {
+        let method: Box<dyn Method + Send> = match scheme {
             Scheme::Explicit => {
                 let explicit = Explicit::new(discrete(), physics.clone(), &state, step)
                     .map_err(|Rigid| Refused::Rigid)?;
@@ -177,8 +175,8 @@ impl<'a> Simulation<'a> {
     }
 
     /// The leaf that moves.
-    pub fn leaf(&self) -> &'a Leaf<'a> {
-        self.leaf
+    pub fn leaf(&self) -> &Leaf {
+        &self.leaf
     }
 
     /// Which method moves the leaf.
@@ -242,7 +240,7 @@ impl<'a> Simulation<'a> {
     /// The leaf now.
     pub fn frame(&mut self) -> Frame {
         let snapshot = self.method.snapshot();
-        Frame::new(self.leaf, &self.physics, &snapshot, self.method.steps())
+        Frame::new(&self.leaf, &self.physics, &snapshot, self.method.steps())
     }
 
     /// Moves on to the time of the next output.

@@ -126,7 +126,7 @@ impl Linear {
             for i in 1..=leaf.segments() {
                 let node = state.base(j) + i;
                 let [turn, shift] = self.freedoms[node].unwrap();
-                let inertia = physics.inertia(leaf.leaf, &leaf.grid, j, i);
+                let inertia = physics.inertia(leaf, j, i);
                 let Inertia {
                     mass, transverse, ..
                 } = inertia;

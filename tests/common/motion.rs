@@ -76,7 +76,7 @@ pub fn stiffness(rod: &mut Rod) -> impl Iterator<Item = &mut Profile> {
 }
 
 /// The leaf of a scenario on a grid.
-pub fn discrete<'a>(leaf: &'a Leaf<'a>, segments: usize) -> DiscreteLeaf<'a> {
+pub fn discrete(leaf: &Leaf, segments: usize) -> DiscreteLeaf {
     DiscreteLeaf::new(leaf, Grid::new(segments, leaf.kinks()))
 }
 
@@ -114,12 +114,7 @@ pub enum Scheme {
 pub const BOTH: [Scheme; 2] = [Scheme::Explicit, Scheme::SemiImplicit];
 
 /// A method at time 0 with steps of `h`.
-pub fn method<'a>(
-    scheme: Scheme,
-    leaf: &'a Leaf<'a>,
-    state: &State,
-    h: f64,
-) -> Box<dyn Method + 'a> {
+pub fn method(scheme: Scheme, leaf: &Leaf, state: &State, h: f64) -> Box<dyn Method> {
     let (physics, grid) = (Physics::new(leaf), discrete(leaf, state.segments()));
     match scheme {
         Scheme::Explicit => Box::new(Explicit::new(grid, physics, state, Some(h)).unwrap()),

@@ -34,7 +34,6 @@ const STILLS: usize = 8;
 /// The files of a simulation that is under way.
 ///
 /// ```
-/// use leafdyn::leaf::Leaf;
 /// use leafdyn::files::Recording;
 /// use leafdyn::scenario::Scenario;
 /// use leafdyn::simulate::{Options, Simulation};
@@ -48,8 +47,7 @@ const STILLS: usize = 8;
 /// # let folder = tempfile::tempdir()?;
 /// # let folder = folder.path();
 /// let scenario = Scenario::from_toml(cantilever)?;
-/// let leaf = Leaf::new(&scenario);
-/// let mut simulation = Simulation::new(&leaf, &Options::default())?;
+/// let mut simulation = Simulation::new(&scenario, &Options::default())?;
 /// let mut recording = Recording::begin(folder, &mut simulation)?;
 /// while !simulation.done() {
 ///     let frame = simulation.next_frame()?;

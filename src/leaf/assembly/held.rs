@@ -9,7 +9,7 @@ use glam::DVec3;
 /// the plane of the mirror: turns about x and z, the shift along y.
 const ACROSS_THE_PLANE: [usize; 3] = [0, 2, 4];
 
-impl DiscreteLeaf<'_> {
+impl DiscreteLeaf {
     /// The components that are zero in the increments of node `i` (from 1) of
     /// rod `j`.
     pub(super) fn held_components(&self, j: usize, i: usize) -> &'static [usize] {

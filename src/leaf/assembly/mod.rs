@@ -10,7 +10,7 @@ use super::state::State;
 use super::system::{Sums, System, each_rod};
 use glam::DVec3;
 
-impl DiscreteLeaf<'_> {
+impl DiscreteLeaf {
     /// Assembles matrix and right-hand side of Newton's equations into
     /// `system`.
     pub fn assemble(&self, state: &State, system: &mut System) -> Sums {

@@ -7,7 +7,7 @@ use crate::leaf::system::{Sums, System};
 use crate::rod::{PlanarBlocks, PlanarGradient, PlanarSegment};
 use glam::{DQuat, DVec2, DVec3};
 
-impl DiscreteLeaf<'_> {
+impl DiscreteLeaf {
     /// Segment `i` of rod `j` of a leaf in the plane.
     fn planar_segment(&self, state: &State, j: usize, i: usize) -> PlanarSegment {
         let k = state.base(j) + i;

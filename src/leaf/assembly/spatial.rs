@@ -7,7 +7,7 @@ use crate::leaf::system::{Sums, System};
 use crate::rod::Blocks;
 use glam::{DMat3, DVec3};
 
-impl DiscreteLeaf<'_> {
+impl DiscreteLeaf {
     /// Assembles rod `j` of a leaf in space.
     pub(super) fn assemble_spatial(
         &self,

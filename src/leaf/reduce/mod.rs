@@ -8,11 +8,11 @@ pub use mirror::{half_of, whole_of};
 
 use super::dimensionless::Leaf;
 
-impl<'a> Leaf<'a> {
+impl Leaf {
     /// The leaf with no more unknowns than its symmetries leave it, if it has
     /// any: half of it if it is its own mirror image, that in its plane if
     /// nothing acts out of it.
-    pub fn reduced(&self) -> Option<Leaf<'a>> {
+    pub fn reduced(&self) -> Option<Leaf> {
         let mut reduced = self.clone();
         reduced.mirrored = mirror::is_mirrored(self.scenario());
         reduced.planar = planar::is_planar(self.scenario());

@@ -51,8 +51,8 @@ fn share(rods: usize) -> usize {
 }
 
 /// A leaf on the move.
-pub struct Explicit<'a> {
-    leaf: DiscreteLeaf<'a>,
+pub struct Explicit {
+    leaf: DiscreteLeaf,
     physics: Physics,
     arch: Arch,
     positions: Vec<Positions>,
@@ -83,14 +83,14 @@ pub struct Explicit<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rigid;
 
-impl<'a> Explicit<'a> {
+impl Explicit {
     /// A leaf at rest in `state`. Time steps are nine tenths of what is stable,
     /// or `step` if that is given, stable or not.
     ///
     /// # Errors
     /// If a rod is rigid: its waves are infinitely fast.
     pub fn new(
-        leaf: DiscreteLeaf<'a>,
+        leaf: DiscreteLeaf,
         physics: Physics,
         state: &State,
         step: Option<f64>,
@@ -100,11 +100,7 @@ impl<'a> Explicit<'a> {
         }
         let count = leaf.rods();
         let joined = leaf.leaf.joined() && count > 1;
-        let tip_mass = |j| {
-            physics
-                .inertia(leaf.leaf, &leaf.grid, j, leaf.segments())
-                .mass
-        };
+        let tip_mass = |j| physics.inertia(&leaf, j, leaf.segments()).mass;
         let positions: Vec<_> = (0..count)
             .map(|j| nodes::positions(&leaf, state, j))
             .collect();

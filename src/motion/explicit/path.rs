@@ -12,7 +12,7 @@ const NO_TIME: f64 = 1e-9;
 const GLANCED: usize = 200;
 const WATCHED: usize = 1000;
 
-impl Explicit<'_> {
+impl Explicit {
     fn judge(&mut self) -> Result<(), Broken> {
         let now = self.snapshot();
         (self.ledger).judge(&self.leaf, &self.physics, &now, self.step)?;
@@ -26,7 +26,7 @@ impl Explicit<'_> {
     }
 }
 
-impl Method for Explicit<'_> {
+impl Method for Explicit {
     fn name(&self) -> &'static str {
         "explicit"
     }

@@ -69,7 +69,7 @@ fn forces_are_those_of_the_element() {
 }
 
 fn forces_are_those(discrete: &DiscreteLeaf) {
-    let (leaf, n, state) = (discrete.leaf, discrete.segments(), bent(discrete));
+    let (leaf, n, state) = (&discrete.leaf, discrete.segments(), bent(discrete));
     let expected = by_element(discrete, &state);
     let largest = expected.iter().map(|(f, m)| f.length().max(m.length()));
     let allowed = 1e-12 * largest.fold(0.0, f64::max);

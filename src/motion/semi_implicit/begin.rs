@@ -17,7 +17,7 @@ const LAST: f64 = 1e-15;
 /// A length by which rounding may strain a rigid segment.
 const VIOLATION: f64 = 1e-12;
 
-impl SemiImplicit<'_> {
+impl SemiImplicit {
     /// Gives the segments their forces and the nodes their accelerations.
     pub(super) fn begin(&mut self) {
         self.dress(0.0, 0.0, HEAVY);

@@ -8,7 +8,7 @@ use super::SemiImplicit;
 use crate::leaf::{Loads, State};
 use crate::rotation;
 
-impl SemiImplicit<'_> {
+impl SemiImplicit {
     /// Strains (v, u) of all segments.
     pub(super) fn strains(&self) -> Vec<[DVec3; 2]> {
         let n = self.leaf.segments();

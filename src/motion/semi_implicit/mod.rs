@@ -66,8 +66,8 @@ struct Moving {
 }
 
 /// A leaf on the move.
-pub struct SemiImplicit<'a> {
-    leaf: DiscreteLeaf<'a>,
+pub struct SemiImplicit {
+    leaf: DiscreteLeaf,
     physics: Physics,
     inertia: Vec<Inertia>,
     /// The rods' own sections, where internal damping changes them.
@@ -94,14 +94,12 @@ pub struct SemiImplicit<'a> {
     ledger: Ledger,
 }
 
-impl<'a> SemiImplicit<'a> {
+impl SemiImplicit {
     /// A leaf at rest in `state`.
-    pub fn new(leaf: DiscreteLeaf<'a>, physics: Physics, state: &State, steps: Steps) -> Self {
+    pub fn new(leaf: DiscreteLeaf, physics: Physics, state: &State, steps: Steps) -> Self {
         let n = leaf.segments();
         let nodes = (0..leaf.rods()).flat_map(|j| (0..=n).map(move |i| (j, i)));
-        let inertia = nodes
-            .map(|(j, i)| physics.inertia(leaf.leaf, &leaf.grid, j, i))
-            .collect();
+        let inertia = nodes.map(|(j, i)| physics.inertia(&leaf, j, i)).collect();
         let system = System::new(&leaf);
         let mut motion = SemiImplicit {
             inertia,
@@ -136,7 +134,7 @@ impl<'a> SemiImplicit<'a> {
     }
 }
 
-impl Method for SemiImplicit<'_> {
+impl Method for SemiImplicit {
     fn name(&self) -> &'static str {
         "semi-implicit"
     }

@@ -29,7 +29,7 @@ const ERROR: f64 = BETA - 1.0 / 6.0;
 /// much, however short the step.
 const STIFFER: f64 = 1e3;
 
-impl SemiImplicit<'_> {
+impl SemiImplicit {
     /// Factorises and solves; false if the matrix is not positive definite.
     pub(super) fn solve(&mut self) -> bool {
         self.factorizations += 1;

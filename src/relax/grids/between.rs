@@ -57,7 +57,7 @@ impl<'a> Run<'a, '_> {
     }
 
     /// The grids that are extrapolated, from coarse to fine.
-    pub fn series(&self) -> Vec<&Level<'a>> {
+    pub fn series(&self) -> Vec<&Level> {
         let mut series: Vec<_> = self.levels.iter().collect();
         if let Some(between) = &self.between {
             series.insert(series.len() - 1, between);

@@ -45,7 +45,7 @@ pub enum From {
 impl<'a> Run<'a, '_> {
     /// Settles on one grid; leaves saddles unless they are wanted. Tells whether
     /// the leaf had to move, not only to settle in the valley it was in.
-    pub(super) fn settle(&mut self, grid: Grid, from: From) -> (Level<'a>, Settled, bool) {
+    pub(super) fn settle(&mut self, grid: Grid, from: From) -> (Level, Settled, bool) {
         self.last = None;
         let leaf = DiscreteLeaf::new(self.leaf, grid);
         let mut near_rest = matches!(from, From::Coarser(_) | From::Finer(_));

@@ -81,7 +81,7 @@ impl<'a> Run<'a, '_> {
 }
 
 /// The leaf with all of its unknowns, of which `reduced` is settled.
-pub fn complete<'a>(reduced: &Leaf, whole: &'a Leaf<'a>, level: &Level<'a>) -> Level<'a> {
+pub fn complete(reduced: &Leaf, whole: &Leaf, level: &Level) -> Level {
     Level {
         leaf: match reduced.rods() == whole.rods() {
             true => level.leaf.seen_as(whole),
