@@ -39,11 +39,8 @@ fn accepted(lines: &str) -> Dynamics {
 }
 
 #[track_caller]
-fn refused(lines: &str, parts: &[&str]) {
-    let message = match with(lines) {
-        Ok(_) => panic!("accepted: {lines}"),
-        Err(error) => error.to_string(),
-    };
+fn holds(scenario: Result<Scenario, ScenarioError>, parts: &[&str]) {
+    let message = scenario.unwrap_err().to_string();
     for part in parts {
         assert!(message.contains(part), "no '{part}' in: {message}");
     }
@@ -52,16 +49,14 @@ fn refused(lines: &str, parts: &[&str]) {
 /// A table of `lines => parts of the message`.
 macro_rules! refused {
     ($($lines:expr => $($part:expr),+;)+) => {
-        $(refused($lines, &[$($part),+]);)+
+        $(holds(with($lines), &[$($part),+]);)+
     };
 }
 
 #[track_caller]
 fn close(found: f64, expected: f64) {
-    assert!(
-        (found / expected - 1.0).abs() < 1e-14,
-        "{found} instead of {expected}"
-    );
+    let close = (found / expected - 1.0).abs() < 1e-14;
+    assert!(close, "{found} instead of {expected}");
 }
 
 #[test]
@@ -70,10 +65,7 @@ fn what_holds_without_the_table() {
     let dynamics = &scenario.dynamics;
     close(dynamics.mean_density(), 2.0 / 16.0);
     assert_eq!(dynamics.density[0], dynamics.density[1]);
-    close(
-        dynamics.rotary_inertia[1].at(0.3),
-        0.125 * 0.4_f64.powi(2) / 4.0,
-    );
+    close(dynamics.rotary_inertia[1].at(0.3), 0.125 * 0.16 / 4.0);
     close(dynamics.external_damping, 2.0 * 3.516 * 0.125);
     assert_eq!(dynamics.internal_damping, 0.0);
     assert_eq!(dynamics.duration, 10.0);
@@ -83,11 +75,8 @@ fn what_holds_without_the_table() {
     assert_eq!(dynamics.tip_force, Schedule::constant([0.5, 0.0, 0.0]));
     assert_eq!(dynamics.tip_moment, Schedule::constant([0.0; 3]));
     assert_eq!(dynamics.rest, Schedule::constant(1.0));
-    let by_hand = Dynamics::default_for(&scenario.rods).with_loads(
-        scenario.gravity,
-        scenario.tip_force,
-        scenario.tip_moment,
-    );
+    let loads = (scenario.gravity, scenario.tip_force, scenario.tip_moment);
+    let by_hand = Dynamics::default_for(&scenario.rods).with_loads(loads.0, loads.1, loads.2);
     assert_eq!(*dynamics, by_hand);
     assert_eq!(*dynamics, accepted(""));
 }
@@ -156,11 +145,8 @@ fn a_single_rod_may_be_free() {
     assert!(!dynamics.clamped);
     assert_eq!(dynamics.tip_moment.at(0.5), [0.0, 0.0, 2.5]);
     let text = text.replace("[0, 0, 5]", "[0, 0, 5e8]");
-    let message = Scenario::from_toml(&text).unwrap_err().to_string();
-    assert!(
-        message.contains("dynamics.tip_moment, value, entry 2 = [0, 0, 5e8]: gives |M| L/A = 1.000e9, the limit is 1e8"),
-        "{message}"
-    );
+    let moment = "dynamics.tip_moment, value, entry 2 = [0, 0, 5e8]: gives |M| L/A = 1.000e9, the limit is 1e8";
+    holds(Scenario::from_toml(&text), &[moment]);
 }
 
 #[test]
@@ -171,23 +157,14 @@ fn overrides() {
     let rest = "dynamics.rest={at=[0,1],factor=[1,2]}";
     assert_eq!(dynamics(rest).rest.at(0.5), 1.5);
     assert!(dynamics("dynamics.clamped=true").clamped);
-    for (given, part) in [
-        (
-            "dynamics.duration=-3",
-            "--set dynamics.duration=-3: dynamics.duration = -3: must be greater than 0",
-        ),
-        (
-            "dynamics.durration=3",
-            "unknown key dynamics.durration (did you mean dynamics.duration?)",
-        ),
-        (
-            "dynamics.gravity=[0,0,-1]",
-            "--set dynamics.gravity=[0,0,-1]: dynamics.gravity = [0,0,-1]: must be a table: a load in time is {",
-        ),
-    ] {
-        let message = with(given).unwrap_err().to_string();
-        assert!(message.contains(part), "no '{part}' in: {message}");
-    }
+    let negative = "dynamics.duration=-3";
+    let part = "dynamics.duration = -3: must be greater than 0";
+    holds(with(negative), &[&format!("--set {negative}: {part}")]);
+    let vector = "dynamics.gravity=[0,0,-1]";
+    let part = "dynamics.gravity = [0,0,-1]: must be a table: a load in time is {";
+    holds(with(vector), &[&format!("--set {vector}: {part}")]);
+    let part = "unknown key dynamics.durration (did you mean dynamics.duration?)";
+    holds(with("dynamics.durration=3"), &[part]);
 }
 
 #[test]
@@ -200,53 +177,36 @@ fn unknown_keys() {
         "[dynamics.load]" => "unknown key dynamics.load";
     }
     let text = format!("dynamics = 3\n{STILL}");
-    let message = Scenario::from_toml(&text).unwrap_err().to_string();
-    assert!(
-        message.contains("scenario:1: dynamics = 3: must be a table: write [dynamics]"),
-        "{message}"
-    );
+    let table = "scenario:1: dynamics = 3: must be a table: write [dynamics]";
+    holds(Scenario::from_toml(&text), &[table]);
 }
 
 #[test]
 fn wrong_types_and_ranges() {
     refused! {
-        "density = 0" =>
-            "leaf.toml:20: dynamics.density = 0: must be greater than 0";
-        "density = [1.0, -1.0]" =>
-            "leaf.toml:20: dynamics.density, entry 2 = -1.0: must be greater than 0";
-        "density = [1.0]" =>
-            "dynamics.density = [1.0]: has 1 entries: must have 2, one per rod";
-        "density = 1e99" =>
-            "dynamics.density = 1e99: must lie between 1e-50 and 1e50";
-        "density = inf" =>
-            "dynamics.density = inf: must be a finite number";
+        "density = 0" => "leaf.toml:20: dynamics.density = 0: must be greater than 0";
+        "density = [1.0, -1.0]" => "leaf.toml:20: dynamics.density, entry 2 = -1.0: must be greater than 0";
+        "density = [1.0]" => "dynamics.density = [1.0]: has 1 entries: must have 2, one per rod";
+        "density = 1e99" => "dynamics.density = 1e99: must lie between 1e-50 and 1e50";
+        "density = inf" => "dynamics.density = inf: must be a finite number";
         "density = true" =>
             "dynamics.density = true: must be a number, a list of 2 (one per rod), or a profile";
         "\nrotary_inertia = { at = [0, 1], value = [1, 0] }" =>
             "leaf.toml:21: dynamics.rotary_inertia, value, entry 2 = 0: must be greater than 0";
-        "section_radius = -1" =>
-            "dynamics.section_radius = -1: must be greater than 0";
+        "section_radius = -1" => "dynamics.section_radius = -1: must be greater than 0";
         "section_radius = 0.1\nrotary_inertia = 0.1" =>
             "leaf.toml:20: dynamics.section_radius = 0.1: dynamics.rotary_inertia is given, too",
             "leave one of them out";
-        "external_damping = -1" =>
-            "leaf.toml:20: dynamics.external_damping = -1: must not be negative";
-        "external_damping = [1.0, 1.0]" =>
-            "dynamics.external_damping = [1.0, 1.0]: must be a number";
-        "internal_damping = inf" =>
-            "dynamics.internal_damping = inf: must be a finite number";
-        "duration = 0" =>
-            "dynamics.duration = 0: must be greater than 0";
-        "duration = \"long\"" =>
-            "dynamics.duration = \"long\": must be a number";
-        "output_interval = 0" =>
-            "dynamics.output_interval = 0: must be greater than 0";
+        "external_damping = -1" => "leaf.toml:20: dynamics.external_damping = -1: must not be negative";
+        "external_damping = [1.0, 1.0]" => "dynamics.external_damping = [1.0, 1.0]: must be a number";
+        "internal_damping = inf" => "dynamics.internal_damping = inf: must be a finite number";
+        "duration = 0" => "dynamics.duration = 0: must be greater than 0";
+        "duration = \"long\"" => "dynamics.duration = \"long\": must be a number";
+        "output_interval = 0" => "dynamics.output_interval = 0: must be greater than 0";
         "output_interval = 11" =>
             "leaf.toml:20: dynamics.output_interval = 11: must be at most dynamics.duration, 10";
-        "clamped = 1" =>
-            "dynamics.clamped = 1: must be true or false";
-        "clamped = false" =>
-            "leaf.toml:20: dynamics.clamped = false: a free base needs leaf.rods = 1 (here 2)";
+        "clamped = 1" => "dynamics.clamped = 1: must be true or false";
+        "clamped = false" => "leaf.toml:20: dynamics.clamped = false: a free base needs leaf.rods = 1 (here 2)";
         "tip_moment = { at = [0, 1], value = [[0, 0, 0], [0, 0, 1]] }" =>
             "leaf.toml:20: dynamics.tip_moment = {",
             "a moment at the tip needs leaf.rods = 1 (here 2)";
@@ -258,16 +218,12 @@ fn loads_and_factors_in_time() {
     refused! {
         "gravity = 1.0" =>
             "leaf.toml:20: dynamics.gravity = 1.0: must be a table: a load in time is { at = [0.0, 1.0], value = [[";
-        "gravity = {}" =>
-            "dynamics.gravity = {}: at is missing: a load in time is";
-        "gravity = { at = [0.0] }" =>
-            "value is missing: a load in time is";
-        "gravity = { at = [0.0], factor = [1.0] }" =>
-            "unknown key factor: a load in time is";
+        "gravity = {}" => "dynamics.gravity = {}: at is missing: a load in time is";
+        "gravity = { at = [0.0] }" => "value is missing: a load in time is";
+        "gravity = { at = [0.0], factor = [1.0] }" => "unknown key factor: a load in time is";
         "gravity = { at = 0.0, value = [[0, 0, 1]] }" =>
             "dynamics.gravity, at = 0.0: must be a list of numbers";
-        "gravity = { at = [], value = [] }" =>
-            "dynamics.gravity, at = []: at least one time is needed";
+        "gravity = { at = [], value = [] }" => "dynamics.gravity, at = []: at least one time is needed";
         "gravity = { at = [0, 1, 1], value = [[0, 0, 1]] }" =>
             "dynamics.gravity, at, entry 3 = 1: must be greater than the entry before it, 1: times rise strictly";
         "gravity = { at = [0, inf], value = [[0, 0, 1]] }" =>
@@ -284,14 +240,11 @@ fn loads_and_factors_in_time() {
             "leaf.toml:22: dynamics.tip_force, value, entry 2, component 2 = nan: must be a finite number";
         "rest = 2.0" =>
             "dynamics.rest = 2.0: must be a table: a factor in time is { at = [0.0, 1.0], factor = [1.0, 2.0] }";
-        "rest = { at = [0], value = [1] }" =>
-            "unknown key value: a factor in time is";
-        "rest = { at = [0], factor = 1 }" =>
-            "dynamics.rest, factor = 1: must be a list of numbers";
+        "rest = { at = [0], value = [1] }" => "unknown key value: a factor in time is";
+        "rest = { at = [0], factor = 1 }" => "dynamics.rest, factor = 1: must be a list of numbers";
         "rest = { at = [0, 1], factor = [1, true] }" =>
             "dynamics.rest, factor, entry 2 = true: must be a number";
-        "[dynamics.rest]\nat = [0, 1]" =>
-            "leaf.toml:20: dynamics.rest =", "factor is missing";
+        "[dynamics.rest]\nat = [0, 1]" => "leaf.toml:20: dynamics.rest =", "factor is missing";
     }
 }
 
@@ -301,8 +254,7 @@ fn limits_that_values_set_together() {
     refused! {
         "density = [1.0, 1e-13]" =>
             "leaf.toml:20: dynamics.density, entry 2 = 1e-13: gives rho/rho_mean = 2.000e-13, the limit is 1e-12";
-        "density = { at = [0, 0.5, 1], value = [1e13, 1, 1] }" =>
-            "rho/rho_mean = 1.000e13, the limit is 1e12";
+        "density = { at = [0, 0.5, 1], value = [1e13, 1, 1] }" => "rho/rho_mean = 1.000e13, the limit is 1e12";
         "density = 1.0\nrotary_inertia = 1e13" =>
             "leaf.toml:21: dynamics.rotary_inertia = 1e13: gives rho I/(rho_mean L^2) = 2.500e12, the limit is 1e12";
         "density = 1.0\nrotary_inertia = [1.0, 1e-13]" =>
@@ -311,14 +263,11 @@ fn limits_that_values_set_together() {
             "dynamics.section_radius, entry 2 = 1e-6: gives r/L = 5.000e-7, the limit is 1e-6";
         "density = 8\nexternal_damping = 1e13" =>
             "leaf.toml:21: dynamics.external_damping = 1e13: gives c T/rho_mean = 1.000e13, the limit is 1e12";
-        "external_damping = 1e308" =>
-            "dynamics.external_damping = 1e308: gives c T/rho_mean";
+        "external_damping = 1e308" => "dynamics.external_damping = 1e308: gives c T/rho_mean";
         "density = 8\ninternal_damping = 1e13" =>
             "dynamics.internal_damping = 1e13: gives t/T = 1.250e12, the limit is 1e12";
-        "density = 8\nduration = 1e13" =>
-            "dynamics.duration = 1e13: gives t/T = 1.250e12, the limit is 1e12";
-        "duration = 1e-13" =>
-            "dynamics.duration = 1e-13: gives t/T = 1.000e-13, the limit is 1e-12";
+        "density = 8\nduration = 1e13" => "dynamics.duration = 1e13: gives t/T = 1.250e12, the limit is 1e12";
+        "duration = 1e-13" => "dynamics.duration = 1e-13: gives t/T = 1.000e-13, the limit is 1e-12";
         "output_interval = 9.9e-6" =>
             "leaf.toml:20: dynamics.output_interval = 9.9e-6: gives duration/output_interval = 1.010e6, the limit is 1e6";
         "rest = { at = [0, 1e13], factor = [1, 1] }" =>

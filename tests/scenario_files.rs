@@ -7,18 +7,13 @@ use leafdyn::scenario::Scenario;
 
 /// Every scenario file in the folders of `scenarios/`.
 fn files() -> Vec<PathBuf> {
-    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
     let list = |folder: &Path| -> Vec<PathBuf> {
-        fs::read_dir(folder)
-            .unwrap()
-            .map(|entry| entry.unwrap().path())
-            .collect()
+        let entries = fs::read_dir(folder).unwrap();
+        entries.map(|entry| entry.unwrap().path()).collect()
     };
-    let mut files: Vec<_> = list(&top)
-        .iter()
-        .filter(|path| path.is_dir())
-        .flat_map(|folder| list(folder))
-        .collect();
+    let top = list(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios"));
+    let folders = top.iter().filter(|path| path.is_dir());
+    let mut files: Vec<_> = folders.flat_map(|folder| list(folder)).collect();
     files.sort();
     files
 }
@@ -33,16 +28,11 @@ fn every_file_is_accepted_named_after_itself_and_explained() {
     assert!(files.len() >= 24, "found {} files", files.len());
     for path in files {
         assert_eq!(path.extension().unwrap(), "toml", "{}", path.display());
-        assert_eq!(
-            read(&path).name,
-            path.file_stem().unwrap().to_str().unwrap()
-        );
-        let header = fs::read_to_string(&path).unwrap();
-        let comments = header
-            .lines()
-            .take_while(|line| line.starts_with('#'))
-            .count();
-        assert!(comments >= 3, "{}: no header comment", path.display());
+        let name = path.file_stem().unwrap().to_str().unwrap();
+        assert_eq!(read(&path).name, name);
+        let text = fs::read_to_string(&path).unwrap();
+        let header = text.lines().take_while(|line| line.starts_with('#'));
+        assert!(header.count() >= 3, "{name}: no header comment");
     }
 }
 
@@ -55,29 +45,19 @@ fn the_papers_figures_share_what_the_paper_says_of_all() {
     assert_eq!(paper.len(), 9);
     for path in paper {
         let scenario = read(&path);
-        assert_eq!(
-            scenario.rods.len(),
-            if scenario.name == "fig06" { 15 } else { 21 }
-        );
+        let rods = if scenario.name == "fig06" { 15 } else { 21 };
+        assert_eq!(scenario.rods.len(), rods);
         assert!(scenario.joined);
         // Fig. 7's leaves are not coupled.
-        let gap = if scenario.name.starts_with("fig07") {
-            0.0
-        } else {
-            1.0
-        };
-        assert!(
-            scenario
-                .coupling
-                .iter()
-                .all(|found| *found == [0.0, gap, gap])
-        );
-        let first_and_last =
-            [&scenario.rods[0], scenario.rods.last().unwrap()].map(|rod| rod.angle);
+        let gap = f64::from(!scenario.name.starts_with("fig07"));
+        assert_eq!(scenario.coupling, vec![[0.0, gap, gap]; rods - 1]);
         let third = std::f64::consts::PI / 3.0;
-        let step = 2.0 * third / scenario.rods.len() as f64;
-        assert!((first_and_last[0] - (step - third)).abs() < 1e-15);
-        assert!((first_and_last[1] - third).abs() < 1e-15);
+        let step = 2.0 * third / rods as f64;
+        let [first, .., last] = &scenario.rods[..] else {
+            panic!()
+        };
+        assert!((first.angle - (step - third)).abs() < 1e-15);
+        assert!((last.angle - third).abs() < 1e-15);
     }
 }
 
@@ -90,11 +70,9 @@ fn what_the_comments_offer_works() {
         for line in text.lines().filter(|line| line.starts_with('#')) {
             for given in line.split("--set ").skip(1) {
                 let given = given.split_whitespace().next().unwrap();
-                let given = given
-                    .trim_end_matches([':', ',', '.', ';', ')'])
-                    .to_string();
-                Scenario::read(&path, &[given])
-                    .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+                let given = given.trim_end_matches([':', ',', '.', ';', ')']);
+                let leaf = Scenario::read(&path, &[given.to_string()]);
+                leaf.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
                 offered += 1;
             }
         }

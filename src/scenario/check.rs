@@ -10,7 +10,7 @@ use super::dynamics::{OUTPUTS, round_inertia};
 use super::error::ScenarioError;
 use super::key::Key;
 use super::raw::{Item, Raw};
-use super::{Dynamics, Profile, Rod, Scenario, Schedule, Start, Units, limits};
+use super::{Dynamics, Profile, Rod, Scenario, Start, Units, limits};
 
 type Result<T> = std::result::Result<T, ScenarioError>;
 
@@ -38,10 +38,9 @@ pub(super) fn check(raw: &Raw) -> Result<Scenario> {
     let coupling = coupling(raw, rods.len() - 1)?;
     let gravity = raw.item(Key::Gravity)?.vector()?;
     let tip_force = raw.item(Key::TipForce)?.vector()?;
-    let tip_moment = raw.item(Key::TipMoment)?;
-    let tip_moment = on_one_rod(tip_moment, rods.len(), tip_moment.vector()?, |moment| {
-        *moment != [0.0; 3]
-    })?;
+    let item = raw.item(Key::TipMoment)?;
+    let tip_moment = item.vector()?;
+    on_one_rod(item, rods.len(), &[tip_moment])?;
     let tolerance = tolerance(raw.item(Key::Tolerance)?)?;
     let dynamics = dynamics(raw, &rods, [gravity, tip_force, tip_moment])?;
     let scenario = Scenario {
@@ -64,24 +63,24 @@ fn name(item: Item) -> Result<String> {
     let name = item.text()?;
     let allowed = |c: char| c.is_alphanumeric() || "_-.+".contains(c);
     let starts_well = name.starts_with(|c: char| c.is_alphanumeric() || c == '_');
-    if starts_well && name.len() <= LONGEST_NAME && name.chars().all(allowed) {
-        return Ok(name.to_string());
-    }
-    Err(item.refuse(format_args!(
-        "must be usable as a folder name: 1 to {LONGEST_NAME} letters, digits and the signs \
-         _ - . + with a letter, digit or _ first"
-    )))
+    item.ensure(
+        starts_well && name.len() <= LONGEST_NAME && name.chars().all(allowed),
+        format_args!(
+            "must be usable as a folder name: 1 to {LONGEST_NAME} letters, digits and the signs \
+             _ - . + with a letter, digit or _ first"
+        ),
+    )?;
+    Ok(name.to_string())
 }
 
 fn unit(item: Item) -> Result<String> {
     let unit = item.text()?;
     let printed = !unit.trim().is_empty() && !unit.chars().any(char::is_control);
-    if printed && unit.chars().count() <= LONGEST_UNIT {
-        return Ok(unit.trim().to_string());
-    }
-    Err(item.refuse(format_args!(
-        "must be 1 to {LONGEST_UNIT} characters that can be printed"
-    )))
+    item.ensure(
+        printed && unit.chars().count() <= LONGEST_UNIT,
+        format_args!("must be 1 to {LONGEST_UNIT} characters that can be printed"),
+    )?;
+    Ok(unit.trim().to_string())
 }
 
 fn veins(raw: &Raw, rods: usize) -> Result<Vec<Rod>> {
@@ -138,30 +137,32 @@ fn coupling(raw: &Raw, gaps: usize) -> Result<Vec<[f64; 3]>> {
     Ok(coupling)
 }
 
-/// A moment at the tip, if it acts on one rod or `acts` not at all.
-fn on_one_rod<T>(item: Item, rods: usize, moment: T, acts: impl Fn(&T) -> bool) -> Result<T> {
-    if rods > 1 && acts(&moment) {
-        return Err(item.refuse(format_args!(
+/// Refuses moments at the tip of more than one rod.
+fn on_one_rod(item: Item, rods: usize, moments: &[[f64; 3]]) -> Result<()> {
+    item.ensure(
+        rods == 1 || moments.iter().all(|moment| *moment == [0.0; 3]),
+        format_args!(
             "a moment at the tip needs leaf.rods = 1 (here {rods}): joined tips pass on no moment"
-        )));
-    }
-    Ok(moment)
+        ),
+    )
 }
 
 fn tolerance(item: Item) -> Result<f64> {
     let tolerance = item.number()?;
-    if tolerance <= 0.0 || tolerance > TOLERANCE_MOST {
-        return Err(item.refuse(format_args!(
+    item.ensure(
+        tolerance > 0.0 && tolerance <= TOLERANCE_MOST,
+        format_args!(
             "must be greater than 0 and at most {TOLERANCE_MOST}: \
              it is the error of the centerlines relative to the length of a rod"
-        )));
-    }
-    if tolerance < TOLERANCE_LEAST {
-        return Err(item.refuse(format_args!(
+        ),
+    )?;
+    item.ensure(
+        tolerance >= TOLERANCE_LEAST,
+        format_args!(
             "must be at least {TOLERANCE_LEAST:e}: double precision carries 16 digits, \
              and rounding in the solve takes about four of them"
-        )));
-    }
+        ),
+    )?;
     Ok(tolerance)
 }
 
@@ -187,6 +188,13 @@ fn dynamics(raw: &Raw, rods: &[Rod], loads: [[f64; 3]; 3]) -> Result<Dynamics> {
         None => duration / OUTPUTS,
     };
     let clamped = clamped(raw.item(Key::Clamped)?, rods.len())?;
+    let start = start(raw.item(Key::Start)?, clamped)?;
+    let gravity = load(Key::GravityInTime, preset.gravity)?;
+    let tip_force = load(Key::TipForceInTime, preset.tip_force)?;
+    let tip_moment = load(Key::TipMomentInTime, preset.tip_moment)?;
+    if let Some(item) = raw.given(Key::TipMomentInTime) {
+        on_one_rod(item, rods.len(), &tip_moment.value)?;
+    }
     Ok(Dynamics {
         polar_excess: if section.is_some() { 1.0 } else { 0.0 },
         rotary_inertia: section.unwrap_or(preset.rotary_inertia),
@@ -195,13 +203,10 @@ fn dynamics(raw: &Raw, rods: &[Rod], loads: [[f64; 3]; 3]) -> Result<Dynamics> {
         duration,
         output_interval,
         clamped,
-        start: start(raw.item(Key::Start)?, clamped)?,
-        gravity: load(Key::GravityInTime, preset.gravity)?,
-        tip_force: load(Key::TipForceInTime, preset.tip_force)?,
-        tip_moment: match raw.given(Key::TipMomentInTime) {
-            Some(item) => on_one_rod(item, rods.len(), item.vectors_in_time()?, acts)?,
-            None => preset.tip_moment,
-        },
+        start,
+        gravity,
+        tip_force,
+        tip_moment,
         rest: match raw.given(Key::RestInTime) {
             Some(item) => item.factors_in_time()?,
             None => preset.rest,
@@ -210,22 +215,17 @@ fn dynamics(raw: &Raw, rods: &[Rod], loads: [[f64; 3]; 3]) -> Result<Dynamics> {
     })
 }
 
-fn acts(moment: &Schedule<[f64; 3]>) -> bool {
-    moment.value.iter().any(|moment| *moment != [0.0; 3])
-}
-
 fn rotary_inertia(raw: &Raw, density: &[Profile]) -> Result<Option<Vec<Profile>>> {
     let quantity = |item: Item| item.quantity(density.len());
     let inertia = raw.given(Key::RotaryInertia).map(quantity).transpose()?;
     let Some(item) = raw.given(Key::SectionRadius) else {
         return Ok(inertia);
     };
-    if inertia.is_some() {
-        return Err(item.refuse(
-            "dynamics.rotary_inertia is given, too, and is density section_radius^2/4: \
-             leave one of them out",
-        ));
-    }
+    item.ensure(
+        inertia.is_none(),
+        "dynamics.rotary_inertia is given, too, and is density section_radius^2/4: \
+         leave one of them out",
+    )?;
     let radius = quantity(item)?;
     let round = density.iter().zip(&radius);
     Ok(Some(
@@ -237,21 +237,24 @@ fn rotary_inertia(raw: &Raw, density: &[Profile]) -> Result<Option<Vec<Profile>>
 
 fn output_interval(item: Item, duration: f64) -> Result<f64> {
     let interval = item.number()?;
-    if interval > duration {
-        return Err(item.refuse(format_args!(
+    item.ensure(
+        interval <= duration,
+        format_args!(
             "must be at most dynamics.duration, {duration} (left out: a hundredth of the duration)"
-        )));
-    }
+        ),
+    )?;
     Ok(interval)
 }
 
 fn clamped(item: Item, rods: usize) -> Result<bool> {
-    match item.switch()? {
-        false if rods > 1 => Err(item.refuse(format_args!(
+    let clamped = item.switch()?;
+    item.ensure(
+        clamped || rods == 1,
+        format_args!(
             "a free base needs leaf.rods = 1 (here {rods}): the rods of a leaf grow from one base"
-        ))),
-        clamped => Ok(clamped),
-    }
+        ),
+    )?;
+    Ok(clamped)
 }
 
 fn start(item: Item, clamped: bool) -> Result<Start> {

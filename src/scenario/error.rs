@@ -20,17 +20,12 @@ pub struct ScenarioError {
 /// Where a value was written, or is missing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// In a file, or the file itself.
+    /// In a file.
     File {
         /// The file.
         file: String,
-    },
-    /// In a line of a file; lines count from 1.
-    Line {
-        /// The file.
-        file: String,
-        /// The line.
-        line: usize,
+        /// The line, counted from 1; none where it is the whole file.
+        line: Option<usize>,
     },
     /// In an override.
     Set {
@@ -42,8 +37,11 @@ pub enum Place {
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Place::File { file } => write!(f, "{file}"),
-            Place::Line { file, line } => write!(f, "{file}:{line}"),
+            Place::File { file, line: None } => write!(f, "{file}"),
+            Place::File {
+                file,
+                line: Some(line),
+            } => write!(f, "{file}:{line}"),
             Place::Set { given } => write!(f, "--set {given}"),
         }
     }

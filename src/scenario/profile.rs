@@ -112,13 +112,14 @@ mod tests {
     #[test]
     fn linear_between_knots_and_exact_at_them() {
         let tent = tent();
-        for (sigma, value) in [
+        let values = [
             (0.0, 1.0),
             (0.125, 2.0),
             (0.25, 3.0),
             (0.5, 0.0),
             (1.0, -6.0),
-        ] {
+        ];
+        for (sigma, value) in values {
             assert_eq!(tent.at(sigma), value, "at {sigma}");
         }
         for (sigma, integral) in [(0.0, 0.0), (0.125, 0.1875), (0.25, 0.5), (1.0, -0.625)] {

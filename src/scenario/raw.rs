@@ -41,15 +41,16 @@ enum Origin<'a> {
 impl<'a> Source<'a> {
     fn place(&self, at: usize) -> Place {
         match self.origin {
-            Origin::File(file) => Place::Line {
+            Origin::File(file) => Place::File {
                 file: file.to_string(),
-                line: line_of(self.text.as_bytes(), at),
+                line: Some(line_of(self.text.as_bytes(), at)),
             },
             Origin::Set(given) => Place::Set {
                 given: shorten(given),
             },
             Origin::LeftOut => Place::File {
                 file: "default".into(),
+                line: None,
             },
         }
     }
@@ -111,15 +112,13 @@ impl<'a> Raw<'a> {
             tables: Vec::new(),
         };
         for key in Key::all() {
-            if let LeftOut::Means(text) = key.left_out() {
-                let origin = Origin::LeftOut;
-                let value = DeValue::parse(text).ok();
-                let entry = |value| Entry {
-                    value,
-                    source: Source { text, origin },
-                };
-                raw.entries[key as usize] = value.map(entry);
-            }
+            let LeftOut::Means(text) = key.left_out() else {
+                continue;
+            };
+            let origin = Origin::LeftOut;
+            let source = Source { text, origin };
+            let value = source.parse(DeValue::parse(text))?;
+            raw.entries[key as usize] = Some(Entry { value, source });
         }
         let origin = Origin::File(file);
         let source = Source { text, origin };
@@ -202,16 +201,15 @@ impl<'a> Raw<'a> {
                 LeftOut::Refused(example) => example,
                 _ => "...",
             };
-            let line = format!("a line such as `{name} = {example}`");
+            let entry = format!("a line such as `{name} = {example}`");
             let how = match table {
-                "" => format!("add {line} at the top of the file"),
-                _ if self.tables.contains(&table) => format!("add {line} below [{table}]"),
-                _ => format!("add the table [{table}], and below it {line}"),
+                "" => format!("add {entry} at the top of the file"),
+                _ if self.tables.contains(&table) => format!("add {entry} below [{table}]"),
+                _ => format!("add the table [{table}], and below it {entry}"),
             };
+            let (file, line) = (self.file.to_string(), None);
             ScenarioError {
-                place: Place::File {
-                    file: self.file.to_string(),
-                },
+                place: Place::File { file, line },
                 key: Some(key),
                 problem: format!("{} is missing: {how}", key.path()),
             }
@@ -297,6 +295,14 @@ impl<'e> Item<'e> {
                 .ok_or_else(|| self.refuse(format_args!("{name} is missing: {form}")))
         };
         Ok([list("at")?, list(other)?])
+    }
+
+    /// Refuses this value unless a condition `holds`.
+    pub(super) fn ensure(&self, holds: bool, problem: impl Display) -> Result<(), ScenarioError> {
+        match holds {
+            true => Ok(()),
+            false => Err(self.refuse(problem)),
+        }
     }
 
     pub(super) fn refuse(&self, problem: impl Display) -> ScenarioError {

@@ -49,17 +49,14 @@ impl Scenario {
 
 /// The text of a scenario's file.
 pub(crate) fn text(path: &Path) -> Result<String, ScenarioError> {
-    let file = path.display().to_string();
-    let refuse = |line, problem| ScenarioError {
-        place: match line {
-            None => Place::File { file: file.clone() },
-            Some(line) => Place::Line {
-                file: file.clone(),
-                line,
-            },
-        },
-        key: None,
-        problem,
+    let refuse = |line, problem| {
+        let file = path.display().to_string();
+        let place = Place::File { file, line };
+        ScenarioError {
+            place,
+            key: None,
+            problem,
+        }
     };
     let mut bytes = Vec::new();
     // Opening a folder succeeds on some systems, and reading it fails.

@@ -83,22 +83,22 @@ mod tests {
     }
 
     #[test]
-    fn linear_between_times_and_exact_at_them() {
-        assert_eq!(factor().at(-1.0), 1.0);
-        assert_eq!(factor().at(0.0), 3.0);
-        assert_eq!(factor().at(0.5), 4.0);
-        assert_eq!(factor().at(0.7), 0.1);
+    fn linear_between_times_exact_at_them_and_constant_outside() {
+        for (time, value) in [
+            (-1e9, 1.0),
+            (-1.0, 1.0),
+            (0.0, 3.0),
+            (0.5, 4.0),
+            (0.7, 0.1),
+            (1e9, 0.1),
+        ] {
+            assert_eq!(factor().at(time), value, "at {time}");
+        }
         let force = Schedule {
             at: vec![0.0, 2.0],
             value: vec![[0.0, 1.0, 0.0], [4.0, 1.0, -2.0]],
         };
         assert_eq!(force.at(0.5), [1.0, 1.0, -0.5]);
-    }
-
-    #[test]
-    fn constant_outside_the_times() {
-        assert_eq!(factor().at(-1e9), 1.0);
-        assert_eq!(factor().at(1e9), 0.1);
     }
 
     #[test]

@@ -13,7 +13,13 @@ type Result<T> = std::result::Result<T, ScenarioError>;
 /// quotients of stiffnesses must not overflow.
 const MAGNITUDES: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
 
-const PROFILE: &str = "a profile is { at = [0.0, 1.0], value = [1.0, 0.5] }";
+const INFINITE: &str = "must be a finite number; inf (rigid) is allowed for stiffness.axial, \
+     shear_2 and shear_3 only, not in a profile";
+const LIST_OF_NUMBERS: &str = "a list of numbers";
+const ONE_PER_ROD: &str = "one per rod (leaf.rods)";
+const ONE_PER_KNOT: &str = "one per entry of at";
+const PROFILE: &str = "a profile { at = [0.0, 1.0], value = [1.0, 0.5] }";
+const PROFILE_IS: &str = "a profile is { at = [0.0, 1.0], value = [1.0, 0.5] }";
 const LOAD_IN_TIME: &str =
     "a load in time is { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0]] }";
 const FACTOR_IN_TIME: &str = "a factor in time is { at = [0.0, 1.0], factor = [1.0, 2.0] }";
@@ -76,29 +82,19 @@ impl<'e> Item<'e> {
             }
         };
         let positive = matches!(range, Range::Positive | Range::PositiveOrInfinite);
-        if value.is_nan() || value == f64::NEG_INFINITY {
-            Err(self.refuse("must be a finite number"))
-        } else if positive && value <= 0.0 {
-            Err(self.refuse("must be greater than 0"))
-        } else if value == f64::INFINITY {
-            match range {
-                Range::PositiveOrInfinite => Ok(value),
-                Range::Positive => Err(self.refuse(
-                    "must be a finite number; inf (rigid) is allowed for stiffness.axial, \
-                     shear_2 and shear_3 only, not in a profile",
-                )),
-                _ => Err(self.refuse("must be a finite number")),
+        let problem = match value {
+            _ if value.is_nan() || value == f64::NEG_INFINITY => "must be a finite number",
+            _ if positive && value <= 0.0 => "must be greater than 0",
+            f64::INFINITY if range == Range::PositiveOrInfinite => return Ok(value),
+            f64::INFINITY if positive => INFINITE,
+            f64::INFINITY => "must be a finite number",
+            _ if positive && !MAGNITUDES.contains(&value) => {
+                "must lie between 1e-50 and 1e50: choose other units"
             }
-        } else if positive && !MAGNITUDES.contains(&value) {
-            let (least, most) = (MAGNITUDES.start(), MAGNITUDES.end());
-            Err(self.refuse(format_args!(
-                "must lie between {least:e} and {most:e}: choose other units"
-            )))
-        } else if range == Range::NotNegative && value < 0.0 {
-            Err(self.refuse("must not be negative"))
-        } else {
-            Ok(value)
-        }
+            _ if range == Range::NotNegative && value < 0.0 => "must not be negative",
+            _ => return Ok(value),
+        };
+        Err(self.refuse(problem))
     }
 
     /// Three numbers.
@@ -117,22 +113,16 @@ impl<'e> Item<'e> {
         if let DeValue::Integer(_) | DeValue::Float(_) = self.value() {
             return Ok(vec![self.number()?; count]);
         }
-        let gaps = "one per gap between neighbouring rods";
-        let (because, needed) = match self.key().form() {
-            Form::PerGap(_) => (
-                format!("{gaps} (leaf.rods - 1)"),
-                format!("a number or a list of {count} ({gaps})"),
-            ),
-            Form::Quantity(_) => (
-                ONE_PER_ROD.into(),
-                format!(
-                    "a number, a list of {count} (one per rod), or a profile {{ at = [0.0, 1.0], value = [1.0, 0.5] }}"
-                ),
-            ),
-            _ => (
-                ONE_PER_ROD.into(),
-                format!("a number or a list of {count} (one per rod)"),
-            ),
+        let (each, counted) = match self.key().form() {
+            Form::PerGap(_) => ("gap between neighbouring rods", "leaf.rods - 1"),
+            _ => ("rod", "leaf.rods"),
+        };
+        let because = format!("one per {each} ({counted})");
+        let needed = match self.key().form() {
+            Form::Quantity(_) => {
+                format!("a number, a list of {count} (one per rod), or {PROFILE}")
+            }
+            _ => format!("a number or a list of {count} (one per {each})"),
         };
         let list = self.list_of(count, &because, &needed)?;
         list.map(|item| item.number()).collect()
@@ -144,7 +134,7 @@ impl<'e> Item<'e> {
             let numbers = self.one_each(rods)?;
             return Ok(numbers.into_iter().map(Profile::Constant).collect());
         };
-        let [at, value] = self.pair("value", PROFILE)?;
+        let [at, value] = self.pair("value", PROFILE_IS)?;
         let at = at.rising(true)?;
         let needed = format!("a list of numbers, or a list of {rods} such lists (one per rod)");
         let mut list = value.array(&needed)?;
@@ -202,27 +192,24 @@ impl<'e> Item<'e> {
         };
         let list = self.array(LIST_OF_NUMBERS)?;
         let count = list.len();
-        if count < least {
-            return Err(self.refuse(too_few));
-        }
+        self.ensure(count >= least, too_few)?;
         let mut at: Vec<f64> = Vec::with_capacity(count);
         for item in list {
             let next = item.number_in(Range::Finite)?;
-            match at.last() {
-                None if fractions && next != 0.0 => {
-                    return Err(item.refuse("must start at 0 (the base)"));
-                }
-                Some(before) if next <= *before => {
-                    return Err(item.refuse(format_args!(
+            let starts = !fractions || !at.is_empty() || next == 0.0;
+            item.ensure(starts, "must start at 0 (the base)")?;
+            if let Some(before) = at.last() {
+                item.ensure(
+                    next > *before,
+                    format_args!(
                         "must be greater than the entry before it, {before}: \
                          {what} rise strictly (write a step as a steep ramp)"
-                    )));
-                }
-                _ => at.push(next),
+                    ),
+                )?;
             }
-            if fractions && at.len() == count && next != 1.0 {
-                return Err(item.refuse("must end at 1 (the tip)"));
-            }
+            at.push(next);
+            let ends = !fractions || at.len() < count || next == 1.0;
+            item.ensure(ends, "must end at 1 (the tip)")?;
         }
         Ok(at)
     }
@@ -244,15 +231,11 @@ impl<'e> Item<'e> {
         needed: &str,
     ) -> Result<impl ExactSizeIterator<Item = Item<'e>> + use<'e>> {
         let list = self.array(needed)?;
-        match list.len() {
-            found if found != count => Err(self.refuse(format_args!(
-                "has {found} entries: must have {count}, {because}"
-            ))),
-            _ => Ok(list),
-        }
+        let found = list.len();
+        self.ensure(
+            found == count,
+            format_args!("has {found} entries: must have {count}, {because}"),
+        )?;
+        Ok(list)
     }
 }
-
-const LIST_OF_NUMBERS: &str = "a list of numbers";
-const ONE_PER_ROD: &str = "one per rod (leaf.rods)";
-const ONE_PER_KNOT: &str = "one per entry of at";

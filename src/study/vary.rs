@@ -61,6 +61,10 @@ impl Knob {
             Knob::Segments => "method.segments",
         }
     }
+
+    fn from_path(path: &str) -> Option<Knob> {
+        Knob::ALL.into_iter().find(|knob| knob.path() == path)
+    }
 }
 
 /// The settings of methods; `None`: as the method chooses.
@@ -74,24 +78,15 @@ pub struct Knobs {
 
 impl Knobs {
     fn set(&mut self, knob: Knob, value: f64) -> Result<(), VaryError> {
-        let needed = match knob {
-            Knob::Step if value > 0.0 && value.is_finite() => {
-                self.step = Some(value);
-                return Ok(());
-            }
+        match knob {
+            Knob::Step if value > 0.0 && value.is_finite() => self.step = Some(value),
+            Knob::Step => return Err(VaryError::knob(knob, value, "greater than 0")),
             Knob::Segments if value >= 1.0 && value.fract() == 0.0 && value < 1e9 => {
                 self.segments = Some(value as usize);
-                return Ok(());
             }
-            Knob::Step => "greater than 0",
-            Knob::Segments => "a whole number from 1",
-        };
-        let found = format!("{value:?}");
-        Err(VaryError::Knob {
-            knob,
-            found,
-            needed,
-        })
+            Knob::Segments => return Err(VaryError::knob(knob, value, "a whole number from 1")),
+        }
+        Ok(())
     }
 }
 
@@ -123,7 +118,7 @@ impl FromStr for Target {
 
     fn from_str(text: &str) -> Result<Self, VaryError> {
         let text = text.trim();
-        if let Some(knob) = Knob::ALL.into_iter().find(|knob| knob.path() == text) {
+        if let Some(knob) = Knob::from_path(text) {
             return Ok(Target::Knob(knob));
         }
         let refuse = |why: String| VaryError::Key {
@@ -219,11 +214,8 @@ impl FromStr for Keys {
 /// As written: `stiffness.axial+stiffness.shear_2`.
 impl fmt::Display for Keys {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        for (i, target) in self.0.iter().enumerate() {
-            let plus = if i > 0 { "+" } else { "" };
-            write!(f, "{plus}{target}")?;
-        }
-        Ok(())
+        let paths: Vec<String> = self.0.iter().map(Target::to_string).collect();
+        f.write_str(&paths.join("+"))
     }
 }
 
@@ -326,18 +318,17 @@ pub enum VaryError {
         why: String,
     },
     /// The setting of a method cannot be this.
-    #[error("{} = {found}: must be {needed}", knob.path())]
-    Knob {
-        /// The setting.
-        knob: Knob,
-        /// The value.
-        found: String,
-        /// What it must be.
-        needed: &'static str,
-    },
+    #[error("{0}")]
+    Knob(String),
     /// The scenario with these values is refused.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
+}
+
+impl VaryError {
+    fn knob(knob: Knob, found: impl fmt::Debug, needed: &str) -> VaryError {
+        VaryError::Knob(format!("{} = {found:?}: must be {needed}", knob.path()))
+    }
 }
 
 #[cfg(test)]

@@ -161,20 +161,15 @@ impl Base {
 
 /// The setting of a method by its path, and its value.
 fn setting(path: &str, value: &str) -> Result<(Knob, f64), VaryError> {
-    let Some(knob) = Knob::ALL.into_iter().find(|knob| knob.path() == path) else {
+    let Some(knob) = Knob::from_path(path) else {
         return Err(VaryError::Key {
             key: path.into(),
             why: format!("methods have {}", Knob::ALL.map(Knob::path).join(" and ")),
         });
     };
-    match value.parse() {
-        Ok(number) => Ok((knob, number)),
-        Err(_) => Err(VaryError::Knob {
-            knob,
-            found: value.into(),
-            needed: "a number",
-        }),
-    }
+    let number = value.parse();
+    let number = number.map_err(|_| VaryError::knob(knob, format_args!("{value}"), "a number"))?;
+    Ok((knob, number))
 }
 
 /// Every entry of an accepted scenario by its path, those left out included
