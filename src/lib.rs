@@ -199,6 +199,7 @@ pub mod files;
 pub mod leaf;
 pub mod modes;
 pub mod motion;
+pub mod newton;
 pub mod numbers;
 pub mod relax;
 #[cfg(feature = "cli")]

@@ -2,16 +2,20 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::equations::{Equations, ITERATIONS, LARGEST, Stuck, converged};
+use super::equations::{Equations, ITERATIONS, LARGEST, Linear, Stuck, at_rest, factorized};
 use super::field::{add, dot, is_finite, largest, plus, times};
 use super::{Point, Tangent};
-use crate::leaf::{Bordered, Field, SparsePattern, State};
+use crate::leaf::{Bordered, Field, SparsePattern, State, System};
 
 /// What of a singular matrix of the border counts as zero, relative to the rest.
 const NEUTRAL: f64 = 1e-7;
 
 /// Iterations of the subspace: the wanted modes are far softer than the rest.
 const SUBSPACE_ITERATIONS: usize = 8;
+
+/// Shift of the matrix (times the masses) in the inverse iteration: it keeps the
+/// pivots from zero.
+const SHIFT: f64 = 1e-9;
 
 /// A point found in the presence of modes that are nearly neutral.
 pub struct Deflated {
@@ -84,40 +88,15 @@ impl Equations<'_> {
                         .collect(),
                 });
             }
-            // What is below rounding decides nothing.
-            let felt = |force: f64| {
-                if force.abs() < linear.noise {
-                    0.0
-                } else {
-                    force
-                }
-            };
-            let mut matrix = DMatrix::zeros(p + 1, p + 1);
-            let mut right = DVector::zeros(p + 1);
-            for r in 0..p {
-                for c in 0..p {
-                    matrix[(r, c)] = h[(r, c)];
-                }
-                matrix[(r, p)] = rate.multipliers[r];
-                matrix[(p, r)] = dot(&dual, &columns[r].increments);
-                right[r] = -felt(forces.multipliers[r]);
-            }
-            matrix[(p, p)] = dot(&dual, &rate.increments) + own;
-            right[p] = -dot(&dual, &forces.increments);
-            let svd = matrix.svd(true, true);
-            let least = NEUTRAL * svd.singular_values.max();
-            let solution = svd.solve(&right, least).map_err(|_| Stuck::NotConverged)?;
-            let mut increments = plus(&forces.increments, solution[p], &rate.increments);
-            for (column, part) in columns.iter().zip(solution.iter()) {
-                add(&mut increments, *part, &column.increments);
-            }
-            let size = largest(&increments).max(solution[p].abs());
+            let step = bordered_step(&linear, &h, (&forces, &rate, &columns), (&dual, own))?;
+            let (increments, change) = step;
+            let size = largest(&increments).max(change.abs());
             if !is_finite(&increments) || size > LARGEST {
                 return Err(Stuck::NotConverged);
             }
             state = self.moved(&state, fraction, &increments, 1.0)?;
-            fraction += solution[p];
-            finished = converged(size, previous);
+            fraction += change;
+            finished = at_rest(size, previous);
             previous = size;
         }
         Err(Stuck::NotConverged)
@@ -151,29 +130,9 @@ impl Equations<'_> {
         let mut state = point.state.clone();
         self.linearise(&mut state, point.fraction)?;
         let count = count.min(6 * self.rods() * self.grid.segments() / 2).max(1);
-        if self.pattern.is_none() {
-            self.pattern = Some(SparsePattern::new(&self.system).map_err(|_| Stuck::TooLarge)?);
-        }
-        let pattern = self.pattern.as_ref().ok_or(Stuck::TooLarge)?;
-        let shift = 1e-9;
-        let factor = pattern.factorize(&self.system, shift);
-        let mut factor = factor.map_err(|_| Stuck::TooLarge)?;
-        let mut modes: Vec<Field> = (0..count)
-            .map(|k| {
-                self.system.seed_mode();
-                let mut seed = self.system.rhs();
-                // Each with another pattern along the rods.
-                for (j, rod) in seed.iter_mut().enumerate() {
-                    for (i, forces) in rod.iter_mut().enumerate() {
-                        for (c, force) in forces.iter_mut().enumerate() {
-                            let phase = (k * (3 * i + 7 * c + 11 * j + 1)) as f64;
-                            *force *= (0.7 * phase).cos();
-                        }
-                    }
-                }
-                seed
-            })
-            .collect();
+        let mut pattern = self.pattern.take();
+        let mut factor = factorized(&mut pattern, &self.system, SHIFT)?;
+        let mut modes: Vec<Field> = (0..count).map(|k| seed(&mut self.system, k)).collect();
         for _ in 0..SUBSPACE_ITERATIONS {
             for mode in &mut modes {
                 *mode = factor.solve_bordered(mode, &[]).increments;
@@ -219,13 +178,66 @@ impl Equations<'_> {
             }
             modes = modes.iter().map(|mode| self.momentum(mode)).collect();
         }
-        Ok(modes
-            .iter()
-            .map(|momentum| {
-                let mode = factor.solve_bordered(momentum, &[]).increments;
-                let norm = self.product(&mode, &mode).sqrt();
-                times(&mode, 1.0 / norm)
-            })
-            .collect())
+        let modes = modes.iter().map(|momentum| {
+            let mode = factor.solve_bordered(momentum, &[]).increments;
+            let norm = self.product(&mode, &mode).sqrt();
+            times(&mode, 1.0 / norm)
+        });
+        let modes = modes.collect();
+        self.pattern = pattern;
+        Ok(modes)
     }
+}
+
+/// Newton's increments and change of the parameter within the plane normal to
+/// `dual` and its `own` part, from the solutions of the bordered equations for the
+/// forces, their rate, and the units of the border.
+fn bordered_step(
+    linear: &Linear,
+    h: &DMatrix<f64>,
+    (forces, rate, columns): (&Bordered, &Bordered, &[Bordered]),
+    (dual, own): (&Field, f64),
+) -> Result<(Field, f64), Stuck> {
+    let p = columns.len();
+    let mut matrix = DMatrix::zeros(p + 1, p + 1);
+    let mut right = DVector::zeros(p + 1);
+    for r in 0..p {
+        for c in 0..p {
+            matrix[(r, c)] = h[(r, c)];
+        }
+        matrix[(r, p)] = rate.multipliers[r];
+        matrix[(p, r)] = dot(dual, &columns[r].increments);
+        // What is below rounding decides nothing.
+        let force = forces.multipliers[r];
+        right[r] = -if force.abs() < linear.noise {
+            0.0
+        } else {
+            force
+        };
+    }
+    matrix[(p, p)] = dot(dual, &rate.increments) + own;
+    right[p] = -dot(dual, &forces.increments);
+    let svd = matrix.svd(true, true);
+    let least = NEUTRAL * svd.singular_values.max();
+    let solution = svd.solve(&right, least).map_err(|_| Stuck::NotConverged)?;
+    let mut increments = plus(&forces.increments, solution[p], &rate.increments);
+    for (column, part) in columns.iter().zip(solution.iter()) {
+        add(&mut increments, *part, &column.increments);
+    }
+    Ok((increments, solution[p]))
+}
+
+/// Forces that excite many modes, each `k` with another pattern along the rods.
+fn seed(system: &mut System, k: usize) -> Field {
+    system.seed_mode();
+    let mut seed = system.rhs();
+    for (j, rod) in seed.iter_mut().enumerate() {
+        for (i, forces) in rod.iter_mut().enumerate() {
+            for (c, force) in forces.iter_mut().enumerate() {
+                let phase = (k * (3 * i + 7 * c + 11 * j + 1)) as f64;
+                *force *= (0.7 * phase).cos();
+            }
+        }
+    }
+    seed
 }

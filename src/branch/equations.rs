@@ -3,7 +3,8 @@
 use super::family::{Family, OutOfRange, clamp};
 use super::field::{dot, is_finite, largest, plus, times};
 use super::{Point, Tangent};
-use crate::leaf::{Field, Grid, Solved, SparsePattern, State, System};
+use crate::leaf::{Field, Grid, Solved, SparseFactor, SparsePattern, State, System};
+use crate::newton::converged;
 use crate::rod::RESOLVED_TURN;
 
 /// Part of the parameter's range over which forces are differenced: the error
@@ -21,6 +22,9 @@ const CG_TOLERANCE: f64 = 1e-11;
 
 /// Accuracy of a point (radians, lengths).
 const ACCURACY: f64 = 1e-10;
+
+/// An increment below this that does not shrink is rounding.
+const ROUNDED: f64 = 1e-8;
 
 /// A step by which no eigenvalue, not even a neutral one, changes its sign.
 const SAME_INDEX: f64 = 1e-9;
@@ -216,15 +220,6 @@ impl<'a> Equations<'a> {
         let shift = linear.shift;
         self.factorizations += 1;
         if self.rodwise {
-            let system = &mut self.system;
-            let mut solved = |rhs: &Field| {
-                system.set_rhs(rhs);
-                match system.solve(None, CG_TOLERANCE) {
-                    Solved::Yes(_) => Some(system.solution()),
-                    _ => None,
-                }
-            };
-            let _ = &mut solved;
             if self.system.factorize(shift) {
                 let mut solved = |rhs: &Field| {
                     self.system.set_rhs(rhs);
@@ -242,12 +237,7 @@ impl<'a> Equations<'a> {
             self.rodwise = false;
             self.factorizations += 1;
         }
-        if self.pattern.is_none() {
-            self.pattern = Some(SparsePattern::new(&self.system).map_err(|_| Stuck::TooLarge)?);
-        }
-        let pattern = self.pattern.as_ref().ok_or(Stuck::TooLarge)?;
-        let factor = pattern.factorize(&self.system, shift);
-        let mut factor = factor.map_err(|_| Stuck::TooLarge)?;
+        let mut factor = factorized(&mut self.pattern, &self.system, shift)?;
         Ok(Pair {
             forces: factor.solve_bordered(&linear.forces, &[]).increments,
             rate: factor.solve_bordered(&linear.rate, &[]).increments,
@@ -285,7 +275,7 @@ impl<'a> Equations<'a> {
             }
             state = self.moved(&state, fraction, &increments, 1.0)?;
             fraction += step;
-            if converged(size, previous) {
+            if at_rest(size, previous) {
                 let (family, grid) = (self.family, &self.grid);
                 family.with(fraction, grid, |leaf| clamp(leaf, &mut state))?;
                 let tangent = self.normalised(Tangent {
@@ -332,15 +322,21 @@ impl<'a> Equations<'a> {
         }
         assemble(system)?;
         self.factorizations += 1;
-        if self.pattern.is_none() {
-            self.pattern = Some(SparsePattern::new(system).map_err(|_| Stuck::TooLarge)?);
-        }
-        let pattern = self.pattern.as_ref().ok_or(Stuck::TooLarge)?;
-        let factor = pattern
-            .factorize(system, shift)
-            .map_err(|_| Stuck::TooLarge)?;
-        Ok(factor.negative())
+        Ok(factorized(&mut self.pattern, system, shift)?.negative())
     }
+}
+
+/// A direct factorisation of the assembled matrix K + `shift` M.
+pub(super) fn factorized<'p>(
+    pattern: &'p mut Option<SparsePattern>,
+    system: &System,
+    shift: f64,
+) -> Result<SparseFactor<'p>, Stuck> {
+    let pattern = match pattern {
+        Some(pattern) => pattern,
+        none => none.insert(SparsePattern::new(system).map_err(|_| Stuck::TooLarge)?),
+    };
+    (pattern.factorize(system, shift)).map_err(|_| Stuck::TooLarge)
 }
 
 /// The same direction, backwards.
@@ -352,11 +348,6 @@ pub fn reversed(t: Tangent) -> Tangent {
 }
 
 /// Whether a Newton step of this size after one of size `previous` ends it.
-pub(super) fn converged(size: f64, previous: f64) -> bool {
-    let rate = (size / previous).min(1.0);
-    let remaining = match previous.is_finite() {
-        true => size * rate * rate,
-        false => 10.0 * size * size,
-    };
-    remaining <= ACCURACY || (size < 1e-8 && rate > 0.3)
+pub(super) fn at_rest(size: f64, previous: f64) -> bool {
+    converged(size, previous, 0.0, (ACCURACY, ROUNDED)).is_some()
 }

@@ -6,7 +6,7 @@ use crate::leaf::{DiscreteLeaf, Grid, Leaf, Scale, State};
 use crate::scenario::Scenario;
 
 /// Stiffness in stretch and shear, in units of A/L^2, with which forces are
-/// condensed out at most: next to a singularity digits are dear.
+/// condensed out at most: near singular points a larger stiffness loses digits.
 const STIFFEST: f64 = 1e5;
 
 /// A leaf for every value of a parameter.

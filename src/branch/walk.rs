@@ -109,28 +109,13 @@ pub fn walk(
             continue;
         };
         let turned = equations.along(&now.tangent, &next.point.tangent);
-        let edge = match next.point.fraction {
-            fraction if fraction > 1.0 => Some((1.0, End::Reached)),
-            fraction if fraction < 0.0 => Some((0.0, End::Returned)),
-            _ => None,
-        };
-        if let Some((edge, _)) = &edge {
-            // The last step is shortened to end where the range does.
-            let part = (edge - now.fraction) / (next.point.fraction - now.fraction);
-            match arrive(equations, &now, part * step, *edge) {
-                Ok(point) => {
-                    next = Found {
-                        point,
-                        step: part * step,
-                        ..next
-                    }
-                }
-                Err(stuck) => {
-                    branch.end = End::Stuck(stuck);
-                    return branch;
-                }
+        let edge = match arrive_at_edge(equations, &now, &mut next, step) {
+            Ok(edge) => edge,
+            Err(stuck) => {
+                branch.end = End::Stuck(stuck);
+                return branch;
             }
-        }
+        };
         if next.point.index != now.index {
             let after = branch.points.len() - 1;
             let found = locate(equations, &now, &next.point, next.step).unwrap_or_default();
@@ -153,7 +138,7 @@ pub fn walk(
         now = next.point;
         progress(&now);
         branch.points.push(now.clone());
-        if let Some((_, end)) = edge {
+        if let Some(end) = edge {
             branch.end = end;
             return branch;
         }
@@ -203,6 +188,25 @@ fn advance(equations: &mut Equations, now: &Point, step: f64) -> Result<Found, S
         step,
         drift,
     })
+}
+
+/// Shortens a step that leaves the range to end where the range does; returns
+/// which end that is.
+fn arrive_at_edge(
+    equations: &mut Equations,
+    now: &Point,
+    next: &mut Found,
+    step: f64,
+) -> Result<Option<End>, Stuck> {
+    let (edge, end) = match next.point.fraction {
+        fraction if fraction > 1.0 => (1.0, End::Reached),
+        fraction if fraction < 0.0 => (0.0, End::Returned),
+        _ => return Ok(None),
+    };
+    let part = (edge - now.fraction) / (next.point.fraction - now.fraction);
+    next.point = arrive(equations, now, part * step, edge)?;
+    next.step = part * step;
+    Ok(Some(end))
 }
 
 /// The point at an end of the range, about `step` away.

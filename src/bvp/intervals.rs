@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::dop853::{Integrator, Unbounded};
 use super::equations::{Equations, RodState, TANGENT};
 use super::propagate::{LinearStep, Perturbations, group};
-use super::trajectory::Trajectory;
+use super::trajectory::{Nodes, Trajectory};
 
 /// Largest growth of a perturbation over one interval.
 pub const GROWTH: f64 = 1e3;
@@ -22,16 +22,6 @@ const ROUGH: f64 = 1e-4;
 
 /// Accuracy to which a start is continued beyond the stations it is known at.
 const START: f64 = 1e-8;
-
-/// Where the intervals begin and end: 0 = sigma_0 < ... < sigma_K = 1, the
-/// states at the K beginnings.
-#[derive(Clone, Debug)]
-pub struct Nodes {
-    /// K + 1 fractions of the length.
-    pub sigma: Vec<f64>,
-    /// K flat states.
-    pub states: Vec<Vec<f64>>,
-}
 
 /// Units in which perturbations are measured, so that none outweighs the
 /// others: lengths and angles as they are, forces and moments of a rod in

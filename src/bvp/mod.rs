@@ -48,6 +48,7 @@ mod newton;
 mod propagate;
 mod solution;
 mod solve;
+mod state;
 mod tableau;
 mod trajectory;
 

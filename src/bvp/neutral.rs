@@ -3,10 +3,10 @@
 use glam::DVec3;
 
 use super::dop853::Unbounded;
-use super::intervals::{GROWTH, Nodes};
+use super::intervals::GROWTH;
 use super::newton::{Newton, Stuck};
 use super::solution::{Neutral, Reason};
-use super::trajectory::Trajectory;
+use super::trajectory::{Nodes, Trajectory};
 
 /// Singular values of the tip's conditions below this part of the largest are
 /// reported as a bifurcation nearby.

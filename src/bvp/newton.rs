@@ -8,9 +8,9 @@
 
 use super::dop853::Unbounded;
 use super::equations::{Equations, RodState};
-use super::intervals::{Flight, Nodes, Units, choose, fly, sensitivities};
+use super::intervals::{Flight, Units, choose, fly, sensitivities};
 use super::march::March;
-use super::trajectory::Trajectory;
+use super::trajectory::{Nodes, Trajectory};
 use std::time::Instant;
 
 /// Iterations before a solution is given up.

@@ -5,8 +5,17 @@ use glam::{DQuat, DVec3};
 
 use super::dop853::{Integrator, Unbounded};
 use super::equations::{Equations, RodState};
-use super::intervals::Nodes;
 use crate::shape::{NodeState, RodShape};
+
+/// Where the intervals begin and end: 0 = sigma_0 < ... < sigma_K = 1, the
+/// states at the K beginnings.
+#[derive(Clone, Debug)]
+pub struct Nodes {
+    /// K + 1 fractions of the length.
+    pub sigma: Vec<f64>,
+    /// K flat states.
+    pub states: Vec<Vec<f64>>,
+}
 
 /// Flat states at some sigmas, with cubic Hermite interpolation between them.
 #[derive(Clone, Debug)]

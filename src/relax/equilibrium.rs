@@ -1,5 +1,6 @@
 //! What a relaxation returns: the shape, and everything that judges it.
 
+use crate::newton::Work;
 use crate::numbers::power_of_ten;
 use crate::relax::method::Method;
 use crate::shape::{self, RodShape};
@@ -56,19 +57,6 @@ impl Serialize for Outcome {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.word())
     }
-}
-
-/// Work done by a solver, counted so that tests can pin it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Work {
-    /// Accepted steps (time steps or Newton iterations).
-    pub steps: usize,
-    /// Factorisations of a leaf matrix, rod by rod or sparse.
-    pub factorizations: usize,
-    /// Evaluations of all internal forces of the leaf.
-    pub force_evaluations: usize,
-    /// Iterations of the conjugate gradients, all steps together.
-    pub cg_iterations: usize,
 }
 
 /// A saddle that was met on the way to rest, and left.

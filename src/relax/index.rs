@@ -1,7 +1,7 @@
 //! The Morse index of a shape found by other means.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
-use crate::relax::equilibrium::Work;
+use crate::newton::Work;
 use crate::relax::prolong::prolong;
 use crate::relax::saddle;
 use crate::scenario::Scenario;
@@ -27,7 +27,7 @@ pub fn index_near(scenario: &Scenario, grid: Grid, rods: &[RodShape]) -> Option<
     let mut work = Work::default();
     while discrete.segments() <= FINEST {
         let mut system = System::new(&discrete);
-        let index = saddle::polish(&discrete, &mut state, &mut system, &mut work).flatten();
+        let index = saddle::polish(&discrete, &mut state, &mut system, &mut work);
         if index.is_some() && index == before {
             return index;
         }

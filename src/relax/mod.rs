@@ -2,33 +2,37 @@
 //! the nested grids with their extrapolation, saddles, modes, and the result.
 
 mod equilibrium;
-mod explicit;
 mod grids;
 mod index;
 mod method;
+mod methods;
 mod modes;
-mod moment;
 mod options;
 pub(crate) mod prolong;
-mod report;
+mod result;
 pub(crate) mod richardson;
+mod run;
 mod saddle;
-mod semi_implicit;
+mod segments;
+mod settle;
 mod shape;
-mod shooting;
+mod solve;
+mod stability;
 mod start;
 
+pub use crate::newton::Work;
 pub use crate::shape::{NodeState, RodShape};
 pub use equilibrium::{
-    Accuracy, Equilibrium, Mode, Model, Outcome, Saddle, Shape, Stability, Work, serialize_index,
+    Accuracy, Equilibrium, Mode, Model, Outcome, Saddle, Shape, Stability, serialize_index,
 };
-pub use grids::{check_segments, relax};
 pub use index::{index_near, project};
 pub use method::{Method, SemiImplicit, UnknownMethod};
+pub use methods::shooting::check_intervals;
 pub use options::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
     check_tolerance,
 };
+pub use segments::check_segments;
 pub(crate) use shape::node as node_state;
-pub use shooting::check_intervals;
+pub use solve::relax;
 pub use start::start;

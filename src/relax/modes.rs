@@ -4,12 +4,12 @@
 use crate::leaf::{DiscreteLeaf, State, System, shift, turn};
 use crate::modes::{self, Eigenpair};
 use crate::motion::Physics;
-use crate::relax::equilibrium::{Mode, Work};
-use crate::relax::grids::{Level, Run};
+use crate::newton::{Newton, Stop, Work};
+use crate::relax::equilibrium::Mode;
 use crate::relax::prolong::{predict, prolong};
 use crate::relax::richardson::Richardson;
+use crate::relax::run::{Level, Run};
 use crate::relax::saddle;
-use crate::relax::semi_implicit::Settled;
 use glam::DVec3;
 
 /// Unknowns of the finest grid on which modes are looked for unless their
@@ -133,18 +133,15 @@ fn settle(last: &Level, before: Option<&State>, tolerance: f64) -> Option<Level>
     let leaf = DiscreteLeaf::new(&last.leaf.leaf, last.leaf.grid.refined());
     let mut system = System::new(&leaf);
     let guess = state.clone();
-    let accuracy = 1e-3 * tolerance;
-    let settled = saddle::newton(
-        &leaf,
-        &mut state,
-        &mut system,
-        accuracy,
-        ITERATIONS,
-        &mut Work::default(),
-        &mut |_, _| {},
-    );
+    let newton = Newton {
+        accuracy: 1e-3 * tolerance,
+        iterations: ITERATIONS,
+        work: &mut Work::default(),
+        progress: &mut |_, _| {},
+    };
+    let stop = saddle::newton(&leaf, &mut state, &mut system, newton);
     let near = guess.shift_to(&state) < SAME_PLACE;
-    (matches!(settled, Settled::Rest(_)) && near).then_some(Level { leaf, state })
+    (matches!(stop, Stop::Rest(_)) && near).then_some(Level { leaf, state })
 }
 
 /// Eigenvalues on nested grids, each extrapolated on its own.

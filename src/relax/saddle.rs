@@ -1,9 +1,8 @@
 //! Saddles: counting their negative eigenvalues, finding them, leaving them.
 
 use crate::leaf::{DiscreteLeaf, Solved, SparsePattern, State, System};
-use crate::relax::equilibrium::Work;
-use crate::relax::semi_implicit::{Settled, at_rest};
-use crate::rod::RESOLVED_TURN;
+use crate::newton::{Equations, Newton, Stop, Work};
+use crate::relax::equilibrium::Saddle;
 
 /// Size of the push off a saddle: largest rotation (radians) or displacement
 /// (lengths) along the unstable mode.
@@ -20,7 +19,8 @@ const MAX_STEP: f64 = 0.5;
 
 /// Morse index of a state at rest: the number of negative eigenvalues of the
 /// Hessian of its energy (the symmetric part of it, under a dead moment).
-/// Eigenvalues (over the masses) between -`shift` and zero do not count. `None` if the factorisation does not fit into memory.
+/// Eigenvalues (over the masses) between -`shift` and zero do not count. `None` if
+/// the factorisation does not fit into memory.
 pub fn index(
     leaf: &DiscreteLeaf,
     state: &State,
@@ -42,68 +42,14 @@ pub fn index(
     Some(pattern.factorize(system, shift).ok()?.negative())
 }
 
-/// Newton's method whatever the signs of the pivots, with steps of bounded
-/// size: it goes to the next equilibrium, stable or not, as the solver of a
-/// boundary-value problem would.
-pub fn newton(
-    leaf: &DiscreteLeaf,
-    state: &mut State,
-    system: &mut System,
-    accuracy: f64,
-    iterations: usize,
-    work: &mut Work,
-    progress: &mut dyn FnMut(usize, f64),
-) -> Settled {
-    let mut next = state.clone();
-    let mut pattern = None;
-    let mut previous = f64::INFINITY;
-    for step in 0..iterations {
-        let turn = leaf.assemble(state, system).turn;
-        work.force_evaluations += 1;
-        if turn > RESOLVED_TURN {
-            return Settled::Unresolved;
-        }
-        if pattern.is_none() {
-            pattern = SparsePattern::new(system).ok();
-        }
-        let Some(Ok(mut factor)) = pattern
-            .as_ref()
-            .map(|p| p.factorize(system, leaf.neutral_shift()))
-        else {
-            return Settled::Stuck;
-        };
-        factor.solve(system, None);
-        work.factorizations += 1;
-        let (turn, shift) = system.largest();
-        let size = turn.max(shift);
-        if !size.is_finite() {
-            return Settled::Stuck;
-        }
-        leaf.advance(state, system, (MAX_STEP / size).min(1.0), &mut next);
-        std::mem::swap(state, &mut next);
-        work.steps += 1;
-        progress(step, size);
-        if size < NEUTRAL_STEP && leaf.residual(state) < BALANCED {
-            return Settled::Rest(size.min(accuracy));
-        }
-        if size < MAX_STEP
-            && let Some(rest) = at_rest(size, previous, 0.0, accuracy)
-        {
-            return rest;
-        }
-        previous = size;
-    }
-    Settled::StepLimit
+/// Newton's method whatever the signs of the pivots, with steps of bounded size.
+pub fn newton(leaf: &DiscreteLeaf, state: &mut State, system: &mut System, newton: Newton) -> Stop {
+    let largest = MAX_STEP;
+    newton.solve(leaf, state, system, Equations::AnySign { largest })
 }
 
 /// Newton iterations that make a saddle exact.
 const POLISH_ITERATIONS: usize = 20;
-
-/// Steps below this (radians, lengths) may be nothing but rounding that drives
-/// a neutral mode, if no force or moment above the second number (A/L^2, A/L)
-/// is unbalanced.
-const NEUTRAL_STEP: f64 = 1e-5;
-const BALANCED: f64 = 1e-9;
 
 /// Accuracy of a polished state: rounding.
 const POLISH_ACCURACY: f64 = 1e-13;
@@ -111,32 +57,29 @@ const POLISH_ACCURACY: f64 = 1e-13;
 /// How far a saddle may be from where it was noticed, in lengths.
 const POLISH_DISTANCE: f64 = 0.1;
 
-/// Makes a state near a saddle exact and counts its Morse index, a neutral mode not counting as negative. `None`, with the state unchanged, if Newton's method leads elsewhere.
+/// Makes a state near a saddle exact and counts its Morse index, a neutral mode
+/// not counting as negative. `None` if Newton's method leads elsewhere, with the
+/// state unchanged, or if the index is not known.
 pub fn polish(
     leaf: &DiscreteLeaf,
     state: &mut State,
     system: &mut System,
     work: &mut Work,
-) -> Option<Option<usize>> {
+) -> Option<usize> {
     let mut exact = state.clone();
-    let settled = newton(
-        leaf,
-        &mut exact,
-        system,
-        POLISH_ACCURACY,
-        POLISH_ITERATIONS,
+    let iteration = Newton {
+        accuracy: POLISH_ACCURACY,
+        iterations: POLISH_ITERATIONS,
         work,
-        &mut |_, _| {},
-    );
+        progress: &mut |_, _| {},
+    };
+    let stop = newton(leaf, &mut exact, system, iteration);
     let moved = state.shift_to(&exact);
-    match settled {
-        Settled::Rest(_) if moved < POLISH_DISTANCE => {
-            *state = exact;
-            let index = index(leaf, state, system, leaf.neutral_shift(), work);
-            Some(index)
-        }
-        _ => None,
+    if !matches!(stop, Stop::Rest(_)) || moved >= POLISH_DISTANCE {
+        return None;
     }
+    *state = exact;
+    index(leaf, state, system, leaf.neutral_shift(), work)
 }
 
 /// Pushes a state at a saddle along its most unstable mode, by inverse
@@ -166,4 +109,14 @@ pub fn push_off(leaf: &DiscreteLeaf, state: &mut State, system: &mut System, wor
     let mut pushed = state.clone();
     leaf.advance(state, system, PUSH / turn.max(displacement), &mut pushed);
     *state = pushed;
+}
+
+/// The saddle at a state, in the units of the scenario.
+pub fn saddle_of(leaf: &DiscreteLeaf, state: &State, index: usize) -> Saddle {
+    let scale = leaf.leaf.scale;
+    Saddle {
+        energy: leaf.energy(state) * scale.moment(),
+        negative_eigenvalues: index,
+        tip: state.tip(0) * scale.length,
+    }
 }

@@ -1,9 +1,12 @@
 //! Segments of the coarsest grid, as wanted or as needed.
 
-use super::{COARSEST, FINEST};
 use crate::leaf::Leaf;
 use crate::relax::method::Method;
 use crate::relax::options::{MAX_NODES, RelaxError};
+use crate::relax::run::COARSEST;
+
+/// Segments of the finest grid.
+pub const FINEST: usize = 16_384;
 
 /// Segments of the coarsest grid if the tolerance is loose, that is if it is at
 /// least so large, and the leaf settles in the valley it starts in.

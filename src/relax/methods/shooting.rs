@@ -2,10 +2,11 @@
 
 use crate::bvp::{self, Reason, Solution, Start};
 use crate::leaf::{Grid, Leaf};
-use crate::relax::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability, Work};
-use crate::relax::grids::coarsest;
+use crate::newton::Work;
+use crate::relax::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability};
 use crate::relax::index::index_near;
 use crate::relax::options::{MAX_INTERVALS, Options, RelaxError};
+use crate::relax::segments::coarsest;
 use crate::scenario::Scenario;
 use crate::shape::RodShape;
 use crate::undulation::Undulation;

@@ -1,29 +1,16 @@
 //! From the settled grids to the result in the units of the scenario.
 
 use crate::leaf::DiscreteLeaf;
+use crate::newton::Stop;
 use crate::relax::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability};
-use crate::relax::grids::{End, Level, Run};
 use crate::relax::method::Method;
 use crate::relax::prolong::lagrange;
 use crate::relax::richardson::Richardson;
-use crate::relax::semi_implicit::Settled;
+use crate::relax::run::{End, Level, Run};
 use crate::relax::shape;
 use crate::shape::{NodeState, RodShape};
 use crate::undulation::{Centerline, Undulation};
 use glam::{DQuat, DVec3};
-
-/// Positions of all rods at every `stride`-th node, dimensionless.
-pub fn positions(level: &Level, stride: usize) -> Vec<f64> {
-    let n = level.leaf.segments();
-    (0..level.leaf.rods())
-        .flat_map(|j| {
-            (0..=n)
-                .step_by(stride)
-                .map(move |i| level.state.base(j) + i)
-        })
-        .flat_map(|k| level.state.x[k].to_array())
-        .collect()
-}
 
 /// Assembles the result.
 pub fn equilibrium(
@@ -260,22 +247,22 @@ pub fn outcome(run: &Run, end: End) -> (Outcome, Option<String>) {
                 ),
             }),
         ),
-        End::Failed(settled) => (
-            match settled {
-                Settled::Stuck => Outcome::Diverged,
+        End::Failed(stop) => (
+            match stop {
+                Stop::Stuck => Outcome::Diverged,
                 _ => Outcome::NotAtRest,
             },
-            Some(match settled {
-                Settled::StepLimit if run.late() => format!(
+            Some(match stop {
+                Stop::StepLimit if run.late() => format!(
                     "the time allowed was over before rest on {finest} segments: allow more"
                 ),
-                Settled::StepLimit if matches!(run.options.method, Method::Explicit { .. }) => format!(
+                Stop::StepLimit if matches!(run.options.method, Method::Explicit { .. }) => format!(
                     "the step limit came before rest on {finest} segments: use fewer, or the semi-implicit method"
                 ),
-                Settled::Unresolved => format!(
+                Stop::Unresolved => format!(
                     "a vein bends by more than a right angle within one of {finest} segments: use more segments or smaller loads"
                 ),
-                Settled::Stuck => format!(
+                Stop::Stuck => format!(
                     "no step lowers the energy on {finest} segments: use more segments, or raise the softest stiffness or lower the load"
                 ),
                 _ => format!(

@@ -7,9 +7,7 @@
 //! exact, unsymmetric tangent.
 
 use crate::leaf::{DiscreteLeaf, State, System};
-use crate::relax::equilibrium::Work;
-use crate::relax::semi_implicit::{Settled, at_rest};
-use crate::rod::RESOLVED_TURN;
+use crate::newton::{Equations, Newton, Stop, Work};
 
 /// Rotation of the tip (radians) that one load step may bring about by bending.
 const TURN_PER_STEP: f64 = 1.0;
@@ -32,7 +30,7 @@ pub fn settle(
     near_rest: bool,
     work: &mut Work,
     progress: &mut dyn FnMut(usize, f64),
-) -> Settled {
+) -> Stop {
     if near_rest {
         return newton(leaf, state, system, accuracy, work, progress);
     }
@@ -52,14 +50,14 @@ pub fn settle(
             accuracy
         };
         match newton(leaf, state, system, wanted, work, progress) {
-            Settled::Rest(remaining) => {
+            Stop::Rest(remaining) => {
                 if leaf.load_factor == 1.0 {
-                    return Settled::Rest(remaining);
+                    return Stop::Rest(remaining);
                 }
                 reached = leaf.load_factor;
                 before.clone_from(state);
             }
-            Settled::Unresolved => return Settled::Unresolved,
+            Stop::Unresolved => return Stop::Unresolved,
             failed if step < SMALLEST_STEP => return failed,
             _ => {
                 step /= 2.0;
@@ -67,7 +65,7 @@ pub fn settle(
             }
         }
     }
-    Settled::StepLimit
+    Stop::StepLimit
 }
 
 fn newton(
@@ -77,34 +75,12 @@ fn newton(
     accuracy: f64,
     work: &mut Work,
     progress: &mut dyn FnMut(usize, f64),
-) -> Settled {
-    let mut next = state.clone();
-    let mut previous = f64::INFINITY;
-    for step in 0..MAX_ITERATIONS {
-        let turn = leaf.assemble(state, system).turn;
-        work.force_evaluations += 1;
-        if turn > RESOLVED_TURN {
-            return Settled::Unresolved;
-        }
-        work.factorizations += 1;
-        if !system.factorize_indefinite() {
-            return Settled::Stuck;
-        }
-        // One rod has no coupling: this is a direct solution.
-        system.solve(None, 0.0);
-        let (turn, shift) = system.largest();
-        let size = turn.max(shift);
-        if !size.is_finite() {
-            return Settled::Stuck;
-        }
-        leaf.advance(state, system, 1.0, &mut next);
-        std::mem::swap(state, &mut next);
-        work.steps += 1;
-        progress(step, size);
-        if let Some(rest) = at_rest(size, previous, 0.0, accuracy) {
-            return rest;
-        }
-        previous = size;
-    }
-    Settled::Stuck
+) -> Stop {
+    let newton = Newton {
+        accuracy,
+        iterations: MAX_ITERATIONS,
+        work,
+        progress,
+    };
+    newton.solve(leaf, state, system, Equations::Unsymmetric)
 }

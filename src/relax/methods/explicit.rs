@@ -14,10 +14,9 @@
 
 use crate::leaf::{DiscreteLeaf, Leaf, SparsePattern, State, System};
 use crate::motion::{Broken, Explicit, Method, Physics};
-use crate::relax::equilibrium::Work;
+use crate::newton::{Stop, Work};
 use crate::relax::options::{RelaxError, past};
 use crate::relax::saddle;
-use crate::relax::semi_implicit::Settled;
 use crate::scenario::Rod;
 use glam::DVec3;
 use std::time::Instant;
@@ -97,10 +96,10 @@ pub fn settle(
     state: &mut State,
     system: &mut System,
     request: &mut Request,
-) -> Settled {
+) -> Stop {
     let Ok(mut motion) = Explicit::new(leaf.clone(), Physics::at_rest(&leaf.leaf), state, None)
     else {
-        return Settled::Stuck;
+        return Stop::Stuck;
     };
     let most_steps = BUDGET / (leaf.rods() * leaf.segments());
     let settled = match request.near_rest {
@@ -112,7 +111,7 @@ pub fn settle(
     request.work.force_evaluations += motion.steps();
     *state = motion.now();
     match settled {
-        Ok(remaining) => Settled::Rest(remaining),
+        Ok(remaining) => Stop::Rest(remaining),
         Err(settled) => settled,
     }
 }
@@ -124,7 +123,7 @@ fn find_valley(
     system: &mut System,
     most_steps: usize,
     request: &mut Request,
-) -> Result<(), Settled> {
+) -> Result<(), Stop> {
     let (mut fastest, mut convex) = (0.0_f64, 0);
     while motion.time() < LONGEST_MOTION {
         look_ahead(motion, request.deadline)?;
@@ -139,7 +138,7 @@ fn find_valley(
             break;
         }
         if motion.steps() > most_steps || past(request.deadline) {
-            return Err(Settled::StepLimit);
+            return Err(Stop::StepLimit);
         }
         (request.progress)(motion.steps(), leaf.residual(&now.state));
     }
@@ -148,7 +147,7 @@ fn find_valley(
 
 /// Moves on to the next look. On fine grids of stiff rods that takes long: with
 /// a deadline the way is made in pieces.
-fn look_ahead(motion: &mut Explicit, deadline: Option<Instant>) -> Result<(), Settled> {
+fn look_ahead(motion: &mut Explicit, deadline: Option<Instant>) -> Result<(), Stop> {
     let begin = motion.time();
     let pieces = match deadline {
         Some(_) => (LOOK / (STEPS_PER_PIECE * motion.longest_step())).ceil(),
@@ -158,11 +157,11 @@ fn look_ahead(motion: &mut Explicit, deadline: Option<Instant>) -> Result<(), Se
         motion
             .advance(begin + LOOK * (piece as f64 / pieces))
             .map_err(|broken| match broken {
-                Broken::Unresolved { .. } => Settled::Unresolved,
-                _ => Settled::Stuck,
+                Broken::Unresolved { .. } => Stop::Unresolved,
+                _ => Stop::Stuck,
             })?;
         if past(deadline) {
-            return Err(Settled::StepLimit);
+            return Err(Stop::StepLimit);
         }
     }
     Ok(())
@@ -175,7 +174,7 @@ fn descend(
     system: &mut System,
     most_steps: usize,
     request: &mut Request,
-) -> Result<f64, Settled> {
+) -> Result<f64, Stop> {
     let accuracy = request.accuracy.max(LEAST_ACCURACY);
     motion.disguise();
     let mut balanced = FIRST_BALANCE * accuracy;
@@ -197,7 +196,7 @@ fn descend(
         let state = motion.now();
         let residual = leaf.residual(&state);
         if !(residual.is_finite() && state.x.iter().all(|x| x.is_finite())) {
-            return Err(Settled::Stuck);
+            return Err(Stop::Stuck);
         }
         (request.progress)(motion.steps(), residual);
         looks_since_best = if residual < 0.5 * best {
@@ -216,13 +215,13 @@ fn descend(
             if looks_since_best > STAGNATION {
                 return match remaining <= LONGEST_REMAINING {
                     true => Ok(remaining),
-                    false => Err(Settled::StepLimit),
+                    false => Err(Stop::StepLimit),
                 };
             }
             balanced *= (0.5 * accuracy / remaining).max(1e-3);
         }
         if motion.steps() > most_steps || past(request.deadline) {
-            return Err(Settled::StepLimit);
+            return Err(Stop::StepLimit);
         }
     }
 }

@@ -1,0 +1,338 @@
+//! Newton's method for the equilibrium of a discrete leaf: the iteration, its
+//! convergence test, and the solution of its linear equations.
+
+use crate::leaf::{DiscreteLeaf, Increment, Solved, SparsePattern, State, System};
+use crate::rod::RESOLVED_TURN;
+use serde::Serialize;
+
+/// An increment (radians, lengths) below this that does not shrink is rounding.
+pub const ROUNDING: f64 = 1e-9;
+
+/// Increments that do not shrink at least to this part are said not to shrink.
+const SHRINKS: f64 = 0.3;
+
+/// Increments below this (radians, lengths) may be nothing but rounding that
+/// drives a neutral mode, if no force or moment above the second number (A/L^2,
+/// A/L) is unbalanced.
+const NEUTRAL_STEP: f64 = 1e-5;
+const BALANCED: f64 = 1e-9;
+
+/// A leaf that moves by less than this in a step (radians, lengths), while its
+/// matrix without inertia is not positive definite, may be at a saddle: it is,
+/// if no force or moment above the second number (A/L^2, A/L) is unbalanced.
+const SADDLE_STEP: f64 = 1e-7;
+const SADDLE_RESIDUAL: f64 = 1e-6;
+
+/// Shift of the matrix (times the mass matrix, in squared frequencies; the
+/// lowest of a clamped rod is 12) that carries Newton's method of a stiff leaf
+/// over a region where its energy is not convex: the first tried, the one below
+/// which it is dropped, the one at which the attempt ends.
+const FIRST_SHIFT: f64 = 30.0;
+const LEAST_SHIFT: f64 = 1.0;
+const LARGEST_SHIFT: f64 = 1e6;
+
+/// Work done by a solver, counted so that tests can pin it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Work {
+    /// Accepted steps (time steps or Newton iterations).
+    pub steps: usize,
+    /// Factorisations of a leaf matrix, rod by rod or sparse.
+    pub factorizations: usize,
+    /// Evaluations of all internal forces of the leaf.
+    pub force_evaluations: usize,
+    /// Iterations of the conjugate gradients, all steps together.
+    pub cg_iterations: usize,
+}
+
+/// How an iteration or a motion on one grid stopped.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stop {
+    /// At rest; the error that is left of the iteration.
+    Rest(f64),
+    /// At rest although the energy has a direction of descent there.
+    Saddle,
+    /// A segment bends by more than the grid can resolve.
+    Unresolved,
+    /// The step limit came first.
+    StepLimit,
+    /// No step however short lowers the energy, or the matrix is singular.
+    Stuck,
+}
+
+/// The error that is left after an increment of this `size`, which follows one of
+/// size `previous`: of second order at best, and never less than what the solution
+/// of its equations left. `None` if that is more than `accuracy`, unless the
+/// increment is below `rounding` and does not shrink.
+pub fn converged(
+    size: f64,
+    previous: f64,
+    cg_tolerance: f64,
+    (accuracy, rounding): (f64, f64),
+) -> Option<f64> {
+    let rate = (size / previous).min(1.0);
+    let quadratic = if previous.is_finite() {
+        size * (rate * rate)
+    } else {
+        10.0 * size * size
+    };
+    let remaining = quadratic.max(cg_tolerance * size);
+    match size < rounding && rate > SHRINKS {
+        true => Some(size),
+        false => (remaining <= accuracy).then_some(remaining),
+    }
+}
+
+/// Whether a leaf whose matrix without inertia is not positive definite rests at
+/// a saddle, after an increment of this size.
+pub fn at_saddle(leaf: &DiscreteLeaf, state: &State, size: f64) -> bool {
+    size < SADDLE_STEP && leaf.residual(state) < SADDLE_RESIDUAL
+}
+
+/// Relative accuracy of the conjugate gradients after an increment of size
+/// `previous`: an iteration is cheap beside a new assembly, so that the next
+/// step is never held up by them.
+pub fn cg_tolerance(previous: f64, loosest: f64) -> f64 {
+    (3e-3 * previous).clamp(1e-10, loosest)
+}
+
+/// Solves with matrices that must be positive definite: by conjugate gradients
+/// over the factorised rods, or directly from when on these proved too slow.
+#[derive(Default)]
+pub struct Definite {
+    /// Pattern of the direct factorisation, once that had to take over.
+    pub direct: Option<SparsePattern>,
+    /// Of a leaf in its plane: room for its matrix in space, which must be positive
+    /// definite wherever that in the plane is, lest the leaf in space move.
+    pub space: Option<System>,
+}
+
+impl Definite {
+    /// Factorises K + `shift` M and solves for the assembled right-hand side plus
+    /// `inertia`; false if the matrix is not positive definite.
+    pub fn solve(
+        &mut self,
+        system: &mut System,
+        shift: f64,
+        inertia: Option<(&[Vec<Increment>], f64)>,
+        tolerance: f64,
+        work: &mut Work,
+    ) -> bool {
+        work.factorizations += 1;
+        if self.direct.is_none() {
+            if !system.factorize(shift) {
+                return false;
+            }
+            let solved = system.solve(inertia, tolerance);
+            let (Solved::Yes(iterations)
+            | Solved::Indefinite(iterations)
+            | Solved::TooSlow(iterations)) = solved;
+            work.cg_iterations += iterations;
+            match solved {
+                Solved::Yes(_) => return true,
+                Solved::Indefinite(_) => return false,
+                Solved::TooSlow(_) if !system.spatial() => return false,
+                Solved::TooSlow(_) => {
+                    work.factorizations += 1;
+                    self.direct = SparsePattern::new(system).ok();
+                }
+            }
+        }
+        let Some(Ok(mut factor)) = self.direct.as_ref().map(|p| p.factorize(system, shift)) else {
+            return false;
+        };
+        let positive = factor.negative() == 0;
+        if positive {
+            factor.solve(system, inertia);
+        }
+        positive
+    }
+
+    /// Whether K + `shift` M of the leaf in space, if that is asked for, is positive
+    /// definite rod by rod: then the leaf takes the step in its plane that it takes
+    /// in space.
+    pub fn convex_in_space(
+        &mut self,
+        leaf: Option<&DiscreteLeaf>,
+        state: &State,
+        shift: f64,
+        work: &mut Work,
+    ) -> bool {
+        let (Some(leaf), Some(system)) = (leaf, &mut self.space) else {
+            return true;
+        };
+        leaf.assemble(state, system);
+        work.force_evaluations += 1;
+        work.factorizations += 1;
+        system.factorize(shift)
+    }
+}
+
+/// The linear equations of an iteration, and what it makes of its increments.
+pub enum Equations<'s> {
+    /// Whatever the signs of the pivots, by a sparse factorisation whose pattern
+    /// is kept; increments are shortened to the given size. It goes to the next
+    /// equilibrium, stable or not, as the solver of a boundary-value problem would.
+    AnySign {
+        /// Largest rotation (radians) or displacement (lengths) in one step.
+        largest: f64,
+    },
+    /// Of a single rod under a dead moment: with the exact, unsymmetric matrix.
+    Unsymmetric,
+    /// With a positive definite matrix, shifted where it is not; an increment
+    /// above the given size ends the iteration.
+    Definite {
+        /// The linear solver.
+        solver: &'s mut Definite,
+        /// Largest rotation (radians) or displacement (lengths) in one step.
+        largest: f64,
+        /// Relative accuracy of the conjugate gradients in the first step.
+        cg_tolerance: f64,
+    },
+}
+
+/// What is asked of an iteration.
+pub struct Newton<'a> {
+    /// Wanted accuracy of positions and rotations.
+    pub accuracy: f64,
+    /// Most iterations.
+    pub iterations: usize,
+    /// Work done so far.
+    pub work: &'a mut Work,
+    /// Told the size of every step.
+    pub progress: &'a mut dyn FnMut(usize, f64),
+}
+
+/// What is kept from one linear solution to the next.
+struct Linear<'s> {
+    equations: Equations<'s>,
+    pattern: Option<SparsePattern>,
+    /// The shift that leaves neutral modes where they are.
+    neutral: f64,
+    /// What is added to it to make the matrix positive definite.
+    shift: f64,
+}
+
+impl Newton<'_> {
+    /// Newton's method from a state. The last factorisation is left in the system.
+    pub fn solve(
+        self,
+        leaf: &DiscreteLeaf,
+        state: &mut State,
+        system: &mut System,
+        equations: Equations,
+    ) -> Stop {
+        let space = match &equations {
+            Equations::Definite { solver, .. } if solver.space.is_some() => Some(leaf.in_space()),
+            _ => None,
+        };
+        let (longest, refused) = match equations {
+            Equations::AnySign { largest } => (largest, f64::INFINITY),
+            Equations::Unsymmetric => (f64::INFINITY, f64::INFINITY),
+            Equations::Definite { largest, .. } => (f64::INFINITY, largest),
+        };
+        let any_sign = longest.is_finite();
+        let mut linear = Linear {
+            equations,
+            pattern: None,
+            neutral: leaf.neutral_shift(),
+            shift: 0.0,
+        };
+        let mut next = state.clone();
+        let mut previous = f64::INFINITY;
+        for step in 0..self.iterations {
+            let turn = leaf.assemble(state, system).turn;
+            self.work.force_evaluations += 1;
+            if turn > RESOLVED_TURN {
+                return Stop::Unresolved;
+            }
+            let solved = linear.solve(space.as_ref(), (state, previous), system, self.work);
+            let Some(tolerance) = solved else {
+                return Stop::Stuck;
+            };
+            let (turn, shift) = system.largest();
+            let size = turn.max(shift);
+            if !size.is_finite() || size > refused {
+                return Stop::Stuck;
+            }
+            leaf.advance(state, system, (longest / size).min(1.0), &mut next);
+            std::mem::swap(state, &mut next);
+            self.work.steps += 1;
+            (self.progress)(step, size);
+            if any_sign && size < NEUTRAL_STEP && leaf.residual(state) < BALANCED {
+                return Stop::Rest(size.min(self.accuracy));
+            }
+            if linear.shift > 0.0 {
+                if at_saddle(leaf, state, size) {
+                    return Stop::Saddle;
+                }
+            } else if size < longest
+                && let Some(remaining) =
+                    converged(size, previous, tolerance, (self.accuracy, ROUNDING))
+            {
+                return Stop::Rest(remaining);
+            }
+            linear.shift /= 10.0;
+            if linear.shift < LEAST_SHIFT {
+                linear.shift = 0.0;
+            }
+            previous = size;
+        }
+        match any_sign {
+            true => Stop::StepLimit,
+            false => Stop::Stuck,
+        }
+    }
+}
+
+impl Linear<'_> {
+    /// Solves the assembled equations; returns the relative accuracy of the
+    /// solution, or `None` if there is none.
+    fn solve(
+        &mut self,
+        space: Option<&DiscreteLeaf>,
+        (state, previous): (&State, f64),
+        system: &mut System,
+        work: &mut Work,
+    ) -> Option<f64> {
+        match &mut self.equations {
+            Equations::AnySign { .. } => {
+                if self.pattern.is_none() {
+                    self.pattern = SparsePattern::new(system).ok();
+                }
+                let pattern = self.pattern.as_ref()?;
+                let mut factor = pattern.factorize(system, self.neutral).ok()?;
+                factor.solve(system, None);
+                work.factorizations += 1;
+                Some(0.0)
+            }
+            Equations::Unsymmetric => {
+                work.factorizations += 1;
+                if !system.factorize_indefinite() {
+                    return None;
+                }
+                // One rod has no coupling: this is a direct solution.
+                system.solve(None, 0.0);
+                Some(0.0)
+            }
+            Equations::Definite {
+                solver,
+                cg_tolerance: loosest,
+                ..
+            } => {
+                let tolerance = cg_tolerance(previous, *loosest);
+                loop {
+                    let shift = self.neutral + self.shift;
+                    if solver.convex_in_space(space, state, shift, work)
+                        && solver.solve(system, shift, None, tolerance, work)
+                    {
+                        return Some(tolerance);
+                    }
+                    self.shift = (4.0 * self.shift).max(FIRST_SHIFT);
+                    if self.shift > LARGEST_SHIFT {
+                        return None;
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! The semi-implicit method: linearly implicit damped motion, its time step
+//! growing as the leaf settles until it is Newton's method.
+//!
+//! With mass M (unit density, rotary inertia of a strip of blade), damping
+//! c M and K, g the Hessian and gradient of the energy, a step is
+//!
+//! ((1/dt + c)/dt M + K) Delta = -g + M v/dt,   v <- Delta/dt,
+//!
+//! the linearly implicit Euler method. Time is in units of sqrt(rho L^4/A). As
+//! long as K is positive definite the leaf is in the valley it will come to
+//! rest in, and the step may be as long as the energy allows; where it is not,
+//! the motion decides where the leaf goes, and the step is kept short enough
+//! to follow it.
+
+use crate::leaf::{DiscreteLeaf, Increment, State, System};
+use crate::newton::{
+    Definite, Equations, Newton, ROUNDING, Stop, Work, at_saddle, cg_tolerance, converged,
+};
+use crate::relax::options::past;
+use crate::rod::RESOLVED_TURN;
+use std::time::Instant;
+
+/// Damping c: critical for the lowest bending mode of a single rod, whose
+/// frequency is 3.516 (canonical value beta_1^2 of the clamped-free beam).
+const DAMPING: f64 = 2.0 * 3.516;
+
+/// First time step once an unlimited one has proved too long: a thirtieth of
+/// that mode's period.
+const FIRST_STEP: f64 = 0.06;
+
+/// Shortest time step; a leaf that asks for less is not settling.
+const SHORTEST_STEP: f64 = 1e-7;
+
+/// Beyond this time step the inertial terms are below the accuracy anyone
+/// asks for: the step becomes Newton's.
+const LONGEST_STEP: f64 = 1e3;
+
+/// Largest rotation of a node in one step, radians.
+const MAX_TURN: f64 = 1.0;
+
+/// Largest displacement of a node in one step, in units of length.
+const MAX_SHIFT: f64 = 1.0;
+
+/// Steps on one grid before the run is given up.
+const MAX_STEPS: usize = 2000;
+
+/// Growth of the time step from one good step to the next, at most.
+const MAX_GROWTH: f64 = 4.0;
+
+/// Relative growth of the energy that is put down to rounding.
+const ENERGY_SLACK: f64 = 1e-9;
+
+/// Smallest compliance (units of L^2/A) of a leaf that is moved by its strain
+/// energy. A stiffer one is first settled with this compliance, which also
+/// tells the forces it carries, and then made stiff.
+const MOVING_COMPLIANCE: f64 = 2e-3;
+
+/// The load stretches a softened leaf by no more than about this.
+const MOVING_STRETCH: f64 = 0.05;
+
+/// Accuracy to which a softened leaf is settled.
+const SOFT_ACCURACY: f64 = 1e-1;
+
+/// Factor by which a softened leaf is made stiffer when Newton's method does not
+/// get from it to the stiffness wanted, and where that ends.
+const STIFFER: f64 = 0.1;
+const SMALLEST_MOVING_COMPLIANCE: f64 = 1e-8;
+
+/// Newton iterations of a stiff leaf before it is made stiffer by steps.
+const STIFF_ITERATIONS: usize = 12;
+
+/// The state of a leaf that is being relaxed on one grid, and what for.
+pub struct Relaxation<'a> {
+    /// The state.
+    pub state: State,
+    /// Wanted accuracy of positions and rotations.
+    pub accuracy: f64,
+    /// Work done so far.
+    pub work: &'a mut Work,
+    /// Told the size of every step.
+    pub progress: &'a mut dyn FnMut(usize, f64),
+    /// Whether the state is one that only has to be corrected: a stiff leaf is
+    /// then not softened first.
+    pub near_rest: bool,
+    /// Relative accuracy of the conjugate gradients in the first step.
+    pub cg_tolerance: f64,
+    /// How often it was pushed off saddles before: each time it is softened
+    /// less, since a softened leaf may find its way back.
+    pub pushes: i32,
+    /// The linear solver.
+    pub solver: Definite,
+    /// Count of force evaluations at which to give up.
+    pub most_evaluations: usize,
+    /// When to give up.
+    pub deadline: Option<Instant>,
+    /// Whether to give up at once if the leaf has to move.
+    pub convex_only: bool,
+    /// Whether the leaf had to move: its energy was not convex on the way.
+    pub moved: bool,
+}
+
+impl Relaxation<'_> {
+    /// Lets the leaf come to rest.
+    pub fn settle(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Stop {
+        let stiffest = leaf.stiffest();
+        let load = leaf.leaf.tip_force.length() + leaf.leaf.gravity.length();
+        let moving = (MOVING_COMPLIANCE * 0.1_f64.powi(self.pushes)).min(MOVING_STRETCH / load);
+        if stiffest >= moving {
+            return self.move_to_rest(leaf, system, self.accuracy);
+        }
+        if self.near_rest {
+            let before = self.state.clone();
+            match self.newton(leaf, system) {
+                Stop::Stuck => self.state = before,
+                settled => return settled,
+            }
+        }
+        let mut floor = moving;
+        loop {
+            let soft = self.move_to_rest(&leaf.softened(floor), system, SOFT_ACCURACY);
+            if !matches!(soft, Stop::Rest(_)) {
+                return soft;
+            }
+            let before = self.state.clone();
+            match self.newton(leaf, system) {
+                Stop::Stuck => self.state = before,
+                settled => return settled,
+            }
+            // From here to the stiffness wanted is too far: go on stiffer.
+            floor *= STIFFER;
+            if floor <= stiffest {
+                return self.move_to_rest(leaf, system, self.accuracy);
+            }
+            if floor < SMALLEST_MOVING_COMPLIANCE {
+                return Stop::Stuck;
+            }
+        }
+    }
+
+    /// Newton's method in the mixed form, for a leaf that is nearly at rest.
+    fn newton(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Stop {
+        let newton = Newton {
+            accuracy: self.accuracy,
+            iterations: STIFF_ITERATIONS,
+            work: self.work,
+            progress: self.progress,
+        };
+        let equations = Equations::Definite {
+            solver: &mut self.solver,
+            largest: MAX_TURN.min(MAX_SHIFT),
+            cg_tolerance: self.cg_tolerance,
+        };
+        newton.solve(leaf, &mut self.state, system, equations)
+    }
+
+    /// Damped motion until rest.
+    fn move_to_rest(&mut self, leaf: &DiscreteLeaf, system: &mut System, accuracy: f64) -> Stop {
+        let n = leaf.segments();
+        let mut trial = self.state.clone();
+        let mut velocity = vec![vec![[0.0; 6]; n]; leaf.rods()];
+        let mut next_velocity = velocity.clone();
+        let mut pace = Pace {
+            dt: f64::INFINITY,
+            growth: MAX_GROWTH,
+        };
+        let mut resting = false;
+        let mut previous = f64::INFINITY;
+        let space = self.solver.space.is_some().then(|| leaf.in_space());
+        let mut sums = leaf.assemble(&self.state, system);
+        self.work.force_evaluations += 1;
+
+        for step in 0..MAX_STEPS {
+            if self.work.force_evaluations > self.most_evaluations || past(self.deadline) {
+                break;
+            }
+            // A positive definite matrix and its solution, with as long a time
+            // step as it takes.
+            let tolerance = cg_tolerance(previous, self.cg_tolerance);
+            while !self.solve(leaf, space.as_ref(), system, pace.dt, &velocity, tolerance) {
+                if resting {
+                    return Stop::Saddle;
+                }
+                self.moved = true;
+                if self.convex_only {
+                    return Stop::Stuck;
+                }
+                if !pace.shorten() {
+                    return Stop::Stuck;
+                }
+            }
+            let (turn, shift) = system.largest();
+            let size = turn.max(shift);
+            let part = (MAX_TURN / turn).min(MAX_SHIFT / shift).min(1.0);
+            leaf.advance(&self.state, system, part, &mut trial);
+            let mut energy = sums.energy;
+            let next = leaf.assemble(&trial, system);
+            self.work.force_evaluations += 1;
+            (self.progress)(step, size);
+            let mut next_energy = next.energy;
+            if pace.dt.is_finite() {
+                energy += system.kinetic_energy(&velocity);
+                system.velocity(part, pace.dt, &mut next_velocity);
+                next_energy += system.kinetic_energy(&next_velocity);
+            }
+            let slack = ENERGY_SLACK * (1.0 + energy.abs());
+            if !next_energy.is_finite() || next_energy > energy + slack {
+                if !pace.shorten() {
+                    return Stop::Stuck;
+                }
+                sums = leaf.assemble(&self.state, system);
+                self.work.force_evaluations += 1;
+                continue;
+            }
+            if next.turn > RESOLVED_TURN {
+                return Stop::Unresolved;
+            }
+            std::mem::swap(&mut self.state, &mut trial);
+            sums = next;
+            self.work.steps += 1;
+            if pace.dt.is_finite() {
+                std::mem::swap(&mut velocity, &mut next_velocity);
+                if at_saddle(leaf, &self.state, size) {
+                    // With neither inertia nor damping it falls, or it rests.
+                    resting = true;
+                    pace.dt = f64::INFINITY;
+                } else if part == 1.0 {
+                    pace.lengthen();
+                }
+                if pace.dt > LONGEST_STEP {
+                    pace.dt = f64::INFINITY;
+                }
+            } else {
+                resting = false;
+                if part == 1.0
+                    && let Some(remaining) =
+                        converged(size, previous, tolerance, (accuracy, ROUNDING))
+                {
+                    return Stop::Rest(remaining);
+                }
+            }
+            previous = size;
+        }
+        Stop::StepLimit
+    }
+
+    /// Factorises and solves for a time step of `dt`; false if the matrix is
+    /// not positive definite. A mode that is neutral up to rounding is left
+    /// where it is by a shift of that size.
+    fn solve(
+        &mut self,
+        leaf: &DiscreteLeaf,
+        space: Option<&DiscreteLeaf>,
+        system: &mut System,
+        dt: f64,
+        velocity: &[Vec<Increment>],
+        tolerance: f64,
+    ) -> bool {
+        let inertia = dt.is_finite().then_some((velocity, 1.0 / dt));
+        let shift = if dt.is_finite() {
+            (1.0 / dt + DAMPING) / dt
+        } else {
+            leaf.neutral_shift()
+        };
+        let (solver, work) = (&mut self.solver, &mut *self.work);
+        solver.convex_in_space(space, &self.state, shift, work)
+            && solver.solve(system, shift, inertia, tolerance, work)
+    }
+}
+
+/// The time step, and its growth after a good one.
+struct Pace {
+    dt: f64,
+    growth: f64,
+}
+
+impl Pace {
+    /// Takes a shorter step; false if that is too short to be worth it.
+    fn shorten(&mut self) -> bool {
+        self.dt = if self.dt.is_finite() {
+            self.dt / 4.0
+        } else {
+            FIRST_STEP
+        };
+        self.growth = 1.0;
+        self.dt >= SHORTEST_STEP
+    }
+
+    /// After a good step, the more the more of them there were.
+    fn lengthen(&mut self) {
+        self.dt *= self.growth;
+        self.growth = (2.0 * self.growth).min(MAX_GROWTH);
+    }
+}

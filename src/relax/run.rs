@@ -1,0 +1,226 @@
+//! A run over nested grids: what is asked, the grids the leaf has settled on,
+//! and the error estimate of their extrapolation.
+
+use crate::leaf::{DiscreteLeaf, Leaf, State, System, whole_of};
+use crate::newton::{Stop, Work};
+use crate::relax::equilibrium::Saddle;
+use crate::relax::method::Method;
+use crate::relax::options::{Options, Progress, past};
+use crate::relax::richardson::Richardson;
+
+/// Segments of the coarsest grid, in two panels or more if profiles have kinks.
+pub const COARSEST: usize = 8;
+
+/// Growth of errors of single grids by extrapolation, sum of the weights at most:
+/// over halved grids, and with one between the finest two.
+const EXTRAPOLATED: f64 = 2.0;
+const EXTRAPOLATED_BETWEEN: f64 = 6.3;
+
+/// Growth of the estimate from two grids of which the coarser is one of a loose
+/// tolerance: it may miss layers that the coupling makes.
+const TWO_COARSE: f64 = 1.5;
+
+/// Part of the rounding error that grows with the number of segments.
+const ROUNDING: f64 = 4e-15;
+
+/// A leaf settled on one grid.
+pub struct Level {
+    pub leaf: DiscreteLeaf,
+    pub state: State,
+}
+
+/// How a run over the grids ended.
+pub enum End {
+    /// At rest; the finest grid's last increments were below the accuracy.
+    Rest,
+    /// At rest, but not to the tolerance on the finest grid allowed.
+    NotAccurate,
+    /// Not at rest on the finest grid tried.
+    Failed(Stop),
+}
+
+/// What is asked, and what was found so far.
+pub struct Run<'a, 'o> {
+    pub leaf: &'a Leaf,
+    /// The leaf with all of its unknowns, if `leaf` is half of it or in its plane.
+    pub whole: Option<&'a Leaf>,
+    /// Rods solved for.
+    pub solved: usize,
+    /// Whether in their plane.
+    pub planar: bool,
+    /// What neglecting shear, and stretch, would change.
+    pub effects: [Option<f64>; 2],
+    pub options: &'o Options,
+    pub tolerance: f64,
+    pub progress: &'o mut dyn FnMut(&Progress),
+    pub work: Work,
+    pub saddle: Option<Saddle>,
+    pub levels: Vec<Level>,
+    /// The leaf on a grid between the finest two, if their extrapolation has it too.
+    pub between: Option<Level>,
+    /// What that changed, times a safety factor: so near to the finest two, it may
+    /// have gained nothing where layers are thin, and the last correction does
+    /// not tell.
+    pub change: Option<f64>,
+    pub table: Richardson,
+    pub index: Option<usize>,
+    /// Largest iteration error left on any grid.
+    pub remaining: f64,
+    /// Nodes times force evaluations so far.
+    pub spent: usize,
+    /// Saddles left that were only noticed by their index.
+    pub pushes: i32,
+    /// The matrix with which the last grid came to rest.
+    pub last: Option<System>,
+}
+
+impl<'a, 'o> Run<'a, 'o> {
+    /// A run that has not begun.
+    pub fn new(
+        leaf: &'a Leaf,
+        options: &'o Options,
+        tolerance: f64,
+        progress: &'o mut dyn FnMut(&Progress),
+    ) -> Self {
+        Run {
+            leaf,
+            whole: None,
+            solved: leaf.rods(),
+            planar: leaf.planar(),
+            effects: [None; 2],
+            options,
+            tolerance,
+            progress,
+            work: Work::default(),
+            saddle: None,
+            levels: Vec::new(),
+            between: None,
+            change: None,
+            table: Richardson::default(),
+            index: None,
+            remaining: 0.0,
+            spent: 0,
+            pushes: 0,
+            last: None,
+        }
+    }
+
+    /// The run as if it had been one of the whole leaf.
+    pub fn completed(mut self, whole: &'a Leaf) -> Self {
+        let reduced = self.leaf;
+        let complete = |level: &Level| complete(reduced, whole, level);
+        self.levels = self.levels.iter().map(complete).collect();
+        self.between = self.between.as_ref().map(complete);
+        self.leaf = whole;
+        self.tabulate();
+        self
+    }
+
+    /// Segments of the only grid, if there is to be one.
+    pub fn segments(&self) -> Option<usize> {
+        self.options.method.segments()
+    }
+
+    /// Whether an unstable equilibrium is wanted as much as a stable one.
+    pub fn keeps_unstable(&self) -> bool {
+        matches!(self.options.method, Method::SemiImplicit(how) if how.keep_unstable)
+    }
+
+    /// Whether the time allowed is over.
+    pub fn late(&self) -> bool {
+        past(self.options.deadline)
+    }
+
+    /// Estimate of the error of the best values, relative to the leaf's length:
+    /// of the extrapolation, of unfinished iterations, and of rounding.
+    pub fn error(&self) -> Option<f64> {
+        let segments = self.levels.last()?.leaf.segments();
+        let best = self.table.best()?;
+        let extrapolation = match self.levels.as_slice() {
+            [first, _] if self.too_coarse(first.leaf.segments()) => TWO_COARSE * best.error,
+            _ => best.error.max(self.change.unwrap_or(0.0)),
+        };
+        let growth = match self.between {
+            Some(_) => EXTRAPOLATED_BETWEEN,
+            None => EXTRAPOLATED,
+        };
+        Some(extrapolation + growth * self.remaining + ROUNDING * segments as f64)
+    }
+
+    /// Whether unfinished iterations and rounding alone are more than the
+    /// tolerance on a grid of so many `segments`, and already on the present one
+    /// most of the error: no refinement helps then.
+    pub fn beyond_rounding(&self, segments: usize) -> bool {
+        let floor = EXTRAPOLATED * self.remaining + ROUNDING * segments as f64;
+        floor > self.tolerance && self.error().is_some_and(|error| error <= 2.0 * floor)
+    }
+
+    /// Whether a grid is one for leaves only that settle where they start.
+    pub fn too_coarse(&self, segments: usize) -> bool {
+        self.segments().is_none() && segments < COARSEST
+    }
+
+    /// Adds the next finer grid.
+    pub fn push(&mut self, level: Level) {
+        self.drop_between();
+        let segments = level.leaf.segments();
+        let stride = match self.levels.first() {
+            Some(first) => segments / first.leaf.segments(),
+            None => 1,
+        };
+        self.table.push(segments, positions(&level, stride));
+        self.levels.push(level);
+    }
+
+    /// Leaves the grid between out, as where refinement goes on.
+    pub fn drop_between(&mut self) {
+        if self.between.take().is_some() {
+            self.change = None;
+            self.tabulate();
+        }
+    }
+
+    /// The grids that are extrapolated, from coarse to fine.
+    pub fn series(&self) -> Vec<&Level> {
+        let mut series: Vec<_> = self.levels.iter().collect();
+        if let Some(between) = &self.between {
+            series.insert(series.len() - 1, between);
+        }
+        series
+    }
+
+    pub fn tabulate(&mut self) {
+        let mut table = Richardson::default();
+        let series = self.series();
+        for level in &series {
+            let segments = level.leaf.segments();
+            let stride = segments / series[0].leaf.segments();
+            table.push(segments, positions(level, stride));
+        }
+        self.table = table;
+    }
+}
+
+/// The leaf with all of its unknowns, of which `reduced` is settled.
+pub fn complete(reduced: &Leaf, whole: &Leaf, level: &Level) -> Level {
+    Level {
+        leaf: match reduced.rods() == whole.rods() {
+            true => level.leaf.seen_as(whole),
+            false => DiscreteLeaf::new(whole, level.leaf.grid.clone()),
+        },
+        state: whole_of(reduced, &level.state),
+    }
+}
+
+/// Positions of all rods at every `stride`-th node, dimensionless.
+pub fn positions(level: &Level, stride: usize) -> Vec<f64> {
+    let n = level.leaf.segments();
+    (0..level.leaf.rods())
+        .flat_map(|j| {
+            (0..=n)
+                .step_by(stride)
+                .map(move |i| level.state.base(j) + i)
+        })
+        .flat_map(|k| level.state.x[k].to_array())
+        .collect()
+}

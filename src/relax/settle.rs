@@ -1,0 +1,270 @@
+//! Settling on one grid.
+
+use crate::leaf::{DiscreteLeaf, Grid, Solved, State, System, half_of};
+use crate::newton::{Definite, Newton, Stop};
+use crate::relax::method::{Method, SemiImplicit};
+use crate::relax::methods::semi_implicit::Relaxation;
+use crate::relax::methods::{explicit, moment};
+use crate::relax::options::Progress;
+use crate::relax::run::{Level, Run};
+use crate::relax::saddle::{self, saddle_of};
+use crate::relax::start::{disturb, start};
+use glam::DVec3;
+
+/// Iteration error allowed on each grid, as a part of the tolerance: after so
+/// coarse a first grid a little more saves a step on the finest.
+const ITERATION_PART: f64 = 1e-3;
+const ITERATION_PART_FROM_COARSE: f64 = 5e-3;
+
+/// Iteration error allowed on a fixed grid, which is there to be compared.
+const FIXED_ACCURACY: f64 = 1e-12;
+
+/// Accuracy of the first solutions with conjugate gradients far from rest.
+const FAR_FROM_REST: f64 = 1e-2;
+
+/// Nodes times force evaluations after which a leaf that has not come to rest
+/// is given up: some seconds.
+pub const BUDGET: usize = 3_000_000;
+
+/// Force evaluations that even the largest leaf is granted on every grid,
+/// whatever was spent before.
+const LEAST_EVALUATIONS: usize = 600;
+
+/// Saddles that are left before the run is given up.
+pub const MAX_SADDLES: i32 = 10;
+
+/// Accuracy, in the energy norm, of the effects of shear and stretch: most of
+/// that norm is stretch itself, and displacements are a small part of it.
+const EFFECT_ACCURACY: f64 = 1e-5;
+
+/// Where settling on a grid begins.
+pub enum InitialGuess {
+    /// The start of the scenario, disturbed if that is asked for.
+    Start,
+    /// The equilibrium of the next coarser grid, prolonged.
+    Coarser(State),
+    /// The equilibrium of the next finer grid, interpolated.
+    Finer(State),
+    /// A saddle the leaf was pushed off.
+    Pushed(State),
+}
+
+/// A leaf that has settled on a grid, or not.
+pub struct Settled {
+    /// Where it is.
+    pub level: Level,
+    /// How it stopped.
+    pub stop: Stop,
+    /// Whether it had to move, not only to settle in the valley it was in.
+    pub moved: bool,
+}
+
+impl Run<'_, '_> {
+    /// Settles on one grid; leaves saddles unless they are wanted.
+    pub fn settle(&mut self, grid: Grid, guess: InitialGuess) -> Settled {
+        self.last = None;
+        let leaf = DiscreteLeaf::new(self.leaf, grid);
+        let near_rest = matches!(guess, InitialGuess::Coarser(_) | InitialGuess::Finer(_));
+        let cg_tolerance = match guess {
+            InitialGuess::Start | InitialGuess::Pushed(_) => FAR_FROM_REST,
+            InitialGuess::Coarser(_) => 1e-4,
+            // The error of interpolation is one of stiff modes, the error that
+            // is to be removed one of soft ones: a small part of the energy.
+            InitialGuess::Finer(_) => 1e-8,
+        };
+        let state = match guess {
+            InitialGuess::Start => self.start(&leaf),
+            InitialGuess::Coarser(state)
+            | InitialGuess::Finer(state)
+            | InitialGuess::Pushed(state) => state,
+        };
+        if let Method::Explicit { .. } = self.options.method {
+            return self.settle_explicitly(leaf, state, near_rest);
+        }
+        if leaf.tip_moment() != DVec3::ZERO {
+            return self.settle_under_moment(leaf, state, near_rest);
+        }
+        if self.keeps_unstable() {
+            return self.settle_anywhere(leaf, state);
+        }
+        self.settle_in_a_valley(leaf, state, near_rest, cg_tolerance)
+    }
+
+    /// Where a leaf starts that nothing is known of.
+    fn start(&self, leaf: &DiscreteLeaf) -> State {
+        if let Some(whole) = self.whole {
+            let whole = DiscreteLeaf::new(whole, leaf.grid.clone());
+            return half_of(self.leaf, &start(&whole));
+        }
+        let mut state = start(leaf);
+        if let Method::SemiImplicit(SemiImplicit {
+            disturbance: Some(number),
+            ..
+        }) = self.options.method
+        {
+            disturb(leaf, number, &mut state);
+        }
+        state
+    }
+
+    /// Iteration error allowed on a grid.
+    fn accuracy(&self, leaf: &DiscreteLeaf) -> f64 {
+        let first = (self.levels.first()).map_or(leaf.segments(), |first| first.leaf.segments());
+        match self.segments() {
+            Some(_) => FIXED_ACCURACY,
+            None if self.too_coarse(first) => ITERATION_PART_FROM_COARSE * self.tolerance,
+            None => ITERATION_PART * self.tolerance,
+        }
+    }
+
+    fn settle_explicitly(
+        &mut self,
+        leaf: DiscreteLeaf,
+        mut state: State,
+        near_rest: bool,
+    ) -> Settled {
+        let mut request = explicit::Request {
+            accuracy: self.accuracy(&leaf),
+            near_rest,
+            work: &mut self.work,
+            progress: &mut told(&mut *self.progress, leaf.segments()),
+            moved: false,
+            deadline: self.options.deadline,
+        };
+        let mut system = System::new(&leaf);
+        let stop = explicit::settle(&leaf, &mut state, &mut system, &mut request);
+        let moved = request.moved;
+        if let Stop::Rest(remaining) = stop {
+            self.remaining = self.remaining.max(remaining);
+        }
+        let level = Level { leaf, state };
+        Settled { level, stop, moved }
+    }
+
+    fn settle_under_moment(
+        &mut self,
+        mut leaf: DiscreteLeaf,
+        mut state: State,
+        near_rest: bool,
+    ) -> Settled {
+        let accuracy = self.accuracy(&leaf);
+        let mut system = System::new(&leaf);
+        let progress = &mut told(&mut *self.progress, leaf.segments());
+        let stop = moment::settle(
+            &mut leaf,
+            &mut state,
+            &mut system,
+            accuracy,
+            near_rest,
+            &mut self.work,
+            progress,
+        );
+        let (level, moved) = (Level { leaf, state }, false);
+        Settled { level, stop, moved }
+    }
+
+    /// Goes to the next equilibrium, stable or not.
+    fn settle_anywhere(&mut self, leaf: DiscreteLeaf, mut state: State) -> Settled {
+        let newton = Newton {
+            accuracy: self.accuracy(&leaf),
+            iterations: saddle::MAX_ITERATIONS,
+            work: &mut self.work,
+            progress: &mut told(&mut *self.progress, leaf.segments()),
+        };
+        let mut system = System::new(&leaf);
+        let stop = saddle::newton(&leaf, &mut state, &mut system, newton);
+        let (level, moved) = (Level { leaf, state }, false);
+        Settled { level, stop, moved }
+    }
+
+    /// Settles by the semi-implicit method.
+    fn settle_in_a_valley(
+        &mut self,
+        leaf: DiscreteLeaf,
+        mut state: State,
+        mut near_rest: bool,
+        mut cg_tolerance: f64,
+    ) -> Settled {
+        let accuracy = self.accuracy(&leaf);
+        let convex_only = self.whole.is_some() || self.too_coarse(leaf.segments());
+        let mut system = System::new(&leaf);
+        let nodes = leaf.rods() * leaf.segments();
+        let allowed = (BUDGET.saturating_sub(self.spent) / nodes).max(LEAST_EVALUATIONS);
+        let begun = self.work.force_evaluations;
+        let mut moved = false;
+        for pushes in 0..MAX_SADDLES {
+            let mut relaxation = Relaxation {
+                state,
+                accuracy,
+                work: &mut self.work,
+                progress: &mut told(&mut *self.progress, leaf.segments()),
+                near_rest,
+                cg_tolerance,
+                pushes,
+                solver: Definite {
+                    direct: None,
+                    space: (leaf.planar() && self.levels.is_empty())
+                        .then(|| System::new(&leaf.in_space())),
+                },
+                most_evaluations: begun + allowed,
+                deadline: self.options.deadline,
+                convex_only,
+                moved: false,
+            };
+            let before = relaxation.work.force_evaluations;
+            let stop = relaxation.settle(&leaf, &mut system);
+            let spent = relaxation.work.force_evaluations - before;
+            moved |= relaxation.moved;
+            let direct = relaxation.solver.direct.is_some();
+            state = relaxation.state;
+            self.spent += nodes * spent;
+            if let Stop::Rest(remaining) = stop {
+                self.remaining = self.remaining.max(remaining);
+                if self.levels.is_empty() && !direct {
+                    self.effects = effects(&leaf, &state, &mut system);
+                }
+            }
+            let rests = matches!(stop, Stop::Rest(_));
+            if stop != Stop::Saddle || convex_only {
+                self.last = (!direct && rests).then_some(system);
+                let level = Level { leaf, state };
+                return Settled { level, stop, moved };
+            }
+            match saddle::polish(&leaf, &mut state, &mut system, &mut self.work) {
+                Some(0) => {
+                    let (level, stop) = (Level { leaf, state }, Stop::Rest(accuracy));
+                    return Settled { level, stop, moved };
+                }
+                Some(index) => self.saddle = Some(saddle_of(&leaf, &state, index)),
+                None => {}
+            }
+            saddle::push_off(&leaf, &mut state, &mut system, &mut self.work);
+            (near_rest, cg_tolerance) = (false, FAR_FROM_REST);
+        }
+        let (level, stop) = (Level { leaf, state }, Stop::StepLimit);
+        Settled { level, stop, moved }
+    }
+}
+
+/// Reports the steps on a grid of so many segments.
+fn told(progress: &mut dyn FnMut(&Progress), grid: usize) -> impl FnMut(usize, f64) + use<'_> {
+    move |step, residual| {
+        progress(&Progress {
+            grid,
+            step,
+            residual,
+        });
+    }
+}
+
+/// Largest displacements if the leaf neither sheared, or did not stretch, to
+/// first order; with the factorisation that the last iteration left.
+fn effects(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> [Option<f64>; 2] {
+    [DVec3::new(0.0, 1.0, 1.0), DVec3::X].map(|dropped| {
+        leaf.assemble_stiffening(state, dropped, system);
+        match system.solve(None, EFFECT_ACCURACY) {
+            Solved::Yes(_) => Some(system.largest().1),
+            _ => None,
+        }
+    })
+}

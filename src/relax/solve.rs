@@ -1,0 +1,103 @@
+//! From a scenario and what is asked to the leaf at rest.
+
+use crate::leaf::{Grid, Leaf};
+use crate::newton::Work;
+use crate::relax::equilibrium::Equilibrium;
+use crate::relax::method::Method;
+use crate::relax::methods::{explicit, shooting};
+use crate::relax::modes;
+use crate::relax::options::{MOST_MODES, Options, Progress, RelaxError, check_tolerance};
+use crate::relax::result;
+use crate::relax::run::{End, Run};
+use crate::relax::segments::{check_segments, least, reducible};
+use crate::scenario::Scenario;
+use std::time::Instant;
+
+/// Brings a scenario's leaf to rest.
+///
+/// # Errors
+/// Requests that cannot be met; everything that happens while solving is an
+/// [`Outcome`](crate::relax::Outcome) instead.
+pub fn relax(
+    scenario: &Scenario,
+    options: &Options,
+    progress: &mut dyn FnMut(&Progress),
+) -> Result<Equilibrium, RelaxError> {
+    let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
+    check_tolerance(tolerance)?;
+    if options.modes > MOST_MODES {
+        return Err(RelaxError::Modes {
+            found: options.modes,
+        });
+    }
+    match options.method {
+        Method::SemiImplicit(_) | Method::Explicit { .. } => {
+            relax_on_grids(scenario, options, tolerance, progress)
+        }
+        Method::SingleShooting => shooting::from_arcs(scenario, options, Some(1), tolerance),
+        Method::Shooting { intervals } => {
+            shooting::from_arcs(scenario, options, intervals, tolerance)
+        }
+        Method::ShootingFromRest { intervals } => {
+            shooting::check_intervals(intervals)?;
+            let rest = Options {
+                method: Method::default(),
+                tolerance: Some(shooting::START),
+                modes: 0,
+                ..options.clone()
+            };
+            let rest = relax(scenario, &rest, progress)?;
+            shooting::from_rest(scenario, options, intervals, tolerance, rest)
+        }
+    }
+}
+
+/// Relaxes on nested grids.
+fn relax_on_grids(
+    scenario: &Scenario,
+    options: &Options,
+    tolerance: f64,
+    progress: &mut dyn FnMut(&Progress),
+) -> Result<Equilibrium, RelaxError> {
+    let clock = Instant::now();
+    let leaf = Leaf::new(scenario);
+    if let Method::Explicit { .. } = options.method {
+        explicit::check(&leaf)?;
+    }
+    let (method, segments) = (options.method, options.method.segments());
+    let first = check_segments(&leaf, segments, least(method, tolerance))?;
+    let reduced = match reducible(method) {
+        true => leaf.reduced(),
+        false => None,
+    };
+    let grid = Grid::new(first, leaf.kinks());
+    let mut work = Work::default();
+    if let Some(reduced) = &reduced {
+        let mut run = Run::new(reduced, options, tolerance, progress);
+        run.whole = Some(&leaf);
+        let end = run.solve(grid.clone());
+        if matches!(end, End::Rest | End::NotAccurate) && run.index == Some(0) {
+            let run = run.completed(&leaf);
+            return Ok(finished(run, end, clock));
+        }
+        // The reduced model fails, as the leaf moves out of its valley, breaks the
+        // mirror, or leaves the plane: solve the full leaf.
+        work = run.work;
+    }
+    let mut run = Run::new(&leaf, options, tolerance, progress);
+    run.work = work;
+    let end = run.solve(grid);
+    Ok(finished(run, end, clock))
+}
+
+/// The result of a run, and of a leaf at rest its modes, which are not counted
+/// in the time of the solution.
+fn finished(run: Run, end: End, clock: Instant) -> Equilibrium {
+    let at_rest = matches!(end, End::Rest | End::NotAccurate);
+    let (outcome, remark) = result::outcome(&run, end);
+    let seconds = clock.elapsed().as_secs_f64();
+    let modes = if at_rest { modes::lowest(&run) } else { None };
+    let mut found = result::equilibrium(run, outcome, remark, seconds);
+    found.stability.modes = modes;
+    found
+}
