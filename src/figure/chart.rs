@@ -1,29 +1,16 @@
-//! The figures of a chart: error against time, and time against the number of
-//! veins.
+//! Speed against accuracy: error against time, and time against the number of
+//! veins, of every way to bring a leaf to rest.
 
-use super::Pictured;
-use super::colors::Color;
+use super::axis::Axis;
+use super::chart_panel::{ChartPanel, Failure, Point, Series};
+use super::colors::{BLUE, Color, GREEN, ORANGE, PURPLE, SKY, SLATE, VERMILION};
 use super::drawing::Drawing;
-use super::header::{self, HEADER};
-use super::logaxis::Labels;
-use super::loglog::LogLog;
-use super::page::WIDTH;
-use super::series::{Failure, Marker, Point, Series};
+use super::header::header;
+use super::markers::Marker;
+use super::page::{HEADER, LEFT, WIDTH};
 use crate::report::numbers::power_of_ten;
 use crate::report::words::contender;
-use crate::study::{Chart, Contender, Peer, Row, Scaling, Spread};
-
-/// Colours that must be told apart, also by the colour-blind (Okabe and Ito);
-/// methods of one kind are alike.
-const COLORS: [Color; 7] = [
-    Color(0, 114, 178),
-    Color(86, 170, 225),
-    Color(205, 80, 0),
-    Color(230, 159, 0),
-    Color(0, 158, 115),
-    Color(170, 90, 150),
-    Color(60, 60, 66),
-];
+use crate::study::{Chart, Contender, Peer, Row, Scaling};
 
 /// Colours of the peers that come with this crate, so that they are the same in
 /// every chart; and of others, in turn.
@@ -38,115 +25,130 @@ const OTHER_PEERS: [Color; 3] = [
     Color(165, 120, 130),
 ];
 
-impl Pictured for Chart {
-    const SVG: &'static str = "chart.svg";
-    const PNG: &'static str = "chart.png";
+/// The smallest error that is drawn: what is smaller is put there.
+const SMALLEST: f64 = 1e-17;
 
-    fn draw(&self) -> Drawing {
-        let contenders = Contender::ALL.into_iter().zip(COLORS);
-        let contenders = contenders.filter_map(|(contender, color)| {
-            let rows = self.rows.iter().filter(|row| row.contender == contender);
-            let rows: Vec<&Row> = rows.collect();
-            (!rows.is_empty()).then(|| series(contender, color, &rows, |_, row| row.point()))
-        });
-        let panel = LogLog {
-            series: contenders.chain(peers(&self.peers)).collect(),
-            across: (
-                "time on one thread: median, and quartiles as a thin line",
-                Labels::Times,
-            ),
-            up: ("largest true error of positions / L", Labels::Powers),
-            floor: self.reference.as_ref().map(|found| found.known_within),
-        };
-        let mut notes = vec![format!("N = {}", self.rods)];
-        notes.push(match &self.reference {
-            None => "no reference: no equilibrium was found".into(),
-            Some(found) if found.confirmed => format!(
-                "reference confirmed by two methods, known within {}",
-                power_of_ten(found.known_within)
-            ),
-            Some(found) => format!(
-                "the reference is NOT confirmed; taken to be within {}",
-                power_of_ten(found.known_within)
-            ),
-        });
-        notes.push("left is faster, down is more accurate".into());
-        let title = format!("{}: speed against accuracy", self.scenario);
-        page(&title, &notes, &panel)
-    }
-}
+/// Decades of an axis, at least.
+const FEWEST_DECADES: f64 = 1.0;
 
-impl Pictured for Scaling {
-    const SVG: &'static str = "chart_rods.svg";
-    const PNG: &'static str = "chart_rods.png";
+const TIME: &str = "time on one thread: median, and quartiles as a thin line";
 
-    fn draw(&self) -> Drawing {
-        let contenders = Contender::ALL.into_iter().zip(COLORS);
-        let contenders = contenders.filter_map(|(contender, color)| {
-            let found = self
-                .rows
-                .iter()
-                .filter(|found| found.row.contender == contender);
-            let (rods, rows): (Vec<usize>, Vec<&Row>) =
-                found.map(|found| (found.rods, &found.row)).unzip();
-            let place = |i: usize, row: &Row| {
-                let (seconds, _) = row.point()?;
-                Some((rods[i] as f64, seconds))
-            };
-            if rows.is_empty() {
-                return None;
-            }
-            let mut series = series(contender, color, &rows, place);
-            // Failures are where their leaf is, run or not.
-            let failed = (0..rows.len()).filter(|&i| place(i, rows[i]).is_none());
-            for (failure, i) in series.failures.iter_mut().zip(failed) {
-                failure.x = Some(rods[i] as f64);
-            }
-            Some(series)
-        });
-        let mut rods: Vec<usize> = self.rows.iter().map(|found| found.rods).collect();
-        rods.sort_unstable();
-        rods.dedup();
-        let panel = LogLog {
-            series: contenders.collect(),
-            across: ("number of veins N", Labels::Numbers(rods)),
-            up: ("time on one thread: median and quartiles", Labels::Times),
-            floor: None,
-        };
-        let mut notes = vec![format!("to a tolerance of {:e}", self.tolerance)];
-        if !self.unconfirmed.is_empty() {
-            let rods: Vec<String> = self.unconfirmed.iter().map(usize::to_string).collect();
-            notes.push(format!(
-                "the reference is NOT confirmed for N = {}",
-                rods.join(", ")
-            ));
-        }
-        let title = format!("{}: time against the number of veins", self.scenario);
-        page(&title, &notes, &panel)
-    }
-}
-
-fn page(title: &str, notes: &[String], panel: &LogLog) -> Drawing {
-    let mut drawing = Drawing {
-        width: WIDTH,
-        height: (HEADER + panel.height()).ceil(),
-        description: title.into(),
-        marks: Vec::new(),
-    };
-    drawing.group("header", |page| {
-        header::draw_without_key(page, title, notes)
+/// Draws error against time.
+pub fn draw_chart(chart: &Chart) -> Drawing {
+    let place = |_: usize, seconds: f64, error: f64| (seconds, error.max(SMALLEST));
+    let contenders = Contender::ALL.into_iter().filter_map(|who| {
+        let rows = chart.rows.iter().filter(|row| row.contender == who);
+        let rows: Vec<(usize, &Row)> = rows.map(|row| (chart.rods, row)).collect();
+        contender_series(who, &rows, place)
     });
+    let series: Vec<Series> = contenders.chain(peers(&chart.peers)).collect();
+    let floor = chart.reference.as_ref().map(|found| found.known_within);
+    let floor = floor.filter(|floor| floor.is_normal() && *floor > 0.0);
+    let (across, up) = places(&series);
+    let failed = series.iter().flat_map(|series| &series.failures);
+    let across = across
+        .into_iter()
+        .chain(failed.filter_map(|failure| failure.x));
+    let panel = ChartPanel {
+        across: Axis::logarithmic(TIME, across, FEWEST_DECADES).in_seconds(),
+        up: Axis::logarithmic(
+            "largest true error of positions / L",
+            up.into_iter().chain(floor),
+            FEWEST_DECADES,
+        ),
+        series,
+        floor,
+    };
+    let mut notes = vec![format!("N = {}", chart.rods)];
+    notes.push(match &chart.reference {
+        None => "no reference: no equilibrium was found".into(),
+        Some(found) if found.confirmed => format!(
+            "reference confirmed by two methods, known within {}",
+            power_of_ten(found.known_within)
+        ),
+        Some(found) => format!(
+            "the reference is NOT confirmed; taken to be within {}",
+            power_of_ten(found.known_within)
+        ),
+    });
+    notes.push("left is faster, down is more accurate".into());
+    let title = format!("{}: speed against accuracy", chart.scenario);
+    page(&title, &notes, &panel)
+}
+
+/// Draws time against the number of veins.
+pub fn draw_scaling(scaling: &Scaling) -> Drawing {
+    let place = |rods: usize, seconds: f64, _: f64| (rods as f64, seconds);
+    let contenders = Contender::ALL.into_iter().filter_map(|who| {
+        let found = scaling.rows.iter();
+        let rows = found.filter(|found| found.row.contender == who);
+        let rows: Vec<(usize, &Row)> = rows.map(|found| (found.rods, &found.row)).collect();
+        let mut series = contender_series(who, &rows, place)?;
+        // Failures are where their leaf is, run or not.
+        let failed = rows.iter().filter(|(_, row)| row.point().is_none());
+        for (failure, (rods, _)) in series.failures.iter_mut().zip(failed) {
+            failure.x = Some(*rods as f64);
+        }
+        Some(series)
+    });
+    let series: Vec<Series> = contenders.collect();
+    let mut rods: Vec<usize> = scaling.rows.iter().map(|found| found.rods).collect();
+    rods.sort_unstable();
+    rods.dedup();
+    let rods: Vec<f64> = rods.into_iter().map(|rods| rods as f64).collect();
+    let (_, up) = places(&series);
+    let across = Axis::logarithmic("number of veins N", rods.iter().copied(), FEWEST_DECADES);
+    let panel = ChartPanel {
+        across: across.at(rods),
+        up: Axis::logarithmic(TIME, up.into_iter(), FEWEST_DECADES).in_seconds(),
+        series,
+        floor: None,
+    };
+    let mut notes = vec![format!("to a tolerance of {:e}", scaling.tolerance)];
+    if !scaling.unconfirmed.is_empty() {
+        let rods: Vec<String> = scaling.unconfirmed.iter().map(usize::to_string).collect();
+        let rods = rods.join(", ");
+        notes.push(format!("the reference is NOT confirmed for N = {rods}"));
+    }
+    let title = format!("{}: time against the number of veins", scaling.scenario);
+    page(&title, &notes, &panel)
+}
+
+fn page(title: &str, notes: &[String], panel: &ChartPanel) -> Drawing {
+    let mut drawing = Drawing::new(WIDTH, title);
+    drawing.height = (HEADER + panel.height()).ceil();
+    drawing.group("header", |page| header(page, LEFT, title, notes, None));
     drawing.group("chart", |page| panel.draw(page, HEADER));
     drawing
 }
 
-/// The line of a contender, with its points where `place` puts them.
-fn series(
+/// Where the points of all series are, across and up.
+fn places(series: &[Series]) -> (Vec<f64>, Vec<f64>) {
+    let points = series.iter().flat_map(|series| &series.points);
+    points.map(|point| point.at).unzip()
+}
+
+/// Colour, the same for methods of one kind, and marker of a contender.
+fn style(who: Contender) -> (Color, Marker) {
+    match who {
+        Contender::SemiImplicit => (BLUE, Marker::Circle),
+        Contender::SemiImplicitGrid => (SKY, Marker::Square),
+        Contender::Explicit => (VERMILION, Marker::Circle),
+        Contender::ExplicitGrid => (ORANGE, Marker::Square),
+        Contender::SingleShooting => (GREEN, Marker::Triangle),
+        Contender::MultipleShooting => (PURPLE, Marker::Wedge),
+        Contender::RelaxedShooting => (SLATE, Marker::Diamond),
+    }
+}
+
+/// The rows of a contender, each with its number of veins, with points where
+/// `place` puts veins, seconds and errors; `None` if it took no part.
+fn contender_series(
     who: Contender,
-    color: Color,
-    rows: &[&Row],
-    place: impl Fn(usize, &Row) -> Option<(f64, f64)>,
-) -> Series {
+    rows: &[(usize, &Row)],
+    place: impl Fn(usize, f64, f64) -> (f64, f64),
+) -> Option<Series> {
+    let (color, marker) = style(who);
     let mut series = Series {
         name: match who {
             Contender::SemiImplicit => format!("{} (default)", contender(who)),
@@ -154,22 +156,15 @@ fn series(
         },
         color,
         dashed: false,
-        marker: match who {
-            Contender::SemiImplicit | Contender::Explicit => Marker::Circle,
-            Contender::SemiImplicitGrid | Contender::ExplicitGrid => Marker::Square,
-            Contender::SingleShooting => Marker::Triangle,
-            Contender::MultipleShooting => Marker::Wedge,
-            Contender::RelaxedShooting => Marker::Diamond,
-        },
+        marker,
         points: Vec::new(),
         failures: Vec::new(),
     };
-    for (i, row) in rows.iter().enumerate() {
-        match place(i, row) {
-            Some((x, y)) => series.points.push(Point {
-                x,
-                y,
-                spread: quartiles(row).and_then(|[q1, q3]| Some([place(i, &q1)?, place(i, &q3)?])),
+    for &(rods, row) in rows {
+        match row.seconds.zip(row.point()) {
+            Some((seconds, (median, error))) => series.points.push(Point {
+                at: place(rods, median, error),
+                spread: [seconds.q1, seconds.q3].map(|time| place(rods, time, error)),
                 front: row.pareto,
             }),
             None => series.failures.push(Failure {
@@ -178,17 +173,7 @@ fn series(
             }),
         }
     }
-    series
-}
-
-/// The row as if its quartiles were its time.
-fn quartiles(row: &Row) -> Option<[Row; 2]> {
-    let spread = row.seconds?;
-    let taking = |median: f64| Row {
-        seconds: Some(Spread { median, ..spread }),
-        ..row.clone()
-    };
-    Some([spread.q1, spread.q3].map(taking))
+    (!rows.is_empty()).then_some(series)
 }
 
 fn peer_color(name: &str, others: usize) -> Color {
@@ -214,9 +199,8 @@ fn peers(peers: &[Peer]) -> Vec<Series> {
         });
         match peer.point() {
             Some((x, y)) => all[place].points.push(Point {
-                x,
-                y,
-                spread: Some([(peer.seconds.q1, y), (peer.seconds.q3, y)]),
+                at: (x, y.max(SMALLEST)),
+                spread: [peer.seconds.q1, peer.seconds.q3].map(|x| (x, y.max(SMALLEST))),
                 front: peer.pareto,
             }),
             None => all[place].failures.push(Failure {
@@ -226,26 +210,19 @@ fn peers(peers: &[Peer]) -> Vec<Series> {
         }
     }
     for series in &mut all {
-        series.points.sort_by(|a, b| b.y.total_cmp(&a.y));
+        series.points.sort_by(|a, b| b.at.1.total_cmp(&a.at.1));
     }
     all
 }
 
 #[cfg(test)]
 mod tests {
-    use std::io;
-
     use super::*;
-    use crate::figure::{FigurePng, FigureSvg};
-    use crate::report::{Format, sample};
+    use crate::figure::svg::text;
+    use crate::report::sample;
 
-    fn svg<R: Pictured>(result: &R) -> String {
-        let mut bytes = Vec::new();
-        FigureSvg.write(result, &mut bytes).unwrap();
-        let svg = String::from_utf8(bytes).unwrap();
-        assert_eq!(svg.matches("<g ").count(), svg.matches("</g>").count());
-        assert!(!svg.contains("NaN") && !svg.contains(">inf"), "{svg}");
-        svg
+    fn svg(chart: &Chart) -> String {
+        text(&draw_chart(chart))
     }
 
     #[test]
@@ -287,7 +264,7 @@ mod tests {
     #[test]
     fn leaves_are_marked_by_their_veins() {
         let mut scaling = sample::scaling();
-        let first = svg(&scaling);
+        let first = text(&draw_scaling(&scaling));
         for text in [
             "to a tolerance of 1e-6",
             ">5<",
@@ -298,20 +275,22 @@ mod tests {
             assert!(first.contains(text), "{text}");
         }
         scaling.unconfirmed = vec![15];
-        assert!(svg(&scaling).contains("NOT confirmed for N = 15"));
+        let second = text(&draw_scaling(&scaling));
+        assert!(second.contains("NOT confirmed for N = 15"));
     }
 
     #[test]
     fn times_are_spread_along_their_axis() {
         let chart = sample::chart();
-        let rows = [&chart.rows[0]];
-        let across = series(rows[0].contender, COLORS[0], &rows, |_, row| row.point());
-        let wanted = Some([(8.75e-4, 1e-4), (1.2e-3, 1e-4)]);
-        assert_eq!(across.points[0].spread, wanted);
-        let up = |_, row: &Row| Some((5.0, row.point()?.0));
-        let up = series(rows[0].contender, COLORS[0], &rows, up);
-        let wanted = Some([(5.0, 8.75e-4), (5.0, 1.2e-3)]);
-        assert_eq!(up.points[0].spread, wanted);
+        let rows = [(5, &chart.rows[0])];
+        let spread = |place: &dyn Fn(usize, f64, f64) -> (f64, f64)| {
+            let series = contender_series(rows[0].1.contender, &rows, place);
+            series.unwrap().points[0].spread
+        };
+        let across = spread(&|_, seconds, error| (seconds, error));
+        assert_eq!(across, [(8.75e-4, 1e-4), (1.2e-3, 1e-4)]);
+        let up = spread(&|rods, seconds, _| (rods as f64, seconds));
+        assert_eq!(up, [(5.0, 8.75e-4), (5.0, 1.2e-3)]);
     }
 
     #[test]
@@ -347,13 +326,5 @@ mod tests {
             }
             svg(&chart);
         }
-    }
-
-    #[test]
-    fn the_picture_is_as_wide_as_that_of_a_leaf() {
-        let mut bytes = Vec::new();
-        FigurePng.write(&sample::chart(), &mut bytes).unwrap();
-        let reader = png::Decoder::new(io::Cursor::new(&bytes)).read_info();
-        assert_eq!(reader.unwrap().info().width, 1800);
     }
 }

@@ -3,14 +3,15 @@
 
 use glam::DVec2;
 
-use super::Pictured;
-use super::colors::{INK, NOTE, vein_color};
+use super::colors::{INK, vein_color};
 use super::differences;
-use super::drawing::{Anchor, Drawing, HALF_CAPITAL, Stroke};
+use super::drawing::{Anchor, Drawing, Stroke};
 use super::font::Font;
-use super::header::{self, HEADER, NOTE_BASE};
+use super::header::{NOTE_BASE, header};
+use super::key::KeyRows;
 use super::markers::dot;
-use super::page::{LEFT, Panels, RIGHT, TEXT_SIZE, WIDTH};
+use super::page::{HEADER, LEFT, RIGHT, TEXT_SIZE, WIDTH};
+use super::panels::Panels;
 use super::veins::Veins;
 use crate::report::words::{equilibrium_of_index, headline, verdict};
 use crate::study::{Check, Verdict};
@@ -18,43 +19,44 @@ use crate::study::{Check, Verdict};
 /// Height of a line of text.
 const LINE: f64 = 19.0;
 
-impl Pictured for Check {
-    const SVG: &'static str = "check.svg";
-    const PNG: &'static str = "check.png";
-
-    fn draw(&self) -> Drawing {
-        let mut veins = Veins::of(&self.relaxed);
-        if let Some(shot) = self.solution() {
-            veins.dot(&shot.solution.rods);
+/// Draws the whole page.
+pub fn draw(check: &Check) -> Drawing {
+    let mut veins = Veins::of(&check.relaxed);
+    if let Some(shot) = check.solution() {
+        veins.dot(&shot.solution.rods);
+    }
+    let title = format!("{}: {}", check.relaxed.scenario, headline(&check.verdict));
+    let reason = reason(check);
+    let key_line = NOTE_BASE + LINE * (reason.len() + 1) as f64;
+    let panels = Panels::below(HEADER - NOTE_BASE + key_line, &veins);
+    let compared = !check.along.is_empty();
+    let below = if compared { differences::HEIGHT } else { 0.0 };
+    let mut drawing = Drawing::new(WIDTH, &title);
+    drawing.height = (panels.end() + below).ceil();
+    drawing.group("header", |page| {
+        header(page, LEFT, &title, &notes(check, &veins), Some(&veins));
+        for (line, text) in reason.iter().enumerate() {
+            let base = DVec2::new(LEFT, NOTE_BASE + LINE * (line + 1) as f64);
+            page.label(base, text, TEXT_SIZE, Anchor::Start, INK);
         }
-        let title = format!("{}: {}", self.relaxed.scenario, headline(&self.verdict));
-        let reason = reason(self);
-        let key_line = NOTE_BASE + LINE * (reason.len() + 1) as f64;
-        let panels = Panels::below(HEADER - NOTE_BASE + key_line, &veins);
-        let compared = !self.along.is_empty();
-        let below = if compared { differences::HEIGHT } else { 0.0 };
-        let mut drawing = Drawing {
-            width: WIDTH,
-            height: (panels.end() + below).ceil(),
-            description: title.clone(),
-            marks: Vec::new(),
-        };
-        drawing.group("header", |page| {
-            header::draw(page, &title, &notes(self, &veins), &veins);
-            for (line, text) in reason.iter().enumerate() {
-                let base = DVec2::new(LEFT, NOTE_BASE + LINE * (line + 1) as f64);
-                page.label(base, text, TEXT_SIZE, Anchor::Start, INK);
-            }
-            key(page, self, &veins, key_line);
+        let mut key = KeyRows::at(key_line, 26.0);
+        key.entry(page, "relaxed", |page, cell| {
+            let [from, to] = cell.midline();
+            page.line(from, to, Stroke::new(vein_color(0.3), veins.line_width()));
         });
-        panels.draw(&mut drawing, &veins);
-        if compared {
-            drawing.group("differences", |page| {
-                differences::draw(page, self, veins.unit, panels.end())
+        if check.solution().is_some() {
+            key.entry(page, "boundary-value solution by shooting", |page, cell| {
+                dot(page, cell.middle(), 2.0);
             });
         }
-        drawing
+    });
+    panels.draw(&mut drawing, &veins);
+    if compared {
+        drawing.group("differences", |page| {
+            differences::draw(page, check, veins.unit, panels.end());
+        });
     }
+    drawing
 }
 
 fn notes(check: &Check, veins: &Veins) -> Vec<String> {
@@ -86,42 +88,16 @@ fn reason(check: &Check) -> Vec<String> {
     }
 }
 
-/// Which solution is drawn how.
-fn key(page: &mut Drawing, check: &Check, veins: &Veins, base: f64) {
-    const SWATCH: f64 = 26.0;
-    let font = Font::embedded();
-    let middle = base - HALF_CAPITAL * TEXT_SIZE;
-    let mut x = LEFT;
-    let start = DVec2::new(x, middle);
-    let stroke = Stroke::new(vein_color(0.3), veins.line_width());
-    page.line(start, start + DVec2::new(SWATCH, 0.0), stroke);
-    let say = |page: &mut Drawing, x: f64, text: &str| {
-        let base = DVec2::new(x, base);
-        page.label(base, text, TEXT_SIZE, Anchor::Start, NOTE);
-        x + font.width(text, TEXT_SIZE)
-    };
-    x = say(page, x + SWATCH + 7.0, "relaxed");
-    if check.solution().is_some() {
-        x += 24.0;
-        dot(page, DVec2::new(x, middle), 2.0);
-        say(page, x + 9.0, "boundary-value solution by shooting");
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use std::io;
-
     use glam::DVec3;
 
     use super::*;
-    use crate::figure::{FigurePng, FigureSvg};
-    use crate::report::{Format, sample};
+    use crate::figure::svg::text;
+    use crate::report::sample;
 
     fn svg(check: &Check) -> String {
-        let mut bytes = Vec::new();
-        FigureSvg.write(check, &mut bytes).unwrap();
-        String::from_utf8(bytes).unwrap()
+        text(&draw(check))
     }
 
     #[test]
@@ -136,8 +112,6 @@ mod tests {
             for quantity in ["position", "rotation", "force", "moment"] {
                 assert!(svg.contains(quantity), "{quantity}");
             }
-            assert_eq!(svg.matches("<g ").count(), svg.matches("</g>").count());
-            assert!(!svg.contains("NaN") && !svg.contains("inf"));
         }
     }
 
@@ -171,18 +145,7 @@ mod tests {
             let wildest = check.along[0];
             check.along.fill(wildest);
             check.relaxed.accuracy.tolerance = wild;
-            let svg = svg(&check);
-            assert!(!svg.contains("NaN") && !svg.contains("inf"), "{wild}");
+            svg(&check);
         }
-    }
-
-    #[test]
-    fn the_picture_is_as_wide_as_that_of_a_leaf() {
-        let mut bytes = Vec::new();
-        FigurePng
-            .write(&sample::check(21, 32, 0.1), &mut bytes)
-            .unwrap();
-        let reader = png::Decoder::new(io::Cursor::new(&bytes)).read_info();
-        assert_eq!(reader.unwrap().info().width, 1800);
     }
 }

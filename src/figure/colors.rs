@@ -21,14 +21,18 @@ pub const SHADOW: Color = Color(212, 213, 220);
 /// Points of a second solution.
 pub const DOT: Color = Color(213, 60, 30);
 
-/// Curves that must be told apart, also by the colour-blind (Okabe and Ito).
-pub const CURVES: [Color; 5] = [
-    Color(0, 114, 178),
-    Color(0, 158, 115),
-    Color(213, 94, 0),
-    Color(170, 90, 150),
-    Color(225, 160, 20),
-];
+/// Colours that must be told apart, also by the colour-blind (after Okabe and Ito).
+pub const BLUE: Color = Color(0, 114, 178);
+pub const SKY: Color = Color(86, 170, 225);
+pub const GREEN: Color = Color(0, 158, 115);
+pub const VERMILION: Color = Color(213, 94, 0);
+pub const PURPLE: Color = Color(170, 90, 150);
+pub const ORANGE: Color = Color(230, 159, 0);
+pub const BROWN: Color = Color(120, 80, 45);
+pub const SLATE: Color = Color(60, 60, 66);
+
+/// Of curves in one panel, in this order.
+pub const CURVES: [Color; 8] = [BLUE, GREEN, VERMILION, PURPLE, ORANGE, SKY, BROWN, SLATE];
 
 /// Viridis (Smith and van der Walt, matplotlib) at equal distances.
 const VIRIDIS: [Color; 11] = [

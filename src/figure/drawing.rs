@@ -32,7 +32,7 @@ pub enum Mark {
 pub struct Stroke {
     pub color: Color,
     pub width: f64,
-    pub opacity: f64,
+    pub dashed: bool,
 }
 
 impl Stroke {
@@ -40,10 +40,17 @@ impl Stroke {
         Stroke {
             color,
             width,
-            opacity: 1.0,
+            dashed: false,
         }
     }
+
+    pub fn dashed(self, dashed: bool) -> Self {
+        Stroke { dashed, ..self }
+    }
 }
+
+/// Lengths of the dashes of dashed lines and of the gaps between them.
+pub const DASHES: [f64; 2] = [5.0, 4.0];
 
 #[derive(Clone, Copy)]
 pub enum Step {
@@ -75,9 +82,19 @@ pub struct Label {
 }
 
 /// From the base line to the middle of digits and capitals, in font sizes.
-pub const HALF_CAPITAL: f64 = 0.36;
+const HALF_CAPITAL: f64 = 0.36;
 
 impl Drawing {
+    /// An empty page whose height is not known yet.
+    pub fn new(width: f64, description: &str) -> Self {
+        Drawing {
+            width,
+            height: 0.0,
+            description: description.into(),
+            marks: Vec::new(),
+        }
+    }
+
     pub fn group(&mut self, name: &'static str, fill: impl FnOnce(&mut Self)) {
         self.marks.push(Mark::Group(name));
         fill(self);
@@ -105,10 +122,9 @@ impl Drawing {
     }
 
     pub fn label(&mut self, at: DVec2, text: &str, size: f64, anchor: Anchor, color: Color) {
-        let text = text.to_string();
         self.marks.push(Mark::Label(Label {
             at,
-            text,
+            text: text.into(),
             size,
             anchor,
             color,
@@ -116,32 +132,36 @@ impl Drawing {
         }));
     }
 
-    /// A label centred on `at` in both directions.
-    pub fn centered(&mut self, at: DVec2, text: &str, size: f64, color: Color) {
-        let base = DVec2::new(at.x, at.y + HALF_CAPITAL * size);
-        self.label(base, text, size, Anchor::Middle, color);
+    /// A label whose digits and capitals have their middle at the height of `at`.
+    pub fn beside(&mut self, at: DVec2, text: &str, size: f64, anchor: Anchor, color: Color) {
+        let base = at + DVec2::new(0.0, HALF_CAPITAL * size);
+        self.label(base, text, size, anchor, color);
     }
 
     pub fn upright_label(&mut self, at: DVec2, text: &str, size: f64, color: Color) {
-        let text = text.to_string();
-        let anchor = Anchor::Middle;
         self.marks.push(Mark::Label(Label {
             at,
-            text,
+            text: text.into(),
             size,
-            anchor,
+            anchor: Anchor::Middle,
             color,
             upright: true,
         }));
     }
 }
 
-pub fn polygon(corners: &[DVec2]) -> Path {
-    let mut path: Path = corners.iter().map(|&corner| Step::Line(corner)).collect();
-    if let Some(first) = corners.first() {
+/// Straight lines from each point to the next.
+pub fn polyline(points: &[DVec2]) -> Path {
+    let mut path: Path = points.iter().map(|&point| Step::Line(point)).collect();
+    if let Some(first) = points.first() {
         path[0] = Step::Move(*first);
-        path.push(Step::Close);
     }
+    path
+}
+
+pub fn polygon(corners: &[DVec2]) -> Path {
+    let mut path = polyline(corners);
+    path.push(Step::Close);
     path
 }
 

@@ -1,15 +1,14 @@
 //! Where the energy of a moving leaf is, in time.
 
-use glam::DVec2;
-
+use super::axes::Axes;
+use super::axis::Axis;
 use super::colors::{CURVES, Color, INK};
-use super::curves::{Axes, Range};
 use super::drawing::{Drawing, Stroke};
-use super::flat::title;
-use super::header::{self, HEADER};
-use super::motion::notes;
-use super::page::{Cell, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, WIDTH};
+use super::header::header;
+use super::key::Key;
+use super::page::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, WIDTH, title};
 use crate::motion::Energy;
+use crate::report::numbers::short;
 use crate::simulate::Record;
 
 const ENERGIES: f64 = 300.0;
@@ -28,129 +27,105 @@ struct Curve {
 }
 
 impl Curve {
-    fn of(
-        record: &Record,
-        name: &'static str,
-        color: Color,
-        value: impl Fn(&Energy) -> f64,
-    ) -> Self {
-        let moments = record.moments.iter();
-        Curve {
-            name,
-            color,
-            points: moments
-                .map(|moment| (moment.time, value(&moment.energy)))
-                .collect(),
-        }
-    }
-
     fn values(&self) -> impl Iterator<Item = f64> {
         self.points.iter().map(|point| point.1)
     }
 }
 
-/// The whole page.
+/// What all pictures say of a simulation.
+pub fn notes(record: &Record) -> Vec<String> {
+    let mut notes = vec![
+        format!("N = {}", record.rods),
+        format!("{} method", record.scheme.name()),
+        format!("{} segments a vein", record.segments),
+    ];
+    if record.stopped.is_some() {
+        notes.push(format!("ended early: {}", record.outcome()));
+    }
+    notes
+}
+
+/// Draws the whole page.
 pub fn draw(record: &Record) -> Drawing {
     let name = format!("{}: energy in time", record.scenario);
-    let (upper, lower) = (HEADER + PANEL_TITLE, HEADER + PANEL_TITLE + ENERGIES);
-    let lower = lower + BETWEEN + PANEL_TITLE;
-    let mut drawing = Drawing {
-        width: WIDTH,
-        height: lower + BALANCE + PANEL_AXIS + BOTTOM,
-        description: name.clone(),
-        marks: Vec::new(),
-    };
+    let upper = HEADER + PANEL_TITLE;
+    let lower = upper + ENERGIES + BETWEEN + PANEL_TITLE;
+    let mut drawing = Drawing::new(WIDTH, &name);
+    drawing.height = lower + BALANCE + PANEL_AXIS + BOTTOM;
     drawing.group("header", |page| {
-        header::draw_without_key(page, &name, &notes(record));
+        header(page, LEFT, &name, &notes(record), None);
     });
-    let first = record.moments.first().map(|moment| moment.energy);
-    let first = first.unwrap_or_default();
-    let balance = Curve::of(record, "balance", INK, |e| e.balance() - first.balance());
-    let cell = |top: f64, height: f64| Cell {
-        corner: DVec2::new(LEFT, top),
-        size: DVec2::new(WIDTH - LEFT - RIGHT - KEY, height),
-    };
     let end = match record.time() {
         time if time > 0.0 => time,
         _ => record.duration,
     };
-    let time = Range::between(0.0, end);
-    let mut curves = parts(record, &first);
+    let curves = curves(record);
+    let balance = &curves[curves.len() - 1];
     let values = curves.iter().flat_map(Curve::values);
     let axes = Axes {
-        cell: cell(upper, ENERGIES),
-        across: time,
-        up: Range::of(values.chain(balance.values()).chain([0.0])).airy(),
+        cell: Cell::beside_key(upper, ENERGIES, KEY),
+        across: Axis::linear("", 0.0, end),
+        up: Axis::holding("energy", values.chain([0.0])),
     };
-    let magnified = Axes {
-        cell: cell(lower, BALANCE),
-        across: time,
-        up: Range::of(balance.values().chain([0.0])).airy(),
-    };
-    curves.push(balance);
     drawing.group("energies", |page| {
         title(page, axes.cell.corner, "(a)", "where the energy is");
-        axes.draw(page, "", "energy");
+        axes.draw(page);
         // The balance, which should be zero, under all others.
-        for (entry, curve) in curves.iter().enumerate().rev() {
+        for curve in curves.iter().rev() {
             axes.curve(page, &curve.points, Stroke::new(curve.color, 1.6));
+        }
+        let mut key = Key::beside(axes.cell);
+        for curve in &curves {
             let last = curve.points.last().map_or(0.0, |point| point.1);
-            let at_end = format!("at the end {}", short(last));
-            axes.key(page, entry, curve.color, curve.name, &at_end);
+            let stroke = Stroke::new(curve.color, 1.6);
+            key.line(
+                page,
+                curve.name,
+                &format!("at the end {}", short(last)),
+                stroke,
+            );
         }
     });
+    let axes = Axes {
+        cell: Cell::beside_key(lower, BALANCE, KEY),
+        across: Axis::linear("time, in the scenario's unit", 0.0, end),
+        up: Axis::holding("balance", balance.values().chain([0.0])),
+    };
     drawing.group("balance", |page| {
-        let balance = &curves[curves.len() - 1];
         let what =
             "its balance, which no motion changes, magnified: all energies less the work put in";
-        title(page, magnified.cell.corner, "(b)", what);
-        magnified.draw(page, "time, in the scenario's unit", "balance");
-        magnified.curve(page, &balance.points, Stroke::new(INK, 1.3));
+        title(page, axes.cell.corner, "(b)", what);
+        axes.draw(page);
+        axes.curve(page, &balance.points, Stroke::new(INK, 1.3));
     });
     drawing
 }
 
-/// All energies but those that are always zero.
-fn parts(record: &Record, first: &Energy) -> Vec<Curve> {
-    let [kinetic, strains, potential, dissipated, work] = CURVES;
+/// All energies but those that are always zero; last their balance.
+fn curves(record: &Record) -> Vec<Curve> {
+    let first = record.moments.first().map(|moment| moment.energy);
+    let first = first.unwrap_or_default();
+    let curve = |name, color, value: &dyn Fn(&Energy) -> f64| Curve {
+        name,
+        color,
+        points: (record.moments.iter())
+            .map(|moment| (moment.time, value(&moment.energy)))
+            .collect(),
+    };
     let mut curves = vec![
-        Curve::of(record, "kinetic", kinetic, |e| e.kinetic),
-        Curve::of(record, "elastic and coupling", strains, |e| {
+        curve("kinetic", CURVES[0], &|e| e.kinetic),
+        curve("elastic and coupling", CURVES[1], &|e| {
             e.elastic + e.coupling
         }),
-        Curve::of(record, "potential, from the start", potential, |e| {
+        curve("potential, from the start", CURVES[2], &|e| {
             e.potential - first.potential
         }),
-        Curve::of(record, "dissipated", dissipated, |e| e.dissipated),
-        Curve::of(record, "work put in", work, |e| e.work),
+        curve("dissipated", CURVES[3], &|e| e.dissipated),
+        curve("work put in", CURVES[4], &|e| e.work),
     ];
     curves.retain(|curve| curve.values().any(|value| value != 0.0));
+    curves.push(curve("balance", INK, &|e| e.balance() - first.balance()));
     curves
-}
-
-/// A number, rounded to four digits.
-pub fn short(value: f64) -> String {
-    let minus = if value < 0.0 { "\u{2212}" } else { "" };
-    let size = value.abs();
-    if size.is_nan() || size.is_infinite() {
-        return "∞".into();
-    }
-    if size < f64::MIN_POSITIVE {
-        return "0".into();
-    }
-    let exponent = size.log10().floor() as i32;
-    if !(-3..6).contains(&exponent) {
-        let mantissa = size / 10f64.powi(exponent);
-        let power = crate::report::numbers::superscript(exponent);
-        return format!("{minus}{mantissa:.2}×10{power}");
-    }
-    let decimals = (3 - exponent).max(0) as usize;
-    let digits = format!("{size:.decimals$}");
-    let digits = match decimals {
-        0 => &digits,
-        _ => digits.trim_end_matches('0').trim_end_matches('.'),
-    };
-    format!("{minus}{digits}")
 }
 
 #[cfg(test)]
@@ -159,24 +134,11 @@ mod tests {
     use crate::report::sample;
 
     #[test]
-    fn numbers_have_few_digits() {
-        assert_eq!(short(0.0), "0");
-        assert_eq!(short(-0.123456), "\u{2212}0.1235");
-        assert_eq!(short(1234.56), "1235");
-        assert_eq!(short(0.7), "0.7");
-        assert_eq!(short(120.0), "120");
-        assert_eq!(short(2.5e-9), "2.50×10⁻⁹");
-        assert_eq!(short(f64::NAN), "∞");
-    }
-
-    #[test]
     fn what_is_always_zero_is_not_drawn() {
         let mut record = sample::record(3, 4);
         let names = |record: &Record| -> Vec<&str> {
-            parts(record, &Energy::default())
-                .iter()
-                .map(|curve| curve.name)
-                .collect()
+            let curves = curves(record).into_iter();
+            curves.map(|curve| curve.name).collect()
         };
         assert!(!names(&record).contains(&"work put in"));
         record.moments[3].energy.work = 0.1;

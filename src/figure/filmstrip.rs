@@ -1,70 +1,51 @@
-//! The leaf at some instants, seen by one camera, to one scale.
+//! A leaf in motion at some instants.
 
 use glam::DVec3;
 
 use super::colors::NOTE;
-use super::drawing::{Drawing, Path, Step, Stroke};
-use super::energy::short;
-use super::flat::title;
-use super::header;
-use super::markers::{clamp_marker, tip_markers};
-use super::motion::notes;
-use super::page::WIDTH;
-use super::space::{self, Camera, draw_box, draw_veins};
-use super::strip::{SIDE, Strip, THINNER};
+use super::drawing::{Drawing, Stroke, polyline};
+use super::energy::notes;
+use super::header::header;
+use super::page::{WIDTH, title};
+use super::small::{SIDE, SmallPanels};
 use super::veins::{Veins, is_near};
+use crate::report::numbers::short;
 use crate::simulate::{Record, Still};
 
 /// Points of the tip's way that are drawn between two panels at most.
 const MOST_WAY: usize = 400;
 
-/// The whole page.
+/// Draws the whole page.
 pub fn draw(record: &Record) -> Drawing {
     let name = format!("{} in motion", record.scenario);
-    let shapes: Vec<Veins> = record
-        .stills
-        .iter()
-        .map(|still| veins(record, still))
-        .collect();
-    let strip = Strip::holding(shapes.iter(), shapes.len());
-    let mut drawing = Drawing {
-        width: WIDTH,
-        height: strip.end(),
-        description: name.clone(),
-        marks: Vec::new(),
-    };
+    let stills = record.stills.iter();
+    let shapes: Vec<Veins> = stills.map(|still| veins(record, still)).collect();
+    let panels = SmallPanels::holding(shapes.iter(), shapes.len());
+    let mut drawing = Drawing::new(WIDTH, &name);
+    drawing.height = panels.end();
     if let Some(veins) = shapes.first() {
+        let mut notes = notes(record);
+        notes.extend(veins.notes());
+        notes.push(format!("a square of the grid is {} L wide", panels.step));
         drawing.group("header", |page| {
-            let mut notes = notes(record);
-            notes.extend(veins.notes());
-            notes.push(format!("a square of the grid is {} L wide", strip.step));
-            header::draw_from(SIDE, page, &name, &notes, veins);
+            header(page, SIDE, &name, &notes, Some(veins));
         });
     }
+    let mut since = record.stills.first().map_or(0, |still| still.moment);
     for (index, (veins, still)) in shapes.iter().zip(&record.stills).enumerate() {
-        let camera = strip.camera(index);
-        let since = match index {
-            0 => still.moment,
-            _ => record.stills[index - 1].moment,
-        };
         let way = way(record, since, still.moment);
+        since = still.moment;
         drawing.group("instant", |page| {
             let time = record.moments.get(still.moment).map_or(0.0, |m| m.time);
             let letter = format!("({})", char::from(b'a' + (index % 26) as u8));
             let when = format!("t = {}", short(time));
-            title(page, strip.cell(index).corner, &letter, &when);
-            let edges = strip.edges(&camera);
-            draw_box(page, &camera, strip.low, strip.high, &edges);
-            if index == 0 {
-                for edge in &edges {
-                    space::name(page, &camera, edge, 9.0);
+            title(page, panels.cell(index).corner, &letter, &when);
+            panels.draw(page, index, veins, |page, scene, _| {
+                let way: Vec<_> = way.iter().map(|&point| scene.place(point)).collect();
+                if !way.is_empty() {
+                    page.stroke(polyline(&way), Stroke::new(NOTE, 0.8));
                 }
-            }
-            let thin = THINNER * veins.line_width();
-            draw_veins(page, &camera, veins, strip.low.z, thin);
-            draw_way(page, &camera, &way);
-            clamp_marker(page, camera.place(DVec3::ZERO));
-            tip_markers(page, veins, |tip| camera.place(tip));
+            });
         });
     }
     drawing
@@ -89,15 +70,4 @@ fn way(record: &Record, from: usize, to: usize) -> Vec<DVec3> {
         .map(|moment| moment.tip / record.length)
         .filter(|&point| is_near(point))
         .collect()
-}
-
-fn draw_way(page: &mut Drawing, camera: &Camera, way: &[DVec3]) {
-    let mut path: Path = way
-        .iter()
-        .map(|&point| Step::Line(camera.place(point)))
-        .collect();
-    if let Some(first) = way.first() {
-        path[0] = Step::Move(camera.place(*first));
-        page.stroke(path, Stroke::new(NOTE, 0.8));
-    }
 }

@@ -1,6 +1,9 @@
 //! The embedded font: how wide a text is, and its outlines for the PNG.
 
+use glam::DVec2;
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
+
+use super::drawing::{Path, Step};
 
 static FONT: &[u8] = include_bytes!("../../assets/DejaVuSans-subset.ttf");
 
@@ -40,21 +43,30 @@ impl Font {
         lines
     }
 
-    /// Outlines a text that starts at the origin of its base line, y up, in
-    /// units of the page.
-    pub fn outline(&self, text: &str, size: f64, into: &mut dyn OutlineBuilder) {
-        let scale = self.scale(size);
-        let mut start = 0.0;
-        for glyph in text.chars().map(|c| self.glyph(c)) {
-            let mut placed = Placed {
-                scale: scale as f32,
-                start: start as f32,
-                into: &mut *into,
-            };
-            // Blanks have no outline.
-            let _ = self.face.outline_glyph(glyph, &mut placed);
-            start += self.advance(glyph) * scale;
+    /// The text, or as much of it as fits, with an ellipsis.
+    pub fn shortened(&self, text: &str, size: f64, width: f64) -> String {
+        let mut shown: String = text.chars().filter(|c| !c.is_control()).collect();
+        if self.width(&shown, size) <= width {
+            return shown;
         }
+        while self.width(&shown, size) + size > width && shown.pop().is_some() {}
+        shown + "…"
+    }
+
+    /// The outlines of a text that starts at the origin of its base line.
+    pub fn outline(&self, text: &str, size: f64) -> Path {
+        let mut outline = Outline {
+            scale: self.scale(size),
+            start: 0.0,
+            at: DVec2::ZERO,
+            path: Vec::new(),
+        };
+        for glyph in text.chars().map(|c| self.glyph(c)) {
+            // Blanks have no outline.
+            let _ = self.face.outline_glyph(glyph, &mut outline);
+            outline.start += self.advance(glyph) * outline.scale;
+        }
+        outline.path
     }
 
     fn scale(&self, size: f64) -> f64 {
@@ -71,45 +83,53 @@ impl Font {
     }
 }
 
-/// Scales a glyph and moves it along the base line.
-struct Placed<'a> {
-    scale: f32,
-    start: f32,
-    into: &'a mut dyn OutlineBuilder,
+/// Glyphs on the way into a path, scaled, turned upside down (y is down on the
+/// page) and moved along the base line.
+struct Outline {
+    scale: f64,
+    /// Where the glyph begins.
+    start: f64,
+    /// Where the pen is.
+    at: DVec2,
+    path: Path,
 }
 
-impl Placed<'_> {
-    fn place(&self, x: f32, y: f32) -> (f32, f32) {
-        (self.start + self.scale * x, self.scale * y)
+impl Outline {
+    fn place(&mut self, x: f32, y: f32) -> DVec2 {
+        let point = self.scale * DVec2::new(f64::from(x), -f64::from(y));
+        self.at = point + DVec2::new(self.start, 0.0);
+        self.at
     }
 }
 
-impl OutlineBuilder for Placed<'_> {
+impl OutlineBuilder for Outline {
     fn move_to(&mut self, x: f32, y: f32) {
-        let (x, y) = self.place(x, y);
-        self.into.move_to(x, y);
+        let to = self.place(x, y);
+        self.path.push(Step::Move(to));
     }
 
     fn line_to(&mut self, x: f32, y: f32) {
-        let (x, y) = self.place(x, y);
-        self.into.line_to(x, y);
+        let to = self.place(x, y);
+        self.path.push(Step::Line(to));
     }
 
     fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
-        let (x1, y1) = self.place(x1, y1);
-        let (x, y) = self.place(x, y);
-        self.into.quad_to(x1, y1, x, y);
+        let from = self.at;
+        let control = self.place(x1, y1);
+        let to = self.place(x, y);
+        // The same curve as a cubic one.
+        let (a, b) = (from.lerp(control, 2.0 / 3.0), to.lerp(control, 2.0 / 3.0));
+        self.path.push(Step::Cubic(a, b, to));
     }
 
     fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
-        let (x1, y1) = self.place(x1, y1);
-        let (x2, y2) = self.place(x2, y2);
-        let (x, y) = self.place(x, y);
-        self.into.curve_to(x1, y1, x2, y2, x, y);
+        let (a, b) = (self.place(x1, y1), self.place(x2, y2));
+        let to = self.place(x, y);
+        self.path.push(Step::Cubic(a, b, to));
     }
 
     fn close(&mut self) {
-        self.into.close();
+        self.path.push(Step::Close);
     }
 }
 
@@ -120,7 +140,7 @@ mod tests {
     #[test]
     fn every_sign_of_the_figure_is_in_the_font() {
         let font = Font::embedded();
-        for c in "ξηζσ=xyz/L(abcd)0123456789.−×⁻⁰¹²³⁴⁵⁶⁷⁸⁹·≤∞…".chars()
+        for c in "ξηζσω=xyz/L(abcd)0123456789.−×⁻⁰¹²³⁴⁵⁶⁷⁸⁹·≤∞…".chars()
         {
             assert!(font.face.glyph_index(c).is_some(), "{c}");
         }
@@ -133,5 +153,13 @@ mod tests {
         let lines = font.wrapped("use more intervals or more", 12.0, width);
         assert_eq!(lines, ["use more", "intervals", "or more"]);
         assert!(font.wrapped("", 12.0, width).is_empty());
+    }
+
+    #[test]
+    fn long_names_are_cut() {
+        let font = Font::embedded();
+        assert_eq!(font.shortened("explicit", 10.5, 200.0), "explicit");
+        let long = font.shortened(&"explicit ".repeat(20), 10.5, 200.0);
+        assert!(long.ends_with('…') && font.width(&long, 10.5) <= 200.0);
     }
 }

@@ -1,33 +1,27 @@
-//! The figure of a leaf at rest.
+//! A leaf at rest.
 
-use super::Pictured;
 use super::drawing::Drawing;
-use super::header::{self, HEADER};
-use super::page::{Panels, WIDTH};
+use super::header::header;
+use super::page::{HEADER, LEFT, WIDTH};
+use super::panels::Panels;
 use super::veins::Veins;
 use crate::relax::Equilibrium;
 use crate::report::numbers::power_of_ten;
 use crate::report::words::{shooting, verdict};
 
-impl Pictured for Equilibrium {
-    const SVG: &'static str = "figure.svg";
-    const PNG: &'static str = "figure.png";
-
-    fn draw(&self) -> Drawing {
-        let veins = Veins::of(self);
-        let panels = Panels::below(HEADER, &veins);
-        let mut drawing = Drawing {
-            width: WIDTH,
-            height: panels.end().ceil(),
-            description: format!("{}: {}", self.scenario, verdict(self)),
-            marks: Vec::new(),
-        };
-        drawing.group("header", |page| {
-            header::draw(page, &self.scenario, &notes(self, &veins), &veins)
-        });
-        panels.draw(&mut drawing, &veins);
-        drawing
-    }
+/// Draws the whole page.
+pub fn draw(leaf: &Equilibrium) -> Drawing {
+    let veins = Veins::of(leaf);
+    let panels = Panels::below(HEADER, &veins);
+    let description = format!("{}: {}", leaf.scenario, verdict(leaf));
+    let mut drawing = Drawing::new(WIDTH, &description);
+    drawing.height = panels.end().ceil();
+    let notes = notes(leaf, &veins);
+    drawing.group("header", |page| {
+        header(page, LEFT, &leaf.scenario, &notes, Some(&veins));
+    });
+    panels.draw(&mut drawing, &veins);
+    drawing
 }
 
 fn notes(equilibrium: &Equilibrium, veins: &Veins) -> Vec<String> {
@@ -62,14 +56,14 @@ mod tests {
                 curve[4].z = wild;
             }
             leaf.tips[0].x = wild;
-            leaf.draw();
+            draw(&leaf);
             leaf.shape
                 .curves
                 .iter_mut()
                 .for_each(|curve| curve.fill(DVec3::splat(wild)));
-            leaf.draw();
+            draw(&leaf);
             leaf.shape.curves.clear();
-            leaf.draw();
+            draw(&leaf);
         }
     }
 }

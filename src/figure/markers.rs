@@ -1,28 +1,73 @@
-//! Markers: the clamp, the tips, and points of a second solution.
+//! Markers: of points in a panel, of the clamp and the tips of a leaf, and of
+//! points of a second solution.
 
 use glam::{DVec2, DVec3};
 
-use super::colors::{DOT, INK, WHITE};
-use super::drawing::{Drawing, Stroke, circle, rectangle};
+use super::colors::{Color, DOT, INK, WHITE};
+use super::drawing::{Drawing, Stroke, circle, polygon, rectangle};
 use super::veins::Veins;
+
+/// The shape of a marked point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Marker {
+    /// A small disc, for points close to each other.
+    Dot,
+    Circle,
+    Square,
+    Triangle,
+    Wedge,
+    Diamond,
+    Ring,
+    Cross,
+}
+
+impl Marker {
+    pub fn draw(self, page: &mut Drawing, at: DVec2, color: Color) {
+        let shape = |corners: &[[f64; 2]]| {
+            let corners = corners.iter().map(|&corner| at + DVec2::from_array(corner));
+            polygon(&corners.collect::<Vec<_>>())
+        };
+        let path = match self {
+            Marker::Dot => circle(at, 2.4),
+            Marker::Circle => circle(at, 3.4),
+            Marker::Square => shape(&[[-3.1, -3.1], [3.1, -3.1], [3.1, 3.1], [-3.1, 3.1]]),
+            Marker::Triangle => shape(&[[0.0, -4.2], [4.0, 3.0], [-4.0, 3.0]]),
+            Marker::Wedge => shape(&[[0.0, 4.2], [4.0, -3.0], [-4.0, -3.0]]),
+            Marker::Diamond => shape(&[[0.0, -4.4], [4.4, 0.0], [0.0, 4.4], [-4.4, 0.0]]),
+            Marker::Ring => {
+                return page.shape(circle(at, 3.4), WHITE, Some(Stroke::new(color, 1.4)));
+            }
+            Marker::Cross => {
+                for arm in [DVec2::new(3.6, 3.6), DVec2::new(3.6, -3.6)] {
+                    page.line(at - arm, at + arm, Stroke::new(color, 1.7));
+                }
+                return;
+            }
+        };
+        page.shape(path, color, Some(Stroke::new(WHITE, 0.8)));
+    }
+}
 
 /// Where the rods are clamped; larger than the tip's marker, which may cover it.
 pub fn clamp_marker(page: &mut Drawing, at: DVec2) {
     let half = DVec2::splat(4.2);
-    page.shape(
-        rectangle(at - half, 2.0 * half),
-        INK,
-        Some(Stroke::new(WHITE, 1.0)),
-    );
+    let rim = Some(Stroke::new(WHITE, 1.0));
+    page.shape(rectangle(at - half, 2.0 * half), INK, rim);
 }
 
 /// The joint tip, or the tip of a single rod.
 pub fn tip_marker(page: &mut Drawing, at: DVec2) {
-    page.shape(circle(at, 3.3), WHITE, Some(Stroke::new(INK, 1.3)));
+    Marker::Ring.draw(page, at, INK);
 }
 
-/// Marks all tips, small if there are many.
-pub fn tip_markers(page: &mut Drawing, veins: &Veins, place: impl Fn(DVec3) -> DVec2) {
+/// What is marked on a leaf: points of a second solution, the clamp and all
+/// tips, small if there are many.
+pub fn leaf_markers(page: &mut Drawing, veins: &Veins, place: impl Fn(DVec3) -> DVec2) {
+    let radius = 0.7 + 0.6 * veins.line_width();
+    for &point in &veins.dots {
+        dot(page, place(point), radius);
+    }
+    clamp_marker(page, place(DVec3::ZERO));
     if let [(tip, _)] = veins.tips.as_slice() {
         return tip_marker(page, place(*tip));
     }
@@ -36,12 +81,4 @@ pub fn tip_markers(page: &mut Drawing, veins: &Veins, place: impl Fn(DVec3) -> D
 /// A point of a second solution: a colour that no vein has.
 pub fn dot(page: &mut Drawing, at: DVec2, radius: f64) {
     page.shape(circle(at, radius), DOT, None);
-}
-
-/// The points of the second solution, small if the veins are thin.
-pub fn dots(page: &mut Drawing, veins: &Veins, place: impl Fn(DVec3) -> DVec2) {
-    let radius = 0.7 + 0.6 * veins.line_width();
-    for &point in &veins.dots {
-        dot(page, place(point), radius);
-    }
 }

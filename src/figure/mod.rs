@@ -3,51 +3,176 @@
 //! time, and the leaf at some instants; of a chart speed against accuracy, and
 //! cost against the number of veins; and the modes of a leaf at rest.
 //!
-//! One drawing code fills a [`drawing::Drawing`]; `svg` writes it down and
-//! `png` paints it, so that both files are the same picture.
+//! Each picture's file says what it shows and fills a [`drawing::Drawing`]: a
+//! page with a header, panels between axes ([`axes`]) or in space ([`space`]),
+//! and keys. `svg` writes it down and `png` paints it, so that both files are
+//! the same picture.
 
 mod all;
+mod axes;
+mod axis;
 mod chart;
+mod chart_panel;
 mod check;
 mod colors;
-mod curves;
 mod differences;
 mod drawing;
 mod energy;
 mod filmstrip;
-mod flat;
 mod font;
 mod header;
+mod key;
 mod leaf;
-mod logaxis;
-mod loglog;
 mod map;
 mod markers;
 mod modes;
-mod motion;
 mod page;
+mod panels;
 mod png;
-mod series;
 mod small;
 mod space;
-mod strip;
 mod svg;
-mod ticks;
 mod trace;
 mod veins;
 
-pub use modes::ModesFigure;
-pub use motion::MotionFigure;
-pub use png::FigurePng;
-pub use svg::FigureSvg;
+use std::io::{self, Write};
 
-/// A result with a figure.
-pub trait Pictured {
-    /// Name of the SVG file.
-    const SVG: &'static str;
-    /// Name of the PNG file.
-    const PNG: &'static str;
+pub use all::draw as all;
+pub use chart::{draw_chart as chart, draw_scaling as scaling};
+pub use check::draw as check;
+pub use energy::draw as energy;
+pub use filmstrip::draw as filmstrip;
+pub use leaf::draw as leaf;
+pub use map::draw as map;
+pub use modes::draw as modes;
+pub use trace::draw as trace;
 
-    /// Draws the whole page.
-    fn draw(&self) -> drawing::Drawing;
+use crate::report::Format;
+use drawing::Drawing;
+
+/// A picture of a result as a file.
+pub struct Picture<R> {
+    file: &'static str,
+    draw: fn(&R) -> Drawing,
+    write: fn(&Drawing, &mut dyn Write) -> io::Result<()>,
+}
+
+impl<R> Picture<R> {
+    /// As text that any browser or editor opens.
+    pub const fn svg(file: &'static str, draw: fn(&R) -> Drawing) -> Self {
+        let write = svg::write;
+        Picture { file, draw, write }
+    }
+
+    /// As pixels.
+    pub const fn png(file: &'static str, draw: fn(&R) -> Drawing) -> Self {
+        let write = png::write;
+        Picture { file, draw, write }
+    }
+}
+
+impl<R> Format<R> for Picture<R> {
+    fn file_name(&self) -> &'static str {
+        self.file
+    }
+
+    fn write(&self, result: &R, out: &mut dyn Write) -> io::Result<()> {
+        (self.write)(&(self.draw)(result), out)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::*;
+    use crate::report::sample;
+    use crate::simulate::{Record, Stopped};
+    use glam::DVec3;
+
+    #[test]
+    fn every_picture_is_wide_enough_to_print() {
+        for drawing in [
+            leaf(&sample::fan(21, 32)),
+            check(&sample::check(21, 32, 0.1)),
+            chart(&sample::chart()),
+            scaling(&sample::scaling()),
+            map(&sample::map()),
+            trace(&sample::trace()),
+            energy(&sample::record(5, 16)),
+            filmstrip(&sample::record(5, 16)),
+        ] {
+            svg::text(&drawing);
+            let mut bytes = Vec::new();
+            png::write(&drawing, &mut bytes).unwrap();
+            let reader = ::png::Decoder::new(Cursor::new(&bytes)).read_info();
+            let reader = reader.unwrap();
+            assert_eq!(reader.info().width, 1800, "{}", drawing.description);
+            assert_eq!(reader.info().color_type, ::png::ColorType::Rgb);
+        }
+    }
+
+    #[test]
+    fn names_are_escaped() {
+        let mut fan = sample::fan(5, 8);
+        fan.scenario = "a < b & \"c\"\u{1}".into();
+        let svg = svg::text(&leaf(&fan));
+        assert!(svg.contains(">a &lt; b &amp; \"c\"</text>"));
+    }
+
+    fn motion(record: &Record) -> [String; 2] {
+        [energy(record), filmstrip(record)].map(|drawing| svg::text(&drawing))
+    }
+
+    #[test]
+    fn an_early_end_is_told() {
+        let mut record = sample::record(5, 8);
+        record.stopped = Some(Stopped::Diverged {
+            otherwise: "--method semi-implicit",
+            time: 10.1,
+            percent: 70.0,
+        });
+        for svg in motion(&record) {
+            assert!(svg.contains("ended early: diverged"));
+        }
+    }
+
+    #[test]
+    fn numbers_gone_wild_are_drawn_without_a_panic() {
+        for wild in [f64::NAN, f64::INFINITY, 1e308, -1e300, 1e-310, 0.0] {
+            let mut record = sample::record(3, 8);
+            record.stills[3].curves[1][4].z = wild;
+            record.moments[70].energy.kinetic = wild;
+            record.moments[71].tip.x = wild;
+            motion(&record);
+            for moment in &mut record.moments {
+                moment.energy.kinetic = wild;
+                moment.energy.potential = -wild;
+                moment.tip = DVec3::splat(wild);
+            }
+            for still in &mut record.stills {
+                let curves = still.curves.iter_mut();
+                curves.for_each(|curve| curve.fill(DVec3::splat(wild)));
+            }
+            motion(&record);
+        }
+    }
+
+    #[test]
+    fn one_output_only() {
+        let mut record = sample::record(3, 8);
+        record.moments.truncate(1);
+        record.stills.truncate(1);
+        motion(&record);
+    }
+
+    #[test]
+    fn a_long_record_makes_no_large_picture() {
+        let mut record = sample::record(3, 8);
+        let many = (0..200_000).map(|i| sample::moment(1e-3 * f64::from(i)));
+        record.moments = many.collect();
+        for svg in motion(&record) {
+            assert!(svg.len() < 1_000_000, "{}", svg.len());
+        }
+    }
 }

@@ -2,17 +2,13 @@
 
 use std::io::{self, Write};
 
-use glam::DVec2;
 use tiny_skia::{
-    FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Stroke as Pen, Transform,
+    FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Stroke as Pen, StrokeDash, Transform,
 };
-use ttf_parser::OutlineBuilder;
 
-use super::Pictured;
 use super::colors::Color;
-use super::drawing::{Anchor, Drawing, Label, Mark, Path, Step, Stroke};
+use super::drawing::{Anchor, DASHES, Drawing, Label, Mark, Path, Step, Stroke};
 use super::font::Font;
-use crate::report::Format;
 
 /// Pixels per unit of the page.
 const SCALE: f64 = 2.0;
@@ -20,22 +16,8 @@ const SCALE: f64 = 2.0;
 /// 192 dots per inch, as the file says them: dots per metre.
 const DOTS_PER_METRE: u32 = 7559;
 
-/// The figure as PNG: `figure.png` of a leaf, `check.png` of a check, `map.png` of a
-/// map.
-pub struct FigurePng;
-
-impl<R: Pictured> Format<R> for FigurePng {
-    fn file_name(&self) -> &'static str {
-        R::PNG
-    }
-
-    fn write(&self, result: &R, out: &mut dyn Write) -> io::Result<()> {
-        write_drawing(&result.draw(), out)
-    }
-}
-
 /// Writes the whole file.
-pub fn write_drawing(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
+pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
     encode(&paint(drawing), out)
 }
 
@@ -49,7 +31,6 @@ fn paint(drawing: &Drawing) -> Pixmap {
         match mark {
             Mark::Group(_) | Mark::EndGroup => (),
             Mark::Shape { path, fill, stroke } => {
-                // A path of a single point has nothing to paint.
                 let Some(path) = outline(path) else { continue };
                 if let Some(fill) = fill {
                     fill_path(&mut canvas, &path, *fill, page_to_pixels());
@@ -68,16 +49,16 @@ fn page_to_pixels() -> Transform {
     Transform::from_scale(SCALE as f32, SCALE as f32)
 }
 
+/// The path; `None` of one that has nothing to paint, like a single point.
 fn outline(path: &Path) -> Option<tiny_skia::Path> {
-    let xy = |point: DVec2| (point.x as f32, point.y as f32);
     let mut builder = PathBuilder::with_capacity(path.len(), 3 * path.len());
     for step in path {
         match *step {
-            Step::Move(to) => builder.move_to(xy(to).0, xy(to).1),
-            Step::Line(to) => builder.line_to(xy(to).0, xy(to).1),
+            Step::Move(to) => builder.move_to(to.x as f32, to.y as f32),
+            Step::Line(to) => builder.line_to(to.x as f32, to.y as f32),
             Step::Cubic(a, b, to) => {
-                let ((ax, ay), (bx, by), (x, y)) = (xy(a), xy(b), xy(to));
-                builder.cubic_to(ax, ay, bx, by, x, y);
+                let [a, b, to] = [a, b, to].map(|point| point.as_vec2());
+                builder.cubic_to(a.x, a.y, b.x, b.y, to.x, to.y);
             }
             Step::Close => builder.close(),
         }
@@ -85,36 +66,30 @@ fn outline(path: &Path) -> Option<tiny_skia::Path> {
     builder.finish()
 }
 
-fn ink(Color(red, green, blue): Color, opacity: f64) -> Paint<'static> {
+fn ink(Color(red, green, blue): Color) -> Paint<'static> {
     let mut paint = Paint::default();
-    paint.set_color_rgba8(red, green, blue, (255.0 * opacity).round() as u8);
+    paint.set_color_rgba8(red, green, blue, 255);
     paint
 }
 
 fn fill_path(canvas: &mut Pixmap, path: &tiny_skia::Path, color: Color, transform: Transform) {
-    canvas.fill_path(path, &ink(color, 1.0), FillRule::Winding, transform, None);
+    canvas.fill_path(path, &ink(color), FillRule::Winding, transform, None);
 }
 
 fn stroke_path(canvas: &mut Pixmap, path: &tiny_skia::Path, stroke: &Stroke) {
+    let dash = stroke.dashed.then(|| DASHES.map(|length| length as f32));
     let pen = Pen {
         width: stroke.width as f32,
         line_cap: LineCap::Round,
         line_join: LineJoin::Round,
+        dash: dash.and_then(|dash| StrokeDash::new(dash.to_vec(), 0.0)),
         ..Pen::default()
     };
-    canvas.stroke_path(
-        path,
-        &ink(stroke.color, stroke.opacity),
-        &pen,
-        page_to_pixels(),
-        None,
-    );
+    canvas.stroke_path(path, &ink(stroke.color), &pen, page_to_pixels(), None);
 }
 
 fn paint_label(canvas: &mut Pixmap, label: &Label, font: &Font) {
-    let mut glyphs = Glyphs(PathBuilder::new());
-    font.outline(&label.text, label.size, &mut glyphs);
-    let Some(path) = glyphs.0.finish() else {
+    let Some(path) = outline(&font.outline(&label.text, label.size)) else {
         return;
     };
     let before = match label.anchor {
@@ -126,34 +101,8 @@ fn paint_label(canvas: &mut Pixmap, label: &Label, font: &Font) {
     let place = page_to_pixels()
         .pre_translate(label.at.x as f32, label.at.y as f32)
         .pre_rotate(turn)
-        .pre_translate(-before as f32, 0.0)
-        .pre_scale(1.0, -1.0);
+        .pre_translate(-before as f32, 0.0);
     fill_path(canvas, &path, label.color, place);
-}
-
-/// Outlines of glyphs on the way into a path.
-struct Glyphs(PathBuilder);
-
-impl OutlineBuilder for Glyphs {
-    fn move_to(&mut self, x: f32, y: f32) {
-        self.0.move_to(x, y);
-    }
-
-    fn line_to(&mut self, x: f32, y: f32) {
-        self.0.line_to(x, y);
-    }
-
-    fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
-        self.0.quad_to(x1, y1, x, y);
-    }
-
-    fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
-        self.0.cubic_to(x1, y1, x2, y2, x, y);
-    }
-
-    fn close(&mut self) {
-        self.0.close();
-    }
 }
 
 fn encode(canvas: &Pixmap, out: &mut dyn Write) -> io::Result<()> {
@@ -178,21 +127,4 @@ fn encode(canvas: &Pixmap, out: &mut dyn Write) -> io::Result<()> {
     writer.write_image_data(&rgb)?;
     writer.finish()?;
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::report::sample;
-
-    #[test]
-    fn the_picture_is_wide_enough_to_print() {
-        let mut bytes = Vec::new();
-        FigurePng.write(&sample::fan(21, 32), &mut bytes).unwrap();
-        let reader = png::Decoder::new(io::Cursor::new(&bytes))
-            .read_info()
-            .unwrap();
-        assert_eq!(reader.info().width, 1800);
-        assert_eq!(reader.info().color_type, png::ColorType::Rgb);
-    }
 }

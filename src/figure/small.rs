@@ -2,75 +2,113 @@
 
 use glam::{DVec2, DVec3};
 
+use super::axis::round_step;
 use super::drawing::Drawing;
-use super::flat::title;
-use super::markers::{clamp_marker, tip_markers};
-use super::page::{Cell, PANEL_TITLE, WIDTH};
-use super::space::{Camera, Room, draw_box, draw_veins, edges_with, surrounding_box};
-use super::ticks::round_step;
+use super::page::{Cell, HEADER, PANEL_TITLE, WIDTH};
+use super::space::{Camera, Room, Scene, surrounding_box};
 use super::veins::Veins;
 
 const COLUMNS: usize = 4;
-const SIDE: f64 = 22.0;
+/// Beside the panels.
+pub const SIDE: f64 = 22.0;
 const GAP: f64 = 12.0;
-const LEAF: f64 = 170.0;
+const LOWEST: f64 = 110.0;
+const HIGHEST: f64 = 330.0;
+const BOTTOM: f64 = 10.0;
 
-/// Between grid lines at least.
+/// Pixels between grid lines at least.
 const GRID: f64 = 17.0;
 
 /// Veins are thinner in small panels.
 const THINNER: f64 = 0.75;
 
 const ROOM: Room = Room {
-    left: 8.0,
-    right: 8.0,
-    below: 8.0,
+    left: 14.0,
+    right: 14.0,
+    below: 14.0,
 };
 
-/// A leaf in the scenario's units, and what it is.
-pub struct SmallLeaf<'a> {
-    pub curves: &'a [Vec<DVec3>],
-    pub tips: &'a [DVec3],
-    pub title: String,
+/// Where the panels are, and the box that all of them show.
+pub struct SmallPanels {
+    bounds: [DVec3; 2],
+    /// Width of a square of the grid, in lengths.
+    pub step: f64,
+    size: DVec2,
+    top: f64,
+    count: usize,
 }
 
-/// Height of the panels of so many leaves.
-pub fn small_height(leaves: usize) -> f64 {
-    leaves.div_ceil(COLUMNS) as f64 * (PANEL_TITLE + LEAF + GAP)
-}
-
-/// Draws them below `top`, numbered from 1.
-pub fn small_leaves(page: &mut Drawing, leaves: &[SmallLeaf], top: f64) {
-    let length = |rod: &Vec<DVec3>| rod.windows(2).map(|w| w[0].distance(w[1])).sum::<f64>();
-    let rods = leaves.iter().flat_map(|leaf| leaf.curves);
-    let longest = rods.map(length).fold(0.0, f64::max);
-    let veins: Vec<Veins> = leaves
-        .iter()
-        .map(|leaf| Veins::through(leaf.curves, leaf.tips, longest))
-        .collect();
-    let lows = veins.iter().map(|veins| veins.low);
-    let highs = veins.iter().map(|veins| veins.high);
-    let (low, high) = surrounding_box(
-        lows.reduce(DVec3::min).unwrap_or(DVec3::ZERO),
-        highs.reduce(DVec3::max).unwrap_or(DVec3::ZERO),
-    );
-    let width = (WIDTH - 2.0 * SIDE - (COLUMNS - 1) as f64 * GAP) / COLUMNS as f64;
-    for (number, (veins, leaf)) in veins.iter().zip(leaves).enumerate() {
-        let (row, column) = (number / COLUMNS, number % COLUMNS);
-        let cell = Cell {
-            corner: DVec2::new(
-                SIDE + column as f64 * (width + GAP),
-                top + PANEL_TITLE + row as f64 * (PANEL_TITLE + LEAF + GAP),
-            ),
-            size: DVec2::new(width, LEAF),
+impl SmallPanels {
+    /// So many panels that hold all of these shapes.
+    pub fn holding<'a>(shapes: impl Iterator<Item = &'a Veins>, count: usize) -> Self {
+        let boxes = shapes.map(|veins| (veins.low, veins.high));
+        let all = boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let (low, high) = all.unwrap_or_default();
+        let bounds = surrounding_box(low, high);
+        let width = (WIDTH - 2.0 * SIDE - (COLUMNS - 1) as f64 * GAP) / COLUMNS as f64;
+        let size = DVec2::new(width, height(bounds, width));
+        let any = Cell {
+            corner: DVec2::ZERO,
+            size,
         };
-        let camera = Camera::facing(low, high, cell, ROOM);
-        let step = round_step(GRID / camera.scale());
-        title(page, cell.corner, &(number + 1).to_string(), &leaf.title);
-        let edges = edges_with(&camera, low, high, |_| step);
-        draw_box(page, &camera, low, high, &edges);
-        draw_veins(page, &camera, veins, low.z, THINNER * veins.line_width());
-        clamp_marker(page, camera.place(DVec3::ZERO));
-        tip_markers(page, veins, |tip| camera.place(tip));
+        SmallPanels {
+            bounds,
+            step: round_step(GRID / Camera::facing(bounds, any, ROOM).scale()),
+            size,
+            top: HEADER,
+            count,
+        }
     }
+
+    /// Below this.
+    pub fn below(self, top: f64) -> Self {
+        SmallPanels { top, ..self }
+    }
+
+    /// Where a panel is.
+    pub fn cell(&self, index: usize) -> Cell {
+        let place = DVec2::new((index % COLUMNS) as f64, (index / COLUMNS) as f64);
+        let pitch = self.size + DVec2::new(GAP, PANEL_TITLE + GAP);
+        Cell {
+            corner: DVec2::new(SIDE, self.top + PANEL_TITLE) + place * pitch,
+            size: self.size,
+        }
+    }
+
+    /// Where the page ends.
+    pub fn end(&self) -> f64 {
+        let rows = self.count.div_ceil(COLUMNS).max(1);
+        let row = PANEL_TITLE + self.size.y + GAP;
+        (self.top + rows as f64 * row + BOTTOM).ceil()
+    }
+
+    /// Draws a leaf into its panel, over what `under` draws there with lines
+    /// of this width. The first panel's axes are named.
+    pub fn draw(
+        &self,
+        page: &mut Drawing,
+        index: usize,
+        veins: &Veins,
+        under: impl FnOnce(&mut Drawing, &Scene, f64),
+    ) {
+        let scene = Scene::new(self.bounds, self.cell(index), ROOM, Some(self.step));
+        scene.draw_box(page);
+        if index == 0 {
+            scene.draw_names(page, 9.0);
+        }
+        let width = THINNER * veins.line_width();
+        under(page, &scene, width);
+        scene.draw_leaf(page, veins, width);
+    }
+}
+
+/// As high as the box needs in a panel of this width.
+fn height(bounds: [DVec3; 2], width: f64) -> f64 {
+    let any = Cell {
+        corner: DVec2::ZERO,
+        size: DVec2::ONE * (ROOM.left + ROOM.right + 1.0),
+    };
+    let (first, last) = Camera::facing(bounds, any, ROOM).outline(bounds);
+    let needed = (last - first).y / (last - first).x * (width - ROOM.left - ROOM.right);
+    (needed + ROOM.below).clamp(LOWEST, HIGHEST)
 }

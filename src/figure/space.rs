@@ -3,12 +3,11 @@
 
 use glam::{DVec2, DVec3};
 
+use super::axis::{multiples, round_step};
 use super::colors::{FLOOR, FRAME, GRID, INK, NOTE, SHADOW};
-use super::drawing::{Drawing, Step, Stroke, polygon};
-use super::flat::{curve, title};
-use super::markers::{clamp_marker, dots, tip_markers};
+use super::drawing::{Anchor, Drawing, Step, Stroke, polygon, polyline};
+use super::markers::leaf_markers;
 use super::page::{Cell, TEXT_SIZE, TICK_SIZE};
-use super::ticks::{round_step, ticks};
 use super::veins::{Piece, Vein, Veins};
 
 /// Where the viewer stands: degrees from the xi axis, and above the floor.
@@ -29,40 +28,18 @@ pub struct Room {
     pub below: f64,
 }
 
-const LABELS: Room = Room {
-    left: 56.0,
-    right: 22.0,
-    below: 36.0,
-};
-
 /// Distance between the ticks of an axis at least.
 const TICK_DISTANCE: f64 = 30.0;
 
-/// Draws the panel into `cell`.
-pub fn draw(page: &mut Drawing, veins: &Veins, cell: Cell) {
-    let (low, high) = surrounding_box(veins.low, veins.high);
-    let camera = Camera::facing(low, high, cell, LABELS);
-    title(page, cell.corner, "(d)", "in space");
-    let edges = edges(&camera, low, high);
-    draw_box(page, &camera, low, high, &edges);
-    for edge in &edges {
-        draw_labels(page, &camera, edge);
-    }
-    draw_veins(page, &camera, veins, low.z, veins.line_width());
-    dots(page, veins, |point| camera.place(point));
-    clamp_marker(page, camera.place(DVec3::ZERO));
-    tip_markers(page, veins, |tip| camera.place(tip));
-}
-
 /// The leaf with air around it, no side too short to see.
-pub fn surrounding_box(low: DVec3, high: DVec3) -> (DVec3, DVec3) {
+pub fn surrounding_box(low: DVec3, high: DVec3) -> [DVec3; 2] {
     let extent = (high - low).max_element();
     let air = DVec3::splat(AIR * if extent > 1e-9 { extent } else { 1.0 });
     let (low, high) = (low - air, high + air);
     let middle = 0.5 * (low + high);
     let sides = high - low;
     let half = 0.5 * sides.max(DVec3::splat(SHORTEST_SIDE * sides.max_element()));
-    (middle - half, middle + half)
+    [middle - half, middle + half]
 }
 
 /// A view with parallel rays, centred in a cell.
@@ -77,7 +54,7 @@ pub struct Camera {
 
 impl Camera {
     /// Sees the whole box in a cell that also has room for labels.
-    pub fn facing(low: DVec3, high: DVec3, cell: Cell, room: Room) -> Self {
+    pub fn facing([low, high]: [DVec3; 2], cell: Cell, room: Room) -> Self {
         let (sin_a, cos_a) = AZIMUTH.to_radians().sin_cos();
         let (sin_e, cos_e) = ELEVATION.to_radians().sin_cos();
         let mut camera = Camera {
@@ -87,7 +64,7 @@ impl Camera {
             scale: 1.0,
             origin: DVec2::ZERO,
         };
-        let (first, last) = camera.outline(low, high);
+        let (first, last) = camera.outline([low, high]);
         let free = cell.size - DVec2::new(room.left + room.right, room.below);
         camera.scale = (free / (last - first)).min_element();
         let middle =
@@ -97,7 +74,7 @@ impl Camera {
     }
 
     /// Corners of the rectangle on the page that holds a box.
-    pub fn outline(&self, low: DVec3, high: DVec3) -> (DVec2, DVec2) {
+    pub fn outline(&self, [low, high]: [DVec3; 2]) -> (DVec2, DVec2) {
         let corners = (0..8).map(|corner| {
             let side = |bit: u32, low: f64, high: f64| if corner & bit == 0 { low } else { high };
             let corner = DVec3::new(
@@ -118,118 +95,26 @@ impl Camera {
         self.scale
     }
 
-    /// Where a point is on the page.
-    pub fn place(&self, point: DVec3) -> DVec2 {
+    fn place(&self, point: DVec3) -> DVec2 {
         let flat = DVec2::new(self.right.dot(point), -self.up.dot(point));
         self.origin + self.scale * flat
     }
 }
 
 /// One axis along an edge of the box.
-pub struct Edge {
+struct Edge {
     name: &'static str,
     direction: DVec3,
     /// A point of the edge.
     at: DVec3,
     low: f64,
     high: f64,
-    /// Between ticks.
-    step: f64,
     /// Away from the box, in the plane the labels lie in.
     outward: DVec3,
     /// Where the two walls on which its grid lines run end.
     walls: [DVec3; 2],
-}
-
-/// Edges along the three axes, each with ticks as fine as can be read.
-fn edges(camera: &Camera, low: DVec3, high: DVec3) -> [Edge; 3] {
-    let step = |direction: DVec3| {
-        let seen = camera.place(direction).distance(camera.place(DVec3::ZERO));
-        round_step(TICK_DISTANCE / seen)
-    };
-    edges_with(camera, low, high, step)
-}
-
-/// Edges with ticks at this distance.
-pub fn edges_with(
-    camera: &Camera,
-    low: DVec3,
-    high: DVec3,
-    step: impl Fn(DVec3) -> f64,
-) -> [Edge; 3] {
-    let sides = high - low;
-    [
-        Edge {
-            name: "ξ",
-            direction: DVec3::X,
-            at: low,
-            low: low.x,
-            high: high.x,
-            step: step(DVec3::X),
-            outward: DVec3::NEG_Y,
-            walls: [
-                DVec3::ZERO.with_y(sides.y),
-                DVec3::new(0.0, sides.y, sides.z),
-            ],
-        },
-        Edge {
-            name: "η",
-            direction: DVec3::Y,
-            at: DVec3::new(high.x, low.y, low.z),
-            low: low.y,
-            high: high.y,
-            step: step(DVec3::Y),
-            outward: DVec3::X,
-            walls: [
-                DVec3::ZERO.with_x(-sides.x),
-                DVec3::new(-sides.x, 0.0, sides.z),
-            ],
-        },
-        Edge {
-            name: "ζ",
-            direction: DVec3::Z,
-            at: low,
-            low: low.z,
-            high: high.z,
-            step: step(DVec3::Z),
-            outward: -camera.right,
-            walls: [
-                DVec3::ZERO.with_y(sides.y),
-                DVec3::new(sides.x, sides.y, 0.0),
-            ],
-        },
-    ]
-}
-
-/// The floor, the two walls behind the leaf, and their grid.
-pub fn draw_box(page: &mut Drawing, camera: &Camera, low: DVec3, high: DVec3, edges: &[Edge]) {
-    // The viewer stands at large xi and small eta: the walls at small xi and
-    // large eta are behind the leaf.
-    let near = DVec3::new(high.x, low.y, low.z);
-    let far = DVec3::new(low.x, high.y, low.z);
-    let floor = [low, near, near.with_y(high.y), far];
-    page.shape(
-        polygon(&floor.map(|corner| camera.place(corner))),
-        FLOOR,
-        None,
-    );
-    for edge in edges {
-        draw_grid(page, camera, edge);
-    }
-    let rim = Stroke::new(FRAME, 0.8);
-    for (from, to) in [
-        (low, near),
-        (near, near.with_y(high.y)),
-        (low, low.with_z(high.z)),
-        (far, near.with_y(high.y)),
-        (far, low),
-        (far, far.with_z(high.z)),
-        (low.with_z(high.z), far.with_z(high.z)),
-        (far.with_z(high.z), high),
-        (near.with_y(high.y), high),
-    ] {
-        page.line(camera.place(from), camera.place(to), rim);
-    }
+    /// Between ticks.
+    step: f64,
 }
 
 impl Edge {
@@ -237,66 +122,158 @@ impl Edge {
         self.at + (value - self.at.dot(self.direction)) * self.direction
     }
 
-    /// Away from the box, on the page.
-    fn outward(&self, camera: &Camera) -> DVec2 {
-        (camera.place(self.outward) - camera.place(DVec3::ZERO)).normalize()
-    }
-
     fn ticks(&self) -> Vec<(f64, String)> {
         let room = 0.02 * (self.high - self.low);
-        ticks(self.low + room, self.high - room, self.step)
+        multiples(self.low + room, self.high - room, self.step)
     }
 }
 
-fn draw_grid(page: &mut Drawing, camera: &Camera, edge: &Edge) {
-    for (value, _) in edge.ticks() {
-        let start = edge.point(value);
-        let path = [start, start + edge.walls[0], start + edge.walls[1]].map(|p| camera.place(p));
-        let [first, second, third] = path;
-        let steps = vec![Step::Move(first), Step::Line(second), Step::Line(third)];
-        page.stroke(steps, Stroke::new(GRID, 0.7));
-    }
+/// Edges along the three axes, each with ticks this far apart or, without a
+/// step, as fine as can be read.
+fn edges(camera: &Camera, low: DVec3, high: DVec3, step: Option<f64>) -> [Edge; 3] {
+    let sides = high - low;
+    let edge = |name, direction: DVec3, at, outward, walls| Edge {
+        name,
+        direction,
+        at,
+        low: direction.dot(low),
+        high: direction.dot(high),
+        outward,
+        walls,
+        step: step.unwrap_or_else(|| {
+            let seen = camera.place(direction).distance(camera.place(DVec3::ZERO));
+            round_step(TICK_DISTANCE / seen)
+        }),
+    };
+    let behind = sides.with_x(0.0).with_z(0.0);
+    let left = DVec3::new(-sides.x, 0.0, 0.0);
+    let up = DVec3::new(0.0, 0.0, sides.z);
+    let right = DVec3::new(sides.x, 0.0, 0.0);
+    [
+        edge("ξ", DVec3::X, low, DVec3::NEG_Y, [behind, behind + up]),
+        edge(
+            "η",
+            DVec3::Y,
+            low.with_x(high.x),
+            DVec3::X,
+            [left, left + up],
+        ),
+        edge("ζ", DVec3::Z, low, -camera.right, [behind, behind + right]),
+    ]
 }
 
-fn draw_labels(page: &mut Drawing, camera: &Camera, edge: &Edge) {
-    let out = edge.outward(camera);
-    for (value, text) in edge.ticks() {
-        let foot = camera.place(edge.point(value));
-        page.line(foot, foot + 4.0 * out, Stroke::new(FRAME, 0.8));
-        page.centered(foot + away(out, 17.0), &text, TICK_SIZE, NOTE);
-    }
-    name(page, camera, edge, 38.0);
+/// A box with a camera that sees it.
+pub struct Scene {
+    low: DVec3,
+    high: DVec3,
+    camera: Camera,
+    edges: [Edge; 3],
 }
 
-/// The name of the axis, so far from its edge.
-pub fn name(page: &mut Drawing, camera: &Camera, edge: &Edge, distance: f64) {
-    let middle = camera.place(edge.point(0.5 * (edge.low + edge.high)));
-    let at = middle + away(edge.outward(camera), distance);
-    page.centered(at, edge.name, TEXT_SIZE + 1.0, INK);
+impl Scene {
+    /// The box in a cell with room for labels; its grid is so wide or, without
+    /// a step, as fine as can be read.
+    pub fn new([low, high]: [DVec3; 2], cell: Cell, room: Room, step: Option<f64>) -> Self {
+        let camera = Camera::facing([low, high], cell, room);
+        let edges = edges(&camera, low, high, step);
+        Scene {
+            low,
+            high,
+            camera,
+            edges,
+        }
+    }
+
+    /// Where a point is on the page.
+    pub fn place(&self, point: DVec3) -> DVec2 {
+        self.camera.place(point)
+    }
+
+    /// The floor, the two walls behind the leaf, and their grid.
+    pub fn draw_box(&self, page: &mut Drawing) {
+        let (low, high) = (self.low, self.high);
+        // The viewer stands at large xi and small eta: the walls at small xi and
+        // large eta are behind the leaf.
+        let near = DVec3::new(high.x, low.y, low.z);
+        let far = DVec3::new(low.x, high.y, low.z);
+        let right = near.with_y(high.y);
+        let floor = [low, near, right, far].map(|corner| self.place(corner));
+        page.shape(polygon(&floor), FLOOR, None);
+        for edge in &self.edges {
+            for (value, _) in edge.ticks() {
+                let start = edge.point(value);
+                let line = [start, start + edge.walls[0], start + edge.walls[1]];
+                let line = line.map(|point| self.place(point));
+                page.stroke(polyline(&line), Stroke::new(GRID, 0.7));
+            }
+        }
+        let top = |corner: DVec3| corner.with_z(high.z);
+        for (from, to) in [
+            (low, near),
+            (near, right),
+            (low, top(low)),
+            (far, right),
+            (far, low),
+            (far, top(far)),
+            (top(low), top(far)),
+            (top(far), high),
+            (right, high),
+        ] {
+            page.line(self.place(from), self.place(to), Stroke::new(FRAME, 0.8));
+        }
+    }
+
+    /// Labels the ticks of all axes.
+    pub fn draw_labels(&self, page: &mut Drawing) {
+        for edge in &self.edges {
+            let out = self.outward(edge);
+            for (value, text) in edge.ticks() {
+                let foot = self.place(edge.point(value));
+                page.line(foot, foot + 4.0 * out, Stroke::new(FRAME, 0.8));
+                let at = foot + away(out, 17.0);
+                page.beside(at, &text, TICK_SIZE, Anchor::Middle, NOTE);
+            }
+        }
+    }
+
+    /// Names all axes, so far from their edges.
+    pub fn draw_names(&self, page: &mut Drawing, distance: f64) {
+        for edge in &self.edges {
+            let middle = self.place(edge.point(0.5 * (edge.low + edge.high)));
+            let at = middle + away(self.outward(edge), distance);
+            page.beside(at, edge.name, TEXT_SIZE + 1.0, Anchor::Middle, INK);
+        }
+    }
+
+    /// Away from the box, on the page.
+    fn outward(&self, edge: &Edge) -> DVec2 {
+        (self.place(edge.outward) - self.place(DVec3::ZERO)).normalize()
+    }
+
+    /// The shadow of all veins on the floor, the veins piece by piece, those
+    /// farther away first, and the leaf's markers.
+    pub fn draw_leaf(&self, page: &mut Drawing, veins: &Veins, width: f64) {
+        for vein in &veins.veins {
+            let shadow = vein.path(|point| self.place(point.with_z(self.low.z)));
+            page.stroke(shadow, Stroke::new(SHADOW, width));
+        }
+        let mut pieces: Vec<(f64, &Piece, &Vein)> = veins
+            .veins
+            .iter()
+            .flat_map(|vein| vein.pieces.iter().map(move |piece| (piece, vein)))
+            .map(|(piece, vein)| (self.camera.toward.dot(piece[0] + piece[3]), piece, vein))
+            .collect();
+        pieces.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (_, piece, vein) in pieces {
+            let [start, a, b, end] = piece.map(|point| self.place(point));
+            let path = vec![Step::Move(start), Step::Cubic(a, b, end)];
+            page.stroke(path, Stroke::new(vein.color, width));
+        }
+        leaf_markers(page, veins, |point| self.place(point));
+    }
 }
 
 /// Labels are wider than high: those beside an axis stand farther away.
 fn away(out: DVec2, distance: f64) -> DVec2 {
     distance * out + DVec2::new(5.0 * out.x, 0.0)
-}
-
-/// The shadow of all veins on the floor, and the veins piece by piece, those
-/// farther away first.
-pub fn draw_veins(page: &mut Drawing, camera: &Camera, veins: &Veins, floor: f64, width: f64) {
-    let on_floor = |point: DVec3| camera.place(point.with_z(floor));
-    for vein in &veins.veins {
-        page.stroke(curve(vein, on_floor), Stroke::new(SHADOW, width));
-    }
-    let mut pieces: Vec<(f64, &Piece, &Vein)> = veins
-        .veins
-        .iter()
-        .flat_map(|vein| vein.pieces.iter().map(move |piece| (piece, vein)))
-        .map(|(piece, vein)| (camera.toward.dot(piece[0] + piece[3]), piece, vein))
-        .collect();
-    pieces.sort_by(|a, b| a.0.total_cmp(&b.0));
-    for (_, piece, vein) in pieces {
-        let [start, a, b, end] = piece.map(|point| camera.place(point));
-        let path = vec![Step::Move(start), Step::Cubic(a, b, end)];
-        page.stroke(path, Stroke::new(vein.color, width));
-    }
 }

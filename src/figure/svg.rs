@@ -4,27 +4,11 @@ use std::io::{self, Write};
 
 use glam::DVec2;
 
-use super::Pictured;
 use super::colors::Color;
-use super::drawing::{Anchor, Drawing, Label, Mark, Path, Step, Stroke};
-use crate::report::Format;
-
-/// The figure as SVG: `figure.svg` of a leaf, `check.svg` of a check, `map.svg` of a
-/// map.
-pub struct FigureSvg;
-
-impl<R: Pictured> Format<R> for FigureSvg {
-    fn file_name(&self) -> &'static str {
-        R::SVG
-    }
-
-    fn write(&self, result: &R, out: &mut dyn Write) -> io::Result<()> {
-        write_drawing(&result.draw(), out)
-    }
-}
+use super::drawing::{Anchor, DASHES, Drawing, Label, Mark, Path, Step, Stroke};
 
 /// Writes the whole file.
-pub fn write_drawing(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
+pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
     let Drawing { width, height, .. } = drawing;
     writeln!(
         out,
@@ -78,8 +62,9 @@ fn write_stroke(stroke: &Stroke, out: &mut dyn Write) -> io::Result<()> {
         hex(stroke.color),
         stroke.width
     )?;
-    if stroke.opacity < 1.0 {
-        write!(out, " stroke-opacity=\"{}\"", stroke.opacity)?;
+    if stroke.dashed {
+        let [dash, gap] = DASHES;
+        write!(out, " stroke-dasharray=\"{dash} {gap}\"")?;
     }
     Ok(())
 }
@@ -140,22 +125,20 @@ fn escaped(text: &str) -> String {
         .collect()
 }
 
+/// The picture as text, of which no number and no group is broken.
+#[cfg(test)]
+pub fn text(drawing: &Drawing) -> String {
+    let mut bytes = Vec::new();
+    write(drawing, &mut bytes).unwrap();
+    let svg = String::from_utf8(bytes).unwrap();
+    assert_eq!(svg.matches("<g ").count(), svg.matches("</g>").count());
+    assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+    svg
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::sample;
-
-    #[test]
-    fn names_are_escaped_and_groups_closed() {
-        let mut leaf = sample::fan(5, 8);
-        leaf.scenario = "a < b & \"c\"\u{1}".into();
-        let mut bytes = Vec::new();
-        FigureSvg.write(&leaf, &mut bytes).unwrap();
-        let svg = String::from_utf8(bytes).unwrap();
-        assert!(svg.contains(">a &lt; b &amp; \"c\"</text>"));
-        assert_eq!(svg.matches("<g ").count(), svg.matches("</g>").count());
-        assert!(!svg.contains("NaN") && !svg.contains("inf"));
-    }
 
     #[test]
     fn numbers_are_short() {

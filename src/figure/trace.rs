@@ -3,70 +3,77 @@
 
 use glam::{DVec2, DVec3};
 
-use super::Pictured;
-use super::colors::{CURVES, INK, WHITE};
-use super::curves::{Axes, Range};
-use super::drawing::{Anchor, Drawing, HALF_CAPITAL, Stroke, circle, polygon};
-use super::energy::short;
-use super::flat::title;
-use super::header::{self, HEADER};
-use super::page::{Cell, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH};
-use super::small::{SmallLeaf, small_height, small_leaves};
-use crate::report::numbers::power_of_ten;
+use super::axes::Axes;
+use super::axis::Axis;
+use super::colors::{CURVES, INK};
+use super::drawing::{Anchor, Drawing, Stroke};
+use super::header::header;
+use super::key::Key;
+use super::markers::Marker;
+use super::page::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, WIDTH, title};
+use super::small::SmallPanels;
+use super::veins::Veins;
+use crate::report::numbers::{power_of_ten, short};
 use crate::report::words::branch_end;
-use crate::study::{PointKind, Trace, TraceBranch, TracePoint};
+use crate::study::{Law, PointKind, Trace, TraceBranch, TracePoint};
 
 const DIAGRAM: f64 = 380.0;
 /// Right of the panel, for the key.
 const KEY: f64 = 190.0;
 const LAW: f64 = 240.0;
 const BETWEEN: f64 = 26.0;
-const BOTTOM: f64 = 10.0;
 
-/// Leaves drawn.
+/// Leaves drawn, and branches named.
 const MOST_LEAVES: usize = 8;
+const MOST_NAMED: usize = 7;
 
-/// Length of a dash and of the gap after it.
-const DASH: f64 = 5.0;
+/// Points closer than this on the page have one label.
+const CLOSE: f64 = 14.0;
 
-impl Pictured for Trace {
-    const SVG: &'static str = "trace.svg";
-    const PNG: &'static str = "trace.png";
+const AXES: [&str; 3] = ["x", "y", "z"];
 
-    fn draw(&self) -> Drawing {
-        let shown = shown(self);
-        let law = match self.law {
-            Some(_) => PANEL_TITLE + LAW + PANEL_AXIS + BETWEEN,
-            None => 0.0,
-        };
-        let diagram = HEADER + PANEL_TITLE;
-        let leaves = diagram + DIAGRAM + PANEL_AXIS + law;
-        let name = format!("{}: equilibria along {}", self.scenario, self.keys);
-        let mut drawing = Drawing {
-            width: WIDTH,
-            height: leaves + small_height(shown.len()) + BOTTOM,
-            description: name.clone(),
-            marks: Vec::new(),
-        };
-        drawing.group("header", |page| {
-            header::draw_without_key(page, &name, &notes(self));
-        });
-        let cell = |top: f64, height: f64| Cell {
-            corner: DVec2::new(LEFT, top),
-            size: DVec2::new(WIDTH - LEFT - RIGHT - KEY, height),
-        };
-        drawing.group("branches", |page| {
-            branches(page, self, &shown, cell(diagram, DIAGRAM));
-        });
-        if self.law.is_some() {
-            let top = diagram + DIAGRAM + PANEL_AXIS + PANEL_TITLE + BETWEEN;
-            drawing.group("law", |page| hooke(page, self, cell(top, LAW)));
-        }
-        drawing.group("leaves", |page| {
-            small_leaves(page, &self::leaves(self, &shown), leaves);
-        });
-        drawing
+/// Draws the whole page.
+pub fn draw(trace: &Trace) -> Drawing {
+    let shown = shown(trace);
+    let point = |&[b, p]: &[usize; 2]| &trace.branches[b].points[p];
+    let longest = shown.iter().map(point).flat_map(|point| &point.curves);
+    let longest = longest.map(|curve| length(curve)).fold(0.0, f64::max);
+    let shapes: Vec<Veins> = (shown.iter().map(point))
+        .map(|point| Veins::through(&point.curves, &point.tips, longest))
+        .collect();
+    let law = match trace.law {
+        Some(_) => BETWEEN + PANEL_TITLE + LAW + PANEL_AXIS,
+        None => 0.0,
+    };
+    let diagram = Cell::beside_key(HEADER + PANEL_TITLE, DIAGRAM, KEY);
+    let below = diagram.end().y + PANEL_AXIS;
+    let panels = SmallPanels::holding(shapes.iter(), shown.len()).below(below + law);
+    let name = format!("{}: equilibria along {}", trace.scenario, trace.keys);
+    let mut drawing = Drawing::new(WIDTH, &name);
+    drawing.height = panels.end();
+    drawing.group("header", |page| {
+        header(page, LEFT, &name, &notes(trace), None);
+    });
+    drawing.group("branches", |page| {
+        draw_branches(page, trace, &shown, diagram);
+    });
+    if let (Some(law), Some(branch)) = (&trace.law, trace.branches.first()) {
+        let cell = Cell::beside_key(below + BETWEEN + PANEL_TITLE, LAW, KEY);
+        drawing.group("law", |page| draw_law(page, trace, law, branch, cell));
     }
+    drawing.group("leaves", |page| {
+        for (index, (veins, at)) in shapes.iter().zip(&shown).enumerate() {
+            let corner = panels.cell(index).corner;
+            let text = format!("at {}", what(point(at)));
+            title(page, corner, &(index + 1).to_string(), &text);
+            panels.draw(page, index, veins, |_, _, _| ());
+        }
+    });
+    drawing
+}
+
+fn length(curve: &[DVec3]) -> f64 {
+    curve.windows(2).map(|w| w[0].distance(w[1])).sum()
 }
 
 fn notes(trace: &Trace) -> Vec<String> {
@@ -117,21 +124,27 @@ fn shown(trace: &Trace) -> Vec<[usize; 2]> {
     shown
 }
 
+/// Where a point is, and what its leaf is.
+fn what(point: &TracePoint) -> String {
+    let kind = match (point.kind, point.index) {
+        (PointKind::Regular, 0) => "stable".into(),
+        (PointKind::Regular, index) => format!("index {index}"),
+        (kind, _) => kind.word().replace('-', " "),
+    };
+    format!("{}, {kind}", short(point.value))
+}
+
 /// The axis along which the tip goes furthest.
 fn axis(trace: &Trace) -> usize {
-    let tips = || {
-        let points = trace.branches.iter().flat_map(|branch| &branch.points);
-        points.filter_map(|point| point.tips.first())
-    };
-    let low = tips().fold(DVec3::INFINITY, |low, tip| low.min(*tip));
-    let high = tips().fold(DVec3::NEG_INFINITY, |high, tip| high.max(*tip));
+    let points = trace.branches.iter().flat_map(|branch| &branch.points);
+    let tips = points.filter_map(|point| point.tips.first().map(|&tip| (tip, tip)));
+    let extent = tips.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let (low, high) = extent.unwrap_or_default();
     let way = high - low;
     (0..3)
         .max_by(|&a, &b| way[a].total_cmp(&way[b]))
         .unwrap_or(2)
 }
-
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// A name with its unit, if that is known.
 fn with_unit(name: &str, unit: &Option<String>) -> String {
@@ -141,67 +154,92 @@ fn with_unit(name: &str, unit: &Option<String>) -> String {
     }
 }
 
-fn branches(page: &mut Drawing, trace: &Trace, shown: &[[usize; 2]], cell: Cell) {
+/// A coordinate of the tip.
+fn tip(point: &TracePoint, axis: usize) -> f64 {
+    point.tips.first().map_or(f64::NAN, |tip| tip[axis])
+}
+
+fn draw_branches(page: &mut Drawing, trace: &Trace, shown: &[[usize; 2]], cell: Cell) {
     let axis = axis(trace);
-    let at = |point: &TracePoint| {
-        let tip = point.tips.first().map_or(f64::NAN, |tip| tip[axis]);
-        (point.value, tip)
-    };
+    let at = |point: &TracePoint| (point.value, tip(point, axis));
     let all = || trace.branches.iter().flat_map(|branch| &branch.points);
-    let axes = Axes {
-        cell,
-        across: Range::of(all().map(|p| at(p).0)).airy(),
-        up: Range::of(all().map(|p| at(p).1)).airy(),
-    };
-    title(
-        page,
-        cell.corner,
-        "(a)",
-        "equilibria: stable drawn solid, unstable dashed",
-    );
-    let tip = format!("{} of the tip", AXES[axis]);
+    let up = format!("{} of the tip", AXES[axis]);
     let across = match trace.keys.to_string() {
         force if force.starts_with("load.tip_force") => with_unit(&force, &trace.units.force),
         other => other,
     };
-    axes.draw(page, &across, &with_unit(&tip, &trace.units.length));
+    let axes = Axes {
+        cell,
+        across: Axis::holding(&across, all().map(|point| at(point).0)),
+        up: Axis::holding(
+            &with_unit(&up, &trace.units.length),
+            all().map(|point| at(point).1),
+        ),
+    };
+    let what = "equilibria: stable drawn solid, unstable dashed";
+    title(page, cell.corner, "(a)", what);
+    axes.draw(page);
     for (b, branch) in trace.branches.iter().enumerate() {
-        let color = CURVES[b % CURVES.len()];
         let entrance = branch.from.map(|[b, p]| &trace.branches[b].points[p]);
         for (points, stable) in pieces(entrance, branch) {
-            let line: Vec<DVec2> = points.iter().map(|p| axes.at(at(p))).collect();
+            let line: Vec<(f64, f64)> = points.into_iter().map(at).collect();
             let width = if stable { 2.0 } else { 1.2 };
-            let stroke = Stroke::new(color, width);
-            match stable {
-                true => line.windows(2).for_each(|w| page.line(w[0], w[1], stroke)),
-                false => dashes(page, &line, stroke),
-            }
-        }
-        if b < 8 {
-            let name = match branch.from {
-                None => "first branch".into(),
-                Some([from, _]) => format!("branch {}, off branch {}", b + 1, from + 1),
-            };
-            axes.key(page, b, color, &name, branch_end(branch.end));
+            let stroke = Stroke::new(CURVES[b % CURVES.len()], width).dashed(!stable);
+            axes.curve(page, &line, stroke);
         }
     }
-    for branch in &trace.branches {
-        for (_, point) in branch.critical() {
-            critical_marker(page, axes.at(at(point)), point.kind);
+    for (kind, marker) in [(true, Marker::Ring), (false, Marker::Diamond)] {
+        let critical = trace.branches.iter().flat_map(TraceBranch::critical);
+        let of_kind = critical.filter(|(_, point)| (point.kind == PointKind::Fold) == kind);
+        axes.markers(page, of_kind.map(|(_, point)| at(point)), marker, INK);
+    }
+    let places = shown
+        .iter()
+        .map(|&[b, p]| axes.at(at(&trace.branches[b].points[p])));
+    number(page, places);
+    draw_key(page, trace, cell);
+}
+
+/// Numbers the leaves that are drawn beside their points.
+fn number(page: &mut Drawing, places: impl Iterator<Item = Option<DVec2>>) {
+    let mut labels: Vec<(DVec2, String)> = Vec::new();
+    for (index, place) in places.enumerate() {
+        let Some(place) = place else { continue };
+        let number = (index + 1).to_string();
+        match labels.iter_mut().find(|(at, _)| at.distance(place) < CLOSE) {
+            Some((_, text)) => *text += &format!(", {number}"),
+            None => labels.push((place, number)),
         }
     }
-    for (number, &[b, p]) in shown.iter().enumerate() {
-        let place = axes.at(at(&trace.branches[b].points[p]));
+    for (place, text) in labels {
         let beside = place + DVec2::new(7.0, -6.0);
-        page.label(
-            beside,
-            &(number + 1).to_string(),
-            TICK_SIZE,
-            Anchor::Start,
-            INK,
-        );
+        page.label(beside, &text, TICK_SIZE, Anchor::Start, INK);
     }
-    markers_key(page, cell, trace.branches.len().min(8));
+}
+
+/// The branches and the kinds of points that there are.
+fn draw_key(page: &mut Drawing, trace: &Trace, cell: Cell) {
+    let mut key = Key::beside(cell);
+    for (b, branch) in trace.branches.iter().enumerate().take(MOST_NAMED) {
+        let name = match branch.from {
+            None => "first branch".into(),
+            Some([from, _]) => format!("branch {}, off branch {}", b + 1, from + 1),
+        };
+        let stroke = Stroke::new(CURVES[b % CURVES.len()], 1.8);
+        key.line(page, &name, branch_end(branch.end), stroke);
+    }
+    if trace.branches.len() > MOST_NAMED {
+        let more = format!("and {} more", trace.branches.len() - MOST_NAMED);
+        key.entry(page, "", &more, |_, _| ());
+    }
+    let folds = |(_, point): (usize, &TracePoint)| point.kind == PointKind::Fold;
+    let critical = || trace.branches.iter().flat_map(TraceBranch::critical);
+    if critical().any(|point| !folds(point)) {
+        key.marker(page, "branches cross", "", Marker::Diamond, INK);
+    }
+    if critical().any(folds) {
+        key.marker(page, "fold", "", Marker::Ring, INK);
+    }
 }
 
 /// The points of a branch, with that from which it was entered, in pieces of one
@@ -225,78 +263,24 @@ fn pieces<'t>(
     pieces
 }
 
-fn dashes(page: &mut Drawing, line: &[DVec2], stroke: Stroke) {
-    let mut gone = 0.0;
-    for pair in line.windows(2) {
-        let way = pair[1] - pair[0];
-        let length = way.length();
-        let mut from = 0.0;
-        while from < length {
-            let phase: f64 = (gone + from) % (2.0 * DASH);
-            let left = if phase < DASH {
-                DASH - phase
-            } else {
-                2.0 * DASH - phase
-            };
-            let to = (from + left.max(1e-3)).min(length);
-            if phase < DASH {
-                let at = |s: f64| pair[0] + way * (s / length);
-                page.line(at(from), at(to), stroke);
-            }
-            from = to;
-        }
-        gone += length;
-    }
-}
-
-fn critical_marker(page: &mut Drawing, at: DVec2, kind: PointKind) {
-    let rim = Some(Stroke::new(INK, 1.1));
-    match kind {
-        PointKind::Fold => page.shape(circle(at, 3.4), WHITE, rim),
-        _ => {
-            let corner = |x: f64, y: f64| at + 4.6 * DVec2::new(x, y);
-            let corners = [
-                corner(1.0, 0.0),
-                corner(0.0, 1.0),
-                corner(-1.0, 0.0),
-                corner(0.0, -1.0),
-            ];
-            page.shape(polygon(&corners), INK, Some(Stroke::new(WHITE, 0.8)));
-        }
-    }
-}
-
-fn markers_key(page: &mut Drawing, cell: Cell, entries: usize) {
-    let x = cell.corner.x + cell.size.x + 27.0;
-    let y = cell.corner.y + 14.0 + 40.0 * entries as f64;
-    let kinds = [
-        (PointKind::Branching(1), "branches cross"),
-        (PointKind::Fold, "fold"),
-    ];
-    for (row, (kind, name)) in kinds.into_iter().enumerate() {
-        let at = DVec2::new(x, y + 18.0 * row as f64);
-        critical_marker(page, at, kind);
-        let base = at + DVec2::new(17.0, HALF_CAPITAL * TICK_SIZE);
-        page.label(base, name, TICK_SIZE, Anchor::Start, INK);
-    }
-}
-
 /// Force against displacement of the tip, and the line through it.
-fn hooke(page: &mut Drawing, trace: &Trace, cell: Cell) {
-    let (Some(law), Some(branch)) = (&trace.law, trace.branches.first()) else {
-        return;
-    };
-    let tip = |point: &TracePoint| point.tips.first().map_or(f64::NAN, |tip| tip[law.axis]);
-    let start = branch.points.first().map_or(0.0, tip);
-    let points: Vec<(f64, f64)> = branch
-        .points
-        .iter()
-        .map(|p| (tip(p) - start, p.value))
+fn draw_law(page: &mut Drawing, trace: &Trace, law: &Law, branch: &TraceBranch, cell: Cell) {
+    let start = branch.points.first().map_or(0.0, |p| tip(p, law.axis));
+    let points: Vec<(f64, f64)> = (branch.points.iter())
+        .map(|point| (tip(point, law.axis) - start, point.value))
         .collect();
+    let units = &trace.units;
+    let across = with_unit(
+        &format!("displacement along {}", AXES[law.axis]),
+        &units.length,
+    );
     let axes = Axes {
         cell,
-        across: Range::of(points.iter().map(|p| p.0)).airy(),
-        up: Range::of(points.iter().map(|p| p.1)).airy(),
+        across: Axis::holding(&across, points.iter().map(|p| p.0)),
+        up: Axis::holding(
+            &with_unit("force", &units.force),
+            points.iter().map(|p| p.1),
+        ),
     };
     title(
         page,
@@ -304,51 +288,34 @@ fn hooke(page: &mut Drawing, trace: &Trace, cell: Cell) {
         "(b)",
         "force against displacement of the tip",
     );
-    let name = format!("displacement along {}", AXES[law.axis]);
-    axes.draw(
-        page,
-        &with_unit(&name, &trace.units.length),
-        &with_unit("force", &trace.units.force),
-    );
+    axes.draw(page);
     let count = points.len() as f64;
-    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
-    let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
+    let x = points.iter().map(|p| p.0).sum::<f64>() / count;
+    let y = points.iter().map(|p| p.1).sum::<f64>() / count;
     let ends = [points.first(), points.last()].map(|end| {
         let across = end.map_or(0.0, |p| p.0);
         (across, y + law.slope * (across - x))
     });
-    axes.curve(page, &ends, Stroke::new(CURVES[2], 1.4));
-    for point in &points {
-        page.shape(circle(axes.at(*point), 1.9), CURVES[0], None);
-    }
-    let unit = match (&trace.units.force, &trace.units.length) {
+    let line = Stroke::new(CURVES[2], 1.4);
+    axes.curve(page, &ends, line);
+    axes.markers(page, points, Marker::Dot, CURVES[0]);
+    let unit = match (&units.force, &units.length) {
         (Some(force), Some(length)) => format!(" {force}/{length}"),
         _ => String::new(),
     };
-    axes.key(page, 0, CURVES[0], "equilibria", "of the first branch");
+    let mut key = Key::beside(cell);
+    key.marker(
+        page,
+        "equilibria",
+        "of the first branch",
+        Marker::Dot,
+        CURVES[0],
+    );
     let slope = format!("slope {}{unit}", short(law.slope));
-    axes.key(page, 1, CURVES[2], "line of least squares", &slope);
+    key.line(page, "line of least squares", &slope, line);
     let off = format!("off by {} % at most", short(100.0 * law.deviation));
-    axes.key(page, 2, WHITE, &format!("R² = {:.6}", law.r_squared), &off);
+    key.entry(page, &format!("R² = {:.6}", law.r_squared), &off, |_, _| ());
     if let Some(young) = law.young {
-        axes.key(page, 3, WHITE, "Young's modulus", &short(young));
+        key.entry(page, "Young's modulus", &short(young), |_, _| ());
     }
-}
-
-/// The leaves at some points, and what each of them is.
-fn leaves<'t>(trace: &'t Trace, shown: &[[usize; 2]]) -> Vec<SmallLeaf<'t>> {
-    let leaf = |at: &[usize; 2]| {
-        let found = &trace.branches[at[0]].points[at[1]];
-        let index = match (found.kind, found.index) {
-            (PointKind::Regular, 0) => "stable".into(),
-            (PointKind::Regular, index) => format!("index {index}"),
-            (kind, _) => kind.word().replace('-', " "),
-        };
-        SmallLeaf {
-            curves: &found.curves,
-            tips: &found.tips,
-            title: format!("at {}, {index}", short(found.value)),
-        }
-    };
-    shown.iter().map(leaf).collect()
 }

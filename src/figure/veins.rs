@@ -1,8 +1,9 @@
 //! The veins as smooth curves, in units of the largest rod length.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::colors::{Color, vein_color};
+use super::drawing::{Path, Step};
 use crate::relax::{Equilibrium, RodShape};
 
 /// Of a wider leaf, only some veins are drawn: more would not be told apart.
@@ -32,6 +33,16 @@ pub type Piece = [DVec3; 4];
 pub struct Vein {
     pub pieces: Vec<Piece>,
     pub color: Color,
+}
+
+impl Vein {
+    /// The whole vein, placed on the page.
+    pub fn path(&self, place: impl Fn(DVec3) -> DVec2) -> Path {
+        let start = self.pieces.first().map(|piece| Step::Move(place(piece[0])));
+        let pieces = self.pieces.iter();
+        let rest = pieces.map(|&[_, a, b, end]| Step::Cubic(place(a), place(b), place(end)));
+        start.into_iter().chain(rest).collect()
+    }
 }
 
 /// What the figure shows.

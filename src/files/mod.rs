@@ -15,7 +15,7 @@ pub use journal::{Journal, belongs, claim, write_rows};
 pub use peers::{PeersError, read_peers};
 pub use recording::{CannotResume, Keeper, Recording};
 
-use crate::figure::{FigurePng, FigureSvg, ModesFigure, MotionFigure};
+use crate::figure::{self, Picture};
 use crate::relax::Equilibrium;
 use crate::report::{
     Centerlines, ChartSummary, ChartTable, CheckSummary, Format, Json, MapSummary, MapTable,
@@ -25,11 +25,18 @@ use crate::simulate::Record;
 use crate::study::{All, Chart, Check, Map, Scaling, Trace};
 
 impl Written for Equilibrium {
-    const FORMATS: &'static [&'static dyn Format<Self>] =
-        &[&Json("summary.json"), &Centerlines, &FigureSvg, &FigurePng];
+    const FORMATS: &'static [&'static dyn Format<Self>] = &[
+        &Json("summary.json"),
+        &Centerlines,
+        &Picture::svg("figure.svg", figure::leaf),
+        &Picture::png("figure.png", figure::leaf),
+    ];
 
-    const MORE: &'static [&'static dyn Format<Self>] =
-        &[&ModesTable, &ModesFigure::SVG, &ModesFigure::PNG];
+    const MORE: &'static [&'static dyn Format<Self>] = &[
+        &ModesTable,
+        &Picture::svg("modes.svg", figure::modes),
+        &Picture::png("modes.png", figure::modes),
+    ];
 
     fn has_more(&self) -> bool {
         let stability = &self.stability;
@@ -42,42 +49,65 @@ impl Written for Equilibrium {
 }
 
 impl Written for Check {
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[&CheckSummary, &FigureSvg, &FigurePng];
+    const FORMATS: &'static [&'static dyn Format<Self>] = &[
+        &CheckSummary,
+        &Picture::svg("check.svg", figure::check),
+        &Picture::png("check.png", figure::check),
+    ];
 }
 
 impl Written for Map {
-    const FORMATS: &'static [&'static dyn Format<Self>] =
-        &[&MapSummary, &MapTable, &FigureSvg, &FigurePng];
+    const FORMATS: &'static [&'static dyn Format<Self>] = &[
+        &MapSummary,
+        &MapTable,
+        &Picture::svg("map.svg", figure::map),
+        &Picture::png("map.png", figure::map),
+    ];
 }
 
 impl Written for All {
-    const FORMATS: &'static [&'static dyn Format<Self>] =
-        &[&Json("equilibria.json"), &FigureSvg, &FigurePng];
+    const FORMATS: &'static [&'static dyn Format<Self>] = &[
+        &Json("equilibria.json"),
+        &Picture::svg("equilibria.svg", figure::all),
+        &Picture::png("equilibria.png", figure::all),
+    ];
 }
 
 impl Written for Trace {
-    const FORMATS: &'static [&'static dyn Format<Self>] =
-        &[&TraceSummary, &TraceTable, &FigureSvg, &FigurePng];
+    const FORMATS: &'static [&'static dyn Format<Self>] = &[
+        &TraceSummary,
+        &TraceTable,
+        &Picture::svg("trace.svg", figure::trace),
+        &Picture::png("trace.png", figure::trace),
+    ];
 }
 
 impl Written for Record {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
         &MotionSummary,
-        &MotionFigure::ENERGY_SVG,
-        &MotionFigure::ENERGY_PNG,
-        &MotionFigure::FILMSTRIP_SVG,
-        &MotionFigure::FILMSTRIP_PNG,
+        &Picture::svg("energy.svg", figure::energy),
+        &Picture::png("energy.png", figure::energy),
+        &Picture::svg("filmstrip.svg", figure::filmstrip),
+        &Picture::png("filmstrip.png", figure::filmstrip),
     ];
 }
 
 impl Written for Chart {
-    const FORMATS: &'static [&'static dyn Format<Self>] =
-        &[&ChartSummary, &ChartTable, &FigureSvg, &FigurePng];
+    const FORMATS: &'static [&'static dyn Format<Self>] = &[
+        &ChartSummary,
+        &ChartTable,
+        &Picture::svg("chart.svg", figure::chart),
+        &Picture::png("chart.png", figure::chart),
+    ];
 }
 
 /// Its numbers are also in the JSON of its chart.
 impl Written for Scaling {
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[&ScalingTable, &FigureSvg, &FigurePng];
+    const FORMATS: &'static [&'static dyn Format<Self>] = &[
+        &ScalingTable,
+        &Picture::svg("chart_rods.svg", figure::scaling),
+        &Picture::png("chart_rods.png", figure::scaling),
+    ];
 }
 
 /// Writes every format of a result into `folder`, which is made if it is not

@@ -113,6 +113,60 @@ pub fn brief(value: f64) -> String {
     }
 }
 
+/// Four digits at most, for figures.
+pub fn short(value: f64) -> String {
+    let minus = minus(value);
+    let size = value.abs();
+    if size.is_nan() || size.is_infinite() {
+        return "∞".into();
+    }
+    if size < f64::MIN_POSITIVE {
+        return "0".into();
+    }
+    let exponent = size.log10().floor() as i32;
+    if !(-3..6).contains(&exponent) {
+        let mantissa = size / 10f64.powi(exponent);
+        return format!("{minus}{mantissa:.2}×10{}", superscript(exponent));
+    }
+    let decimals = (3 - exponent).max(0) as usize;
+    let digits = format!("{size:.decimals$}");
+    format!("{minus}{}", without_idle_zeros(&digits))
+}
+
+/// With so many decimals, for axes.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    format!("{}{:.decimals$}", minus(value), value.abs())
+}
+
+/// A minus sign as wide as a plus sign, of negative values.
+fn minus(value: f64) -> &'static str {
+    if value < 0.0 { "\u{2212}" } else { "" }
+}
+
+/// A power of ten of this sign, as in `10⁻³`.
+pub fn decade(sign: f64, power: i32) -> String {
+    format!("{}10{}", minus(sign), superscript(power))
+}
+
+/// A digit times a power of ten, written out where that is short.
+pub fn digit_of_decade(digit: f64, power: i32) -> String {
+    let (minus, digit) = (minus(digit), digit.abs());
+    match power {
+        -3..=3 => format!("{minus}{}", digit * 10f64.powi(power)),
+        _ => format!("{minus}{digit}×10{}", superscript(power)),
+    }
+}
+
+/// A digit times a power of ten seconds, as in `20 ms`.
+pub fn time_of_decade(digit: f64, power: i32) -> String {
+    let (power, unit) = match power {
+        ..=-1 => (power + 3, "ms"),
+        _ => (power, "s"),
+    };
+    let decimals = (-power).max(0) as usize;
+    format!("{:.decimals$} {unit}", digit * 10f64.powi(power))
+}
+
 fn without_idle_zeros(digits: &str) -> &str {
     match digits.contains('.') {
         true => digits.trim_end_matches('0').trim_end_matches('.'),
@@ -153,5 +207,23 @@ mod tests {
     fn times_are_readable() {
         assert_eq!(seconds(0.00123), "1.23 ms");
         assert_eq!(seconds(12.0), "12.00 s");
+    }
+
+    #[test]
+    fn numbers_in_figures_have_few_digits() {
+        assert_eq!(short(0.0), "0");
+        assert_eq!(short(-0.123456), "\u{2212}0.1235");
+        assert_eq!(short(1234.56), "1235");
+        assert_eq!(short(0.7), "0.7");
+        assert_eq!(short(120.0), "120");
+        assert_eq!(short(2.5e-9), "2.50×10⁻⁹");
+        assert_eq!(short(f64::NAN), "∞");
+        assert_eq!(fixed(-0.25, 1), "\u{2212}0.2");
+        assert_eq!(decade(-1.0, -3), "\u{2212}10⁻³");
+        assert_eq!(digit_of_decade(-2.0, -1), "\u{2212}0.2");
+        assert_eq!(digit_of_decade(5.0, 6), "5×10⁶");
+        let times = [-5, -4, -3, -1, 0, 2].map(|power| time_of_decade(1.0, power));
+        let wanted = ["0.01 ms", "0.1 ms", "1 ms", "100 ms", "1 s", "100 s"];
+        assert_eq!(times, wanted);
     }
 }

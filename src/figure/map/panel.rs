@@ -2,20 +2,23 @@
 
 use glam::DVec2;
 
-use super::super::colors::{Color, FRAME, INK, NOTE, WHITE, vein_color};
-use super::super::drawing::{Anchor, Drawing, HALF_CAPITAL, Stroke, circle, rectangle};
-use super::super::page::{Cell, TICK_SIZE};
-use super::axis::Axis;
-use crate::study::{Confidence, Knob, MapOutcome, MapRequest};
+use crate::figure::axes::Axes;
+use crate::figure::axis::Axis;
+use crate::figure::colors::{Color, FRAME, INK, WHITE, vein_color};
+use crate::figure::drawing::{Anchor, Drawing, Stroke, circle, rectangle};
+use crate::figure::page::Cell;
+use crate::study::{Confidence, Knob, MapOutcome, MapRequest, Vary};
 
-const TICK_LENGTH: f64 = 4.0;
 /// Cells smaller than this are not set apart, and bear no marks.
 const APART: f64 = 5.0;
 /// And no numbers, if smaller than this.
 const NUMBERED: f64 = 13.0;
 const NUMBER_SIZE: f64 = 8.0;
-/// Room that a tick's text takes at least, along each axis.
-const TICK_ROOM: DVec2 = DVec2::new(38.0, 22.0);
+
+/// A leaf that does not wave.
+const PALE: Color = Color(226, 236, 226);
+/// Waves beyond which colours do not change any more.
+const MOST_WAVES: f64 = 2.5;
 
 /// What a cell shows.
 #[derive(Clone, Copy)]
@@ -42,23 +45,17 @@ fn color(outcome: MapOutcome) -> Color {
     }
 }
 
-/// A leaf that does not wave.
-const PALE: Color = Color(226, 236, 226);
-
 /// Fills a cell; one that was refused is crossed out.
 pub fn fill(page: &mut Drawing, cell: Cell, outcome: MapOutcome) {
     page.shape(rectangle(cell.corner, cell.size), color(outcome), None);
     if outcome == MapOutcome::Refused && cell.size.min_element() >= APART {
         let inset = 0.25 * cell.size;
-        let (low, high) = (cell.corner + inset, cell.corner + cell.size - inset);
+        let (low, high) = (cell.corner + inset, cell.end() - inset);
         let thin = Stroke::new(FRAME, 0.8);
         page.line(low, high, thin);
-        page.line(DVec2::new(low.x, high.y), DVec2::new(high.x, low.y), thin);
+        page.line(low.with_y(high.y), high.with_y(low.y), thin);
     }
 }
-
-/// Waves beyond which colours do not change any more.
-const MOST_WAVES: f64 = 2.5;
 
 /// Fills a cell by its number of waves: none is pale.
 pub fn fill_waves(page: &mut Drawing, cell: Cell, waves: f64) {
@@ -73,63 +70,118 @@ pub fn fill_waves(page: &mut Drawing, cell: Cell, waves: f64) {
 /// none.
 pub fn mark(page: &mut Drawing, cell: Cell, reference: Confidence) {
     let radius = (0.14 * cell.size.min_element()).clamp(1.0, 2.2);
-    let at = cell.corner + DVec2::new(cell.size.x, 0.0) + 2.0 * radius * DVec2::new(-1.0, 1.0);
-    match reference {
-        Confidence::Confirmed => {}
-        Confidence::Unconfirmed => {
-            page.shape(circle(at, radius), INK, Some(Stroke::new(WHITE, 0.5)));
-        }
-        Confidence::None => page.shape(circle(at, radius), WHITE, Some(Stroke::new(INK, 0.8))),
-    }
+    let at = cell.corner.with_x(cell.end().x) + 2.0 * radius * DVec2::new(-1.0, 1.0);
+    let (color, rim) = match reference {
+        Confidence::Confirmed => return,
+        Confidence::Unconfirmed => (INK, Stroke::new(WHITE, 0.5)),
+        Confidence::None => (WHITE, Stroke::new(INK, 0.8)),
+    };
+    page.shape(circle(at, radius), color, Some(rim));
 }
 
-const BOUND: Color = Color(170, 0, 60);
-
 /// How the longest stable step is drawn.
-pub fn bound_key(page: &mut Drawing, cell: Cell) {
-    let middle = cell.corner + 0.5 * cell.size;
-    let half = DVec2::new(0.5 * cell.size.x, 0.0);
-    page.line(middle - half, middle + half, Stroke::new(BOUND, 2.0));
+pub fn bound_stroke() -> Stroke {
+    Stroke::new(Color(170, 0, 60), 2.0)
+}
+
+/// A number that varies from cell to cell.
+pub struct Varied {
+    pub axis: Axis,
+    /// Where cells end, as parts of the axis: one more than there are cells.
+    edges: Vec<f64>,
+}
+
+impl Varied {
+    /// Cells in the order given, each around its value.
+    pub fn of(vary: &Vary) -> Self {
+        let sign = vary.log.then(|| vary.values[0].signum());
+        let scale = |value: &f64| match sign {
+            Some(sign) => (sign * value).log10(),
+            None => *value,
+        };
+        let places: Vec<f64> = vary.values.iter().map(scale).collect();
+        let (first, last) = (places[0], places[places.len() - 1]);
+        let mut edges: Vec<f64> = places.windows(2).map(|p| 0.5 * (p[0] + p[1])).collect();
+        let (start, end) = match (edges.first(), edges.last()) {
+            (Some(low), Some(high)) => (2.0 * first - low, 2.0 * last - high),
+            _ => (first - 0.5, first + 0.5),
+        };
+        edges.insert(0, start);
+        edges.push(end);
+        let mut axis = Axis::linear(&name(&vary.keys.to_string()), start, end);
+        if let Some(sign) = sign {
+            axis = axis.of_sign(sign);
+        }
+        if vary.keys.is_whole() {
+            axis = axis.at(vary.values.clone());
+        }
+        let part = |edge: f64| (edge - start) / (end - start);
+        Varied {
+            axis,
+            edges: edges.into_iter().map(part).collect(),
+        }
+    }
+
+    fn cells(&self) -> usize {
+        self.edges.len() - 1
+    }
 }
 
 /// A panel; with one axis it is a strip.
 pub struct Panel<'a> {
-    pub cell: Cell,
-    pub x: &'a Axis,
-    pub y: Option<&'a Axis>,
+    axes: Axes,
+    x: &'a Varied,
+    y: Option<&'a Varied>,
 }
 
-impl Panel<'_> {
-    /// Cells are counted along the last axis first; `named`: with ticks below.
-    pub fn draw(&self, page: &mut Drawing, tiles: &[Option<Tile>], named: bool) {
-        for (i, tile) in tiles.iter().enumerate() {
-            if let Some(tile) = tile {
-                self.tile(page, i, *tile);
-            }
-        }
-        let rim = Stroke::new(FRAME, 0.8);
-        page.stroke(rectangle(self.cell.corner, self.cell.size), rim);
-        self.ticks(page, named);
+impl<'a> Panel<'a> {
+    /// In this cell of the page, with or without labels below.
+    pub fn new(cell: Cell, x: &'a Varied, y: Option<&'a Varied>, labelled: bool) -> Self {
+        // Panels share the names of their axes.
+        let across = x.axis.clone().named("");
+        let across = if labelled {
+            across
+        } else {
+            across.unlabelled()
+        };
+        let up = match y {
+            Some(y) => y.axis.clone().named(""),
+            None => Axis::linear("", 0.0, 1.0).at(Vec::new()),
+        };
+        let axes = Axes { cell, across, up };
+        Panel { axes, x, y }
     }
 
-    /// Which cell along x and y, and how many there are along y.
+    /// Cells are counted along the last axis first.
+    pub fn draw(&self, page: &mut Drawing, tiles: &[Option<Tile>]) {
+        for (i, tile) in tiles.iter().enumerate() {
+            if let Some(tile) = tile {
+                self.draw_tile(page, i, *tile);
+            }
+        }
+        self.axes.draw_frame(page);
+    }
+
+    /// Which cell along x and y.
     fn place(&self, i: usize) -> (usize, usize) {
-        let along_y = self.y.map_or(1, Axis::cells);
+        let along_y = self.y.map_or(1, Varied::cells);
         (i / along_y, i % along_y)
     }
 
     fn rectangle(&self, i: usize) -> Cell {
-        let Cell { corner, size } = self.cell;
+        let Cell { corner, size } = self.axes.cell;
         let (column, row) = self.place(i);
-        let (left, right) = self.x.cell(column);
-        let (low, high) = self.y.map_or((0.0, 1.0), |y| y.cell(row));
+        let (left, right) = (self.x.edges[column], self.x.edges[column + 1]);
+        let (low, high) = self
+            .y
+            .map_or((0.0, 1.0), |y| (y.edges[row], y.edges[row + 1]));
         Cell {
             corner: corner + size * DVec2::new(left, 1.0 - high),
             size: size * DVec2::new(right - left, high - low),
         }
     }
 
-    fn tile(&self, page: &mut Drawing, i: usize, tile: Tile) {
+    fn draw_tile(&self, page: &mut Drawing, i: usize, tile: Tile) {
         let mut cell = self.rectangle(i);
         let large = cell.size.min_element() >= APART;
         if large {
@@ -150,61 +202,108 @@ impl Panel<'_> {
             _ => return,
         };
         if cell.size.min_element() >= NUMBERED {
-            let middle = cell.corner + 0.5 * cell.size;
-            page.centered(middle, &number, NUMBER_SIZE, WHITE);
+            page.beside(cell.middle(), &number, NUMBER_SIZE, Anchor::Middle, WHITE);
         }
     }
 
-    fn ticks(&self, page: &mut Drawing, named: bool) {
-        let Cell { corner, size } = self.cell;
-        let rim = Stroke::new(FRAME, 0.8);
-        let most = size / TICK_ROOM;
-        for (part, text) in self.x.ticks(most.x as usize) {
-            let foot = corner + size * DVec2::new(part, 1.0);
-            page.line(foot, foot + DVec2::new(0.0, TICK_LENGTH), rim);
-            if named {
-                let base = foot + DVec2::new(0.0, TICK_LENGTH + 1.2 * TICK_SIZE);
-                page.label(base, &text, TICK_SIZE, Anchor::Middle, NOTE);
-            }
-        }
-        for (part, text) in self.y.map_or(Vec::new(), |y| y.ticks(most.y as usize)) {
-            let foot = corner + size * DVec2::new(0.0, 1.0 - part);
-            page.line(foot, foot - DVec2::new(TICK_LENGTH, 0.0), rim);
-            let base = foot + DVec2::new(-TICK_LENGTH - 3.0, HALF_CAPITAL * TICK_SIZE);
-            page.label(base, &text, TICK_SIZE, Anchor::End, NOTE);
-        }
-    }
-
-    /// The longest step known to be stable, across every row or column.
-    pub fn bound(&self, page: &mut Drawing, request: &MapRequest) {
-        let steps_along_x = request.axes[0].keys.sets(Knob::Step);
-        let Cell { corner, size } = self.cell;
-        let stroke = Stroke::new(BOUND, 2.0);
+    /// Draws the longest step known to be stable, across every row or column.
+    pub fn draw_bound(&self, page: &mut Drawing, request: &MapRequest) {
+        let along_x = request.axes[0].keys.sets(Knob::Step);
+        let inside = |part: &f64| (0.0..=1.0).contains(part);
         for i in 0..request.cells() {
             let (column, row) = self.place(i);
-            let first = if steps_along_x { column } else { row };
-            if first > 0 {
+            if if along_x { column } else { row } > 0 {
                 continue;
             }
-            let axis = if steps_along_x { Some(self.x) } else { self.y };
-            let stable = request.stable_step(i);
-            let Some(part) = axis.zip(stable).and_then(|(axis, step)| axis.part(step)) else {
+            let axis = if along_x {
+                &self.axes.across
+            } else {
+                &self.axes.up
+            };
+            let part = request.stable_step(i).map(|step| axis.part(step));
+            let Some(part) = part.filter(inside) else {
                 continue;
             };
-            let tile = self.rectangle(i);
-            let (from, to) = match steps_along_x {
-                true => {
-                    let x = corner.x + part * size.x;
-                    let y = tile.corner.y;
-                    (DVec2::new(x, y), DVec2::new(x, y + tile.size.y))
-                }
-                false => {
-                    let y = corner.y + (1.0 - part) * size.y;
-                    let x = tile.corner.x;
-                    (DVec2::new(x, y), DVec2::new(x + tile.size.x, y))
-                }
+            let (tile, Cell { corner, size }) = (self.rectangle(i), self.axes.cell);
+            let place = corner + size * DVec2::new(part, 1.0 - part);
+            let (from, to) = match along_x {
+                true => (tile.corner.with_x(place.x), tile.end().with_x(place.x)),
+                false => (tile.corner.with_y(place.y), tile.end().with_y(place.y)),
             };
-            page.line(from, to, stroke);
+            page.line(from, to, bound_stroke());
         }
+    }
+}
+
+/// Of more keys than these the first and the last are named.
+const NAMED: usize = 4;
+
+/// Keys of one table are told with its name once: `stiffness: axial = shear_2`.
+fn name(keys: &str) -> String {
+    let keys: Vec<&str> = keys.split('+').collect();
+    let table = |key: &str| key.split('.').next().unwrap_or_default().to_string();
+    let first = table(keys[0]);
+    let joined = |keys: &[&str]| match keys {
+        [first, .., last] if keys.len() > NAMED => format!("{first} = … = {last}"),
+        few => few.join(" = "),
+    };
+    if keys.len() == 1 || keys.iter().any(|key| table(key) != first) {
+        return joined(&keys);
+    }
+    let short: Vec<&str> = (keys.iter())
+        .map(|key| key.split_once('.').map_or(*key, |(_, name)| name))
+        .collect();
+    format!("{first}: {}", joined(&short))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::figure::axis::Direction;
+
+    fn varied(given: &str) -> Varied {
+        Varied::of(&given.parse().unwrap())
+    }
+
+    #[test]
+    fn cells_fill_the_axis_in_the_order_given() {
+        for given in [
+            "stiffness.torsion=1..1e-5:6log",
+            "load.gravity[2]=-1e-3..-10:5log",
+            "rest.twist=3..-3:4",
+            "leaf.rods=1..40:6log",
+            "rest.twist=3..4:1",
+        ] {
+            let edges = varied(given).edges;
+            assert_eq!(edges[0], 0.0, "{given}");
+            assert_eq!(edges[edges.len() - 1], 1.0, "{given}");
+            assert!(edges.windows(2).all(|pair| pair[0] < pair[1]), "{given}");
+        }
+    }
+
+    #[test]
+    fn ticks_are_readable() {
+        let texts = |given: &str, length: f64| -> Vec<String> {
+            let ticks = varied(given).axis.ticks(length, Direction::Across);
+            ticks.into_iter().map(|tick| tick.text).collect()
+        };
+        let decades = texts("load.gravity[2]=-1e-3..-10:5log", 230.0);
+        assert_eq!(decades.len(), 5);
+        assert_eq!(decades[0], "\u{2212}10⁻³");
+        assert!(texts("stiffness.axial=1..1e10:11log", 230.0).len() <= 6);
+        assert_eq!(texts("stiffness.axial=2..5:4log", 230.0), ["2", "5"]);
+        let whole = texts("leaf.rods=1..5:5", 250.0);
+        assert_eq!(whole, ["1", "2", "3", "4", "5"]);
+        assert_eq!(texts("rest.twist=0..1:3", 250.0), ["0.0", "0.5", "1.0"]);
+    }
+
+    #[test]
+    fn a_table_is_told_once() {
+        let h = "stiffness.axial+stiffness.shear_2";
+        assert_eq!(name(h), "stiffness: axial = shear_2");
+        let many: Vec<String> = (0..6).map(|i| format!("rest.twist[{i}]")).collect();
+        assert_eq!(name(&many.join("+")), "rest: twist[0] = … = twist[5]");
+        assert_eq!(name("load.gravity[2]"), "load.gravity[2]");
+        assert_eq!(name("method.step+leaf.length"), "method.step = leaf.length");
     }
 }

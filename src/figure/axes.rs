@@ -1,0 +1,262 @@
+//! Two axes around a panel: grid, frame, ticks and names; curves and markers
+//! in it. Every panel of numbers is one of these.
+
+use glam::DVec2;
+
+use super::axis::{Axis, Direction, Tick};
+use super::colors::{Color, FRAME, GRID, INK, NOTE};
+use super::drawing::{Anchor, Drawing, Path, Step, Stroke, rectangle};
+use super::font::Font;
+use super::markers::Marker;
+use super::page::{Cell, TEXT_SIZE, TICK_SIZE};
+
+const TICK: f64 = 4.0;
+const DIVISION: f64 = 2.0;
+/// From the frame to the base line of the name below.
+const NAME_BELOW: f64 = 34.0;
+/// And to that of the name beside: at least, after the labels, and at most.
+const NAME_BESIDE: f64 = 42.0;
+const AFTER_LABELS: f64 = 13.0;
+const FARTHEST_NAME: f64 = 53.0;
+
+/// A panel between two axes.
+pub struct Axes {
+    pub cell: Cell,
+    pub across: Axis,
+    pub up: Axis,
+}
+
+impl Axes {
+    /// Where a point is on the page; `None` if it cannot be drawn.
+    pub fn at(&self, (x, y): (f64, f64)) -> Option<DVec2> {
+        let part = DVec2::new(self.across.part(x), 1.0 - self.up.part(y));
+        let at = self.cell.corner + self.cell.size * part;
+        at.is_finite().then_some(at)
+    }
+
+    /// Draws grid, frame, ticks and names.
+    pub fn draw(&self, page: &mut Drawing) {
+        let Cell { corner, size } = self.cell;
+        let line = |stressed: bool| match stressed {
+            true => Stroke::new(FRAME, 0.8),
+            false => Stroke::new(GRID, 0.7),
+        };
+        for tick in self.across.ticks(size.x, Direction::Across) {
+            let top = corner + DVec2::new(tick.part * size.x, 0.0);
+            page.line(
+                top,
+                top.with_y(self.cell.end().y),
+                line(self.across.stresses(&tick)),
+            );
+        }
+        for tick in self.up.ticks(size.y, Direction::Up) {
+            let left = corner + DVec2::new(0.0, (1.0 - tick.part) * size.y);
+            page.line(
+                left,
+                left.with_x(self.cell.end().x),
+                line(self.up.stresses(&tick)),
+            );
+        }
+        self.draw_frame(page);
+    }
+
+    /// Draws all but the grid.
+    pub fn draw_frame(&self, page: &mut Drawing) {
+        let Cell { corner, size } = self.cell;
+        let rim = Stroke::new(FRAME, 0.8);
+        page.stroke(rectangle(corner, size), rim);
+        let foot = |part: f64| corner + size * DVec2::new(part, 1.0);
+        for part in self.across.divisions(size.x) {
+            page.line(foot(part), foot(part) + DVec2::new(0.0, DIVISION), rim);
+        }
+        for Tick { part, text, .. } in self.across.ticks(size.x, Direction::Across) {
+            page.line(foot(part), foot(part) + DVec2::new(0.0, TICK), rim);
+            if self.across.is_labelled() {
+                let base = foot(part) + DVec2::new(0.0, TICK + 1.2 * TICK_SIZE);
+                page.label(base, &text, TICK_SIZE, Anchor::Middle, NOTE);
+            }
+        }
+        let foot = |part: f64| corner + size * DVec2::new(0.0, 1.0 - part);
+        for part in self.up.divisions(size.y) {
+            page.line(foot(part), foot(part) - DVec2::new(DIVISION, 0.0), rim);
+        }
+        let font = Font::embedded();
+        let mut widest = 0.0_f64;
+        for Tick { part, text, .. } in self.up.ticks(size.y, Direction::Up) {
+            page.line(foot(part), foot(part) - DVec2::new(TICK, 0.0), rim);
+            if self.up.is_labelled() {
+                let end = foot(part) - DVec2::new(TICK + 3.0, 0.0);
+                page.beside(end, &text, TICK_SIZE, Anchor::End, NOTE);
+                widest = widest.max(font.width(&text, TICK_SIZE));
+            }
+        }
+        self.draw_names(page, widest);
+    }
+
+    /// Draws the names; labels beside the frame are so wide.
+    fn draw_names(&self, page: &mut Drawing, widest: f64) {
+        let Cell { corner, .. } = self.cell;
+        let (middle, end) = (self.cell.middle(), self.cell.end());
+        let (below, beside) = (self.across.name(), self.up.name());
+        if self.across.is_labelled() && !below.is_empty() {
+            let base = DVec2::new(middle.x, end.y + NAME_BELOW);
+            page.label(base, &below, TEXT_SIZE, Anchor::Middle, INK);
+        }
+        if self.up.is_labelled() && !beside.is_empty() {
+            let away = (widest + AFTER_LABELS).clamp(NAME_BESIDE, FARTHEST_NAME);
+            let base = DVec2::new(corner.x - away, middle.y);
+            page.upright_label(base, &beside, TEXT_SIZE, INK);
+        }
+    }
+
+    /// Draws a curve through these points, as much of it as is inside the
+    /// frame; it is broken where a point cannot be drawn.
+    pub fn curve(&self, page: &mut Drawing, points: &[(f64, f64)], stroke: Stroke) {
+        let columns = self.cell.size.x.ceil().max(1.0) as usize;
+        let mut path: Path = Vec::new();
+        let mut pen = None;
+        for pair in thinned(points, columns).windows(2) {
+            let inside = self.at(pair[0]).zip(self.at(pair[1]));
+            let Some((from, to)) = inside.and_then(|(from, to)| self.clipped(from, to)) else {
+                continue;
+            };
+            if pen != Some(from) {
+                path.push(Step::Move(from));
+            }
+            path.push(Step::Line(to));
+            pen = Some(to);
+        }
+        if !path.is_empty() {
+            page.stroke(path, stroke);
+        }
+    }
+
+    /// The part of a line that is inside the frame (Liang and Barsky).
+    fn clipped(&self, from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
+        let way = to - from;
+        let (low, high) = (self.cell.corner - from, self.cell.end() - from);
+        let (mut first, mut last) = (0.0_f64, 1.0_f64);
+        for (way, low, high) in [(way.x, low.x, high.x), (way.y, low.y, high.y)] {
+            if way == 0.0 {
+                if low > 0.0 || high < 0.0 {
+                    return None;
+                }
+                continue;
+            }
+            let (a, b) = (low / way, high / way);
+            first = first.max(a.min(b));
+            last = last.min(a.max(b));
+        }
+        let point = |part: f64| match part {
+            0.0 => from,
+            1.0 => to,
+            part => from + part * way,
+        };
+        (first <= last).then(|| (point(first), point(last)))
+    }
+
+    /// Marks those of these points that are inside the frame.
+    pub fn markers(
+        &self,
+        page: &mut Drawing,
+        points: impl IntoIterator<Item = (f64, f64)>,
+        marker: Marker,
+        color: Color,
+    ) {
+        let (low, high) = (self.cell.corner - 0.01, self.cell.end() + 0.01);
+        for at in points.into_iter().filter_map(|point| self.at(point)) {
+            if at.cmpge(low).all() && at.cmple(high).all() {
+                marker.draw(page, at, color);
+            }
+        }
+    }
+}
+
+/// Points that look the same when drawn over so many columns: of every
+/// column's, the first, the last, the lowest and the highest.
+fn thinned(points: &[(f64, f64)], columns: usize) -> Vec<(f64, f64)> {
+    let each = points.len().div_ceil(columns);
+    if each <= 4 {
+        return points.to_vec();
+    }
+    let mut kept = Vec::with_capacity(4 * columns);
+    for column in points.chunks(each) {
+        let by_height = |a: &usize, b: &usize| column[*a].1.total_cmp(&column[*b].1);
+        let lowest = (0..column.len()).min_by(by_height).unwrap_or(0);
+        let highest = (0..column.len()).max_by(by_height).unwrap_or(0);
+        let mut chosen = vec![0, lowest, highest, column.len() - 1];
+        chosen.sort_unstable();
+        chosen.dedup();
+        kept.extend(chosen.into_iter().map(|index| column[index]));
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::figure::drawing::Mark;
+
+    fn axes() -> Axes {
+        Axes {
+            cell: Cell {
+                corner: DVec2::new(10.0, 20.0),
+                size: DVec2::new(100.0, 50.0),
+            },
+            across: Axis::linear("x", 0.0, 1.0),
+            up: Axis::linear("y", 0.0, 1.0),
+        }
+    }
+
+    #[test]
+    fn curves_are_cut_at_the_frame_and_broken_at_holes() {
+        let curve = |points: &[(f64, f64)]| -> Vec<Vec<DVec2>> {
+            let mut page = Drawing::new(200.0, "");
+            axes().curve(&mut page, points, Stroke::new(INK, 1.0));
+            let mut pieces: Vec<Vec<DVec2>> = Vec::new();
+            for mark in &page.marks {
+                let Mark::Shape { path, .. } = mark else {
+                    continue;
+                };
+                for step in path {
+                    match *step {
+                        Step::Move(at) => pieces.push(vec![at]),
+                        Step::Line(at) => pieces.last_mut().unwrap().push(at),
+                        _ => unreachable!(),
+                    }
+                }
+            }
+            pieces
+        };
+        let (corner, end) = (DVec2::new(10.0, 70.0), DVec2::new(110.0, 20.0));
+        assert_eq!(curve(&[(-1.0, -1.0), (3.0, 3.0)]), [[corner, end]]);
+        assert_eq!(curve(&[(0.0, 0.0), (1.0, 1.0)]), [[corner, end]]);
+        assert!(curve(&[(0.0, 1.5), (1.0, 1.2)]).is_empty());
+        let holed = [
+            (0.0, 0.0),
+            (0.2, 0.2),
+            (0.3, f64::NAN),
+            (0.4, 0.4),
+            (1.0, 1.0),
+        ];
+        assert_eq!(curve(&holed).len(), 2);
+        let wild = [
+            (0.0, 0.5),
+            (0.5, f64::INFINITY),
+            (0.6, 1e300),
+            (0.7, -1e280),
+        ];
+        assert!(curve(&wild).is_empty());
+    }
+
+    #[test]
+    fn thinning_keeps_peaks_and_ends() {
+        let peak = |i: usize| if i == 5432 { 1.0 } else { 0.0 };
+        let points: Vec<(f64, f64)> = (0..10_000).map(|i| (i as f64, peak(i))).collect();
+        let kept = thinned(&points, 100);
+        assert!(kept.len() <= 400);
+        assert!(kept.contains(&(5432.0, 1.0)));
+        assert_eq!((kept[0], kept[kept.len() - 1]), (points[0], points[9999]));
+        assert!(kept.windows(2).all(|w| w[0].0 < w[1].0));
+    }
+}

@@ -1,0 +1,464 @@
+//! An axis: from values to parts of its length, and its ticks.
+
+use super::font::Font;
+use super::page::TICK_SIZE;
+use crate::report::numbers::{decade, digit_of_decade, fixed, superscript, time_of_decade};
+
+/// Air at both ends: as a part of a linear extent, and in decades.
+const AIR: f64 = 0.06;
+const DECADES_OF_AIR: f64 = 0.12;
+/// What is smaller is rounding of rounding.
+const MOST_DECADES: f64 = 18.0;
+
+/// What is larger is a number gone wild.
+const LARGEST: f64 = 1e290;
+
+/// Powers of ten that are written out on a linear axis.
+const PLAIN: std::ops::Range<f64> = -2.0..4.0;
+
+/// Pixels between ticks at least, and between their labels.
+const LINEAR: [f64; 2] = [62.0, 25.0];
+const LOGARITHMIC: [f64; 2] = [38.0, 22.0];
+const BETWEEN_LABELS: f64 = 4.0;
+/// Pixels of a decade that is divided further.
+const DIVIDED: f64 = 60.0;
+
+/// The direction of an axis on the page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    Across,
+    Up,
+}
+
+/// Where ticks are, and how they are labelled.
+#[derive(Clone, Debug)]
+enum Ticks {
+    /// Round numbers; on a logarithmic axis powers of ten.
+    Round,
+    /// Powers of ten, in seconds.
+    Times,
+    /// These whole numbers, or some of them.
+    At(Vec<f64>),
+}
+
+/// A linear or logarithmic axis.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    name: String,
+    /// Of a logarithmic axis: the sign of all its values.
+    sign: Option<f64>,
+    /// Values or, of a logarithmic axis, decades at both ends.
+    start: f64,
+    end: f64,
+    ticks: Ticks,
+    /// Pixels between ticks at least, if not as usual.
+    apart: Option<f64>,
+    labelled: bool,
+    stresses_zero: bool,
+}
+
+/// A tick.
+#[derive(Clone, Debug)]
+pub struct Tick {
+    pub value: f64,
+    /// From 0 at the start of the axis to 1 at its end.
+    pub part: f64,
+    pub text: String,
+}
+
+impl Axis {
+    /// A linear axis between two values, which may fall.
+    pub fn linear(name: &str, start: f64, end: f64) -> Self {
+        let size = start.abs().max(end.abs());
+        let extent = (end - start).abs();
+        // An extent that is rounding is none.
+        let (start, end) = if extent > 1e-12 * size && extent > f64::MIN_POSITIVE {
+            (start, end)
+        } else if size > f64::MIN_POSITIVE {
+            (start - 0.5 * size, end + 0.5 * size)
+        } else {
+            (-1.0, 1.0)
+        };
+        Axis {
+            name: name.into(),
+            sign: None,
+            start,
+            end,
+            ticks: Ticks::Round,
+            apart: None,
+            labelled: true,
+            stresses_zero: false,
+        }
+    }
+
+    /// A linear axis that holds these values with some air; zero is stressed,
+    /// where most curves begin.
+    pub fn holding(name: &str, values: impl Iterator<Item = f64>) -> Self {
+        let (low, high) = extent(values.filter(|value| value.abs() < LARGEST)).unwrap_or_default();
+        let axis = Axis::linear(name, low, high);
+        let air = AIR * (axis.end - axis.start);
+        Axis {
+            start: axis.start - air,
+            end: axis.end + air,
+            stresses_zero: true,
+            ..axis
+        }
+    }
+
+    /// A logarithmic axis that holds those of these values that are positive,
+    /// with some air.
+    pub fn logarithmic(name: &str, values: impl Iterator<Item = f64>, fewest: f64) -> Self {
+        let drawable = values.filter(|value| value.is_normal() && *value > 0.0);
+        let (start, end) = match extent(drawable.map(f64::log10)) {
+            Some((low, high)) => {
+                let low = low.max(high - MOST_DECADES);
+                let air = (0.5 * (fewest - (high - low))).max(DECADES_OF_AIR);
+                (low - air, high + air)
+            }
+            None => (-fewest, 0.0),
+        };
+        Axis {
+            start,
+            end,
+            ..Axis::linear(name, 0.0, 1.0)
+        }
+        .of_sign(1.0)
+    }
+
+    /// The same ends as decades of values that all have this sign.
+    pub fn of_sign(self, sign: f64) -> Self {
+        Axis {
+            sign: Some(sign),
+            ..self
+        }
+    }
+
+    /// With another name.
+    pub fn named(self, name: &str) -> Self {
+        Axis {
+            name: name.into(),
+            ..self
+        }
+    }
+
+    /// With ticks at some of these whole numbers.
+    pub fn at(self, values: Vec<f64>) -> Self {
+        Axis {
+            ticks: Ticks::At(values),
+            ..self
+        }
+    }
+
+    /// A logarithmic axis of seconds.
+    pub fn in_seconds(self) -> Self {
+        Axis {
+            ticks: Ticks::Times,
+            ..self
+        }
+    }
+
+    /// With ticks at least so many pixels apart.
+    pub fn apart(self, pixels: f64) -> Self {
+        Axis {
+            apart: Some(pixels),
+            ..self
+        }
+    }
+
+    /// With ticks, but no labels and no name.
+    pub fn unlabelled(self) -> Self {
+        Axis {
+            labelled: false,
+            ..self
+        }
+    }
+
+    /// Whether this is to be written.
+    pub fn is_labelled(&self) -> bool {
+        self.labelled
+    }
+
+    /// Whether a tick's grid line is stressed.
+    pub fn stresses(&self, tick: &Tick) -> bool {
+        self.stresses_zero && tick.value == 0.0
+    }
+
+    /// The name, with the power of ten in which values are given.
+    pub fn name(&self) -> String {
+        match self.power() {
+            _ if self.name.is_empty() => String::new(),
+            0 => self.name.clone(),
+            power => format!("{} · 10{}", self.name, superscript(-power)),
+        }
+    }
+
+    /// Values are given in this power of ten.
+    fn power(&self) -> i32 {
+        let size = self.start.abs().max(self.end.abs()).log10();
+        match (self.sign, &self.ticks) {
+            (None, Ticks::Round) if !PLAIN.contains(&size) => 3 * (size / 3.0).floor() as i32,
+            _ => 0,
+        }
+    }
+
+    /// Where a value is, from 0 at the start to 1 at the end; not finite if it
+    /// has no place.
+    pub fn part(&self, value: f64) -> f64 {
+        let at = match self.sign {
+            Some(sign) => (sign * value).log10(),
+            None if value.abs() < LARGEST => value,
+            None => f64::NAN,
+        };
+        (at - self.start) / (self.end - self.start)
+    }
+
+    /// As many ticks as can be read on an axis of this length.
+    pub fn ticks(&self, length: f64, direction: Direction) -> Vec<Tick> {
+        let usual = match self.ticks {
+            Ticks::Round if self.sign.is_none() => LINEAR,
+            _ => LOGARITHMIC,
+        };
+        let font = Font::embedded();
+        let taken = |tick: &Tick| match direction {
+            Direction::Across => font.width(&tick.text, TICK_SIZE),
+            Direction::Up => TICK_SIZE,
+        };
+        let apart = |pair: &[Tick]| {
+            let distance = length * (pair[1].part - pair[0].part).abs();
+            distance - 0.5 * (taken(&pair[0]) + taken(&pair[1])) > BETWEEN_LABELS
+        };
+        let mut room = self.apart.unwrap_or(usual[direction as usize]);
+        loop {
+            let ticks = self.ticks_apart(room / length);
+            if !self.labelled || room > length || ticks.windows(2).all(apart) {
+                return ticks;
+            }
+            room *= 1.25;
+        }
+    }
+
+    /// Ticks about this part of the axis apart.
+    fn ticks_apart(&self, part: f64) -> Vec<Tick> {
+        let (low, high) = (self.start.min(self.end), self.start.max(self.end));
+        let every = |count: usize| (count as f64 * part).ceil().max(1.0) as usize;
+        let ticks = match (&self.ticks, self.sign) {
+            (Ticks::At(values), _) => {
+                let kept = values.iter().step_by(every(values.len()));
+                kept.map(|&value| (value, fixed(value, 0))).collect()
+            }
+            (_, Some(sign)) => self.decades(low, high, sign, every),
+            (Ticks::Round | Ticks::Times, None) => {
+                let unit = 10f64.powi(self.power());
+                let step = round_step((high - low) * part / unit);
+                let found = multiples(low / unit, high / unit, step).into_iter();
+                found.map(|(value, text)| (value * unit, text)).collect()
+            }
+        };
+        let tick = |(value, text): (f64, String)| Tick {
+            value,
+            part: self.part(value),
+            text,
+        };
+        ticks.into_iter().map(tick).collect()
+    }
+
+    /// Powers of ten, or 1, 2 and 5 times these where there are few.
+    fn decades(
+        &self,
+        low: f64,
+        high: f64,
+        sign: f64,
+        every: impl Fn(usize) -> usize,
+    ) -> Vec<(f64, String)> {
+        let times = matches!(self.ticks, Ticks::Times);
+        let (first, last) = (low.ceil() as i32, high.floor() as i32);
+        let count = (last - first + 1).max(0) as usize;
+        if count >= 2 {
+            let every = every(count) as i32;
+            let shown = (first..=last).filter(|power| power % every == 0);
+            return shown
+                .map(|power| match times {
+                    true => (power, time_of_decade(1.0, power)),
+                    false => (power, decade(sign, power)),
+                })
+                .map(|(power, text)| (sign * 10f64.powi(power), text))
+                .collect();
+        }
+        (first - 1..=last + 1)
+            .flat_map(|power| [1.0, 2.0, 5.0].map(|digit| (digit, power)))
+            .filter(|&(digit, power)| {
+                (low..=high).contains(&(f64::from(power) + f64::log10(digit)))
+            })
+            .map(|(digit, power)| {
+                let text = match times {
+                    true => time_of_decade(digit, power),
+                    false => digit_of_decade(sign * digit, power),
+                };
+                (sign * digit * 10f64.powi(power), text)
+            })
+            .collect()
+    }
+
+    /// Parts at which long decades are divided: twice to nine times the power of ten.
+    pub fn divisions(&self, length: f64) -> Vec<f64> {
+        let (low, high) = (self.start.min(self.end), self.start.max(self.end));
+        let divided = length > DIVIDED * (high - low) && !matches!(self.ticks, Ticks::At(_));
+        let Some(sign) = self.sign.filter(|_| divided) else {
+            return Vec::new();
+        };
+        let powers = low.floor() as i32..=high.floor() as i32;
+        let values =
+            powers.flat_map(|power| (2..10).map(move |n| f64::from(n) * 10f64.powi(power)));
+        let parts = values.map(|value| self.part(sign * value));
+        parts.filter(|part| (0.0..=1.0).contains(part)).collect()
+    }
+}
+
+/// The least and the greatest value.
+fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let both = values.map(|value| (value, value));
+    both.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+}
+
+/// The smallest of 1, 2 or 5 times a power of ten that is at least `smallest`.
+pub fn round_step(smallest: f64) -> f64 {
+    let decade = 10f64.powf(smallest.log10().floor());
+    // A hair of slack, so that 0.2 asked for is 0.2 and not 0.5.
+    let wanted = smallest * (1.0 - 1e-9);
+    [1.0, 2.0, 5.0]
+        .into_iter()
+        .map(|factor| factor * decade)
+        .find(|&step| step >= wanted)
+        .unwrap_or(10.0 * decade)
+}
+
+/// Multiples of `step` from `low` to `high`, and how each is written.
+pub fn multiples(low: f64, high: f64, step: f64) -> Vec<(f64, String)> {
+    let slack = 1e-9;
+    let first = (low / step - slack).ceil() as i64;
+    let last = (high / step + slack).floor() as i64;
+    let decimals = (-step.log10().floor()).max(0.0) as usize;
+    (first..=last)
+        .map(|multiple| multiple as f64 * step)
+        .map(|value| (value, fixed(value, decimals)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use Direction::{Across, Up};
+
+    fn texts(axis: &Axis, length: f64) -> Vec<String> {
+        let ticks = axis.ticks(length, Across).into_iter();
+        ticks.map(|tick| tick.text).collect()
+    }
+
+    #[test]
+    fn linear_axes_have_few_digits() {
+        for (low, high, name) in [
+            (0.0, 12.0, "t"),
+            (0.0, 3e-5, "t · 10⁶"),
+            (-2e7, 1e6, "t · 10⁻⁶"),
+            (0.02, 0.5, "t"),
+        ] {
+            let axis = Axis::holding("t", [low, high].into_iter());
+            assert_eq!(axis.name(), name);
+            let ticks = axis.ticks(300.0, Up);
+            assert!((3..=12).contains(&ticks.len()), "{low} {high}: {ticks:?}");
+            for tick in ticks {
+                assert!(tick.text.chars().count() <= 6, "{tick:?}");
+                assert!((0.0..=1.0).contains(&tick.part), "{tick:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_and_constants_have_an_extent() {
+        for values in [
+            vec![],
+            vec![0.0, 0.0],
+            vec![3.0],
+            vec![f64::NAN, f64::INFINITY],
+            vec![1.0, 1.0 + 1e-15],
+            vec![1e-320, 0.0],
+        ] {
+            for axis in [
+                Axis::holding("t", values.iter().copied()),
+                Axis::logarithmic("t", values.iter().copied(), 1.0),
+            ] {
+                assert!(axis.end > axis.start, "{values:?}");
+                assert!(!axis.ticks(300.0, Up).is_empty(), "{values:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn logarithmic_axes_hold_their_values_with_some_air() {
+        for values in [vec![1e-4, 3.0], vec![2.0, 2.1], vec![7.0], vec![1e-12, 0.0]] {
+            for fewest in [1.0, 3.0] {
+                let axis = Axis::logarithmic("", values.iter().copied(), fewest);
+                for &value in values.iter().filter(|&&value| value > 0.0) {
+                    assert!(
+                        (0.0..=1.0).contains(&axis.part(value)),
+                        "{value} in {axis:?}"
+                    );
+                }
+                assert!(axis.end - axis.start >= fewest - 1e-12);
+                assert!(!axis.part(0.0).is_finite());
+            }
+        }
+        let axis = Axis::logarithmic("", [1e-300, 1e-3].into_iter(), 3.0);
+        assert!(axis.part(1e-300) < 0.0, "rounding of rounding is left out");
+    }
+
+    #[test]
+    fn labels_are_readable_and_do_not_touch() {
+        let axis = Axis::logarithmic("", [1.1e-3, 0.5].into_iter(), 1.0);
+        assert_eq!(texts(&axis, 400.0), ["10⁻²", "10⁻¹"]);
+        assert_eq!(texts(&axis.in_seconds(), 400.0), ["10 ms", "100 ms"]);
+        let axis = Axis::logarithmic("", [2.0, 5.0].into_iter(), 0.1);
+        assert_eq!(texts(&axis, 400.0), ["2", "5"]);
+        assert_eq!(
+            texts(&axis.of_sign(-1.0), 400.0),
+            ["\u{2212}2", "\u{2212}5"]
+        );
+        let veins: Vec<f64> = (1..=40).map(f64::from).collect();
+        let axis = Axis::linear("", 0.5, 40.5).at(veins);
+        assert_eq!(texts(&axis, 200.0).len(), 5);
+        assert!(texts(&axis, 2000.0).len() == 40);
+        let axis = Axis::linear("", 1000.001, 1000.009);
+        for pair in axis.ticks(300.0, Across).windows(2) {
+            assert!(300.0 * (pair[1].part - pair[0].part) > 62.0, "{pair:?}");
+        }
+    }
+
+    #[test]
+    fn steps_are_round() {
+        for (smallest, step) in [
+            (0.13, 0.2),
+            (0.2, 0.2),
+            (0.21, 0.5),
+            (0.6, 1.0),
+            (30.0, 50.0),
+        ] {
+            let found = round_step(smallest);
+            assert!((found - step).abs() < 1e-12 * step, "{smallest}: {found}");
+        }
+    }
+
+    #[test]
+    fn multiples_reach_both_ends_and_have_equal_decimals() {
+        let texts = |low, high, step| -> Vec<String> {
+            let found = multiples(low, high, step).into_iter();
+            found.map(|(_, text)| text).collect()
+        };
+        assert_eq!(
+            texts(-0.4, 0.45, 0.2),
+            ["\u{2212}0.4", "\u{2212}0.2", "0.0", "0.2", "0.4"]
+        );
+        assert_eq!(texts(-0.1, 0.1, 0.05).len(), 5);
+        assert_eq!(texts(0.3, 19.0, 10.0), ["10"]);
+        assert_eq!(texts(0.1, 0.2, 1.0), [""; 0]);
+    }
+}

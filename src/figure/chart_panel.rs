@@ -1,0 +1,215 @@
+//! The panel of a chart: one line for each series, failures in lanes above.
+
+use glam::DVec2;
+
+use super::axes::Axes;
+use super::axis::Axis;
+use super::colors::{Color, INK, NOTE, SHADOW};
+use super::drawing::{Anchor, Drawing, Stroke, circle, rectangle};
+use super::font::Font;
+use super::key::Key;
+use super::markers::Marker;
+use super::page::{Cell, PANEL_AXIS, TICK_SIZE};
+
+const FRAME_HEIGHT: f64 = 430.0;
+/// Right of the frame, for the key and the names of lanes.
+const KEY: f64 = 252.0;
+/// Height of a lane of failures.
+const LANE: f64 = 16.0;
+/// Between the lanes and the frame.
+const LANE_GAP: f64 = 7.0;
+
+/// Points on the Pareto front, and the band that joins them.
+const FRONT: Color = Color(247, 205, 92);
+/// What cannot be told from zero.
+const FLOOR: Color = Color(240, 240, 243);
+const LANES: Color = Color(250, 240, 238);
+
+/// A point, in the units of the axes.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    pub at: (f64, f64),
+    /// From here to there it was spread in repeated measurements.
+    pub spread: [(f64, f64); 2],
+    /// Whether it is on the Pareto front.
+    pub front: bool,
+}
+
+/// A run that has no place among the points.
+#[derive(Clone, Debug)]
+pub struct Failure {
+    /// Where it is on the axis across; `None`: nowhere.
+    pub x: Option<f64>,
+    /// How it ended: the name of its lane.
+    pub word: String,
+}
+
+/// What is joined by one line.
+pub struct Series {
+    pub name: String,
+    pub color: Color,
+    pub dashed: bool,
+    pub marker: Marker,
+    pub points: Vec<Point>,
+    pub failures: Vec<Failure>,
+}
+
+impl Series {
+    fn stroke(&self) -> Stroke {
+        Stroke::new(self.color, 1.5).dashed(self.dashed)
+    }
+
+    fn places(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.points.iter().map(|point| point.at)
+    }
+}
+
+/// The whole panel.
+pub struct ChartPanel {
+    pub series: Vec<Series>,
+    pub across: Axis,
+    pub up: Axis,
+    /// Values of the axis upwards that cannot be told from zero.
+    pub floor: Option<f64>,
+}
+
+impl ChartPanel {
+    /// Names of the lanes, in the order in which they appear.
+    fn lanes(&self) -> Vec<&str> {
+        let mut lanes: Vec<&str> = Vec::new();
+        for failure in self.series.iter().flat_map(|series| &series.failures) {
+            if !lanes.contains(&failure.word.as_str()) {
+                lanes.push(&failure.word);
+            }
+        }
+        lanes
+    }
+
+    fn above(&self) -> f64 {
+        match self.lanes().len() {
+            0 => 0.0,
+            lanes => lanes as f64 * LANE + LANE_GAP,
+        }
+    }
+
+    /// Height of the panel with lanes and axis.
+    pub fn height(&self) -> f64 {
+        self.above() + FRAME_HEIGHT + PANEL_AXIS
+    }
+
+    /// Draws the panel below `start`.
+    pub fn draw(&self, page: &mut Drawing, start: f64) {
+        let axes = Axes {
+            cell: Cell::beside_key(start + self.above(), FRAME_HEIGHT, KEY),
+            across: self.across.clone(),
+            up: self.up.clone(),
+        };
+        self.draw_floor(page, axes.cell);
+        axes.draw(page);
+        self.draw_front(page, &axes);
+        for series in &self.series {
+            let line: Vec<(f64, f64)> = series.places().collect();
+            axes.curve(page, &line, series.stroke());
+        }
+        for series in &self.series {
+            for point in &series.points {
+                axes.curve(page, &point.spread, Stroke::new(series.color, 1.1));
+            }
+            axes.markers(page, series.places(), series.marker, series.color);
+        }
+        for (lane, word) in self.lanes().into_iter().enumerate() {
+            self.draw_lane(page, axes.cell, start + lane as f64 * LANE, word);
+        }
+        self.draw_key(page, axes.cell);
+    }
+
+    /// Shades what cannot be told from zero.
+    fn draw_floor(&self, page: &mut Drawing, cell: Cell) {
+        let Some(floor) = self.floor else { return };
+        let height = cell.size.y * self.up.part(floor).clamp(0.0, 1.0);
+        let start = DVec2::new(cell.corner.x, cell.end().y - height);
+        let area = DVec2::new(cell.size.x, height);
+        page.shape(rectangle(start, area), FLOOR, None);
+        page.line(start, start.with_x(cell.end().x), Stroke::new(SHADOW, 1.0));
+    }
+
+    /// A broad band under the lines that joins the points of the front.
+    fn draw_front(&self, page: &mut Drawing, axes: &Axes) {
+        let points = self.series.iter().flat_map(|series| &series.points);
+        let front = points.filter(|point| point.front);
+        let mut front: Vec<(f64, f64)> = front.map(|point| point.at).collect();
+        front.sort_by(|a, b| a.0.total_cmp(&b.0));
+        axes.curve(page, &front, Stroke::new(FRONT, 8.0));
+        for place in front.into_iter().filter_map(|point| axes.at(point)) {
+            halo(page, place);
+        }
+    }
+
+    /// Crosses for the runs that failed in this way, and its name.
+    fn draw_lane(&self, page: &mut Drawing, cell: Cell, top: f64, word: &str) {
+        const ROOM: f64 = 11.0;
+        let (left, right) = (cell.corner.x, cell.end().x);
+        let middle = top + 0.5 * LANE;
+        let area = DVec2::new(cell.size.x, LANE - 2.0);
+        let start = DVec2::new(left, top + 1.0);
+        page.shape(rectangle(start, area), LANES, None);
+        let name = Font::embedded().shortened(word, TICK_SIZE, KEY - 14.0);
+        let beside = DVec2::new(right + 10.0, middle);
+        page.beside(beside, &name, TICK_SIZE, Anchor::Start, NOTE);
+        let mut from_right = right;
+        for series in &self.series {
+            let failures = series.failures.iter();
+            let places = failures.filter(|failure| failure.word == word);
+            let places: Vec<Option<f64>> = places.map(|failure| failure.x).collect();
+            let parts = places.iter().flatten().map(|&x| self.across.part(x));
+            for part in parts.filter(|part| part.is_finite()) {
+                let x = left + part.clamp(0.0, 1.0) * cell.size.x;
+                Marker::Cross.draw(page, DVec2::new(x, middle), series.color);
+            }
+            if places.contains(&None) {
+                from_right -= ROOM;
+                Marker::Cross.draw(page, DVec2::new(from_right, middle), series.color);
+            }
+        }
+    }
+
+    fn draw_key(&self, page: &mut Drawing, cell: Cell) {
+        let mut key = Key::beside(cell);
+        for series in &self.series {
+            key.entry(page, &series.name, "", |page, cell| {
+                let [from, to] = cell.midline();
+                page.line(from, to, series.stroke());
+                series.marker.draw(page, cell.middle(), series.color);
+            });
+        }
+        let points = || self.series.iter().flat_map(|series| &series.points);
+        if points().any(|point| point.front) {
+            let note = "nothing is both faster and more accurate";
+            key.entry(page, "Pareto front", note, |page, cell| {
+                let [from, to] = cell.midline();
+                page.line(from, to, Stroke::new(FRONT, 8.0));
+                halo(page, cell.middle());
+            });
+        }
+        if !self.lanes().is_empty() {
+            key.marker(
+                page,
+                "",
+                "failed or not run: see above",
+                Marker::Cross,
+                NOTE,
+            );
+        }
+        if self.floor.is_some() {
+            let note = "below what is known of the reference itself";
+            key.entry(page, "", note, |page, cell| {
+                let rim = Stroke::new(SHADOW, 1.0);
+                page.shape(rectangle(cell.corner, cell.size), FLOOR, Some(rim));
+            });
+        }
+    }
+}
+
+fn halo(page: &mut Drawing, at: DVec2) {
+    page.shape(circle(at, 7.5), FRONT, Some(Stroke::new(INK, 0.8)));
+}

@@ -1,0 +1,233 @@
+//! The four panels of a leaf: along each axis, and in space.
+//!
+//! The three flat panels are drawn to one scale and placed as in a technical
+//! drawing: the side view under the top view with the same xi axis, the front
+//! view beside the side view with the same zeta axis.
+
+use glam::{DVec2, DVec3};
+
+use super::axes::Axes;
+use super::axis::Axis;
+use super::drawing::{Drawing, Stroke};
+use super::markers::leaf_markers;
+use super::page::{Cell, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, title};
+use super::space::{Room, Scene, surrounding_box};
+use super::veins::{Vein, Veins};
+
+const BOTTOM: f64 = 4.0;
+/// Between the columns, for the right one's axis.
+const COLUMN_GAP: f64 = 74.0;
+const COLUMNS: f64 = WIDTH - LEFT - RIGHT - COLUMN_GAP;
+
+/// Panels do not get smaller than this, however flat the leaf.
+const NARROWEST_COLUMN: f64 = 340.0;
+const LOWEST_TOP: f64 = 270.0;
+const LOWEST_BOTTOM: f64 = 130.0;
+/// Both rows together do not get higher than this, however tall the leaf.
+const HIGHEST_ROWS: f64 = 800.0;
+
+/// Air around the leaf, as a fraction of its largest extent.
+const AIR: f64 = 0.06;
+
+/// Distance between grid lines at least.
+const TICK_DISTANCE: f64 = 36.0;
+
+/// Around the panel in space.
+const ROOM: Room = Room {
+    left: 56.0,
+    right: 22.0,
+    below: 36.0,
+};
+
+/// An axis of a leaf, and what it is called.
+type Way = (&'static str, DVec3);
+const XI: Way = ("ξ = x/L", DVec3::X);
+const ETA: Way = ("η = y/L", DVec3::Y);
+const ZETA: Way = ("ζ = z/L", DVec3::Z);
+
+/// Which way a flat panel looks.
+struct View {
+    /// Name of its group in the SVG.
+    name: &'static str,
+    letter: &'static str,
+    title: &'static str,
+    across: Way,
+    up: Way,
+    /// Points towards the viewer.
+    toward: DVec3,
+}
+
+const TOP: View = View {
+    name: "top",
+    letter: "(a)",
+    title: "from above",
+    across: XI,
+    up: ETA,
+    toward: DVec3::Z,
+};
+const SIDE: View = View {
+    name: "side",
+    letter: "(b)",
+    title: "from the side",
+    across: XI,
+    up: ZETA,
+    toward: DVec3::NEG_Y,
+};
+const FRONT: View = View {
+    name: "front",
+    letter: "(c)",
+    title: "from the front",
+    across: ETA,
+    up: ZETA,
+    toward: DVec3::X,
+};
+
+impl View {
+    fn flatten(&self, point: DVec3) -> DVec2 {
+        DVec2::new(self.across.1.dot(point), self.up.1.dot(point))
+    }
+
+    /// Draws the panel with `scale` pixels per length, the leaf in its middle.
+    fn draw(&self, page: &mut Drawing, veins: &Veins, cell: Cell, scale: f64) {
+        let middle = self.flatten(0.5 * (veins.low + veins.high));
+        let half = 0.5 * cell.size / scale;
+        let (low, high) = (middle - half, middle + half);
+        let axis = |way: Way, low: f64, high: f64| Axis::linear(way.0, low, high);
+        let axes = Axes {
+            cell,
+            across: axis(self.across, low.x, high.x).apart(TICK_DISTANCE),
+            up: axis(self.up, low.y, high.y).apart(TICK_DISTANCE),
+        };
+        title(page, cell.corner, self.letter, self.title);
+        axes.draw(page);
+        let place = |point: DVec3| {
+            let from_low = scale * (self.flatten(point) - low);
+            DVec2::new(cell.corner.x + from_low.x, cell.end().y - from_low.y)
+        };
+        // Veins farther from the viewer first.
+        let nearness = |vein: &Vein| {
+            let ends = vein.pieces.iter().map(|piece| self.toward.dot(piece[3]));
+            ends.sum::<f64>() / vein.pieces.len().max(1) as f64
+        };
+        let mut order: Vec<&Vein> = veins.veins.iter().collect();
+        order.sort_by(|a, b| nearness(a).total_cmp(&nearness(b)));
+        for vein in order {
+            let stroke = Stroke::new(vein.color, veins.line_width());
+            page.stroke(vein.path(place), stroke);
+        }
+        leaf_markers(page, veins, place);
+    }
+}
+
+/// Starts and lengths of columns and rows, and the pixels per length of the
+/// flat panels.
+pub struct Panels {
+    columns: [(f64, f64); 2],
+    rows: [(f64, f64); 2],
+    scale: f64,
+}
+
+impl Panels {
+    /// The panels of these veins, placed below `start`.
+    pub fn below(start: f64, veins: &Veins) -> Self {
+        let DVec3 { x, y, z } = veins.high - veins.low + DVec3::splat(2.0 * AIR * veins.extent());
+        // The largest scale that lets every panel hold the leaf.
+        let scale = [
+            COLUMNS / (x + y),
+            (COLUMNS - NARROWEST_COLUMN) / x.max(y),
+            HIGHEST_ROWS / (y + z),
+            (HIGHEST_ROWS - LOWEST_BOTTOM) / y,
+            (HIGHEST_ROWS - LOWEST_TOP) / z,
+        ]
+        .into_iter()
+        .fold(f64::INFINITY, f64::min);
+
+        let widths = [x, y].map(|extent| (scale * extent).max(NARROWEST_COLUMN));
+        let spare = COLUMNS - widths[0] - widths[1];
+        let widths = widths.map(|width| width + 0.5 * spare);
+        let heights = [(scale * y).max(LOWEST_TOP), (scale * z).max(LOWEST_BOTTOM)];
+        let top = start + PANEL_TITLE;
+        let bottom = top + heights[0] + PANEL_AXIS + PANEL_TITLE;
+        Panels {
+            columns: [
+                (LEFT, widths[0]),
+                (LEFT + widths[0] + COLUMN_GAP, widths[1]),
+            ],
+            rows: [(top, heights[0]), (bottom, heights[1])],
+            scale,
+        }
+    }
+
+    /// Where the page may go on.
+    pub fn end(&self) -> f64 {
+        let (start, height) = self.rows[1];
+        start + height + PANEL_AXIS + BOTTOM
+    }
+
+    /// Draws all four.
+    pub fn draw(&self, drawing: &mut Drawing, veins: &Veins) {
+        let [left, right] = self.columns;
+        let [top, bottom] = self.rows;
+        let cell = |column: (f64, f64), row: (f64, f64)| Cell {
+            corner: DVec2::new(column.0, row.0),
+            size: DVec2::new(column.1, row.1),
+        };
+        for (view, cell) in [
+            (&TOP, cell(left, top)),
+            (&SIDE, cell(left, bottom)),
+            (&FRONT, cell(right, bottom)),
+        ] {
+            drawing.group(view.name, |page| view.draw(page, veins, cell, self.scale));
+        }
+        // Nothing stands left of the panel in space: it takes half of the gap.
+        let shift = 0.5 * COLUMN_GAP;
+        let cell = cell(
+            (right.0 - shift, right.1 + shift),
+            (top.0, top.1 + PANEL_AXIS - TICK_SIZE),
+        );
+        drawing.group("space", |page| {
+            let scene = Scene::new(surrounding_box(veins.low, veins.high), cell, ROOM, None);
+            title(page, cell.corner, "(d)", "in space");
+            scene.draw_box(page);
+            scene.draw_labels(page);
+            scene.draw_names(page, 38.0);
+            scene.draw_leaf(page, veins, veins.line_width());
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn every_extent_fits_its_panel() {
+        for size in [
+            [1.0, 1.0, 0.2],
+            [1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [0.1, 2.0, 0.0],
+            [0.0; 3],
+        ] {
+            let mut veins = Veins::of(&sample::fan(3, 4));
+            veins.low = DVec3::ZERO;
+            veins.high = DVec3::from_array(size);
+            let Panels {
+                columns,
+                rows,
+                scale,
+            } = Panels::below(0.0, &veins);
+            let slack = 1e-9;
+            assert!(columns[0].1 + slack >= scale * size[0], "{size:?}");
+            assert!(columns[1].1 + slack >= scale * size[1], "{size:?}");
+            assert!(rows[0].1 + slack >= scale * size[1], "{size:?}");
+            assert!(rows[1].1 + slack >= scale * size[2], "{size:?}");
+            assert!(
+                (columns[0].1 + columns[1].1 - COLUMNS).abs() < slack,
+                "{size:?}"
+            );
+            assert!(rows[0].1 + rows[1].1 <= HIGHEST_ROWS + slack, "{size:?}");
+        }
+    }
+}
