@@ -1,8 +1,8 @@
 //! All shapes of a leaf that were found, lowest energy first.
 
 use super::drawing::Drawing;
-use super::header::header;
-use super::page::{WIDTH, title};
+use super::header;
+use super::page::title;
 use super::small::{SIDE, SmallPanels};
 use super::veins::Veins;
 use crate::study::All;
@@ -19,8 +19,6 @@ pub fn draw(all: &All) -> Drawing {
         .collect();
     let panels = SmallPanels::holding(shapes.iter(), shown.len());
     let name = format!("{}: equilibria, lowest energy first", all.scenario);
-    let mut drawing = Drawing::new(WIDTH, &name);
-    drawing.height = panels.end();
     let mut notes = vec![format!(
         "{} found from {} starts",
         all.found.len(),
@@ -29,9 +27,8 @@ pub fn draw(all: &All) -> Drawing {
     if all.found.len() > MOST {
         notes.push(format!("the first {MOST} drawn"));
     }
-    drawing.group("header", |page| {
-        header(page, SIDE, &name, &notes, shapes.first());
-    });
+    let mut drawing = header::page(SIDE, &name, &notes, shapes.first());
+    drawing.height = panels.end();
     for (index, (found, veins)) in shown.iter().zip(&shapes).enumerate() {
         let stability = match found.equilibrium.stability.negative_eigenvalues {
             Some(0) => "stable".into(),

@@ -37,25 +37,18 @@ impl Axes {
     /// Draws grid, frame, ticks and names.
     pub fn draw(&self, page: &mut Drawing) {
         let Cell { corner, size } = self.cell;
-        let line = |stressed: bool| match stressed {
+        let end = self.cell.end();
+        let stroke = |axis: &Axis, tick: &Tick| match axis.stresses_zero && tick.value == 0.0 {
             true => Stroke::new(FRAME, 0.8),
             false => Stroke::new(GRID, 0.7),
         };
         for tick in self.across.ticks(size.x, Direction::Across) {
-            let top = corner + DVec2::new(tick.part * size.x, 0.0);
-            page.line(
-                top,
-                top.with_y(self.cell.end().y),
-                line(self.across.stresses(&tick)),
-            );
+            let top = corner.with_x(corner.x + tick.part * size.x);
+            page.line(top, top.with_y(end.y), stroke(&self.across, &tick));
         }
         for tick in self.up.ticks(size.y, Direction::Up) {
-            let left = corner + DVec2::new(0.0, (1.0 - tick.part) * size.y);
-            page.line(
-                left,
-                left.with_x(self.cell.end().x),
-                line(self.up.stresses(&tick)),
-            );
+            let left = corner.with_y(end.y - tick.part * size.y);
+            page.line(left, left.with_x(end.x), stroke(&self.up, &tick));
         }
         self.draw_frame(page);
     }
@@ -71,7 +64,7 @@ impl Axes {
         }
         for Tick { part, text, .. } in self.across.ticks(size.x, Direction::Across) {
             page.line(foot(part), foot(part) + DVec2::new(0.0, TICK), rim);
-            if self.across.is_labelled() {
+            if self.across.labelled {
                 let base = foot(part) + DVec2::new(0.0, TICK + 1.2 * TICK_SIZE);
                 page.label(base, &text, TICK_SIZE, Anchor::Middle, NOTE);
             }
@@ -84,7 +77,7 @@ impl Axes {
         let mut widest = 0.0_f64;
         for Tick { part, text, .. } in self.up.ticks(size.y, Direction::Up) {
             page.line(foot(part), foot(part) - DVec2::new(TICK, 0.0), rim);
-            if self.up.is_labelled() {
+            if self.up.labelled {
                 let end = foot(part) - DVec2::new(TICK + 3.0, 0.0);
                 page.beside(end, &text, TICK_SIZE, Anchor::End, NOTE);
                 widest = widest.max(font.width(&text, TICK_SIZE));
@@ -97,15 +90,14 @@ impl Axes {
     fn draw_names(&self, page: &mut Drawing, widest: f64) {
         let Cell { corner, .. } = self.cell;
         let (middle, end) = (self.cell.middle(), self.cell.end());
-        let (below, beside) = (self.across.name(), self.up.name());
-        if self.across.is_labelled() && !below.is_empty() {
+        if self.across.labelled {
             let base = DVec2::new(middle.x, end.y + NAME_BELOW);
-            page.label(base, &below, TEXT_SIZE, Anchor::Middle, INK);
+            page.label(base, &self.across.title(), TEXT_SIZE, Anchor::Middle, INK);
         }
-        if self.up.is_labelled() && !beside.is_empty() {
+        if self.up.labelled {
             let away = (widest + AFTER_LABELS).clamp(NAME_BESIDE, FARTHEST_NAME);
             let base = DVec2::new(corner.x - away, middle.y);
-            page.upright_label(base, &beside, TEXT_SIZE, INK);
+            page.upright_label(base, &self.up.title(), TEXT_SIZE, INK);
         }
     }
 

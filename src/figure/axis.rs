@@ -1,7 +1,10 @@
 //! An axis: from values to parts of its length, and its ticks.
 
+use std::ops::{Range, RangeInclusive};
+
 use super::font::Font;
 use super::page::TICK_SIZE;
+use super::ticks::{multiples, round_step};
 use crate::report::numbers::{decade, digit_of_decade, fixed, superscript, time_of_decade};
 
 /// Air at both ends: as a part of a linear extent, and in decades.
@@ -14,7 +17,7 @@ const MOST_DECADES: f64 = 18.0;
 const LARGEST: f64 = 1e290;
 
 /// Powers of ten that are written out on a linear axis.
-const PLAIN: std::ops::Range<f64> = -2.0..4.0;
+const PLAIN: Range<f64> = -2.0..4.0;
 
 /// Pixels between ticks at least, and between their labels.
 const LINEAR: [f64; 2] = [62.0, 25.0];
@@ -32,29 +35,31 @@ pub enum Direction {
 
 /// Where ticks are, and how they are labelled.
 #[derive(Clone, Debug)]
-enum Ticks {
+pub enum Ticks {
     /// Round numbers; on a logarithmic axis powers of ten.
     Round,
     /// Powers of ten, in seconds.
     Times,
-    /// These whole numbers, or some of them.
+    /// Some of these whole numbers.
     At(Vec<f64>),
 }
 
 /// A linear or logarithmic axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    name: String,
+    pub name: String,
     /// Of a logarithmic axis: the sign of all its values.
-    sign: Option<f64>,
-    /// Values or, of a logarithmic axis, decades at both ends.
-    start: f64,
-    end: f64,
-    ticks: Ticks,
+    pub sign: Option<f64>,
+    /// Values or, of a logarithmic axis, decades at both ends, which may fall.
+    pub start: f64,
+    pub end: f64,
+    pub ticks: Ticks,
     /// Pixels between ticks at least, if not as usual.
-    apart: Option<f64>,
-    labelled: bool,
-    stresses_zero: bool,
+    pub apart: Option<f64>,
+    /// Whether ticks and axis have their text.
+    pub labelled: bool,
+    /// Whether the grid line of zero, where most curves begin, is stressed.
+    pub stresses_zero: bool,
 }
 
 /// A tick.
@@ -67,7 +72,7 @@ pub struct Tick {
 }
 
 impl Axis {
-    /// A linear axis between two values, which may fall.
+    /// A linear axis between two values.
     pub fn linear(name: &str, start: f64, end: f64) -> Self {
         let size = start.abs().max(end.abs());
         let extent = (end - start).abs();
@@ -91,8 +96,7 @@ impl Axis {
         }
     }
 
-    /// A linear axis that holds these values with some air; zero is stressed,
-    /// where most curves begin.
+    /// A linear axis that holds these values with some air.
     pub fn holding(name: &str, values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = extent(values.filter(|value| value.abs() < LARGEST)).unwrap_or_default();
         let axis = Axis::linear(name, low, high);
@@ -105,8 +109,8 @@ impl Axis {
         }
     }
 
-    /// A logarithmic axis that holds those of these values that are positive,
-    /// with some air.
+    /// A logarithmic axis of at least so many decades that holds those of
+    /// these values that are positive, with some air.
     pub fn logarithmic(name: &str, values: impl Iterator<Item = f64>, fewest: f64) -> Self {
         let drawable = values.filter(|value| value.is_normal() && *value > 0.0);
         let (start, end) = match extent(drawable.map(f64::log10)) {
@@ -118,73 +122,13 @@ impl Axis {
             None => (-fewest, 0.0),
         };
         Axis {
-            start,
-            end,
-            ..Axis::linear(name, 0.0, 1.0)
+            sign: Some(1.0),
+            ..Axis::linear(name, start, end)
         }
-        .of_sign(1.0)
-    }
-
-    /// The same ends as decades of values that all have this sign.
-    pub fn of_sign(self, sign: f64) -> Self {
-        Axis {
-            sign: Some(sign),
-            ..self
-        }
-    }
-
-    /// With another name.
-    pub fn named(self, name: &str) -> Self {
-        Axis {
-            name: name.into(),
-            ..self
-        }
-    }
-
-    /// With ticks at some of these whole numbers.
-    pub fn at(self, values: Vec<f64>) -> Self {
-        Axis {
-            ticks: Ticks::At(values),
-            ..self
-        }
-    }
-
-    /// A logarithmic axis of seconds.
-    pub fn in_seconds(self) -> Self {
-        Axis {
-            ticks: Ticks::Times,
-            ..self
-        }
-    }
-
-    /// With ticks at least so many pixels apart.
-    pub fn apart(self, pixels: f64) -> Self {
-        Axis {
-            apart: Some(pixels),
-            ..self
-        }
-    }
-
-    /// With ticks, but no labels and no name.
-    pub fn unlabelled(self) -> Self {
-        Axis {
-            labelled: false,
-            ..self
-        }
-    }
-
-    /// Whether this is to be written.
-    pub fn is_labelled(&self) -> bool {
-        self.labelled
-    }
-
-    /// Whether a tick's grid line is stressed.
-    pub fn stresses(&self, tick: &Tick) -> bool {
-        self.stresses_zero && tick.value == 0.0
     }
 
     /// The name, with the power of ten in which values are given.
-    pub fn name(&self) -> String {
+    pub fn title(&self) -> String {
         match self.power() {
             _ if self.name.is_empty() => String::new(),
             0 => self.name.clone(),
@@ -246,7 +190,10 @@ impl Axis {
                 let kept = values.iter().step_by(every(values.len()));
                 kept.map(|&value| (value, fixed(value, 0))).collect()
             }
-            (_, Some(sign)) => self.decades(low, high, sign, every),
+            (_, Some(sign)) => {
+                let count = (high.floor() - low.ceil() + 1.0).max(0.0) as usize;
+                self.decades(low..=high, sign, every(count) as i32, count < 2)
+            }
             (Ticks::Round | Ticks::Times, None) => {
                 let unit = 10f64.powi(self.power());
                 let step = round_step((high - low) * part / unit);
@@ -262,37 +209,28 @@ impl Axis {
         ticks.into_iter().map(tick).collect()
     }
 
-    /// Powers of ten, or 1, 2 and 5 times these where there are few.
+    /// Every so many-th power of ten or, where there are few, 1, 2 and 5 times these.
     fn decades(
         &self,
-        low: f64,
-        high: f64,
+        range: RangeInclusive<f64>,
         sign: f64,
-        every: impl Fn(usize) -> usize,
+        every: i32,
+        few: bool,
     ) -> Vec<(f64, String)> {
-        let times = matches!(self.ticks, Ticks::Times);
-        let (first, last) = (low.ceil() as i32, high.floor() as i32);
-        let count = (last - first + 1).max(0) as usize;
-        if count >= 2 {
-            let every = every(count) as i32;
-            let shown = (first..=last).filter(|power| power % every == 0);
-            return shown
-                .map(|power| match times {
-                    true => (power, time_of_decade(1.0, power)),
-                    false => (power, decade(sign, power)),
-                })
-                .map(|(power, text)| (sign * 10f64.powi(power), text))
-                .collect();
-        }
-        (first - 1..=last + 1)
-            .flat_map(|power| [1.0, 2.0, 5.0].map(|digit| (digit, power)))
-            .filter(|&(digit, power)| {
-                (low..=high).contains(&(f64::from(power) + f64::log10(digit)))
-            })
+        let (digits, every) = match few {
+            true => ([1.0, 2.0, 5.0].as_slice(), 1),
+            false => ([1.0].as_slice(), every),
+        };
+        let powers = range.start().floor() as i32..=range.end().ceil() as i32;
+        let powers = powers.filter(|power| power % every == 0);
+        let found = powers.flat_map(|power| digits.iter().map(move |&digit| (digit, power)));
+        found
+            .filter(|&(digit, power)| range.contains(&(f64::from(power) + f64::log10(digit))))
             .map(|(digit, power)| {
-                let text = match times {
-                    true => time_of_decade(digit, power),
-                    false => digit_of_decade(sign * digit, power),
+                let text = match self.ticks {
+                    Ticks::Times => time_of_decade(digit, power),
+                    _ if few => digit_of_decade(sign * digit, power),
+                    _ => decade(sign, power),
                 };
                 (sign * digit * 10f64.powi(power), text)
             })
@@ -320,30 +258,6 @@ fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     both.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
-/// The smallest of 1, 2 or 5 times a power of ten that is at least `smallest`.
-pub fn round_step(smallest: f64) -> f64 {
-    let decade = 10f64.powf(smallest.log10().floor());
-    // A hair of slack, so that 0.2 asked for is 0.2 and not 0.5.
-    let wanted = smallest * (1.0 - 1e-9);
-    [1.0, 2.0, 5.0]
-        .into_iter()
-        .map(|factor| factor * decade)
-        .find(|&step| step >= wanted)
-        .unwrap_or(10.0 * decade)
-}
-
-/// Multiples of `step` from `low` to `high`, and how each is written.
-pub fn multiples(low: f64, high: f64, step: f64) -> Vec<(f64, String)> {
-    let slack = 1e-9;
-    let first = (low / step - slack).ceil() as i64;
-    let last = (high / step + slack).floor() as i64;
-    let decimals = (-step.log10().floor()).max(0.0) as usize;
-    (first..=last)
-        .map(|multiple| multiple as f64 * step)
-        .map(|value| (value, fixed(value, decimals)))
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -363,7 +277,7 @@ mod tests {
             (0.02, 0.5, "t"),
         ] {
             let axis = Axis::holding("t", [low, high].into_iter());
-            assert_eq!(axis.name(), name);
+            assert_eq!(axis.title(), name);
             let ticks = axis.ticks(300.0, Up);
             assert!((3..=12).contains(&ticks.len()), "{low} {high}: {ticks:?}");
             for tick in ticks {
@@ -414,51 +328,27 @@ mod tests {
 
     #[test]
     fn labels_are_readable_and_do_not_touch() {
-        let axis = Axis::logarithmic("", [1.1e-3, 0.5].into_iter(), 1.0);
+        let axis = Axis::logarithmic("", [2e-3, 0.5].into_iter(), 1.0);
         assert_eq!(texts(&axis, 400.0), ["10⁻²", "10⁻¹"]);
-        assert_eq!(texts(&axis.in_seconds(), 400.0), ["10 ms", "100 ms"]);
+        let axis = Axis {
+            ticks: Ticks::Times,
+            ..axis
+        };
+        assert_eq!(texts(&axis, 400.0), ["10 ms", "100 ms"]);
         let axis = Axis::logarithmic("", [2.0, 5.0].into_iter(), 0.1);
         assert_eq!(texts(&axis, 400.0), ["2", "5"]);
-        assert_eq!(
-            texts(&axis.of_sign(-1.0), 400.0),
-            ["\u{2212}2", "\u{2212}5"]
-        );
-        let veins: Vec<f64> = (1..=40).map(f64::from).collect();
-        let axis = Axis::linear("", 0.5, 40.5).at(veins);
+        let sign = Some(-1.0);
+        let axis = Axis { sign, ..axis };
+        assert_eq!(texts(&axis, 400.0), ["\u{2212}2", "\u{2212}5"]);
+        let axis = Axis {
+            ticks: Ticks::At((1..=40).map(f64::from).collect()),
+            ..Axis::linear("", 0.5, 40.5)
+        };
         assert_eq!(texts(&axis, 200.0).len(), 5);
-        assert!(texts(&axis, 2000.0).len() == 40);
+        assert_eq!(texts(&axis, 2000.0).len(), 40);
         let axis = Axis::linear("", 1000.001, 1000.009);
         for pair in axis.ticks(300.0, Across).windows(2) {
             assert!(300.0 * (pair[1].part - pair[0].part) > 62.0, "{pair:?}");
         }
-    }
-
-    #[test]
-    fn steps_are_round() {
-        for (smallest, step) in [
-            (0.13, 0.2),
-            (0.2, 0.2),
-            (0.21, 0.5),
-            (0.6, 1.0),
-            (30.0, 50.0),
-        ] {
-            let found = round_step(smallest);
-            assert!((found - step).abs() < 1e-12 * step, "{smallest}: {found}");
-        }
-    }
-
-    #[test]
-    fn multiples_reach_both_ends_and_have_equal_decimals() {
-        let texts = |low, high, step| -> Vec<String> {
-            let found = multiples(low, high, step).into_iter();
-            found.map(|(_, text)| text).collect()
-        };
-        assert_eq!(
-            texts(-0.4, 0.45, 0.2),
-            ["\u{2212}0.4", "\u{2212}0.2", "0.0", "0.2", "0.4"]
-        );
-        assert_eq!(texts(-0.1, 0.1, 0.05).len(), 5);
-        assert_eq!(texts(0.3, 19.0, 10.0), ["10"]);
-        assert_eq!(texts(0.1, 0.2, 1.0), [""; 0]);
     }
 }

@@ -1,13 +1,13 @@
 //! Speed against accuracy: error against time, and time against the number of
 //! veins, of every way to bring a leaf to rest.
 
-use super::axis::Axis;
+use super::axis::{Axis, Ticks};
 use super::chart_panel::{ChartPanel, Failure, Point, Series};
 use super::colors::{BLUE, Color, GREEN, ORANGE, PURPLE, SKY, SLATE, VERMILION};
 use super::drawing::Drawing;
-use super::header::header;
+use super::header;
 use super::markers::Marker;
-use super::page::{HEADER, LEFT, WIDTH};
+use super::page::{HEADER, LEFT};
 use crate::report::numbers::power_of_ten;
 use crate::report::words::contender;
 use crate::study::{Chart, Contender, Peer, Row, Scaling};
@@ -31,17 +31,11 @@ const SMALLEST: f64 = 1e-17;
 /// Decades of an axis, at least.
 const FEWEST_DECADES: f64 = 1.0;
 
-const TIME: &str = "time on one thread: median, and quartiles as a thin line";
-
 /// Draws error against time.
 pub fn draw_chart(chart: &Chart) -> Drawing {
-    let place = |_: usize, seconds: f64, error: f64| (seconds, error.max(SMALLEST));
-    let contenders = Contender::ALL.into_iter().filter_map(|who| {
-        let rows = chart.rows.iter().filter(|row| row.contender == who);
-        let rows: Vec<(usize, &Row)> = rows.map(|row| (chart.rods, row)).collect();
-        contender_series(who, &rows, place)
-    });
-    let series: Vec<Series> = contenders.chain(peers(&chart.peers)).collect();
+    let rows: Vec<(usize, &Row)> = chart.rows.iter().map(|row| (chart.rods, row)).collect();
+    let mut series = contenders(&rows, false);
+    series.extend(peers(&chart.peers));
     let floor = chart.reference.as_ref().map(|found| found.known_within);
     let floor = floor.filter(|floor| floor.is_normal() && *floor > 0.0);
     let (across, up) = places(&series);
@@ -49,58 +43,47 @@ pub fn draw_chart(chart: &Chart) -> Drawing {
     let across = across
         .into_iter()
         .chain(failed.filter_map(|failure| failure.x));
+    let up = up.into_iter().chain(floor);
     let panel = ChartPanel {
-        across: Axis::logarithmic(TIME, across, FEWEST_DECADES).in_seconds(),
-        up: Axis::logarithmic(
-            "largest true error of positions / L",
-            up.into_iter().chain(floor),
-            FEWEST_DECADES,
-        ),
+        across: times(across),
+        up: Axis::logarithmic("largest true error of positions / L", up, FEWEST_DECADES),
         series,
         floor,
     };
-    let mut notes = vec![format!("N = {}", chart.rods)];
-    notes.push(match &chart.reference {
+    let reference = match &chart.reference {
         None => "no reference: no equilibrium was found".into(),
-        Some(found) if found.confirmed => format!(
-            "reference confirmed by two methods, known within {}",
-            power_of_ten(found.known_within)
-        ),
-        Some(found) => format!(
-            "the reference is NOT confirmed; taken to be within {}",
-            power_of_ten(found.known_within)
-        ),
-    });
-    notes.push("left is faster, down is more accurate".into());
+        Some(found) => {
+            let within = power_of_ten(found.known_within);
+            match found.confirmed {
+                true => format!("reference confirmed by two methods, known within {within}"),
+                false => format!("the reference is NOT confirmed; taken to be within {within}"),
+            }
+        }
+    };
+    let notes = [
+        format!("N = {}", chart.rods),
+        reference,
+        "left is faster, down is more accurate".into(),
+    ];
     let title = format!("{}: speed against accuracy", chart.scenario);
     page(&title, &notes, &panel)
 }
 
 /// Draws time against the number of veins.
 pub fn draw_scaling(scaling: &Scaling) -> Drawing {
-    let place = |rods: usize, seconds: f64, _: f64| (rods as f64, seconds);
-    let contenders = Contender::ALL.into_iter().filter_map(|who| {
-        let found = scaling.rows.iter();
-        let rows = found.filter(|found| found.row.contender == who);
-        let rows: Vec<(usize, &Row)> = rows.map(|found| (found.rods, &found.row)).collect();
-        let mut series = contender_series(who, &rows, place)?;
-        // Failures are where their leaf is, run or not.
-        let failed = rows.iter().filter(|(_, row)| row.point().is_none());
-        for (failure, (rods, _)) in series.failures.iter_mut().zip(failed) {
-            failure.x = Some(*rods as f64);
-        }
-        Some(series)
-    });
-    let series: Vec<Series> = contenders.collect();
+    let rows = scaling.rows.iter().map(|found| (found.rods, &found.row));
+    let series = contenders(&rows.collect::<Vec<_>>(), true);
     let mut rods: Vec<usize> = scaling.rows.iter().map(|found| found.rods).collect();
     rods.sort_unstable();
     rods.dedup();
     let rods: Vec<f64> = rods.into_iter().map(|rods| rods as f64).collect();
-    let (_, up) = places(&series);
-    let across = Axis::logarithmic("number of veins N", rods.iter().copied(), FEWEST_DECADES);
+    let across = rods.iter().copied();
     let panel = ChartPanel {
-        across: across.at(rods),
-        up: Axis::logarithmic(TIME, up.into_iter(), FEWEST_DECADES).in_seconds(),
+        across: Axis {
+            ticks: Ticks::At(rods.clone()),
+            ..Axis::logarithmic("number of veins N", across, FEWEST_DECADES)
+        },
+        up: times(places(&series).1.into_iter()),
         series,
         floor: None,
     };
@@ -114,10 +97,17 @@ pub fn draw_scaling(scaling: &Scaling) -> Drawing {
     page(&title, &notes, &panel)
 }
 
+fn times(values: impl Iterator<Item = f64>) -> Axis {
+    let name = "time on one thread: median, and quartiles as a thin line";
+    Axis {
+        ticks: Ticks::Times,
+        ..Axis::logarithmic(name, values, FEWEST_DECADES)
+    }
+}
+
 fn page(title: &str, notes: &[String], panel: &ChartPanel) -> Drawing {
-    let mut drawing = Drawing::new(WIDTH, title);
+    let mut drawing = header::page(LEFT, title, notes, None);
     drawing.height = (HEADER + panel.height()).ceil();
-    drawing.group("header", |page| header(page, LEFT, title, notes, None));
     drawing.group("chart", |page| panel.draw(page, HEADER));
     drawing
 }
@@ -141,39 +131,49 @@ fn style(who: Contender) -> (Color, Marker) {
     }
 }
 
-/// The rows of a contender, each with its number of veins, with points where
-/// `place` puts veins, seconds and errors; `None` if it took no part.
-fn contender_series(
-    who: Contender,
-    rows: &[(usize, &Row)],
-    place: impl Fn(usize, f64, f64) -> (f64, f64),
-) -> Option<Series> {
-    let (color, marker) = style(who);
-    let mut series = Series {
-        name: match who {
-            Contender::SemiImplicit => format!("{} (default)", contender(who)),
-            _ => contender(who).into(),
-        },
-        color,
-        dashed: false,
-        marker,
-        points: Vec::new(),
-        failures: Vec::new(),
-    };
-    for &(rods, row) in rows {
-        match row.seconds.zip(row.point()) {
-            Some((seconds, (median, error))) => series.points.push(Point {
-                at: place(rods, median, error),
-                spread: [seconds.q1, seconds.q3].map(|time| place(rods, time, error)),
-                front: row.pareto,
-            }),
-            None => series.failures.push(Failure {
-                x: row.seconds.map(|spread| spread.median),
-                word: row.ending.word().into(),
-            }),
+/// The lines of all contenders that took part: seconds over veins, or errors
+/// over seconds. Each row comes with its number of veins.
+fn contenders(rows: &[(usize, &Row)], over_veins: bool) -> Vec<Series> {
+    let of = |who: Contender| {
+        let (color, marker) = style(who);
+        let mut series = Series {
+            name: match who {
+                Contender::SemiImplicit => format!("{} (default)", contender(who)),
+                _ => contender(who).into(),
+            },
+            color,
+            dashed: false,
+            marker,
+            points: Vec::new(),
+            failures: Vec::new(),
+        };
+        for (rods, row) in rows.iter().filter(|(_, row)| row.contender == who) {
+            let rods = *rods as f64;
+            let place = |seconds: f64, error: f64| match over_veins {
+                true => (rods, seconds),
+                false => (seconds, error.max(SMALLEST)),
+            };
+            match row.seconds.zip(row.point()) {
+                Some((seconds, (median, error))) => series.points.push(Point {
+                    at: place(median, error),
+                    spread: [seconds.q1, seconds.q3].map(|time| place(time, error)),
+                    front: row.pareto,
+                }),
+                // Failures are where their leaf is, run or not.
+                None => series.failures.push(Failure {
+                    x: match over_veins {
+                        true => Some(rods),
+                        false => row.seconds.map(|spread| spread.median),
+                    },
+                    word: row.ending.word().into(),
+                }),
+            }
         }
-    }
-    (!rows.is_empty()).then_some(series)
+        series
+    };
+    let mut all: Vec<Series> = Contender::ALL.into_iter().map(of).collect();
+    all.retain(|series| !(series.points.is_empty() && series.failures.is_empty()));
+    all
 }
 
 fn peer_color(name: &str, others: usize) -> Color {
@@ -283,14 +283,9 @@ mod tests {
     fn times_are_spread_along_their_axis() {
         let chart = sample::chart();
         let rows = [(5, &chart.rows[0])];
-        let spread = |place: &dyn Fn(usize, f64, f64) -> (f64, f64)| {
-            let series = contender_series(rows[0].1.contender, &rows, place);
-            series.unwrap().points[0].spread
-        };
-        let across = spread(&|_, seconds, error| (seconds, error));
-        assert_eq!(across, [(8.75e-4, 1e-4), (1.2e-3, 1e-4)]);
-        let up = spread(&|rods, seconds, _| (rods as f64, seconds));
-        assert_eq!(up, [(5.0, 8.75e-4), (5.0, 1.2e-3)]);
+        let spread = |over_veins| contenders(&rows, over_veins)[0].points[0].spread;
+        assert_eq!(spread(false), [(8.75e-4, 1e-4), (1.2e-3, 1e-4)]);
+        assert_eq!(spread(true), [(5.0, 8.75e-4), (5.0, 1.2e-3)]);
     }
 
     #[test]

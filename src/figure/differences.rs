@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::axes::Axes;
-use super::axis::Axis;
+use super::axis::{Axis, Ticks};
 use super::colors::{CURVES, Color, NOTE};
 use super::drawing::{Drawing, Stroke};
 use super::key::Key;
@@ -84,14 +84,17 @@ pub fn draw(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
         "(e)",
         "largest difference of all veins at each station",
     );
-    let stations = Axis::linear("σ, fraction of each vein's length", 0.0, 1.0).apart(50.0);
+    let stations = Axis {
+        apart: Some(50.0),
+        ..Axis::linear("σ, fraction of each vein's length", 0.0, 1.0)
+    };
     let mut across = stations.clone();
     if curves
         .iter()
         .any(|curve| curve.values().any(|value| value == 0.0))
     {
         cell.size.y -= ZERO_STRIP;
-        across = across.unlabelled();
+        across.labelled = false;
         draw_zeros(page, &curves, cell, stations);
     }
     let allowed = curves.iter().filter_map(|curve| curve.allowed);
@@ -125,7 +128,10 @@ fn draw_zeros(page: &mut Drawing, curves: &[Curve], above: Cell, stations: Axis)
             size: DVec2::new(above.size.x, ZERO_STRIP),
         },
         across: stations,
-        up: Axis::linear("", 2.7, -2.7).at(vec![0.0]),
+        up: Axis {
+            ticks: Ticks::At(vec![0.0]),
+            ..Axis::linear("", 2.7, -2.7)
+        },
     };
     strip.draw(page);
     for (lane, curve) in curves.iter().enumerate() {

@@ -121,15 +121,22 @@ impl Drawing {
         self.stroke(vec![Step::Move(from), Step::Line(to)], stroke);
     }
 
+    /// Adds a label, if it says anything.
+    fn add(&mut self, label: Label) {
+        if !label.text.is_empty() {
+            self.marks.push(Mark::Label(label));
+        }
+    }
+
     pub fn label(&mut self, at: DVec2, text: &str, size: f64, anchor: Anchor, color: Color) {
-        self.marks.push(Mark::Label(Label {
+        self.add(Label {
             at,
             text: text.into(),
             size,
             anchor,
             color,
             upright: false,
-        }));
+        });
     }
 
     /// A label whose digits and capitals have their middle at the height of `at`.
@@ -139,14 +146,14 @@ impl Drawing {
     }
 
     pub fn upright_label(&mut self, at: DVec2, text: &str, size: f64, color: Color) {
-        self.marks.push(Mark::Label(Label {
+        self.add(Label {
             at,
             text: text.into(),
             size,
             anchor: Anchor::Middle,
             color,
             upright: true,
-        }));
+        });
     }
 }
 

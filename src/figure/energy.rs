@@ -4,9 +4,9 @@ use super::axes::Axes;
 use super::axis::Axis;
 use super::colors::{CURVES, Color, INK};
 use super::drawing::{Drawing, Stroke};
-use super::header::header;
+use super::header;
 use super::key::Key;
-use super::page::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, WIDTH, title};
+use super::page::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, title};
 use crate::motion::Energy;
 use crate::report::numbers::short;
 use crate::simulate::Record;
@@ -50,11 +50,8 @@ pub fn draw(record: &Record) -> Drawing {
     let name = format!("{}: energy in time", record.scenario);
     let upper = HEADER + PANEL_TITLE;
     let lower = upper + ENERGIES + BETWEEN + PANEL_TITLE;
-    let mut drawing = Drawing::new(WIDTH, &name);
+    let mut drawing = header::page(LEFT, &name, &notes(record), None);
     drawing.height = lower + BALANCE + PANEL_AXIS + BOTTOM;
-    drawing.group("header", |page| {
-        header(page, LEFT, &name, &notes(record), None);
-    });
     let end = match record.time() {
         time if time > 0.0 => time,
         _ => record.duration,

@@ -5,8 +5,8 @@ use glam::DVec3;
 use super::colors::NOTE;
 use super::drawing::{Drawing, Stroke, polyline};
 use super::energy::notes;
-use super::header::header;
-use super::page::{WIDTH, title};
+use super::header;
+use super::page::title;
 use super::small::{SIDE, SmallPanels};
 use super::veins::{Veins, is_near};
 use crate::report::numbers::short;
@@ -21,16 +21,11 @@ pub fn draw(record: &Record) -> Drawing {
     let stills = record.stills.iter();
     let shapes: Vec<Veins> = stills.map(|still| veins(record, still)).collect();
     let panels = SmallPanels::holding(shapes.iter(), shapes.len());
-    let mut drawing = Drawing::new(WIDTH, &name);
+    let mut notes = notes(record);
+    notes.extend(shapes.first().map(Veins::notes).unwrap_or_default());
+    notes.push(format!("a square of the grid is {} L wide", panels.step));
+    let mut drawing = header::page(SIDE, &name, &notes, shapes.first());
     drawing.height = panels.end();
-    if let Some(veins) = shapes.first() {
-        let mut notes = notes(record);
-        notes.extend(veins.notes());
-        notes.push(format!("a square of the grid is {} L wide", panels.step));
-        drawing.group("header", |page| {
-            header(page, SIDE, &name, &notes, Some(veins));
-        });
-    }
     let mut since = record.stills.first().map_or(0, |still| still.moment);
     for (index, (veins, still)) in shapes.iter().zip(&record.stills).enumerate() {
         let way = way(record, since, still.moment);

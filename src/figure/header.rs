@@ -6,12 +6,19 @@ use super::colors::{INK, NOTE, vein_color};
 use super::drawing::{Anchor, Drawing, rectangle};
 use super::font::Font;
 use super::markers::{clamp_marker, tip_marker};
-use super::page::{RIGHT, TEXT_SIZE, TITLE_SIZE};
+use super::page::{RIGHT, TEXT_SIZE, TITLE_SIZE, WIDTH};
 use super::veins::Veins;
 
 const TITLE_BASE: f64 = 38.0;
 /// Base line of the notes.
 pub const NOTE_BASE: f64 = 60.0;
+
+/// A page as wide as usual whose header says this; its text begins at `left`.
+pub fn page(left: f64, title: &str, notes: &[String], leaf: Option<&Veins>) -> Drawing {
+    let mut drawing = Drawing::new(WIDTH, title);
+    drawing.group("header", |page| header(page, left, title, notes, leaf));
+    drawing
+}
 
 /// Draws the title, as much of it as fits, the notes and, of a leaf, the key to
 /// its veins. The text begins at `left`.

@@ -1,8 +1,8 @@
 //! A leaf at rest.
 
 use super::drawing::Drawing;
-use super::header::header;
-use super::page::{HEADER, LEFT, WIDTH};
+use super::header;
+use super::page::{HEADER, LEFT};
 use super::panels::Panels;
 use super::veins::Veins;
 use crate::relax::Equilibrium;
@@ -13,13 +13,9 @@ use crate::report::words::{shooting, verdict};
 pub fn draw(leaf: &Equilibrium) -> Drawing {
     let veins = Veins::of(leaf);
     let panels = Panels::below(HEADER, &veins);
-    let description = format!("{}: {}", leaf.scenario, verdict(leaf));
-    let mut drawing = Drawing::new(WIDTH, &description);
+    let mut drawing = header::page(LEFT, &leaf.scenario, &notes(leaf, &veins), Some(&veins));
+    drawing.description = format!("{}: {}", leaf.scenario, verdict(leaf));
     drawing.height = panels.end().ceil();
-    let notes = notes(leaf, &veins);
-    drawing.group("header", |page| {
-        header(page, LEFT, &leaf.scenario, &notes, Some(&veins));
-    });
     panels.draw(&mut drawing, &veins);
     drawing
 }

@@ -32,6 +32,7 @@ mod png;
 mod small;
 mod space;
 mod svg;
+mod ticks;
 mod trace;
 mod veins;
 

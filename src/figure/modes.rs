@@ -4,8 +4,8 @@ use glam::{DVec2, DVec3};
 
 use super::colors::{DOT, FRAME};
 use super::drawing::{Anchor, Drawing, Stroke};
-use super::header::header;
-use super::page::{TEXT_SIZE, WIDTH, title};
+use super::header;
+use super::page::{TEXT_SIZE, title};
 use super::small::{SIDE, SmallPanels};
 use super::veins::Veins;
 use crate::relax::{Equilibrium, Mode};
@@ -29,18 +29,15 @@ pub fn draw(equilibrium: &Equilibrium) -> Drawing {
         .map(|mode| displaced(equilibrium, &rest, mode))
         .collect();
     let panels = SmallPanels::holding(shapes.iter().chain([&rest]), drawn.len());
-    let mut drawing = Drawing::new(WIDTH, &name);
-    drawing.height = panels.end();
-    drawing.group("header", |page| {
-        let mut notes = vec![format!("N = {}", rest.count), verdict(equilibrium)];
-        notes.push(match modes.len() {
-            count if count > MOST => format!("the lowest {MOST} of {count}"),
-            count => format!("the lowest {count}"),
-        });
-        notes.push("grey: at rest".into());
-        notes.extend(rest.notes());
-        header(page, SIDE, &name, &notes, Some(&rest));
+    let mut notes = vec![format!("N = {}", rest.count), verdict(equilibrium)];
+    notes.push(match modes.len() {
+        count if count > MOST => format!("the lowest {MOST} of {count}"),
+        count => format!("the lowest {count}"),
     });
+    notes.push("grey: at rest".into());
+    notes.extend(rest.notes());
+    let mut drawing = header::page(SIDE, &name, &notes, Some(&rest));
+    drawing.height = panels.end();
     for (index, (mode, veins)) in drawn.iter().zip(&shapes).enumerate() {
         drawing.group("mode", |page| {
             let corner = panels.cell(index).corner;

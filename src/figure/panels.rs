@@ -92,11 +92,14 @@ impl View {
         let middle = self.flatten(0.5 * (veins.low + veins.high));
         let half = 0.5 * cell.size / scale;
         let (low, high) = (middle - half, middle + half);
-        let axis = |way: Way, low: f64, high: f64| Axis::linear(way.0, low, high);
+        let axis = |way: Way, low: f64, high: f64| Axis {
+            apart: Some(TICK_DISTANCE),
+            ..Axis::linear(way.0, low, high)
+        };
         let axes = Axes {
             cell,
-            across: axis(self.across, low.x, high.x).apart(TICK_DISTANCE),
-            up: axis(self.up, low.y, high.y).apart(TICK_DISTANCE),
+            across: axis(self.across, low.x, high.x),
+            up: axis(self.up, low.y, high.y),
         };
         title(page, cell.corner, self.letter, self.title);
         axes.draw(page);

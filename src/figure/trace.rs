@@ -7,10 +7,10 @@ use super::axes::Axes;
 use super::axis::Axis;
 use super::colors::{CURVES, INK};
 use super::drawing::{Anchor, Drawing, Stroke};
-use super::header::header;
+use super::header;
 use super::key::Key;
 use super::markers::Marker;
-use super::page::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, WIDTH, title};
+use super::page::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, title};
 use super::small::SmallPanels;
 use super::veins::Veins;
 use crate::report::numbers::{power_of_ten, short};
@@ -49,11 +49,8 @@ pub fn draw(trace: &Trace) -> Drawing {
     let below = diagram.end().y + PANEL_AXIS;
     let panels = SmallPanels::holding(shapes.iter(), shown.len()).below(below + law);
     let name = format!("{}: equilibria along {}", trace.scenario, trace.keys);
-    let mut drawing = Drawing::new(WIDTH, &name);
+    let mut drawing = header::page(LEFT, &name, &notes(trace), None);
     drawing.height = panels.end();
-    drawing.group("header", |page| {
-        header(page, LEFT, &name, &notes(trace), None);
-    });
     drawing.group("branches", |page| {
         draw_branches(page, trace, &shown, diagram);
     });

@@ -188,7 +188,7 @@ fn draw_strips(drawing: &mut Drawing, map: &Map, x: &Varied, start: f64) -> f64 
     }
     let below = cell.corner.y - STRIP_GAP + TICKS + 16.0;
     let middle = DVec2::new(cell.middle().x, below);
-    drawing.label(middle, &x.axis.name(), TEXT_SIZE, Anchor::Middle, INK);
+    drawing.label(middle, &x.axis.title(), TEXT_SIZE, Anchor::Middle, INK);
     below + 12.0
 }
 
@@ -217,9 +217,9 @@ fn draw_panels(drawing: &mut Drawing, map: &Map, x: &Varied, y: &Varied, start: 
     let across = columns as f64 * pitch.x - GAP;
     let end = start + rows as f64 * pitch.y - 6.0;
     let below = DVec2::new(left + 0.5 * across, end + 12.0);
-    drawing.label(below, &x.axis.name(), TEXT_SIZE, Anchor::Middle, INK);
+    drawing.label(below, &x.axis.title(), TEXT_SIZE, Anchor::Middle, INK);
     let beside = DVec2::new(24.0, 0.5 * (start + PANEL_TITLE + end - TICKS));
-    drawing.upright_label(beside, &y.axis.name(), TEXT_SIZE, INK);
+    drawing.upright_label(beside, &y.axis.title(), TEXT_SIZE, INK);
     end + NAME
 }
 

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use crate::figure::axes::Axes;
-use crate::figure::axis::Axis;
+use crate::figure::axis::{Axis, Ticks};
 use crate::figure::colors::{Color, FRAME, INK, WHITE, vein_color};
 use crate::figure::drawing::{Anchor, Drawing, Stroke, circle, rectangle};
 use crate::figure::page::Cell;
@@ -109,11 +109,9 @@ impl Varied {
         edges.insert(0, start);
         edges.push(end);
         let mut axis = Axis::linear(&name(&vary.keys.to_string()), start, end);
-        if let Some(sign) = sign {
-            axis = axis.of_sign(sign);
-        }
+        axis.sign = sign;
         if vary.keys.is_whole() {
-            axis = axis.at(vary.values.clone());
+            axis.ticks = Ticks::At(vary.values.clone());
         }
         let part = |edge: f64| (edge - start) / (end - start);
         Varied {
@@ -138,16 +136,19 @@ impl<'a> Panel<'a> {
     /// In this cell of the page, with or without labels below.
     pub fn new(cell: Cell, x: &'a Varied, y: Option<&'a Varied>, labelled: bool) -> Self {
         // Panels share the names of their axes.
-        let across = x.axis.clone().named("");
-        let across = if labelled {
-            across
-        } else {
-            across.unlabelled()
+        let unnamed = |axis: &Axis| Axis {
+            name: String::new(),
+            ..axis.clone()
         };
-        let up = match y {
-            Some(y) => y.axis.clone().named(""),
-            None => Axis::linear("", 0.0, 1.0).at(Vec::new()),
+        let across = Axis {
+            labelled,
+            ..unnamed(&x.axis)
         };
+        let strip = Axis {
+            ticks: Ticks::At(Vec::new()),
+            ..Axis::linear("", 0.0, 1.0)
+        };
+        let up = y.map_or(strip, |y| unnamed(&y.axis));
         let axes = Axes { cell, across, up };
         Panel { axes, x, y }
     }
