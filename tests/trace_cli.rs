@@ -255,7 +255,7 @@ fn a_branch_that_goes_on_is_an_outcome() {
         trace["branches"][0]["remark"]
             .as_str()
             .unwrap()
-            .contains("--points")
+            .contains("allow more")
     );
     assert_eq!(place.names("out/small"), FILES);
 }

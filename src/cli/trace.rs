@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use crate::study::{self, MOST_POINTS, TraceRequest, Vary};
+use crate::study::{self, MOST_POINTS, TraceError, TraceRequest, Vary};
 
 use crate::report;
 
@@ -69,7 +69,8 @@ impl Trace {
                     elapsed.as_secs_f64()
                 )
             });
-        })?;
+        })
+        .map_err(name_option)?;
         drop(line);
         if let (true, Some(remark)) = (self.request.json, &trace.remark) {
             note(&format!("{name}: {remark}"));
@@ -77,9 +78,18 @@ impl Trace {
         self.request.deliver(&trace, &folder, |folder| {
             report::trace_report(&trace, folder)
         })?;
-        Ok(match trace.complete() {
+        Ok(match trace.complete {
             true => Status::Success,
             false => Status::Failure,
         })
+    }
+}
+
+/// An error with the option that it is about.
+fn name_option(error: TraceError) -> Refusal {
+    match error {
+        TraceError::Vary { .. } => format!("--vary {error}").into(),
+        TraceError::Option { .. } => format!("--{error}").into(),
+        error => error.into(),
     }
 }

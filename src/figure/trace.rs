@@ -223,7 +223,7 @@ fn draw_key(page: &mut Drawing, trace: &Trace, cell: Cell) {
             Some([from, _]) => format!("branch {}, off branch {}", b + 1, from + 1),
         };
         let stroke = Stroke::new(CURVES[b % CURVES.len()], 1.8);
-        key.line(page, &name, branch_end(branch.end), stroke);
+        key.line(page, &name, branch_end(&branch.end), stroke);
     }
     if trace.branches.len() > MOST_NAMED {
         let more = format!("and {} more", trace.branches.len() - MOST_NAMED);

@@ -19,7 +19,7 @@ use crate::figure::{self, Picture};
 use crate::relax::Equilibrium;
 use crate::report::{
     Centerlines, ChartSummary, ChartTable, CheckSummary, Format, Json, MapSummary, MapTable,
-    ModesTable, MotionSummary, OutputError, ScalingTable, TraceSummary, TraceTable, Written,
+    ModesTable, MotionSummary, OutputError, ScalingTable, TraceTable, Written,
 };
 use crate::simulate::Record;
 use crate::study::{All, Chart, Check, Map, Scaling, Trace};
@@ -75,7 +75,7 @@ impl Written for All {
 
 impl Written for Trace {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &TraceSummary,
+        &Json("trace.json"),
         &TraceTable,
         &Picture::svg("trace.svg", figure::trace),
         &Picture::png("trace.png", figure::trace),

@@ -9,13 +9,11 @@ use crate::motion::{Energy, StableStep, Velocity};
 use crate::relax::{
     self, Accuracy, Equilibrium, Method, Model, NodeState, Outcome, RodShape, Stability, Work,
 };
-use crate::scenario::Units;
 use crate::shape::Difference;
 use crate::simulate::{Frame, Moment, Record, Scheme, Still};
 use crate::study::{
-    Base, Chart, Check, Confidence, Contender, Ending, Law, Map, MapMethod, MapOutcome, MapRequest,
-    MapRow, Peer, PointKind, Reference, Row, Scaling, ScalingRow, Setting, Shot, Spread, Trace,
-    TraceBranch, TraceEnd, TracePoint, Verdict,
+    Base, Chart, Check, Confidence, Contender, Ending, Map, MapMethod, MapOutcome, MapRequest,
+    MapRow, Peer, Reference, Row, Scaling, ScalingRow, Setting, Shot, Spread, Verdict,
 };
 use crate::undulation::{Undulation, Vein};
 
@@ -204,67 +202,6 @@ pub fn map() -> Map {
     };
     let rows = (0..8).flat_map(|cell| MapMethod::ALL.map(|method| row(cell, method)));
     Map::new(request, rows.collect())
-}
-
-/// A branch that loses its stability where another leaves it.
-pub fn trace() -> Trace {
-    let leaf = fan(3, 4);
-    let point = |value: f64, side: f64, index: usize| TracePoint {
-        kind: PointKind::Regular,
-        value,
-        value_error: None,
-        tips: vec![leaf.tips[0] + DVec3::new(0.0, 0.0, side)],
-        error: Some(1e-9),
-        energy: 0.1 * value,
-        index,
-        undulation: Undulation::default(),
-        curves: leaf.shape.curves.clone(),
-    };
-    let mut points: Vec<TracePoint> = (0..10)
-        .map(|k| point(0.1 * f64::from(k), 0.0, usize::from(k >= 5)))
-        .collect();
-    points[5].kind = PointKind::Branching(1);
-    points[5].value_error = Some(1e-12);
-    let other = (5..10).map(|k| {
-        let value = 0.1 * f64::from(k);
-        point(value, (value - 0.5).sqrt(), 0)
-    });
-    let law = Law {
-        axis: 0,
-        slope: 3.0,
-        r_squared: 0.99,
-        deviation: 0.02,
-        length: 0.9,
-        young: None,
-    };
-    Trace {
-        scenario: "fan".into(),
-        keys: "load.tip_force[0]".parse().unwrap(),
-        range: [0.0, 0.9],
-        units: Units::default(),
-        rods: 3,
-        joined: true,
-        tolerance: 1e-6,
-        segments: 16,
-        branches: vec![
-            TraceBranch {
-                from: None,
-                points,
-                end: TraceEnd::Reached,
-                remark: None,
-            },
-            TraceBranch {
-                from: Some([0, 5]),
-                points: other.collect(),
-                end: TraceEnd::MostPoints,
-                remark: Some("there are more points".into()),
-            },
-        ],
-        law: Some(law),
-        remark: None,
-        factorizations: 40,
-        wall_seconds: 0.1,
-    }
 }
 
 /// That fan at a time, swinging up and down.

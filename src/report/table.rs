@@ -47,9 +47,37 @@ pub fn write_csv<R: Serialize>(
     rows: impl IntoIterator<Item = R>,
     out: &mut dyn Write,
 ) -> io::Result<()> {
-    let mut table = csv::Writer::from_writer(out);
+    write_rows(csv::Writer::from_writer(out), rows)
+}
+
+/// The same without the header.
+///
+/// # Errors
+/// Those of `out`.
+pub fn append_csv<R: Serialize>(
+    rows: impl IntoIterator<Item = R>,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let mut table = csv::WriterBuilder::new();
+    write_rows(table.has_headers(false).from_writer(out), rows)
+}
+
+fn write_rows<R: Serialize>(
+    mut table: csv::Writer<&mut dyn Write>,
+    rows: impl IntoIterator<Item = R>,
+) -> io::Result<()> {
     for row in rows {
         table.serialize(row)?;
     }
     table.flush()
+}
+
+/// The header of a table that may have no rows, or not yet.
+pub fn header<R: Serialize + Default>() -> Vec<u8> {
+    let mut table = Vec::new();
+    // Writing to memory cannot fail.
+    let _ = write_csv([R::default()], &mut table);
+    let end = table.iter().position(|&byte| byte == b'\n');
+    table.truncate(end.map_or(0, |end| end + 1));
+    table
 }

@@ -35,7 +35,7 @@ pub fn report(trace: &Trace, folder: Option<&Path>) -> String {
                 "{}{from}: {} points, {}",
                 number + 1,
                 branch.points.len(),
-                branch_end(branch.end)
+                branch_end(&branch.end)
             ),
         ));
         let mut before = branch.points.first().map_or(0, |point| point.index);

@@ -2,32 +2,67 @@
 
 use std::io::{self, Write};
 
+use serde::Serialize;
+
 use super::Format;
-use crate::study::Trace;
+use super::table::{append_csv, header};
+use crate::study::{PointKind, Trace, TracePoint};
 
 /// `trace.csv`: one row per branch and point.
 pub struct TraceTable;
 
-/// Names of the columns; the number that varies stands in `value`. Branches and
-/// points are numbered from 1. The tip is the joint one, or the first rod's.
-const HEADER: [&str; 16] = [
-    "branch",
-    "point",
-    "kind",
-    "value",
-    "value_error",
-    "tip_x",
-    "tip_y",
-    "tip_z",
-    "error",
-    "energy",
-    "negative_eigenvalues",
-    "stable",
-    "multiplicity",
-    "margin_waves",
-    "margin_amplitude",
-    "twist",
-];
+/// A row; the number that varies stands in `value`. Branches and points are
+/// numbered from 1. The tip is the joint one, or the first rod's.
+#[derive(Default, Serialize)]
+struct Row {
+    branch: usize,
+    point: usize,
+    kind: &'static str,
+    value: f64,
+    value_error: Option<f64>,
+    tip_x: f64,
+    tip_y: f64,
+    tip_z: f64,
+    error: Option<f64>,
+    energy: f64,
+    negative_eigenvalues: usize,
+    stable: bool,
+    multiplicity: Option<usize>,
+    margin_waves: Option<f64>,
+    margin_amplitude: Option<f64>,
+    twist: f64,
+}
+
+impl Row {
+    fn of(branch: usize, point: &TracePoint) -> Self {
+        let tip = point.tips.first();
+        // Adding zero turns -0 into 0.
+        let [tip_x, tip_y, tip_z] =
+            tip.map_or([f64::NAN; 3], |tip| tip.to_array().map(|x| x + 0.0));
+        let margin = point.undulation.margin();
+        Row {
+            branch: branch + 1,
+            point: point.point,
+            kind: point.kind.word(),
+            value: point.value,
+            value_error: point.value_error,
+            tip_x,
+            tip_y,
+            tip_z,
+            error: point.error,
+            energy: point.energy,
+            negative_eigenvalues: point.index,
+            stable: point.index == 0,
+            multiplicity: match point.kind {
+                PointKind::Branching(modes) => Some(modes),
+                _ => None,
+            },
+            margin_waves: margin.map(|vein| vein.waves()),
+            margin_amplitude: margin.map(|vein| vein.amplitude),
+            twist: point.undulation.twist() + 0.0,
+        }
+    }
+}
 
 impl Format<Trace> for TraceTable {
     fn file_name(&self) -> &'static str {
@@ -35,47 +70,11 @@ impl Format<Trace> for TraceTable {
     }
 
     fn write(&self, trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
-        use crate::study::PointKind::Branching;
-        let mut table = csv::WriterBuilder::new()
-            .has_headers(false)
-            .from_writer(out);
-        table.write_record(HEADER)?;
-        for (b, branch) in trace.branches.iter().enumerate() {
-            for (p, point) in branch.points.iter().enumerate() {
-                let tip = point
-                    .tips
-                    .first()
-                    .map_or([f64::NAN; 3], |tip| tip.to_array());
-                let margin = point.undulation.margin();
-                let multiplicity = match point.kind {
-                    Branching(modes) => Some(modes),
-                    _ => None,
-                };
-                table.serialize((
-                    (
-                        b + 1,
-                        p + 1,
-                        point.kind.word(),
-                        point.value,
-                        point.value_error,
-                    ),
-                    // Adding zero turns -0 into 0.
-                    tip.map(|value| value + 0.0),
-                    (
-                        point.error,
-                        point.energy,
-                        point.index,
-                        point.index == 0,
-                        multiplicity,
-                    ),
-                    (
-                        margin.map(|vein| vein.waves()),
-                        margin.map(|vein| vein.amplitude),
-                        point.undulation.twist() + 0.0,
-                    ),
-                ))?;
-            }
-        }
-        table.flush()
+        // Even of a trace without points.
+        out.write_all(&header::<Row>())?;
+        let branches = trace.branches.iter().enumerate();
+        let rows =
+            branches.flat_map(|(b, branch)| branch.points.iter().map(move |p| Row::of(b, p)));
+        append_csv(rows, out)
     }
 }

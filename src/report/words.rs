@@ -1,7 +1,8 @@
 //! Sentences about a result that the figure and the command line share.
 
+use crate::branch::{End, Stuck};
 use crate::relax::{Equilibrium, Outcome};
-use crate::study::{Contender, TraceEnd, Verdict};
+use crate::study::{Contender, Verdict};
 
 /// How the run ended and what was found, in one phrase.
 pub fn verdict(equilibrium: &Equilibrium) -> String {
@@ -70,15 +71,15 @@ pub fn contender(contender: Contender) -> &'static str {
 }
 
 /// How a branch ended, in a phrase.
-pub fn branch_end(end: TraceEnd) -> &'static str {
+pub fn branch_end(end: &End) -> &'static str {
     match end {
-        TraceEnd::Reached => "to the end of the range",
-        TraceEnd::Returned => "back to its start",
-        TraceEnd::Closed => "closed",
-        TraceEnd::MostPoints => "goes on",
-        TraceEnd::OutOfRange => "ends where no leaf is",
-        TraceEnd::Unresolved => "ends: grid too coarse",
-        TraceEnd::Stuck => "lost",
+        End::Reached => "to the end of the range",
+        End::Returned => "back to its start",
+        End::Closed => "closed",
+        End::MostPoints => "goes on",
+        End::Stuck(Stuck::OutOfRange(_)) => "ends where no leaf is",
+        End::Stuck(Stuck::Unresolved) => "ends: grid too coarse",
+        End::Stuck(_) => "lost",
     }
 }
 

@@ -18,7 +18,7 @@ pub use map::{
     UnknownWord, map,
 };
 pub use trace::{
-    Law, MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceEnd, TraceError,
-    TracePoint, TraceRequest, trace,
+    Law, MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceError, TracePoint,
+    TraceRequest, trace,
 };
 pub use vary::{Base, Keys, Knob, Knobs, Target, Varied, Vary, VaryError};

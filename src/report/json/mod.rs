@@ -6,7 +6,6 @@ mod map;
 mod motion;
 #[cfg(test)]
 mod summary;
-mod trace;
 
 use std::io::{self, Write};
 
@@ -20,7 +19,6 @@ pub use chart::ChartSummary;
 pub use check::CheckSummary;
 pub use map::MapSummary;
 pub use motion::MotionSummary;
-pub use trace::TraceSummary;
 
 type Point = [f64; 3];
 

@@ -1,14 +1,17 @@
 //! Force against displacement, as a tensile test measures it.
 
+use serde::{Serialize, Serializer};
+
 use super::result::TraceBranch;
 use crate::scenario::Key;
 use crate::study::{Keys, Target};
 
 /// The straight line through the forces on a tip against its displacements
 /// along them: Hooke's law, and how well it holds.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Law {
     /// Axis of the force: 0, 1, 2 for x, y, z.
+    #[serde(serialize_with = "serialize_axis")]
     pub axis: usize,
     /// Stiffness: slope of the line of least squares, force per length.
     pub slope: f64,
@@ -71,15 +74,21 @@ impl Law {
     }
 }
 
+fn serialize_axis<S: Serializer>(axis: &usize, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_char(['x', 'y', 'z'][*axis])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::trace::{PointKind, TraceEnd, TracePoint};
+    use crate::branch::End;
+    use crate::study::trace::{PointKind, TracePoint};
     use crate::undulation::Undulation;
     use glam::DVec3;
 
     fn branch(tip: impl Fn(f64) -> f64) -> TraceBranch {
         let point = |force: f64| TracePoint {
+            point: 1,
             kind: PointKind::Regular,
             value: force,
             value_error: None,
@@ -93,7 +102,7 @@ mod tests {
         TraceBranch {
             from: None,
             points: (0..=10).map(|k| point(0.1 * f64::from(k))).collect(),
-            end: TraceEnd::Reached,
+            end: End::Reached,
             remark: None,
         }
     }

@@ -5,7 +5,7 @@ mod result;
 mod run;
 
 pub use law::Law;
-pub use result::{PointKind, Trace, TraceBranch, TraceEnd, TracePoint};
+pub use result::{PointKind, Trace, TraceBranch, TracePoint};
 pub use run::trace;
 
 use super::vary::{Base, Vary};
@@ -48,7 +48,7 @@ pub struct TraceRequest {
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
     /// The number cannot be followed.
-    #[error("--vary {keys}: {why}")]
+    #[error("{keys}: {why}")]
     Vary {
         /// The number.
         keys: String,
@@ -113,7 +113,7 @@ impl TraceRequest {
         }
         if self.most_points < 2 {
             return Err(TraceError::Option {
-                option: "--points",
+                option: "points",
                 found: self.most_points.to_string(),
                 needed: "2 or more",
             });
@@ -122,7 +122,7 @@ impl TraceRequest {
             && !(area > 0.0 && area.is_finite())
         {
             return Err(TraceError::Option {
-                option: "--cross-section",
+                option: "cross-section",
                 found: format!("{area:?}"),
                 needed: "greater than 0",
             });

@@ -1,37 +1,47 @@
 //! What a trace found.
 
 use glam::DVec3;
+use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::law::Law;
+use crate::branch::{End, Stuck};
 use crate::scenario::Units;
+use crate::shape::serialize_tips;
 use crate::study::Keys;
 use crate::undulation::Undulation;
 
-/// An equilibrium followed through a number of its scenario.
-#[derive(Clone, Debug)]
+/// An equilibrium followed through a number of its scenario. As JSON it is
+/// `trace.json`.
+#[derive(Clone, Debug, serde::Serialize)]
 pub struct Trace {
     /// Name of the scenario.
     pub scenario: String,
     /// The number that varied.
+    #[serde(rename = "vary", serialize_with = "serialize_keys")]
     pub keys: Keys,
     /// Its values at the ends of the range.
     pub range: [f64; 2],
     /// Names of the units, if the scenario gives any.
+    #[serde(skip)]
     pub units: Units,
     /// Number of rods.
     pub rods: usize,
     /// Whether the tips share one point.
+    #[serde(skip)]
     pub joined: bool,
-    /// Wanted accuracy of the tips, relative to the longest rod.
-    pub tolerance: f64,
     /// Segments a rod of the grid on which branches were followed.
     pub segments: usize,
+    /// Wanted accuracy of the tips, relative to the longest rod.
+    pub tolerance: f64,
+    /// Whether there are branches, and all are known as far as was asked.
+    pub complete: bool,
+    /// Why there is no branch, or fewer than there are.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remark: Option<String>,
     /// The branches: first that of the first equilibrium.
     pub branches: Vec<TraceBranch>,
     /// Force against displacement, if it is a tip force that varied.
     pub law: Option<Law>,
-    /// Why there is no branch, or fewer than there are.
-    pub remark: Option<String>,
     /// Matrices factorised while following.
     pub factorizations: usize,
     /// Time of all, in seconds.
@@ -41,19 +51,22 @@ pub struct Trace {
 /// One branch.
 #[derive(Clone, Debug)]
 pub struct TraceBranch {
-    /// Branch and point from which it was entered; none of the first.
+    /// Indices of the branch and of its point from which it was entered; none of
+    /// the first.
     pub from: Option<[usize; 2]>,
     /// Its points in order, critical ones among them.
     pub points: Vec<TracePoint>,
     /// How it ended.
-    pub end: TraceEnd,
+    pub end: End,
     /// Why, in a sentence, if that is not plain.
     pub remark: Option<String>,
 }
 
 /// A point of a branch, in the scenario's units.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize)]
 pub struct TracePoint {
+    /// Its number on the branch, from 1.
+    pub point: usize,
     /// What it is.
     pub kind: PointKind,
     /// The number that varies.
@@ -61,16 +74,20 @@ pub struct TracePoint {
     /// Bound on its error, where it is found and not chosen.
     pub value_error: Option<f64>,
     /// The joint tip alone, or every tip.
+    #[serde(flatten, serialize_with = "serialize_tips")]
     pub tips: Vec<DVec3>,
     /// Bound on the error of the tips.
     pub error: Option<f64>,
     /// Potential energy.
     pub energy: f64,
     /// Morse index; at a critical point that behind it.
+    #[serde(flatten, serialize_with = "serialize_index")]
     pub index: usize,
     /// Waves and twist of the veins.
+    #[serde(skip)]
     pub undulation: Undulation,
     /// Centerlines on the finest grid, one per rod.
+    #[serde(skip)]
     pub curves: Vec<Vec<DVec3>>,
 }
 
@@ -96,60 +113,78 @@ impl PointKind {
     }
 }
 
-/// How a branch ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TraceEnd {
-    /// At the end of the range.
-    Reached,
-    /// Back at its start.
-    Returned,
-    /// Where the branch began.
-    Closed,
-    /// After as many points as were allowed.
-    MostPoints,
-    /// The number cannot have the next value.
-    OutOfRange,
-    /// A segment bends by more than the grid resolves.
-    Unresolved,
-    /// No step could be made.
-    Stuck,
+impl Serialize for PointKind {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.word())
+    }
 }
 
-impl TraceEnd {
+impl End {
     /// The word in files.
-    pub fn word(self) -> &'static str {
+    pub fn word(&self) -> &'static str {
         match self {
-            TraceEnd::Reached => "reached",
-            TraceEnd::Returned => "returned",
-            TraceEnd::Closed => "closed",
-            TraceEnd::MostPoints => "most-points",
-            TraceEnd::OutOfRange => "out-of-range",
-            TraceEnd::Unresolved => "unresolved",
-            TraceEnd::Stuck => "stuck",
+            End::Reached => "reached",
+            End::Returned => "returned",
+            End::Closed => "closed",
+            End::MostPoints => "most-points",
+            End::Stuck(Stuck::OutOfRange(_)) => "out-of-range",
+            End::Stuck(Stuck::Unresolved) => "unresolved",
+            End::Stuck(_) => "stuck",
         }
     }
 
     /// Whether the branch is known as far as was asked.
-    pub fn complete(self) -> bool {
-        matches!(
-            self,
-            TraceEnd::Reached | TraceEnd::Returned | TraceEnd::Closed
-        )
+    pub fn complete(&self) -> bool {
+        matches!(self, End::Reached | End::Returned | End::Closed)
+    }
+
+    /// What stopped a branch that is not, and what may help.
+    pub(super) fn remark(&self) -> Option<String> {
+        match self {
+            End::Reached | End::Returned | End::Closed => None,
+            End::MostPoints => Some("there are more points: allow more".into()),
+            End::Stuck(Stuck::Unresolved) => {
+                Some(format!("{}: use more segments", Stuck::Unresolved))
+            }
+            End::Stuck(stuck) => Some(stuck.to_string()),
+        }
     }
 }
 
 impl TraceBranch {
-    /// Its critical points, with their numbers.
+    /// Its critical points, with their indices.
     pub fn critical(&self) -> impl Iterator<Item = (usize, &TracePoint)> {
         let points = self.points.iter().enumerate();
         points.filter(|(_, point)| point.kind != PointKind::Regular)
     }
 }
 
-impl Trace {
-    /// Whether all branches are known as far as was asked.
-    pub fn complete(&self) -> bool {
-        let mut branches = self.branches.iter();
-        !self.branches.is_empty() && branches.all(|branch| branch.end.complete())
+/// With its first, its last and its critical points for all of them.
+impl Serialize for TraceBranch {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let critical: Vec<&TracePoint> = self.critical().map(|(_, point)| point).collect();
+        let mut object = serializer.serialize_struct("TraceBranch", 7)?;
+        object.serialize_field("from", &self.from.map(|from| from.map(|index| index + 1)))?;
+        object.serialize_field("points", &self.points.len())?;
+        object.serialize_field("end", self.end.word())?;
+        match &self.remark {
+            Some(remark) => object.serialize_field("remark", remark)?,
+            None => object.skip_field("remark")?,
+        }
+        object.serialize_field("first", &self.points.first())?;
+        object.serialize_field("last", &self.points.last())?;
+        object.serialize_field("critical", &critical)?;
+        object.end()
     }
+}
+
+fn serialize_keys<S: Serializer>(keys: &Keys, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(keys)
+}
+
+fn serialize_index<S: Serializer>(index: &usize, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut keys = serializer.serialize_struct("Index", 2)?;
+    keys.serialize_field("negative_eigenvalues", index)?;
+    keys.serialize_field("stable", &(*index == 0))?;
+    keys.end()
 }

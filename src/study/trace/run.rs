@@ -1,16 +1,17 @@
 //! Making a trace.
 
+use std::collections::VecDeque;
 use std::time::Instant;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::law::Law;
-use super::result::{PointKind, Trace, TraceBranch, TraceEnd, TracePoint};
+use super::result::{PointKind, Trace, TraceBranch, TracePoint};
 use super::{MOST_BRANCHES, TraceError, TraceRequest};
 use crate::branch::{
-    self, Branch, Critical, End, Equations, Family, Kind, Point, Refined, Stuck, Walk, refine,
-    refine_critical, switch, walk,
+    self, Branch, Critical, Equations, Family, Kind, Point, Refined, Walk, refine, refine_critical,
+    switch, walk,
 };
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::relax::{Equilibrium, Options, SemiImplicit, node_state, project, relax};
@@ -70,35 +71,36 @@ pub fn trace(
         units: scenario.units.clone(),
         rods: scenario.rods.len(),
         joined: scenario.joined,
-        tolerance,
         segments: grid.segments(),
+        tolerance,
+        complete: false,
+        remark: None,
         branches: Vec::new(),
         law: None,
-        remark: None,
         factorizations: 0,
         wall_seconds: 0.0,
     };
-    if first.stability.negative_eigenvalues.is_none() {
+    if first.stability.negative_eigenvalues.is_some() {
+        let mut run = Run {
+            family: &family,
+            request,
+            grid,
+            tolerance,
+            crossings: Vec::new(),
+            progress,
+        };
+        run.follow_all(&state, &mut trace);
+    } else {
         trace.remark = Some(format!(
             "no equilibrium to begin with at {keys} = {}: {}",
             keys.text(ends[0]),
             first.remark.as_deref().unwrap_or("the leaf is not at rest")
         ));
-        trace.wall_seconds = clock.elapsed().as_secs_f64();
-        return Ok(trace);
     }
-    let mut run = Run {
-        family: &family,
-        request,
-        tolerance,
-        known: Vec::new(),
-        progress,
-    };
-    run.all(grid, state, &mut trace);
-    trace.law = trace
-        .branches
-        .first()
-        .and_then(|branch| Law::of(keys, branch, request.cross_section));
+    let branches = &trace.branches;
+    trace.complete = !branches.is_empty() && branches.iter().all(|branch| branch.end.complete());
+    let first = branches.first();
+    trace.law = first.and_then(|branch| Law::of(keys, branch, request.cross_section));
     trace.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(trace)
 }
@@ -142,136 +144,140 @@ fn unsettled(family: &Family, grid: &Grid, state: &State, first: &Equilibrium) -
     found.is_none_or(|(point, _)| Some(point.index) != first.stability.negative_eigenvalues)
 }
 
-/// A place where another branch begins.
-struct Entrance {
-    point: Point,
-    from: [usize; 2],
-}
-
+/// What all branches have in common.
 struct Run<'r, 'p> {
     family: &'r Family<'r>,
     request: &'r TraceRequest,
+    /// On which branches are followed.
+    grid: Grid,
     tolerance: f64,
-    /// Points where branches cross that are known.
-    known: Vec<(f64, State)>,
+    /// Points where branches cross, found so far.
+    crossings: Vec<(f64, State)>,
     progress: &'p mut dyn FnMut(usize, usize, f64),
 }
 
 impl Run<'_, '_> {
-    fn all(&mut self, grid: Grid, state: State, trace: &mut Trace) {
-        let mut equations = match Equations::new(self.family, grid.clone()) {
+    /// Follows the branch of the equilibrium near `state` and, if that is asked for,
+    /// those that cross it, breadth first.
+    fn follow_all(&mut self, state: &State, trace: &mut Trace) {
+        let mut equations = match Equations::new(self.family, self.grid.clone()) {
             Ok(equations) => equations,
-            Err(out) => {
-                trace.remark = Some(out.to_string());
+            Err(out_of_range) => {
+                trace.remark = Some(out_of_range.to_string());
                 return;
             }
         };
-        let mut entrances = match equations.correct(&state, 0.0, None) {
-            Ok((mut point, _)) => {
-                point.tangent = point.tangent.towards(true);
-                vec![(point, None)]
-            }
+        let mut first = match equations.correct(state, 0.0, None) {
+            Ok((point, _)) => point,
             Err(stuck) => {
-                trace.remark = Some(format!("on {} segments: {stuck}", grid.segments()));
+                trace.remark = Some(format!("on {} segments: {stuck}", self.grid.segments()));
                 return;
             }
         };
-        entrances.reverse();
-        while let Some((first, from)) = entrances.pop() {
-            if trace.branches.len() == MOST_BRANCHES {
+        first.tangent = first.tangent.towards(true);
+        let values = self.request.vary.values.len();
+        let how = Walk {
+            longest: (1.0 / (values - 1) as f64).min(LONGEST),
+            most: self.request.most_points,
+        };
+        let mut entrances = VecDeque::from([(first, None)]);
+        while let Some((first, from)) = entrances.pop_front() {
+            let number = trace.branches.len();
+            if number == MOST_BRANCHES {
                 trace.remark = Some(format!("there are more than {MOST_BRANCHES} branches"));
                 break;
             }
-            let number = trace.branches.len();
-            let how = Walk {
-                longest: (1.0 / (self.request.vary.values.len() - 1) as f64).min(LONGEST),
-                most: self.request.most_points,
-            };
             let (family, progress) = (self.family, &mut *self.progress);
             let mut count = 0;
             let branch = walk(&mut equations, first, &how, &mut |point| {
                 count += 1;
                 progress(number, count, family.value(point.fraction));
             });
-            let told = self.tell(&grid, &branch, from);
+            trace.branches.push(self.refined(&branch, from));
             if self.request.switch {
-                let mut new = self.entrances(&mut equations, &branch, number);
-                new.reverse();
-                // In the order in which they were found, after those before.
-                let waiting = std::mem::take(&mut entrances);
-                entrances = new
-                    .into_iter()
-                    .map(|entrance| (entrance.point, Some(entrance.from)))
-                    .collect();
-                entrances.extend(waiting);
+                self.enter_crossing(&mut equations, &branch, number, &mut entrances);
             }
-            trace.branches.push(told);
         }
         trace.factorizations = equations.factorizations;
     }
 
-    /// First points of the branches that cross, where that is new.
-    fn entrances(
+    /// Adds first points of the branches that cross, each with the indices of the
+    /// branch and the point it was entered from, where that is new.
+    fn enter_crossing(
         &mut self,
         equations: &mut Equations,
         branch: &Branch,
         number: usize,
-    ) -> Vec<Entrance> {
-        let mut found = Vec::new();
+        entrances: &mut VecDeque<(Point, Option<[usize; 2]>)>,
+    ) {
         for (which, (after, critical)) in branch.critical.iter().enumerate() {
-            let known =
-                (self.known.iter()).any(|(fraction, state)| near(*fraction, state, critical));
+            let mut crossings = self.crossings.iter();
+            let known = crossings.any(|(fraction, state)| near(*fraction, state, critical));
             if critical.kind != Kind::Branching || known {
                 continue;
             }
-            self.known.push((critical.fraction, critical.state.clone()));
+            let crossing = (critical.fraction, critical.state.clone());
+            self.crossings.push(crossing);
             // Where several modes become neutral at once for reasons of symmetry,
             // branches of any mixture of them are the same, turned.
-            let from = [number, after + 1 + which];
             let new = switch(equations, critical, 0).into_iter();
-            found.extend(new.map(|point| Entrance { point, from }));
+            let from = Some([number, after + 1 + which]);
+            entrances.extend(new.map(|point| (point, from)));
         }
-        found
     }
 
     /// A branch in the scenario's units, without the error of its grid.
-    fn tell(&self, grid: &Grid, branch: &Branch, from: Option<[usize; 2]>) -> TraceBranch {
-        let (family, tolerance) = (self.family, self.tolerance);
-        let points: Vec<(Option<Refined>, &Point)> = (branch.points.par_iter())
-            .map(|point| (refine(family, grid, point, tolerance).ok(), point))
+    fn refined(&self, branch: &Branch, from: Option<[usize; 2]>) -> TraceBranch {
+        let (family, grid, tolerance) = (self.family, &self.grid, self.tolerance);
+        let regular: Vec<Option<Refined>> = (branch.points.par_iter())
+            .map(|point| refine(family, grid, point, tolerance).ok())
             .collect();
-        let critical: Vec<(usize, Option<Refined>, &Critical)> = (branch.critical.par_iter())
-            .map(|(after, point)| (*after, refine_critical(family, grid, point).ok(), point))
+        let critical: Vec<Option<Refined>> = (branch.critical.par_iter())
+            .map(|(_, point)| refine_critical(family, grid, point).ok())
             .collect();
-        let mut told = Vec::new();
-        for (i, (refined, point)) in points.into_iter().enumerate() {
-            let refined =
-                refined.unwrap_or_else(|| unrefined(family, grid, &point.state, point.fraction));
-            told.push(self.point(PointKind::Regular, point.index, &refined));
-            for (_, refined, point) in critical.iter().filter(|(after, ..)| *after == i) {
+        let mut points = Vec::new();
+        let mut critical = branch.critical.iter().zip(critical).peekable();
+        for (i, (point, refined)) in branch.points.iter().zip(regular).enumerate() {
+            let refined = refined.unwrap_or_else(|| self.unrefined(&point.state, point.fraction));
+            let number = points.len() + 1;
+            points.push(self.point(number, PointKind::Regular, point.index, &refined));
+            while let Some(((_, point), refined)) = critical.next_if(|((after, _), _)| *after == i)
+            {
                 let kind = match point.kind {
                     Kind::Fold => PointKind::Fold,
                     Kind::Branching => PointKind::Branching(point.modes.len()),
                 };
-                let refined = refined
-                    .clone()
-                    .unwrap_or_else(|| unrefined(family, grid, &point.state, point.fraction));
-                told.push(self.point(kind, point.indices[1], &refined));
+                let refined =
+                    refined.unwrap_or_else(|| self.unrefined(&point.state, point.fraction));
+                let number = points.len() + 1;
+                points.push(self.point(number, kind, point.indices[1], &refined));
             }
         }
-        let (end, remark) = end(&branch.end);
-        let missed = match branch.missed.is_empty() {
-            true => None,
-            false => Some(format!(
-                "the index changes in {} places that could not be located",
-                branch.missed.len()
+        let missed = match branch.missed.len() {
+            0 => None,
+            count => Some(format!(
+                "the index changes in {count} places that could not be located"
             )),
         };
         TraceBranch {
             from,
-            points: told,
-            end,
-            remark: remark.or(missed),
+            points,
+            end: branch.end.clone(),
+            remark: branch.end.remark().or(missed),
+        }
+    }
+
+    /// What is known of a point on one grid.
+    fn unrefined(&self, state: &State, fraction: f64) -> Refined {
+        let energy = (self.family).with(fraction, &self.grid, |leaf| leaf.energy(state));
+        Refined {
+            fraction,
+            energy: energy.unwrap_or(f64::NAN),
+            tips: (0..state.rods()).map(|j| state.tip(j).to_array()).collect(),
+            error: None,
+            fraction_error: None,
+            state: state.clone(),
+            grid: self.grid.clone(),
         }
     }
 
@@ -304,7 +310,7 @@ impl Run<'_, '_> {
         ))
     }
 
-    fn point(&self, kind: PointKind, index: usize, refined: &Refined) -> TracePoint {
+    fn point(&self, point: usize, kind: PointKind, index: usize, refined: &Refined) -> TracePoint {
         let scale = self.family.scale();
         let value = self.family.value(refined.fraction);
         let joined = self.request.base.scenario().joined;
@@ -314,6 +320,7 @@ impl Run<'_, '_> {
             .map(|tip| DVec3::from_array(*tip) * scale.length);
         let nodes = refined.grid.segments() + 1;
         TracePoint {
+            point,
             kind,
             value,
             value_error: match kind {
@@ -335,43 +342,6 @@ impl Run<'_, '_> {
     }
 }
 
-/// What is known of a point on one grid.
-fn unrefined(family: &Family, grid: &Grid, state: &State, fraction: f64) -> Refined {
-    let energy = family.with(fraction, grid, |leaf| leaf.energy(state));
-    Refined {
-        fraction,
-        energy: energy.unwrap_or(f64::NAN),
-        tips: (0..state.rods()).map(|j| state.tip(j).to_array()).collect(),
-        error: None,
-        fraction_error: None,
-        state: state.clone(),
-        grid: grid.clone(),
-    }
-}
-
 fn near(fraction: f64, state: &State, critical: &Critical) -> bool {
     (fraction - critical.fraction).abs() < SAME && state.shift_to(&critical.state) < SAME.sqrt()
-}
-
-fn end(end: &End) -> (TraceEnd, Option<String>) {
-    match end {
-        End::Reached => (TraceEnd::Reached, None),
-        End::Returned => (TraceEnd::Returned, None),
-        End::Closed => (TraceEnd::Closed, None),
-        End::MostPoints => (
-            TraceEnd::MostPoints,
-            Some("there are more points: allow them by --points".into()),
-        ),
-        End::Stuck(stuck) => (
-            match stuck {
-                Stuck::OutOfRange(_) => TraceEnd::OutOfRange,
-                Stuck::Unresolved => TraceEnd::Unresolved,
-                _ => TraceEnd::Stuck,
-            },
-            Some(match stuck {
-                Stuck::Unresolved => format!("{stuck}: use more --segments"),
-                _ => stuck.to_string(),
-            }),
-        ),
-    }
 }
