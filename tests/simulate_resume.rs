@@ -211,14 +211,14 @@ gravity = { at = [0.0, 1.0], value = [[0, 0, -1], [0, 1, -1]] }
                     recording.add(&simulation, &frame).unwrap();
                 }
                 if outputs.is_some() {
-                    let time = recording.keeper().keep().unwrap().unwrap();
+                    let time = recording.checkpointer().write().unwrap().unwrap();
                     assert_eq!(time, simulation.time());
                     return;
                 }
                 let record = recording.record(&simulation, None).unwrap();
                 recording.finish(&record).unwrap();
                 assert!(
-                    recording.keeper().keep().is_none(),
+                    recording.checkpointer().write().is_none(),
                     "nothing is left to keep"
                 );
             };

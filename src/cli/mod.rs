@@ -17,7 +17,7 @@ use std::sync::OnceLock;
 use clap::{Parser, Subcommand};
 
 use crate::files;
-use crate::files::Keeper;
+use crate::files::Checkpointer;
 use crate::report::OutputError;
 
 /// How a leaf of coupled elastic veins comes to rest, with an error bar and a statement of stability, and how it moves.
@@ -105,20 +105,20 @@ impl From<Status> for ExitCode {
     }
 }
 
-/// What keeps a simulation when the process is stopped, if there is one.
-static KEEPER: OnceLock<Keeper> = OnceLock::new();
+/// What writes a checkpoint of a simulation when the process is stopped, if there is one.
+static CHECKPOINTER: OnceLock<Checkpointer> = OnceLock::new();
 
 /// Lets Ctrl-C end the process at once, with no file half written, and a
 /// simulation kept.
 fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     ctrlc::set_handler(|| {
-        let kept = KEEPER.get().and_then(Keeper::keep_for_good);
+        let kept = CHECKPOINTER.get().and_then(Checkpointer::write_and_stop);
         files::abandon_unfinished();
         if io::stderr().is_terminal() {
             // The progress line may be there.
             let _ = write!(io::stderr(), "\r\x1b[2K");
         }
-        let status = match kept.map(|kept| tell_kept(&kept)) {
+        let status = match kept.map(|kept| show_checkpoint(&kept)) {
             Some(Status::Refused) => Status::Refused as i32,
             _ => INTERRUPTED,
         };
@@ -127,14 +127,14 @@ fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Lets Ctrl-C keep what this keeper keeps, from now on.
-fn keep_on_interrupt(keeper: Keeper) {
+/// Lets Ctrl-C write a checkpoint, from now on.
+fn checkpoint_on_interrupt(checkpointer: Checkpointer) {
     // A process has one simulation.
-    let _ = KEEPER.set(keeper);
+    let _ = CHECKPOINTER.set(checkpointer);
 }
 
 /// Says where a simulation that was kept can go on, or why it cannot.
-fn tell_kept(kept: &Result<f64, OutputError>) -> Status {
+fn show_checkpoint(kept: &Result<f64, OutputError>) -> Status {
     match kept {
         Ok(time) => {
             let time = crate::report::numbers::brief(*time);

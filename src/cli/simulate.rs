@@ -13,7 +13,7 @@ use crate::report;
 
 use super::progress::ProgressLine;
 use super::request::Request;
-use super::{Refusal, Status, keep_on_interrupt, note, tell_kept};
+use super::{Refusal, Status, checkpoint_on_interrupt, note, show_checkpoint};
 use crate::report::numbers::brief;
 
 /// Follow a leaf as it moves: its shape, velocities and energies in time.
@@ -73,13 +73,13 @@ impl Simulate {
             true => Recording::resume(&folder, &mut simulation)?,
             false => Recording::begin(&folder, &mut simulation)?,
         };
-        keep_on_interrupt(recording.keeper());
+        checkpoint_on_interrupt(recording.checkpointer());
         let ended = self.follow(&mut simulation, &mut recording, &folder);
         if ended.is_err()
-            && let Some(kept) = recording.keeper().keep()
+            && let Some(kept) = recording.checkpointer().write()
         {
             // What was found so far need not be lost with the files.
-            tell_kept(&kept);
+            show_checkpoint(&kept);
         }
         ended
     }

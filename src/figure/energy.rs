@@ -52,7 +52,7 @@ pub fn draw(record: &Record) -> Drawing {
     let lower = upper + ENERGIES + BETWEEN + PANEL_TITLE;
     let mut drawing = header::page(LEFT, &name, &notes(record), None);
     drawing.height = lower + BALANCE + PANEL_AXIS + BOTTOM;
-    let end = match record.time() {
+    let end = match record.time {
         time if time > 0.0 => time,
         _ => record.duration,
     };

@@ -13,7 +13,7 @@ use crate::report::OutputError;
 /// Large enough that a centerline file of a wide leaf is not written in crumbs.
 const BUFFER_BYTES: usize = 1 << 16;
 
-/// Files begun and not yet renamed.
+/// Drafts that are not renamed yet.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
@@ -37,41 +37,54 @@ pub(super) fn write_file(
     file: &Path,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
-    let (draft, created) = begin(file)?;
+    let (draft, created) = Draft::begin(file)?;
     let mut out = BufWriter::with_capacity(BUFFER_BYTES, created);
-    let filled = fill(&mut out).and_then(|()| out.flush());
+    fill(&mut out)?;
+    out.flush()?;
     drop(out);
-    let finished = filled.and_then(|()| finish(&draft, file));
-    if finished.is_err() {
-        discard(&draft);
+    rename(draft.path(), file)
+}
+
+/// The path of a file that is being written. What was begun and not renamed is
+/// removed when this is dropped.
+pub(super) struct Draft(PathBuf);
+
+impl Draft {
+    /// Begins a file under another name.
+    pub fn begin(file: &Path) -> io::Result<(Self, File)> {
+        let path = draft_path(file);
+        let mut paths = unfinished();
+        let created = File::create(&path)?;
+        paths.push(path.clone());
+        Ok((Draft(path), created))
     }
-    finished
+
+    /// A draft that an earlier process has left, and that is left again.
+    pub fn resume(path: &Path) -> Self {
+        Draft(path.into())
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
 }
 
-/// Begins a file under another name, to be finished or discarded.
-pub(super) fn begin(file: &Path) -> io::Result<(PathBuf, File)> {
-    let draft = draft_path(file);
-    let mut paths = unfinished();
-    let created = File::create(&draft)?;
-    paths.push(draft.clone());
-    Ok((draft, created))
+impl Drop for Draft {
+    fn drop(&mut self) {
+        let mut paths = unfinished();
+        if let Some(at) = paths.iter().position(|path| *path == self.0) {
+            // Nothing is left to do about a file that cannot be removed.
+            let _ = fs::remove_file(paths.swap_remove(at));
+        }
+    }
 }
 
-/// Gives a draft the name of a finished file.
-pub(super) fn finish(draft: &Path, file: &Path) -> io::Result<()> {
+/// Gives a draft the name by which it is found.
+pub(super) fn rename(draft: &Path, file: &Path) -> io::Result<()> {
     let mut paths = unfinished();
     fs::rename(draft, file)?;
     paths.retain(|path| path != draft);
     Ok(())
-}
-
-/// Removes a draft, if it still is one.
-pub(super) fn discard(draft: &Path) {
-    let mut paths = unfinished();
-    if paths.iter().any(|path| path == draft) {
-        let _ = fs::remove_file(draft);
-        paths.retain(|path| path != draft);
-    }
 }
 
 /// A hidden name beside `file` that no other process uses.

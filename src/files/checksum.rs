@@ -12,11 +12,6 @@ impl Checksum {
         Checksum(0xcbf2_9ce4_8422_2325)
     }
 
-    /// A sum that was told by its bits.
-    pub fn from_bits(bits: u64) -> Self {
-        Checksum(bits)
-    }
-
     pub fn add(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);

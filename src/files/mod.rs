@@ -3,7 +3,6 @@
 mod atomic;
 mod checksum;
 mod journal;
-mod part;
 mod peers;
 mod recording;
 
@@ -13,13 +12,13 @@ use std::path::{Path, PathBuf};
 pub use atomic::{abandon_unfinished, check_writable};
 pub use journal::{Journal, belongs, claim, write_rows};
 pub use peers::{PeersError, read_peers};
-pub use recording::{CannotResume, Keeper, Recording};
+pub use recording::{CannotResume, Checkpointer, Recording};
 
 use crate::figure::{self, Picture};
 use crate::relax::Equilibrium;
 use crate::report::{
     Centerlines, ChartSummary, ChartTable, CheckSummary, Format, Json, MapSummary, MapTable,
-    ModesTable, MotionSummary, OutputError, ScalingTable, TraceTable, Written,
+    ModesTable, OutputError, ScalingTable, TraceTable, Written,
 };
 use crate::simulate::Record;
 use crate::study::{All, Chart, Check, Map, Scaling, Trace};
@@ -84,7 +83,7 @@ impl Written for Trace {
 
 impl Written for Record {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &MotionSummary,
+        &Json("summary.json"),
         &Picture::svg("energy.svg", figure::energy),
         &Picture::png("energy.png", figure::energy),
         &Picture::svg("filmstrip.svg", figure::filmstrip),

@@ -13,7 +13,7 @@ pub struct Velocity {
 }
 
 /// Where the energy of a moving leaf is. Dimensionless: A/L.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Energy {
     /// Of motion.
     pub kinetic: f64,

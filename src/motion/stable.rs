@@ -27,7 +27,7 @@ use crate::leaf::{DiscreteLeaf, State};
 use glam::{DMat3, DQuat, DVec3};
 
 /// The longest stable time step, and what limits it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct StableStep {
     /// The step.
     pub step: f64,

@@ -266,7 +266,8 @@ pub fn record(rods: usize, segments: usize) -> Record {
         segments,
         tolerance: 1e-6,
         duration: 10.0,
-        longest_step: Some(9e-3),
+        time: 10.0,
+        time_step: Some(9e-3),
         stable_step: Some(StableStep {
             step: 1e-2,
             limit: "shear with rotation",

@@ -41,7 +41,7 @@ fn moved(record: &Record) -> String {
     let steps = record.moments.last().map_or(0, |moment| moment.steps);
     let way = format!(
         "t = {} in {steps} steps, {} outputs",
-        brief(record.time()),
+        brief(record.time),
         record.moments.len()
     );
     match record.stopped {
@@ -55,7 +55,7 @@ fn moved(record: &Record) -> String {
 }
 
 fn step(record: &Record) -> String {
-    let longest = match record.longest_step {
+    let longest = match record.time_step {
         Some(step) => format!("at most {step:.3e}"),
         None => format!(
             "so that its local error is within {}",
@@ -119,7 +119,7 @@ fn speed(record: &Record) -> String {
         true => format!(
             "{} in all: {} of simulated time a second, {:.0} ns a step and segment",
             seconds(wall),
-            brief(record.time() / wall),
+            brief(record.time / wall),
             1e9 * wall / work as f64
         ),
         false => format!("{} in all", seconds(wall)),
@@ -128,78 +128,29 @@ fn speed(record: &Record) -> String {
 
 #[cfg(test)]
 mod tests {
-    use crate::files::Recording;
-    use crate::scenario::Scenario;
-    use crate::simulate::{Options, Scheme, Simulation, Stopped};
-
     use super::*;
-
-    fn swing(scheme: Scheme) -> Record {
-        let scenario = r#"
-            name = "swing"
-            leaf = { rods = 1, length = 2.0, fan = [0.0] }
-            stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }
-            load = { gravity = [0.0, 0.0, -0.1] }
-            dynamics = { duration = 0.3, output_interval = 0.1 }
-        "#;
-        let scenario = Scenario::from_toml(scenario).unwrap();
-        let options = Options {
-            scheme: Some(scheme),
-            ..Options::default()
-        };
-        let mut simulation = Simulation::new(&scenario, &options).unwrap();
-        let folder = tempfile::tempdir().unwrap();
-        let mut recording = Recording::begin(folder.path(), &mut simulation).unwrap();
-        while !simulation.done() {
-            let frame = simulation.next_frame().unwrap();
-            recording.add(&simulation, &frame).unwrap();
-        }
-        recording.record(&simulation, None).unwrap()
-    }
-
-    #[track_caller]
-    fn says(record: &Record, parts: &[&str]) {
-        let report = report(record, None);
-        for part in parts {
-            assert!(report.contains(part), "{part} in {report}");
-        }
-    }
+    use crate::report::sample;
+    use crate::simulate::Stopped;
 
     #[test]
-    fn what_was_done() {
-        says(
-            &swing(Scheme::Explicit),
-            &[
-                "swing: 1 vein, method explicit\n",
-                "  moved    to t = 0.3 in ",
-                " steps, 4 outputs\n",
-                "  step     at most ",
-                ", stable up to ",
-                " (shear with rotation)\n",
-            ],
-        );
-        says(
-            &swing(Scheme::SemiImplicit),
-            &["  step     so that its local error is within 1.0×10⁻⁶\n"],
-        );
-    }
-
-    #[test]
-    fn an_early_end() {
-        let mut record = swing(Scheme::Explicit);
+    fn an_early_end_without_a_step_of_its_own() {
+        let mut record = sample::record(1, 4);
+        record.time_step = None;
+        record.stable_step = None;
         record.stopped = Some(Stopped::Diverged {
-            otherwise: "--method semi-implicit",
-            time: 0.4,
+            otherwise: "another method",
+            time: 10.1,
             percent: 70.0,
         });
-        record.duration = 4.0;
-        says(
-            &record,
-            &[
-                "  moved    diverged: only to t = 0.3 in ",
-                ", of t = 4\n",
-                "  remark   diverged at t = ",
-            ],
-        );
+        record.duration = 40.0;
+        let report = report(&record, None);
+        for part in [
+            "swing: 1 vein, method explicit\n",
+            "  moved    diverged: only to t = 10 in 1000 steps, 101 outputs, of t = 40\n",
+            "  step     so that its local error is within 1.0×10⁻⁶\n",
+            "  remark   diverged at t = ",
+        ] {
+            assert!(report.contains(part), "{part} in {report}");
+        }
     }
 }

@@ -41,7 +41,8 @@ use crate::scenario::{Scenario, Start};
 const SEGMENTS: usize = 16;
 
 /// Which method moves the leaf.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Scheme {
     /// [`Explicit`]: short steps, each very cheap. Not for rigid rods.
     Explicit,

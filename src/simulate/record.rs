@@ -3,7 +3,10 @@
 use super::{Frame, Scheme, Simulation, Stopped};
 use crate::motion::{Energy, StableStep};
 use crate::scenario;
+use crate::shape::serialize_tips;
 use glam::DVec3;
+use serde::Serialize;
+use serde::ser::{SerializeMap, Serializer};
 
 /// What is kept of every output, in the units of the scenario.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,20 +53,24 @@ pub struct Still {
 }
 
 /// A simulation that has ended: how, and what was seen of it. In the units of
-/// the scenario.
-#[derive(Clone, Debug)]
+/// the scenario. As JSON it is the `summary.json` of a simulation.
+#[derive(Clone, Debug, Serialize)]
 pub struct Record {
     /// Name of the scenario.
     pub scenario: String,
     /// The method.
+    #[serde(rename = "method")]
     pub scheme: Scheme,
     /// Why it ended before its time, if it did.
+    #[serde(flatten, serialize_with = "serialize_outcome")]
     pub stopped: Option<Stopped>,
     /// Number of rods.
     pub rods: usize,
     /// Whether their tips are one.
+    #[serde(skip)]
     pub joined: bool,
     /// The longest rod.
+    #[serde(skip)]
     pub length: f64,
     /// Segments a rod.
     pub segments: usize,
@@ -71,26 +78,38 @@ pub struct Record {
     pub tolerance: f64,
     /// How long the leaf was to be followed.
     pub duration: f64,
+    /// The time of the last output.
+    pub time: f64,
     /// The longest time step, if it was not the error that decided.
-    pub longest_step: Option<f64>,
+    pub time_step: Option<f64>,
     /// The longest stable time step of the explicit method.
     pub stable_step: Option<StableStep>,
     /// Time steps made.
     pub steps: usize,
     /// All outputs; the first at time 0.
+    #[serde(flatten, serialize_with = "serialize_moments")]
     pub moments: Vec<Moment>,
     /// The joint tip at the last output, or the tips of all rods.
+    #[serde(flatten, serialize_with = "serialize_tips")]
     pub tips: Vec<DVec3>,
-    /// Shapes at some of the outputs.
+    /// Shapes at some of the outputs, the last among them.
+    #[serde(skip)]
     pub stills: Vec<Still>,
     /// Time on the clock for the motion alone.
     pub wall_seconds: f64,
 }
 
 impl Record {
-    /// The record of a simulation so far, without what was seen.
-    pub fn of(simulation: &Simulation, stopped: Option<Stopped>) -> Self {
+    /// The record of a simulation so far, whose outputs were these.
+    pub fn new(
+        simulation: &Simulation,
+        stopped: Option<Stopped>,
+        moments: Vec<Moment>,
+        stills: Vec<Still>,
+    ) -> Self {
         let scenario = simulation.leaf().scenario();
+        let last = stills.last().map_or(&[][..], |still| &still.curves);
+        let tips = last.iter().filter_map(|curve| curve.last().copied());
         Record {
             scenario: scenario.name.clone(),
             scheme: simulation.scheme(),
@@ -101,23 +120,61 @@ impl Record {
             segments: simulation.segments(),
             tolerance: simulation.tolerance(),
             duration: scenario.dynamics.duration,
-            longest_step: simulation.longest_step(),
+            time: moments.last().map_or(0.0, |moment| moment.time),
+            time_step: simulation.longest_step(),
             stable_step: simulation.stable_step(),
             steps: simulation.steps(),
-            moments: Vec::new(),
-            tips: Vec::new(),
-            stills: Vec::new(),
+            moments,
+            tips: match scenario.joined {
+                true => tips.take(1).collect(),
+                false => tips.collect(),
+            },
+            stills,
             wall_seconds: simulation.wall_time().as_secs_f64(),
         }
     }
 
     /// How it ended, in one word: `completed`, or [`Stopped::word`].
     pub fn outcome(&self) -> &'static str {
-        self.stopped.map_or("completed", Stopped::word)
+        outcome(&self.stopped)
     }
+}
 
-    /// The time of the last output.
-    pub fn time(&self) -> f64 {
-        self.moments.last().map_or(0.0, |moment| moment.time)
+fn outcome(stopped: &Option<Stopped>) -> &'static str {
+    stopped.map_or("completed", Stopped::word)
+}
+
+/// The word, and a sentence about an early end.
+fn serialize_outcome<S: Serializer>(
+    stopped: &Option<Stopped>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    let mut keys = serializer.serialize_map(None)?;
+    keys.serialize_entry("outcome", outcome(stopped))?;
+    if let Some(stopped) = stopped {
+        keys.serialize_entry("remark", &stopped.to_string())?;
     }
+    keys.end()
+}
+
+/// How many there are, all energies at the last, and what no motion can change at
+/// the first and at the last.
+fn serialize_moments<S: Serializer>(moments: &[Moment], serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Energies {
+        #[serde(flatten)]
+        end: Energy,
+        balance_start: f64,
+        balance_end: f64,
+    }
+    let ends = moments.first().zip(moments.last());
+    let energies = ends.map(|(first, last)| Energies {
+        end: last.energy,
+        balance_start: first.energy.balance(),
+        balance_end: last.energy.balance(),
+    });
+    let mut keys = serializer.serialize_map(None)?;
+    keys.serialize_entry("frames", &moments.len())?;
+    keys.serialize_entry("energy", &energies)?;
+    keys.end()
 }

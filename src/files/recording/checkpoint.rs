@@ -5,14 +5,13 @@
 
 use std::fs;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::energy;
-use super::motion::Form;
+use super::error::CannotResume;
+use super::growing::Extent;
 use crate::files::checksum::Checksum;
-use crate::files::part::Extent;
 use crate::report::json;
 use crate::simulate::Simulation;
 
@@ -20,50 +19,6 @@ pub const FILE_NAME: &str = "checkpoint.json";
 
 /// Digits of a number.
 const DIGITS: usize = 16;
-
-/// Why a simulation cannot go on.
-#[derive(Debug, thiserror::Error)]
-pub enum CannotResume {
-    /// There is no checkpoint.
-    #[error(
-        "cannot resume: there is no {}; leave out --resume to begin anew, or name the folder with --out DIR",
-        file.display()
-    )]
-    Absent {
-        /// The checkpoint.
-        file: PathBuf,
-    },
-    /// The checkpoint is of another run.
-    #[error(
-        "cannot resume: {} is of another run: {what}; ask for the same run, or leave out --resume to begin anew",
-        file.display()
-    )]
-    Other {
-        /// The checkpoint.
-        file: PathBuf,
-        /// What is different.
-        what: String,
-    },
-    /// The checkpoint, or a file it goes with, is not what was written.
-    #[error(
-        "cannot resume: {} is damaged: {what}; leave out --resume to begin anew",
-        file.display()
-    )]
-    Damaged {
-        /// The damaged file.
-        file: PathBuf,
-        /// How that is known.
-        what: String,
-    },
-    /// A file cannot be read or written.
-    #[error("cannot resume: {}: {reason}", file.display())]
-    Unreadable {
-        /// The file.
-        file: PathBuf,
-        /// What the system says.
-        reason: io::Error,
-    },
-}
 
 /// What is asked of a run: two with the same identity are the same.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -93,56 +48,32 @@ impl Identity {
         }
     }
 
+    /// What tells runs apart, with numbers as people read them.
+    fn told(&self) -> [(&'static str, String); 7] {
+        let number = |digits: &str| number(digits).map_or("?".into(), |number| number.to_string());
+        let step = self.step.as_deref();
+        [
+            ("version", self.version.clone()),
+            ("scenario", self.scenario.clone()),
+            ("content", self.content.clone()),
+            ("method", self.method.clone()),
+            ("segments", self.segments.to_string()),
+            (
+                "time step",
+                step.map_or("left to the tolerance".into(), number),
+            ),
+            ("tolerance", number(&self.tolerance)),
+        ]
+    }
+
     /// The first difference from what is asked for now, in words.
     fn difference(&self, asked: &Identity) -> Option<String> {
-        let both = |what: &str, its: &dyn std::fmt::Display, now: &dyn std::fmt::Display| {
-            Some(format!("{what} {its}, now {now}"))
-        };
-        let number = |digits: &Option<String>| match digits.as_deref().and_then(number) {
-            Some(number) => number.to_string(),
-            None => "left to the tolerance".into(),
-        };
-        if self.version != asked.version {
-            return both("version", &self.version, &asked.version);
-        }
-        if self.scenario != asked.scenario {
-            return both("scenario", &self.scenario, &asked.scenario);
-        }
-        if self.content != asked.content {
-            return Some("the scenario, or an override of it, has changed".into());
-        }
-        if self.method != asked.method {
-            return both("method", &self.method, &asked.method);
-        }
-        if self.segments != asked.segments {
-            return both("segments", &self.segments, &asked.segments);
-        }
-        if self.step != asked.step {
-            return both("time step", &number(&self.step), &number(&asked.step));
-        }
-        if self.tolerance != asked.tolerance {
-            let [its, now] = [self, asked].map(|run| number(&Some(run.tolerance.clone())));
-            return both("tolerance", &its, &now);
-        }
-        None
-    }
-}
-
-/// How much of a file belongs to the checkpoint.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Kept {
-    file: String,
-    bytes: u64,
-    checksum: String,
-}
-
-impl Kept {
-    fn of(file: &str, extent: Extent) -> Self {
-        Kept {
-            file: file.into(),
-            bytes: extent.bytes,
-            checksum: extent.checksum.to_string(),
-        }
+        let mut told = self.told().into_iter().zip(asked.told());
+        let ((what, its), (_, now)) = told.find(|(its, now)| its != now)?;
+        Some(match what {
+            "content" => "the scenario, or an override of it, has changed".into(),
+            _ => format!("{what} {its}, now {now}"),
+        })
     }
 }
 
@@ -152,9 +83,9 @@ pub struct Checkpoint {
     /// For people: `state` has it to the last digit.
     time: f64,
     run: Identity,
-    motion: Kept,
-    energy: Kept,
-    wall_nanoseconds: u64,
+    pub motion: Extent,
+    pub energy: Extent,
+    pub wall_nanoseconds: u64,
     state: String,
     checksum: String,
 }
@@ -162,7 +93,6 @@ pub struct Checkpoint {
 impl Checkpoint {
     pub fn new(
         run: Identity,
-        form: Form,
         [motion, energy]: [Extent; 2],
         time: f64,
         wall_nanoseconds: u64,
@@ -171,8 +101,8 @@ impl Checkpoint {
         let mut checkpoint = Checkpoint {
             time,
             run,
-            motion: Kept::of(form.file_name(), motion),
-            energy: Kept::of(energy::FILE_NAME, energy),
+            motion,
+            energy,
             wall_nanoseconds,
             state: state.iter().map(|&number| digits(number)).collect(),
             checksum: String::new(),
@@ -220,22 +150,6 @@ impl Checkpoint {
         whole.then(|| numbers.collect())?
     }
 
-    /// The extents of the motion and of the energies.
-    pub fn extents(&self) -> Option<[Extent; 2]> {
-        let extent = |kept: &Kept| {
-            let bits = u64::from_str_radix(&kept.checksum, 16).ok()?;
-            Some(Extent {
-                bytes: kept.bytes,
-                checksum: Checksum::from_bits(bits),
-            })
-        };
-        Some([extent(&self.motion)?, extent(&self.energy)?])
-    }
-
-    pub fn wall_nanoseconds(&self) -> u64 {
-        self.wall_nanoseconds
-    }
-
     /// Of all that the motion and its files depend on.
     fn sum(&self) -> String {
         let Checkpoint {
@@ -277,12 +191,13 @@ mod tests {
 
     fn written() -> (tempfile::TempDir, Checkpoint) {
         let extent = Extent {
+            file: "a.csv".into(),
             bytes: 7,
-            checksum: Checksum::new(),
+            checksum: "0".into(),
         };
         let state = [0.1, -0.0, f64::MIN_POSITIVE / 3.0, f64::NAN, 1e300 / 3.0];
-        let form = Form::Table;
-        let checkpoint = Checkpoint::new(identity(), form, [extent; 2], 0.3, 12, &state);
+        let extents = [extent.clone(), extent];
+        let checkpoint = Checkpoint::new(identity(), extents, 0.3, 12, &state);
         let folder = tempfile::tempdir().unwrap();
         let mut bytes = Vec::new();
         checkpoint.write(&mut bytes).unwrap();
@@ -300,7 +215,6 @@ mod tests {
         assert_eq!(state[1].to_bits(), (-0.0_f64).to_bits());
         assert_eq!(state[2], f64::MIN_POSITIVE / 3.0);
         assert!(state[3].is_nan());
-        assert_eq!(read.extents().unwrap()[1].bytes, 7);
     }
 
     #[test]
@@ -332,71 +246,16 @@ mod tests {
     #[test]
     fn what_is_different_is_told() {
         let (folder, _) = written();
-        let same = identity();
-        let text = |text: &str| text.to_string();
-        for (asked, told) in [
-            (
-                Identity {
-                    version: text("9.0.0"),
-                    ..same.clone()
-                },
-                "version 0.1.0, now 9.0.0",
-            ),
-            (
-                Identity {
-                    scenario: text("b"),
-                    ..same.clone()
-                },
-                "scenario leaf, now b",
-            ),
-            (
-                Identity {
-                    content: text("1"),
-                    ..same.clone()
-                },
-                "has changed",
-            ),
-            (
-                Identity {
-                    method: text("x"),
-                    ..same.clone()
-                },
-                "method explicit, now x",
-            ),
-            (
-                Identity {
-                    segments: 8,
-                    ..same.clone()
-                },
-                "segments 16, now 8",
-            ),
-            (
-                Identity {
-                    step: None,
-                    ..same.clone()
-                },
-                "time step 0.1, now left to the tolerance",
-            ),
-            (
-                Identity {
-                    tolerance: digits(0.1),
-                    ..same.clone()
-                },
-                "tolerance 0.000001, now 0.1",
-            ),
-        ] {
-            let error = Checkpoint::read(folder.path(), &asked)
-                .unwrap_err()
-                .to_string();
-            assert!(error.contains(told), "{error}");
-            assert!(error.contains("is of another run") && error.contains("--resume"));
-        }
-    }
-
-    #[test]
-    fn no_checkpoint() {
-        let folder = tempfile::tempdir().unwrap();
-        let read = Checkpoint::read(folder.path(), &identity());
-        assert!(matches!(read, Err(CannotResume::Absent { .. })));
+        let mut asked = identity();
+        let told = |asked: &Identity| {
+            let read = Checkpoint::read(folder.path(), asked);
+            read.unwrap_err().to_string()
+        };
+        asked.step = None;
+        assert!(told(&asked).contains(": time step 0.1, now left to the tolerance;"));
+        asked.content = "1".into();
+        assert!(told(&asked).contains(": the scenario, or an override of it, has changed;"));
+        asked.version = "9.0.0".into();
+        assert!(told(&asked).contains(" of another run: version 0.1.0, now 9.0.0;"));
     }
 }

@@ -1,85 +1,89 @@
 //! `energy.csv`: energies and the tip at all outputs.
 
-use std::io::{self, Read, Write};
+use std::io::{self, Read};
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use crate::motion::Energy;
+use crate::report::table::append_csv;
 use crate::simulate::Moment;
 
 pub const FILE_NAME: &str = "energy.csv";
 
-const HEADER: [&str; 11] = [
-    "time",
-    "steps",
-    "kinetic",
-    "elastic",
-    "coupling",
-    "potential",
-    "dissipated",
-    "work",
-    "tip_x",
-    "tip_y",
-    "tip_z",
-];
+#[derive(Default, Serialize, Deserialize)]
+pub struct Row {
+    time: f64,
+    steps: usize,
+    kinetic: f64,
+    elastic: f64,
+    coupling: f64,
+    potential: f64,
+    dissipated: f64,
+    work: f64,
+    tip_x: f64,
+    tip_y: f64,
+    tip_z: f64,
+}
 
-/// A row: time, steps, six energies, and the tip.
-type Row = (f64, usize, [f64; 6], [f64; 3]);
+impl From<&Moment> for Row {
+    fn from(moment: &Moment) -> Self {
+        let Moment {
+            time,
+            steps,
+            energy,
+            tip,
+        } = moment;
+        Row {
+            time: *time,
+            steps: *steps,
+            kinetic: energy.kinetic,
+            elastic: energy.elastic,
+            coupling: energy.coupling,
+            potential: energy.potential,
+            dissipated: energy.dissipated,
+            work: energy.work,
+            tip_x: tip.x,
+            tip_y: tip.y,
+            tip_z: tip.z,
+        }
+    }
+}
 
-pub fn start() -> Vec<u8> {
-    (HEADER.join(",") + "\n").into_bytes()
+impl From<Row> for Moment {
+    fn from(row: Row) -> Self {
+        Moment {
+            time: row.time,
+            steps: row.steps,
+            energy: Energy {
+                kinetic: row.kinetic,
+                elastic: row.elastic,
+                coupling: row.coupling,
+                potential: row.potential,
+                dissipated: row.dissipated,
+                work: row.work,
+            },
+            tip: DVec3::new(row.tip_x, row.tip_y, row.tip_z),
+        }
+    }
 }
 
 /// Appends a row.
-pub fn write(moment: &Moment, out: &mut dyn Write) -> io::Result<()> {
-    let mut table = csv::WriterBuilder::new()
-        .has_headers(false)
-        .from_writer(out);
-    let e = &moment.energy;
-    let row: Row = (
-        moment.time,
-        moment.steps,
-        [
-            e.kinetic,
-            e.elastic,
-            e.coupling,
-            e.potential,
-            e.dissipated,
-            e.work,
-        ],
-        moment.tip.to_array(),
-    );
-    table.serialize(row)?;
-    table.flush()
+pub fn write(moment: &Moment, out: &mut Vec<u8>) -> io::Result<()> {
+    append_csv([Row::from(moment)], out)
 }
 
 /// All rows, the same as when they were written.
 pub fn read(file: impl Read) -> io::Result<Vec<Moment>> {
     let mut table = csv::Reader::from_reader(file);
-    let rows = table.deserialize().map(|row| {
-        let (time, steps, energy, tip): Row = row?;
-        let [kinetic, elastic, coupling, potential, dissipated, work] = energy;
-        Ok(Moment {
-            time,
-            steps,
-            energy: Energy {
-                kinetic,
-                elastic,
-                coupling,
-                potential,
-                dissipated,
-                work,
-            },
-            tip: DVec3::from_array(tip),
-        })
-    });
-    rows.collect()
+    let rows = table.deserialize::<Row>();
+    rows.map(|row| Ok(row?.into())).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::sample;
+    use crate::report::{sample, table::header};
 
     #[test]
     fn moments_are_read_back_to_the_last_digit() {
@@ -88,22 +92,18 @@ mod tests {
         moments[4].energy.potential = -1e300 / 3.0;
         moments[5].energy.work = f64::INFINITY;
         moments[6].tip.y = 0.1 + 0.2;
-        let mut bytes = start();
+        let mut bytes = header::<Row>();
         for moment in &moments {
             write(moment, &mut bytes).unwrap();
         }
         assert_eq!(read(&bytes[..]).unwrap(), moments);
-        let text = String::from_utf8(bytes).unwrap();
-        let header =
-            "time,steps,kinetic,elastic,coupling,potential,dissipated,work,tip_x,tip_y,tip_z";
-        assert_eq!(text.lines().next(), Some(header));
     }
 
     #[test]
     fn nonsense_is_an_error() {
-        for row in ["1,2,3", "a,1,2,3,4,5,6,7,8,9,10"] {
-            let text = String::from_utf8(start()).unwrap() + row + "\n";
-            assert!(read(text.as_bytes()).is_err(), "{row}");
+        for row in ["1,2,3\n", "a,1,2,3,4,5,6,7,8,9,10\n"] {
+            let bytes = [&header::<Row>(), row.as_bytes()].concat();
+            assert!(read(&bytes[..]).is_err(), "{row}");
         }
     }
 }

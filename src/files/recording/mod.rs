@@ -6,26 +6,31 @@
 //! them. A run that is stopped can be kept instead, and resumed.
 
 mod checkpoint;
+mod checkpointer;
 mod energy;
-mod keeper;
+mod error;
+mod growing;
 mod motion;
 
 use std::fs;
+use std::io;
 use std::mem;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use glam::DVec3;
 
-pub use checkpoint::CannotResume;
-pub use keeper::Keeper;
+pub use checkpointer::Checkpointer;
+pub use error::CannotResume;
 
-use super::part::{Extent, Lost, Part};
 use super::{atomic, write_all};
 use crate::report::OutputError;
+use crate::report::table::header;
+use crate::scenario;
 use crate::simulate::{Frame, Moment, Record, Simulation, Still, Stopped, stills};
 use checkpoint::{Checkpoint, Identity};
-use keeper::Latest;
+use checkpointer::Latest;
+use growing::{GrowingFile, kept_path};
 use motion::{Form, Size};
 
 /// Shapes that a film strip shows.
@@ -65,13 +70,12 @@ pub struct Recording {
     size: Size,
     stations: Vec<f64>,
     joined: bool,
-    motion: Part,
-    energy: Part,
+    motion: GrowingFile,
+    energy: GrowingFile,
     moments: Vec<Moment>,
-    tips: Vec<DVec3>,
     /// Time on the clock in processes before this one.
     wall: Duration,
-    keeper: Keeper,
+    checkpointer: Checkpointer,
 }
 
 impl Recording {
@@ -83,68 +87,51 @@ impl Recording {
     pub fn begin(folder: &Path, simulation: &mut Simulation) -> Result<Self, OutputError> {
         atomic::make_folder(folder)?;
         let (form, size) = form(simulation);
-        let mut recording = Recording::with(
-            folder,
-            simulation,
-            Part::begin(folder.join(form.file_name()))?,
-            Part::begin(folder.join(energy::FILE_NAME))?,
-        );
+        let motion = GrowingFile::begin(folder.join(form.file_name()))?;
+        let energy = GrowingFile::begin(folder.join(energy::FILE_NAME))?;
+        let mut recording = Recording::with(folder, simulation, motion, energy);
+        let append = |start: Vec<u8>| move |out: &mut Vec<u8>| io::Result::Ok(out.extend(start));
         let start = form.start(size, outputs(simulation));
-        recording.motion.append(|out| out.write_all(&start))?;
-        recording
-            .energy
-            .append(|out| out.write_all(&energy::start()))?;
+        recording.motion.append(append(start))?;
+        recording.energy.append(append(header::<energy::Row>()))?;
         let frame = simulation.frame();
         recording.add(simulation, &frame)?;
         Ok(recording)
     }
 
-    /// Goes on where a simulation of the same leaf and options was kept in
-    /// `folder`: the simulation is brought there, too.
+    /// Goes on where a simulation of the same leaf and options was stopped with a
+    /// checkpoint in `folder`: the simulation is brought there, too.
     ///
     /// # Errors
     /// If there is no checkpoint, or it does not fit. Nothing that was kept is
     /// lost then.
     pub fn resume(folder: &Path, simulation: &mut Simulation) -> Result<Self, CannotResume> {
-        let run = Identity::of(simulation);
-        let found = Checkpoint::read(folder, &run)?;
+        let found = Checkpoint::read(folder, &Identity::of(simulation))?;
         let damaged = |name: &str, what: &str| CannotResume::Damaged {
             file: folder.join(name),
             what: what.into(),
         };
-        let no_state = || damaged(checkpoint::FILE_NAME, "it does not fit the leaf");
-        let extents = found.extents().ok_or_else(no_state)?;
-        let state = found.state().ok_or_else(no_state)?;
-        if !simulation.restore(&state) {
-            return Err(no_state());
-        }
+        let state = found.state().filter(|state| simulation.restore(state));
+        state.ok_or_else(|| damaged(checkpoint::FILE_NAME, "it does not fit the leaf"))?;
         let (form, _) = form(simulation);
-        let part = |name: &str, extent: Extent| {
-            let file = folder.join(name);
-            let kept = Part::kept_path(&file);
-            Part::resume(file, extent).map_err(|lost| match lost {
-                Lost::Changed => CannotResume::Damaged {
-                    file: kept,
-                    what: format!("it is not as {} says", checkpoint::FILE_NAME),
-                },
-                Lost::Unreadable(reason) => CannotResume::Unreadable { file: kept, reason },
-            })
-        };
-        let motion = part(form.file_name(), extents[0])?;
-        let energy = part(energy::FILE_NAME, extents[1])?;
+        let motion = GrowingFile::resume(folder.join(form.file_name()), &found.motion)?;
+        let energy = GrowingFile::resume(folder.join(energy::FILE_NAME), &found.energy)?;
         let mut recording = Recording::with(folder, simulation, motion, energy);
         let moments = recording.energy.read(energy::read).ok();
         recording.moments = moments
             .filter(|moments| moments.len() == simulation.frames().1 + 1)
             .ok_or_else(|| damaged(energy::FILE_NAME, "outputs are missing"))?;
-        recording.wall = Duration::from_nanos(found.wall_nanoseconds());
-        let frame = simulation.frame();
-        recording.tips = tips(&frame, recording.joined);
-        recording.look(simulation, extents);
+        recording.wall = Duration::from_nanos(found.wall_nanoseconds);
+        recording.update_checkpointer(simulation);
         Ok(recording)
     }
 
-    fn with(folder: &Path, simulation: &Simulation, motion: Part, energy: Part) -> Self {
+    fn with(
+        folder: &Path,
+        simulation: &Simulation,
+        motion: GrowingFile,
+        energy: GrowingFile,
+    ) -> Self {
         let (form, size) = form(simulation);
         Recording {
             folder: folder.into(),
@@ -156,15 +143,14 @@ impl Recording {
             motion,
             energy,
             moments: Vec::new(),
-            tips: Vec::new(),
             wall: Duration::ZERO,
-            keeper: Keeper::default(),
+            checkpointer: Checkpointer::default(),
         }
     }
 
-    /// What keeps this recording when the program is stopped.
-    pub fn keeper(&self) -> Keeper {
-        self.keeper.clone()
+    /// What writes a checkpoint when the program is stopped.
+    pub fn checkpointer(&self) -> Checkpointer {
+        self.checkpointer.clone()
     }
 
     /// Adds an output: the leaf of `simulation` now.
@@ -174,25 +160,20 @@ impl Recording {
     pub fn add(&mut self, simulation: &Simulation, frame: &Frame) -> Result<(), OutputError> {
         let moment = Moment::of(frame, self.joined);
         let (form, stations) = (self.form, &self.stations);
-        let extents = [
-            self.motion.append(|out| form.write(frame, stations, out))?,
-            self.energy.append(|out| energy::write(&moment, out))?,
-        ];
+        self.motion.append(|out| form.write(frame, stations, out))?;
+        self.energy.append(|out| energy::write(&moment, out))?;
         self.moments.push(moment);
-        self.tips = tips(frame, self.joined);
-        self.look(simulation, extents);
+        self.update_checkpointer(simulation);
         Ok(())
     }
 
-    /// Lets the keeper know where the simulation is.
-    fn look(&self, simulation: &Simulation, extents: [Extent; 2]) {
+    fn update_checkpointer(&self, simulation: &Simulation) {
         let wall = self.wall + simulation.wall_time();
-        *self.keeper.latest() = Some(Latest {
-            run: self.run.clone(),
+        *self.checkpointer.latest() = Some(Latest {
             folder: self.folder.clone(),
-            form: self.form,
-            parts: [self.motion.keepable(), self.energy.keepable()],
-            extents,
+            files: [self.motion.unfinished(), self.energy.unfinished()],
+            run: self.run.clone(),
+            extents: [self.motion.extent(), self.energy.extent()],
             time: simulation.time(),
             wall_nanoseconds: wall.as_nanos().min(u128::from(u64::MAX)) as u64,
             state: simulation.save(),
@@ -209,32 +190,32 @@ impl Recording {
         simulation: &Simulation,
         stopped: Option<Stopped>,
     ) -> Result<Record, OutputError> {
-        let mut record = Record::of(simulation, stopped);
-        let chosen = stills(&self.moments, STILLS, record.length);
+        let longest = scenario::longest(&simulation.leaf().scenario().rods);
+        let chosen = stills(&self.moments, STILLS, longest);
         let (form, size) = (self.form, self.size);
         let shapes = self
             .motion
             .read(|file| form.positions(size, &chosen, file))?;
-        let still = |(moment, shape): (usize, Vec<DVec3>)| Still {
+        let still = |(moment, shape): (usize, &[DVec3])| Still {
             moment,
             curves: shape.chunks(size.nodes).map(<[DVec3]>::to_vec).collect(),
         };
-        record.stills = chosen.into_iter().zip(shapes).map(still).collect();
-        record.moments = mem::take(&mut self.moments);
-        record.tips = mem::take(&mut self.tips);
+        let stills = chosen.into_iter().zip(shapes.chunks(size.rows()));
+        let moments = mem::take(&mut self.moments);
+        let mut record = Record::new(simulation, stopped, moments, stills.map(still).collect());
         record.wall_seconds += self.wall.as_secs_f64();
         Ok(record)
     }
 
     /// Writes all else about the simulation, gives all files their names, and
-    /// removes what a run that was kept has left. Returns the files.
+    /// removes what a run that was stopped has left. Returns the files.
     ///
     /// # Errors
-    /// If a file cannot be written; the recording can then still be kept.
+    /// If a file cannot be written; a checkpoint can then still be.
     pub fn finish(&mut self, record: &Record) -> Result<Vec<PathBuf>, OutputError> {
         let mut files = write_all(&self.folder, record)?;
-        // From here on there is nothing left to be kept.
-        let mut latest = self.keeper.latest();
+        // From here on there is nothing left to go on from.
+        let mut latest = self.checkpointer.latest();
         let start = self.form.start(self.size, record.moments.len());
         self.motion.replace_start(&start)?;
         files.push(self.motion.finish()?);
@@ -242,13 +223,13 @@ impl Recording {
         latest.take();
         drop(latest);
         let file = |name: &str| self.folder.join(name);
-        let (this, other) = (self.form.file_name(), self.form.other().file_name());
+        let other = file(self.form.other().file_name());
         for left in [
             file(checkpoint::FILE_NAME),
-            Part::kept_path(&file(this)),
-            Part::kept_path(&file(other)),
-            Part::kept_path(&file(energy::FILE_NAME)),
-            file(other),
+            kept_path(&file(self.form.file_name())),
+            kept_path(&other),
+            kept_path(&file(energy::FILE_NAME)),
+            other,
         ] {
             // What is not there need not be removed.
             let _ = fs::remove_file(left);
@@ -268,10 +249,4 @@ fn form(simulation: &Simulation) -> (Form, Size) {
         nodes: simulation.stations().len(),
     };
     (Form::of(size, outputs(simulation)), size)
-}
-
-/// Negative zeros become zeros, as in the files.
-fn tips(frame: &Frame, joined: bool) -> Vec<DVec3> {
-    let tips = frame.tips(joined).into_iter();
-    tips.map(|tip| tip + DVec3::ZERO).collect()
 }

@@ -1,26 +1,43 @@
 //! The leaf at all outputs: `motion.csv`, or where that would be long
 //! `motion.npy`.
 
-use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
+use crate::report::table::{append_csv, header};
 use crate::simulate::Frame;
 
 /// Most rows of a CSV file, some 60 MB.
 const MOST_ROWS: usize = 200_000;
 
-/// Columns of the CSV file. Velocities and angular velocities are along the
-/// lab axes.
-const HEADER: [&str; 16] = [
-    "time", "rod", "sigma", "x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy",
-    "wz",
-];
+/// A row of the CSV file. Velocities and angular velocities are along the lab
+/// axes.
+#[derive(Default, Serialize, Deserialize)]
+struct Row {
+    time: f64,
+    rod: usize,
+    sigma: f64,
+    x: f64,
+    y: f64,
+    z: f64,
+    qw: f64,
+    qx: f64,
+    qy: f64,
+    qz: f64,
+    vx: f64,
+    vy: f64,
+    vz: f64,
+    wx: f64,
+    wy: f64,
+    wz: f64,
+}
 
-/// Numbers per node: the columns from `x` on.
+/// Numbers per node of a NumPy array: the columns from `x` on.
 const NUMBERS: usize = 13;
 
-/// Bytes before the numbers of a NumPy array.
+/// Bytes before them.
 const NPY_HEADER: usize = 128;
 
 /// How the leaf is written down.
@@ -39,7 +56,8 @@ pub struct Size {
 }
 
 impl Size {
-    fn rows(self) -> usize {
+    /// Nodes of all rods.
+    pub fn rows(self) -> usize {
         self.rods * self.nodes
     }
 }
@@ -70,16 +88,21 @@ impl Form {
     /// What stands before the first of so many outputs.
     pub fn start(self, size: Size, outputs: usize) -> Vec<u8> {
         match self {
-            Form::Table => (HEADER.join(",") + "\n").into_bytes(),
+            Form::Table => header::<Row>(),
             Form::Array => npy_header(size, outputs),
         }
     }
 
     /// Appends an output.
-    pub fn write(self, frame: &Frame, stations: &[f64], out: &mut dyn Write) -> io::Result<()> {
+    pub fn write(self, frame: &Frame, stations: &[f64], out: &mut Vec<u8>) -> io::Result<()> {
+        let nodes = 0..frame.positions.len();
         match self {
-            Form::Table => write_rows(frame, stations, out),
-            Form::Array => write_numbers(frame, out),
+            Form::Table => append_csv(nodes.map(|node| row(frame, stations, node)), out),
+            Form::Array => {
+                let numbers = nodes.flat_map(|node| numbers(frame, node));
+                out.extend(numbers.flat_map(f64::to_le_bytes));
+                Ok(())
+            }
         }
     }
 
@@ -89,10 +112,14 @@ impl Form {
         size: Size,
         outputs: &[usize],
         file: BufReader<impl Read + Seek>,
-    ) -> io::Result<Vec<Vec<DVec3>>> {
-        match self {
-            Form::Table => read_rows(size, outputs, file),
-            Form::Array => read_numbers(size, outputs, file),
+    ) -> io::Result<Vec<DVec3>> {
+        let positions = match self {
+            Form::Table => read_rows(size, outputs, file)?,
+            Form::Array => read_numbers(size, outputs, file)?,
+        };
+        match positions.len() == outputs.len() * size.rows() {
+            true => Ok(positions),
+            false => Err(io::ErrorKind::UnexpectedEof.into()),
         }
     }
 }
@@ -111,48 +138,39 @@ fn numbers(frame: &Frame, node: usize) -> [f64; NUMBERS] {
     .map(|value| value + 0.0)
 }
 
-fn write_rows(frame: &Frame, stations: &[f64], out: &mut dyn Write) -> io::Result<()> {
-    let mut table = csv::WriterBuilder::new()
-        .has_headers(false)
-        .from_writer(out);
-    for node in 0..frame.positions.len() {
-        let (rod, station) = (node / stations.len(), node % stations.len());
-        let place = (frame.time, rod + 1, stations[station]);
-        table.serialize((place, numbers(frame, node)))?;
+fn row(frame: &Frame, stations: &[f64], node: usize) -> Row {
+    let [x, y, z, qw, qx, qy, qz, vx, vy, vz, wx, wy, wz] = numbers(frame, node);
+    Row {
+        time: frame.time,
+        rod: node / stations.len() + 1,
+        sigma: stations[node % stations.len()],
+        x,
+        y,
+        z,
+        qw,
+        qx,
+        qy,
+        qz,
+        vx,
+        vy,
+        vz,
+        wx,
+        wy,
+        wz,
     }
-    table.flush()
 }
 
-fn read_rows(
-    size: Size,
-    outputs: &[usize],
-    mut file: BufReader<impl Read>,
-) -> io::Result<Vec<Vec<DVec3>>> {
-    // The header is passed with the first output.
-    let mut passed = 0;
-    let mut line = String::new();
-    let mut read = Vec::with_capacity(outputs.len());
-    for output in outputs {
-        let first = 1 + output * size.rows();
-        while passed < first {
-            file.skip_until(b'\n')?;
-            passed += 1;
+fn read_rows(size: Size, outputs: &[usize], file: impl Read) -> io::Result<Vec<DVec3>> {
+    let mut points = Vec::with_capacity(outputs.len() * size.rows());
+    let rows = csv::Reader::from_reader(file).into_byte_records();
+    for (number, row) in rows.enumerate() {
+        let row = row?;
+        if outputs.binary_search(&(number / size.rows())).is_ok() {
+            let row: Row = row.deserialize(None)?;
+            points.push(DVec3::new(row.x, row.y, row.z));
         }
-        let mut points = Vec::with_capacity(size.rows());
-        for _ in 0..size.rows() {
-            line.clear();
-            file.read_line(&mut line)?;
-            passed += 1;
-            let mut cells = line.split(',').skip(3).map(str::parse);
-            let mut cell = || match cells.next() {
-                Some(Ok(number)) => Ok(number),
-                _ => Err(io::Error::from(io::ErrorKind::InvalidData)),
-            };
-            points.push(DVec3::new(cell()?, cell()?, cell()?));
-        }
-        read.push(points);
     }
-    Ok(read)
+    Ok(points)
 }
 
 /// Format 1.0: magic, version, length of the rest, and the rest in Python.
@@ -169,39 +187,24 @@ fn npy_header(size: Size, outputs: usize) -> Vec<u8> {
     header
 }
 
-fn write_numbers(frame: &Frame, out: &mut dyn Write) -> io::Result<()> {
-    for node in 0..frame.positions.len() {
-        for number in numbers(frame, node) {
-            out.write_all(&number.to_le_bytes())?;
-        }
-    }
-    Ok(())
-}
-
 fn read_numbers(
     size: Size,
     outputs: &[usize],
-    mut file: BufReader<impl Read + Seek>,
-) -> io::Result<Vec<Vec<DVec3>>> {
-    const NODE: usize = 8 * NUMBERS;
-    let mut read = Vec::with_capacity(outputs.len());
+    mut file: impl Read + Seek,
+) -> io::Result<Vec<DVec3>> {
+    let mut points = Vec::with_capacity(outputs.len() * size.rows());
+    let mut nodes = vec![[[0; 8]; NUMBERS]; size.rows()];
     for output in outputs {
-        let start = NPY_HEADER as u64 + (output * size.rows()) as u64 * NODE as u64;
-        file.seek(SeekFrom::Start(start))?;
-        let mut points = Vec::with_capacity(size.rows());
-        let mut node = [0; NODE];
-        for _ in 0..size.rows() {
-            file.read_exact(&mut node)?;
-            let [x, y, z] = [0, 8, 16].map(|at| {
-                let mut bytes = [0; 8];
-                bytes.copy_from_slice(&node[at..at + 8]);
-                f64::from_le_bytes(bytes)
-            });
-            points.push(DVec3::new(x, y, z));
-        }
-        read.push(points);
+        let bytes = nodes.as_flattened_mut().as_flattened_mut();
+        let start = NPY_HEADER + output * bytes.len();
+        file.seek(SeekFrom::Start(start as u64))?;
+        file.read_exact(bytes)?;
+        let numbers = |node: &[[u8; 8]; NUMBERS]| {
+            DVec3::from_array([0, 1, 2].map(|axis| f64::from_le_bytes(node[axis])))
+        };
+        points.extend(nodes.iter().map(numbers));
     }
-    Ok(read)
+    Ok(points)
 }
 
 #[cfg(test)]
@@ -230,7 +233,7 @@ mod tests {
             let (size, bytes) = written(form, &frames);
             let file = BufReader::new(Cursor::new(bytes));
             let read = form.positions(size, &[0, 2, 3, 5], file).unwrap();
-            for (positions, output) in read.iter().zip([0, 2, 3, 5]) {
+            for (positions, output) in read.chunks(15).zip([0, 2, 3, 5]) {
                 assert_eq!(*positions, frames[output].positions, "{form:?} {output}");
             }
         }
@@ -244,21 +247,6 @@ mod tests {
             let file = BufReader::new(Cursor::new(bytes));
             assert!(form.positions(size, &[0], file).is_err());
         }
-    }
-
-    #[test]
-    fn header_and_rows() {
-        let (_, bytes) = written(Form::Table, &[sample::frame(3, 4, 0.5)]);
-        let text = String::from_utf8(bytes).unwrap();
-        let lines: Vec<&str> = text.lines().collect();
-        assert_eq!(
-            lines[0],
-            "time,rod,sigma,x,y,z,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz"
-        );
-        assert_eq!(lines.len(), 1 + 3 * 5);
-        assert!(lines[1].starts_with("0.5,1,0.0,"), "{}", lines[1]);
-        assert!(lines[15].starts_with("0.5,3,1.0,"), "{}", lines[15]);
-        assert_eq!(lines[15].split(',').count(), HEADER.len());
     }
 
     #[test]

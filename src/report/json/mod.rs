@@ -3,7 +3,6 @@
 mod chart;
 mod check;
 mod map;
-mod motion;
 #[cfg(test)]
 mod summary;
 
@@ -18,7 +17,6 @@ use super::Format;
 pub use chart::ChartSummary;
 pub use check::CheckSummary;
 pub use map::MapSummary;
-pub use motion::MotionSummary;
 
 type Point = [f64; 3];
 

@@ -1,0 +1,205 @@
+//! A file that grows during a run, and that can be left unfinished, to be
+//! continued by another process.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::error::CannotResume;
+use crate::files::atomic::{self, Draft};
+use crate::files::checksum::Checksum;
+use crate::report::OutputError;
+
+/// How much of a file was written, as a checkpoint has it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Extent {
+    pub file: String,
+    pub bytes: u64,
+    pub checksum: String,
+}
+
+/// A file that grows.
+pub struct GrowingFile {
+    /// The finished file.
+    file: PathBuf,
+    draft: Draft,
+    out: File,
+    bytes: u64,
+    checksum: Checksum,
+    /// What is to be appended.
+    buffer: Vec<u8>,
+}
+
+/// Where an unfinished file is, and where another process looks for it.
+#[derive(Clone, Debug)]
+pub struct Unfinished {
+    draft: PathBuf,
+    kept: PathBuf,
+}
+
+impl Unfinished {
+    /// Gives the file the name by which another process finds it.
+    pub fn keep(&self) -> io::Result<()> {
+        atomic::rename(&self.draft, &self.kept)
+    }
+}
+
+/// Where an unfinished file is kept: `motion.csv.part`.
+pub fn kept_path(file: &Path) -> PathBuf {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    file.with_file_name(format!("{name}.part"))
+}
+
+impl GrowingFile {
+    pub fn begin(file: PathBuf) -> Result<Self, OutputError> {
+        match Draft::begin(&file) {
+            Ok((draft, out)) => Ok(GrowingFile {
+                file,
+                draft,
+                out,
+                bytes: 0,
+                checksum: Checksum::new(),
+                buffer: Vec::new(),
+            }),
+            Err(reason) => Err(OutputError::File { file, reason }),
+        }
+    }
+
+    /// Goes on with a kept file where it had this extent. Nothing is changed if it
+    /// is not what was kept.
+    pub fn resume(file: PathBuf, extent: &Extent) -> Result<Self, CannotResume> {
+        let kept = kept_path(&file);
+        let resume = || -> io::Result<Option<Self>> {
+            let mut out = OpenOptions::new().read(true).write(true).open(&kept)?;
+            let (mut bytes, mut checksum) = (0, Checksum::new());
+            let mut reader = BufReader::new(&out).take(extent.bytes);
+            let mut buffer = vec![0; 1 << 16];
+            loop {
+                let read = reader.read(&mut buffer)?;
+                if read == 0 {
+                    break;
+                }
+                bytes += read as u64;
+                checksum.add(&buffer[..read]);
+            }
+            if bytes != extent.bytes || checksum.to_string() != extent.checksum {
+                return Ok(None);
+            }
+            out.set_len(bytes)?;
+            out.seek(SeekFrom::Start(bytes))?;
+            Ok(Some(GrowingFile {
+                draft: Draft::resume(&kept),
+                file,
+                out,
+                bytes,
+                checksum,
+                buffer,
+            }))
+        };
+        match resume() {
+            Ok(Some(file)) => Ok(file),
+            Ok(None) => Err(CannotResume::Damaged {
+                file: kept,
+                what: "it is not as checkpoint.json says".into(),
+            }),
+            Err(reason) => Err(CannotResume::Unreadable { file: kept, reason }),
+        }
+    }
+
+    pub fn unfinished(&self) -> Unfinished {
+        Unfinished {
+            draft: self.draft.path().into(),
+            kept: kept_path(&self.file),
+        }
+    }
+
+    pub fn extent(&self) -> Extent {
+        let name = self.file.file_name().unwrap_or_default();
+        Extent {
+            file: name.to_string_lossy().into(),
+            bytes: self.bytes,
+            checksum: self.checksum.to_string(),
+        }
+    }
+
+    /// Appends to the file what `fill` adds to a buffer.
+    pub fn append(
+        &mut self,
+        fill: impl FnOnce(&mut Vec<u8>) -> io::Result<()>,
+    ) -> Result<(), OutputError> {
+        self.buffer.clear();
+        let filled = fill(&mut self.buffer).and_then(|()| self.out.write_all(&self.buffer));
+        filled.map_err(|reason| self.failed(reason))?;
+        self.bytes += self.buffer.len() as u64;
+        self.checksum.add(&self.buffer);
+        Ok(())
+    }
+
+    /// Replaces the beginning of the file, as the last thing that is written.
+    pub fn replace_start(&mut self, bytes: &[u8]) -> Result<(), OutputError> {
+        let replaced = self.out.rewind().and_then(|()| self.out.write_all(bytes));
+        replaced.map_err(|reason| self.failed(reason))
+    }
+
+    /// Reads what was written so far.
+    pub fn read<T>(
+        &self,
+        read: impl FnOnce(BufReader<File>) -> io::Result<T>,
+    ) -> Result<T, OutputError> {
+        let opened = File::open(self.draft.path()).map(BufReader::new);
+        opened.and_then(read).map_err(|reason| self.failed(reason))
+    }
+
+    /// Gives the file its name, and returns its path.
+    pub fn finish(&mut self) -> Result<PathBuf, OutputError> {
+        let finished = atomic::rename(self.draft.path(), &self.file);
+        finished.map_err(|reason| self.failed(reason))?;
+        Ok(self.file.clone())
+    }
+
+    fn failed(&self, reason: io::Error) -> OutputError {
+        let file = self.file.clone();
+        OutputError::File { file, reason }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    fn write(file: &mut GrowingFile, text: &str) -> Extent {
+        file.append(|out| out.write_all(text.as_bytes())).unwrap();
+        file.extent()
+    }
+
+    #[test]
+    fn a_kept_file_goes_on_where_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        let mut file = GrowingFile::begin(path.clone()).unwrap();
+        let extent = write(&mut file, "one two ");
+        write(&mut file, "and a half-written thr");
+        file.unfinished().keep().unwrap();
+        drop(file);
+        assert!(kept_path(&path).exists());
+
+        let mut file = GrowingFile::resume(path.clone(), &extent).unwrap();
+        write(&mut file, "three");
+        file.finish().unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "one two three");
+        assert!(!kept_path(&path).exists());
+    }
+
+    #[test]
+    fn an_unfinished_file_that_is_dropped_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut file = GrowingFile::begin(folder.path().join("a.csv")).unwrap();
+        write(&mut file, "one");
+        drop(file);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}
