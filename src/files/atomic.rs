@@ -166,25 +166,4 @@ mod tests {
         check_writable(&folder.path().join("out/deep")).unwrap();
         assert!(names(folder.path()).is_empty());
     }
-
-    #[test]
-    fn a_file_in_the_way_is_named() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("plain");
-        fs::write(&file, "").unwrap();
-        let wanted = file.join("out");
-        for error in [
-            check_writable(&wanted).unwrap_err(),
-            make_folder(&wanted).unwrap_err(),
-        ] {
-            assert!(
-                matches!(&error, OutputError::NotAFolder { obstacle, .. } if *obstacle == file)
-            );
-            assert!(
-                error
-                    .to_string()
-                    .ends_with("is not a folder; name another with --out DIR")
-            );
-        }
-    }
 }

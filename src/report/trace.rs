@@ -2,82 +2,29 @@
 
 use std::path::Path;
 
-use crate::report::numbers::power_of_ten;
-use crate::report::words::branch_end;
-use crate::study::{PointKind, Trace, TracePoint};
+use crate::study::{Law, PointKind, Trace, TraceBranch, TracePoint};
 
-use super::numbers::{seconds, veins_of};
-use super::table::{lay_out, written};
+use super::numbers::{power_of_ten, seconds, veins_of};
+use super::table::{lay_out, under, written};
+use super::words::branch_end;
 
 /// The branches, their ends, and where the index changes.
 pub fn report(trace: &Trace, folder: Option<&Path>) -> String {
-    let mut lines: Vec<(&str, String)> = vec![(
-        "vary",
-        format!(
-            "{} from {} to {}",
-            trace.keys,
-            trace.keys.text(trace.range[0]),
-            trace.keys.text(trace.range[1])
-        ),
-    )];
-    for (number, branch) in trace.branches.iter().enumerate() {
-        let name = match number {
-            0 => "branch",
-            _ => "",
-        };
-        let from = match branch.from {
-            Some([from, _]) => format!(", off branch {}", from + 1),
-            None => String::new(),
-        };
-        lines.push((
-            name,
-            format!(
-                "{}{from}: {} points, {}",
-                number + 1,
-                branch.points.len(),
-                branch_end(&branch.end)
-            ),
-        ));
-        let mut before = branch.points.first().map_or(0, |point| point.index);
-        let first = branch.points.first();
-        lines.extend(first.map(|point| ("", format!("  from {}", place(trace, point)))));
-        for (_, point) in branch.critical() {
-            lines.push(("", format!("  {}", critical(trace, point, before))));
-            before = point.index;
-        }
-        let last = branch.points.last();
-        lines.extend(last.map(|point| ("", format!("  to {}", place(trace, point)))));
-        lines.extend((branch.remark.iter()).map(|remark| ("", format!("  {remark}"))));
-    }
-    if let Some(law) = trace.law {
-        let unit = match (&trace.units.force, &trace.units.length) {
-            (Some(force), Some(length)) => format!(" {force}/{length}"),
-            _ => String::new(),
-        };
-        lines.push((
-            "law",
-            format!(
-                "force against displacement along {}: slope {:.6}{unit}, R² = {:.7}, off the line by {:.2} % at most",
-                ['x', 'y', 'z'][law.axis],
-                law.slope,
-                law.r_squared,
-                100.0 * law.deviation
-            ),
-        ));
-        lines.extend(law.young.map(|young| {
-            let length = format!("over a length of {:.6}", law.length);
-            ("", format!("Young's modulus {young:.6}, {length}"))
-        }));
+    let [from, to] = trace.range.map(|value| trace.keys.text(value));
+    let mut lines = vec![("vary", format!("{} from {from} to {to}", trace.keys))];
+    let branches = trace.branches.iter().enumerate();
+    let branches = branches.flat_map(|(number, branch)| branch_lines(trace, number, branch));
+    lines.extend(under("branch", branches.collect()));
+    if let Some(law) = &trace.law {
+        lines.extend(under("law", law_lines(trace, law)));
     }
     let errors = trace.branches.iter().flat_map(|branch| &branch.points);
     let errors = errors.filter_map(|point| point.error);
-    if let Some(worst) = errors.reduce(f64::max) {
-        let worst = format!("tips within {}", power_of_ten(worst));
-        lines.push((
-            "error",
-            format!("{worst}, followed on {} segments a vein", trace.segments),
-        ));
-    }
+    lines.extend(errors.reduce(f64::max).map(|worst| {
+        let (worst, segments) = (power_of_ten(worst), trace.segments);
+        let error = format!("tips within {worst}, followed on {segments} segments a vein");
+        ("error", error)
+    }));
     lines.push((
         "work",
         format!(
@@ -90,6 +37,47 @@ pub fn report(trace: &Trace, folder: Option<&Path>) -> String {
     lines.extend((trace.remark.iter()).map(|remark| ("remark", remark.clone())));
     let veins = veins_of(trace.rods, trace.joined);
     lay_out(&format!("{}: {veins}, followed", trace.scenario), &lines)
+}
+
+/// How a branch ended, its ends and its critical points.
+fn branch_lines(trace: &Trace, number: usize, branch: &TraceBranch) -> Vec<String> {
+    let from = match branch.from {
+        Some([from, _]) => format!(", off branch {}", from + 1),
+        None => String::new(),
+    };
+    let (number, points) = (number + 1, branch.points.len());
+    let end = branch_end(&branch.end);
+    let mut lines = vec![format!("{number}{from}: {points} points, {end}")];
+    let first = branch.points.first();
+    lines.extend(first.map(|point| format!("  from {}", place(trace, point))));
+    let mut before = first.map_or(0, |point| point.index);
+    for (_, point) in branch.critical() {
+        lines.push(format!("  {}", critical(trace, point, before)));
+        before = point.index;
+    }
+    let last = branch.points.last();
+    lines.extend(last.map(|point| format!("  to {}", place(trace, point))));
+    lines.extend(branch.remark.iter().map(|remark| format!("  {remark}")));
+    lines
+}
+
+/// Hooke's law, and Young's modulus by it.
+fn law_lines(trace: &Trace, law: &Law) -> Vec<String> {
+    let unit = match (&trace.units.force, &trace.units.length) {
+        (Some(force), Some(length)) => format!(" {force}/{length}"),
+        _ => String::new(),
+    };
+    let mut lines = vec![format!(
+        "force against displacement along {}: slope {:.6}{unit}, R² = {:.7}, off the line by {:.2} % at most",
+        ['x', 'y', 'z'][law.axis],
+        law.slope,
+        law.r_squared,
+        100.0 * law.deviation
+    )];
+    let length = law.length;
+    let young = |young| format!("Young's modulus {young:.6}, over a length of {length:.6}");
+    lines.extend(law.young.map(young));
+    lines
 }
 
 fn place(trace: &Trace, point: &TracePoint) -> String {

@@ -81,7 +81,7 @@ impl Identity {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoint {
     /// For people: `state` has it to the last digit.
-    time: f64,
+    pub time: f64,
     run: Identity,
     pub motion: Extent,
     pub energy: Extent,
@@ -91,24 +91,29 @@ pub struct Checkpoint {
 }
 
 impl Checkpoint {
+    /// Where a run is whose files have these extents, without its state.
     pub fn new(
         run: Identity,
         [motion, energy]: [Extent; 2],
         time: f64,
         wall_nanoseconds: u64,
-        state: &[f64],
     ) -> Self {
-        let mut checkpoint = Checkpoint {
+        Checkpoint {
             time,
             run,
             motion,
             energy,
             wall_nanoseconds,
-            state: state.iter().map(|&number| digits(number)).collect(),
+            state: String::new(),
             checksum: String::new(),
-        };
-        checkpoint.checksum = checkpoint.sum();
-        checkpoint
+        }
+    }
+
+    /// The same with the state of the motion.
+    pub fn with_state(mut self, state: &[f64]) -> Self {
+        self.state = state.iter().map(|&number| digits(number)).collect();
+        self.checksum = self.sum();
+        self
     }
 
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
@@ -197,7 +202,7 @@ mod tests {
         };
         let state = [0.1, -0.0, f64::MIN_POSITIVE / 3.0, f64::NAN, 1e300 / 3.0];
         let extents = [extent.clone(), extent];
-        let checkpoint = Checkpoint::new(identity(), extents, 0.3, 12, &state);
+        let checkpoint = Checkpoint::new(identity(), extents, 0.3, 12).with_state(&state);
         let folder = tempfile::tempdir().unwrap();
         let mut bytes = Vec::new();
         checkpoint.write(&mut bytes).unwrap();

@@ -4,8 +4,8 @@ use std::mem;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::checkpoint::{self, Checkpoint, Identity};
-use super::growing::{Extent, Unfinished};
+use super::checkpoint::{self, Checkpoint};
+use super::growing::Unfinished;
 use crate::files::atomic;
 use crate::report::OutputError;
 
@@ -13,10 +13,8 @@ use crate::report::OutputError;
 pub struct Latest {
     pub folder: PathBuf,
     pub files: [Unfinished; 2],
-    pub run: Identity,
-    pub extents: [Extent; 2],
-    pub time: f64,
-    pub wall_nanoseconds: u64,
+    pub checkpoint: Checkpoint,
+    /// Of the motion.
     pub state: Vec<f64>,
 }
 
@@ -49,24 +47,17 @@ impl Checkpointer {
 
 fn write(latest: &mut Option<Latest>) -> Option<Result<f64, OutputError>> {
     let latest = latest.take()?;
-    let (time, files) = (latest.time, latest.files);
     let file = latest.folder.join(checkpoint::FILE_NAME);
-    let checkpoint = Checkpoint::new(
-        latest.run,
-        latest.extents,
-        time,
-        latest.wall_nanoseconds,
-        &latest.state,
-    );
+    let checkpoint = latest.checkpoint.with_state(&latest.state);
     let written = atomic::write_file(&file, |out| {
         checkpoint.write(out)?;
         out.flush()?;
         // Only now: an older checkpoint needs the files it goes with until
         // nothing but renaming is left to be done.
-        files.iter().try_for_each(Unfinished::keep)
+        latest.files.iter().try_for_each(Unfinished::keep)
     });
     Some(match written {
-        Ok(()) => Ok(time),
+        Ok(()) => Ok(checkpoint.time),
         Err(reason) => Err(OutputError::File { file, reason }),
     })
 }

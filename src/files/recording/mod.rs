@@ -168,14 +168,14 @@ impl Recording {
     }
 
     fn update_checkpointer(&self, simulation: &Simulation) {
-        let wall = self.wall + simulation.wall_time();
+        let wall = (self.wall + simulation.wall_time()).as_nanos();
+        let wall = wall.min(u128::from(u64::MAX)) as u64;
+        let extents = [self.motion.extent(), self.energy.extent()];
+        let time = simulation.time();
         *self.checkpointer.latest() = Some(Latest {
             folder: self.folder.clone(),
             files: [self.motion.unfinished(), self.energy.unfinished()],
-            run: self.run.clone(),
-            extents: [self.motion.extent(), self.energy.extent()],
-            time: simulation.time(),
-            wall_nanoseconds: wall.as_nanos().min(u128::from(u64::MAX)) as u64,
+            checkpoint: Checkpoint::new(self.run.clone(), extents, time, wall),
             state: simulation.save(),
         });
     }

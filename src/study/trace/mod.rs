@@ -87,23 +87,18 @@ impl TraceRequest {
             ));
         }
         for target in keys.targets() {
-            match target {
-                Target::Knob(_) => return Err(refuse("is a setting of a method, not of the leaf")),
-                Target::Entry { key, .. } if key.path().starts_with("dynamics.") => {
-                    return Err(refuse("changes a motion, but no equilibrium"));
-                }
-                Target::Entry {
-                    key: Key::TipMoment,
-                    ..
-                } => return Err(refuse(NO_MOMENT)),
-                Target::Entry {
-                    key: Key::Tolerance,
-                    ..
-                } => {
-                    return Err(refuse("changes no leaf"));
-                }
-                Target::Entry { .. } => {}
-            }
+            let why = match target {
+                Target::Knob(_) => "is a setting of a method, not of the leaf",
+                Target::Entry { key, .. } => match key {
+                    Key::TipMoment => NO_MOMENT,
+                    Key::Tolerance => "changes no leaf",
+                    key if key.path().starts_with("dynamics.") => {
+                        "changes a motion, but no equilibrium"
+                    }
+                    _ => continue,
+                },
+            };
+            return Err(refuse(why));
         }
         if self.vary.values.len() < 2 {
             return Err(refuse("FROM and TO are the same"));
