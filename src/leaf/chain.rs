@@ -253,7 +253,7 @@ impl RodMatrix {
     pub fn spatial(&self) -> &Chain<SPATIAL> {
         match self {
             RodMatrix::Spatial(chain, _) => chain,
-            RodMatrix::Planar(..) => unreachable!("nothing but rest is asked of a planar leaf"),
+            RodMatrix::Planar(..) => unreachable!("a leaf in its plane is only brought to rest"),
         }
     }
 
@@ -261,7 +261,7 @@ impl RodMatrix {
     pub fn spatial_mut(&mut self) -> &mut Chain<SPATIAL> {
         match self {
             RodMatrix::Spatial(chain, _) => chain,
-            RodMatrix::Planar(..) => unreachable!("nothing but rest is asked of a planar leaf"),
+            RodMatrix::Planar(..) => unreachable!("a leaf in its plane is only brought to rest"),
         }
     }
 

@@ -26,7 +26,7 @@ pub struct DiscreteLeaf {
     coupling: Vec<DVec3>,
     /// Trapezoidal weights of the nodes as fractions of the length.
     weights: Vec<f64>,
-    /// Part of the loads that acts: one, but on the way to a dead moment.
+    /// Part of the loads that acts: one, but in the continuation to a dead moment.
     pub load_factor: f64,
     /// The loads.
     pub loads: Loads,
@@ -72,8 +72,8 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The same rods, all of them, seen as those of `leaf`.
-    pub fn seen_as(&self, leaf: &Leaf) -> Self {
+    /// The same rods, all of them, as those of `leaf`.
+    pub fn with_leaf(&self, leaf: &Leaf) -> Self {
         DiscreteLeaf {
             leaf: leaf.clone(),
             planar: leaf.planar,
@@ -135,7 +135,7 @@ impl DiscreteLeaf {
         self.leaf.rods()
     }
 
-    /// Whether the rods feel each other other than through the tip.
+    /// Whether neighbouring rods are coupled.
     pub fn coupled(&self) -> bool {
         let between = self.coupling.iter().take(self.rods() - 1);
         between.into_iter().any(|&k| k != DVec3::ZERO)

@@ -16,15 +16,15 @@ const LEAST_ACCURACY: f64 = 1e-13;
 const MOST: usize = 40;
 const MOST_A_PAIR: usize = 4;
 
-/// Directions between looks at what has converged.
-const LOOK: usize = 4;
+/// Directions between checks of what has converged.
+const CHECK_EVERY: usize = 4;
 
 /// A direction shorter than this part of what it was has no digit left: all
 /// that the start can reach is found.
-const NOTHING: f64 = 1e-13;
+const EXHAUSTED: f64 = 1e-13;
 
 /// An eigenvector of unit mass.
-pub struct Found {
+pub struct Mode {
     /// Lambda.
     pub eigenvalue: f64,
     pub vector: Vec<f64>,
@@ -38,7 +38,7 @@ pub struct Lanczos<'a> {
     /// Solves (K - sigma M) x = b in place.
     pub solve: &'a mut dyn FnMut(&mut [f64]),
     /// Eigenvectors that are not to be found again.
-    pub known: &'a [Found],
+    pub known: &'a [Mode],
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -58,7 +58,7 @@ impl Lanczos<'_> {
         mut start: Vec<f64>,
         wanted: usize,
         limit: f64,
-    ) -> (Vec<Found>, Option<f64>) {
+    ) -> (Vec<Mode>, Option<f64>) {
         (self.solve)(&mut start);
         let most = (MOST + MOST_A_PAIR * wanted).min(start.len() - self.known.len());
         let mut basis: Vec<Vec<f64>> = Vec::new();
@@ -74,11 +74,11 @@ impl Lanczos<'_> {
             basis.push(next);
             let before = dot(&image, &self.masses.times(&image)).max(0.0).sqrt();
             length = self.orthogonal(&mut image, &basis);
-            if length <= NOTHING * before {
+            if length <= EXHAUSTED * before {
                 length = 0.0;
             }
             let size = basis.len();
-            if size.is_multiple_of(LOOK) || size == most || length == 0.0 {
+            if size.is_multiple_of(CHECK_EVERY) || size == most || length == 0.0 {
                 let (values, vectors) = ritz(&diagonal, &off);
                 let error = |k: usize| length * vectors[(size - 1, k)].abs();
                 let good =
@@ -87,7 +87,7 @@ impl Lanczos<'_> {
                 let eigenvalue = |k: usize| self.shift + 1.0 / values[k];
                 let beyond = done > 0 && eigenvalue(done - 1) > limit;
                 if done >= wanted || beyond || size == most || length == 0.0 {
-                    let pair = |k: usize| Found {
+                    let pair = |k: usize| Mode {
                         eigenvalue: eigenvalue(k),
                         vector: self.combined(&basis, &vectors, k),
                     };

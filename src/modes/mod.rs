@@ -8,11 +8,11 @@
 //!
 //! K - sigma M is factorised for a sigma below all eigenvalues, which the signs
 //! of its pivots prove, and the Lanczos method finds the eigenvalues next to
-//! sigma. How many there are below the last one found is again told by the
-//! signs of the pivots (Sylvester's law), of a second factorisation there: those
+//! sigma. How many there are below the last one found follows again from
+//! the signs of the pivots (Sylvester's law), of a second factorisation there: those
 //! that were missed, such as the second one of a double eigenvalue, are looked
 //! for besides the known ones until the numbers agree. A list that could not
-//! be proved is not handed out.
+//! be proved is not returned.
 
 mod lanczos;
 mod masses;
@@ -21,13 +21,13 @@ mod quotient;
 use crate::leaf::{DiscreteLeaf, Increment, SparseError, SparseFactor, SparsePattern};
 use crate::leaf::{State, System};
 use crate::motion::Physics;
-use lanczos::{Found, Lanczos};
+use lanczos::{Lanczos, Mode};
 use masses::Masses;
 use quotient::quotient;
 pub use quotient::rounding;
 
 /// Stiffness, in A/L^2, to which stiffer rods are softened in the matrix, as a
-/// larger one costs digits. The eigenvalues do not feel it to first order.
+/// larger one loses digits. The eigenvalues do not change to first order.
 const STIFFEST: f64 = 1e6;
 
 /// It is at least so many times the largest force carried.
@@ -98,9 +98,9 @@ pub fn lowest(
     count: usize,
 ) -> Result<Vec<Eigenpair>, ModesError> {
     let mut soft = leaf.clone();
-    let pull = state.n.iter().fold(0.0_f64, |m, n| m.max(n.length()));
+    let tension = state.n.iter().fold(0.0_f64, |m, n| m.max(n.length()));
     for section in &mut soft.sections {
-        *section = section.condense(STIFFEST.max(STIFFER * pull));
+        *section = section.condense(STIFFEST.max(STIFFER * tension));
     }
     let system = System::new(&soft);
     let pattern = SparsePattern::new(&system)?;
@@ -162,7 +162,7 @@ impl Vibration<'_> {
         }
         let lowest = self.below_all()?;
         let (mut shift, mut limit) = (lowest, f64::INFINITY);
-        let mut found: Vec<Found> = Vec::new();
+        let mut found: Vec<Mode> = Vec::new();
         let mut wanted = count;
         for search in 0..SEARCHES + count {
             let bound = self.search(shift, (wanted, limit), search, &mut found)?;
@@ -188,7 +188,7 @@ impl Vibration<'_> {
     /// which there may be more that are equal.
     fn missing(
         &mut self,
-        found: &[Found],
+        found: &[Mode],
         count: usize,
         lowest: f64,
     ) -> Result<Missing, ModesError> {
@@ -208,7 +208,7 @@ impl Vibration<'_> {
 
     /// A shift closer to the next eigenvalues, where many are close together:
     /// somewhat below `bound`, but above no more than those found.
-    fn closer(&mut self, shift: f64, bound: f64, found: &[Found]) -> Result<f64, ModesError> {
+    fn closer(&mut self, shift: f64, bound: f64, found: &[Mode]) -> Result<f64, ModesError> {
         let mut part = FIRST_PART;
         while part < 1.0 {
             let closer = bound - part * (bound - shift);
@@ -227,7 +227,7 @@ impl Vibration<'_> {
         shift: f64,
         (wanted, limit): (usize, f64),
         search: usize,
-        found: &mut Vec<Found>,
+        found: &mut Vec<Mode>,
     ) -> Result<Option<f64>, ModesError> {
         let start = self.start(search);
         self.leaf.assemble(self.state, &mut self.system);

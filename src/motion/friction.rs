@@ -1,6 +1,6 @@
 //! The rate at which strains change, for internal friction.
 
-/// A step shorter than this part of the next tells too little of the rate.
+/// A step shorter than this part of the next determines the rate too poorly.
 const SHORTEST_PART: f64 = 0.25;
 
 /// Weights of a value and the two before it in its rate of change now, the

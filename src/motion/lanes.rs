@@ -157,38 +157,24 @@ impl<S: Simd> Lanes<S> {
     }
 }
 
-impl<S: Simd> Add for Lanes<S> {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Lanes {
-            simd: self.simd,
-            v: self.simd.add_f64s(self.v, other.v),
+macro_rules! lanes_operator {
+    ($operator:ident, $method:ident, $instruction:ident) => {
+        impl<S: Simd> $operator for Lanes<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Lanes {
+                    simd: self.simd,
+                    v: self.simd.$instruction(self.v, other.v),
+                }
+            }
         }
-    }
+    };
 }
 
-impl<S: Simd> Sub for Lanes<S> {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Lanes {
-            simd: self.simd,
-            v: self.simd.sub_f64s(self.v, other.v),
-        }
-    }
-}
-
-impl<S: Simd> Mul for Lanes<S> {
-    type Output = Self;
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Lanes {
-            simd: self.simd,
-            v: self.simd.mul_f64s(self.v, other.v),
-        }
-    }
-}
+lanes_operator!(Add, add, add_f64s);
+lanes_operator!(Sub, sub, sub_f64s);
+lanes_operator!(Mul, mul, mul_f64s);
 
 /// A vector for each of several neighbouring nodes.
 #[derive(Clone, Copy)]
@@ -298,26 +284,21 @@ impl<S: Simd> Vectors<S> {
     }
 }
 
-impl<S: Simd> Add for Vectors<S> {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Vectors {
-            x: self.x + other.x,
-            y: self.y + other.y,
-            z: self.z + other.z,
+macro_rules! vectors_operator {
+    ($operator:ident, $method:ident) => {
+        impl<S: Simd> $operator for Vectors<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Vectors {
+                    x: self.x.$method(other.x),
+                    y: self.y.$method(other.y),
+                    z: self.z.$method(other.z),
+                }
+            }
         }
-    }
+    };
 }
 
-impl<S: Simd> Sub for Vectors<S> {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Vectors {
-            x: self.x - other.x,
-            y: self.y - other.y,
-            z: self.z - other.z,
-        }
-    }
-}
+vectors_operator!(Add, add);
+vectors_operator!(Sub, sub);

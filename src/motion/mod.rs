@@ -1,11 +1,11 @@
 //! Motion in time.
 
+mod energy_balance;
 mod explicit;
 mod fictitious;
 mod friction;
 mod kernel;
 mod lanes;
-mod ledger;
 mod method;
 mod nodes;
 mod physics;

@@ -1,6 +1,8 @@
 //! From the leaf to the arrays of the explicit method, and back.
 
-use super::kernel::{Array, BLOCK, Done, GROUP, Material, Motion, Node, Past, Positions, blocks};
+use super::kernel::{
+    Array, BLOCK, GROUP, Material, Motion, Node, Past, Positions, StepTotals, blocks,
+};
 use super::method::Velocity;
 use super::physics::Physics;
 use crate::leaf::{DiscreteLeaf, State};
@@ -13,8 +15,8 @@ pub struct Rod {
     pub motion: Motion,
     pub material: Vec<Arc<Material>>,
     pub past: Past,
-    /// What the last step did.
-    pub done: Done,
+    /// Sums of the last step.
+    pub totals: StepTotals,
 }
 
 fn arrays<const K: usize>(length: usize) -> [Array; K] {
@@ -78,9 +80,9 @@ pub fn rod(
             one: past(),
             two: past(),
         },
-        done: Done::default(),
+        totals: StepTotals::default(),
     };
-    rod.close(n);
+    rod.pad(n);
     rod
 }
 
@@ -138,10 +140,10 @@ impl Rod {
         material.node(i)
     }
 
-    /// Lets what stands behind the last node, in its group and next to that, be
-    /// like it, so that the segments that are read there, though they have no
-    /// stiffness, are sound ones.
-    pub fn close(&mut self, segments: usize) {
+    /// Fills the places behind the last node, in its group and next to that, with
+    /// its rotation, so that the segments read there, which have no stiffness, are
+    /// straight ones.
+    pub fn pad(&mut self, segments: usize) {
         let last = GROUP + segments;
         let end = (last + 1).next_multiple_of(GROUP);
         for q in &mut self.motion.q {
@@ -152,7 +154,7 @@ impl Rod {
         }
     }
 
-    /// The arrays that tell the future, but positions.
+    /// The arrays on which the motion depends, but positions.
     pub fn moving_arrays(&self) -> impl Iterator<Item = &Array> {
         let Motion { q, v, p, .. } = &self.motion;
         let past = self.past.one.iter().chain(&self.past.two).flatten();

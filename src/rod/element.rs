@@ -19,7 +19,7 @@
 //! Stationary in n this is the paper's law; the implicit midpoint rule on eqs
 //! (1) and (2) and the minimum of a discrete energy coincide. The force is
 //! condensed out segment by segment, so that the nodes see a 12 x 12 matrix,
-//! and Newton's method does not feel how stiff the rod is in stretch and shear:
+//! and Newton's method converges as fast for any stiffness in stretch and shear:
 //! a rigid rod is c = 0.
 
 use crate::rotation::{self, Relative, cross_matrix, outer};

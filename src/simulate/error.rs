@@ -11,7 +11,7 @@ pub enum Refused {
          use --method semi-implicit, or give a number"
     )]
     Rigid,
-    /// The base is to fly free, and the semi-implicit method holds it.
+    /// The base is free, and the semi-implicit method clamps it.
     #[error(
         "dynamics.clamped = false: the semi-implicit method holds the base: use --method explicit{}",
         if *.rigid { ", and a number for every stiffness that is inf" } else { "" }

@@ -37,7 +37,7 @@ use crate::motion::{Broken, Explicit, Method, Physics, Rigid, SemiImplicit, Stab
 use crate::relax::{self, LARGEST_TOLERANCE, RelaxError, SMALLEST_TOLERANCE, start};
 use crate::scenario::{Scenario, Start};
 
-/// Segments a rod where none are asked for, if its rest shape does not need more.
+/// Default of segments a rod, if its rest shape does not need more.
 const SEGMENTS: usize = 16;
 
 /// Which method moves the leaf.

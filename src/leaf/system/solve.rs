@@ -135,7 +135,7 @@ impl System {
                 tip_residual[c] -= alpha * tip_b_p[c];
             }
             if joined {
-                // The joint tip feels no coupling: what stands there is B p alone.
+                // No coupling acts on the joint tip: B p alone stands there.
                 for rod in &mut self.rods {
                     for c in 3..6 {
                         rod.residual[last][c] = 0.0;

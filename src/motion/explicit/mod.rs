@@ -1,7 +1,7 @@
 //! The explicit method: leapfrog for positions and angular momenta.
 //!
 //! Forces at the nodes' positions kick velocities from half a step before to
-//! half a step after; with these, positions and rotations fly on freely for
+//! half a step after; with these, positions and rotations drift freely for
 //! one step. A node of a round section is a body with one axis of symmetry,
 //! whose free rotation is known in closed form. The method is of second order
 //! and symplectic, and keeps momentum and angular momentum to rounding, since
@@ -16,7 +16,7 @@
 //! them is reached by a shorter step from the one before, off the path, to
 //! which the motion returns. It does not depend on the times asked for.
 
-mod path;
+mod advance;
 #[cfg(test)]
 mod tests;
 
@@ -24,10 +24,10 @@ use glam::DVec3;
 use pulp::Arch;
 use rayon::prelude::*;
 
+use super::energy_balance::{EnergyBalance, Exchange};
 use super::fictitious;
 use super::friction::rates;
-use super::kernel::{self, Block, Forces, GROUP, Law, Neighbour, Positions, Pull, Step};
-use super::ledger::{Exchange, Ledger};
+use super::kernel::{self, Block, Forces, GROUP, Law, Neighbour, Positions, RodLoads, Step};
 use super::method::{Method, Snapshot};
 use super::nodes::{self, Rod, vector};
 use super::physics::Physics;
@@ -72,10 +72,10 @@ pub struct Explicit {
     begin: (f64, usize),
     /// Widths of the last step and of the one before; zero if there was none.
     widths: [f64; 2],
-    ledger: Ledger,
-    /// The last look at the leaf, until it moves or is changed: where a motion
-    /// was judged it is often asked for, too.
-    seen: Option<Snapshot>,
+    balance: EnergyBalance,
+    /// The last snapshot, until the leaf moves or is changed: where a motion
+    /// was judged it is often wanted, too.
+    last_snapshot: Option<Snapshot>,
     parallel: bool,
 }
 
@@ -121,8 +121,8 @@ impl Explicit {
             steps: 0,
             begin: (0.0, 0),
             widths: [0.0; 2],
-            ledger: Ledger::default(),
-            seen: None,
+            balance: EnergyBalance::default(),
+            last_snapshot: None,
             parallel: count > 1
                 && count * leaf.segments() >= PARALLEL_SEGMENTS
                 && rayon::current_num_threads() > 1,
@@ -136,7 +136,7 @@ impl Explicit {
             rod.past.two = rod.past.one.clone();
         }
         let start = explicit.snapshot();
-        explicit.ledger.begin(&start);
+        explicit.balance.begin(&start);
         Ok(explicit)
     }
 
@@ -157,7 +157,7 @@ impl Explicit {
     /// Gives the nodes masses that serve to come to rest, not to move: the
     /// fastest motions of all segments become alike. Time steps may be as long
     /// as one then, and the leaf is stopped.
-    pub fn disguise(&mut self) {
+    pub fn use_fictitious_masses(&mut self) {
         let tip = fictitious::masses(&self.leaf, &mut self.rods);
         self.tip_mass = self.tip_mass.map(|_| tip);
         self.stop();
@@ -165,7 +165,7 @@ impl Explicit {
 
     /// Takes all velocities away.
     pub fn stop(&mut self) {
-        self.seen = None;
+        self.last_snapshot = None;
         for rod in &mut self.rods {
             for array in rod.motion.v.iter_mut().chain(&mut rod.motion.p) {
                 array.fill(0.0);
@@ -174,44 +174,44 @@ impl Explicit {
         self.widths = [0.0; 2];
     }
 
-    /// Lets every velocity decay at this rate from now on.
-    pub fn damp(&mut self, rate: f64) {
-        self.seen = None;
+    /// Sets the rate at which every velocity decays from now on.
+    pub fn set_damping(&mut self, rate: f64) {
+        self.last_snapshot = None;
         self.physics.damping = rate;
     }
 
     /// One time step of any length; returns twice the kinetic energy at its
     /// beginning.
     pub fn step(&mut self, h: f64) -> f64 {
-        let (exchange, energy) = self.go(h);
-        self.ledger.add(exchange);
+        let (exchange, energy) = self.kick_and_drift(h);
+        self.balance.add(exchange);
         self.steps += 1;
         self.begin = (self.stepped, self.steps);
         self.time = self.stepped;
         energy
     }
 
-    /// The largest turn of a segment that the last step saw. That of unit
-    /// quaternions is told up to 2 pi, since their signs are aligned.
-    fn sharpest(&self) -> f64 {
-        let sharpest = self.rods.iter().map(|rod| rod.done.sharpest);
-        4.0 * (0.5 * sharpest.fold(0.0, f64::max).sqrt()).min(1.0).asin()
+    /// The largest rotation between the ends of a segment before the last step. That
+    /// of unit quaternions is known up to 2 pi, since their signs are aligned.
+    fn largest_turn(&self) -> f64 {
+        let deltas = self.rods.iter().map(|rod| rod.totals.largest_delta);
+        4.0 * (0.5 * deltas.fold(0.0, f64::max).sqrt()).min(1.0).asin()
     }
 
-    /// Whether what the last step saw is fit to go on from: finite numbers, and no
+    /// Whether the leaf before the last step can be trusted: finite numbers, and no
     /// segment bent by more than its grid can resolve.
-    fn sound(&self) -> bool {
-        let finite = |rod: &Rod| rod.done.twice_kinetic.is_finite();
-        self.sharpest() <= RESOLVED_TURN && self.rods.iter().all(finite)
+    fn trusted(&self) -> bool {
+        let finite = |rod: &Rod| rod.totals.twice_kinetic.is_finite();
+        self.largest_turn() <= RESOLVED_TURN && self.rods.iter().all(finite)
     }
 
-    /// Kicks, and flies on for `h`.
-    fn go(&mut self, h: f64) -> (Exchange, f64) {
-        self.seen = None;
-        let done = self.kick(0.5 * h, h, true);
+    /// Kicks, and drifts for `h`.
+    fn kick_and_drift(&mut self, h: f64) -> (Exchange, f64) {
+        self.last_snapshot = None;
+        let exchange = self.kick(0.5 * h, h, true);
         self.widths = [h, self.widths[0]];
         self.stepped += h;
-        done
+        exchange
     }
 
     /// By how much time velocities lag behind positions: half a step, but not
@@ -221,10 +221,10 @@ impl Explicit {
     }
 
     /// Kicks velocities, by the forces at the present positions, to where they
-    /// are `ahead` of these, and lets positions fly on for the time `flight`.
+    /// are `ahead` of these, and lets positions drift for the time `drift`.
     /// Strains become the last step's if they are to be remembered. Returns
     /// twice the kinetic energy in the middle of the kick, too.
-    fn kick(&mut self, ahead: f64, flight: f64, remember: bool) -> (Exchange, f64) {
+    fn kick(&mut self, ahead: f64, drift: f64, remember: bool) -> (Exchange, f64) {
         let length = self.behind() + ahead;
         let [from, to] = [self.stepped - self.behind(), self.stepped + ahead];
         let loads = self.physics.loads(self.stepped);
@@ -236,22 +236,22 @@ impl Explicit {
         let (rotation, before) = (self.rods[0].rotation(last), self.rods[0].moving(last));
         let decay = 0.5 * self.physics.damping * length;
         let (keep, kick) = ((1.0 - decay) / (1.0 + decay), length / (1.0 + decay));
-        self.step_rods(&loads, (keep, kick), flight, remember);
+        self.step_rods(&loads, (keep, kick), drift, remember);
         let (mut energy, mut friction, mut rest) = (0.0, 0.0, 0.0);
         for rod in &self.rods {
-            energy += rod.done.twice_kinetic;
-            friction += self.physics.retardation * rod.done.friction;
-            rest += rod.done.rest;
+            energy += rod.totals.twice_kinetic;
+            friction += self.physics.retardation * rod.totals.friction;
+            rest += rod.totals.rest;
         }
         if let Some(mass) = self.tip_mass {
             let mut force = loads.tip_force;
             for rod in &self.rods {
                 force += rod.weight(last) * loads.gravity;
-                force -= DVec3::from(rod.done.last_force);
+                force -= DVec3::from(rod.totals.last_force);
             }
             let after = keep * before.0 + force * (kick / mass);
             energy += mass * (0.5 * (before.0 + after)).length_squared();
-            let tip = vector(&self.next[0].x, last) + flight * after;
+            let tip = vector(&self.next[0].x, last) + drift * after;
             for (rod, positions) in self.rods.iter_mut().zip(&mut self.positions) {
                 for c in 0..3 {
                     rod.motion.v[c][last] = after[c];
@@ -307,10 +307,10 @@ impl Explicit {
     }
 
     /// Moves all nodes but a joint tip; the positions before are left in `next`.
-    fn step_rods(&mut self, loads: &Loads, kick: (f64, f64), flight: f64, remember: bool) {
+    fn step_rods(&mut self, loads: &Loads, kick: (f64, f64), drift: f64, remember: bool) {
         let (arch, law, segments) = (self.arch, self.law(remember), self.leaf.segments());
-        // A free tip feels its force in its own rod, a joint one elsewhere.
-        let pull = Pull {
+        // The force on a free tip acts in its own rod, a joint one elsewhere.
+        let loads = RodLoads {
             gravity: loads.gravity.to_array(),
             tip_force: match self.tip_mass {
                 Some(_) => [0.0; 3],
@@ -339,15 +339,15 @@ impl Explicit {
                 material: &rod.material,
                 past: &mut rod.past,
                 law,
-                pull,
+                loads,
                 keep: kick.0,
                 kick: kick.1,
-                flight,
+                drift,
                 normalise,
                 block,
             };
-            rod.done = step.make(arch);
-            rod.close(segments);
+            rod.totals = step.make(arch);
+            rod.pad(segments);
         };
         if self.parallel {
             (self.rods.par_iter_mut().zip(&mut self.next).enumerate())

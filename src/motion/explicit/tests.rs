@@ -77,9 +77,9 @@ fn forces_are_those(discrete: &DiscreteLeaf) {
         let physics = Physics::at_rest(leaf);
         let mut explicit = Explicit::new(discrete.clone(), physics, &state, None).unwrap();
         explicit.arch = arch;
-        explicit.damp(0.0);
+        explicit.set_damping(0.0);
         let h = 1e-6;
-        explicit.go(h);
+        explicit.kick_and_drift(h);
         let mut tip = DVec3::ZERO;
         for (j, rod) in explicit.rods.iter().enumerate() {
             for i in 1..=n {

@@ -3,14 +3,14 @@
 //!
 //! It goes along the rod in blocks. The forces of a block's segments
 //! ([`segments`]) stay in the processor's nearest memories until its nodes have
-//! moved ([`flight`]). Nodes that have moved are not looked at again: the next
-//! block's first node gets what the segment before it does from the block
-//! before, and neighbouring rods, which feel where its nodes were, read
-//! positions that are not written over but written anew.
+//! moved ([`nodes`]). Nodes that have moved are not read again: the next block's
+//! first node gets what the segment before it does from the block before, and
+//! the new positions are written to other arrays, as neighbouring rods are coupled
+//! to the old ones.
 
 mod array;
-mod flight;
 mod material;
+mod nodes;
 mod segments;
 
 use std::sync::Arc;
@@ -18,9 +18,8 @@ use std::sync::Arc;
 use pulp::{Arch, Simd};
 
 pub use self::array::Array;
-use self::flight::Flight;
 pub use self::material::{Material, Node, blocks};
-use self::segments::{Found, Nodes};
+use self::segments::{Nodes, SegmentSums};
 use super::lanes::Lanes;
 
 /// Nodes come in groups of so many; arrays are that much longer at both ends.
@@ -40,7 +39,7 @@ pub struct Positions {
 /// What else moves.
 #[derive(Clone, Debug)]
 pub struct Motion {
-    /// Rotations as quaternions, but for rounding and for what [`flight`] cuts off
+    /// Rotations as quaternions, but for rounding and for what [`nodes`] cuts off
     /// of unit length.
     pub q: [Array; 4],
     /// Velocities, half a step behind or ahead.
@@ -62,7 +61,7 @@ pub struct Past {
 pub struct Law {
     /// Whether there is internal friction.
     pub damped: bool,
-    /// Whether the rest curvature changes, and what that does is asked.
+    /// Whether the rest curvature changes, and its work is summed up.
     pub changes: bool,
     /// Factor of the rest curvature if that changes, or one.
     pub rest: f64,
@@ -100,8 +99,8 @@ impl Block {
         }
     }
 
-    /// Begins the next block after one of `nodes` nodes.
-    fn carry(&mut self, nodes: usize) {
+    /// Goes on to the next block after one of `nodes` nodes.
+    fn advance(&mut self, nodes: usize) {
         for array in self.n.iter_mut().chain(&mut self.right) {
             array[GROUP - 1] = array[GROUP + nodes - 1];
         }
@@ -109,6 +108,7 @@ impl Block {
 }
 
 /// Coupling with a neighbour.
+#[derive(Clone, Copy)]
 pub struct Neighbour<'a> {
     pub positions: &'a Positions,
     /// Force per displacement and unit of sigma.
@@ -117,7 +117,7 @@ pub struct Neighbour<'a> {
 
 /// Loads on a rod.
 #[derive(Clone, Copy, Debug)]
-pub struct Pull {
+pub struct RodLoads {
     /// Force per length.
     pub gravity: [f64; 3],
     /// Force and moment on the tip, if that is the rod's own.
@@ -126,11 +126,11 @@ pub struct Pull {
 }
 
 /// A time step of a rod: a kick by all forces, of length `kick`, velocities
-/// before it times `keep`, and free flight for the time `flight`.
+/// before it times `keep`, and motion free of forces for the time `drift`.
 pub struct Step<'a> {
     pub segments: usize,
     pub positions: &'a Positions,
-    /// Where they will be; of a joint tip its maker must say.
+    /// Where they will be, but for a joint tip, which is set outside.
     pub next: &'a mut Positions,
     pub neighbours: [Option<Neighbour<'a>>; 2],
     pub motion: &'a mut Motion,
@@ -138,10 +138,10 @@ pub struct Step<'a> {
     pub material: &'a [Arc<Material>],
     pub past: &'a mut Past,
     pub law: Law,
-    pub pull: Pull,
+    pub loads: RodLoads,
     pub keep: f64,
     pub kick: f64,
-    pub flight: f64,
+    pub drift: f64,
     /// Whether quaternions are brought back to unit length, from which rounding
     /// and truncated series slowly take them.
     pub normalise: bool,
@@ -149,9 +149,9 @@ pub struct Step<'a> {
     pub block: &'a mut Block,
 }
 
-/// What a step did.
+/// What a step sums up over a rod.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Done {
+pub struct StepTotals {
     /// Twice the kinetic energy in the middle of the kick.
     pub twice_kinetic: f64,
     /// Power of internal friction, over the retardation time.
@@ -160,19 +160,19 @@ pub struct Done {
     /// over that rise.
     pub rest: f64,
     /// Largest (2 sin(psi/4))^2 of a segment bent by psi, before the step.
-    pub sharpest: f64,
+    pub largest_delta: f64,
     /// Force of the last segment.
     pub last_force: [f64; 3],
 }
 
 impl Step<'_> {
     /// Makes the step.
-    pub fn make(self, arch: Arch) -> Done {
+    pub fn make(self, arch: Arch) -> StepTotals {
         match (self.law.damped, self.law.changes) {
-            (true, true) => arch.dispatch(Made::<true, true>(self)),
-            (true, false) => arch.dispatch(Made::<true, false>(self)),
-            (false, true) => arch.dispatch(Made::<false, true>(self)),
-            (false, false) => arch.dispatch(Made::<false, false>(self)),
+            (true, true) => arch.dispatch(Dispatched::<true, true>(self)),
+            (true, false) => arch.dispatch(Dispatched::<true, false>(self)),
+            (false, true) => arch.dispatch(Dispatched::<false, true>(self)),
+            (false, false) => arch.dispatch(Dispatched::<false, false>(self)),
         }
     }
 }
@@ -200,33 +200,18 @@ fn length(segments: usize, start: usize) -> usize {
     ((segments + 1).next_multiple_of(GROUP) - start).min(BLOCK)
 }
 
-struct Made<'a, const DAMPED: bool, const CHANGES: bool>(Step<'a>);
+struct Dispatched<'a, const DAMPED: bool, const CHANGES: bool>(Step<'a>);
 
-impl<const DAMPED: bool, const CHANGES: bool> pulp::WithSimd for Made<'_, DAMPED, CHANGES> {
-    type Output = Done;
+impl<const DAMPED: bool, const CHANGES: bool> pulp::WithSimd for Dispatched<'_, DAMPED, CHANGES> {
+    type Output = StepTotals;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Done {
-        let Step {
-            segments,
-            positions,
-            next,
-            neighbours,
-            motion,
-            material,
-            past,
-            law,
-            pull,
-            keep,
-            kick,
-            flight,
-            normalise,
-            block,
-        } = self.0;
-        let mut done = Done::default();
-        let zero = Lanes::splat(simd, 0.0);
-        let (mut energy, mut found) = (zero, Found::nothing(simd));
-        for array in block.n.iter_mut().chain(&mut block.right) {
+    fn with_simd<S: Simd>(self, simd: S) -> StepTotals {
+        let mut step = self.0;
+        let segments = step.segments;
+        let mut totals = StepTotals::default();
+        let (mut energy, mut sums) = (Lanes::splat(simd, 0.0), SegmentSums::zero(simd));
+        for array in step.block.n.iter_mut().chain(&mut step.block.right) {
             array[GROUP - 1] = 0.0;
         }
         let mut start = 0;
@@ -235,45 +220,32 @@ impl<const DAMPED: bool, const CHANGES: bool> pulp::WithSimd for Made<'_, DAMPED
             let place = (GROUP + start, nodes);
             let part = Nodes {
                 place,
-                x: &positions.x,
-                q: &motion.q,
-                material: &material[start / BLOCK],
-                law: &law,
+                x: &step.positions.x,
+                q: &step.motion.q,
+                material: &step.material[start / BLOCK],
+                law: &step.law,
             };
-            segments::forces::<S, DAMPED, CHANGES>(simd, part, past, block, &mut found);
+            let (past, block) = (&mut *step.past, &mut *step.block);
+            segments::forces::<S, DAMPED, CHANGES>(simd, part, past, block, &mut sums);
             // The tip is the last node; no segment follows it.
-            let end = start + nodes > segments;
-            if end {
+            if start + nodes > segments {
                 let tip = GROUP + segments - start;
                 for c in 0..3 {
-                    done.last_force[c] = block.n[c][tip - 1];
-                    block.n[c][tip] = pull.tip_force[c];
-                    block.left[c][tip] = 2.0 * pull.tip_moment[c];
+                    totals.last_force[c] = block.n[c][tip - 1];
+                    block.n[c][tip] = step.loads.tip_force[c];
+                    block.left[c][tip] = 2.0 * step.loads.tip_moment[c];
                 }
             }
-            let flight = Flight {
-                positions: &positions.x,
-                next: &mut next.x,
-                neighbours: &neighbours,
-                motion,
-                material: &material[start / BLOCK],
-                gravity: pull.gravity,
-                keep,
-                kick,
-                step: flight,
-                normalise,
-                block,
-            };
-            energy = energy + flight.go(simd, place);
-            block.carry(nodes);
+            energy = energy + step.kick_and_drift(simd, place);
+            step.block.advance(nodes);
             start += nodes;
         }
         // Velocities were sums of two.
-        done.twice_kinetic = 0.25 * energy.sum();
-        done.friction = found.friction.sum();
-        done.rest = found.rest.sum();
-        done.sharpest = found.sharpest.largest();
-        done
+        totals.twice_kinetic = 0.25 * energy.sum();
+        totals.friction = sums.friction.sum();
+        totals.rest = sums.rest.sum();
+        totals.largest_delta = sums.largest_delta.largest();
+        totals
     }
 }
 
@@ -296,7 +268,7 @@ impl pulp::WithSimd for Forces<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let mut block = Block::new();
-        let found = &mut Found::nothing(simd);
+        let sums = &mut SegmentSums::zero(simd);
         let mut start = 0;
         while start < self.segments {
             let nodes = length(self.segments, start);
@@ -309,8 +281,8 @@ impl pulp::WithSimd for Forces<'_> {
             };
             let (past, block) = (&mut *self.past, &mut block);
             match self.law.damped {
-                true => segments::forces::<S, true, true>(simd, part, past, block, found),
-                false => segments::forces::<S, false, true>(simd, part, past, block, found),
+                true => segments::forces::<S, true, true>(simd, part, past, block, sums),
+                false => segments::forces::<S, false, true>(simd, part, past, block, sums),
             }
             let own = GROUP..GROUP + nodes.min(self.segments - start);
             (self.forces).extend(own.map(|at| [0, 1, 2].map(|c| block.n[c][at])));

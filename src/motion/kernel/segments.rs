@@ -75,27 +75,27 @@ pub struct Nodes<'a> {
     pub law: &'a Law,
 }
 
-/// What is found on the way, summed up over a rod.
+/// What the loops over segments sum up over a rod.
 #[derive(Clone, Copy)]
-pub struct Found<S: Simd> {
+pub struct SegmentSums<S: Simd> {
     /// Power of internal friction over the retardation time, if `DAMPED`.
     pub friction: Lanes<S>,
     /// Elastic energy taken by a rise of the factor of the rest curvature, over
     /// that rise, if `CHANGES`.
     pub rest: Lanes<S>,
     /// Largest delta.
-    pub sharpest: Lanes<S>,
+    pub largest_delta: Lanes<S>,
 }
 
-impl<S: Simd> Found<S> {
-    /// Nothing yet.
+impl<S: Simd> SegmentSums<S> {
+    /// All zero.
     #[inline(always)]
-    pub fn nothing(simd: S) -> Self {
+    pub fn zero(simd: S) -> Self {
         let zero = Lanes::splat(simd, 0.0);
-        Found {
+        SegmentSums {
             friction: zero,
             rest: zero,
-            sharpest: zero,
+            largest_delta: zero,
         }
     }
 }
@@ -107,12 +107,12 @@ pub fn forces<S: Simd, const DAMPED: bool, const CHANGES: bool>(
     nodes: Nodes,
     past: &mut Past,
     block: &mut Block,
-    found: &mut Found<S>,
+    sums: &mut SegmentSums<S>,
 ) {
     let ([one_v, one_psi], [two_v, two_psi]) = (&mut past.one, &mut past.two);
     // In two loops: of short ones the processor works on several rounds at once.
-    bend::<S, DAMPED, CHANGES>(simd, nodes, (one_psi, two_psi), block, found);
-    stretch::<S, DAMPED>(simd, nodes, (one_v, two_v), block, found);
+    bend::<S, DAMPED, CHANGES>(simd, nodes, (one_psi, two_psi), block, sums);
+    stretch::<S, DAMPED>(simd, nodes, (one_v, two_v), block, sums);
 }
 
 /// Bending: M, R tau and 2/|s|^2, for [`stretch`] to go on with.
@@ -122,7 +122,7 @@ fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
     nodes: Nodes,
     (past_one, past_two): (&mut [Array; 3], &mut [Array; 3]),
     block: &mut Block,
-    found: &mut Found<S>,
+    sums: &mut SegmentSums<S>,
 ) {
     let Nodes {
         place: (start, count),
@@ -145,18 +145,18 @@ fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
     let retardation = Lanes::splat(simd, law.retardation);
     let rest = Lanes::splat(simd, law.rest);
     let (two, four) = (Lanes::splat(simd, 2.0), Lanes::splat(simd, 4.0));
-    let Found {
+    let SegmentSums {
         friction: mut power,
         rest: mut lost,
-        mut sharpest,
-    } = *found;
+        mut largest_delta,
+    } = *sums;
     let mut at = 0;
     while at + S::F64_LANES <= count {
         let (a, aw) = quaternion(simd, &q0, at);
         let (b, bw) = quaternion(simd, &q1, at);
         let (d, dw) = (b - a, bw - aw);
         let delta = d.x.times(d.x, d.y * d.y) + d.z.times(d.z, dw * dw);
-        sharpest = sharpest.max(delta);
+        largest_delta = largest_delta.max(delta);
         let inverse = (four - delta).recip();
         let twice = inverse + inverse;
         let (even, odd) = (a.times_from(bw, b.scale(aw)), a.cross(b));
@@ -191,10 +191,10 @@ fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
         twice.store(twice_inverse, at);
         at += S::F64_LANES;
     }
-    *found = Found {
+    *sums = SegmentSums {
         friction: power,
         rest: lost,
-        sharpest,
+        largest_delta,
     };
 }
 
@@ -205,7 +205,7 @@ fn stretch<S: Simd, const DAMPED: bool>(
     nodes: Nodes,
     (past_one, past_two): (&mut [Array; 3], &mut [Array; 3]),
     block: &mut Block,
-    found: &mut Found<S>,
+    sums: &mut SegmentSums<S>,
 ) {
     let Nodes {
         place: (start, count),
@@ -227,7 +227,7 @@ fn stretch<S: Simd, const DAMPED: bool>(
     let rates = law.rates.map(|rate| Lanes::splat(simd, rate));
     let retardation = Lanes::splat(simd, law.retardation);
     let one = Lanes::splat(simd, 1.0);
-    let mut power = found.friction;
+    let mut power = sums.friction;
     let mut at = 0;
     while at + S::F64_LANES <= count {
         let (a, aw) = quaternion(simd, &q0, at);
@@ -274,7 +274,7 @@ fn stretch<S: Simd, const DAMPED: bool>(
         (g - t).store(&mut right, at);
         at += S::F64_LANES;
     }
-    found.friction = power;
+    sums.friction = power;
 }
 
 /// Vector and scalar parts of unit quaternions.

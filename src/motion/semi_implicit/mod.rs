@@ -16,24 +16,24 @@
 //! (1 - alpha_m) a1 + alpha_m a0 = (1 - alpha_f) w1 + alpha_f w0
 //! ```
 
-mod begin;
-mod books;
+mod exchange;
+mod initial;
 mod step;
 
 use glam::DVec3;
 
-use super::ledger::{Exchange, Ledger, measure};
+use super::energy_balance::{EnergyBalance, Exchange, measure};
 use super::method::{Broken, Method, Snapshot, Velocity};
 use super::physics::{Inertia, Physics};
 use crate::leaf::{DiscreteLeaf, SparsePattern, State, System};
 use crate::rod::Section;
 
-/// Spectral radius at infinite frequency: what remains in a step of what it
-/// cannot resolve. Smaller values damp more of what it can.
-const REMAINING: f64 = 0.8;
+/// Spectral radius rho_inf at infinite frequency: what remains in a step of what
+/// it cannot resolve. Smaller values damp more of what it can.
+const RHO_INF: f64 = 0.8;
 
-const ALPHA_M: f64 = (2.0 * REMAINING - 1.0) / (REMAINING + 1.0);
-const ALPHA_F: f64 = REMAINING / (REMAINING + 1.0);
+const ALPHA_M: f64 = (2.0 * RHO_INF - 1.0) / (RHO_INF + 1.0);
+const ALPHA_F: f64 = RHO_INF / (RHO_INF + 1.0);
 const GAMMA: f64 = 0.5 + ALPHA_F - ALPHA_M;
 const BETA: f64 = 0.25 * (GAMMA + 0.5) * (GAMMA + 0.5);
 
@@ -77,7 +77,7 @@ pub struct SemiImplicit {
     past: [Vec<[DVec3; 2]>; 2],
     past_step: f64,
     /// Power of internal friction at the last step.
-    rubbing: f64,
+    friction_power: f64,
     system: System,
     direct: Option<SparsePattern>,
     state: State,
@@ -91,7 +91,7 @@ pub struct SemiImplicit {
     count: usize,
     /// Factorisations so far.
     pub factorizations: usize,
-    ledger: Ledger,
+    balance: EnergyBalance,
 }
 
 impl SemiImplicit {
@@ -106,7 +106,7 @@ impl SemiImplicit {
             sections: leaf.sections.clone(),
             past: [Vec::new(), Vec::new()],
             past_step: 0.0,
-            rubbing: 0.0,
+            friction_power: 0.0,
             system,
             direct: None,
             state: state.clone(),
@@ -122,14 +122,14 @@ impl SemiImplicit {
             time: 0.0,
             count: 0,
             factorizations: 0,
-            ledger: Ledger::default(),
+            balance: EnergyBalance::default(),
             leaf,
             physics,
         };
-        motion.begin();
+        motion.initialise();
         motion.past = [motion.strains(), motion.strains()];
         let start = motion.snapshot();
-        motion.ledger.begin(&start);
+        motion.balance.begin(&start);
         motion
     }
 }
@@ -170,7 +170,7 @@ impl Method for SemiImplicit {
                     self.step = next;
                     continue;
                 }
-                // A step cut short by `until` says little about the next.
+                // The error of a step cut short by `until` does not limit the next.
                 self.step = if last { next.max(self.step) } else { next };
             }
             match error {
@@ -188,7 +188,7 @@ impl Method for SemiImplicit {
             }
         }
         let now = self.snapshot();
-        (self.ledger).judge(&self.leaf, &self.physics, &now, self.step)
+        (self.balance).judge(&self.leaf, &self.physics, &now, self.step)
     }
 
     fn snapshot(&mut self) -> Snapshot {
@@ -208,7 +208,7 @@ impl Method for SemiImplicit {
         );
         Snapshot {
             time: self.time,
-            energy: self.ledger.complete(energy, Exchange::default()),
+            energy: self.balance.complete(energy, Exchange::default()),
             state: self.state.clone(),
             velocity,
         }
@@ -220,10 +220,10 @@ impl Method for SemiImplicit {
             self.count as f64,
             self.step,
             self.past_step,
-            self.rubbing,
+            self.friction_power,
             f64::from(u8::from(self.direct.is_some())),
         ];
-        numbers.extend(self.ledger.save());
+        numbers.extend(self.balance.save());
         numbers.extend(self.state.x.iter().flat_map(|x| x.to_array()));
         numbers.extend(self.state.q.iter().flat_map(|q| q.to_array()));
         numbers.extend(self.state.n.iter().flat_map(|n| n.to_array()));
@@ -245,9 +245,9 @@ impl Method for SemiImplicit {
         self.count = next() as usize;
         self.step = next();
         self.past_step = next();
-        self.rubbing = next();
+        self.friction_power = next();
         let direct = next() == 1.0;
-        self.ledger.restore(&mut next);
+        self.balance.restore(&mut next);
         let vector = |next: &mut dyn FnMut() -> f64| DVec3::new(next(), next(), next());
         for x in &mut self.state.x {
             *x = vector(&mut next);

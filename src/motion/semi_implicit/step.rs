@@ -56,7 +56,7 @@ impl SemiImplicit {
 
     /// Turn and shift of a node from the state to the trial; none of a base,
     /// which is held and not even rounding may move.
-    pub(super) fn way(&self, k: usize) -> [DVec3; 2] {
+    pub(super) fn increment(&self, k: usize) -> [DVec3; 2] {
         if k.is_multiple_of(self.leaf.segments() + 1) {
             return [DVec3::ZERO; 2];
         }
@@ -65,10 +65,10 @@ impl SemiImplicit {
     }
 
     /// Motion at the end of a step of h that leads from the state to the trial.
-    fn arrive(&mut self, h: f64) {
+    fn update_motion(&mut self, h: f64) {
         let nodes = self.leaf.segments() + 1;
         for k in (0..self.state.x.len()).filter(|k| !k.is_multiple_of(nodes)) {
-            let (m, d) = (self.moving[k], self.way(k));
+            let (m, d) = (self.moving[k], self.increment(k));
             let next = &mut self.next_moving[k];
             for c in 0..2 {
                 let a1 = (d[c] - h * m.v[c] - h * h * (0.5 - BETA) * m.a[c]) / (BETA * h * h);
@@ -83,9 +83,9 @@ impl SemiImplicit {
     /// One step of h; returns its local error, or `None` if it was too long.
     pub(super) fn attempt(&mut self, h: f64) -> Option<f64> {
         let damping = self.physics.damping;
-        let heavy =
+        let per_mass =
             (1.0 - ALPHA_M) / ((1.0 - ALPHA_F) * BETA * h * h) + damping * GAMMA / (BETA * h);
-        self.dress(self.time + h, h, heavy);
+        self.apply_loads_and_damping(self.time + h, h, per_mass);
         self.predict(h);
         let last = match self.steps {
             Steps::Fixed(_) => FIXED_LAST,
@@ -93,7 +93,7 @@ impl SemiImplicit {
         };
         let mut before = f64::INFINITY;
         for _ in 0..ITERATIONS {
-            self.arrive(h);
+            self.update_motion(h);
             self.leaf.assemble(&self.trial, &mut self.system);
             let (moving, inertia) = (&self.next_moving, &self.inertia);
             let inertial = |k: usize, tensor: &DMat3| {
@@ -102,7 +102,7 @@ impl SemiImplicit {
                 let moment = *tensor * m.w[0] + m.v[0].cross(momentum) + damping * momentum;
                 (-moment, -inertia[k].mass * (m.w[1] + damping * m.v[1]))
             };
-            add_inertia(&mut self.system, &self.trial, inertia, heavy, inertial);
+            add_inertia(&mut self.system, &self.trial, inertia, per_mass, inertial);
             if !self.solve() {
                 return None;
             }
@@ -115,7 +115,7 @@ impl SemiImplicit {
                 .advance(&self.trial, &self.system, 1.0, &mut self.next);
             std::mem::swap(&mut self.trial, &mut self.next);
             if size <= last || (size < 1e-11 && size > 0.3 * before) {
-                self.arrive(h);
+                self.update_motion(h);
                 return Some(self.local_error(h));
             }
             before = size;
@@ -149,12 +149,12 @@ impl SemiImplicit {
         }
     }
 
-    /// Gives the leaf its loads and rest shapes at a time, and to its sections
-    /// the internal friction of a step of `h` that ends then: with the strain
+    /// Sets the leaf's loads and rest shapes at a time, and in its sections the
+    /// internal friction of a step of `h` that ends then: with the strain
     /// rate c0 v + c1 v1 + c2 v2 from this and the last two strains, a rod is
     /// stiffer by 1 + eta c0 and rests elsewhere. Inertia enters the matrix by
-    /// `heavy` times the masses.
-    pub(super) fn dress(&mut self, time: f64, h: f64, heavy: f64) {
+    /// `per_mass` times the masses.
+    pub(super) fn apply_loads_and_damping(&mut self, time: f64, h: f64, per_mass: f64) {
         self.leaf.loads = self.physics.loads(time);
         let (rest, eta) = (self.physics.rest(time), self.physics.retardation);
         let [c0, c1, c2] = rates(h, self.past_step).map(|c| eta * c);
@@ -173,20 +173,20 @@ impl SemiImplicit {
             }
             let node = i / n * (n + 1) + i % n;
             let mass = 0.5 * (self.inertia[node].mass + self.inertia[node + 1].mass);
-            let inertial = DVec3::splat(STIFFER * heavy * mass * section.ds);
+            let inertial = DVec3::splat(STIFFER * per_mass * mass * section.ds);
             let condensing = (stiffer * own.condensing).max(inertial);
             section.condensing = condensing.min(section.compliance.recip());
         }
     }
 }
 
-/// Adds mass times `heavy` to the matrix, and a moment and a force to the
+/// Adds mass times `per_mass` to the matrix, and a moment and a force to the
 /// right-hand side, at all nodes but the bases.
 pub(super) fn add_inertia(
     system: &mut System,
     state: &State,
     inertia: &[Inertia],
-    heavy: f64,
+    per_mass: f64,
     load: impl Fn(usize, &DMat3) -> (DVec3, DVec3),
 ) {
     let n = state.segments();
@@ -194,7 +194,7 @@ pub(super) fn add_inertia(
         for i in 1..=n {
             let k = state.base(j) + i;
             let tensor = inertia[k].tensor(state.q[k]);
-            let matrix = (tensor * heavy, inertia[k].mass * heavy);
+            let matrix = (tensor * per_mass, inertia[k].mass * per_mass);
             system.add(j, i, matrix, load(k, &tensor));
         }
     }

@@ -176,14 +176,14 @@ fn descend(
     request: &mut Request,
 ) -> Result<f64, Stop> {
     let accuracy = request.accuracy.max(LEAST_ACCURACY);
-    motion.disguise();
+    motion.use_fictitious_masses();
     let mut balanced = FIRST_BALANCE * accuracy;
     let (mut since, mut before) = (0, 0.0);
     let (mut best, mut looks_since_best) = (f64::INFINITY, 0);
     loop {
         for _ in 0..STEPS_PER_LOOK {
             let rate = 3.0 / (STEP * (since + 2) as f64);
-            motion.damp(rate);
+            motion.set_damping(rate);
             let moving = motion.step(STEP);
             // What the forces do: kinetic energy gained, and lost to damping.
             let downhill = 0.5 * (moving - before) / STEP + rate * moving;

@@ -6,12 +6,12 @@ use crate::leaf::{DiscreteLeaf, State};
 use crate::rod::RESOLVED_TURN;
 use glam::DVec3;
 
-/// Part of the energy that ever moved by which it may have grown from nowhere.
+/// Part of the energy that ever moved by which it may have grown without cause.
 /// Growth without bound passes any such limit soon.
 const LARGEST_IMBALANCE: f64 = 0.5;
 
-/// Energy, in units of A/L, that rounding may make of nothing.
-const NOTHING: f64 = 1e-12;
+/// Energy, in units of A/L, that rounding may make.
+const ROUNDING: f64 = 1e-12;
 
 /// Energies at an instant, but what was dissipated and put in before. Leaves
 /// `leaf` with the loads and rest shape of that time.
@@ -65,7 +65,7 @@ pub fn measure(
 /// The energy that the loads, had they come all at once, would give a leaf at
 /// rest in a step of `h`: what comes faster than steps can follow is not known
 /// better than this.
-fn kick(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) -> f64 {
+fn unresolved_energy(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) -> f64 {
     let loads = physics.loads(time);
     let n = leaf.segments();
     let mut energy = 0.0;
@@ -101,7 +101,7 @@ impl std::ops::AddAssign for Exchange {
 
 /// What was taken out and put in, and where it began.
 #[derive(Clone, Debug, Default)]
-pub struct Ledger {
+pub struct EnergyBalance {
     exchanged: Exchange,
     balance: f64,
     potential: f64,
@@ -109,28 +109,28 @@ pub struct Ledger {
     largest: f64,
 }
 
-impl Ledger {
+impl EnergyBalance {
     /// Begins with this.
     pub fn begin(&mut self, start: &Snapshot) {
         self.balance = start.energy.balance();
         self.potential = start.energy.potential;
-        self.look(&start.energy);
+        self.record(&start.energy);
     }
 
     /// What has moved until now: energy that is there or was taken out, or that
     /// loads gave.
-    fn look(&mut self, energy: &Energy) {
+    fn record(&mut self, energy: &Energy) {
         let there = energy.kinetic + energy.elastic + energy.coupling + energy.dissipated;
         let given = (energy.potential - self.potential - energy.work).abs();
         self.largest = self.largest.max(there).max(given);
     }
 
-    /// Takes down what was exchanged in a step.
+    /// Adds what was exchanged in a step.
     pub fn add(&mut self, exchange: Exchange) {
         self.exchanged += exchange;
     }
 
-    /// Adds what only the ledger knows, and what was exchanged since.
+    /// Adds what was exchanged so far, and `since`.
     pub fn complete(&self, energy: Energy, since: Exchange) -> Energy {
         Energy {
             dissipated: self.exchanged.dissipated + since.dissipated,
@@ -149,11 +149,11 @@ impl Ledger {
         h: f64,
     ) -> Result<(), Broken> {
         let time = now.time;
-        self.look(&now.energy);
+        self.record(&now.energy);
         // Energy may be lost to the method's own damping, but not gained.
         let gain = now.energy.balance() - self.balance;
-        let unresolved = kick(leaf, physics, time, h);
-        let imbalance = gain / (self.largest + unresolved + NOTHING);
+        let unresolved = unresolved_energy(leaf, physics, time, h);
+        let imbalance = gain / (self.largest + unresolved + ROUNDING);
         if !imbalance.is_finite() || imbalance > LARGEST_IMBALANCE {
             return Err(Broken::Diverged { time, imbalance });
         }
@@ -181,7 +181,7 @@ impl Ledger {
 
     /// Takes them back.
     pub fn restore(&mut self, next: &mut impl FnMut() -> f64) {
-        *self = Ledger {
+        *self = EnergyBalance {
             exchanged: Exchange {
                 dissipated: next(),
                 work: next(),

@@ -1,9 +1,9 @@
-//! The motion of nodes: a kick by all forces, then free flight.
+//! The motion of nodes: a kick by all forces, then a drift free of them.
 
 use pulp::Simd;
 
 use super::segments::quaternion;
-use super::{Array, Block, GROUP, Material, Motion, Neighbour};
+use super::{BLOCK, GROUP, Motion, Neighbour, Step};
 use crate::motion::lanes::{Lanes, Vectors, cut, cut_mut, slice, slice_mut};
 
 /// cos and sin(a)/a as series in a^2, for angles of a step (halved). Truncated,
@@ -14,67 +14,54 @@ use crate::motion::lanes::{Lanes, Vectors, cut, cut_mut, slice, slice_mut};
 const COS: [f64; 4] = [1.0, -1.0 / 2.0, 1.0 / 24.0, -1.0 / 720.0];
 const SINC: [f64; 3] = [1.0, -1.0 / 6.0, 1.0 / 120.0];
 
-/// A kick and a flight of the nodes of a block. Positions move on, and every
-/// node turns as a body free of moments with one axis of symmetry does: about
-/// its angular momentum, and about its own axis.
-pub struct Flight<'a> {
-    pub positions: &'a [Array; 3],
-    pub next: &'a mut [Array; 3],
-    pub neighbours: &'a [Option<Neighbour<'a>>; 2],
-    pub motion: &'a mut Motion,
-    pub material: &'a Material,
-    pub gravity: [f64; 3],
-    pub keep: f64,
-    pub kick: f64,
-    pub step: f64,
-    pub normalise: bool,
-    pub block: &'a Block,
-}
-
-impl Flight<'_> {
-    /// Moves the nodes of `place` (index of the first, count); returns eight
-    /// times their kinetic energy in the middle of the kick.
+impl Step<'_> {
+    /// Moves the nodes of `place` (index of the first, count) with the forces in
+    /// the block; returns eight times their kinetic energy in the middle of the
+    /// kick. Positions move on, and every node turns as a body free of moments
+    /// with one axis of symmetry does: about its angular momentum, and about its
+    /// own axis.
     #[inline(always)]
-    pub fn go<S: Simd>(mut self, simd: S, place: (usize, usize)) -> Lanes<S> {
+    pub fn kick_and_drift<S: Simd>(&mut self, simd: S, place: (usize, usize)) -> Lanes<S> {
         // In two loops, as of forces.
-        let drifting = match self.neighbours {
-            [None, None] => self.drift(simd, place, []),
-            [Some(one), None] | [None, Some(one)] => self.drift(simd, place, [one]),
-            [Some(one), Some(two)] => self.drift(simd, place, [one, two]),
+        let moving = match self.neighbours {
+            [None, None] => self.translate(simd, place, []),
+            [Some(one), None] | [None, Some(one)] => self.translate(simd, place, [one]),
+            [Some(one), Some(two)] => self.translate(simd, place, [one, two]),
         };
         let turning = match self.normalise {
-            true => self.turn::<S, true>(simd, place),
-            false => self.turn::<S, false>(simd, place),
+            true => self.rotate::<S, true>(simd, place),
+            false => self.rotate::<S, false>(simd, place),
         };
-        drifting + turning
+        moving + turning
     }
 
     /// Velocities and positions.
     #[inline(always)]
-    fn drift<S: Simd, const K: usize>(
+    fn translate<S: Simd, const K: usize>(
         &mut self,
         simd: S,
         place: (usize, usize),
-        neighbours: [&Neighbour; K],
+        neighbours: [Neighbour; K],
     ) -> Lanes<S> {
         let nodes = place.1;
         let own = |array| slice(array, (0, nodes));
-        let material = self.material;
+        let blocks = self.material;
+        let material = &blocks[(place.0 - GROUP) / BLOCK];
         let (weight, coupled) = (own(&material.weight), own(&material.coupled));
         let (mass, per_mass) = (own(&material.mass), own(&material.per_mass));
         let n_right = cut(&self.block.n, (GROUP, nodes));
         let n_left = cut(&self.block.n, (GROUP - 1, nodes));
-        let x = cut(self.positions, place);
-        let mut next = cut_mut(self.next, place);
+        let x = cut(&self.positions.x, place);
+        let mut next = cut_mut(&mut self.next.x, place);
         let mut v = cut_mut(&mut self.motion.v, place);
         let (mut beside, mut ties) = ([x; K], [Vectors::splat(simd, [0.0; 3]); K]);
         for k in 0..K {
             beside[k] = cut(&neighbours[k].positions.x, place);
             ties[k] = Vectors::splat(simd, neighbours[k].stiffness);
         }
-        let gravity = Vectors::splat(simd, self.gravity);
+        let gravity = Vectors::splat(simd, self.loads.gravity);
         let (keep, kick) = (Lanes::splat(simd, self.keep), Lanes::splat(simd, self.kick));
-        let step = Lanes::splat(simd, self.step);
+        let step = Lanes::splat(simd, self.drift);
         let mut energy = Lanes::splat(simd, 0.0);
         let mut at = 0;
         while at + S::F64_LANES <= nodes {
@@ -101,11 +88,16 @@ impl Flight<'_> {
 
     /// Angular momenta and rotations.
     #[inline(always)]
-    fn turn<S: Simd, const NORMALISE: bool>(&mut self, simd: S, place: (usize, usize)) -> Lanes<S> {
+    fn rotate<S: Simd, const NORMALISE: bool>(
+        &mut self,
+        simd: S,
+        place: (usize, usize),
+    ) -> Lanes<S> {
         let nodes = place.1;
         let own = |array| slice(array, (0, nodes));
-        let per_inertia = own(&self.material.per_inertia);
-        let per_spin = own(&self.material.per_spin);
+        let blocks = self.material;
+        let material = &blocks[(place.0 - GROUP) / BLOCK];
+        let (per_inertia, per_spin) = (own(&material.per_inertia), own(&material.per_spin));
         let left = cut(&self.block.left, (GROUP, nodes));
         let right = cut(&self.block.right, (GROUP - 1, nodes));
         let Motion { q, p, .. } = &mut *self.motion;
@@ -119,7 +111,7 @@ impl Flight<'_> {
         let mut p = cut_mut(p, place);
         let keep = Lanes::splat(simd, self.keep);
         let half_kick = Lanes::splat(simd, 0.5 * self.kick);
-        let half_step = Lanes::splat(simd, 0.5 * self.step);
+        let half_step = Lanes::splat(simd, 0.5 * self.drift);
         let one = Lanes::splat(simd, 1.0);
         let (three_halves, half) = (Lanes::splat(simd, 1.5), Lanes::splat(simd, 0.5));
         let mut energy = Lanes::splat(simd, 0.0);

@@ -6,9 +6,9 @@ use super::step::add_inertia;
 use super::{Moving, SemiImplicit};
 
 /// A first step from rest, of implicit Euler, so short that the leaf hardly
-/// moves: one over the square of its length. It tells the forces that rigid
-/// segments carry, which no strain does.
-const HEAVY: f64 = 1e6;
+/// moves: one over the square of its length. It gives the forces in rigid
+/// segments, which no strain determines.
+const INVERSE_STEP_SQUARED: f64 = 1e6;
 
 /// Its iterations, and the size of the last.
 const ITERATIONS: usize = 30;
@@ -19,11 +19,11 @@ const VIOLATION: f64 = 1e-12;
 
 impl SemiImplicit {
     /// Gives the segments their forces and the nodes their accelerations.
-    pub(super) fn begin(&mut self) {
-        self.dress(0.0, 0.0, HEAVY);
-        let violation = self.carry();
+    pub(super) fn initialise(&mut self) {
+        self.apply_loads_and_damping(0.0, 0.0, INVERSE_STEP_SQUARED);
+        let violation = self.set_segment_forces();
         if self.leaf.stiffest() > 0.0 {
-            return self.accelerate();
+            return self.set_accelerations();
         }
         if violation > VIOLATION && self.first_step() {
             // To where rigid segments are not strained.
@@ -33,18 +33,18 @@ impl SemiImplicit {
             true => {
                 std::mem::swap(&mut self.state.n, &mut self.trial.n);
                 for k in 0..self.state.x.len() {
-                    let w = self.way(k).map(|way| HEAVY * way);
+                    let w = self.increment(k).map(|d| INVERSE_STEP_SQUARED * d);
                     let v = [DVec3::ZERO; 2];
                     self.moving[k] = Moving { v, a: w, w };
                 }
             }
-            false => self.accelerate(),
+            false => self.set_accelerations(),
         }
     }
 
-    /// Lets every segment carry the force its strain tells, and a rigid one
-    /// none. Returns by what length the strain of these is off.
-    fn carry(&mut self) -> f64 {
+    /// Sets the force of every segment to that of its strain, and of a rigid one to
+    /// zero. Returns the largest strain of these, as a length.
+    fn set_segment_forces(&mut self) -> f64 {
         let (n, mut violation) = (self.leaf.segments(), 0.0_f64);
         for j in 0..self.leaf.rods() {
             for i in 0..n {
@@ -66,13 +66,22 @@ impl SemiImplicit {
         self.trial.clone_from(&self.state);
         for _ in 0..ITERATIONS {
             self.leaf.assemble(&self.trial, &mut self.system);
-            let ways: Vec<_> = (0..self.state.x.len()).map(|k| self.way(k)).collect();
+            let increments: Vec<_> = (0..self.state.x.len()).map(|k| self.increment(k)).collect();
             let inertia = &self.inertia;
             let inertial = |k: usize, tensor: &DMat3| {
-                let [turn, shift] = ways[k];
-                (-HEAVY * (*tensor * turn), -HEAVY * inertia[k].mass * shift)
+                let [turn, shift] = increments[k];
+                (
+                    -INVERSE_STEP_SQUARED * (*tensor * turn),
+                    -INVERSE_STEP_SQUARED * inertia[k].mass * shift,
+                )
             };
-            add_inertia(&mut self.system, &self.trial, inertia, HEAVY, inertial);
+            add_inertia(
+                &mut self.system,
+                &self.trial,
+                inertia,
+                INVERSE_STEP_SQUARED,
+                inertial,
+            );
             if !self.solve() {
                 return false;
             }
@@ -88,7 +97,7 @@ impl SemiImplicit {
     }
 
     /// Accelerations of a leaf at rest.
-    fn accelerate(&mut self) {
+    fn set_accelerations(&mut self) {
         self.leaf.assemble(&self.state, &mut self.system);
         let n = self.leaf.segments();
         let joined = self.leaf.leaf.joined() && self.leaf.rods() > 1;

@@ -1,9 +1,9 @@
-//! What a step put in and took out.
+//! Work and dissipation of a step.
 
 use glam::DVec3;
 
+use super::super::energy_balance::Exchange;
 use super::super::friction::rates;
-use super::super::ledger::Exchange;
 use super::SemiImplicit;
 use crate::leaf::{Loads, State};
 use crate::rotation;
@@ -28,26 +28,26 @@ impl SemiImplicit {
         std::mem::swap(&mut self.state, &mut self.trial);
         std::mem::swap(&mut self.moving, &mut self.next_moving);
         let mut exchange = Exchange {
-            dissipated: self.physics.damping * self.dragged(),
-            work: self.changed(h),
+            dissipated: self.physics.damping * self.momentum_times_displacement(),
+            work: self.work_of_changes(h),
         };
         if self.physics.retardation > 0.0 {
-            let rubbing = self.rub(h);
-            exchange.dissipated += 0.5 * h * (self.rubbing + rubbing);
-            self.rubbing = rubbing;
+            let power = self.power_of_friction(h);
+            exchange.dissipated += 0.5 * h * (self.friction_power + power);
+            self.friction_power = power;
             let now = self.strains();
             let last = std::mem::replace(&mut self.past[0], now);
             self.past[1] = last;
             self.past_step = h;
         }
-        self.ledger.add(exchange);
+        self.balance.add(exchange);
         self.time += h;
         self.count += 1;
     }
 
     /// Work of what changed in the accepted step of `h`: as much as it would
     /// be on the mean of the states before (the trial) and after.
-    fn changed(&mut self, h: f64) -> f64 {
+    fn work_of_changes(&mut self, h: f64) -> f64 {
         let (from, to) = (self.time, self.time + h);
         let mut work = 0.0;
         if self.physics.loads_change() {
@@ -87,7 +87,7 @@ impl SemiImplicit {
     }
 
     /// Power of internal friction at the end of a step of `h`.
-    fn rub(&self, h: f64) -> f64 {
+    fn power_of_friction(&self, h: f64) -> f64 {
         let [c0, c1, c2] = rates(h, self.past_step);
         let mut power = 0.0;
         for (i, now) in self.strains().iter().enumerate() {
@@ -106,10 +106,10 @@ impl SemiImplicit {
         self.physics.retardation * power
     }
 
-    /// The mean momentum of the accepted step times the way it led: work of
+    /// The mean momentum of the accepted step times its displacement: work of
     /// external damping, over its rate. Of what the step does not resolve,
     /// which alternates, nothing is left in it.
-    fn dragged(&self) -> f64 {
+    fn momentum_times_displacement(&self) -> f64 {
         let mut sum = 0.0;
         for (k, inertia) in self.inertia.iter().enumerate() {
             let (before, after) = (&self.next_moving[k], &self.moving[k]);

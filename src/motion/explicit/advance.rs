@@ -1,24 +1,24 @@
-//! Along the path in time: advancing, looking, going back.
+//! Motion to a given time, snapshots, and numbers to go on from.
 
 use super::Explicit;
-use crate::motion::ledger::{Exchange, measure};
+use crate::motion::energy_balance::{Exchange, measure};
 use crate::motion::method::{Broken, Method, Snapshot, Velocity};
 use crate::rod::RESOLVED_TURN;
 
 /// Part of a step that is rounding.
 const NO_TIME: f64 = 1e-9;
 
-/// Steps between looks at what costs nothing to see, and at the energy.
-const GLANCED: usize = 200;
-const WATCHED: usize = 1000;
+/// Steps between checks of the bending, which cost nothing, and of the energy.
+const BENDING_CHECKED: usize = 200;
+const ENERGY_CHECKED: usize = 1000;
 
 impl Explicit {
     fn judge(&mut self) -> Result<(), Broken> {
         let now = self.snapshot();
-        (self.ledger).judge(&self.leaf, &self.physics, &now, self.step)?;
-        self.seen = Some(now);
-        // The ledger takes turns for what they are in space, at most pi.
-        let (time, turn) = (self.time, self.sharpest());
+        (self.balance).judge(&self.leaf, &self.physics, &now, self.step)?;
+        self.last_snapshot = Some(now);
+        // In the balance rotations are at most pi, as they are in space.
+        let (time, turn) = (self.time, self.largest_turn());
         match turn > RESOLVED_TURN {
             true => Err(Broken::Unresolved { time, turn }),
             false => Ok(()),
@@ -47,12 +47,12 @@ impl Method for Explicit {
             if next > until + NO_TIME * h {
                 break;
             }
-            let (exchange, _) = self.go(h);
-            self.ledger.add(exchange);
+            let (exchange, _) = self.kick_and_drift(h);
+            self.balance.add(exchange);
             self.steps += 1;
             (self.stepped, self.time) = (next, next);
-            let suspect = self.steps.is_multiple_of(GLANCED) && !self.sound();
-            if suspect || self.steps.is_multiple_of(WATCHED) {
+            let suspect = self.steps.is_multiple_of(BENDING_CHECKED) && !self.trusted();
+            if suspect || self.steps.is_multiple_of(ENERGY_CHECKED) {
                 self.judge()?;
             }
         }
@@ -61,10 +61,10 @@ impl Method for Explicit {
     }
 
     fn snapshot(&mut self) -> Snapshot {
-        if let Some(seen) = self.seen.take()
-            && seen.time == self.time
+        if let Some(last) = self.last_snapshot.take()
+            && last.time == self.time
         {
-            return seen;
+            return last;
         }
         let path: Vec<_> = (self.rods.iter().zip(&self.positions))
             .map(|(rod, x)| (x.clone(), rod.motion.clone(), rod.past.clone()))
@@ -73,7 +73,7 @@ impl Method for Explicit {
         let mut exchange = Exchange::default();
         let left = self.time - self.stepped;
         if left > NO_TIME * self.step {
-            exchange += self.go(left).0;
+            exchange += self.kick_and_drift(left).0;
         }
         self.stepped = self.time;
         exchange += self.kick(0.0, 0.0, false).0;
@@ -89,7 +89,7 @@ impl Method for Explicit {
         let energy = measure(&mut self.leaf, &self.physics, self.time, &state, &velocity);
         Snapshot {
             time: self.time,
-            energy: self.ledger.complete(energy, exchange),
+            energy: self.balance.complete(energy, exchange),
             state,
             velocity,
         }
@@ -105,7 +105,7 @@ impl Method for Explicit {
             self.widths[0],
             self.widths[1],
         ];
-        numbers.extend(self.ledger.save());
+        numbers.extend(self.balance.save());
         for (rod, positions) in self.rods.iter().zip(&self.positions) {
             let moving = positions.x.iter().chain(rod.moving_arrays());
             numbers.extend(moving.flat_map(|array| array.iter()));
@@ -124,8 +124,8 @@ impl Method for Explicit {
         self.steps = next() as usize;
         self.begin = (next(), next() as usize);
         self.widths = [next(), next()];
-        self.ledger.restore(&mut next);
-        self.seen = None;
+        self.balance.restore(&mut next);
+        self.last_snapshot = None;
         for (rod, positions) in self.rods.iter_mut().zip(&mut self.positions) {
             let moving = positions.x.iter_mut().chain(rod.moving_arrays_mut());
             for value in moving.flat_map(|array| array.iter_mut()) {
