@@ -76,7 +76,7 @@ fn looked_at_or_not() {
             let first = bits(&looked.snapshot().state);
             assert_eq!(first, bits(&looked.snapshot().state));
         }
-        assert_eq!(looked.save(), other.save(), "{}", looked.name());
+        assert_eq!(looked.save(), other.save());
     }
 }
 
@@ -94,7 +94,7 @@ fn from_saved_numbers() {
             bits(&through.snapshot().state),
             bits(&other.snapshot().state)
         );
-        assert_eq!(through.save(), other.save(), "{}", through.name());
+        assert_eq!(through.save(), other.save());
         assert!(!other.restore(&[0.0]));
     }
 }

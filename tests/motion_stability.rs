@@ -12,7 +12,7 @@ mod movers;
 
 use common::{paper_leaf, settle_on};
 use leafdyn::leaf::{Leaf, State};
-use leafdyn::motion::{Broken, Energy, Explicit, Method, Physics};
+use leafdyn::motion::{Energy, Explicit, Method, Physics, Stopped};
 use leafdyn::scenario::{Scenario, Schedule};
 use leafdyn::simulate::{Options, Refused, Simulation};
 use linear::Linear;
@@ -99,7 +99,7 @@ proptest! {
             let h = over * truth;
             let mut lost = method(h);
             let found = lost.advance(2000.0 * h);
-            let told = matches!(found, Err(Broken::Diverged { .. } | Broken::Unresolved { .. }));
+            let told = matches!(found, Err(Stopped::Diverged { .. } | Stopped::Unresolved { .. }));
             prop_assert!(told, "{over} times the limit: {found:?} {:?}", lost.snapshot().energy);
         }
     }

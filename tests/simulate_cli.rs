@@ -381,9 +381,9 @@ fn long_motions_are_arrays() {
 #[test]
 fn bad_requests_are_refused_before_anything_is_written() {
     let refused: [(&[&str], &str); 14] = [
-        (&["leaf.toml", "--step", "0"], "--step 0: must be greater"),
-        (&["leaf.toml", "--step", "-1"], "--step -1"),
-        (&["leaf.toml", "--step", "nan"], "--step NaN"),
+        (&["leaf.toml", "--step", "0"], "step 0: must be greater"),
+        (&["leaf.toml", "--step", "-1"], "step -1"),
+        (&["leaf.toml", "--step", "nan"], "step NaN"),
         (
             &["leaf.toml", "--step", "0.1"],
             "stable up to 5.964e-3, because of shear with rotation: use a shorter step",

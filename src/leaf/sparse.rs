@@ -19,14 +19,10 @@ const DISSECTION_LEAF: usize = 4;
 /// The pattern of a leaf's matrix: ordering and symbolic factorisation.
 pub struct SparsePattern {
     symbolic: SymbolicCholesky<usize>,
-    /// First unknown of node i (from 1) of rod j, at j n + i - 1.
-    first: Vec<usize>,
-    /// First unknown of the joint tip.
-    tip: Option<usize>,
+    unknowns: Unknowns,
     /// First of the rows that border the matrix, behind all others.
     border: usize,
     size: usize,
-    segments: usize,
 }
 
 /// The solution of a bordered system.
@@ -76,7 +72,7 @@ impl SparsePattern {
         let border = size;
         size += rows;
         let unknowns = Unknowns {
-            first: &first,
+            first,
             tip,
             segments: n,
         };
@@ -96,20 +92,10 @@ impl SparsePattern {
         .map_err(|_| SparseError)?;
         Ok(SparsePattern {
             symbolic,
-            first,
-            tip,
+            unknowns,
             border,
             size,
-            segments: n,
         })
-    }
-
-    fn table(&self, segments: usize) -> Unknowns<'_> {
-        Unknowns {
-            first: &self.first,
-            tip: self.tip,
-            segments,
-        }
     }
 
     /// Number of unknowns.
@@ -120,11 +106,7 @@ impl SparsePattern {
     /// First unknown of the turn and of the shift of node `i` (from 1) of rod
     /// `j`. A joint tip has one shift for all rods.
     pub fn unknowns(&self, j: usize, i: usize) -> [usize; 2] {
-        let first = self.first[j * self.segments + i - 1];
-        match self.tip {
-            Some(tip) if i == self.segments => [first, tip],
-            _ => [first, first + 3],
-        }
+        [0, 3].map(|c| self.unknowns.at(j, i - 1, c))
     }
 
     /// Factorises the matrix assembled in `system`, of the same leaf, plus
@@ -143,8 +125,14 @@ impl SparsePattern {
         let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
             return Err(SparseError);
         };
-        let unknowns = self.table(system.segments());
-        let matrix = triangle(system, &unknowns, border, self.border, shift, Side::Lower)?;
+        let matrix = triangle(
+            system,
+            &self.unknowns,
+            border,
+            self.border,
+            shift,
+            Side::Lower,
+        )?;
         let scratch =
             supernodal::factorize_supernodal_numeric_intranode_lblt_scratch::<usize, f64>(
                 symbolic,
@@ -231,7 +219,7 @@ impl SparseFactor<'_> {
     /// Solves for the right-hand side assembled in `system` plus `inertia`
     /// (see [`System::solve`]); the solution stands in `system` afterwards.
     pub fn solve(&mut self, system: &mut System, inertia: Option<(&[Vec<Increment>], f64)>) {
-        let unknowns = self.pattern.table(system.segments());
+        let unknowns = &self.pattern.unknowns;
         let mut b = vec![0.0; self.pattern.size];
         system.each_rhs(inertia, |j, i, rhs| unknowns.gather(j, i, rhs, &mut b));
         self.solve_vector(&mut b);
@@ -243,7 +231,7 @@ impl SparseFactor<'_> {
     /// Solves the bordered system for forces `rhs`, and `below` in the rows of
     /// the border.
     pub fn solve_bordered(&mut self, rhs: &Field, below: &[f64]) -> Bordered {
-        let unknowns = self.pattern.table(rhs[0].len());
+        let unknowns = &self.pattern.unknowns;
         let mut b = vec![0.0; self.pattern.size];
         for (j, rod) in rhs.iter().enumerate() {
             for (i, rhs) in rod.iter().enumerate() {
@@ -266,13 +254,15 @@ impl SparseFactor<'_> {
 }
 
 /// Where the unknowns of the nodes stand.
-struct Unknowns<'a> {
-    first: &'a [usize],
+struct Unknowns {
+    /// First unknown of node i (from 0) of rod j, at j n + i.
+    first: Vec<usize>,
+    /// First unknown of the joint tip.
     tip: Option<usize>,
     segments: usize,
 }
 
-impl Unknowns<'_> {
+impl Unknowns {
     /// Component `c` of node `i` (from 0) of rod `j`.
     fn at(&self, j: usize, i: usize, c: usize) -> usize {
         match self.tip {

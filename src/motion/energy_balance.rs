@@ -1,6 +1,6 @@
 //! The energy of a moving leaf, and whether it can be trusted.
 
-use super::method::{Broken, Energy, Snapshot, Velocity};
+use super::method::{Energy, Snapshot, Stopped, Velocity};
 use super::physics::{Inertia, Physics};
 use crate::leaf::{DiscreteLeaf, State};
 use crate::rod::RESOLVED_TURN;
@@ -140,14 +140,15 @@ impl EnergyBalance {
     }
 
     /// Whether the leaf, which was moved by steps of `h`, can be trusted to be
-    /// where it is.
+    /// where it is; if not, `otherwise` may help besides a shorter step.
     pub fn judge(
         &mut self,
         leaf: &DiscreteLeaf,
         physics: &Physics,
         now: &Snapshot,
         h: f64,
-    ) -> Result<(), Broken> {
+        otherwise: &'static str,
+    ) -> Result<(), Stopped> {
         let time = now.time;
         self.record(&now.energy);
         // Energy may be lost to the method's own damping, but not gained.
@@ -155,7 +156,11 @@ impl EnergyBalance {
         let unresolved = unresolved_energy(leaf, physics, time, h);
         let imbalance = gain / (self.largest + unresolved + ROUNDING);
         if !imbalance.is_finite() || imbalance > LARGEST_IMBALANCE {
-            return Err(Broken::Diverged { time, imbalance });
+            return Err(Stopped::Diverged {
+                time,
+                percent: 100.0 * imbalance,
+                otherwise,
+            });
         }
         let n = leaf.segments();
         let turns = (0..leaf.rods()).flat_map(|j| (0..n).map(move |i| (j, i)));
@@ -163,7 +168,11 @@ impl EnergyBalance {
             .map(|(j, i)| leaf.segment(&now.state, j, i, DVec3::ZERO).turn())
             .fold(0.0, f64::max);
         match turn > RESOLVED_TURN {
-            true => Err(Broken::Unresolved { time, turn }),
+            true => Err(Stopped::Unresolved {
+                time,
+                turn,
+                segments: n,
+            }),
             false => Ok(()),
         }
     }

@@ -50,36 +50,67 @@ pub struct Snapshot {
     pub energy: Energy,
 }
 
-/// Why a motion cannot go on.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Broken {
-    /// A value is not finite, or energy appeared from nowhere: its balance is
-    /// off by so much of the energy that ever moved.
+/// Why a motion ended before its time. Times are dimensionless as a [`Method`]
+/// returns them, and in the scenario's unit as a simulation does.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Stopped {
+    /// Energy appeared from nowhere, or a value is not a number.
+    #[error(
+        "diverged at t = {time:.6e}: energy grew from nowhere by {percent:.0} % of all that moved; use a shorter step, or {otherwise}"
+    )]
     Diverged {
         /// When.
         time: f64,
-        /// The part.
-        imbalance: f64,
+        /// Energy gained, in percent of the largest that ever moved.
+        percent: f64,
+        /// What else may help.
+        otherwise: &'static str,
     },
-    /// A segment bends by more than its grid can resolve (radians).
+    /// The grid is too coarse.
+    #[error(
+        "at t = {time:.6e} a segment is bent by {turn:.2} rad, more than it can resolve; use more segments than {segments}"
+    )]
     Unresolved {
         /// When.
         time: f64,
-        /// By how much.
+        /// Bending of the segment, radians.
         turn: f64,
+        /// Segments a rod.
+        segments: usize,
     },
     /// No time step is short enough.
+    #[error("at t = {time:.6e} no time step is short enough to go on; {advice}")]
     StepTooShort {
         /// When.
         time: f64,
+        /// What may help.
+        advice: &'static str,
     },
+}
+
+impl Stopped {
+    /// The word used in `summary.json`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Stopped::Diverged { .. } => "diverged",
+            Stopped::Unresolved { .. } => "unresolved",
+            Stopped::StepTooShort { .. } => "step-too-short",
+        }
+    }
+
+    /// The same with its time in another unit: `unit` is that of the present one.
+    pub fn in_unit(mut self, unit: f64) -> Self {
+        match &mut self {
+            Stopped::Diverged { time, .. }
+            | Stopped::Unresolved { time, .. }
+            | Stopped::StepTooShort { time, .. } => *time *= unit,
+        }
+        self
+    }
 }
 
 /// A method that moves a leaf on in time. Dimensionless throughout.
 pub trait Method {
-    /// Its name.
-    fn name(&self) -> &'static str;
-
     /// The time now.
     fn time(&self) -> f64;
 
@@ -90,7 +121,7 @@ pub trait Method {
     ///
     /// # Errors
     /// If the motion cannot be trusted any more.
-    fn advance(&mut self, until: f64) -> Result<(), Broken>;
+    fn advance(&mut self, until: f64) -> Result<(), Stopped>;
 
     /// The leaf now, positions and velocities at the same instant.
     fn snapshot(&mut self) -> Snapshot;
@@ -98,7 +129,7 @@ pub trait Method {
     /// All numbers the motion depends on from here, to go on bit for bit.
     fn save(&self) -> Vec<f64>;
 
-    /// Goes back to what [`Method::save`] told of the same leaf and method;
-    /// false if it does not fit.
+    /// Goes back to the numbers that [`Method::save`] returned of the same leaf and
+    /// method; false if they do not fit.
     fn restore(&mut self, numbers: &[f64]) -> bool;
 }

@@ -13,7 +13,7 @@ mod semi_implicit;
 mod stable;
 
 pub use explicit::{Explicit, Rigid};
-pub use method::{Broken, Energy, Method, Snapshot, Velocity};
+pub use method::{Energy, Method, Snapshot, Stopped, Velocity};
 pub use physics::{Inertia, Physics};
 pub use semi_implicit::{SemiImplicit, Steps};
 pub use stable::StableStep;

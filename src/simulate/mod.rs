@@ -25,7 +25,8 @@ mod frame;
 mod record;
 mod stills;
 
-pub use error::{Refused, Stopped};
+pub use crate::motion::Stopped;
+pub use error::Refused;
 pub use frame::Frame;
 pub use record::{Moment, Record, Still};
 pub use stills::stills;
@@ -33,7 +34,7 @@ pub use stills::stills;
 use std::time::{Duration, Instant};
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
-use crate::motion::{Broken, Explicit, Method, Physics, Rigid, SemiImplicit, StableStep, Steps};
+use crate::motion::{Explicit, Method, Physics, Rigid, SemiImplicit, StableStep, Steps};
 use crate::relax::{self, LARGEST_TOLERANCE, RelaxError, SMALLEST_TOLERANCE, start};
 use crate::scenario::{Scenario, Start};
 
@@ -262,31 +263,8 @@ impl Simulation {
             true => duration,
             false => interval * (self.made + 1) as f64,
         };
-        let (unit, segments) = (self.physics.time, self.segments());
-        self.method.advance(until).map_err(|broken| match broken {
-            Broken::Diverged { time, imbalance } => Stopped::Diverged {
-                otherwise: match self.scheme {
-                    Scheme::Explicit => "--method semi-implicit",
-                    Scheme::SemiImplicit => "dynamics.start = \"at-rest\"",
-                },
-                time: time * unit,
-                percent: 100.0 * imbalance,
-            },
-            Broken::Unresolved { time, turn } => Stopped::Unresolved {
-                time: time * unit,
-                turn,
-                segments,
-            },
-            Broken::StepTooShort { time } => Stopped::StepTooShort {
-                time: time * unit,
-                advice: match time > 0.0 {
-                    true => "use more segments a rod, or slower changes of the loads",
-                    false => {
-                        "the arcs it is released from strain rods that are rigid: use dynamics.start = \"at-rest\", or a stiffness less than inf"
-                    }
-                },
-            },
-        })?;
+        let unit = self.physics.time;
+        (self.method.advance(until)).map_err(|stopped| stopped.in_unit(unit))?;
         self.made += 1;
         Ok(self.frame())
     }

@@ -2,35 +2,38 @@
 
 use super::Explicit;
 use crate::motion::energy_balance::{Exchange, measure};
-use crate::motion::method::{Broken, Method, Snapshot, Velocity};
+use crate::motion::method::{Method, Snapshot, Stopped, Velocity};
 use crate::rod::RESOLVED_TURN;
 
 /// Part of a step that is rounding.
 const NO_TIME: f64 = 1e-9;
+
+/// What may help if energy grows, besides a shorter step.
+const OTHERWISE: &str = "the semi-implicit method";
 
 /// Steps between checks of the bending, which cost nothing, and of the energy.
 const BENDING_CHECKED: usize = 200;
 const ENERGY_CHECKED: usize = 1000;
 
 impl Explicit {
-    fn judge(&mut self) -> Result<(), Broken> {
+    fn judge(&mut self) -> Result<(), Stopped> {
         let now = self.snapshot();
-        (self.balance).judge(&self.leaf, &self.physics, &now, self.step)?;
+        (self.balance).judge(&self.leaf, &self.physics, &now, self.step, OTHERWISE)?;
         self.last_snapshot = Some(now);
         // In the balance rotations are at most pi, as they are in space.
         let (time, turn) = (self.time, self.largest_turn());
         match turn > RESOLVED_TURN {
-            true => Err(Broken::Unresolved { time, turn }),
+            true => Err(Stopped::Unresolved {
+                time,
+                turn,
+                segments: self.leaf.segments(),
+            }),
             false => Ok(()),
         }
     }
 }
 
 impl Method for Explicit {
-    fn name(&self) -> &'static str {
-        "explicit"
-    }
-
     fn time(&self) -> f64 {
         self.time
     }
@@ -39,7 +42,7 @@ impl Method for Explicit {
         self.steps
     }
 
-    fn advance(&mut self, until: f64) -> Result<(), Broken> {
+    fn advance(&mut self, until: f64) -> Result<(), Stopped> {
         let h = self.step;
         loop {
             // Times are not summed up, and neither is rounding.

@@ -23,7 +23,7 @@ mod step;
 use glam::DVec3;
 
 use super::energy_balance::{EnergyBalance, Exchange, measure};
-use super::method::{Broken, Method, Snapshot, Velocity};
+use super::method::{Method, Snapshot, Stopped, Velocity};
 use super::physics::{Inertia, Physics};
 use crate::leaf::{DiscreteLeaf, SparsePattern, State, System};
 use crate::rod::Section;
@@ -43,6 +43,13 @@ const NO_TIME: f64 = 1e-9;
 
 /// Bounds of the change of the step.
 const GROWTH: (f64, f64) = (0.2, 2.0);
+
+/// What may help if energy grows, besides a shorter step, and if steps become too
+/// short.
+const OTHERWISE: &str = "dynamics.start = \"at-rest\"";
+const TOO_SHORT: &str = "use more segments a rod, or slower changes of the loads";
+const TOO_SHORT_AT_THE_START: &str = "the arcs it is released from strain rods that are rigid: \
+    use dynamics.start = \"at-rest\", or a stiffness less than inf";
 
 /// How long time steps are.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -135,10 +142,6 @@ impl SemiImplicit {
 }
 
 impl Method for SemiImplicit {
-    fn name(&self) -> &'static str {
-        "semi-implicit"
-    }
-
     fn time(&self) -> f64 {
         self.time
     }
@@ -147,7 +150,7 @@ impl Method for SemiImplicit {
         self.count
     }
 
-    fn advance(&mut self, until: f64) -> Result<(), Broken> {
+    fn advance(&mut self, until: f64) -> Result<(), Stopped> {
         while self.time < until {
             let left = until - self.time;
             if left < NO_TIME * self.step {
@@ -181,14 +184,20 @@ impl Method for SemiImplicit {
                 self.step = longest.min(GROWTH.1 * self.step);
             }
             if self.step < SHORTEST_STEP {
-                return Err(Broken::StepTooShort { time: self.time });
+                return Err(Stopped::StepTooShort {
+                    time: self.time,
+                    advice: match self.time > 0.0 {
+                        true => TOO_SHORT,
+                        false => TOO_SHORT_AT_THE_START,
+                    },
+                });
             }
             if error.is_some() && last {
                 self.time = until;
             }
         }
         let now = self.snapshot();
-        (self.balance).judge(&self.leaf, &self.physics, &now, self.step)
+        (self.balance).judge(&self.leaf, &self.physics, &now, self.step, OTHERWISE)
     }
 
     fn snapshot(&mut self) -> Snapshot {

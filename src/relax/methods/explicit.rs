@@ -13,7 +13,7 @@
 //! constant damping when that was chosen best.
 
 use crate::leaf::{DiscreteLeaf, Leaf, SparsePattern, State, System};
-use crate::motion::{Broken, Explicit, Method, Physics};
+use crate::motion::{Explicit, Method, Physics, Stopped};
 use crate::newton::{Stop, Work};
 use crate::relax::options::{RelaxError, past};
 use crate::relax::saddle;
@@ -156,8 +156,8 @@ fn look_ahead(motion: &mut Explicit, deadline: Option<Instant>) -> Result<(), St
     for piece in 1..=pieces as usize {
         motion
             .advance(begin + LOOK * (piece as f64 / pieces))
-            .map_err(|broken| match broken {
-                Broken::Unresolved { .. } => Stop::Unresolved,
+            .map_err(|stopped| match stopped {
+                Stopped::Unresolved { .. } => Stop::Unresolved,
                 _ => Stop::Stuck,
             })?;
         if past(deadline) {

@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
-use crate::motion::{Broken, Explicit, Method, Physics};
+use crate::motion::{Explicit, Method, Physics, Stopped};
 use crate::relax::{self, Options, index_near, node_state, start};
 use crate::scenario::Scenario;
 use crate::shape::RodShape;
@@ -54,16 +54,16 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, deadline: Insta
     let (duration, _) = physics.duration();
     while motion.time() < duration {
         let until = motion.time() + LOOK * h;
-        if let Err(broken) = motion.advance(until.min(duration)) {
-            return match broken {
-                Broken::Unresolved { time, turn } => failed(
+        if let Err(stopped) = motion.advance(until.min(duration)) {
+            return match stopped {
+                Stopped::Unresolved { time, turn, .. } => failed(
                     MapOutcome::NotConverged,
                     format!(
                         "at t = {:.3e} a segment bends by {turn:.2} rad, more than it resolves",
                         time * physics.time
                     ),
                 ),
-                Broken::Diverged { time, .. } | Broken::StepTooShort { time } => failed(
+                Stopped::Diverged { time, .. } | Stopped::StepTooShort { time, .. } => failed(
                     MapOutcome::Diverged,
                     format!("energy from nowhere at t = {:.3e}", time * physics.time),
                 ),
