@@ -99,7 +99,6 @@ mod tests {
             chart(&sample::chart()),
             scaling(&sample::scaling()),
             map(&sample::map()),
-            trace(&sample::trace()),
             energy(&sample::record(5, 16)),
             filmstrip(&sample::record(5, 16)),
         ] {
@@ -129,7 +128,7 @@ mod tests {
     fn an_early_end_is_told() {
         let mut record = sample::record(5, 8);
         record.stopped = Some(Stopped::Diverged {
-            otherwise: "--method semi-implicit",
+            otherwise: "the semi-implicit method",
             time: 10.1,
             percent: 70.0,
         });

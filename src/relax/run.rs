@@ -205,7 +205,7 @@ impl<'a, 'o> Run<'a, 'o> {
 pub fn complete(reduced: &Leaf, whole: &Leaf, level: &Level) -> Level {
     Level {
         leaf: match reduced.rods() == whole.rods() {
-            true => level.leaf.seen_as(whole),
+            true => level.leaf.with_leaf(whole),
             false => DiscreteLeaf::new(whole, level.leaf.grid.clone()),
         },
         state: whole_of(reduced, &level.state),
