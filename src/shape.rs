@@ -32,7 +32,7 @@ pub struct RodShape {
 
 /// Largest differences between two shapes at common stations, in the units of
 /// the scenario (rotations in radians).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Difference {
     /// Distance of positions.
     pub position: f64,
@@ -96,6 +96,7 @@ pub fn serialize_tips<S: Serializer>(tips: &[DVec3], serializer: S) -> Result<S:
         tips: Option<&'a [DVec3]>,
     }
     let (tip, tips) = match tips {
+        [] => (None, None),
         [only] => (Some(only), None),
         several => (None, Some(several)),
     };

@@ -11,6 +11,7 @@ use super::equations::{Equations, RodState};
 use super::intervals::{Flight, Units, choose, fly, sensitivities};
 use super::march::March;
 use super::trajectory::{Nodes, Trajectory};
+use serde::Serialize;
 use std::time::Instant;
 
 /// Iterations before a solution is given up.
@@ -34,7 +35,7 @@ const KEEP: f64 = 0.1;
 const NOISE: f64 = 1e3;
 
 /// Work done by the shooting, counted so that tests can pin it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Work {
     /// Corrections made.
     pub iterations: usize,

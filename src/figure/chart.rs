@@ -157,7 +157,7 @@ fn contenders(rows: &[(usize, &Row)], over_veins: bool) -> Vec<Series> {
                 Some((seconds, (median, error))) => series.points.push(Point {
                     at: place(median, error),
                     spread: [seconds.q1, seconds.q3].map(|time| place(time, error)),
-                    front: row.pareto,
+                    front: row.pareto == Some(true),
                 }),
                 // Failures are where their leaf is, run or not.
                 None => series.failures.push(Failure {

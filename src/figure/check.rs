@@ -22,8 +22,8 @@ const LINE: f64 = 19.0;
 /// Draws the whole page.
 pub fn draw(check: &Check) -> Drawing {
     let mut veins = Veins::of(&check.relaxed);
-    if let Some(shot) = check.solution() {
-        veins.dot(&shot.solution.rods);
+    if let Some(solution) = check.solution() {
+        veins.dot(&solution.rods);
     }
     let title = format!("{}: {}", check.relaxed.scenario, headline(&check.verdict));
     let reason = reason(check);
@@ -62,8 +62,8 @@ pub fn draw(check: &Check) -> Drawing {
 fn notes(check: &Check, veins: &Veins) -> Vec<String> {
     let mut notes = vec![format!("N = {}", veins.count)];
     let relaxed = verdict(&check.relaxed);
-    match check.solution() {
-        Some(shot) => {
+    match &check.shot {
+        Some(shot) if shot.found.is_ok() => {
             let shot = equilibrium_of_index(shot.negative_eigenvalues);
             if shot == relaxed {
                 notes.push(format!("both: {shot}"));
@@ -72,7 +72,7 @@ fn notes(check: &Check, veins: &Veins) -> Vec<String> {
                 notes.push(format!("by shooting: {shot}"));
             }
         }
-        None => notes.push(format!("relaxed: {relaxed}")),
+        _ => notes.push(format!("relaxed: {relaxed}")),
     }
     notes.extend(veins.notes());
     notes
@@ -138,13 +138,13 @@ mod tests {
                 difference.moment = wild;
             }
             check.along[3].force = wild;
-            if let Some(Ok(shot)) = &mut check.shot {
-                shot.solution.rods[1].nodes[4].position = DVec3::splat(wild);
+            if let Some(Ok(solution)) = check.shot.as_mut().map(|shot| shot.found.as_mut()) {
+                solution.rods[1].nodes[4].position = DVec3::splat(wild);
             }
             svg(&check);
             let wildest = check.along[0];
             check.along.fill(wildest);
-            check.relaxed.accuracy.tolerance = wild;
+            check.tolerance = wild;
             svg(&check);
         }
     }

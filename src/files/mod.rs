@@ -17,8 +17,8 @@ pub use recording::{CannotResume, Checkpointer, Recording};
 use crate::figure::{self, Picture};
 use crate::relax::Equilibrium;
 use crate::report::{
-    Centerlines, ChartSummary, ChartTable, CheckSummary, Format, Json, MapSummary, MapTable,
-    ModesTable, OutputError, ScalingTable, TraceTable, Written,
+    Centerlines, ChartTable, Format, Json, MapTable, ModesTable, OutputError, ScalingTable,
+    TraceTable, Written,
 };
 use crate::simulate::Record;
 use crate::study::{All, Chart, Check, Map, Scaling, Trace};
@@ -49,7 +49,7 @@ impl Written for Equilibrium {
 
 impl Written for Check {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &CheckSummary,
+        &Json("check.json"),
         &Picture::svg("check.svg", figure::check),
         &Picture::png("check.png", figure::check),
     ];
@@ -57,7 +57,7 @@ impl Written for Check {
 
 impl Written for Map {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &MapSummary,
+        &Json("map.json"),
         &MapTable,
         &Picture::svg("map.svg", figure::map),
         &Picture::png("map.png", figure::map),
@@ -93,7 +93,7 @@ impl Written for Record {
 
 impl Written for Chart {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &ChartSummary,
+        &Json("chart.json"),
         &ChartTable,
         &Picture::svg("chart.svg", figure::chart),
         &Picture::png("chart.png", figure::chart),

@@ -76,7 +76,7 @@ fn entry((time, error): (f64, f64), who: &str, knob: &str) -> String {
 }
 
 fn front(chart: &Chart) -> Vec<String> {
-    let rows = chart.rows.iter().filter(|row| row.pareto);
+    let rows = chart.rows.iter().filter(|row| row.pareto == Some(true));
     let rows = rows.filter_map(|row| {
         let point = row.point()?;
         Some((
@@ -96,26 +96,22 @@ fn front(chart: &Chart) -> Vec<String> {
 
 fn fastest(chart: &Chart) -> Vec<String> {
     let line = |decade: &Decade| -> Option<String> {
-        let row = &chart.rows[decade.fastest?];
-        let time = row.seconds?.median;
-        let default = match (decade.factor, decade.default) {
+        let default = match (decade.factor, decade.default_knob) {
             (Some(1.0), _) => "the default".to_string(),
-            (Some(factor), Some(default)) => {
-                let knob = &chart.rows[default].knob;
+            (Some(factor), Some(knob)) => {
                 format!("the default ({knob}) takes {factor:.2} times as long")
             }
             _ => "the default does not get there".to_string(),
         };
         Some(format!(
             "{:>10}  to {:<7} {}, {}; {default}",
-            seconds(time),
+            seconds(decade.seconds?),
             format!("{:e}", decade.error),
-            contender(row.contender),
-            row.knob
+            contender(decade.contender?),
+            decade.knob?
         ))
     };
-    let decades = chart.decades();
-    decades.iter().filter_map(line).collect()
+    chart.decades.iter().filter_map(line).collect()
 }
 
 /// Failures, one line for each contender and way to fail.
@@ -175,7 +171,7 @@ fn peers(chart: &Chart) -> Vec<String> {
             .collect();
         measured.sort_by(|a, b| b.1.total_cmp(&a.1));
         for (peer, error) in measured {
-            let ratio = match chart.ratio(peer) {
+            let ratio = match peer.ratio {
                 Some(ratio) => format!("{} times the default's time", rounded(ratio)),
                 None => "the default is nowhere as accurate".into(),
             };
@@ -230,41 +226,10 @@ fn veins(scaling: &Scaling) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use crate::scenario::Scenario;
-    use crate::study::{ChartOptions, Contender, Ending, PeerRow, chart, scaling};
+    use crate::report::sample;
+    use crate::study::Ending;
 
     use super::*;
-
-    fn cantilever() -> Chart {
-        let scenario = r#"
-            name = "cantilever"
-            leaf = { rods = 1, length = 2.0, fan = [0.0] }
-            stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }
-            load = { gravity = [0.0, 0.0, -0.1] }
-        "#;
-        let scenario = Scenario::from_toml(scenario).unwrap();
-        let peer = |rods: usize, error: Option<f64>, outcome: &str| PeerRow {
-            program: "peer".into(),
-            scenario: "cantilever".into(),
-            rods,
-            knob: "n=10".into(),
-            seconds: 100.0,
-            error,
-            outcome: outcome.into(),
-        };
-        let options = ChartOptions {
-            seconds: 0.01,
-            contenders: vec![Contender::SemiImplicit, Contender::SemiImplicitGrid],
-            peers: vec![
-                peer(1, Some(2e-3), "converged"),
-                peer(1, None, "diverged"),
-                peer(7, Some(2e-3), "converged"),
-            ],
-        };
-        let mut found = chart(&scenario, &options, &mut |_| {}).unwrap();
-        found.scaling = Some(scaling(&[scenario], 1e-4, &options, &mut |_| {}).unwrap());
-        found
-    }
 
     #[track_caller]
     fn says(chart: &Chart, parts: &[&str]) {
@@ -277,47 +242,40 @@ mod tests {
 
     #[test]
     fn everything_is_told() {
+        let mut chart = sample::chart();
+        chart.scaling = Some(sample::scaling());
         says(
-            &cantilever(),
+            &chart,
             &[
-                "cantilever: 1 vein, speed against accuracy\n",
-                "  errors   against a solution known within ",
-                "relaxation and shooting agree within their error estimates; they differ by ",
-                "  measured ",
-                " runs of 18 settings in turns, ",
-                " one thread",
-                "  front    ",
-                "  fastest  ",
-                " to 1e-10   semi-implicit, extrapolated, tolerance=",
-                "  peers    ",
-                "  1.0×10⁻³  peer, n=10: ",
-                " times the default's time\n",
-                "100.00 s  peer, n=10, diverged\n",
-                "  veins    to a tolerance of 1e-4\n",
-                "semi-implicit, extrapolated, N = 1: ",
+                "fan: 5 veins joined at the tip, speed against accuracy\n",
+                "  errors   against a solution known within 1.0×10⁻¹² of the longest vein\n",
+                "relaxation and shooting agree within their error estimates; they differ by 1.0×10⁻¹⁴\n",
+                "  measured 25 runs of 5 settings in turns, 5 rounds, one thread; times are medians\n",
+                "  front       0.50 ms  9.0×10⁻³  semi-implicit, single grids, segments=4\n",
+                "  fastest     0.50 ms  to 1e-2    semi-implicit, single grids, segments=4; the default (tolerance=1e-2) takes 2.00 times as long\n",
+                "  failed   explicit, extrapolated, tolerance=1e-11, not-run\n",
+                "single shooting, tolerance=1e-6, not-at-rest: perturbations grow\n",
+                "  peers     250.00 ms  5.0×10⁻⁶  solve_bvp, tol=0.001: 125 times the default's time\n",
+                "16.00 s  solve_bvp, tol=1e-09, not-converged max-nodes\n",
+                "  veins    to a tolerance of 1e-6\n",
+                "semi-implicit, extrapolated, N = 5: 1.00 ms, N = 15: 3.00 ms\n",
+                "explicit, extrapolated, N = 5: 30.00 ms, N = 15: not-run\n",
                 "  remark   1 row of --peers is about another leaf, and left out\n",
             ],
         );
     }
 
     #[test]
-    fn what_is_not_confirmed_or_failed_is_told() {
-        let mut chart = cantilever();
+    fn what_is_not_confirmed_is_told_and_failures_of_a_kind_are_one_line() {
+        let mut chart = sample::chart();
         if let Some(reference) = &mut chart.reference {
             reference.confirmed = false;
         }
-        for row in chart.rows.iter_mut().take(3) {
+        for row in chart.rows.iter_mut().take(2) {
             row.ending = Ending::OtherEquilibrium;
         }
-        chart.rows[3].ending = Ending::NotRun;
-        says(
-            &chart,
-            &[
-                "that is NOT CONFIRMED",
-                "  failed   semi-implicit, extrapolated, tolerance=1e-2,1e-3,1e-4, other-equilibrium\n",
-                "           semi-implicit, extrapolated, tolerance=1e-5, not-run\n",
-            ],
-        );
+        let failed = "semi-implicit, extrapolated, tolerance=1e-2,1e-6, other-equilibrium\n";
+        says(&chart, &["that is NOT CONFIRMED", failed]);
         chart.reference = None;
         says(&chart, &["  errors   not known: no equilibrium was found"]);
     }

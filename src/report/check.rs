@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use crate::bvp::Solution;
 use crate::report::numbers::power_of_ten;
 use crate::report::words::{equilibrium_of_index, headline, shooting};
-use crate::study::{Check, Place, Quantity, Shot, Verdict};
+use crate::study::{Check, Place, Quantity, Verdict};
 
 use super::numbers::{bound, decimals, eigenvalues, grids, point, seconds, significant, veins};
 use super::relax::found;
@@ -16,8 +17,8 @@ pub fn report(check: &Check, folder: Option<&Path>) -> String {
     lines.extend(both(check));
     lines.extend(differences(check));
     lines.extend(errors(check));
-    if let Some(shot) = check.solution() {
-        lines.extend(shooting_itself(shot));
+    if let Some(solution) = check.solution() {
+        lines.extend(shooting_itself(solution));
     }
     // Why the leaf is not at rest is in the verdict.
     if let (Some(remark), true) = (&check.relaxed.remark, check.shot.is_some()) {
@@ -56,25 +57,28 @@ fn both(check: &Check) -> Vec<(&'static str, String)> {
         "relaxed",
         format!("{} in {}", found(relaxed), seconds(relaxed.wall_seconds)),
     )];
-    let time = check.shot_seconds.map(seconds).unwrap_or_default();
     lines.push((
         "shooting",
         match &check.shot {
-            Some(Ok(shot)) => format!(
-                "{}{} in {time}",
-                equilibrium_of_index(shot.negative_eigenvalues),
-                eigenvalues(shot.negative_eigenvalues)
-            ),
-            Some(Err(_)) => format!("no solution in {time}"),
+            Some(shot) => {
+                let found = match shot.found {
+                    Ok(_) => format!(
+                        "{}{}",
+                        equilibrium_of_index(shot.negative_eigenvalues),
+                        eigenvalues(shot.negative_eigenvalues)
+                    ),
+                    Err(_) => "no solution".into(),
+                };
+                format!("{found} in {}", seconds(shot.wall_seconds))
+            }
             None => "not tried".into(),
         },
     ));
     if let [tip] = relaxed.tips.as_slice() {
         let tip = point(tip.to_array(), decimals(relaxed));
         lines.push(("tip", format!("{tip} relaxed")));
-        let shot = check.solution().map(|shot| &shot.solution.rods[0]);
-        if let Some(node) = shot.and_then(|rod| rod.nodes.last()) {
-            let tip = point(node.position.to_array(), decimals(relaxed));
+        if let Some([tip]) = check.shot.as_ref().map(|shot| shot.tips.as_slice()) {
+            let tip = point(tip.to_array(), decimals(relaxed));
             lines.push(("", format!("{tip} by shooting")));
         }
     }
@@ -82,9 +86,9 @@ fn both(check: &Check) -> Vec<(&'static str, String)> {
     lines.push((
         "energy",
         match check.solution() {
-            Some(shot) => format!(
+            Some(solution) => format!(
                 "{relaxed} relaxed, {} by shooting",
-                significant(shot.solution.energy)
+                significant(solution.energy)
             ),
             None => format!("{relaxed} relaxed"),
         },
@@ -143,8 +147,7 @@ fn errors(check: &Check) -> Vec<(&'static str, String)> {
             None => "relaxed: not known".into(),
         },
     )];
-    if let Some(shot) = check.solution() {
-        let error = &shot.solution.error;
+    if let Some(Solution { error, .. }) = check.solution() {
         lines.push((
             "",
             format!(
@@ -159,7 +162,7 @@ fn errors(check: &Check) -> Vec<(&'static str, String)> {
             ),
         ));
     }
-    match check.within_estimates() {
+    match check.within_estimates {
         Some(true) => lines.push(("", "positions differ by no more than both errors".into())),
         Some(false) => lines.push(("", "positions differ by more than both errors".into())),
         None => (),
@@ -168,8 +171,7 @@ fn errors(check: &Check) -> Vec<(&'static str, String)> {
 }
 
 /// How the shooting went.
-fn shooting_itself(shot: &Shot) -> Vec<(&'static str, String)> {
-    let solution = &shot.solution;
+fn shooting_itself(solution: &Solution) -> Vec<(&'static str, String)> {
     let mut lines = vec![
         (
             "growth",
@@ -197,21 +199,9 @@ fn shooting_itself(shot: &Shot) -> Vec<(&'static str, String)> {
 #[cfg(test)]
 mod tests {
     use crate::bvp::Neutral;
-    use crate::scenario::Scenario;
-    use crate::study::{CheckOptions, check};
+    use crate::report::sample;
 
     use super::*;
-
-    fn cantilever() -> Check {
-        let scenario = r#"
-            name = "cantilever"
-            leaf = { rods = 1, length = 2.0, fan = [0.0] }
-            stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }
-            load = { gravity = [0.0, 0.0, -0.1] }
-        "#;
-        let scenario = Scenario::from_toml(scenario).unwrap();
-        check(&scenario, &CheckOptions::default(), &mut |_| {}).unwrap()
-    }
 
     #[track_caller]
     fn says(check: &Check, parts: &[&str]) {
@@ -226,45 +216,25 @@ mod tests {
     }
 
     #[test]
-    fn agreement() {
-        says(
-            &cantilever(),
-            &[
-                "cantilever: 1 vein, relaxed and by shooting\n",
-                "  verdict  both methods agree: positions within 2.0×10⁻⁶, rotations within 1.0×10⁻⁴ rad\n",
-                "  relaxed  stable equilibrium (0 negative eigenvalues) in ",
-                "  shooting stable equilibrium (0 negative eigenvalues) in ",
-                "  differ   positions by ",
-                " of the length\n           rotations by ",
-                "  error    relaxed: positions within ",
-                "\n           shooting: positions within ",
-                "  growth   perturbations grow 10^",
-                ": single shooting\n",
-            ],
-        );
-    }
-
-    #[test]
     fn another_equilibrium_is_called_unstable() {
-        let mut check = cantilever();
-        check.verdict = Verdict::Differ;
-        if let Some(Ok(shot)) = &mut check.shot {
-            shot.negative_eigenvalues = Some(2);
-            shot.solution.neutral = Some(Neutral {
+        let mut check = sample::check(1, 8, 0.1);
+        if let Some(Ok(solution)) = check.shot.as_mut().map(|shot| shot.found.as_mut()) {
+            solution.neutral = Some(Neutral {
                 ratio: 1e-12,
-                displacement: shot
-                    .solution
-                    .rods
-                    .iter()
-                    .map(|_| vec![glam::DVec3::Y])
-                    .collect(),
+                displacement: vec![vec![glam::DVec3::Y]],
             });
         }
         says(
             &check,
             &[
-                "  verdict  the methods differ: to agree, positions within 2.0×10⁻⁶",
-                "  shooting unstable equilibrium of index 2 (2 negative eigenvalues)",
+                "fan: 1 vein, relaxed and by shooting\n",
+                "  verdict  the methods differ: to agree, positions within 1.0×10⁻⁶, rotations within 1.0×10⁻⁴ rad\n",
+                "  relaxed  stable equilibrium (0 negative eigenvalues) in 10.00 ms\n",
+                "  shooting unstable equilibrium of index 2 (2 negative eigenvalues) in 20.00 ms\n",
+                "at 1.000 of the length\n           rotations by ",
+                "  error    relaxed: positions within 3.0×10⁻⁹, from grids of 8 segments a vein\n           shooting: positions within 1.0×10⁻¹⁰",
+                "positions differ by more than both errors\n",
+                "  growth   perturbations grow 10^4.2 times from base to tip: multiple shooting over 2 intervals\n",
                 "  neutral  a bifurcation is near",
             ],
         );
@@ -272,10 +242,14 @@ mod tests {
 
     #[test]
     fn equal_shapes_and_no_second_shape() {
-        let mut check = cantilever();
-        check.difference = Some(Default::default());
-        says(&check, &["  differ   positions not at all\n"]);
-
+        let mut check = sample::check(1, 8, 0.0);
+        says(
+            &check,
+            &[
+                "  verdict  both methods agree: ",
+                "  differ   positions not at all\n",
+            ],
+        );
         check.difference = None;
         check.shot = None;
         check.verdict = Verdict::NotCompared("the leaf is not at rest".into());

@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use crate::study::{Confidence, Map, MapOutcome};
+use crate::study::{Map, MapOutcome};
 
 use super::numbers::seconds;
-use super::table::lay_out;
+use super::table::{lay_out, under};
 
 /// What was done for it.
 #[derive(Clone, Copy)]
@@ -30,19 +30,11 @@ pub fn report(map: &Map, told: Told, files: &str) -> String {
         let text = format!("{} from {from} to {to}: {count} values{spacing}", axis.keys);
         lines.push(("vary", text));
     }
-    let mut cells: Vec<_> = (map.rows.iter())
-        .map(|row| (row.cell, row.reference))
-        .collect();
-    cells.dedup_by_key(|(cell, _)| *cell);
-    let confirmed = |(_, reference): &&(usize, Confidence)| *reference == Confidence::Confirmed;
+    let (known, confirmed) = map.known_and_confirmed();
+    let cells = request.cells();
     lines.push((
         "cells",
-        format!(
-            "{} of {}, reference confirmed in {}",
-            cells.len(),
-            request.cells(),
-            cells.iter().filter(confirmed).count()
-        ),
+        format!("{known} of {cells}, reference confirmed in {confirmed}"),
     ));
     lines.push((
         "rows",
@@ -53,9 +45,7 @@ pub fn report(map: &Map, told: Told, files: &str) -> String {
             seconds(told.seconds)
         ),
     ));
-    for (i, line) in counts(map).into_iter().enumerate() {
-        lines.push((if i == 0 { "found" } else { "" }, line));
-    }
+    lines.extend(under("found", counts(map)));
     if !files.is_empty() {
         lines.push(("written", files.into()));
     }

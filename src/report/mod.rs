@@ -27,7 +27,7 @@ pub use chart::report as chart_report;
 pub use chart_table::{ChartTable, ScalingTable};
 pub use check::report as check_report;
 pub use error::{MapFileError, OutputError};
-pub use json::{ChartSummary, CheckSummary, Json, MapSummary};
+pub use json::Json;
 pub use map::{Told as MapTold, report as map_report};
 pub use map_table::{MapTable, lines, read_rows, table};
 pub use relax::report as relax_report;

@@ -13,7 +13,7 @@ use crate::shape::Difference;
 use crate::simulate::{Frame, Moment, Record, Scheme, Still};
 use crate::study::{
     Base, Chart, Check, Confidence, Contender, Ending, Map, MapMethod, MapOutcome, MapRequest,
-    MapRow, Peer, Reference, Row, Scaling, ScalingRow, Setting, Shot, Spread, Verdict,
+    MapRow, Peer, Reference, Row, Scaling, ScalingRow, Setting, Shot, Spread,
 };
 use crate::undulation::{Undulation, Vein};
 
@@ -97,14 +97,6 @@ pub fn check(rods: usize, segments: usize, angle: f64) -> Check {
         node.position = turn * node.position;
         node.rotation = turn * node.rotation;
     }
-    let at = |i: usize| {
-        let pairs = relaxed.shape.rods.iter().zip(&shapes);
-        pairs
-            .map(|(a, b)| Difference::of(&a.nodes[i], &b.nodes[i]))
-            .fold(Difference::default(), Difference::max)
-    };
-    let along: Vec<Difference> = (0..=segments).map(at).collect();
-    let difference = along.iter().copied().reduce(Difference::max);
     let still = vec![DVec3::ZERO; segments + 1];
     let solution = Solution {
         stations: relaxed.shape.stations.clone(),
@@ -126,21 +118,13 @@ pub fn check(rods: usize, segments: usize, angle: f64) -> Check {
         }),
         work: bvp::Work::default(),
     };
-    Check {
-        relaxed,
-        shot: Some(Ok(Shot {
-            solution,
-            negative_eigenvalues: Some(2),
-        })),
-        shot_seconds: Some(0.02),
-        along,
-        difference,
-        verdict: if angle == 0.0 {
-            Verdict::Agree
-        } else {
-            Verdict::Differ
-        },
-    }
+    let shot = Shot {
+        tips: vec![turn * relaxed.tips[0]],
+        found: Ok(solution),
+        negative_eigenvalues: Some(2),
+        wall_seconds: 0.02,
+    };
+    Check::new(relaxed, Some(shot))
 }
 
 /// A map of 2 x 4 cells in which every outcome and reference occurs.
@@ -179,25 +163,31 @@ pub fn map() -> Map {
                 | MapOutcome::Refused
                 | MapOutcome::OutOfTime
         );
-        MapRow {
-            cell,
-            method,
-            outcome,
+        let reference = match cell {
+            6 => Confidence::Unconfirmed,
+            7 => Confidence::None,
+            _ => Confidence::Confirmed,
+        };
+        let row = MapRow {
             detail: format!("said of cell {cell}, \"quoted\""),
-            index: rests.then_some(if outcome == MapOutcome::Saddle { 3 } else { 0 }),
-            tip: rests.then_some([0.9, 0.1 * cell as f64, -1.0 / 3.0]),
-            margin_waves: rests.then_some(if cell == 2 { 1.5 } else { 0.0 }),
-            margin_amplitude: rests.then_some(0.01),
-            twist: rests.then_some(-0.5),
-            energy: rests.then_some(-1.5e-7),
-            error: rests.then_some(1e-9),
-            error_estimate: rests.then_some(2e-9),
             seconds: 0.012345,
-            reference: match cell {
-                6 => Confidence::Unconfirmed,
-                7 => Confidence::None,
-                _ => Confidence::Confirmed,
-            },
+            ..MapRow::without_answer(cell, method, outcome, reference)
+        };
+        if !rests {
+            return row;
+        }
+        MapRow {
+            index: Some(if outcome == MapOutcome::Saddle { 3 } else { 0 }),
+            tip_x: Some(0.9),
+            tip_y: Some(0.1 * cell as f64),
+            tip_z: Some(-1.0 / 3.0),
+            margin_waves: Some(if cell == 2 { 1.5 } else { 0.0 }),
+            margin_amplitude: Some(0.01),
+            twist: Some(-0.5),
+            energy: Some(-1.5e-7),
+            error: Some(1e-9),
+            error_estimate: Some(2e-9),
+            ..row
         }
     };
     let rows = (0..8).flat_map(|cell| MapMethod::ALL.map(|method| row(cell, method)));
@@ -292,60 +282,55 @@ fn spread(median: f64) -> Spread {
 
 fn row(contender: Contender, knob: Setting, seconds: f64, error: f64) -> Row {
     Row {
-        contender,
-        knob,
         seconds: Some(spread(seconds)),
-        work: Work {
-            steps: 8,
-            factorizations: 9,
-            force_evaluations: 9,
-            cg_iterations: 40,
-        },
+        steps: Some(8),
+        factorizations: Some(9),
+        force_evaluations: Some(9),
         true_error: Some(error),
         error_estimate: Some(10.0 * error),
-        ending: Ending::Ended(Outcome::Converged),
-        remark: None,
-        pareto: false,
+        ..Row::without_result(contender, knob, Ending::Ended(Outcome::Converged))
     }
 }
 
 fn not_run(contender: Contender, knob: Setting) -> Row {
-    Row {
-        seconds: None,
-        true_error: None,
-        error_estimate: None,
-        ending: Ending::NotRun,
-        ..row(contender, knob, 1.0, 1.0)
-    }
+    Row::without_result(contender, knob, Ending::NotRun)
 }
 
 /// A chart of few points, two failures and a peer.
 pub fn chart() -> Chart {
     use Setting::{Segments, Tolerance};
-    let on_it = |row: Row| Row {
-        pareto: true,
-        ..row
+    let peer = |knob: &str, seconds: f64, true_error: Option<f64>, outcome: &str| Peer {
+        name: "solve_bvp".into(),
+        knob: knob.into(),
+        seconds: spread(seconds),
+        true_error,
+        outcome: outcome.into(),
+        pareto: false,
+        ratio: None,
     };
-    Chart {
+    let chart = Chart {
         scenario: "fan".into(),
         rods: 5,
         joined: true,
+        threads: 1,
+        rounds: 5,
         reference: Some(Reference {
             confirmed: true,
             told: "relaxation and shooting agree within their error estimates".into(),
             known_within: 1e-12,
-            relaxed: Some(1e-12),
-            shot: Some(2e-12),
+            relaxation_estimate: Some(1e-12),
+            shooting_estimate: Some(2e-12),
             difference: Some(1e-14),
             neutral: None,
         }),
+        remarks: vec!["1 row of --peers is about another leaf, and left out".into()],
         rows: vec![
-            on_it(row(Contender::SemiImplicit, Tolerance(1e-2), 1e-3, 1e-4)),
-            on_it(row(Contender::SemiImplicit, Tolerance(1e-6), 2e-3, 1e-8)),
-            on_it(Row {
+            row(Contender::SemiImplicit, Tolerance(1e-2), 1e-3, 1e-4),
+            row(Contender::SemiImplicit, Tolerance(1e-6), 2e-3, 1e-8),
+            Row {
                 error_estimate: None,
                 ..row(Contender::SemiImplicitGrid, Segments(4), 5e-4, 9e-3)
-            }),
+            },
             row(Contender::Explicit, Tolerance(1e-2), 2e-2, 1e-4),
             not_run(Contender::Explicit, Tolerance(1e-11)),
             Row {
@@ -357,27 +342,13 @@ pub fn chart() -> Chart {
             },
         ],
         peers: vec![
-            Peer {
-                name: "solve_bvp".into(),
-                knob: "tol=0.001".into(),
-                seconds: spread(0.25),
-                true_error: Some(5e-6),
-                outcome: "converged".into(),
-                pareto: false,
-            },
-            Peer {
-                name: "solve_bvp".into(),
-                knob: "tol=1e-09".into(),
-                seconds: spread(16.0),
-                true_error: None,
-                outcome: "not-converged max-nodes".into(),
-                pareto: false,
-            },
+            peer("tol=0.001", 0.25, Some(5e-6), "converged"),
+            peer("tol=1e-09", 16.0, None, "not-converged max-nodes"),
         ],
-        rounds: 5,
-        remarks: vec!["1 row of --peers is about another leaf, and left out".into()],
+        decades: Vec::new(),
         scaling: None,
-    }
+    };
+    chart.compared()
 }
 
 /// Two leaves, two contenders, one of which was too slow.
@@ -387,12 +358,12 @@ pub fn scaling() -> Scaling {
     Scaling {
         scenario: "fan".into(),
         tolerance: 1e-6,
+        unconfirmed: Vec::new(),
         rows: vec![
             found(5, row(Contender::SemiImplicit, knob, 1e-3, 1e-8)),
             found(15, row(Contender::SemiImplicit, knob, 3e-3, 1e-8)),
             found(5, row(Contender::Explicit, knob, 3e-2, 1e-8)),
             found(15, not_run(Contender::Explicit, knob)),
         ],
-        unconfirmed: Vec::new(),
     }
 }

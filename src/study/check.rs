@@ -1,18 +1,16 @@
 //! Two roads to the same equilibrium, compared.
 
-use std::time::Instant;
+use glam::DVec3;
+use serde::{Serialize, Serializer};
 
-use crate::bvp::{self, Failure, Solution, Start};
-use crate::leaf::{Grid, Leaf};
+use super::judge::{fine_grid, timed};
+use crate::bvp::{self, Failure, Reason, Solution, Start};
 use crate::relax::{
     self, Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit, index_near,
+    serialize_index,
 };
 use crate::scenario::Scenario;
-use crate::shape::{Difference, RodShape};
-
-/// Stations of the boundary-value solution, at least: enough to count its
-/// negative eigenvalues from.
-const SEGMENTS: usize = 32;
+use crate::shape::{Difference, serialize_tips};
 
 /// Rotations may differ by this many times the tolerance (in radians) before
 /// the shapes are called different: they are less accurate than the positions
@@ -32,7 +30,8 @@ pub struct CheckOptions {
 }
 
 /// What a check says.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "verdict", content = "reason", rename_all = "kebab-case")]
 pub enum Verdict {
     /// Both find the same shape within the tolerance.
     Agree,
@@ -42,31 +41,17 @@ pub enum Verdict {
     NotCompared(String),
 }
 
-impl Verdict {
-    /// The word used in `check.json`.
-    pub fn word(&self) -> &'static str {
-        match self {
-            Verdict::Agree => "agree",
-            Verdict::Differ => "differ",
-            Verdict::NotCompared(_) => "not-compared",
-        }
-    }
-}
-
-/// A solution of the boundary-value problem, judged.
+/// The boundary-value solution, judged, or why there is none.
 #[derive(Clone, Debug)]
 pub struct Shot {
-    /// The solution.
-    pub solution: Solution,
+    /// What the shooting found.
+    pub found: Result<Solution, Failure>,
+    /// The joint tip alone, or one tip per rod; empty without a solution.
+    pub tips: Vec<DVec3>,
     /// Its Morse index, counted on the energy's Hessian at this shape.
     pub negative_eigenvalues: Option<usize>,
-}
-
-impl Shot {
-    /// Whether the equilibrium is stable: no negative eigenvalue.
-    pub fn stable(&self) -> Option<bool> {
-        self.negative_eigenvalues.map(|count| count == 0)
-    }
+    /// Time of the shooting alone, in seconds.
+    pub wall_seconds: f64,
 }
 
 /// The quantities that are compared.
@@ -121,43 +106,100 @@ pub struct Place {
     pub sigma: f64,
 }
 
-/// Both roads, and how far apart they end.
-#[derive(Clone, Debug)]
+/// Both roads, and how far apart they end: `check.json`.
+#[derive(Clone, Debug, Serialize)]
 pub struct Check {
-    /// The relaxed leaf.
-    pub relaxed: Equilibrium,
-    /// The boundary-value solution that starts from it; `None` if it is not
-    /// at rest.
-    pub shot: Option<Result<Shot, Failure>>,
-    /// Time of the shooting alone, in seconds.
-    pub shot_seconds: Option<f64>,
-    /// Largest differences at each station of the relaxed leaf.
-    pub along: Vec<Difference>,
+    /// Name of the scenario.
+    pub scenario: String,
+    /// The verdict.
+    #[serde(flatten)]
+    pub verdict: Verdict,
+    /// Number of veins.
+    pub rods: usize,
+    /// Wanted accuracy, relative to the longest rod.
+    pub tolerance: f64,
     /// Largest differences of all.
     pub difference: Option<Difference>,
-    /// The verdict.
-    pub verdict: Verdict,
+    /// Whether the positions differ by no more than both error estimates
+    /// together allow.
+    pub within_estimates: Option<bool>,
+    /// The relaxed leaf.
+    #[serde(rename = "relaxation", serialize_with = "relaxation")]
+    pub relaxed: Equilibrium,
+    /// The boundary-value problem solved from there; `None` if it is not at rest.
+    #[serde(rename = "shooting")]
+    pub shot: Option<Shot>,
+    /// Stations of the relaxed leaf: fractions of the length.
+    pub stations: Vec<f64>,
+    /// Largest differences of all veins at each of them; none without a solution.
+    #[serde(rename = "differences")]
+    pub along: Vec<Difference>,
 }
 
 impl Check {
-    /// The boundary-value solution, if there is one.
-    pub fn solution(&self) -> Option<&Shot> {
-        self.shot.as_ref()?.as_ref().ok()
+    /// Of a relaxed leaf and what the shooting found from there.
+    pub(crate) fn new(relaxed: Equilibrium, shot: Option<Shot>) -> Self {
+        let mut check = Check {
+            scenario: relaxed.scenario.clone(),
+            verdict: Verdict::Differ,
+            rods: relaxed.rod_count,
+            tolerance: relaxed.accuracy.tolerance,
+            difference: None,
+            within_estimates: None,
+            stations: relaxed.shape.stations.clone(),
+            along: Vec::new(),
+            relaxed,
+            shot,
+        };
+        check.compare();
+        check
     }
 
-    /// Whether the positions differ by no more than both error estimates
-    /// together allow.
-    pub fn within_estimates(&self) -> Option<bool> {
-        let estimate =
-            self.relaxed.accuracy.error_estimate? + self.solution()?.solution.error.position;
+    fn compare(&mut self) {
+        self.along = match self.solution() {
+            Some(solution) => differences(&self.relaxed, solution),
+            None => Vec::new(),
+        };
+        self.difference = self.along.iter().copied().reduce(Difference::max);
+        self.within_estimates = self.differs_within_estimates();
+        self.verdict = self.judge();
+    }
+
+    fn differs_within_estimates(&self) -> Option<bool> {
+        let estimate = self.relaxed.accuracy.error_estimate? + self.solution()?.error.position;
         Some(self.difference?.position <= estimate)
+    }
+
+    fn judge(&self) -> Verdict {
+        let solution = match self.shot.as_ref().map(|shot| &shot.found) {
+            None => return Verdict::NotCompared(why_not_at_rest(&self.relaxed)),
+            Some(Err(failure)) => return Verdict::NotCompared(failure.reason.to_string()),
+            Some(Ok(solution)) => solution,
+        };
+        if solution.error.position > self.allowed() {
+            return Verdict::NotCompared(format!(
+                "the boundary-value solution is only known within {:.1e}: ask for a larger tolerance",
+                solution.error.position
+            ));
+        }
+        let same = |found: Difference| {
+            found.position <= self.allowed() && found.rotation <= self.allowed_rotation()
+        };
+        match self.difference.is_some_and(same) {
+            true => Verdict::Agree,
+            false => Verdict::Differ,
+        }
+    }
+
+    /// The boundary-value solution, if there is one.
+    pub fn solution(&self) -> Option<&Solution> {
+        self.shot.as_ref()?.found.as_ref().ok()
     }
 
     /// Where a quantity differs most.
     pub fn farthest(&self, quantity: Quantity) -> Option<Place> {
-        let solution = &self.solution()?.solution;
-        let stations = &self.relaxed.shape.stations;
-        let stride = (solution.stations.len() - 1) / (stations.len() - 1);
+        let solution = self.solution()?;
+        let stride = (solution.stations.len() - 1) / (self.stations.len() - 1);
         let rods = self
             .relaxed
             .shape
@@ -167,7 +209,7 @@ impl Check {
             .enumerate();
         let found = rods.flat_map(|(rod, (a, b))| {
             let nodes = a.nodes.iter().zip(b.nodes.iter().step_by(stride));
-            nodes.zip(stations).map(move |((a, b), &sigma)| {
+            nodes.zip(&self.stations).map(move |((a, b), &sigma)| {
                 let difference = quantity.of(&Difference::of(a, b));
                 (difference, Place { rod, sigma })
             })
@@ -179,12 +221,12 @@ impl Check {
     /// Distance of positions up to which the shapes are called the same, in
     /// units of length.
     pub fn allowed(&self) -> f64 {
-        self.relaxed.accuracy.tolerance * longest(&self.relaxed)
+        self.tolerance * self.relaxed.shape.longest()
     }
 
     /// Angle between directors up to which the shapes are called the same.
     pub fn allowed_rotation(&self) -> f64 {
-        ROTATION_PART * self.relaxed.accuracy.tolerance
+        ROTATION_PART * self.tolerance
     }
 }
 
@@ -208,102 +250,144 @@ pub fn check(
         ..Options::default()
     };
     let relaxed = relax::relax(scenario, &asked, progress)?;
-    if matches!(relaxed.outcome, Outcome::NotAtRest | Outcome::Diverged) {
-        let why = match &relaxed.remark {
-            Some(remark) => format!("the relaxation did not come to rest: {remark}"),
-            None => "the relaxation did not come to rest".into(),
-        };
-        return Ok(Check {
-            relaxed,
-            shot: None,
-            shot_seconds: None,
-            along: Vec::new(),
-            difference: None,
-            verdict: Verdict::NotCompared(why),
-        });
-    }
-    let stations = Grid::new(
-        relaxed.shape.stations.len() - 1,
-        Leaf::new(scenario).kinks(),
-    );
-    let mut fine = stations.clone();
-    while fine.segments() < SEGMENTS {
-        fine = fine.refined();
-    }
-    let clock = Instant::now();
+    let lost = matches!(relaxed.outcome, Outcome::NotAtRest | Outcome::Diverged);
+    let shot = (!lost).then(|| shoot(scenario, &relaxed, options.intervals));
+    Ok(Check::new(relaxed, shot))
+}
+
+/// Solves the boundary-value problem from a relaxed leaf, as accurately.
+fn shoot(scenario: &Scenario, relaxed: &Equilibrium, intervals: Option<usize>) -> Shot {
+    let grid = fine_grid(scenario, relaxed.shape.stations.len() - 1);
     let start = Start::Leaf {
         stations: &relaxed.shape.stations,
         rods: &relaxed.shape.rods,
     };
-    let found = bvp::solve_within(
-        scenario,
-        start,
-        relaxed.accuracy.tolerance,
-        options.intervals,
-        fine.sigma(),
-    );
-    let shot_seconds = Some(clock.elapsed().as_secs_f64());
-    let shot = found.map(|solution| Shot {
-        negative_eigenvalues: index_near(scenario, fine.clone(), &solution.rods),
-        solution,
-    });
-    let stride = fine.segments() / stations.segments();
-    let along = match &shot {
-        Ok(shot) => differences(&relaxed.shape.rods, &shot.solution.rods, stride),
-        Err(_) => Vec::new(),
-    };
-    let difference = along.iter().copied().reduce(Difference::max);
-    Ok(Check {
-        verdict: judge(&relaxed, &shot, difference),
-        relaxed,
-        shot: Some(shot),
-        shot_seconds,
-        along,
-        difference,
-    })
+    let accuracy = relaxed.accuracy.tolerance;
+    let (found, wall_seconds) =
+        timed(|| bvp::solve_within(scenario, start, accuracy, intervals, grid.sigma()));
+    let rods = found.as_ref().map_or(&[][..], |solution| &solution.rods);
+    let ends = rods.iter().take(relaxed.tips.len());
+    Shot {
+        tips: (ends.filter_map(|rod| rod.nodes.last()))
+            .map(|node| node.position)
+            .collect(),
+        negative_eigenvalues: match &found {
+            Ok(solution) => index_near(scenario, grid, &solution.rods),
+            Err(_) => None,
+        },
+        found,
+        wall_seconds,
+    }
 }
 
-/// Largest differences over all rods at each node of `coarse`, of which `fine`
-/// has `stride` times as many.
-fn differences(coarse: &[RodShape], fine: &[RodShape], stride: usize) -> Vec<Difference> {
-    (0..coarse[0].nodes.len())
+fn why_not_at_rest(relaxed: &Equilibrium) -> String {
+    let why = "the relaxation did not come to rest";
+    match &relaxed.remark {
+        Some(remark) => format!("{why}: {remark}"),
+        None => why.into(),
+    }
+}
+
+/// Largest differences over all rods at each station of the relaxed leaf, which
+/// are among those of the solution.
+fn differences(relaxed: &Equilibrium, solution: &Solution) -> Vec<Difference> {
+    let leaf = &relaxed.shape;
+    let stride = (solution.stations.len() - 1) / (leaf.stations.len() - 1);
+    let rods = || leaf.rods.iter().zip(&solution.rods);
+    (0..leaf.stations.len())
         .map(|i| {
-            coarse
-                .iter()
-                .zip(fine)
+            rods()
                 .map(|(a, b)| Difference::of(&a.nodes[i], &b.nodes[stride * i]))
                 .fold(Difference::default(), Difference::max)
         })
         .collect()
 }
 
-fn longest(leaf: &Equilibrium) -> f64 {
-    leaf.shape
-        .rods
-        .iter()
-        .map(|rod| rod.length)
-        .fold(0.0, f64::max)
+/// What `check.json` says of the relaxed leaf.
+fn relaxation<S: Serializer>(leaf: &Equilibrium, serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Keys<'a> {
+        outcome: &'static str,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        remark: Option<&'a str>,
+        segments: &'a [usize],
+        error_estimate: Option<f64>,
+        residual: Option<f64>,
+        energy: Option<f64>,
+        #[serde(flatten, serialize_with = "serialize_tips")]
+        tips: &'a [DVec3],
+        #[serde(flatten, serialize_with = "serialize_index")]
+        index: Option<usize>,
+        wall_seconds: f64,
+    }
+    Keys {
+        outcome: leaf.outcome.word(),
+        remark: leaf.remark.as_deref(),
+        segments: &leaf.accuracy.segments,
+        error_estimate: leaf.accuracy.error_estimate,
+        residual: leaf.accuracy.residual,
+        energy: leaf.energy,
+        tips: &leaf.tips,
+        index: leaf.stability.negative_eigenvalues,
+        wall_seconds: leaf.wall_seconds,
+    }
+    .serialize(serializer)
 }
 
-fn judge(
-    relaxed: &Equilibrium,
-    shot: &Result<Shot, Failure>,
-    difference: Option<Difference>,
-) -> Verdict {
-    let wanted = relaxed.accuracy.tolerance * longest(relaxed);
-    match (shot, difference) {
-        (Err(failure), _) => Verdict::NotCompared(failure.reason.to_string()),
-        (Ok(shot), _) if shot.solution.error.position > wanted => Verdict::NotCompared(format!(
-            "the boundary-value solution is only known within {:.1e}: ask for a larger tolerance",
-            shot.solution.error.position
-        )),
-        (_, Some(found))
-            if found.position <= wanted
-                && found.rotation <= ROTATION_PART * relaxed.accuracy.tolerance =>
-        {
-            Verdict::Agree
+/// All keys; those of a solution are null if there is none.
+impl Serialize for Shot {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Keys<'a> {
+            outcome: &'static str,
+            intervals: Option<usize>,
+            growth_log10: Option<f64>,
+            defect: Option<f64>,
+            condition: Option<f64>,
+            error_estimate: Option<Difference>,
+            energy: Option<f64>,
+            #[serde(flatten, serialize_with = "serialize_tips")]
+            tips: &'a [DVec3],
+            #[serde(flatten, serialize_with = "serialize_index")]
+            index: Option<usize>,
+            neutral: Option<NeutralKeys<'a>>,
+            work: bvp::Work,
+            wall_seconds: f64,
         }
-        _ => Verdict::Differ,
+        #[derive(Serialize)]
+        struct NeutralKeys<'a> {
+            ratio: f64,
+            meaning: String,
+            displacement: &'a [Vec<DVec3>],
+        }
+        let solution = self.found.as_ref().ok();
+        let (outcome, neutral, work) = match &self.found {
+            Ok(solution) => ("converged", solution.neutral.as_ref(), solution.work),
+            Err(Failure { reason, work, .. }) => match reason {
+                Reason::Singular(neutral) => ("singular", Some(neutral), *work),
+                Reason::NoConvergence { .. } => ("no-convergence", None, *work),
+                Reason::Unbounded { .. } => ("unbounded", None, *work),
+            },
+        };
+        Keys {
+            outcome,
+            intervals: solution.map(|solution| solution.intervals.len() - 1),
+            growth_log10: solution.map(|solution| solution.growth),
+            defect: solution.map(|solution| solution.defect),
+            condition: solution.map(|solution| solution.condition),
+            error_estimate: solution.map(|solution| solution.error),
+            energy: solution.map(|solution| solution.energy),
+            tips: &self.tips,
+            index: self.negative_eigenvalues,
+            neutral: neutral.map(|neutral| NeutralKeys {
+                ratio: neutral.ratio,
+                meaning: neutral.to_string(),
+                displacement: &neutral.displacement,
+            }),
+            work,
+            wall_seconds: self.wall_seconds,
+        }
+        .serialize(serializer)
     }
 }
 
@@ -326,14 +410,10 @@ mod tests {
 
     /// The check with the boundary-value solution changed after the fact.
     fn changed(mut check: Check, change: impl Fn(&mut Solution)) -> Check {
-        let mut shot = check.shot.take().unwrap().unwrap();
-        change(&mut shot.solution);
-        let stride = (shot.solution.stations.len() - 1) / (check.relaxed.shape.stations.len() - 1);
-        check.along = differences(&check.relaxed.shape.rods, &shot.solution.rods, stride);
-        check.difference = check.along.iter().copied().reduce(Difference::max);
-        let shot = Ok(shot);
-        check.verdict = judge(&check.relaxed, &shot, check.difference);
-        check.shot = Some(shot);
+        if let Some(Ok(solution)) = check.shot.as_mut().map(|shot| shot.found.as_mut()) {
+            change(solution);
+        }
+        check.compare();
         check
     }
 
@@ -341,8 +421,8 @@ mod tests {
     fn both_roads_end_in_the_same_place() {
         let check = fan();
         assert_eq!(check.verdict, Verdict::Agree);
-        assert_eq!(check.within_estimates(), Some(true));
-        assert_eq!(check.allowed(), 2.0 * check.relaxed.accuracy.tolerance);
+        assert_eq!(check.within_estimates, Some(true));
+        assert_eq!(check.allowed(), 2.0 * check.tolerance);
     }
 
     #[test]
@@ -353,7 +433,7 @@ mod tests {
             solution.rods[1].nodes[middle].position += 3e-6 * DVec3::Z;
         });
         assert_eq!(moved.verdict, Verdict::Differ);
-        assert_eq!(moved.within_estimates(), Some(false));
+        assert_eq!(moved.within_estimates, Some(false));
         let place = Place { rod: 1, sigma: 0.5 };
         assert_eq!(moved.farthest(Quantity::Position), Some(place));
 

@@ -3,6 +3,7 @@
 mod all;
 mod chart;
 mod check;
+mod judge;
 mod map;
 mod trace;
 mod vary;

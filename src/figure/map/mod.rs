@@ -60,20 +60,17 @@ pub fn draw(map: &Map) -> Drawing {
 
 fn notes(map: &Map) -> Vec<String> {
     let request = &map.request;
-    let rows = map.rows.iter();
-    let mut cells: Vec<(usize, Confidence)> = rows.map(|row| (row.cell, row.reference)).collect();
-    cells.dedup_by_key(|(cell, _)| *cell);
-    let confirmed = cells.iter().filter(|cell| cell.1 == Confidence::Confirmed);
+    let (known, confirmed) = map.known_and_confirmed();
     let mut axes = request.axes.iter();
     let mut notes = Vec::new();
     if !axes.any(|axis| axis.keys.to_string() == "leaf.rods") {
         notes.push(format!("N = {}", request.base.scenario().rods.len()));
     }
-    notes.push(match cells.len() {
+    notes.push(match known {
         known if known < request.cells() => format!("{known} of {} cells", request.cells()),
         all => format!("{all} cells"),
     });
-    notes.push(format!("reference confirmed in {}", confirmed.count()));
+    notes.push(format!("reference confirmed in {confirmed}"));
     if let Some(segments) = request.base.knobs().segments {
         notes.push(format!("{segments} segments a vein"));
     }

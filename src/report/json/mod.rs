@@ -1,36 +1,14 @@
 //! JSON, for scripts: compact, numbers that are not finite as null.
 
-mod chart;
-mod check;
-mod map;
 #[cfg(test)]
 mod summary;
 
 use std::io::{self, Write};
 
-use glam::DVec3;
 use serde::Serialize;
 use serde_json::ser::Formatter;
 
 use super::Format;
-
-pub use chart::ChartSummary;
-pub use check::CheckSummary;
-pub use map::MapSummary;
-
-type Point = [f64; 3];
-
-fn points(points: impl IntoIterator<Item = DVec3>) -> Vec<Point> {
-    points.into_iter().map(|point| point.to_array()).collect()
-}
-
-/// The only tip, or else all of them.
-fn tips(tips: &[DVec3]) -> (Option<Point>, Option<Vec<Point>>) {
-    match tips {
-        [only] => (Some(only.to_array()), None),
-        tips => (None, Some(points(tips.iter().copied()))),
-    }
-}
 
 /// A result as it serializes, in a file of this name: also what `--json` prints.
 pub struct Json(pub &'static str);

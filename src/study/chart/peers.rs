@@ -1,5 +1,7 @@
 //! Measurements of other programs, beside ours.
 
+use serde::Serialize;
+
 use super::timing::Spread;
 
 /// First words of outcomes that are solutions.
@@ -28,13 +30,15 @@ pub struct PeerRow {
 }
 
 /// A peer's measurements at one setting.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Peer {
     /// The program, with its settings other than the knob.
+    #[serde(rename = "program")]
     pub name: String,
     /// Where its knob stands.
     pub knob: String,
     /// Times of all rows alike.
+    #[serde(flatten)]
     pub seconds: Spread,
     /// The largest error of these rows, relative to the longest rod; `None`
     /// if it did not come to rest.
@@ -43,6 +47,15 @@ pub struct Peer {
     pub outcome: String,
     /// Whether it is on the Pareto front.
     pub pareto: bool,
+    /// Its time over that of the default contender at an error at most as large.
+    pub ratio: Option<f64>,
+}
+
+impl Peer {
+    /// Seconds and error, if it came to rest.
+    pub fn point(&self) -> Option<(f64, f64)> {
+        Some((self.seconds.median, self.true_error?))
+    }
 }
 
 /// The rows about a leaf, with equal rows taken together, and what is to be
@@ -53,7 +66,8 @@ pub fn about(
     rods: usize,
     longest: f64,
 ) -> (Vec<Peer>, Vec<String>) {
-    let mut groups: Vec<(Peer, Vec<f64>)> = Vec::new();
+    let mut peers: Vec<Peer> = Vec::new();
+    let mut times: Vec<Vec<f64>> = Vec::new();
     let (mut other, mut silent) = (0, 0);
     for row in rows {
         if row.scenario != scenario || row.rods != rods {
@@ -69,42 +83,31 @@ pub fn about(
         let true_error = row.error.filter(|_| at_rest).map(|error| error / longest);
         let (knob, settings) = row.knob.split_once(' ').unwrap_or((&row.knob, ""));
         let name = format!("{} {settings}", row.program).trim_end().to_string();
-        let same = groups.iter_mut().find(|(peer, _)| {
-            peer.name == name && peer.knob == knob && peer.outcome == row.outcome
+        let same = peers
+            .iter()
+            .position(|peer| peer.name == name && peer.knob == knob && peer.outcome == row.outcome);
+        let same = same.unwrap_or_else(|| {
+            peers.push(Peer {
+                name,
+                knob: knob.into(),
+                seconds: Spread::default(),
+                true_error,
+                outcome: row.outcome.clone(),
+                pareto: false,
+                ratio: None,
+            });
+            times.push(Vec::new());
+            times.len() - 1
         });
-        match same {
-            Some((peer, seconds)) => {
-                seconds.push(row.seconds);
-                if true_error > peer.true_error {
-                    peer.true_error = true_error;
-                }
-            }
-            None => {
-                let seconds = vec![row.seconds];
-                let Some(spread) = Spread::of(&seconds) else {
-                    continue;
-                };
-                let peer = Peer {
-                    name,
-                    knob: knob.into(),
-                    seconds: spread,
-                    true_error,
-                    outcome: row.outcome.clone(),
-                    pareto: false,
-                };
-                groups.push((peer, seconds));
-            }
+        times[same].push(row.seconds);
+        if true_error > peers[same].true_error {
+            peers[same].true_error = true_error;
         }
     }
-    let peers = groups.into_iter().map(|(peer, mut seconds)| {
+    for (peer, seconds) in peers.iter_mut().zip(&mut times) {
         seconds.sort_by(f64::total_cmp);
-        let spread = Spread::of(&seconds).unwrap_or(peer.seconds);
-        Peer {
-            seconds: spread,
-            ..peer
-        }
-    });
-    let peers = peers.collect();
+        peer.seconds = Spread::of(seconds).unwrap_or_default();
+    }
     let rows = |count: usize| match count {
         1 => "1 row of --peers is".to_string(),
         count => format!("{count} rows of --peers are"),

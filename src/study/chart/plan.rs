@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use serde::{Serialize, Serializer};
+
 use crate::scenario::Scenario;
 
 /// A way to bring a leaf to rest, with one knob for its accuracy.
@@ -65,6 +67,11 @@ impl Contender {
         }
     }
 
+    /// Whether it is what a relaxation does unless told otherwise.
+    pub fn is_default(self) -> bool {
+        self == Contender::SemiImplicit
+    }
+
     /// Whether its knob is the number of segments of its only grid.
     pub fn on_one_grid(self) -> bool {
         matches!(self, Contender::SemiImplicitGrid | Contender::ExplicitGrid)
@@ -76,6 +83,18 @@ impl Contender {
             true => SEGMENTS.map(Setting::Segments).to_vec(),
             false => TOLERANCES.map(Setting::Tolerance).to_vec(),
         }
+    }
+}
+
+impl Serialize for Contender {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.word())
+    }
+}
+
+impl Serialize for Setting {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
     }
 }
 

@@ -1,9 +1,11 @@
 //! The solution that all others are measured against.
 
-use super::run::{Shape, longest, union};
-use crate::bvp::{self, Neutral, Solution, Start};
-use crate::relax::{self, Equilibrium, Options, Outcome, RelaxError, SMALLEST_TOLERANCE};
+use serde::Serialize;
+
+use crate::bvp::{self, Start};
+use crate::relax::{Options, Outcome, RelaxError, SMALLEST_TOLERANCE};
 use crate::scenario::Scenario;
+use crate::study::judge::{Answer, longest, union};
 
 /// Tolerances of the relaxation: first one that most leaves reach, then the
 /// best, or else one that asks for fewer grids to come to rest on.
@@ -12,7 +14,7 @@ const LARGER: f64 = 1e-4;
 
 /// The reference, and how far it can be trusted. Lengths are relative to the
 /// longest rod.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Reference {
     /// Whether relaxation and shooting agree within their error estimates.
     pub confirmed: bool,
@@ -23,9 +25,9 @@ pub struct Reference {
     /// cannot be told from none.
     pub known_within: f64,
     /// Error estimate of the relaxation, if the leaf came to rest.
-    pub relaxed: Option<f64>,
+    pub relaxation_estimate: Option<f64>,
     /// Error estimate of the shooting, if it found a solution.
-    pub shot: Option<f64>,
+    pub shooting_estimate: Option<f64>,
     /// Largest distance between both.
     pub difference: Option<f64>,
     /// How the leaf could move without resistance, if it could: errors then say
@@ -41,70 +43,71 @@ pub struct Reference {
 pub fn find(
     scenario: &Scenario,
     wanted: Vec<f64>,
-) -> Result<Option<(Reference, Shape)>, RelaxError> {
+) -> Result<Option<(Reference, Answer)>, RelaxError> {
     let relaxed = best_relaxed(scenario)?;
-    let stations = relaxed.iter().flat_map(|leaf| &leaf.shape.stations);
-    let stations = union(wanted.into_iter().chain(stations.copied()).collect());
-    let start = match &relaxed {
-        Some(leaf) => Start::Leaf {
-            stations: &leaf.shape.stations,
-            rods: &leaf.shape.rods,
-        },
-        None => Start::Arcs,
+    let known = relaxed.iter().flat_map(|leaf| &leaf.stations);
+    let stations = union(wanted.into_iter().chain(known.copied()).collect());
+    let start = relaxed.as_ref().map_or(Start::Arcs, Answer::as_start);
+    let solved = bvp::solve_within(scenario, start, SMALLEST_TOLERANCE, None, &stations);
+    let neutral = match &solved {
+        Ok(solution) => solution.neutral.as_ref().map(ToString::to_string),
+        Err(_) => None,
     };
-    let shot = bvp::solve_within(scenario, start, SMALLEST_TOLERANCE, None, &stations);
+    let shot = solved.map(|solution| Answer::of_solution(scenario, solution, SMALLEST_TOLERANCE));
     let unit = longest(scenario);
     Ok(match (relaxed, shot) {
-        (Some(leaf), Ok(solution)) => Some(both(leaf, solution, unit)),
+        (Some(leaf), Ok(shot)) => {
+            let (reference, answer) = both(leaf, shot, unit);
+            Some((
+                Reference {
+                    neutral,
+                    ..reference
+                },
+                answer,
+            ))
+        }
         (Some(leaf), Err(failure)) => {
+            let estimate = leaf.error() / unit;
             let reference = Reference {
                 confirmed: false,
                 told: format!(
                     "the relaxed leaf: shooting does not confirm it, {}",
                     failure.reason
                 ),
-                known_within: estimate(&leaf, unit),
-                relaxed: Some(estimate(&leaf, unit)),
-                shot: None,
+                known_within: estimate,
+                relaxation_estimate: Some(estimate),
+                shooting_estimate: None,
                 difference: None,
-                neutral: None,
+                neutral,
             };
-            Some((reference, Shape::new(leaf.shape.stations, &leaf.shape.rods)))
+            Some((reference, leaf))
         }
-        (None, Ok(solution)) => {
-            let error = solution.error.position / unit;
+        (None, Ok(shot)) => {
+            let estimate = shot.error() / unit;
             let reference = Reference {
                 confirmed: false,
                 told: "the boundary-value solution from arcs: the relaxation does not come to rest"
                     .into(),
-                known_within: error,
-                relaxed: None,
-                shot: Some(error),
+                known_within: estimate,
+                relaxation_estimate: None,
+                shooting_estimate: Some(estimate),
                 difference: None,
-                neutral: solution.neutral.as_ref().map(Neutral::to_string),
+                neutral,
             };
-            Some((reference, Shape::new(solution.stations, &solution.rods)))
+            Some((reference, shot))
         }
         (None, Err(_)) => None,
     })
 }
 
-fn estimate(leaf: &Equilibrium, unit: f64) -> f64 {
-    leaf.accuracy
-        .error_estimate
-        .map_or(f64::INFINITY, |error| error / unit)
-}
-
 /// The most accurate relaxation that comes to rest.
-fn best_relaxed(scenario: &Scenario) -> Result<Option<Equilibrium>, RelaxError> {
+fn best_relaxed(scenario: &Scenario) -> Result<Option<Answer>, RelaxError> {
     let at = |tolerance: f64| {
         let options = Options {
             tolerance: Some(tolerance),
             ..Options::default()
         };
-        let leaf = relax::relax(scenario, &options, &mut |_| {})?;
-        let at_rest = leaf.outcome.is_success() || leaf.outcome == Outcome::ToleranceNotReached;
-        Ok(at_rest.then_some(leaf))
+        Ok(Some(Answer::relaxed(scenario, &options)?).filter(Answer::at_rest))
     };
     let Some(first) = at(FIRST)? else {
         return at(LARGER);
@@ -114,21 +117,19 @@ fn best_relaxed(scenario: &Scenario) -> Result<Option<Equilibrium>, RelaxError> 
     }
     let better = at(SMALLEST_TOLERANCE)?;
     Ok(better
-        .filter(|leaf| leaf.accuracy.error_estimate <= first.accuracy.error_estimate)
+        .filter(|leaf| leaf.error_estimate <= first.error_estimate)
         .or(Some(first)))
 }
 
 /// The boundary-value solution, which is known at all stations, if both agree;
 /// otherwise the one that claims to be better.
-fn both(leaf: Equilibrium, solution: Solution, unit: f64) -> (Reference, Shape) {
-    let (relaxed, shot) = (estimate(&leaf, unit), solution.error.position / unit);
-    let leaf = Shape::new(leaf.shape.stations, &leaf.shape.rods);
-    let neutral = solution.neutral.as_ref().map(Neutral::to_string);
-    let solution = Shape::new(solution.stations, &solution.rods);
-    let difference = leaf.distance(&solution).map(|distance| distance / unit);
-    let confirmed = difference.is_some_and(|difference| difference <= relaxed + shot);
-    let better = relaxed.min(shot);
-    let told = match (confirmed, relaxed < shot) {
+fn both(leaf: Answer, shot: Answer, unit: f64) -> (Reference, Answer) {
+    let [relaxation, shooting] = [&leaf, &shot].map(|answer| answer.error() / unit);
+    let distance = leaf.distance(&shot);
+    let confirmed = distance.is_some_and(|distance| leaf.confirms(&shot, distance));
+    let difference = distance.map(|distance| distance / unit);
+    let better = relaxation.min(shooting);
+    let told = match (confirmed, relaxation < shooting) {
         (true, _) => "relaxation and shooting agree within their error estimates",
         (false, true) => "the relaxed leaf: shooting finds another shape",
         (false, false) => "the boundary-value solution: the relaxed leaf has another shape",
@@ -140,13 +141,13 @@ fn both(leaf: Equilibrium, solution: Solution, unit: f64) -> (Reference, Shape) 
             Some(difference) if confirmed => better.max(difference),
             _ => better,
         },
-        relaxed: Some(relaxed),
-        shot: Some(shot),
+        relaxation_estimate: Some(relaxation),
+        shooting_estimate: Some(shooting),
         difference,
-        neutral,
+        neutral: None,
     };
-    match confirmed || shot <= relaxed {
-        true => (reference, solution),
+    match confirmed || shooting <= relaxation {
+        true => (reference, shot),
         false => (reference, leaf),
     }
 }
@@ -155,51 +156,33 @@ fn both(leaf: Equilibrium, solution: Solution, unit: f64) -> (Reference, Shape) 
 mod tests {
     use super::*;
 
-    fn leaf() -> Scenario {
+    #[test]
+    fn another_shape_does_not_confirm_and_the_better_is_taken() {
         let leaf = r#"
             name = "fan"
             leaf = { rods = 2, length = 2.0, fan = "symmetric" }
             stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }
             load = { gravity = [0.0, 0.0, -0.1] }
         "#;
-        Scenario::from_toml(leaf).unwrap()
-    }
-
-    #[test]
-    fn both_ways_confirm_each_other_and_all_stations_are_known() {
-        let found = find(&leaf(), vec![0.0, 1.0 / 3.0, 1.0]).unwrap();
-        let (reference, shape) = found.unwrap();
+        let scenario = Scenario::from_toml(leaf).unwrap();
+        let relaxed = best_relaxed(&scenario).unwrap().unwrap();
+        let (reference, mut elsewhere) = find(&scenario, Vec::new()).unwrap().unwrap();
         assert!(reference.confirmed, "{}", reference.told);
         assert!(reference.known_within < 1e-11);
-        assert!(shape.covers(&[1.0 / 3.0, 0.125, 1.0]));
-    }
-
-    #[test]
-    fn another_shape_does_not_confirm_and_the_better_is_taken() {
-        let scenario = leaf();
-        let relaxed = best_relaxed(&scenario).unwrap().unwrap();
-        let start = Start::Leaf {
-            stations: &relaxed.shape.stations,
-            rods: &relaxed.shape.rods,
-        };
-        let solution =
-            bvp::solve_within(&scenario, start, 1e-12, None, &relaxed.shape.stations).unwrap();
-        let mut elsewhere = solution.clone();
         for rod in &mut elsewhere.rods {
             for node in &mut rod.nodes {
                 node.position.z += 1e-6;
             }
         }
         for (error, shot_is_better) in [(1e-16, true), (1e-7, false)] {
-            elsewhere.error.position = error;
-            let (reference, shape) = both(relaxed.clone(), elsewhere.clone(), 2.0);
+            elsewhere.error_estimate = Some(error);
+            let (reference, taken) = both(relaxed.clone(), elsewhere.clone(), 2.0);
             assert!(!reference.confirmed);
-            let shifted = Shape::new(elsewhere.stations.clone(), &elsewhere.rods);
-            assert_eq!(shape == shifted, shot_is_better);
+            assert_eq!(taken.rods == elsewhere.rods, shot_is_better);
         }
         // An estimate that is as large as the difference confirms little, but
         // truly.
-        elsewhere.error.position = 3e-6;
+        elsewhere.error_estimate = Some(3e-6);
         assert!(both(relaxed, elsewhere, 2.0).0.confirmed);
     }
 }

@@ -2,30 +2,35 @@
 
 use super::plan::{Cell, Contender, SEGMENTS, Setting};
 use super::reference;
-use super::run::{Shape, longest, run};
-use super::{ChartError, ChartOptions, Ending, Row, Turn, alone, judge, timing};
-use crate::relax::{MAX_NODES, Outcome, RelaxError, Work, check_tolerance};
+use super::run::run;
+use super::{ChartError, ChartOptions, Ending, Row, Turn, alone, rows, timing};
+use crate::relax::{MAX_NODES, Outcome, RelaxError, check_tolerance};
 use crate::scenario::Scenario;
+use crate::study::judge::{Answer, longest};
+use serde::Serialize;
 
 /// Cost against the number of veins.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Scaling {
     /// Name of the scenario.
+    #[serde(skip)]
     pub scenario: String,
     /// Wanted accuracy, relative to the longest rod.
     pub tolerance: f64,
-    /// One row for each leaf and contender.
-    pub rows: Vec<ScalingRow>,
     /// Numbers of veins whose reference is not confirmed.
     pub unconfirmed: Vec<usize>,
+    /// One row for each leaf and contender.
+    #[serde(rename = "runs")]
+    pub rows: Vec<ScalingRow>,
 }
 
 /// One contender on one leaf.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct ScalingRow {
     /// Number of veins.
     pub rods: usize,
     /// What was measured.
+    #[serde(flatten)]
     pub row: Row,
 }
 
@@ -53,12 +58,19 @@ pub fn scaling(
             .first()
             .map_or(String::new(), |leaf| leaf.name.clone()),
         tolerance,
-        rows,
         unconfirmed,
+        rows,
     })
 }
 
 type Found = (Vec<ScalingRow>, Vec<usize>);
+
+/// A leaf, its reference, and the coarsest grid that is accurate enough for it.
+struct Leaf<'s> {
+    scenario: &'s Scenario,
+    reference: Option<Answer>,
+    grid: Option<usize>,
+}
 
 fn measure(
     leaves: &[&Scenario],
@@ -66,53 +78,56 @@ fn measure(
     options: &ChartOptions,
     progress: &mut (dyn FnMut(&Turn) + Send),
 ) -> Result<Found, RelaxError> {
-    let any_grid = options
-        .contenders
-        .iter()
-        .any(|contender| contender.on_one_grid());
-    let (mut shapes, mut grids, mut unconfirmed) = (Vec::new(), Vec::new(), Vec::new());
-    for leaf in leaves {
-        let (reference, shape) = reference::find(leaf, Vec::new())?.unzip();
-        if !reference.is_some_and(|found| found.confirmed) {
-            unconfirmed.push(leaf.rods.len());
+    let mut contenders = options.contenders.iter();
+    let any_grid = contenders.any(|contender| contender.on_one_grid());
+    let mut unconfirmed = Vec::new();
+    let leaves = leaves.iter().map(|&scenario| {
+        let (found, reference) = reference::find(scenario, Vec::new())?.unzip();
+        if !found.is_some_and(|found| found.confirmed) {
+            unconfirmed.push(scenario.rods.len());
         }
-        grids.push(match &shape {
-            Some(shape) if any_grid => accurate_grid(leaf, shape, tolerance),
+        let grid = match &reference {
+            Some(reference) if any_grid => accurate_grid(scenario, reference, tolerance),
             _ => None,
-        });
-        shapes.push(shape);
-    }
+        };
+        Ok(Leaf {
+            scenario,
+            reference,
+            grid,
+        })
+    });
+    let leaves: Vec<Leaf> = leaves.collect::<Result<_, RelaxError>>()?;
     // A contender goes from few veins to many: if one leaf takes it too long,
     // larger ones are not tried.
-    let mut cells = Vec::new();
-    let mut hopeless = Vec::new();
+    let (mut cells, mut of_leaf, mut rows) = (Vec::new(), Vec::new(), Vec::new());
     for &contender in &options.contenders {
-        for (scenario, grid) in leaves.iter().zip(&grids) {
-            let knob = match (contender.on_one_grid(), grid) {
+        for leaf in &leaves {
+            let knob = match (contender.on_one_grid(), leaf.grid) {
                 (false, _) => Setting::Tolerance(tolerance),
-                (true, Some(segments)) => Setting::Segments(*segments),
+                (true, Some(segments)) => Setting::Segments(segments),
                 (true, None) => {
-                    hopeless.push(no_grid(scenario, contender));
+                    rows.push(no_grid(leaf.scenario, contender));
                     continue;
                 }
             };
             cells.push(Cell {
-                scenario,
+                scenario: leaf.scenario,
                 contender,
                 knob,
             });
+            of_leaf.push(leaf);
         }
     }
     let (measured, _) = timing::measure(&cells, options.seconds, progress);
-    let mut rows = hopeless;
-    for (cell, measured) in cells.iter().zip(measured) {
-        let place = leaves
-            .iter()
-            .position(|leaf| std::ptr::eq(*leaf, cell.scenario));
-        let reference = place.and_then(|place| shapes[place].as_ref());
-        let row = judge::rows(cell.scenario, &[*cell], vec![measured], reference);
+    for ((cell, leaf), measured) in cells.iter().zip(of_leaf).zip(measured) {
+        let row = rows::rows(
+            leaf.scenario,
+            &[*cell],
+            &[measured],
+            leaf.reference.as_ref(),
+        );
         rows.extend(row.into_iter().map(|row| ScalingRow {
-            rods: cell.scenario.rods.len(),
+            rods: leaf.scenario.rods.len(),
             row,
         }));
     }
@@ -122,40 +137,33 @@ fn measure(
 }
 
 /// The coarsest single grid whose error is within the tolerance.
-fn accurate_grid(scenario: &Scenario, reference: &Shape, tolerance: f64) -> Option<usize> {
-    let fits = |segments: &&usize| scenario.rods.len() * **segments <= MAX_NODES;
-    let accurate = |segments: usize| {
+fn accurate_grid(scenario: &Scenario, reference: &Answer, tolerance: f64) -> Option<usize> {
+    let fits = |segments: &usize| scenario.rods.len() * segments <= MAX_NODES;
+    let accurate = |&segments: &usize| {
         let cell = Cell {
             scenario,
             contender: Contender::SemiImplicitGrid,
             knob: Setting::Segments(segments),
         };
-        let (run, _) = run(&cell).ok()?;
-        let error = run.shape.distance(reference)? / longest(scenario);
-        (run.at_rest() && error <= tolerance).then_some(segments)
+        let Ok((answer, _)) = run(&cell) else {
+            return false;
+        };
+        let distance = answer.distance(reference);
+        let within = |distance: f64| distance / longest(scenario) <= tolerance;
+        answer.at_rest() && distance.is_some_and(within)
     };
-    SEGMENTS
-        .iter()
-        .take_while(fits)
-        .find_map(|&segments| accurate(segments))
+    SEGMENTS.into_iter().take_while(fits).find(accurate)
 }
 
 fn no_grid(scenario: &Scenario, contender: Contender) -> ScalingRow {
     let finest = SEGMENTS[SEGMENTS.len() - 1];
+    let ending = Ending::Ended(Outcome::ToleranceNotReached);
+    let why = format!("no grid of up to {finest} segments is accurate enough");
     ScalingRow {
         rods: scenario.rods.len(),
         row: Row {
-            contender,
-            knob: Setting::Segments(finest),
-            seconds: None,
-            work: Work::default(),
-            true_error: None,
-            error_estimate: None,
-            ending: Ending::Ended(Outcome::ToleranceNotReached),
-            remark: Some(format!(
-                "no grid of up to {finest} segments is accurate enough"
-            )),
-            pareto: false,
+            remark: Some(why),
+            ..Row::without_result(contender, Setting::Segments(finest), ending)
         },
     }
 }

@@ -1,9 +1,12 @@
 //! Time measured fairly: all cells take turns, so that a busy machine treats
 //! them alike.
 
+use serde::{Serialize, Serializer};
+
 use super::plan::{Cell, Contender};
-use super::run::{Run, run};
+use super::run::run;
 use crate::relax::RelaxError;
+use crate::study::judge::Answer;
 
 /// Runs that take longer, in seconds, are slow: they are not repeated.
 const SLOW: f64 = 1.0;
@@ -31,21 +34,32 @@ pub struct Turn {
 pub struct Measured {
     /// What the first run found. `None`: it was not run, as a coarser one of
     /// its contender took too long already.
-    pub found: Option<Result<Run, RelaxError>>,
+    pub found: Option<Result<Answer, RelaxError>>,
     /// Seconds of each run, ascending.
     pub seconds: Vec<f64>,
 }
 
+impl Measured {
+    /// What was found, unless the run was refused or not made.
+    pub fn answer(&self) -> Option<&Answer> {
+        self.found.as_ref()?.as_ref().ok()
+    }
+}
+
 /// The spread of repeated measurements, in seconds.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Spread {
+    /// Median.
+    #[serde(rename = "seconds")]
+    pub median: f64,
     /// Shortest.
+    #[serde(rename = "seconds_min")]
     pub min: f64,
     /// First quartile.
+    #[serde(rename = "seconds_q1")]
     pub q1: f64,
-    /// Median.
-    pub median: f64,
     /// Third quartile.
+    #[serde(rename = "seconds_q3")]
     pub q3: f64,
     /// Number of measurements.
     pub runs: usize,
@@ -69,6 +83,25 @@ impl Spread {
             q3: at(0.75),
             runs: sorted.len(),
         })
+    }
+}
+
+/// The same keys without a measurement: all null, and no run.
+pub fn serialize_spread<S: Serializer>(
+    spread: &Option<Spread>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    #[derive(Default, Serialize)]
+    struct Nothing {
+        seconds: (),
+        seconds_min: (),
+        seconds_q1: (),
+        seconds_q3: (),
+        runs: usize,
+    }
+    match spread {
+        Some(spread) => spread.serialize(serializer),
+        None => Nothing::default().serialize(serializer),
     }
 }
 

@@ -2,14 +2,14 @@
 
 use std::time::{Duration, Instant};
 
-use crate::bvp::Start;
-use crate::relax::{Method, Options};
+use crate::bvp::{self, Reason, Start};
+use crate::relax::{self, Method, Options, Outcome};
 use crate::scenario::Scenario;
+use crate::study::judge::{
+    Answer, SAME_PLACE, SEGMENTS, fine_grid, grid_error, index_at, longest, timed, union,
+};
 use crate::study::vary::{Knobs, Varied};
 
-use super::answer::{
-    Answer, Found, SAME_PLACE, Shooting, Timed, fine_grid, longest, relaxed, timed,
-};
 use super::motion;
 use super::row::{Confidence, MapMethod, MapOutcome, MapRow};
 
@@ -18,8 +18,9 @@ use super::row::{Confidence, MapMethod, MapOutcome, MapRow};
 const SHARPER: f64 = 1e-2;
 const SHARPEST: f64 = 1e-12;
 
-/// Segments between the stations of shooting, at least.
-const SEGMENTS: usize = 32;
+/// An answer at rest within the tolerance, or why there is none: an outcome and
+/// a sentence.
+pub type Found = Result<Answer, (MapOutcome, String)>;
 
 /// What a cell's leaf is solved with.
 pub struct Cell<'a> {
@@ -27,8 +28,8 @@ pub struct Cell<'a> {
     knobs: Knobs,
     tolerance: f64,
     limit: Duration,
-    /// The default's answer: the start of shooting from rest.
-    relaxed: Timed,
+    /// The default's answer and its seconds: the start of shooting from rest.
+    relaxed: (Found, f64),
     reference: Option<Answer>,
     confidence: Confidence,
 }
@@ -39,13 +40,8 @@ impl<'a> Cell<'a> {
     pub fn new(varied: &'a Varied, tolerance: Option<f64>, limit: Duration) -> Self {
         let scenario = &varied.scenario;
         let tolerance = tolerance.unwrap_or(scenario.tolerance);
-        let relaxed = timed(limit, |deadline| {
-            let options = Options {
-                tolerance: Some(tolerance),
-                deadline: Some(deadline),
-                ..Options::default()
-            };
-            relaxed(scenario, &options)
+        let relaxed = within(limit, |deadline| {
+            relaxed(scenario, Method::default(), tolerance, deadline)
         });
         let mut cell = Cell {
             scenario,
@@ -57,148 +53,145 @@ impl<'a> Cell<'a> {
             confidence: Confidence::None,
         };
         let sharp = (SHARPER * tolerance).max(SHARPEST);
-        let shot = timed(limit, |deadline| cell.shoot_from_rest(sharp, deadline));
-        if let Found::Rest(relaxed) = &cell.relaxed.found {
-            (cell.confidence, cell.reference) = match shot.found {
-                Found::Rest(shot) => {
-                    let apart = relaxed.distance(&shot);
-                    let known = relaxed.estimate + shot.estimate;
-                    match (apart <= known, shot.index) {
-                        (true, index) if index == relaxed.index => {
-                            (Confidence::Confirmed, Some(*shot))
-                        }
-                        (_, Some(0)) => (Confidence::Unconfirmed, Some(*shot)),
-                        _ => (Confidence::Unconfirmed, Some((**relaxed).clone())),
-                    }
-                }
-                Found::Failed(..) => (Confidence::Unconfirmed, Some((**relaxed).clone())),
-            };
+        let (shot, _) = within(limit, |deadline| cell.shoot_from_rest(sharp, deadline));
+        if let Ok(relaxed) = &cell.relaxed.0 {
+            let (confidence, reference) = confirm(relaxed, shot.ok());
+            (cell.confidence, cell.reference) = (confidence, Some(reference));
         }
         cell
     }
 
     /// Solves by a method and judges.
     pub fn row(&self, cell: usize, method: MapMethod) -> MapRow {
-        let Timed { found, seconds } = self.answer(method);
-        let length = longest(self.scenario);
+        let (found, seconds) = self.answer(method);
         let blank = MapRow {
-            cell,
-            method,
-            outcome: MapOutcome::Refused,
-            detail: String::new(),
-            index: None,
-            tip: None,
-            energy: None,
-            margin_waves: None,
-            margin_amplitude: None,
-            twist: None,
-            error: None,
-            error_estimate: None,
             seconds,
-            reference: self.confidence,
+            ..MapRow::without_answer(cell, method, MapOutcome::Refused, self.confidence)
         };
-        match found {
-            Found::Failed(outcome, detail) => MapRow {
-                outcome,
-                detail: one_line(&detail),
-                ..blank
-            },
-            Found::Rest(answer) => {
-                let error = self.reference.as_ref().map(|it| it.distance(&answer));
-                let (outcome, detail) = self.judge(&answer, error);
-                let margin = answer.undulation.margin();
-                let tip = answer.rods.first().and_then(|rod| rod.nodes.last());
-                MapRow {
+        let answer = match found {
+            Ok(answer) => answer,
+            Err((outcome, detail)) => {
+                return MapRow {
                     outcome,
                     detail: one_line(&detail),
-                    index: answer.index,
-                    tip: tip.map(|node| node.position.to_array()),
-                    energy: Some(answer.energy),
-                    margin_waves: margin.map(|vein| vein.waves()),
-                    margin_amplitude: margin.map(|vein| vein.amplitude / length),
-                    twist: Some(answer.undulation.twist()),
-                    error: error.map(|error| error / length),
-                    error_estimate: Some(answer.estimate / length),
                     ..blank
-                }
-            }
-        }
-    }
-
-    fn answer(&self, method: MapMethod) -> Timed {
-        let relaxation = |method: Method| {
-            timed(self.limit, |deadline| {
-                let options = Options {
-                    method: method.on_grid(self.knobs.segments),
-                    tolerance: Some(self.tolerance),
-                    deadline: Some(deadline),
-                    ..Options::default()
                 };
-                relaxed(self.scenario, &options)
-            })
+            }
         };
-        let from_arcs = |intervals: Option<usize>| {
-            timed(self.limit, |deadline| {
-                self.shooting(self.tolerance, intervals, deadline, |shooting| {
-                    shooting.from(Start::Arcs)
-                })
-            })
-        };
-        match method {
-            MapMethod::SemiImplicit if self.knobs.segments.is_none() => self.relaxed.clone(),
-            MapMethod::SemiImplicit => relaxation(Method::default()),
-            MapMethod::Explicit => relaxation(Method::Explicit { segments: None }),
-            MapMethod::ExplicitMotion => timed(self.limit, |deadline| {
-                motion::answer(self.scenario, self.knobs, self.tolerance, deadline)
-            }),
-            MapMethod::SingleShooting => from_arcs(Some(1)),
-            MapMethod::Shooting => from_arcs(None),
-            MapMethod::ShootingFromRest => timed(self.limit, |deadline| {
-                self.shoot_from_rest(self.tolerance, deadline)
-            }),
+        let length = longest(self.scenario);
+        let reference = self.reference.as_ref();
+        let distance = reference.and_then(|it| it.distance(&answer));
+        let (outcome, detail) = self.judge(&answer, distance);
+        let margin = answer.undulation.margin();
+        let tip = answer.rods.first().and_then(|rod| rod.nodes.last());
+        MapRow {
+            outcome,
+            detail: one_line(&detail),
+            index: answer.index,
+            tip_x: tip.map(|node| node.position.x),
+            tip_y: tip.map(|node| node.position.y),
+            tip_z: tip.map(|node| node.position.z),
+            energy: Some(answer.energy),
+            margin_waves: margin.map(|vein| vein.waves()),
+            margin_amplitude: margin.map(|vein| vein.amplitude / length),
+            twist: Some(answer.undulation.twist()),
+            error: distance.map(|distance| distance / length),
+            error_estimate: Some(answer.error() / length),
+            ..blank
         }
     }
 
-    /// With the stations a boundary-value solution is compared at.
-    fn shooting(
+    fn answer(&self, method: MapMethod) -> (Found, f64) {
+        let segments = self.knobs.segments;
+        if method == MapMethod::SemiImplicit && segments.is_none() {
+            return self.relaxed.clone();
+        }
+        let (scenario, tolerance) = (self.scenario, self.tolerance);
+        within(self.limit, |deadline| match method {
+            MapMethod::SemiImplicit => {
+                let method = Method::default().on_grid(segments);
+                relaxed(scenario, method, tolerance, deadline)
+            }
+            MapMethod::Explicit => {
+                relaxed(scenario, Method::Explicit { segments }, tolerance, deadline)
+            }
+            MapMethod::ExplicitMotion => motion::answer(scenario, self.knobs, tolerance, deadline),
+            MapMethod::SingleShooting => self.shoot(Start::Arcs, tolerance, Some(1), deadline),
+            MapMethod::Shooting => self.shoot(Start::Arcs, tolerance, None, deadline),
+            MapMethod::ShootingFromRest => self.shoot_from_rest(tolerance, deadline),
+        })
+    }
+
+    /// Solves the boundary-value problem.
+    fn shoot(
         &self,
+        start: Start,
         accuracy: f64,
         intervals: Option<usize>,
         deadline: Instant,
-        solve: impl FnOnce(&Shooting) -> Found,
     ) -> Found {
-        let segments = match &self.relaxed.found {
-            Found::Rest(relaxed) => relaxed.stations.len() - 1,
-            Found::Failed(..) => SEGMENTS,
+        let segments = match &self.relaxed.0 {
+            Ok(relaxed) => relaxed.stations.len() - 1,
+            Err(_) => SEGMENTS,
         };
-        solve(&Shooting {
-            scenario: self.scenario,
+        let grid = fine_grid(self.scenario, segments);
+        let others = motion::stations(self.scenario, self.knobs);
+        let stations = union([grid.sigma(), &others].concat());
+        let deadline = Some(deadline);
+        let solved = bvp::solve_before(
+            self.scenario,
+            start,
             accuracy,
             intervals,
-            grid: &fine_grid(self.scenario, segments),
-            more: &motion::stations(self.scenario, self.knobs),
+            &stations,
             deadline,
+        );
+        let solution = solved.map_err(|failure| {
+            let outcome = match failure.reason {
+                Reason::Unbounded { .. } => MapOutcome::Diverged,
+                _ => MapOutcome::NotConverged,
+            };
+            let way = match failure.part {
+                part if part < 1.0 => format!(" (at {part:.4} of the way from arcs)"),
+                _ => String::new(),
+            };
+            (outcome, format!("{}{way}", failure.reason))
+        })?;
+        let intervals = match solution.intervals.len() - 1 {
+            1 => "1 interval".into(),
+            count => format!("{count} intervals"),
+        };
+        let neutral = solution.neutral.as_ref();
+        let neutral = neutral.map_or(String::new(), |neutral| format!("; {neutral}"));
+        let note = format!(
+            "over {intervals}, growth 10^{:.1}{neutral}",
+            solution.growth
+        );
+        let answer = Answer::of_solution(self.scenario, solution, accuracy);
+        if !answer.outcome.is_success() {
+            let known = format!("the solution is only known within {:.1e}", answer.error());
+            return Err((MapOutcome::NotConverged, known));
+        }
+        Ok(Answer {
+            index: index_at(self.scenario, grid, &answer.stations, &answer.rods),
+            remark: Some(note),
+            ..answer
         })
     }
 
     fn shoot_from_rest(&self, accuracy: f64, deadline: Instant) -> Found {
-        match &self.relaxed.found {
-            Found::Rest(relaxed) => self.shooting(accuracy, None, deadline, |shooting| {
-                shooting.from(Start::Leaf {
-                    stations: &relaxed.stations,
-                    rods: &relaxed.rods,
-                })
-            }),
-            Found::Failed(outcome, why) => Found::Failed(
+        match &self.relaxed.0 {
+            Ok(relaxed) => self.shoot(relaxed.as_start(), accuracy, None, deadline),
+            Err((outcome, why)) => Err((
                 *outcome,
                 format!("the leaf to start from is not at rest: {why}"),
-            ),
+            )),
         }
     }
 
     /// What an answer is worth at this distance from the reference.
     fn judge(&self, answer: &Answer, distance: Option<f64>) -> (MapOutcome, String) {
-        let note = &answer.note;
+        let note = answer.remark.as_deref().unwrap_or_default();
         if let Some(index @ 1..) = answer.index {
             return (MapOutcome::Saddle, format!("index {index}; {note}"));
         }
@@ -208,17 +201,16 @@ impl<'a> Cell<'a> {
                 format!("stable, with nothing to compare with; {note}"),
             );
         };
-        if distance <= answer.estimate + reference.estimate {
-            return (MapOutcome::Right, note.clone());
+        if answer.confirms(reference, distance) {
+            return (MapOutcome::Right, note.into());
         }
-        let length = longest(self.scenario);
         let lower = match answer.energy - reference.energy {
             lower if lower < 0.0 => format!("energy lower by {:.1e}", -lower),
             higher => format!("energy higher by {higher:.1e}"),
         };
         let text = format!(
             "{:.1e} lengths from the reference, {lower}; {note}",
-            distance / length
+            distance / longest(self.scenario)
         );
         match self.is_elsewhere(answer, reference, distance) {
             true => (MapOutcome::OtherEquilibrium, text),
@@ -228,20 +220,82 @@ impl<'a> Cell<'a> {
 
     /// Whether the equilibrium near an answer is not the reference.
     fn is_elsewhere(&self, answer: &Answer, reference: &Answer, distance: f64) -> bool {
-        let near = timed(self.limit, |deadline| {
-            self.shooting(self.tolerance, None, deadline, |shooting| {
-                shooting.from(Start::Leaf {
-                    stations: &answer.stations,
-                    rods: &answer.rods,
-                })
-            })
+        let (near, _) = within(self.limit, |deadline| {
+            self.shoot(answer.as_start(), self.tolerance, None, deadline)
         });
-        match near.found {
-            Found::Rest(near) if near.distance(answer) < distance => {
-                near.distance(reference) > 0.5 * distance
+        match near {
+            Ok(near) if near.distance(answer) < Some(distance) => {
+                near.distance(reference) > Some(0.5 * distance)
             }
             _ => distance > SAME_PLACE * longest(self.scenario),
         }
+    }
+}
+
+/// Lets a method run, told when to give up; returns also the seconds it took.
+/// What takes longer than it may is out of time, whatever it found.
+fn within(limit: Duration, run: impl FnOnce(Instant) -> Found) -> (Found, f64) {
+    let (found, seconds) = timed(|| run(Instant::now() + limit));
+    let limit = limit.as_secs_f64();
+    match seconds > limit {
+        true => {
+            let late = format!("no answer within {limit} s");
+            (Err((MapOutcome::OutOfTime, late)), seconds)
+        }
+        false => (found, seconds),
+    }
+}
+
+/// Relaxes, perhaps on one grid. That tells no error: a finer grid does.
+fn relaxed(scenario: &Scenario, method: Method, tolerance: f64, deadline: Instant) -> Found {
+    let options = Options {
+        method,
+        tolerance: Some(tolerance),
+        deadline: Some(deadline),
+        ..Options::default()
+    };
+    let leaf = relax::relax(scenario, &options, &mut |_| {});
+    let leaf = leaf.map_err(|refused| (MapOutcome::Refused, refused.to_string()))?;
+    let saddle = leaf
+        .stability
+        .saddle
+        .map(|saddle| saddle.negative_eigenvalues);
+    let mut answer = Answer::from(leaf);
+    if !answer.outcome.is_success() {
+        let outcome = match answer.outcome {
+            Outcome::Diverged => MapOutcome::Diverged,
+            _ => MapOutcome::NotConverged,
+        };
+        return Err((outcome, answer.remark.unwrap_or_default()));
+    }
+    if answer.error_estimate.is_none() {
+        let segments = method.segments();
+        let error = segments.and_then(|n| grid_error(scenario, n, tolerance, Some(deadline)));
+        let Some(error) = error else {
+            let why = "the error of the grid cannot be told: a finer one finds no rest";
+            return Err((MapOutcome::NotConverged, why.into()));
+        };
+        answer.error_estimate = Some(error + tolerance);
+    }
+    if let Some(index) = saddle {
+        answer.remark = Some(format!("left a saddle of index {index}"));
+    }
+    Ok(answer)
+}
+
+/// The reference, of a relaxed leaf and the solution that shooting found from
+/// there, if it did. Where they agree, in their numbers of negative eigenvalues
+/// too, it is the solution; where not, only if that is stable.
+fn confirm(relaxed: &Answer, shot: Option<Answer>) -> (Confidence, Answer) {
+    let Some(shot) = shot else {
+        return (Confidence::Unconfirmed, relaxed.clone());
+    };
+    let distance = relaxed.distance(&shot);
+    let same = distance.is_some_and(|distance| relaxed.confirms(&shot, distance));
+    match (same && shot.index == relaxed.index, shot.index) {
+        (true, _) => (Confidence::Confirmed, shot),
+        (false, Some(0)) => (Confidence::Unconfirmed, shot),
+        (false, _) => (Confidence::Unconfirmed, relaxed.clone()),
     }
 }
 

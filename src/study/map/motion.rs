@@ -5,12 +5,13 @@ use std::time::Instant;
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::motion::{Explicit, Method, Physics, Stopped};
-use crate::relax::{self, Options, index_near, node_state, start};
+use crate::relax::{self, Outcome, Work, index_near, node_state, start};
 use crate::scenario::Scenario;
 use crate::shape::RodShape;
+use crate::study::judge::{Answer, SAME_PLACE, fine_grid, grid_error};
 use crate::undulation::Undulation;
 
-use super::answer::{Answer, Found, SAME_PLACE, fine_grid, grid_error};
+use super::cell::Found;
 use super::row::MapOutcome;
 use crate::study::vary::{Knobs, Varied};
 
@@ -23,7 +24,7 @@ const LOOK: f64 = 1000.0;
 /// Released from where a relaxation starts, the leaf moves for the scenario's
 /// duration under the loads of its dynamics, in steps of `method.step`.
 pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, deadline: Instant) -> Found {
-    let refused = |why: String| Found::Failed(MapOutcome::Refused, why);
+    let refused = |why: String| Err((MapOutcome::Refused, why));
     let Some(step) = knobs.step else {
         return refused("explicit motion needs method.step".into());
     };
@@ -50,7 +51,7 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, deadline: Insta
         stable.step * physics.time,
         stable.limit
     );
-    let failed = |outcome, what: String| Found::Failed(outcome, format!("{what}; {note}"));
+    let failed = |outcome, what: String| Err((outcome, format!("{what}; {note}")));
     let (duration, _) = physics.duration();
     while motion.time() < duration {
         let until = motion.time() + LOOK * h;
@@ -83,31 +84,25 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, deadline: Insta
         return failed(MapOutcome::NotConverged, moves);
     }
     let rods = shape(&DiscreteLeaf::new(&leaf, grid.clone()), &end.state);
-    let index = match index_near(scenario, grid.clone(), &rods) {
-        None if leaf.tip_moment == glam::DVec3::ZERO => {
-            return failed(MapOutcome::NotConverged, "slow, but not at rest".into());
-        }
-        index => index,
-    };
-    let options = Options {
-        method: relax::Method::default().on_grid(Some(segments)),
-        tolerance: Some(tolerance),
-        deadline: Some(deadline),
-        ..Options::default()
-    };
+    let index = index_near(scenario, grid.clone(), &rods);
+    if index.is_none() && leaf.tip_moment == glam::DVec3::ZERO {
+        return failed(MapOutcome::NotConverged, "slow, but not at rest".into());
+    }
     let length = leaf.scale.length;
-    let error = grid_error(scenario, &options).unwrap_or(SAME_PLACE * length);
-    let estimate = error + tolerance * length;
-    Found::Rest(Box::new(Answer {
+    let error = grid_error(scenario, segments, tolerance, Some(deadline));
+    let estimate = error.unwrap_or(SAME_PLACE * length) + tolerance * length;
+    Ok(Answer {
+        outcome: Outcome::Converged,
+        remark: Some(note),
         undulation: Undulation::at_stations(scenario, grid.sigma(), &rods, Some(estimate)),
         stations: grid.sigma().to_vec(),
         rods,
         energy: (end.energy.elastic + end.energy.coupling + end.energy.potential)
             * leaf.scale.moment(),
         index,
-        estimate,
-        note,
-    }))
+        error_estimate: Some(estimate),
+        work: Work::default(),
+    })
 }
 
 /// The longest step that is known to be stable.

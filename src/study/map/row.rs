@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+
 /// The methods that are compared, in the order of the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum MapMethod {
@@ -177,15 +179,30 @@ macro_rules! words {
                 })
             }
         }
+
+        impl Serialize for $type {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                serializer.serialize_str(self.word())
+            }
+        }
+
+        impl<'de> Deserialize<'de> for $type {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                let word = String::deserialize(deserializer)?;
+                word.parse().map_err(de::Error::custom)
+            }
+        }
     )*};
 }
 
 words!(MapMethod, MapOutcome, Confidence, MapShow);
 
-/// One method in one cell.
-#[derive(Clone, Debug, PartialEq)]
+/// One method in one cell: a row of `map.csv`, in the order of its columns.
+/// Lengths are relative to the longest rod but for the tip.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapRow {
-    /// The cell, counted along the last axis first.
+    /// The cell, counted along the last axis first; in the table its values tell.
+    #[serde(skip)]
     pub cell: usize,
     /// The method.
     pub method: MapMethod,
@@ -196,26 +213,80 @@ pub struct MapRow {
     /// Negative eigenvalues of the equilibrium found.
     pub index: Option<usize>,
     /// The joint tip, or the first rod's.
-    pub tip: Option<[f64; 3]>,
+    #[serde(serialize_with = "number")]
+    pub tip_x: Option<f64>,
+    /// Its y.
+    #[serde(serialize_with = "number")]
+    pub tip_y: Option<f64>,
+    /// Its z.
+    #[serde(serialize_with = "number")]
+    pub tip_z: Option<f64>,
+    /// Energy of the equilibrium found.
+    #[serde(serialize_with = "number")]
+    pub energy: Option<f64>,
+    /// Largest distance from the reference.
+    #[serde(serialize_with = "number")]
+    pub error: Option<f64>,
+    /// What the method says of its error.
+    #[serde(serialize_with = "number")]
+    pub error_estimate: Option<f64>,
     /// Waves along the margins of the equilibrium found: a multiple of 1/2.
+    #[serde(serialize_with = "number")]
     pub margin_waves: Option<f64>,
-    /// Their amplitude, relative to the longest rod.
+    /// Their amplitude.
+    #[serde(serialize_with = "number")]
     pub margin_amplitude: Option<f64>,
     /// Mean twist of its veins from base to tip, in radians; positive: right-handed.
+    #[serde(serialize_with = "number")]
     pub twist: Option<f64>,
-    /// Energy of the equilibrium found.
-    pub energy: Option<f64>,
-    /// Largest distance from the reference, relative to the longest rod.
-    pub error: Option<f64>,
-    /// What the method says of its error, likewise.
-    pub error_estimate: Option<f64>,
     /// Time taken, by one thread.
+    #[serde(serialize_with = "microseconds")]
     pub seconds: f64,
     /// What it was compared with.
     pub reference: Confidence,
 }
 
+/// As in Rust's own notation, which reads back to the last bit.
+fn number<S: Serializer>(value: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
+    match value {
+        // Adding zero turns -0 into 0.
+        Some(value) => serializer.collect_str(&format_args!("{:?}", value + 0.0)),
+        None => serializer.serialize_none(),
+    }
+}
+
+fn microseconds<S: Serializer>(seconds: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&format_args!("{seconds:.6}"))
+}
+
 impl MapRow {
+    /// Of a method that found no equilibrium.
+    pub fn without_answer(
+        cell: usize,
+        method: MapMethod,
+        outcome: MapOutcome,
+        reference: Confidence,
+    ) -> Self {
+        MapRow {
+            cell,
+            method,
+            outcome,
+            detail: String::new(),
+            index: None,
+            tip_x: None,
+            tip_y: None,
+            tip_z: None,
+            energy: None,
+            error: None,
+            error_estimate: None,
+            margin_waves: None,
+            margin_amplitude: None,
+            twist: None,
+            seconds: 0.0,
+            reference,
+        }
+    }
+
     /// Waves along the margins of a stable equilibrium; `None` where the
     /// method found none.
     pub fn stable_waves(&self) -> Option<f64> {

@@ -3,11 +3,11 @@
 
 use super::plan::{Cell, Contender};
 use super::reference::Reference;
-use super::run::{Shape, longest};
 use super::timing::{Measured, Spread};
 use super::{Ending, Row};
-use crate::relax::{Outcome, Work};
+use crate::relax::Outcome;
 use crate::scenario::Scenario;
+use crate::study::judge::{Answer, common, longest};
 
 /// Errors above this are not of discretisation if the run's own estimate is
 /// less than half as large: it is another equilibrium.
@@ -18,102 +18,99 @@ const MUCH_LESS: f64 = 0.5;
 /// nothing has to be interpolated. Runs on one grid have those of the others
 /// among their own, if they are fine enough; only those that have not add theirs.
 pub fn stations(measured: &[Measured]) -> Vec<f64> {
-    let runs = || {
-        measured
-            .iter()
-            .filter_map(|cell| cell.found.as_ref()?.as_ref().ok())
-    };
-    let Some(fewest) = runs().min_by_key(|run| run.shape.stations.len()) else {
+    let runs = || measured.iter().filter_map(Measured::answer);
+    let Some(fewest) = runs().min_by_key(|run| run.stations.len()) else {
         return Vec::new();
     };
-    let common = &fewest.shape.stations;
-    let mut wanted = common.clone();
+    let mut wanted = fewest.stations.clone();
     for run in runs() {
-        if !run.shape.covers(common) {
-            wanted.extend(&run.shape.stations);
+        if common(&run.stations, &fewest.stations).len() < fewest.stations.len() {
+            wanted.extend(&run.stations);
         }
     }
     wanted
+}
+
+/// A cell, what was measured in it, and how far that is from the reference,
+/// relative to the longest rod.
+struct Judged<'a> {
+    cell: &'a Cell<'a>,
+    measured: &'a Measured,
+    error: Option<f64>,
+}
+
+impl<'a> Judged<'a> {
+    /// Where the run knows the leaf to be at rest.
+    fn at_rest(&self) -> Option<&'a Answer> {
+        self.measured.answer().filter(|run| run.at_rest())
+    }
 }
 
 /// The rows of cells of one leaf.
 pub fn rows(
     scenario: &Scenario,
     cells: &[Cell],
-    measured: Vec<Measured>,
-    reference: Option<&Shape>,
+    measured: &[Measured],
+    reference: Option<&Answer>,
 ) -> Vec<Row> {
     let unit = longest(scenario);
-    let at_rest: Vec<Option<&Shape>> = measured.iter().map(shape_at_rest).collect();
-    let errors: Vec<Option<f64>> = at_rest
-        .iter()
-        .map(|shape| Some((*shape)?.distance(reference?)? / unit))
-        .collect();
-    let elsewhere: Vec<bool> = (0..cells.len())
-        .map(|i| match errors[i] {
-            Some(error) if error > ELSEWHERE => {
-                if cells[i].contender.on_one_grid() {
-                    return is_elsewhere(i, cells, &at_rest, &errors, unit);
-                }
-                let found = measured[i].found.as_ref().and_then(|run| run.as_ref().ok());
-                let estimate = found.and_then(|run| run.estimate);
-                estimate.is_some_and(|estimate| estimate < MUCH_LESS * error)
-            }
-            _ => false,
-        })
-        .collect();
-    let rows = cells
-        .iter()
-        .zip(measured)
-        .zip(errors.into_iter().zip(elsewhere));
-    rows.map(|((cell, measured), (error, elsewhere))| row(cell, measured, error, elsewhere))
+    let judged = cells.iter().zip(measured).map(|(cell, measured)| {
+        let mut judged = Judged {
+            cell,
+            measured,
+            error: None,
+        };
+        let distance = reference.and_then(|it| judged.at_rest()?.distance(it));
+        judged.error = distance.map(|distance| distance / unit);
+        judged
+    });
+    let judged: Vec<Judged> = judged.collect();
+    (0..judged.len())
+        .map(|i| row(&judged[i], is_elsewhere(i, &judged, unit)))
         .collect()
 }
 
-/// Where a run knows the leaf to be at rest.
-fn shape_at_rest(measured: &Measured) -> Option<&Shape> {
-    let run = measured.found.as_ref()?.as_ref().ok()?;
-    run.at_rest().then_some(&run.shape)
-}
-
-/// Whether a run on one grid, which has no estimate of its error, owes that to
-/// being in another equilibrium: a coarser grid does much better, or the next
-/// grid finds nearly the same shape.
-fn is_elsewhere(
-    i: usize,
-    cells: &[Cell],
-    at_rest: &[Option<&Shape>],
-    errors: &[Option<f64>],
-    unit: f64,
-) -> bool {
-    let (Some(shape), Some(error)) = (at_rest[i], errors[i]) else {
+/// Whether a run owes its error to being in another equilibrium.
+fn is_elsewhere(i: usize, judged: &[Judged], unit: f64) -> bool {
+    let this = &judged[i];
+    let (Some(answer), Some(error)) = (this.at_rest(), this.error) else {
         return false;
     };
-    let alike = |j: &usize| cells[*j].contender == cells[i].contender;
-    let mut coarser = (0..i).filter(alike);
-    if coarser.any(|j| errors[j].is_some_and(|other| other < MUCH_LESS * error)) {
+    if error <= ELSEWHERE {
+        return false;
+    }
+    if !this.cell.contender.on_one_grid() {
+        let estimate = answer.error_estimate.map(|estimate| estimate / unit);
+        return estimate.is_some_and(|estimate| estimate < MUCH_LESS * error);
+    }
+    // On one grid, which has no estimate of its error, it is if a coarser grid
+    // does much better, or the next grid finds nearly the same shape.
+    let alike = |other: &&Judged| other.cell.contender == this.cell.contender;
+    let mut coarser = judged[..i].iter().filter(alike);
+    if coarser.any(|it| {
+        it.error
+            .is_some_and(|error_there| error_there < MUCH_LESS * error)
+    }) {
         return true;
     }
-    let finer = (i + 1..cells.len()).find(alike).and_then(|j| at_rest[j]);
-    let coarser = || (0..i).rfind(alike).and_then(|j| at_rest[j]);
+    let finer = judged[i + 1..].iter().find(alike).and_then(Judged::at_rest);
+    let coarser = || judged[..i].iter().rfind(alike)?.at_rest();
     let next = finer.or_else(coarser);
-    let apart = next.and_then(|next| shape.distance(next));
+    let apart = next.and_then(|next| answer.distance(next));
     apart.is_some_and(|apart| apart / unit < MUCH_LESS * error)
 }
 
-fn row(cell: &Cell, measured: Measured, true_error: Option<f64>, elsewhere: bool) -> Row {
+fn row(judged: &Judged, elsewhere: bool) -> Row {
+    let Judged {
+        cell,
+        measured,
+        error,
+    } = judged;
     let blank = Row {
-        contender: cell.contender,
-        knob: cell.knob,
         seconds: Spread::of(&measured.seconds),
-        work: Work::default(),
-        true_error: None,
-        error_estimate: None,
-        ending: Ending::NotRun,
-        remark: None,
-        pareto: false,
+        ..Row::without_result(cell.contender, cell.knob, Ending::NotRun)
     };
-    let run = match measured.found {
+    let run = match &measured.found {
         None => return blank,
         Some(Err(refusal)) => {
             return Row {
@@ -129,13 +126,16 @@ fn row(cell: &Cell, measured: Measured, true_error: Option<f64>, elsewhere: bool
         _ if elsewhere => Ending::OtherEquilibrium,
         outcome => Ending::Ended(outcome),
     };
+    let unit = longest(cell.scenario);
     Row {
-        work: run.work,
-        true_error,
-        error_estimate: run.estimate,
+        steps: Some(run.work.steps),
+        factorizations: Some(run.work.factorizations),
+        force_evaluations: Some(run.work.force_evaluations),
+        true_error: *error,
+        error_estimate: run.error_estimate.map(|estimate| estimate / unit),
         ending,
         // That the count of eigenvalues is not known is no failure.
-        remark: run.remark.filter(|_| !ending.is_success()),
+        remark: run.remark.clone().filter(|_| !ending.is_success()),
         ..blank
     }
 }
@@ -163,47 +163,53 @@ pub fn remarks(
             "errors tell little: {neutral}, and runs come to rest in different places"
         ));
     }
-    for contender in contenders {
-        let of_it = || rows.iter().filter(|row| row.contender == *contender);
-        if of_it().all(|row| row.ending == Ending::Refused)
-            && let Some(why) = of_it().find_map(|row| row.remark.as_ref())
-        {
-            remarks.push(format!("{} is not charted: {why}", contender.word()));
-        }
-        if let Some(first) = of_it().find(|row| row.ending == Ending::NotRun) {
-            remarks.push(format!(
-                "{} is not run from {} on: the run before took too long; allow more --seconds",
-                contender.word(),
-                first.knob
-            ));
-        }
-        // The chart is the place where an estimate is found out.
-        let too_small = |row: &&Row| {
-            let estimate = row.error_estimate.unwrap_or(f64::INFINITY).max(floor);
-            row.ending.is_success() && row.true_error.is_some_and(|error| error > estimate)
-        };
-        let knobs: Vec<String> = of_it()
-            .filter(too_small)
-            .map(|row| row.knob.to_string())
-            .collect();
-        if !knobs.is_empty() && neutral.is_none() {
-            remarks.push(format!(
-                "{} underestimates its error at {}",
-                contender.word(),
-                knobs.join(", ")
-            ));
-        }
+    for &contender in contenders {
+        remarks.extend(remarks_on(contender, rows, floor, neutral.is_some()));
+    }
+    remarks
+}
+
+/// What is to be said of one contender.
+fn remarks_on(contender: Contender, rows: &[Row], floor: f64, neutral: bool) -> Vec<String> {
+    let mut remarks = Vec::new();
+    let of_it = || rows.iter().filter(|row| row.contender == contender);
+    let word = contender.word();
+    if of_it().all(|row| row.ending == Ending::Refused)
+        && let Some(why) = of_it().find_map(|row| row.remark.as_ref())
+    {
+        remarks.push(format!("{word} is not charted: {why}"));
+    }
+    if let Some(first) = of_it().find(|row| row.ending == Ending::NotRun) {
+        remarks.push(format!(
+            "{word} is not run from {} on: the run before took too long; allow more --seconds",
+            first.knob
+        ));
+    }
+    // The chart is the place where an estimate is found out.
+    let too_small = |row: &&Row| {
+        let estimate = row.error_estimate.unwrap_or(f64::INFINITY).max(floor);
+        row.ending.is_success() && row.true_error.is_some_and(|error| error > estimate)
+    };
+    let knobs: Vec<String> = of_it()
+        .filter(too_small)
+        .map(|row| row.knob.to_string())
+        .collect();
+    if !knobs.is_empty() && !neutral {
+        let knobs = knobs.join(", ");
+        remarks.push(format!("{word} underestimates its error at {knobs}"));
     }
     remarks
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
+    use glam::{DQuat, DVec3};
 
-    use super::super::{plan, run::Run};
+    use super::super::plan;
     use super::*;
-    use crate::relax::RelaxError;
+    use crate::relax::{RelaxError, Work};
+    use crate::shape::{NodeState, RodShape};
+    use crate::undulation::Undulation;
 
     const STATIONS: [f64; 3] = [0.0, 0.5, 1.0];
 
@@ -216,24 +222,36 @@ mod tests {
         Scenario::from_toml(leaf).unwrap()
     }
 
-    /// Straight but for a shift of its tip.
-    fn shape(shift: f64) -> Shape {
-        let at = STATIONS.map(|sigma| DVec3::new(2.0 * sigma, 0.0, shift * sigma));
-        Shape {
+    /// Straight but for a shift of its tip; the estimate is relative to the length
+    /// of 2.
+    fn answer(outcome: Outcome, shift: f64, estimate: Option<f64>) -> Answer {
+        let node = |sigma: f64| NodeState {
+            position: DVec3::new(2.0 * sigma, 0.0, shift * sigma),
+            rotation: DQuat::IDENTITY,
+            v: DVec3::X,
+            u: DVec3::ZERO,
+            n: DVec3::ZERO,
+            m: DVec3::ZERO,
+        };
+        Answer {
+            outcome,
+            remark: Some("why".into()),
             stations: STATIONS.to_vec(),
-            positions: vec![at.to_vec()],
+            rods: vec![RodShape {
+                length: 2.0,
+                nodes: STATIONS.map(node).to_vec(),
+            }],
+            energy: 0.0,
+            index: None,
+            error_estimate: estimate.map(|estimate| 2.0 * estimate),
+            undulation: Undulation::default(),
+            work: Work::default(),
         }
     }
 
     fn found(outcome: Outcome, shift: f64, estimate: Option<f64>) -> Measured {
         Measured {
-            found: Some(Ok(Run {
-                outcome,
-                remark: Some("why".into()),
-                shape: shape(shift),
-                estimate,
-                work: Work::default(),
-            })),
+            found: Some(Ok(answer(outcome, shift, estimate))),
             seconds: vec![1.0],
         }
     }
@@ -246,7 +264,8 @@ mod tests {
             found: None,
             seconds: Vec::new(),
         });
-        rows(&scenario, &cells, measured, Some(&shape(0.0)))
+        let reference = answer(Outcome::Converged, 0.0, None);
+        rows(&scenario, &cells, &measured, Some(&reference))
     }
 
     #[test]
@@ -330,8 +349,8 @@ mod tests {
             confirmed: true,
             told: String::new(),
             known_within: 1e-11,
-            relaxed: None,
-            shot: None,
+            relaxation_estimate: None,
+            shooting_estimate: None,
             difference: None,
             neutral: None,
         };
@@ -357,7 +376,7 @@ mod tests {
         let with = |stations: &[f64]| {
             let mut measured = found(Outcome::Converged, 0.0, None);
             if let Some(Ok(run)) = &mut measured.found {
-                run.shape.stations = stations.to_vec();
+                run.stations = stations.to_vec();
             }
             measured
         };

@@ -1,25 +1,13 @@
-//! Where each method fails: a leaf solved in every cell of a grid of
-//! parameters by every method, each answer judged.
-//!
-//! What is right is decided by two methods that share nothing: the relaxed
-//! leaf, and the solution of the boundary-value problem that starts from it,
-//! a hundred times sharper. Where they agree within their estimates the
-//! reference is confirmed. Everything else is measured against it.
+//! What is asked of a map, and what cannot be asked.
 
-mod answer;
-mod cell;
-mod motion;
-mod row;
-
-pub use row::{Confidence, MapMethod, MapOutcome, MapRow, MapShow, UnknownWord};
-
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
-use std::thread;
 use std::time::Duration;
 
-use super::vary::{Base, Keys, Knob, Vary};
-use cell::{Cell, one_line};
+use serde::{Serialize, Serializer};
+
+use super::cell::{Cell, one_line};
+use super::motion;
+use super::row::{Confidence, MapMethod, MapOutcome, MapRow};
+use crate::study::vary::{Base, Keys, Knob, Vary, VaryError};
 
 /// Most cells of a map.
 const MOST_CELLS: usize = 1_000_000;
@@ -160,7 +148,7 @@ impl MapRequest {
         let first = self.base.at(&self.values(0));
         let last = self.base.at(&self.values(self.cells() - 1));
         match (first, last) {
-            (Err(super::VaryError::Key { key, why }), Err(super::VaryError::Key { .. })) => {
+            (Err(VaryError::Key { key, why }), Err(VaryError::Key { .. })) => {
                 let message = format!("{key}: {why}");
                 Err(MapRefused::Entry { message })
             }
@@ -213,20 +201,8 @@ impl MapRequest {
             Err(refused) => {
                 let detail = one_line(&refused.to_string());
                 let refused = |&method: &MapMethod| MapRow {
-                    cell,
-                    method,
-                    outcome: MapOutcome::Refused,
                     detail: detail.clone(),
-                    index: None,
-                    tip: None,
-                    energy: None,
-                    margin_waves: None,
-                    margin_amplitude: None,
-                    twist: None,
-                    error: None,
-                    error_estimate: None,
-                    seconds: 0.0,
-                    reference: Confidence::None,
+                    ..MapRow::without_answer(cell, method, MapOutcome::Refused, Confidence::None)
                 };
                 return methods.iter().map(refused).collect();
             }
@@ -237,71 +213,60 @@ impl MapRequest {
     }
 }
 
-/// A finished map, or as much of one as there is.
-#[derive(Clone, Debug)]
-pub struct Map {
-    /// What was asked.
-    pub request: MapRequest,
-    /// What is known, sorted by cell and method, none twice.
-    pub rows: Vec<MapRow>,
-    /// What the figure shows.
-    pub show: MapShow,
+/// What tells one map from another. Values are texts, as in the table: they must
+/// be the same to the last digit.
+impl Serialize for MapRequest {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Keys<'a> {
+            scenario_digest: String,
+            set: &'a [String],
+            vary: Vec<Axis>,
+            step: Option<String>,
+            segments: Option<usize>,
+            tolerance: Option<String>,
+            cell_seconds: String,
+        }
+        #[derive(Serialize)]
+        struct Axis {
+            keys: String,
+            log: bool,
+            values: Vec<String>,
+        }
+        let knobs = self.base.knobs();
+        let text = |value: f64| format!("{value:?}");
+        let axes = self.axes.iter().map(|axis| Axis {
+            keys: axis.keys.to_string(),
+            log: axis.log,
+            values: axis.values.iter().map(|&v| axis.keys.text(v)).collect(),
+        });
+        Keys {
+            scenario_digest: format!("{:016x}", digest(self.base.text().as_bytes())),
+            set: self.base.overrides(),
+            vary: axes.collect(),
+            step: knobs.step.map(text),
+            segments: knobs.segments,
+            tolerance: self.tolerance.map(text),
+            cell_seconds: text(self.cell_seconds),
+        }
+        .serialize(serializer)
+    }
 }
 
-impl Map {
-    /// Sorts the rows; of two about the same the first stays.
-    pub fn new(request: MapRequest, mut rows: Vec<MapRow>) -> Self {
-        rows.sort_by_key(|row| (row.cell, row.method));
-        rows.dedup_by_key(|row| (row.cell, row.method));
-        Map {
-            request,
-            rows,
-            show: MapShow::default(),
-        }
-    }
-
-    /// How often a method had an outcome.
-    pub fn count(&self, method: MapMethod, outcome: MapOutcome) -> usize {
-        let counted = |row: &&MapRow| row.method == method && row.outcome == outcome;
-        self.rows.iter().filter(counted).count()
-    }
+/// FNV-1a: tells whether a text has changed, from release to release the same.
+fn digest(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
 }
 
-/// Solves cells, each by its methods, and hands over the rows of each as it
-/// is finished; `false` from there ends the run. As many cells at a time as
-/// rayon has threads, each on one thread of its own, so that no cell's time is
-/// spent on another's work.
-pub fn map(
-    request: &MapRequest,
-    cells: &[(usize, Vec<MapMethod>)],
-    done: &mut (dyn FnMut(Vec<MapRow>) -> bool + Send),
-) {
-    let next = AtomicUsize::new(0);
-    let stopped = AtomicBool::new(false);
-    let done = Mutex::new(done);
-    let work = || {
-        while !stopped.load(Ordering::Relaxed) {
-            let Some((cell, methods)) = cells.get(next.fetch_add(1, Ordering::Relaxed)) else {
-                break;
-            };
-            let rows = request.solve(*cell, methods);
-            let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
-            if !(*done)(rows) {
-                stopped.store(true, Ordering::Relaxed);
-            }
-        }
-    };
-    let threads = rayon::current_num_threads().min(cells.len());
-    thread::scope(|scope| {
-        for _ in 0..threads {
-            scope.spawn(|| {
-                let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-                match alone {
-                    Ok(pool) => pool.install(work),
-                    // Slower, but as right.
-                    Err(_) => work(),
-                }
-            });
-        }
-    });
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_digest_is_the_published_one() {
+        assert_eq!(digest(b""), 0xcbf2_9ce4_8422_2325);
+        assert_eq!(digest(b"foobar"), 0x8594_4171_f739_67e8);
+    }
 }

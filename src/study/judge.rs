@@ -1,0 +1,315 @@
+//! The judge of all that compares methods: what a method answers, within a
+//! deadline if there is one, how far apart two answers are, and whether they
+//! confirm each other.
+//!
+//! What is right is decided by two methods that share nothing: the relaxed leaf,
+//! and the solution of the boundary-value problem that starts from it.
+
+use std::ops::Add;
+use std::time::Instant;
+
+use crate::bvp::{self, Solution, Start};
+use crate::leaf::{Grid, Leaf};
+use crate::relax::{self, Equilibrium, Method, Options, Outcome, RelaxError, Work, index_near};
+use crate::scenario::Scenario;
+use crate::shape::{Difference, RodShape};
+use crate::undulation::Undulation;
+
+/// Stations closer than this are the same.
+const SAME_STATION: f64 = 1e-9;
+
+/// Segments of a grid on which negative eigenvalues are counted, at least.
+pub const SEGMENTS: usize = 32;
+
+/// Two leaves this far apart, in lengths, are not two grids' versions of one.
+pub const SAME_PLACE: f64 = 0.05;
+
+/// What a method answers, in the units of the scenario.
+#[derive(Clone, Debug)]
+pub struct Answer {
+    /// How the run ended.
+    pub outcome: Outcome,
+    /// Why it did not succeed, or what else the method says of it.
+    pub remark: Option<String>,
+    /// Fractions of the length at which the shape is known, ascending.
+    pub stations: Vec<f64>,
+    /// The shape there, one per rod.
+    pub rods: Vec<RodShape>,
+    /// Energy.
+    pub energy: f64,
+    /// Number of negative eigenvalues.
+    pub index: Option<usize>,
+    /// Bound on the error of the positions, in units of length, by the method
+    /// itself.
+    pub error_estimate: Option<f64>,
+    /// Waves and twist of the veins.
+    pub undulation: Undulation,
+    /// Work done.
+    pub work: Work,
+}
+
+impl From<Equilibrium> for Answer {
+    fn from(leaf: Equilibrium) -> Self {
+        Answer {
+            outcome: leaf.outcome,
+            remark: leaf.remark,
+            stations: leaf.shape.stations,
+            rods: leaf.shape.rods,
+            energy: leaf.energy.unwrap_or(f64::NAN),
+            index: leaf.stability.negative_eigenvalues,
+            error_estimate: leaf.accuracy.error_estimate,
+            undulation: leaf.undulation,
+            work: leaf.work,
+        }
+    }
+}
+
+impl Answer {
+    /// Relaxes a leaf.
+    ///
+    /// # Errors
+    /// If that cannot be asked of the method.
+    pub fn relaxed(scenario: &Scenario, options: &Options) -> Result<Self, RelaxError> {
+        relax::relax(scenario, options, &mut |_| {}).map(Answer::from)
+    }
+
+    /// What a solution of the boundary-value problem says if this `accuracy`,
+    /// relative to the longest rod, was asked for. Eigenvalues are not counted.
+    pub fn of_solution(scenario: &Scenario, solution: Solution, accuracy: f64) -> Self {
+        let error = solution.error.position;
+        Answer {
+            outcome: match error > accuracy * longest(scenario) {
+                true => Outcome::ToleranceNotReached,
+                false => Outcome::Converged,
+            },
+            remark: None,
+            energy: solution.energy,
+            index: None,
+            error_estimate: Some(error),
+            undulation: Undulation::at_stations(
+                scenario,
+                &solution.stations,
+                &solution.rods,
+                Some(error),
+            ),
+            work: solution.work.into(),
+            stations: solution.stations,
+            rods: solution.rods,
+        }
+    }
+
+    /// Whether the leaf is at rest, stable or not, accurate or not.
+    pub fn at_rest(&self) -> bool {
+        self.outcome.is_success() || self.outcome == Outcome::ToleranceNotReached
+    }
+
+    /// It as the start of a boundary-value problem.
+    pub fn as_start(&self) -> Start<'_> {
+        Start::Leaf {
+            stations: &self.stations,
+            rods: &self.rods,
+        }
+    }
+
+    /// Largest distance from another answer at the stations common to both;
+    /// nothing is interpolated. `None` if there are none but the base, which is
+    /// clamped. What is not a number is infinitely far.
+    pub fn distance(&self, other: &Answer) -> Option<f64> {
+        let common = common(&self.stations, &other.stations);
+        if common.iter().all(|&(i, _)| self.stations[i] == 0.0) {
+            return None;
+        }
+        let pairs = self.rods.iter().zip(&other.rods).flat_map(|(a, b)| {
+            let common = common.iter();
+            common.map(|&(i, j)| Difference::of(&a.nodes[i], &b.nodes[j]))
+        });
+        let largest = pairs.fold(Difference::default(), Difference::max);
+        Some(largest.position)
+    }
+
+    /// Whether two answers this far apart differ by no more than their error
+    /// estimates together allow.
+    pub fn confirms(&self, other: &Answer, distance: f64) -> bool {
+        distance <= self.error() + other.error()
+    }
+
+    /// The bound on its error; infinite if it has none.
+    pub fn error(&self) -> f64 {
+        self.error_estimate.unwrap_or(f64::INFINITY)
+    }
+}
+
+/// What shooting does, in the words of a relaxation: corrections are steps,
+/// linearisations factorisations, evaluations of all slopes those of all forces.
+impl From<bvp::Work> for Work {
+    fn from(work: bvp::Work) -> Self {
+        Work {
+            steps: work.iterations,
+            factorizations: work.linearizations,
+            force_evaluations: work.slopes,
+            cg_iterations: 0,
+        }
+    }
+}
+
+impl Add for Work {
+    type Output = Work;
+
+    fn add(self, other: Work) -> Work {
+        Work {
+            steps: self.steps + other.steps,
+            factorizations: self.factorizations + other.factorizations,
+            force_evaluations: self.force_evaluations + other.force_evaluations,
+            cg_iterations: self.cg_iterations + other.cg_iterations,
+        }
+    }
+}
+
+/// Does something, and tells also the seconds it took.
+pub fn timed<T>(run: impl FnOnce() -> T) -> (T, f64) {
+    let clock = Instant::now();
+    let found = run();
+    (found, clock.elapsed().as_secs_f64())
+}
+
+/// Length of the longest rod: the unit of all relative errors.
+pub fn longest(scenario: &Scenario) -> f64 {
+    let lengths = scenario.rods.iter().map(|rod| rod.length);
+    lengths.fold(0.0, f64::max)
+}
+
+/// A grid of at least so many segments on which eigenvalues can be counted.
+pub fn fine_grid(scenario: &Scenario, segments: usize) -> Grid {
+    let leaf = Leaf::new(scenario);
+    let mut grid = Grid::new(segments.max(leaf.kinks().len() + 1), leaf.kinks());
+    while grid.segments() < SEGMENTS {
+        grid = grid.refined();
+    }
+    grid
+}
+
+/// Negative eigenvalues of the equilibrium near a shape that is known at the
+/// nodes of `grid` and perhaps at other stations.
+pub fn index_at(
+    scenario: &Scenario,
+    grid: Grid,
+    stations: &[f64],
+    rods: &[RodShape],
+) -> Option<usize> {
+    let kept: Vec<usize> = (common(stations, grid.sigma()).into_iter())
+        .map(|(i, _)| i)
+        .collect();
+    let at_nodes = |rod: &RodShape| RodShape {
+        length: rod.length,
+        nodes: kept.iter().map(|&i| rod.nodes[i]).collect(),
+    };
+    let rods: Vec<RodShape> = rods.iter().map(at_nodes).collect();
+    index_near(scenario, grid, &rods)
+}
+
+/// Bound on the error of a leaf on one grid, in units of length: from the
+/// distance to the leaf on a grid twice as fine, which is three quarters of it
+/// where the grids are fine enough for their series. `None` if one of both is
+/// not at rest within the tolerance.
+pub fn grid_error(
+    scenario: &Scenario,
+    segments: usize,
+    tolerance: f64,
+    deadline: Option<Instant>,
+) -> Option<f64> {
+    const SAFETY: f64 = 2.0;
+    let on = |segments: usize| {
+        let options = Options {
+            method: Method::default().on_grid(Some(segments)),
+            tolerance: Some(tolerance),
+            deadline,
+            ..Options::default()
+        };
+        let leaf = Answer::relaxed(scenario, &options).ok()?;
+        leaf.outcome.is_success().then_some(leaf)
+    };
+    let apart = on(segments)?.distance(&on(2 * segments)?)?;
+    Some((SAFETY * apart).min(SAME_PLACE * longest(scenario)))
+}
+
+/// Places in two ascending lists of the stations that are in both.
+pub fn common(a: &[f64], b: &[f64]) -> Vec<(usize, usize)> {
+    let (mut i, mut j) = (0, 0);
+    let mut common = Vec::new();
+    while i < a.len() && j < b.len() {
+        if (a[i] - b[j]).abs() <= SAME_STATION {
+            common.push((i, j));
+            (i, j) = (i + 1, j + 1);
+        } else if a[i] < b[j] {
+            i += 1;
+        } else {
+            j += 1;
+        }
+    }
+    common
+}
+
+/// All stations in one ascending list.
+pub fn union(mut stations: Vec<f64>) -> Vec<f64> {
+    stations.sort_by(f64::total_cmp);
+    stations.dedup_by(|b, a| *b - *a <= SAME_STATION);
+    stations
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DQuat, DVec3};
+
+    use super::*;
+    use crate::shape::NodeState;
+
+    /// One straight rod, stretched.
+    fn answer(stations: &[f64], x: impl Fn(f64) -> f64) -> Answer {
+        let node = |&sigma: &f64| NodeState {
+            position: x(sigma) * DVec3::X,
+            rotation: DQuat::IDENTITY,
+            v: DVec3::X,
+            u: DVec3::ZERO,
+            n: DVec3::ZERO,
+            m: DVec3::ZERO,
+        };
+        Answer {
+            outcome: Outcome::Converged,
+            remark: None,
+            stations: stations.to_vec(),
+            rods: vec![RodShape {
+                length: 1.0,
+                nodes: stations.iter().map(node).collect(),
+            }],
+            energy: 0.0,
+            index: None,
+            error_estimate: Some(0.06),
+            undulation: Undulation::default(),
+            work: Work::default(),
+        }
+    }
+
+    #[test]
+    fn answers_are_compared_where_both_are_known() {
+        let coarse = answer(&[0.0, 0.5, 1.0], |sigma| sigma);
+        let fine = answer(&[0.0, 0.25, 0.5, 0.75, 1.0], |sigma| {
+            if sigma == 0.25 { 9.0 } else { 1.1 * sigma }
+        });
+        let distance = coarse.distance(&fine).unwrap();
+        assert!((distance - 0.1).abs() < 1e-15);
+        assert_eq!(fine.distance(&coarse), Some(distance));
+        assert!(coarse.confirms(&fine, distance) && !coarse.confirms(&fine, 0.13));
+
+        let third = answer(&[0.0, 1.0 / 3.0], |_| 0.0);
+        assert_eq!(coarse.distance(&third), None, "only the base is common");
+        let wild = answer(&[0.0, 1.0], |_| f64::NAN);
+        assert_eq!(coarse.distance(&wild), Some(f64::INFINITY));
+    }
+
+    #[test]
+    fn stations_are_united() {
+        let stations = union(vec![0.0, 0.5, 1.0, 0.0, 0.3, 0.5 + 1e-16, 1.0]);
+        assert_eq!(stations, [0.0, 0.3, 0.5, 1.0]);
+        assert_eq!(common(&stations, &[0.0, 0.5, 0.7]), [(0, 0), (2, 1)]);
+    }
+}
