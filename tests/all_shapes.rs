@@ -3,57 +3,40 @@
 mod common;
 mod workplace;
 
-use leafdyn::relax::SemiImplicit;
-use leafdyn::scenario::Scenario;
+use common::scenario;
+use leafdyn::relax::{Equilibrium, SemiImplicit};
 use leafdyn::study::{All, all};
-use serde_json::Value;
-use workplace::{Workplace, is_whole_png, text};
+use workplace::{Workplace, timeless};
 
-fn fig10(set: &[&str]) -> Scenario {
-    let overrides = ["leaf.rods=5"].iter().chain(set).map(|s| s.to_string());
-    Scenario::read(&common::path("paper/fig10"), &overrides.collect::<Vec<_>>()).unwrap()
+fn search(entries: &str) -> All {
+    let fig10 = scenario("paper/fig10", &format!("leaf.rods=5; {entries}"));
+    all(&fig10, SemiImplicit::default(), Some(1e-5), &mut |_, _| {}).unwrap()
 }
 
-fn search(scenario: &Scenario) -> All {
-    all(
-        scenario,
-        SemiImplicit::default(),
-        Some(1e-5),
-        &mut |_, _| {},
-    )
-    .unwrap()
+fn stable(all: &All) -> Vec<&Equilibrium> {
+    let found = all.found.iter().map(|one| &one.equilibrium);
+    found.filter(|leaf| leaf.stable() == Some(true)).collect()
 }
 
 /// The paper's Fig. 10 with five veins has several places to rest, those with
 /// tips at 0.227 and -0.113 among them, and the flat saddle.
 #[test]
 fn soft_leaf_with_many() {
-    let found = search(&fig10(&[]));
-    let stable: Vec<f64> = (found.found.iter())
-        .filter(|one| one.equilibrium.stable() == Some(true))
-        .map(|one| one.equilibrium.tips[0].z)
-        .collect();
-    println!("{stable:?} from {} starts", found.starts);
-    assert!(stable.len() >= 5, "{stable:?}");
+    let all = search("");
+    let tips: Vec<f64> = stable(&all).iter().map(|leaf| leaf.tips[0].z).collect();
+    println!("{tips:?} from {} starts", all.starts);
+    assert!(tips.len() >= 5, "{tips:?}");
     for wanted in [0.2263, -0.1132, -0.2309] {
-        assert!(stable.iter().any(|z| (z - wanted).abs() < 1e-3), "{wanted}");
+        assert!(tips.iter().any(|z| (z - wanted).abs() < 1e-3), "{wanted}");
     }
-    let energies: Vec<f64> = found
-        .found
-        .iter()
-        .map(|one| one.equilibrium.energy.unwrap())
-        .collect();
-    assert!(energies.is_sorted(), "lowest first");
-    let saddle = found.found.last().unwrap();
+    assert!(all.found.is_sorted_by_key(|one| one.equilibrium.energy));
+    let saddle = all.found.last().unwrap();
     assert_eq!(saddle.equilibrium.stability.negative_eigenvalues, Some(18));
-    let plain = found.found.iter().filter(|one| one.plain).count();
+    let plain = all.found.iter().filter(|one| one.plain).count();
     assert_eq!(plain, 1, "the plain start is told");
-    for one in &found.found {
-        assert!(
-            one.equilibrium.accuracy.residual.unwrap() < 1e-7,
-            "{:?}",
-            one.equilibrium.accuracy.residual
-        );
+    for one in &all.found {
+        let residual = one.equilibrium.accuracy.residual.unwrap();
+        assert!(residual < 1e-7, "{residual}");
     }
 }
 
@@ -61,20 +44,15 @@ fn soft_leaf_with_many() {
 /// with its mirror image.
 #[test]
 fn mirror_images() {
-    let found = search(&fig10(&["load.gravity=[0,0,0]"]));
-    let stable: Vec<_> = (found.found.iter())
-        .filter(|one| one.equilibrium.stable() == Some(true))
-        .collect();
+    let all = search("load.gravity=[0,0,0]");
+    let stable = stable(&all);
     assert!(stable.len() >= 2);
-    let mut paired = 0;
-    for one in &stable {
-        let [tip, energy] = [one.equilibrium.tips[0].z, one.equilibrium.energy.unwrap()];
-        let image = stable.iter().any(|other| {
-            let other = &other.equilibrium;
-            (other.tips[0].z + tip).abs() < 1e-4 && (other.energy.unwrap() - energy).abs() < 1e-7
-        });
-        paired += usize::from(image);
-    }
+    let images = |a: &Equilibrium, b: &Equilibrium| {
+        (a.tips[0].z + b.tips[0].z).abs() < 1e-4
+            && (a.energy.unwrap() - b.energy.unwrap()).abs() < 1e-7
+    };
+    let paired = |one: &&&Equilibrium| stable.iter().any(|other| images(one, other));
+    let paired = stable.iter().filter(paired).count();
     println!("{paired} of {} paired", stable.len());
     assert!(paired >= 2 && 4 * paired >= 3 * stable.len());
 }
@@ -82,29 +60,17 @@ fn mirror_images() {
 #[test]
 fn a_stiff_leaf_has_one_whatever_the_threads() {
     let place = Workplace::new();
-    let run = |threads: &str| {
-        let arguments = ["relax", "leaf.toml", "--all", "--json"];
-        let output = place
-            .command(&arguments)
-            .env("RAYON_NUM_THREADS", threads)
-            .output()
-            .unwrap();
-        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-        let mut object: Value = serde_json::from_slice(&output.stdout).unwrap();
-        object["wall_seconds"] = Value::Null;
-        object
-    };
-    let one = run("1");
-    assert_eq!(one, run("2"));
+    let [one, two] = ["1", "2"].map(|threads| {
+        let run = place.run_on(threads, "relax leaf.toml --all --json");
+        timeless(run.ends(0).json())
+    });
+    assert_eq!(one, two);
     assert_eq!(one["equilibria"].as_array().unwrap().len(), 1);
     assert_eq!(one["equilibria"][0]["stable"], true);
-    assert_eq!(
-        place.names("out/small"),
-        ["equilibria.json", "equilibria.png", "equilibria.svg"]
-    );
-    assert!(is_whole_png(&place.path("out/small/equilibria.png")));
-    for more in [["--method", "explicit"], ["--segments", "8"]] {
-        let output = place.run(&["relax", "leaf.toml", "--all", more[0], more[1]]);
-        assert_eq!(output.status.code(), Some(2), "{more:?}");
+    let files = ["equilibria.json", "equilibria.png", "equilibria.svg"];
+    assert_eq!(place.names("out/small"), files);
+    place.picture("out/small/equilibria");
+    for more in ["--method explicit", "--segments 8"] {
+        place.run(&format!("relax leaf.toml --all {more}")).ends(2);
     }
 }

@@ -3,7 +3,9 @@
 
 mod common;
 
-use common::{close, extrapolate, fig04, in_lab, paper_leaf, settle, settle_on};
+use common::{
+    close, extrapolate, fig04, in_lab, linear, order, paper_leaf, settle, settle_on, tip_node,
+};
 use glam::{DMat3, DVec3};
 use leafdyn::relax::{Equilibrium, NodeState, RodShape};
 use leafdyn::scenario::{Profile, Scenario};
@@ -18,10 +20,7 @@ fn twisted(joined: bool) -> Scenario {
     for (j, rod) in leaf.rods.iter_mut().enumerate() {
         rod.length = 1.0 + 0.1 * j as f64;
         rod.rest_curvature = [0.4, 0.8 - 0.5 * j as f64, 0.3].map(Profile::Constant);
-        rod.couple_stiffness[1] = Profile::Linear {
-            at: vec![0.0, 1.0],
-            value: vec![1.5, 0.5],
-        };
+        rod.couple_stiffness[1] = linear(&[0.0, 1.0], &[1.5, 0.5]);
     }
     leaf
 }
@@ -125,12 +124,8 @@ fn the_bases_carry_all_moments() {
 fn tips_meet_and_carry_the_tip_force_and_no_moment() {
     for scenario in scenes() {
         let leaf = settle(&scenario, 1e-11);
-        let tips: Vec<NodeState> = leaf
-            .shape
-            .rods
-            .iter()
-            .map(|rod| *rod.nodes.last().unwrap())
-            .collect();
+        let rods = 0..leaf.shape.rods.len();
+        let tips: Vec<NodeState> = rods.map(|rod| tip_node(&leaf.shape.rods, rod)).collect();
         let carried: DVec3 = tips.iter().map(|tip| in_lab(tip).0).sum();
         let load = vector(scenario.tip_force) * tip_forces(&scenario) as f64;
         assert!((carried - load).length() < 1e-9, "{carried}");
@@ -161,11 +156,8 @@ fn the_clamp_holds_and_directors_are_orthonormal() {
             for node in &rod.nodes {
                 let directors = DMat3::from_quat(node.rotation);
                 let error = directors * directors.transpose() - DMat3::IDENTITY;
-                let worst = error
-                    .to_cols_array()
-                    .into_iter()
-                    .fold(0.0, |m: f64, e| m.max(e.abs()));
-                assert!(worst < 1e-14, "{worst:.1e}");
+                let mut entries = error.to_cols_array().into_iter();
+                assert!(entries.all(|e| e.abs() < 1e-14), "{error}");
             }
         }
     }
@@ -248,11 +240,9 @@ fn kinematics_and_balance_hold_along_every_rod() {
             let [coarse, middle, fine] = errors.map(|e| e[k]);
             assert!(fine < 2e-3, "equation {k}: {fine:.1e}");
             if fine > 1e-9 {
-                let orders = [coarse / middle, middle / fine].map(f64::log2);
-                assert!(
-                    orders.iter().all(|order| (order - 2.0).abs() < 0.15),
-                    "equation {k}: orders {orders:?}"
-                );
+                for order in [order(coarse, middle), order(middle, fine)] {
+                    assert!((order - 2.0).abs() < 0.15, "equation {k}: {order}");
+                }
             }
         }
     }
@@ -279,15 +269,11 @@ fn quadrature(scenario: &Scenario, leaf: &Equilibrium) -> f64 {
             energy += 0.5 * apart.dot(coupling(scenario, leaf, gap, i)) * weight;
         }
     }
-    for rod in leaf.shape.rods.iter().take(tip_forces(scenario)) {
-        energy -= rod
-            .nodes
-            .last()
-            .unwrap()
-            .position
-            .dot(vector(scenario.tip_force));
-    }
+    let tips = (0..tip_forces(scenario)).map(|rod| tip_node(&leaf.shape.rods, rod).position);
     energy
+        - tips
+            .map(|tip| tip.dot(vector(scenario.tip_force)))
+            .sum::<f64>()
 }
 
 #[test]

@@ -5,10 +5,9 @@ mod workplace;
 
 use std::collections::HashMap;
 use std::fs;
-use std::path::Path;
 
-use serde_json::Value;
-use workplace::{Workplace, is_whole_png, text};
+use serde_json::{Value, json};
+use workplace::{Workplace, all_refused, contains, help_names};
 
 const FILES: [&str; 4] = ["chart.csv", "chart.json", "chart.png", "chart.svg"];
 
@@ -17,21 +16,13 @@ const COLUMNS: &str = "method,knob,seconds,seconds_min,seconds_q1,seconds_q3,run
 
 const PEERS: &str = "program,scenario,rods,knob,seconds,error,outcome\n";
 
-/// The path of a scenario that comes with the program.
-fn scenario(name: &str) -> String {
-    let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
-    scenarios.join(name).to_str().unwrap().into()
-}
-
 /// One row of a table, by the names of its columns.
 type Row = HashMap<String, String>;
 
-fn table(file: &Path) -> Vec<Row> {
-    let mut table = csv::Reader::from_path(file).unwrap();
-    table
-        .deserialize()
-        .map(|row: Result<Row, _>| row.unwrap())
-        .collect()
+fn rows(place: &Workplace, file: &str, columns: &str) -> Vec<Row> {
+    let name = || columns.split(',').map(String::from);
+    let rows = place.table(file, columns).into_iter();
+    rows.map(|row| name().zip(row).collect()).collect()
 }
 
 fn number(row: &Row, column: &str) -> Option<f64> {
@@ -39,64 +30,59 @@ fn number(row: &Row, column: &str) -> Option<f64> {
     (!cell.is_empty()).then(|| cell.parse().unwrap())
 }
 
-/// Charts a leaf with some methods; returns also what is in `chart.json`.
-fn chart(place: &Workplace, leaf: &str, methods: &str, more: &[&str]) -> (Vec<Row>, Value) {
-    let common = ["chart", leaf, "--methods", methods, "--seconds", "0.05"];
-    let output = place.run(&[&common[..], &["--json", "--out", "out"], more].concat());
-    let status = output.status.code();
-    assert_eq!(status, Some(0), "{}", text(&output.stderr));
-    let written = fs::read(place.path("out/chart.json")).unwrap();
-    assert_eq!(text(&output.stdout), text(&written));
-    let rows = table(&place.path("out/chart.csv"));
-    (rows, serde_json::from_slice(&output.stdout).unwrap())
+/// What a row's knob is set to.
+fn knob(row: &Row, name: &str) -> f64 {
+    row["knob"].strip_prefix(name).unwrap().parse().unwrap()
 }
+
+/// Charts a leaf with some methods; returns also what is in `chart.json`.
+#[track_caller]
+fn chart(place: &Workplace, leaf: &str, methods: &str) -> (Vec<Row>, Value) {
+    let how = format!("--methods {methods} --seconds 0.05 --json --out out");
+    let run = place.run(&format!("chart {leaf} {how}")).ends(0);
+    assert_eq!(run.out, place.read("out/chart.json"));
+    (rows(place, "out/chart.csv", COLUMNS), run.json())
+}
+
+const TWO: &str = "leaf.toml --set leaf.rods=2";
 
 fn of<'r>(rows: &'r [Row], method: &str) -> Vec<&'r Row> {
     rows.iter().filter(|row| row["method"] == method).collect()
 }
 
+/// The least time of rows no less accurate than `error`.
+fn fastest<'r>(rows: impl IntoIterator<Item = &'r Row>, error: f64) -> f64 {
+    let accurate = rows.into_iter();
+    let accurate = accurate.filter(|row| number(row, "true_error") <= Some(error));
+    let seconds = accurate.map(|row| number(row, "seconds").unwrap());
+    seconds.fold(f64::INFINITY, f64::min)
+}
+
 #[test]
 fn help_names_every_option_and_exit_status() {
-    let output = Workplace::new().run(&["chart", "--help"]);
-    assert_eq!(output.status.code(), Some(0));
-    for part in [
-        "--seconds",
-        "--methods",
-        "--peers",
-        "--rods",
-        "--tolerance",
-        "--set",
-        "--out",
-        "--json",
-        "relaxed-shooting",
-        "0 charted",
-        "do not confirm the reference",
-        "2 the request was refused",
-    ] {
-        let help: Vec<&str> = text(&output.stdout).split_whitespace().collect();
-        assert!(help.join(" ").contains(part), "{part}");
-    }
+    help_names(
+        "chart",
+        "--seconds
+        --methods
+        --peers
+        --rods
+        --tolerance
+        --set
+        --out
+        --json
+        relaxed-shooting
+        0 charted
+        do not confirm the reference
+        2 the request was refused",
+    );
 }
 
 #[test]
 fn a_leaf_is_charted_and_written_down() {
     let place = Workplace::new();
-    let arguments = [
-        "chart",
-        "leaf.toml",
-        "--set",
-        "leaf.rods=2",
-        "--seconds",
-        "0.05",
-    ];
-    let methods = [
-        "--methods",
-        "semi-implicit,semi-implicit-grid,single-shooting,relaxed-shooting",
-    ];
-    let output = place.run(&[&arguments[..], &methods].concat());
-    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-    assert_eq!(text(&output.stderr), "");
-    for part in [
+    let methods = "semi-implicit,semi-implicit-grid,single-shooting,relaxed-shooting";
+    let run = place.run(&format!("chart {TWO} --seconds 0.05 --methods {methods}"));
+    run.ok().says(&[
         "small: 2 veins joined at the tip, speed against accuracy",
         "  errors   against a solution known within ",
         "relaxation and shooting agree within their error estimates",
@@ -107,27 +93,18 @@ fn a_leaf_is_charted_and_written_down() {
         " to 1e-2 ",
         " to 1e-10 ",
         "out/small: chart.json, chart.csv, chart.svg, chart.png",
-    ] {
-        let report = text(&output.stdout);
-        assert!(report.contains(part), "{part} in {report}");
-    }
+    ]);
     assert_eq!(place.names("out/small"), FILES);
-    assert!(is_whole_png(&place.path("out/small/chart.png")));
-    let svg = fs::read_to_string(place.path("out/small/chart.svg")).unwrap();
-    assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>\n"));
-    for part in ["small: speed against accuracy", "N = 2", "single shooting"] {
-        assert!(svg.contains(part), "{part}");
-    }
-    let csv = fs::read_to_string(place.path("out/small/chart.csv")).unwrap();
-    assert_eq!(csv.lines().next(), Some(COLUMNS));
-    assert_eq!(csv.lines().count(), 1 + 38);
+    let parts = ["small: speed against accuracy", "N = 2", "single shooting"];
+    contains(&place.picture("out/small/chart"), &parts);
+    assert_eq!(rows(&place, "out/small/chart.csv", COLUMNS).len(), 38);
 }
 
 #[test]
 fn table_and_json_say_the_same_and_the_front_is_not_beaten() {
     let place = Workplace::new();
     let methods = "semi-implicit,semi-implicit-grid,relaxed-shooting";
-    let (rows, chart) = chart(&place, "leaf.toml", methods, &["--set", "leaf.rods=2"]);
+    let (rows, chart) = chart(&place, TWO, methods);
     assert_eq!(chart["scenario"], "small");
     assert_eq!(chart["rods"], 2);
     assert_eq!(chart["threads"], 1);
@@ -145,10 +122,9 @@ fn table_and_json_say_the_same_and_the_front_is_not_beaten() {
                 Value::String(word) => word.clone(),
                 Value::Null => String::new(),
                 Value::Bool(yes) => yes.to_string(),
-                number => {
-                    let cell: f64 = row[column].parse().unwrap();
-                    let number = number.as_f64().unwrap();
-                    assert!((number - cell).abs() <= 1e-12 * cell, "{column}");
+                value => {
+                    let (value, cell) = (value.as_f64().unwrap(), number(row, column).unwrap());
+                    assert!((value - cell).abs() <= 1e-12 * cell, "{column}");
                     continue;
                 }
             };
@@ -170,84 +146,59 @@ fn table_and_json_say_the_same_and_the_front_is_not_beaten() {
     };
     for row in &rows {
         let (time, error) = point(row);
-        let beaten = rows
-            .iter()
-            .map(point)
-            .any(|(t, e)| t < time && e <= error || t <= time && e < error);
+        let beaten = |(t, e): (f64, f64)| t < time && e <= error || t <= time && e < error;
+        let beaten = rows.iter().map(point).any(beaten);
         assert_eq!(row["pareto"] == "true", !beaten, "{row:?}");
     }
 
     let decades = chart["decades"].as_array().unwrap();
     assert_eq!(decades.len(), 9);
     for decade in decades {
-        let error = decade["error"].as_f64().unwrap();
-        let accurate = rows
-            .iter()
-            .filter(|row| number(row, "true_error") <= Some(error));
-        let fastest = accurate
-            .map(|row| point(row).0)
-            .fold(f64::INFINITY, f64::min);
-        let seconds = |key: &str| decade[key].as_f64().unwrap();
-        assert!((seconds("seconds") / fastest - 1.0).abs() < 1e-12);
-        let factor = seconds("default_seconds") / fastest;
-        assert!((decade["factor"].as_f64().unwrap() / factor - 1.0).abs() < 1e-12);
+        let value = |key: &str| decade[key].as_f64().unwrap();
+        let fastest = fastest(&rows, value("error"));
+        assert!((value("seconds") / fastest - 1.0).abs() < 1e-12);
+        let factor = value("default_seconds") / fastest;
+        assert!((value("factor") / factor - 1.0).abs() < 1e-12);
         assert!(factor > 1.0 - 1e-12);
     }
 }
 
 #[test]
 fn single_grids_are_of_second_order() {
-    let place = Workplace::new();
-    let methods = "semi-implicit-grid,explicit-grid";
-    let (rows, _) = chart(&place, "leaf.toml", methods, &["--set", "leaf.rods=2"]);
-    for (method, finest) in [("semi-implicit-grid", 512), ("explicit-grid", 64)] {
-        let errors: Vec<f64> = of(&rows, method)
-            .iter()
-            .filter(|row| {
-                let segments: usize = row["knob"]
-                    .strip_prefix("segments=")
-                    .unwrap()
-                    .parse()
-                    .unwrap();
-                (8..=finest).contains(&segments)
-            })
-            .map(|row| number(row, "true_error").unwrap())
-            .collect();
+    let (rows, _) = chart(&Workplace::new(), TWO, "semi-implicit-grid,explicit-grid");
+    for (method, finest) in [("semi-implicit-grid", 512.0), ("explicit-grid", 64.0)] {
+        let grids = of(&rows, method);
+        let fine = |row: &&&Row| (8.0..=finest).contains(&knob(row, "segments="));
+        let fine = grids.iter().filter(fine);
+        let errors: Vec<f64> = fine.map(|row| number(row, "true_error").unwrap()).collect();
         assert!(errors.len() >= 4);
         for pair in errors.windows(2) {
             let ratio = pair[0] / pair[1];
             assert!((ratio - 4.0).abs() < 0.2, "{method}: {errors:?}");
         }
-        let estimates = of(&rows, method);
-        assert!(estimates.iter().all(|row| row["error_estimate"].is_empty()));
+        assert!(grids.iter().all(|row| row["error_estimate"].is_empty()));
     }
 }
 
 #[test]
 fn tolerances_are_kept_and_estimates_are_bounds() {
-    let place = Workplace::new();
     let methods = "semi-implicit,explicit,single-shooting,multiple-shooting,relaxed-shooting";
-    let (rows, chart) = chart(&place, "leaf.toml", methods, &["--set", "leaf.rods=2"]);
+    let (rows, chart) = chart(&Workplace::new(), TWO, methods);
     let floor = chart["reference"]["known_within"].as_f64().unwrap();
     assert_eq!(rows.len(), 50);
-    for row in rows.iter().filter(|row| row["outcome"] == "converged") {
-        let tolerance: f64 = row["knob"]
-            .strip_prefix("tolerance=")
-            .unwrap()
-            .parse()
-            .unwrap();
+    let converged = |row: &&Row| row["outcome"] == "converged";
+    for row in rows.iter().filter(converged) {
         let estimate = number(row, "error_estimate").unwrap();
         let error = number(row, "true_error").unwrap();
-        assert!(estimate <= tolerance, "{row:?}");
+        assert!(estimate <= knob(row, "tolerance="), "{row:?}");
         assert!(error <= estimate.max(floor), "{row:?}");
     }
     for method in methods.split(',') {
-        let converged = of(&rows, method);
-        let converged = converged.iter().filter(|row| row["outcome"] == "converged");
-        assert!(converged.count() >= 5, "{method}");
+        let count = of(&rows, method).into_iter().filter(converged).count();
+        assert!(count >= 5, "{method}");
     }
     let remarks = chart["remarks"].to_string();
-    assert!(remarks.contains("no knob for its time step"), "{remarks}");
+    contains(&remarks, &["no knob for its time step"]);
     assert!(!remarks.contains("underestimates"), "{remarks}");
 }
 
@@ -255,16 +206,11 @@ fn tolerances_are_kept_and_estimates_are_bounds() {
 fn all_but_times_is_the_same_every_time() {
     let place = Workplace::new();
     let two = || {
-        let (mut rows, _) = chart(
-            &place,
-            "leaf.toml",
-            "semi-implicit,semi-implicit-grid,relaxed-shooting",
-            &["--set", "leaf.rods=2"],
-        );
+        let methods = "semi-implicit,semi-implicit-grid,relaxed-shooting";
+        let (mut rows, _) = chart(&place, TWO, methods);
+        let timed = |column: &str| column.starts_with("seconds") || column == "runs";
         for row in &mut rows {
-            row.retain(|column, _| {
-                !column.starts_with("seconds") && column != "runs" && column != "pareto"
-            });
+            row.retain(|column, _| !timed(column) && column != "pareto");
         }
         rows
     };
@@ -275,10 +221,8 @@ fn all_but_times_is_the_same_every_time() {
 #[test]
 fn what_fails_is_shown_with_the_reason() {
     let place = Workplace::new();
-    let fig08 = scenario("paper/fig08.toml");
-    let pulled = ["--set", "leaf.rods=5", "--set", "load.tip_force=[5,0,0]"];
-    let methods = "single-shooting,relaxed-shooting";
-    let (rows, chart) = chart(&place, &fig08, methods, &pulled);
+    let pulled = "scenarios/paper/fig08.toml --set leaf.rods=5 --set load.tip_force=[5,0,0]";
+    let (rows, chart) = chart(&place, pulled, "single-shooting,relaxed-shooting");
     let single = of(&rows, "single-shooting");
     assert_eq!(single.len(), 10, "failures are not left out");
     assert_eq!(single[0]["outcome"], "not-at-rest");
@@ -289,37 +233,29 @@ fn what_fails_is_shown_with_the_reason() {
         assert_eq!(row["pareto"], "false");
     }
     let remark = chart["runs"][0]["remark"].as_str().unwrap();
-    assert!(remark.contains("use more intervals"), "{remark}");
+    contains(remark, &["use more intervals"]);
     let relaxed = of(&rows, "relaxed-shooting");
     assert!(relaxed.iter().any(|row| row["pareto"] == "true"));
-    let svg = fs::read_to_string(place.path("out/chart.svg")).unwrap();
-    assert!(svg.contains(">not-at-rest</text>"));
+    contains(&place.picture("out/chart"), &[">not-at-rest</text>"]);
 }
 
 /// A buckled round column may do so in any direction.
 #[test]
 fn where_errors_tell_little_it_is_said() {
-    let place = Workplace::new();
-    let round = [
-        "leaf.rods=1",
-        "leaf.fan=[0.0]",
-        "load.gravity=[0,0,0]",
-        "load.tip_force=[-4,0,0]",
-    ];
-    let round: Vec<&str> = round.iter().flat_map(|entry| ["--set", *entry]).collect();
-    let (_, chart) = chart(&place, "leaf.toml", "semi-implicit-grid", &round);
+    let round = "leaf.toml --set leaf.rods=1 --set leaf.fan=[0.0] \
+                 --set load.gravity=[0,0,0] --set load.tip_force=[-4,0,0]";
+    let (_, chart) = chart(&Workplace::new(), round, "semi-implicit-grid");
     let neutral = chart["reference"]["neutral"].as_str().unwrap();
-    assert!(neutral.contains("vein 1 would move"), "{neutral}");
-    let remarks = chart["remarks"].to_string();
-    assert!(remarks.contains("errors tell little"), "{remarks}");
+    contains(neutral, &["vein 1 would move"]);
+    contains(&chart["remarks"].to_string(), &["errors tell little"]);
 }
 
 /// A straight column under more than Euler's load.
 #[test]
 fn a_saddle_is_no_solution() {
-    let place = Workplace::new();
-    let column = scenario("classic/elastica_buckled.toml");
-    let (rows, chart) = chart(&place, &column, "semi-implicit,multiple-shooting", &[]);
+    let column = "scenarios/classic/elastica_buckled.toml";
+    let methods = "semi-implicit,multiple-shooting";
+    let (rows, chart) = chart(&Workplace::new(), column, methods);
     assert_eq!(chart["reference"]["confirmed"], true);
     for row in of(&rows, "multiple-shooting") {
         assert_eq!(row["outcome"], "saddle");
@@ -332,35 +268,28 @@ fn a_saddle_is_no_solution() {
 
 #[test]
 fn what_a_method_cannot_do_is_told_and_the_others_are_charted() {
-    let place = Workplace::new();
-    let rigid = ["--set", "stiffness.axial=inf", "--set", "leaf.rods=1"];
-    let (rows, chart) = chart(&place, "leaf.toml", "semi-implicit,explicit", &rigid);
+    let rigid = "leaf.toml --set stiffness.axial=inf --set leaf.rods=1";
+    let (rows, chart) = chart(&Workplace::new(), rigid, "semi-implicit,explicit");
     let explicit = of(&rows, "explicit");
     assert!(explicit.iter().all(|row| row["outcome"] == "refused"));
     assert!(explicit.iter().all(|row| row["seconds"].is_empty()));
     let remarks = chart["remarks"].to_string();
-    assert!(remarks.contains("explicit is not charted: "), "{remarks}");
+    contains(&remarks, &["explicit is not charted: "]);
     let default = of(&rows, "semi-implicit");
     assert!(default.iter().all(|row| row["outcome"] == "converged"));
 }
 
 #[test]
 fn profiles_with_knots_anywhere_have_a_reference_at_every_station() {
-    let place = Workplace::new();
     let knots = "stiffness.bending_2={at=[0.0,0.3,0.37,1.0],value=[1.0,0.9,0.3,0.2]}";
-    let more = ["--set", "leaf.rods=2", "--set", knots];
     let methods = "semi-implicit,semi-implicit-grid,relaxed-shooting";
-    let (rows, chart) = chart(&place, "leaf.toml", methods, &more);
+    let leaf = format!("{TWO} --set {knots}");
+    let (rows, chart) = chart(&Workplace::new(), &leaf, methods);
     assert_eq!(chart["reference"]["confirmed"], true);
     let grids = of(&rows, "semi-implicit-grid");
-    let errors: Vec<f64> = grids
-        .iter()
-        .map(|row| number(row, "true_error").unwrap())
-        .collect();
-    assert!(
-        errors[7] < 1e-5 && errors[1] / errors[7] > 500.0,
-        "{errors:?}"
-    );
+    let errors = [1, 7].map(|k| number(grids[k], "true_error").unwrap());
+    let [coarse, fine] = errors;
+    assert!(fine < 1e-5 && coarse / fine > 500.0, "{errors:?}");
     for row in of(&rows, "semi-implicit") {
         assert!(number(row, "true_error") <= number(row, "error_estimate"));
     }
@@ -369,22 +298,10 @@ fn profiles_with_knots_anywhere_have_a_reference_at_every_station() {
 #[test]
 fn without_an_equilibrium_the_exit_status_says_so() {
     let place = Workplace::new();
-    let output = place.run(&[
-        "chart",
-        "leaf.toml",
-        "--methods",
-        "semi-implicit",
-        "--seconds",
-        "0.05",
-        "--set",
-        "leaf.rods=1",
-        "--set",
-        "load.gravity=[-1e6,0,0]",
-        "--json",
-    ]);
-    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    let heavy = "leaf.toml --set leaf.rods=1 --set load.gravity=[-1e6,0,0]";
+    let how = "--methods semi-implicit --seconds 0.05 --json";
+    let chart = place.run(&format!("chart {heavy} {how}")).ends(1).json();
     assert_eq!(place.names("out/small"), FILES);
-    let chart: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(chart["reference"], Value::Null);
     for run in chart["runs"].as_array().unwrap() {
         assert_ne!(run["outcome"], "converged");
@@ -401,180 +318,109 @@ fn peers_stand_beside_our_own_methods() {
     fs::write(place.path("a.csv"), format!("{PEERS}{rows}")).unwrap();
     let other = "fast,small,2,n=10,1e-9,1e-2,at-rest\nslow,small,3,n=1,1,1e-2,at-rest\n";
     fs::write(place.path("b.csv"), format!("{PEERS}{other}")).unwrap();
-    let more = [
-        "--peers",
-        "a.csv",
-        "--peers",
-        "b.csv",
-        "--set",
-        "leaf.rods=2",
-    ];
-    let (rows, chart) = chart(&place, "leaf.toml", "semi-implicit", &more);
+    let leaf = format!("{TWO} --peers a.csv --peers b.csv");
+    let (rows, chart) = chart(&place, &leaf, "semi-implicit");
     let slow = of(&rows, "slow");
     assert_eq!(slow.len(), 2);
     assert_eq!(number(slow[0], "seconds"), Some(2000.0));
     assert_eq!(number(slow[0], "true_error"), Some(1e-5));
     assert_eq!(slow[0]["runs"], "2");
     assert_eq!(slow[1]["outcome"], "not-converged max-nodes");
-    assert_eq!(
-        of(&rows, "fast")[0]["pareto"],
-        "true",
-        "who is faster is on the front"
-    );
+    let fast = &of(&rows, "fast")[0]["pareto"];
+    assert_eq!(fast, "true", "who is faster is on the front");
 
-    let peers = chart["peers"].as_array().unwrap();
-    let default = of(&rows, "semi-implicit");
-    let accurate = default
-        .iter()
-        .filter(|row| number(row, "true_error") <= Some(1e-5));
-    let ours = accurate.map(|row| number(row, "seconds").unwrap());
-    let ours = ours.fold(f64::INFINITY, f64::min);
-    let ratio = peers[0]["ratio"].as_f64().unwrap();
+    let ours = fastest(of(&rows, "semi-implicit"), 1e-5);
+    let ratio = chart["peers"][0]["ratio"].as_f64().unwrap();
     assert!((ratio * ours / 2000.0 - 1.0).abs() < 1e-12);
-    assert_eq!(peers[1]["ratio"], Value::Null);
+    assert_eq!(chart["peers"][1]["ratio"], Value::Null);
     let remarks = chart["remarks"].to_string();
-    assert!(
-        remarks.contains("1 row of --peers is about another leaf"),
-        "{remarks}"
-    );
-    let svg = fs::read_to_string(place.path("out/chart.svg")).unwrap();
-    assert!(svg.contains(">slow</text>") && svg.contains(">not-converged max-nodes</text>"));
+    contains(&remarks, &["1 row of --peers is about another leaf"]);
+    let parts = [">slow</text>", ">not-converged max-nodes</text>"];
+    contains(&place.picture("out/chart"), &parts);
 }
 
 #[test]
 fn malformed_tables_are_refused_with_file_and_line() {
-    for (content, message) in [
-        (
-            "a,small,5,n=1,fast,1e-2,converged\n",
-            "peers.csv:2: seconds = \"fast\"",
-        ),
-        (
-            "a,small,5,n=1,1,1e-2,converged\nb,small,5,n=1,1,1e-2\n",
-            "peers.csv:3: 6 cells, not 7",
-        ),
-        (
-            "a,small,none,n=1,1,1e-2,converged\n",
-            "peers.csv:2: rods = \"none\"",
-        ),
-    ] {
-        let place = Workplace::new();
-        fs::write(place.path("peers.csv"), format!("{PEERS}{content}")).unwrap();
-        refused(&place, &["leaf.toml", "--peers", "peers.csv"], message);
-    }
     let place = Workplace::new();
-    fs::write(place.path("peers.csv"), "no,such,columns\n").unwrap();
-    let message = "peers.csv:1: the first line must name the columns program, ";
-    refused(&place, &["leaf.toml", "--peers", "peers.csv"], message);
-    refused(
-        &place,
-        &["leaf.toml", "--peers", "absent.csv"],
-        "absent.csv",
-    );
+    let columns = "peers.csv:1: the first line must name the columns program, ";
+    let [fast, short, none] = [
+        "a,small,5,n=1,fast,1e-2,converged",
+        "a,small,5,n=1,1,1e-2,converged\nb,small,5,n=1,1,1e-2",
+        "a,small,none,n=1,1,1e-2,converged",
+    ]
+    .map(|rows| format!("{PEERS}{rows}\n"));
+    for (table, message) in [
+        (fast, "peers.csv:2: seconds = \"fast\""),
+        (short, "peers.csv:3: 6 cells, not 7"),
+        (none, "peers.csv:2: rods = \"none\""),
+        ("no,such,columns\n".into(), columns),
+    ] {
+        fs::write(place.path("peers.csv"), table).unwrap();
+        place.refuses("chart leaf.toml --peers peers.csv", message);
+    }
+    place.refuses("chart leaf.toml --peers absent.csv", "absent.csv");
 }
 
 #[test]
 fn cost_is_charted_against_the_number_of_veins() {
     let place = Workplace::new();
-    let output = place.run(&[
-        "chart",
-        "leaf.toml",
-        "--methods",
-        "semi-implicit,semi-implicit-grid,relaxed-shooting",
-        "--seconds",
-        "0.05",
-        "--rods",
-        "3,2",
-        "--tolerance",
-        "1e-3",
-        "--set",
-        "leaf.rods=2",
-    ]);
-    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-    for part in [
+    let methods = "--methods semi-implicit,semi-implicit-grid,relaxed-shooting";
+    let how = "--seconds 0.05 --rods 3,2 --tolerance 1e-3";
+    let run = place.run(&format!("chart {TWO} {methods} {how}")).ends(0);
+    run.says(&[
         "  veins    to a tolerance of 1e-3\n",
         "semi-implicit, extrapolated, N = 2: ",
         ", N = 3: ",
         "chart_rods.csv, chart_rods.svg, chart_rods.png",
-    ] {
-        let report = text(&output.stdout);
-        assert!(report.contains(part), "{part} in {report}");
-    }
+    ]);
     let more = ["chart_rods.csv", "chart_rods.png", "chart_rods.svg"];
     let mut files = [&FILES[..], &more].concat();
     files.sort_unstable();
     assert_eq!(place.names("out/small"), files);
-    assert!(is_whole_png(&place.path("out/small/chart_rods.png")));
-    let csv = place.path("out/small/chart_rods.csv");
-    let header = fs::read_to_string(&csv).unwrap();
-    let shared = COLUMNS.strip_suffix(",pareto").unwrap();
-    assert_eq!(
-        header.lines().next(),
-        Some(format!("rods,{shared}").as_str())
-    );
-    let rows = table(&csv);
-    let who: Vec<(&str, &str)> = rows
+    place.picture("out/small/chart_rods");
+    let columns = format!("rods,{}", COLUMNS.strip_suffix(",pareto").unwrap());
+    let rows = rows(&place, "out/small/chart_rods.csv", &columns);
+    let who: Vec<String> = rows
         .iter()
-        .map(|row| (row["method"].as_str(), row["rods"].as_str()))
+        .map(|row| format!("{} {}", row["method"], row["rods"]))
         .collect();
     assert_eq!(
         who,
         [
-            ("semi-implicit", "2"),
-            ("semi-implicit", "3"),
-            ("semi-implicit-grid", "2"),
-            ("semi-implicit-grid", "3"),
-            ("relaxed-shooting", "2"),
-            ("relaxed-shooting", "3"),
+            "semi-implicit 2",
+            "semi-implicit 3",
+            "semi-implicit-grid 2",
+            "semi-implicit-grid 3",
+            "relaxed-shooting 2",
+            "relaxed-shooting 3",
         ]
     );
     for row in &rows {
         assert!(number(row, "true_error").unwrap() <= 1e-3, "{row:?}");
         assert_eq!(row["outcome"], "converged");
     }
-    let json = fs::read(place.path("out/small/chart.json")).unwrap();
-    let chart: Value = serde_json::from_slice(&json).unwrap();
+    let chart = place.json("out/small/chart.json");
     assert_eq!(chart["scaling"]["tolerance"], 1e-3);
-    assert_eq!(chart["scaling"]["unconfirmed"], serde_json::json!([]));
+    assert_eq!(chart["scaling"]["unconfirmed"], json!([]));
     assert_eq!(chart["scaling"]["runs"].as_array().unwrap().len(), 6);
-}
-
-#[track_caller]
-fn refused(place: &Workplace, arguments: &[&str], message: &str) {
-    let before = place.names(".");
-    let output = place.run(&[&["chart"], arguments].concat());
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-    assert_eq!(text(&output.stdout), "", "{arguments:?}");
-    let said = text(&output.stderr);
-    assert!(said.contains(message), "{message} in {said}");
-    assert_eq!(place.names("."), before, "{arguments:?}");
 }
 
 #[test]
 fn bad_requests_are_refused_before_anything_is_written() {
-    for (arguments, message) in [
-        (
-            vec!["leaf.toml", "--seconds", "0"],
-            "--seconds 0: must be greater than 0",
-        ),
-        (vec!["leaf.toml", "--seconds", "-1"], "--seconds -1"),
-        (vec!["leaf.toml", "--seconds", "nan"], "--seconds NaN"),
-        (vec!["leaf.toml", "--seconds", "1e9"], "at most 86400"),
-        (
-            vec!["leaf.toml", "--methods", "newton"],
-            "semi-implicit-grid",
-        ),
-        (vec!["leaf.toml", "--tolerance", "1e-3"], "--rods"),
-        (
-            vec!["leaf.toml", "--tolerance", "2", "--rods", "2"],
-            "tolerance = 2",
-        ),
-        (vec!["leaf.toml", "--rods", "2,many"], "--rods"),
-        (vec!["leaf.toml", "--rods", "2,0"], "leaf.rods"),
-        (vec!["leaf.toml", "--set", "leaf.rods=0"], "rods"),
-        (vec!["leaf.toml", "--out", "leaf.toml/out"], "--out DIR"),
-        (vec!["absent.toml"], "absent.toml"),
-        (vec![], "SCENARIO"),
-    ] {
-        refused(&Workplace::new(), &arguments, message);
-    }
+    all_refused(
+        "chart",
+        "leaf.toml --seconds 0 => --seconds 0: must be greater than 0
+        leaf.toml --seconds -1 => --seconds -1
+        leaf.toml --seconds nan => --seconds NaN
+        leaf.toml --seconds 1e9 => at most 86400
+        leaf.toml --methods newton => semi-implicit-grid
+        leaf.toml --tolerance 1e-3 => --rods
+        leaf.toml --tolerance 2 --rods 2 => tolerance = 2
+        leaf.toml --rods 2,many => --rods
+        leaf.toml --rods 2,0 => leaf.rods
+        leaf.toml --set leaf.rods=0 => rods
+        leaf.toml --out leaf.toml/out => --out DIR
+        absent.toml => absent.toml
+        => SCENARIO",
+    );
 }

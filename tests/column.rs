@@ -1,32 +1,29 @@
 //! Columns buckle at the loads of Euler, of Reissner and of Greenhill: there,
-//! and nowhere else, the number of negative eigenvalues changes.
+//! and nowhere else, the number of negative eigenvalues changes; on grids, and
+//! along the branch of equilibria.
 
 mod common;
 
 use std::f64::consts::PI;
 
+use common::branch::{changes_at, follow};
 use common::{
-    NEUTRAL, close, critical, critical_of_rigid, set_stiffness, set_vector, settle_on, tip,
+    NEUTRAL, RIGID, ROD, close, critical, critical_of_rigid, rod, set_stiffness, settle_on, table,
+    tip,
 };
-use glam::DVec3;
 use leafdyn::scenario::Scenario;
 
 /// A straight column, clamped at the base, EI = 1 sideways and `other` up and
 /// down.
-fn column(other: f64, axial: f64, shear: f64, tip_force: f64, gravity: f64) -> Scenario {
-    let text = r#"
-        name = "column"
-        leaf = { rods = 1, length = 1.0, fan = [0.0] }
-        stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 1.0, shear_2 = 1.0, shear_3 = 1.0 }
-    "#;
-    let mut overrides = set_stiffness(axial, shear).to_vec();
-    overrides.push(format!("stiffness.bending_2={other:?}"));
-    overrides.push(set_vector(
-        "load.tip_force",
-        DVec3::new(-tip_force, 0.0, 0.0),
-    ));
-    overrides.push(set_vector("load.gravity", DVec3::new(-gravity, 0.0, 0.0)));
-    Scenario::from_toml_with(text, "column", &overrides).unwrap()
+fn column(other: f64, [axial, shear]: [f64; 2], tip_force: f64, gravity: f64) -> Scenario {
+    let stiffness = set_stiffness(axial, shear);
+    let loads = format!(
+        "load.tip_force=[{}, 0, 0]; load.gravity=[{}, 0, 0]",
+        -tip_force, -gravity
+    );
+    rod(&format!(
+        "{stiffness}; stiffness.bending_2={other:?}; {loads}"
+    ))
 }
 
 /// A thousand times as stiff up and down: it never buckles that way here.
@@ -47,61 +44,77 @@ fn euler(k: usize) -> f64 {
 #[test]
 fn euler_between_two_critical_loads_the_index_counts_those_below() {
     for stiffness in [1e3, 1e6, f64::INFINITY] {
-        assert_eq!(
-            index(
-                &column(STRIP, stiffness, stiffness, 0.99 * euler(1), 0.0),
-                64
-            ),
-            0
-        );
+        let index = |other: f64, load: f64| index(&column(other, [stiffness; 2], load, 0.0), 64);
+        assert_eq!(index(STRIP, 0.99 * euler(1)), 0);
         for k in 1..6 {
             for load in [1.01 * euler(k), 0.98 * euler(k + 1)] {
-                let strip = column(STRIP, stiffness, stiffness, load, 0.0);
-                assert_eq!(index(&strip, 64), k, "H = {stiffness}, P = {load}");
+                assert_eq!(index(STRIP, load), k, "H = {stiffness}, P = {load}");
                 // A round section buckles both ways at once.
-                let round = column(1.0, stiffness, stiffness, load, 0.0);
-                assert_eq!(index(&round, 64), 2 * k, "H = {stiffness}, P = {load}");
+                assert_eq!(index(1.0, load), 2 * k, "H = {stiffness}, P = {load}");
             }
         }
     }
 }
 
 /// Equally stiff in stretch and shear, a column buckles at Euler's load all
-/// the same: see the next test.
+/// the same: see Reissner's.
 #[test]
 fn euler_the_first_three_critical_loads_are_the_closed_form() {
     for (k, coarsest) in [(1, 8), (2, 16), (3, 16)] {
         let exact = euler(k);
         let found = critical(0.9 * exact, 1.1 * exact, coarsest, |load, segments| {
-            index(&column(STRIP, 1000.0, 1000.0, load, 0.0), segments) >= k
+            index(&column(STRIP, [1000.0; 2], load, 0.0), segments) >= k
         });
         close(&format!("P/P_{k}"), found / exact, 1.0, NEUTRAL);
     }
+    let stiff = set_stiffness(1000.0, 1000.0);
+    let strip = format!("{stiff}; stiffness.bending_2={STRIP}");
+    let strip = follow(ROD, &strip, "load.tip_force[0]=0..-70", false);
+    changes_at("Euler", &strip, &[1, 2, 3].map(|k| (-euler(k), 1)), 1e-8);
+    let round = follow(ROD, &stiff, "load.tip_force[0]=0..-30", false);
+    changes_at(
+        "Euler, round",
+        &round,
+        &[1, 2].map(|k| (-euler(k), 2)),
+        1e-8,
+    );
 }
 
-/// P (1 + P/GA - P/EA) = pi^2/4 EI/L^2 for a column that stretches and shears.
+/// P (1 + P/GA - P/EA) = pi^2/4 EI/L^2 for a column that stretches and shears
+/// (Engesser and Reissner): EA, GA, P.
+const REISSNER: &str = "
+    1000  400  2.458335976611486
+     100   40  2.382272748545408
+";
+
 #[test]
 fn reissner_stretch_and_shear_move_the_critical_load() {
-    for (axial, shear, exact) in [
-        (1000.0, 400.0, 2.458335976611486),
-        (100.0, 40.0, 2.382272748545408),
-    ] {
+    for [axial, shear, exact] in table(REISSNER) {
         let found = critical(2.0, 3.0, 8, |load, segments| {
-            index(&column(STRIP, axial, shear, load, 0.0), segments) > 0
+            index(&column(STRIP, [axial, shear], load, 0.0), segments) > 0
         });
         close("P", found / exact, 1.0, NEUTRAL);
+        let strip = format!(
+            "{}; stiffness.bending_2={STRIP}",
+            set_stiffness(axial, shear)
+        );
+        let found = follow(ROD, &strip, "load.tip_force[0]=0..-5", false);
+        changes_at("Reissner", &found, &[(-exact, 1)], 1e-8);
     }
 }
 
 /// q L^3/EI = 9/4 j^2, j the first zero of the Bessel function J_(-1/3), for
-/// an inextensible column.
+/// an inextensible column (1881).
 #[test]
 fn greenhill_a_column_buckles_under_its_own_weight() {
     let exact = 7.837347438943484;
     let found = critical_of_rigid(7.5, 8.2, 8, |weight, segments, stiffness| {
-        index(&column(STRIP, stiffness, stiffness, 0.0, weight), segments) > 0
+        index(&column(STRIP, [stiffness; 2], 0.0, weight), segments) > 0
     });
     close("q", found / exact, 1.0, NEUTRAL);
+    let strip = format!("{RIGID}; stiffness.bending_2=2.0");
+    let found = follow(ROD, &strip, "load.gravity[0]=0..-10", false);
+    changes_at("Greenhill", &found, &[(-exact, 1)], 1e-8);
 }
 
 /// Rigid in stretch and shear, exactly: the count must not be blurred by it.
@@ -109,15 +122,11 @@ fn greenhill_a_column_buckles_under_its_own_weight() {
 fn the_index_of_an_inextensible_column_changes_at_the_critical_load() {
     for (other, segments) in [(1.0, 64), (2.0, 64), (STRIP, 64), (1e4, 64), (1.0, 512)] {
         for part in [0.999, 1.001] {
-            let load = part * euler(1);
-            let rigid = column(other, f64::INFINITY, f64::INFINITY, load, 0.0);
+            let rigid = column(other, [f64::INFINITY; 2], part * euler(1), 0.0);
             let ways = if other == 1.0 { 2 } else { 1 };
             let wanted = if part > 1.0 { ways } else { 0 };
-            let found = index(&rigid, segments);
-            assert_eq!(
-                found, wanted,
-                "EI = 1 and {other}, {segments} segments, {part} P_1"
-            );
+            let what = format!("EI = 1 and {other}, {segments} segments, {part} P_1");
+            assert_eq!(index(&rigid, segments), wanted, "{what}");
         }
     }
 }

@@ -2,25 +2,12 @@
 //! than it, mostly.
 
 mod common;
-#[path = "common/random.rs"]
-mod random;
 
-use common::{distance, paper_leaf, path};
-use leafdyn::relax::{Equilibrium, Options, SemiImplicit, relax};
+use common::random::{drawn, leaves};
+use common::{distance, files, kept, paper_leaf, read, relaxed, scenario, to};
 use leafdyn::scenario::Scenario;
-use proptest::strategy::{Strategy, ValueTree};
-use proptest::test_runner::TestRunner;
-use random::leaves;
 
 const TOLERANCES: [f64; 5] = [1e-2, 1e-3, 1e-4, 1e-6, 1e-8];
-
-fn solve(scenario: &Scenario, tolerance: f64) -> Equilibrium {
-    let options = Options {
-        tolerance: Some(tolerance),
-        ..Options::default()
-    };
-    relax(scenario, &options, &mut |_| {}).unwrap()
-}
 
 /// Estimates over true errors of all scenes and tolerances, and what is wrong.
 #[derive(Default)]
@@ -33,21 +20,19 @@ impl Verdict {
     /// Judges a scene at all tolerances. The truth is the solution at 1e-10,
     /// itself uncertain by its own estimate.
     fn judge(&mut self, name: &str, scenario: &Scenario) {
-        let truth = solve(scenario, 1e-10);
+        let truth = relaxed(scenario, &to(1e-10));
         if !truth.outcome.is_success() {
-            self.wrong
-                .push(format!("{name} at 1e-10: {:?}", truth.outcome));
-            return;
+            let outcome = truth.outcome;
+            return self.wrong.push(format!("{name} at 1e-10: {outcome:?}"));
         }
         let lengths = scenario.rods.iter().map(|rod| rod.length);
         let length = lengths.fold(0.0, f64::max);
         let uncertain = truth.accuracy.error_estimate.unwrap();
         for tolerance in TOLERANCES {
-            let leaf = solve(scenario, tolerance);
+            let leaf = relaxed(scenario, &to(tolerance));
             if !leaf.outcome.is_success() {
-                let outcome = leaf.outcome;
-                self.wrong
-                    .push(format!("{name} at {tolerance:e}: {outcome:?}"));
+                let wrong = format!("{name} at {tolerance:e}: {:?}", leaf.outcome);
+                self.wrong.push(wrong);
                 continue;
             }
             let estimate = leaf.accuracy.error_estimate.unwrap();
@@ -71,20 +56,11 @@ impl Verdict {
         let count = self.ratios.len();
         let quantile = |part: f64| self.ratios[(part * (count - 1) as f64) as usize];
         let sharp = self.ratios.iter().filter(|ratio| **ratio <= 150.0).count();
-        println!(
-            "{what}: {count} estimates / errors: least {:.2}, quartiles {:.1} {:.1} {:.1}, most {:.0}; {sharp} within 150",
-            quantile(0.0),
-            quantile(0.25),
-            quantile(0.5),
-            quantile(0.75),
-            quantile(1.0),
-        );
-        assert!(
-            self.wrong.len() <= stray && quantile(0.0) > 1.0 / 3.0,
-            "{} wrong:\n{}",
-            self.wrong.len(),
-            self.wrong.join("\n")
-        );
+        let quantiles = [0.0, 0.25, 0.5, 0.75, 1.0].map(quantile);
+        println!("{what}: {count} estimates / errors: {quantiles:.2?}; {sharp} within 150");
+        let wrong = self.wrong;
+        let few = wrong.len() <= stray && quantiles[0] > 1.0 / 3.0;
+        assert!(few, "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
         assert!(count > 10 && 2 * sharp >= count, "{sharp} of {count}");
     }
 }
@@ -95,8 +71,7 @@ fn of_the_papers_leaves_with_five_veins() {
     for figure in [
         "fig04", "fig05", "fig06", "fig08", "fig09", "fig10", "fig13",
     ] {
-        let rods = ["leaf.rods=5".to_string()];
-        let scenario = Scenario::read(&path(&format!("paper/{figure}")), &rods).unwrap();
+        let scenario = scenario(&format!("paper/{figure}"), "leaf.rods=5");
         verdict.judge(figure, &scenario);
     }
     verdict.assert("paper", 0);
@@ -105,10 +80,8 @@ fn of_the_papers_leaves_with_five_veins() {
 #[test]
 fn of_the_classic_problems() {
     let mut verdict = Verdict::default();
-    let folder = path("classic/rollup").parent().unwrap().to_path_buf();
-    for file in std::fs::read_dir(folder).unwrap() {
-        let file = file.unwrap().path();
-        let scenario = Scenario::read(&file, &[]).unwrap();
+    for file in files("classic") {
+        let scenario = read(&file, "");
         verdict.judge(&scenario.name, &scenario);
     }
     verdict.assert("classic", 0);
@@ -147,11 +120,9 @@ fn of_boundary_layers() {
 
 #[test]
 fn of_random_leaves() {
-    let mut runner = TestRunner::deterministic();
     let mut verdict = Verdict::default();
-    for case in 0..200 {
-        let leaf = leaves().new_tree(&mut runner).unwrap().current();
-        verdict.judge(&format!("leaf {case}"), &leaf);
+    for (case, leaf) in drawn(leaves(), 200).iter().enumerate() {
+        verdict.judge(&format!("leaf {case}"), leaf);
     }
     // An estimate from three grids can be fooled, but by little, and one time in
     // hundreds.
@@ -162,30 +133,15 @@ fn of_random_leaves() {
 /// a grid between the finest two does not stay among them.
 #[test]
 fn of_a_saddle_that_is_kept() {
-    let pushed = |k: usize| vec![format!("load.tip_force=[-{k}, 0, 0]")];
     for (k, tolerance) in (4..9).flat_map(|k| [1e-6, 1e-7, 3e-8, 1e-8].map(|t| (k, t))) {
-        let scenario = Scenario::read(&path("classic/lens_30"), &pushed(k)).unwrap();
-        let solve = |tolerance| {
-            let options = Options {
-                method: SemiImplicit {
-                    keep_unstable: true,
-                    ..SemiImplicit::default()
-                }
-                .into(),
-                tolerance: Some(tolerance),
-                ..Options::default()
-            };
-            relax(&scenario, &options, &mut |_| {}).unwrap()
-        };
-        let (truth, saddle) = (solve(1e-10), solve(tolerance));
+        let pushed = scenario("classic/lens_30", &format!("load.tip_force=[-{k}, 0, 0]"));
+        let [truth, saddle] = [1e-10, tolerance].map(|tolerance| kept(&pushed, tolerance));
         let grids = &saddle.accuracy.segments;
         assert!(grids.is_sorted(), "{k}, {tolerance:e}: {grids:?}");
         let [estimate, uncertain] =
             [&saddle, &truth].map(|leaf| leaf.accuracy.error_estimate.unwrap());
         let error = distance(&saddle, &truth);
-        assert!(
-            error <= estimate + uncertain,
-            "{k}, {tolerance:e}: {error:e}, {estimate:e}"
-        );
+        let what = format!("{k}, {tolerance:e}: {error:e}, {estimate:e}");
+        assert!(error <= estimate + uncertain, "{what}");
     }
 }

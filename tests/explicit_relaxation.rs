@@ -2,29 +2,32 @@
 //! where the damped motion of which both are short cuts ends.
 
 mod common;
-#[path = "common/random.rs"]
-mod random;
 
-use common::{files, scenario};
+use common::motion::run;
+use common::random::{drawn, leaves};
+use common::{files, read, scale, scenario, settle, settled, tip, to};
 use leafdyn::relax::{Equilibrium, Method, Options, Outcome, RelaxError, relax};
 use leafdyn::scenario::Scenario;
-use leafdyn::simulate::{self, Scheme, Simulation};
-use proptest::strategy::{Strategy, ValueTree};
-use proptest::test_runner::TestRunner;
+use leafdyn::simulate::{self, Scheme};
 
 /// Of positions, in lengths of the leaf.
 const CLOSE: f64 = 1e-8;
 
 const EXPLICIT: Method = Method::Explicit { segments: None };
 
+fn explicit(options: Options) -> Options {
+    Options {
+        method: EXPLICIT,
+        ..options
+    }
+}
+
 fn rest(scenario: &Scenario, method: Method, segments: Option<usize>) -> Equilibrium {
     let options = Options {
         method: method.on_grid(segments),
         ..Options::default()
     };
-    let leaf = relax(scenario, &options, &mut |_| {}).unwrap();
-    assert!(leaf.outcome.is_success(), "{}: {:?}", scenario.name, leaf);
-    leaf
+    settled(scenario, &options)
 }
 
 #[track_caller]
@@ -33,37 +36,31 @@ fn agree_on(scenario: &Scenario, segments: usize) {
     let semi_implicit = rest(scenario, Method::default(), Some(segments));
     let apart = common::apart(scenario, &explicit.shape.rods, &semi_implicit.shape.rods).position;
     assert!(apart < CLOSE, "{}: {apart:.1e}", scenario.name);
-    assert_eq!(
-        explicit.stability.negative_eigenvalues,
-        semi_implicit.stability.negative_eigenvalues
-    );
-    let energies = explicit.energy.unwrap() - semi_implicit.energy.unwrap();
-    assert!(energies.abs() < 1e-9 * semi_implicit.energy.unwrap().abs().max(1.0));
+    let [a, b] = [&explicit, &semi_implicit].map(|leaf| leaf.stability.negative_eigenvalues);
+    assert_eq!(a, b);
+    let [a, b] = [&explicit, &semi_implicit].map(|leaf| leaf.energy.unwrap());
+    assert!((a - b).abs() < 1e-9 * b.abs().max(1.0));
 }
 
 #[test]
 fn on_every_figure_of_the_paper() {
     for file in files("paper") {
         // The paper's soft leaves bend too much for fewer.
-        agree_on(&Scenario::read(&file, &["leaf.rods=5".into()]).unwrap(), 32);
+        agree_on(&read(&file, "leaf.rods=5"), 32);
     }
 }
 
 #[test]
 fn on_fig_4_with_as_many_veins_as_the_paper() {
-    agree_on(&scenario("paper/fig04", &[]), 16);
+    agree_on(&scenario("paper/fig04", ""), 16);
 }
 
 #[test]
 fn on_the_classic_problems_it_can_do() {
     let mut done = 0;
     for file in files("classic") {
-        let scenario = Scenario::read(&file, &[]).unwrap();
-        let options = Options {
-            method: EXPLICIT,
-            ..Options::default()
-        };
-        match relax(&scenario, &options, &mut |_| {}) {
+        let scenario = read(&file, "");
+        match relax(&scenario, &explicit(Options::default()), &mut |_| {}) {
             Ok(explicit) => {
                 done += 1;
                 assert_eq!(explicit.outcome, Outcome::Converged, "{}", scenario.name);
@@ -83,22 +80,14 @@ fn on_the_classic_problems_it_can_do() {
 
 #[test]
 fn on_leaves_nobody_has_thought_of() {
-    let mut runner = TestRunner::deterministic();
     let mut agreed = 0;
-    for case in 0..25 {
-        let scenario = random::leaves().new_tree(&mut runner).unwrap().current();
-        let options = Options {
-            method: EXPLICIT,
-            tolerance: Some(1e-5),
-            ..Options::default()
-        };
-        let Ok(explicit) = relax(&scenario, &options, &mut |_| {}) else {
+    for (case, scenario) in drawn(leaves(), 25).iter().enumerate() {
+        let Ok(explicit) = relax(scenario, &explicit(to(1e-5)), &mut |_| {}) else {
             continue;
         };
         assert!(explicit.outcome.is_success(), "leaf {case}: {explicit:?}");
-        let other = common::settle(&scenario, 1e-8);
-        let apart = common::tip(&explicit) - common::tip(&other);
-        let length = common::scale(&scenario).length;
+        let apart = tip(&explicit) - tip(&settle(scenario, 1e-8));
+        let length = scale(scenario).length;
         assert!(apart.length() < 2e-5 * length, "leaf {case}: {apart}");
         agreed += 1;
     }
@@ -110,23 +99,16 @@ fn on_leaves_nobody_has_thought_of() {
 #[test]
 fn the_damped_motion_ends_there() {
     for (figure, duration) in [("fig08", 10.0), ("fig09", 5.0), ("fig10", 10.0)] {
-        let entries = [
-            "leaf.rods=5".into(),
-            format!("dynamics.duration={duration}"),
-        ];
+        let entries = format!("leaf.rods=5; dynamics.duration={duration}");
         let leaf_scenario = scenario(&format!("paper/{figure}"), &entries);
         let options = simulate::Options {
             scheme: Some(Scheme::Explicit),
             segments: Some(64),
             ..simulate::Options::default()
         };
-        let mut simulation = Simulation::new(&leaf_scenario, &options).unwrap();
-        while !simulation.done() {
-            simulation.next_frame().unwrap();
-        }
-        let end = simulation.frame().tips(true)[0];
+        let end = run(&leaf_scenario, &options).tips(true)[0];
         for method in [EXPLICIT, Method::default()] {
-            let tip = rest(&leaf_scenario, method, Some(64)).tips[0];
+            let tip = tip(&rest(&leaf_scenario, method, Some(64)));
             assert!((tip - end).length() < 0.01, "{figure}: {tip} or {end}");
         }
     }
@@ -136,7 +118,7 @@ fn the_damped_motion_ends_there() {
 #[test]
 fn its_work_is_known() {
     for (figure, most) in [("fig04", 4000), ("fig06", 3000), ("fig10", 25_000)] {
-        let scenario = scenario(&format!("paper/{figure}"), &["leaf.rods=5".into()]);
+        let scenario = scenario(&format!("paper/{figure}"), "leaf.rods=5");
         let leaf = rest(&scenario, EXPLICIT, Some(32));
         assert!(leaf.work.steps < most, "{figure}: {:?}", leaf.work);
         assert!(leaf.work.steps > most / 2, "{figure}: {:?}", leaf.work);
@@ -146,18 +128,13 @@ fn its_work_is_known() {
 
 #[test]
 fn what_it_cannot_do_is_refused() {
-    let explicit = |name: &str| {
-        let options = Options {
-            method: EXPLICIT,
-            ..Options::default()
-        };
-        relax(&scenario(name, &[]), &options, &mut |_| {}).unwrap_err()
-    };
     for (name, part) in [
         ("classic/lens_30", "a stiffness is inf"),
         ("classic/rollup", "load.tip_moment"),
     ] {
-        let message = explicit(name).to_string();
+        let options = explicit(Options::default());
+        let refused = relax(&scenario(name, ""), &options, &mut |_| {}).unwrap_err();
+        let message = refused.to_string();
         assert!(message.contains(part), "{message}");
         assert!(message.contains("semi-implicit"), "{message}");
     }

@@ -6,7 +6,7 @@ mod common;
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
-use common::{close, fig04, paper_leaf, settle, tip};
+use common::{close, fig04, linear, paper_leaf, settle, tip};
 use glam::DVec3;
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::{Profile, Scenario};
@@ -72,11 +72,9 @@ fn free_tips() {
     }
     free.coupling = vec![[1e4; 3]; 3];
     let coupled = stable(&free, 1e-6);
-    let apart = coupled
-        .tips
-        .iter()
-        .map(|tip| (*tip - coupled.tips[0]).length());
-    assert!(apart.fold(0.0, f64::max) < 0.1);
+    for found in &coupled.tips {
+        assert!((*found - tip(&coupled)).length() < 0.1);
+    }
 }
 
 /// Two rods that leave the base in opposite directions meet half-way; six in a
@@ -88,12 +86,8 @@ fn opposite_rods_and_stars() {
         assert!(tip(&pair).x.abs() < 1e-8 && tip(&pair).length() > 0.7);
         let upright = stable(&fan(&[-FRAC_PI_2, FRAC_PI_2], stiffness, 0.0), 1e-8);
         assert!(tip(&upright).y.abs() < 1e-8);
-        close(
-            "the same pair",
-            tip(&upright).length(),
-            tip(&pair).length(),
-            1e-7,
-        );
+        let [one, other] = [&upright, &pair].map(|leaf| tip(leaf).length());
+        close("the same pair", one, other, 1e-7);
         close(
             "the same pair",
             upright.energy.unwrap(),
@@ -107,12 +101,8 @@ fn opposite_rods_and_stars() {
         // Rigid rods snap through on the way to rest, to either side.
         if stiffness != RIGID {
             let three = fan(&[0.0, 2.0 * FRAC_PI_3, -2.0 * FRAC_PI_3], stiffness, 1.0);
-            close(
-                "half a star",
-                tip(&stable(&three, 1e-8)).z,
-                tip(&star).z,
-                1e-7,
-            );
+            let height = tip(&stable(&three, 1e-8)).z;
+            close("half a star", height, tip(&star).z, 1e-7);
         }
     }
 }
@@ -129,49 +119,31 @@ fn angles_that_go_round_more_than_once() {
 /// elastica as a strip that can go only two ways.
 #[test]
 fn round_columns() {
-    for load in [2.5, 3.0, 5.0, 10.0, 50.0, 100.0, 300.0] {
+    let both = |force: f64, weight: f64| {
         let mut round = fan(&[0.0], RIGID, 0.0);
-        round.tip_force = [-load, 0.0, 0.0];
-        let mut strip = round.clone();
-        strip.rods[0].couple_stiffness[1] = Profile::Constant(2.0);
-        let (round, strip) = (stable(&round, 1e-8), stable(&strip, 1e-8));
-        let bulge = |leaf: &Equilibrium| tip(leaf).y.hypot(tip(leaf).z);
-        close(
-            &format!("x, P = {load}"),
-            tip(&round).x,
-            tip(&strip).x,
-            3e-8,
-        );
-        close(
-            &format!("bulge, P = {load}"),
-            bulge(&round),
-            bulge(&strip),
-            3e-8,
-        );
-        // An even number of ways down from the straight state: it is round.
-        let saddle = round.stability.saddle.expect("the straight state was met");
-        assert!(saddle.negative_eigenvalues > 0 && saddle.negative_eigenvalues % 2 == 0);
-        assert!(
-            strip
-                .stability
-                .saddle
-                .expect("the straight state was met")
-                .negative_eigenvalues
-                > 0
-        );
-    }
-    for weight in [7.9, 9.0, 20.0, 50.0, 100.0] {
-        let mut round = fan(&[0.0], RIGID, 0.0);
+        round.tip_force = [-force, 0.0, 0.0];
         round.gravity = [-weight, 0.0, 0.0];
         let mut strip = round.clone();
         strip.rods[0].couple_stiffness[1] = Profile::Constant(2.0);
-        let (round, strip) = (stable(&round, 1e-8), stable(&strip, 1e-8));
-        close(
-            &format!("x, w = {weight}"),
-            tip(&round).x,
-            tip(&strip).x,
-            3e-8,
-        );
+        let both = [round, strip].map(|rod| stable(&rod, 1e-8));
+        let [round, strip] = both.each_ref().map(tip);
+        let what = format!("x, P = {force}, w = {weight}");
+        close(&what, round.x, strip.x, 3e-8);
+        both
+    };
+    for load in [2.5, 3.0, 5.0, 10.0, 50.0, 100.0, 300.0] {
+        let [round, strip] = both(load, 0.0);
+        let [bulge, wanted] = [&round, &strip].map(|leaf| tip(leaf).y.hypot(tip(leaf).z));
+        close(&format!("bulge, P = {load}"), bulge, wanted, 3e-8);
+        // An even number of ways down from the straight state: it is round.
+        let [round, strip] = [round, strip].map(|leaf| {
+            let saddle = leaf.stability.saddle.expect("the straight state was met");
+            saddle.negative_eigenvalues
+        });
+        assert!(round > 0 && round % 2 == 0 && strip > 0);
+    }
+    for weight in [7.9, 9.0, 20.0, 50.0, 100.0] {
+        both(0.0, weight);
     }
 }
 
@@ -218,18 +190,13 @@ fn veins_of_different_kinds() {
     let mut leaf = fig04(5);
     leaf.gravity = [0.0, 0.0, -1e-6];
     for rod in &mut leaf.rods {
-        rod.couple_stiffness = [0, 1, 2].map(|_| Profile::Linear {
-            at: vec![0.0, 1.0],
-            value: vec![1.0, 1e-6],
-        });
+        rod.couple_stiffness = [0, 1, 2].map(|_| linear(&[0.0, 1.0], &[1.0, 1e-6]));
     }
     stable(&leaf, 1e-6);
     let mut leaf = fig04(5);
     for rod in &mut leaf.rods {
-        rod.couple_stiffness[0] = Profile::Linear {
-            at: vec![0.0, 0.01, 0.5, 0.501, 1.0],
-            value: vec![1.0, 0.1, 1.0, 0.01, 1.0],
-        };
+        rod.couple_stiffness[0] =
+            linear(&[0.0, 0.01, 0.5, 0.501, 1.0], &[1.0, 0.1, 1.0, 0.01, 1.0]);
     }
     stable(&leaf, 1e-6);
 }
@@ -254,27 +221,20 @@ fn veins_wound_up_at_rest() {
 
 #[test]
 fn loads_from_all_sides() {
-    for gravity in [
-        [0.0, 0.0, 10.0],
-        [-50.0, 0.0, 0.0],
-        [0.0, 0.0, -1000.0],
-        [1000.0, 0.0, 0.0],
-    ] {
+    let loaded = |gravity, tip_force| {
         let mut leaf = fig04(5);
         leaf.gravity = gravity;
+        leaf.tip_force = tip_force;
         stable(&leaf, 1e-6);
-    }
-    for force in [
-        [-100.0, 0.0, 0.0],
-        [-1000.0, 0.0, 0.0],
-        [1e5, 0.0, 1.0],
-        [0.0, 100.0, 0.0],
-    ] {
-        let mut leaf = fig04(5);
-        leaf.gravity = [0.0; 3];
-        leaf.tip_force = force;
-        stable(&leaf, 1e-6);
-    }
+    };
+    loaded([0.0, 0.0, 10.0], [0.0; 3]);
+    loaded([-50.0, 0.0, 0.0], [0.0; 3]);
+    loaded([0.0, 0.0, -1000.0], [0.0; 3]);
+    loaded([1000.0, 0.0, 0.0], [0.0; 3]);
+    loaded([0.0; 3], [-100.0, 0.0, 0.0]);
+    loaded([0.0; 3], [-1000.0, 0.0, 0.0]);
+    loaded([0.0; 3], [1e5, 0.0, 1.0]);
+    loaded([0.0; 3], [0.0, 100.0, 0.0]);
     // Inextensible rods, pulled: they point where the force does.
     for force in [1e3, 1e4, 1e5] {
         let mut rod = fan(&[0.0], RIGID, 0.0);

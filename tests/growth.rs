@@ -4,20 +4,17 @@
 
 mod common;
 
-use common::{TIGHT, agree, parse, settle, shoot_near};
-use leafdyn::relax::{Method, Options, SemiImplicit, relax};
+use common::motion::run;
+use common::{
+    ROD, TIGHT, agree, apart, in_full, parse, relaxed, settle, shot_alone, shot_near, to,
+};
+use leafdyn::relax::{Method, Options};
 use leafdyn::scenario::Scenario;
-use leafdyn::simulate::{self, Scheme, Simulation};
+use leafdyn::simulate::{self, Scheme};
 
-const ROD: &str = r#"
-    name = "rod"
-    leaf = { rods = 1, length = 2.0, fan = [0.0] }
-    stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }
-"#;
-
-fn rod(entries: &[&str]) -> Scenario {
-    let entries: Vec<String> = entries.iter().map(|entry| entry.to_string()).collect();
-    Scenario::from_toml_with(ROD, "rod", &entries).unwrap_or_else(|error| panic!("{error}"))
+/// A rod of length two.
+fn rod(overrides: &str) -> Scenario {
+    common::rod(&format!("leaf.length=2.0; {overrides}"))
 }
 
 /// What is said of a leaf, written for a growth of `g` that is either a factor
@@ -65,7 +62,7 @@ fn a_vein_without_loads_is_as_long_as_it_has_grown() {
         ("[1.25]", 2.5),
         ("{ at = [0.0, 0.3, 1.0], value = [1.0, 1.5, 2.0] }", 3.2),
     ] {
-        let leaf = settle(&rod(&[&format!("rest.stretch={stretch}")]), TIGHT);
+        let leaf = settle(&rod(&format!("rest.stretch={stretch}")), TIGHT);
         let tip = leaf.tips[0];
         assert!((tip.x - length).abs() < 1e-14, "{stretch}: {tip}");
         assert!(tip.y.hypot(tip.z) < 1e-14 && leaf.energy.unwrap().abs() < 1e-14);
@@ -74,14 +71,8 @@ fn a_vein_without_loads_is_as_long_as_it_has_grown() {
 
 #[test]
 fn a_rigid_vein_keeps_its_stretch_under_load() {
-    let leaf = settle(
-        &rod(&[
-            "rest.stretch=1.4",
-            "stiffness.axial=inf",
-            "load.tip_force=[3.0, 1.0, 2.0]",
-        ]),
-        1e-9,
-    );
+    let rigid = "rest.stretch=1.4; stiffness.axial=inf; load.tip_force=[3.0, 1.0, 2.0]";
+    let leaf = settle(&rod(rigid), 1e-9);
     for node in &leaf.shape.rods[0].nodes {
         assert_eq!(node.v.x, 1.4);
         assert!((node.v.y - node.n.y / 100.0).abs() < 1e-15);
@@ -91,16 +82,12 @@ fn a_rigid_vein_keeps_its_stretch_under_load() {
 #[test]
 fn tension_adds_to_growth() {
     let leaf = settle(
-        &rod(&["rest.stretch=1.4", "load.tip_force=[5.0, 0.0, 0.0]"]),
+        &rod("rest.stretch=1.4; load.tip_force=[5.0, 0.0, 0.0]"),
         TIGHT,
     );
     assert!((leaf.tips[0].x - 2.0 * (1.4 + 0.05)).abs() < 1e-13);
-    assert!(
-        leaf.shape.rods[0]
-            .nodes
-            .iter()
-            .all(|node| (node.n.x - 5.0).abs() < 1e-12)
-    );
+    let mut nodes = leaf.shape.rods[0].nodes.iter();
+    assert!(nodes.all(|node| (node.n.x - 5.0).abs() < 1e-12));
     // Elastic energy less the work of the load, both from the grown length on.
     let energy = 0.5 * 5.0 * 5.0 / 100.0 * 2.0 - 5.0 * leaf.tips[0].x;
     assert!((leaf.energy.unwrap() - energy).abs() < 1e-12);
@@ -141,16 +128,12 @@ fn and_moves_like_it() {
                 step: Some(1e-3),
                 ..simulate::Options::default()
             };
-            let mut simulation = Simulation::new(&scenario, &options).unwrap();
-            while !simulation.done() {
-                simulation.next_frame().unwrap();
-            }
-            let frame = simulation.frame();
+            let frame = run(&scenario, &options);
             (frame.positions, frame.energy)
         });
-        let apart = a.0.iter().zip(&b.0).map(|(a, b)| (*a - *b).length());
-        let apart = apart.fold(0.0, f64::max);
-        assert!(apart < 1e-9, "{scheme:?}: {apart:.1e}");
+        let off = a.0.iter().zip(&b.0).map(|(a, b)| (*a - *b).length());
+        let off = off.fold(0.0, f64::max);
+        assert!(off < 1e-9, "{scheme:?}: {off:.1e}");
         assert!((a.1.elastic - b.1.elastic).abs() < 1e-8);
         assert!((a.1.dissipated - b.1.dissipated).abs() < 1e-8);
     }
@@ -178,10 +161,9 @@ fn relaxation_and_shooting_agree_on_lists_and_profiles() {
     for entry in GROWN {
         let scenario = fan(entry);
         let relaxed = settle(&scenario, TIGHT);
-        let shot = shoot_near(&scenario, &relaxed).unwrap_or_else(|f| panic!("{}", f.reason));
+        let shot = shot_near(&scenario, &relaxed);
         agree(entry, &scenario, &relaxed, &shot, 1e-9);
-        let alone = common::shoot_alone(&scenario, &relaxed.shape.stations);
-        let alone = alone.unwrap_or_else(|f| panic!("{entry}: {}", f.reason));
+        let alone = shot_alone(&scenario, &relaxed.shape.stations);
         agree(entry, &scenario, &relaxed, &alone, 1e-9);
     }
 }
@@ -195,13 +177,13 @@ fn explicit_motion_agrees() {
                 method: method.on_grid(Some(16)),
                 ..Options::default()
             };
-            relax(&scenario, &options, &mut |_| {}).unwrap()
+            relaxed(&scenario, &options)
         };
         let (explicit, implicit) = (
             rest(Method::Explicit { segments: None }),
             rest(Method::default()),
         );
-        let apart = common::apart(&scenario, &explicit.shape.rods, &implicit.shape.rods).position;
+        let apart = apart(&scenario, &explicit.shape.rods, &implicit.shape.rods).position;
         assert!(apart < 1e-8, "{entry}: {apart:.1e}");
     }
 }
@@ -212,17 +194,8 @@ fn a_mirrored_leaf_is_solved_by_half() {
     let scenario = fan("rest.stretch=[1.2, 1.0, 1.2]");
     let half = settle(&scenario, 1e-9);
     assert_eq!(half.model.rods, 2);
-    let options = Options {
-        method: SemiImplicit {
-            full_model: true,
-            ..SemiImplicit::default()
-        }
-        .into(),
-        tolerance: Some(1e-9),
-        ..Options::default()
-    };
-    let whole = relax(&scenario, &options, &mut |_| {}).unwrap();
-    assert!(common::apart(&scenario, &half.shape.rods, &whole.shape.rods).position < 2e-9);
+    let whole = relaxed(&scenario, &in_full(to(1e-9)));
+    assert!(apart(&scenario, &half.shape.rods, &whole.shape.rods).position < 2e-9);
 }
 
 #[test]
@@ -241,9 +214,8 @@ fn impossible_growth_is_refused() {
         ),
     ] {
         let entry = format!("rest.stretch={value}");
-        let message = Scenario::from_toml_with(ROD, "rod", &[entry])
-            .unwrap_err()
-            .to_string();
+        let refused = Scenario::from_toml_with(ROD, "rod", &[entry]).unwrap_err();
+        let message = refused.to_string();
         assert!(message.contains(part), "{value}: {message}");
         assert!(message.contains("rest.stretch"), "{value}: {message}");
     }

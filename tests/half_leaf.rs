@@ -3,10 +3,9 @@
 //! the whole leaf takes over.
 
 mod common;
-#[path = "common/random.rs"]
-mod random;
 
-use common::{rest, scenario};
+use common::random::{cases, leaves};
+use common::{on, relaxed, rest, same, scale, scenario, set_stiffness};
 use leafdyn::relax::Outcome;
 use leafdyn::scenario::{Profile, Scenario};
 use leafdyn::shape::Difference;
@@ -44,10 +43,10 @@ fn mirrored(mut leaf: Scenario, odd: bool) -> Scenario {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(60, None))]
 
     #[test]
-    fn half_a_leaf_is_the_leaf(leaf in random::leaves(), odd in prop::bool::ANY) {
+    fn half_a_leaf_is_the_leaf(leaf in leaves(), odd in prop::bool::ANY) {
         let leaf = mirrored(leaf, odd);
         let segments = Some(20);
         let (half, whole) = (rest(&leaf, false, segments), rest(&leaf, true, segments));
@@ -55,17 +54,9 @@ proptest! {
         prop_assert_eq!(whole.model.rods, leaf.rods.len());
         prop_assert_eq!(half.stability.negative_eigenvalues, whole.stability.negative_eigenvalues);
         prop_assume!(whole.outcome == Outcome::Converged);
-        let scale = common::scale(&leaf);
-        let apart = Difference::between(&half.shape.rods, &whole.shape.rods);
-        prop_assert!(apart.position < 1e-10 * scale.length, "{:?}", apart);
-        // Ends that differ by so much turn a segment of a twentieth by so much more.
-        prop_assert!(apart.rotation < 20.0 * 1e-10, "{:?}", apart);
-        prop_assert!(apart.force < 1e-8 * scale.force(), "{:?}", apart);
-        prop_assert!(apart.moment < 1e-8 * scale.moment(), "{:?}", apart);
-        let energy = half.energy.unwrap() - whole.energy.unwrap();
-        prop_assert!(energy.abs() < 1e-10 * scale.moment() * (1.0 + whole.energy.unwrap().abs()));
+        same(&leaf, &half, &whole);
         let force = half.tip_force_sum - whole.tip_force_sum;
-        prop_assert!(force.length() < 1e-8 * scale.force());
+        prop_assert!(force.length() < 1e-8 * scale(&leaf).force());
     }
 }
 
@@ -74,8 +65,8 @@ proptest! {
 fn the_paper_s_firm_leaves_are_found_by_half() {
     for figure in ["fig04", "fig05", "fig06", "fig13"] {
         for (rods, solved) in [(2, 1), (4, 2), (5, 3), (21, 11)] {
-            let entries = [format!("leaf.rods={rods}"), "leaf.fan='symmetric'".into()];
-            let leaf = scenario(&format!("paper/{figure}"), &entries);
+            let (figure, rods_are) = (format!("paper/{figure}"), format!("leaf.rods={rods}"));
+            let leaf = scenario(&figure, &format!("{rods_are}; leaf.fan='symmetric'"));
             let half = rest(&leaf, false, None);
             assert_eq!(half.model.rods, solved, "{figure}, {rods}");
             assert_eq!(half.outcome, Outcome::Converged);
@@ -85,12 +76,10 @@ fn the_paper_s_firm_leaves_are_found_by_half() {
             let apart = Difference::between(&half.shape.rods, &whole.shape.rods);
             // Both end their iterations a thousandth of the tolerance away.
             assert!(apart.position < 2e-9, "{figure}, {rods}: {apart:?}");
-            assert_eq!(
-                half.accuracy.error_estimate.is_some(),
-                whole.accuracy.error_estimate.is_some()
-            );
+            let [a, b] = [&half, &whole].map(|leaf| leaf.accuracy.error_estimate.is_some());
+            assert_eq!(a, b);
             // The fan of the paper is not symmetric: nothing is left out there.
-            let own = scenario(&format!("paper/{figure}"), &entries[..1]);
+            let own = scenario(&figure, &rods_are);
             assert_eq!(rest(&own, false, None).model.rods, rods);
         }
     }
@@ -101,13 +90,8 @@ fn the_paper_s_firm_leaves_are_found_by_half() {
 #[test]
 fn a_leaf_that_breaks_its_mirror_is_followed() {
     for rods in [2, 3, 4] {
-        let entries = [
-            format!("leaf.rods={rods}"),
-            "leaf.fan='symmetric'".into(),
-            "stiffness.bending_3=0.05".into(),
-            "load.tip_force=[-2.0, 0, 0]".into(),
-        ];
-        let leaf = scenario("paper/fig04", &entries);
+        let soft = "leaf.fan='symmetric'; stiffness.bending_3=0.05; load.tip_force=[-2.0, 0, 0]";
+        let leaf = scenario("paper/fig04", &format!("leaf.rods={rods}; {soft}"));
         let (found, whole) = (rest(&leaf, false, None), rest(&leaf, true, None));
         assert!(found.outcome.is_success(), "{rods}: {:?}", found.outcome);
         assert_eq!(found.stability.negative_eigenvalues, Some(0), "{rods}");
@@ -127,17 +111,8 @@ fn a_leaf_that_breaks_its_mirror_is_followed() {
 fn what_shear_and_stretch_matter_is_told() {
     for figure in ["fig04", "fig06"] {
         let with = |axial: f64, shear: f64| {
-            let entries = [
-                "leaf.rods=5".into(),
-                format!("stiffness.axial={axial}"),
-                format!("stiffness.shear_2={shear}"),
-                format!("stiffness.shear_3={shear}"),
-            ];
-            rest(
-                &scenario(&format!("paper/{figure}"), &entries),
-                false,
-                Some(16),
-            )
+            let entries = format!("leaf.rods=5; {}", set_stiffness(axial, shear));
+            relaxed(&scenario(&format!("paper/{figure}"), &entries), &on(16))
         };
         // Compliances small enough for their effects to be linear.
         let leaf = with(1e4, 1e4);
@@ -150,10 +125,8 @@ fn what_shear_and_stretch_matter_is_told() {
                 .flat_map(|(a, b)| a.nodes.iter().zip(&b.nodes))
                 .map(|(a, b)| (a.position - b.position).abs().max_element())
                 .fold(0.0, f64::max);
-            assert!(
-                (effect / apart - 1.0).abs() < 0.03,
-                "{figure}: {effect} {apart}"
-            );
+            let ratio = effect / apart;
+            assert!((ratio - 1.0).abs() < 0.03, "{figure}: {effect} {apart}");
         }
     }
 }

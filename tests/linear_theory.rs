@@ -7,8 +7,8 @@
 
 mod common;
 
-use common::parse;
-use leafdyn::relax::{Equilibrium, Options, SemiImplicit, relax};
+use common::{RIGID, kept, rod};
+use leafdyn::relax::Equilibrium;
 
 const LENGTH: f64 = 1.5;
 const A2: f64 = 0.8;
@@ -22,27 +22,12 @@ fn solve(axis: usize, load: f64, tension: f64) -> Equilibrium {
 }
 
 fn pulled(gravity: [f64; 3], tip_force: [f64; 3], tolerance: f64) -> Equilibrium {
-    let scenario = parse(&format!(
-        r#"
-        name = "rod"
-        leaf = {{ rods = 1, length = {LENGTH:?}, fan = [0.0] }}
-        stiffness = {{ torsion = 1.0, bending_2 = {A2:?}, bending_3 = {A3:?}, axial = inf, shear_2 = inf, shear_3 = inf }}
-        load = {{ gravity = {gravity:?}, tip_force = {tip_force:?} }}
-        "#
+    let scenario = rod(&format!(
+        "{RIGID}; leaf.length={LENGTH:?}; stiffness.bending_2={A2:?}; stiffness.bending_3={A3:?}; \
+         load.gravity={gravity:?}; load.tip_force={tip_force:?}"
     ));
     // Above its buckling load the rod has no stable equilibrium near the axis.
-    let options = Options {
-        method: SemiImplicit {
-            keep_unstable: true,
-            ..SemiImplicit::default()
-        }
-        .into(),
-        tolerance: Some(tolerance),
-        ..Options::default()
-    };
-    let leaf = relax(&scenario, &options, &mut |_| {}).unwrap();
-    assert!(leaf.outcome.is_success(), "{:?}", leaf.outcome);
-    leaf
+    kept(&scenario, tolerance)
 }
 
 /// Deflection at s: clamped at 0, without moment and transverse force at L.

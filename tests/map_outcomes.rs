@@ -1,8 +1,9 @@
 //! A few cells of the maps in docs/where-methods-fail.md, failures included: if
 //! a method comes to do better there, the page has to be written anew.
 
-use std::path::Path;
+mod common;
 
+use common::{entries, path};
 use leafdyn::study::{Base, Confidence, MapMethod, MapOutcome, MapRequest, MapRow};
 
 use MapMethod::{
@@ -15,18 +16,14 @@ const H: &str = "stiffness.axial+stiffness.shear_2+stiffness.shear_3";
 /// One cell of a leaf of the paper, by some methods.
 fn cell(
     figure: &str,
-    set: &[&str],
+    set: &str,
     values: &[(&str, &str)],
     methods: &[MapMethod],
     seconds: f64,
 ) -> Vec<MapRow> {
-    let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/paper");
-    let overrides: Vec<String> = set.iter().map(|given| given.to_string()).collect();
-    let base = Base::read(&scenarios.join(figure), &overrides).unwrap();
-    let axes = values
-        .iter()
-        .map(|(key, value)| format!("{key}={value}..{value}:1"));
-    let axes = axes.map(|axis| axis.parse().unwrap()).collect();
+    let base = Base::read(&path(&format!("paper/{figure}")), &entries(set)).unwrap();
+    let axis = |(key, value): &(&str, &str)| format!("{key}={value}..{value}:1");
+    let axes = values.iter().map(|of| axis(of).parse().unwrap()).collect();
     let request = MapRequest::new(base, axes, Some(methods.to_vec()), None, seconds).unwrap();
     request.solve(0, methods)
 }
@@ -47,7 +44,7 @@ const SHORT: f64 = 1.5;
 /// Map (a): explicit motion, time step against stiffness.
 #[test]
 fn explicit_motion_is_right_only_below_its_bound_and_where_little_is_stretched() {
-    let set = ["leaf.rods=3", "method.segments=16", "dynamics.duration=30"];
+    let set = "leaf.rods=3; method.segments=16; dynamics.duration=30";
     for (h, step, outcome, says) in [
         ("100", "2e-3", Right, "stable up to 5.965e-3"),
         ("100", "1e-2", Diverged, "energy from nowhere"),
@@ -60,7 +57,7 @@ fn explicit_motion_is_right_only_below_its_bound_and_where_little_is_stretched()
         ("1", "5e-3", NotConverged, "still moves"),
     ] {
         let values = [(H, h), ("method.step", step)];
-        let rows = cell("fig04.toml", &set, &values, &[ExplicitMotion], LONG);
+        let rows = cell("fig04", set, &values, &[ExplicitMotion], LONG);
         expect(&rows, &[outcome]);
         assert!(rows[0].detail.contains(says), "{}", rows[0].detail);
         assert_eq!(rows[0].reference, Confidence::Confirmed);
@@ -69,7 +66,7 @@ fn explicit_motion_is_right_only_below_its_bound_and_where_little_is_stretched()
 
 fn soft(bending: &str, load: &str, methods: &[MapMethod], seconds: f64) -> Vec<MapRow> {
     let values = [("stiffness.bending_2", bending), ("load.gravity[2]", load)];
-    cell("fig04.toml", &["leaf.rods=3"], &values, methods, seconds)
+    cell("fig04", "leaf.rods=3", &values, methods, seconds)
 }
 
 /// Map (b): soft veins under load.
@@ -115,7 +112,7 @@ fn single_shooting_loses_a_soft_heavy_leaf() {
 /// Map (c): stiffness against stretch and shear.
 #[test]
 fn only_explicit_methods_feel_how_stiff_a_leaf_is() {
-    let set = ["leaf.rods=3", "method.step=1e-3"];
+    let set = "leaf.rods=3; method.step=1e-3";
     let methods = [
         SemiImplicit,
         ExplicitMotion,
@@ -123,21 +120,15 @@ fn only_explicit_methods_feel_how_stiff_a_leaf_is() {
         Shooting,
         ShootingFromRest,
     ];
-    let rows = cell("fig04.toml", &set, &[(H, "1e10")], &methods, LONG);
+    let rows = cell("fig04", set, &[(H, "1e10")], &methods, LONG);
     expect(&rows, &[Right, Diverged, Right, Right, Right]);
-    let rows = cell("fig04.toml", &set, &[(H, "1e10")], &[Explicit], SHORT);
+    let rows = cell("fig04", set, &[(H, "1e10")], &[Explicit], SHORT);
     expect(&rows, &[OutOfTime]);
-    let rows = cell("fig04.toml", &set, &[(H, "1e4")], &[Explicit], LONG);
+    let rows = cell("fig04", set, &[(H, "1e4")], &[Explicit], LONG);
     expect(&rows, &[OtherEquilibrium]);
-    let rigid = [&set[..], &["stiffness.axial=inf"]].concat();
+    let rigid = format!("{set}; stiffness.axial=inf");
     let values = [("stiffness.shear_2", "100")];
-    let rows = cell(
-        "fig04.toml",
-        &rigid,
-        &values,
-        &[SemiImplicit, Explicit],
-        LONG,
-    );
+    let rows = cell("fig04", &rigid, &values, &[SemiImplicit, Explicit], LONG);
     expect(&rows, &[Right, MapOutcome::Refused]);
 }
 
@@ -146,7 +137,7 @@ fn only_explicit_methods_feel_how_stiff_a_leaf_is() {
 fn shooting_from_arcs_takes_saddles_for_answers_around_fig_10() {
     let around = |bending: &str, load: &str, methods: &[MapMethod]| {
         let values = [("stiffness.bending_2", bending), ("load.gravity[2]", load)];
-        cell("fig10.toml", &["leaf.rods=5"], &values, methods, LONG)
+        cell("fig10", "leaf.rods=5", &values, methods, LONG)
     };
     let methods = [SemiImplicit, SingleShooting, Shooting, ShootingFromRest];
     let rows = around("0.1", "-0.002", &methods);

@@ -2,26 +2,25 @@
 //! many unstable ones as there are, and the leaf does vibrate so.
 
 mod common;
-#[path = "common/linear.rs"]
-mod linear;
-#[path = "common/motion.rs"]
-mod motion;
-#[path = "common/random.rs"]
-mod random;
 
 use std::f64::consts::PI;
 
-use common::{TIMOSHENKO, close, extrapolate, fig04, paper_leaf, scenario};
-use leafdyn::leaf::{Leaf, State};
+use common::motion::{
+    CHAIN, SLENDER, beam, chain, discrete, layered, off_cosine, rest, state_of, three_veins,
+};
+use common::random::{cases, leaves};
+use common::vibration::Linear;
+use common::{
+    TIMOSHENKO, close, extrapolate, fig04, in_full, keeping, linear, on_threads, paper_leaf,
+    relaxed, scenario, settled, table,
+};
+use leafdyn::leaf::{DiscreteLeaf, Leaf, State, shift, turn};
 use leafdyn::modes;
 use leafdyn::motion::{Inertia, Physics};
-use leafdyn::relax::{Equilibrium, Method, Mode, Options, SemiImplicit, relax};
-use leafdyn::scenario::{Profile, Scenario, Schedule};
-use linear::Linear;
-use motion::{Scheme, discrete, method as moving_by, rest, three_veins};
+use leafdyn::relax::{Equilibrium, Method, Mode, Options, relax};
+use leafdyn::scenario::{Dynamics, Profile, Scenario, Schedule};
 use nalgebra::SymmetricEigen;
 use proptest::prelude::*;
-use rayon::ThreadPoolBuilder;
 
 fn with(count: usize) -> Options {
     Options {
@@ -31,11 +30,12 @@ fn with(count: usize) -> Options {
     }
 }
 
-#[track_caller]
-fn solve(scenario: &Scenario, options: &Options) -> Equilibrium {
-    let leaf = relax(scenario, options, &mut |_| {}).unwrap();
-    assert!(leaf.outcome.is_success(), "{:?}", leaf.outcome);
-    leaf
+/// On one grid.
+fn with_on(segments: usize, count: usize) -> Options {
+    Options {
+        method: Method::default().on_grid(Some(segments)),
+        ..with(count)
+    }
 }
 
 #[track_caller]
@@ -53,36 +53,24 @@ fn assert_known(name: &str, leaf: &Equilibrium, known: &[f64], digits: f64) {
         let found = mode.frequency().expect("the rod is stable");
         let error = (found / known - 1.0).abs();
         let estimate = mode.error.expect("several grids") / (2.0 * known * known);
-        println!(
-            "{name}, mode {}: {found:.10}, error {error:.1e}, estimate {estimate:.1e}",
-            k + 1
-        );
-        assert!(error < 1e-6, "{name}, mode {}: {found} for {known}", k + 1);
-        assert!(
-            error <= estimate + digits,
-            "{name}, mode {}: {error:.1e}, estimate {estimate:.1e}",
-            k + 1
-        );
+        let what = format!("{name}, mode {k}: {found:.10}, {error:.1e}, estimate {estimate:.1e}");
+        println!("{what}");
+        assert!(error < 1e-6, "{what}");
+        assert!(error <= estimate + digits, "{what}");
     }
 }
 
-/// A straight rod of unit length, bending stiffness and mass, as stiff in all
-/// directions, with the rotary inertia r2.
-fn beam(r2: f64, [axial, shear]: [f64; 2]) -> Scenario {
-    let mut beam = paper_leaf(1, [1.0; 3], [axial, shear, shear], 0.0);
-    beam.rods[0].angle = 0.0;
-    beam.dynamics.rotary_inertia = vec![Profile::Constant(r2)];
-    beam
-}
-
-/// Squares of the roots of cos b cosh b = -1 (S. Timoshenko, Vibration problems
-/// in engineering), each twice.
+/// Every frequency twice.
 #[test]
 fn a_slender_beam_vibrates_as_euler_and_bernoulli_say() {
-    let known = [1.875104068711961_f64, 4.694091132974175, 7.854757438237613].map(|b| b * b);
-    let known: Vec<f64> = known.iter().flat_map(|&omega| [omega, omega]).collect();
+    let known: Vec<f64> = SLENDER.iter().flat_map(|b| [b * b; 2]).collect();
     let slender = beam(1e-10, [f64::INFINITY; 2]);
-    assert_known("Euler-Bernoulli", &solve(&slender, &with(6)), &known, 1e-8);
+    assert_known(
+        "Euler-Bernoulli",
+        &settled(&slender, &with(6)),
+        &known,
+        1e-8,
+    );
 }
 
 /// Roots of the frequency equation of the clamped Timoshenko beam (T. C. Huang,
@@ -90,38 +78,28 @@ fn a_slender_beam_vibrates_as_euler_and_bernoulli_say() {
 /// with (k - 1/2) pi/r here: the whole spectrum is known.
 #[test]
 fn timoshenko_beams_with_all_modes_in_space() {
-    for (r2, s2, bending) in TIMOSHENKO {
+    for [r2, s2, bending @ ..] in table::<6>(TIMOSHENKO) {
         let bars = (1..10).map(|k| (f64::from(k) - 0.5) * PI / r2.sqrt());
         let mut known: Vec<f64> = bars.chain(bending).flat_map(|omega| [omega; 2]).collect();
         known.sort_by(f64::total_cmp);
         known.retain(|&omega| omega <= bending[3]);
         let name = format!("r2 = {r2}, s2 = {s2}");
         let beam = beam(r2, [1.0 / r2, 1.0 / s2]);
-        assert_known(&name, &solve(&beam, &with(known.len())), &known, 1e-12);
+        assert_known(&name, &settled(&beam, &with(known.len())), &known, 1e-12);
     }
 }
 
-/// (j/2)^2 with the zeros j of the Bessel function J0 (H. Lamb, Higher
-/// mechanics): a rod of length, mass and gravity one that hardly bends, by the
-/// stiffness `part`^2, and less and less of it.
+/// Ever softer in bending.
 #[test]
 fn a_hanging_chain() {
-    let known = [1.445796490736696_f64, 7.617815585915522].map(f64::sqrt);
+    let known = CHAIN.map(f64::sqrt);
     let softer = [0.02, 0.01, 0.005, 0.0025, 0.00125].map(|part| {
-        let [soft, stiff] = [part * part, 1.0 / (part * part)];
-        let mut rod = paper_leaf(1, [soft; 3], [stiff; 3], 0.0);
-        rod.rods[0].angle = 0.0;
-        rod.dynamics.density = vec![Profile::Constant(1.0)];
-        rod.dynamics.rotary_inertia = vec![Profile::Constant(soft)];
-        rod.gravity = [1.0, 0.0, 0.0];
-        // A layer at the clamp, `part` thick, bends: knots put most nodes there.
-        let growth = 4.2_f64;
-        let knots = (0..=48).map(|i| (growth * f64::from(i) / 48.0).exp_m1() / growth.exp_m1());
-        let at: Vec<f64> = knots.collect();
-        // Twist is fast.
-        let value = vec![1e4 * soft; at.len()];
-        rod.rods[0].couple_stiffness[0] = Profile::Linear { at, value };
-        let leaf = solve(&rod, &with(4));
+        let mut rod = chain(part);
+        // Twist is fast; its knots put nodes where the rod bends.
+        let at = layered(48);
+        let value = vec![1e4 * part * part; at.len()];
+        rod.rods[0].couple_stiffness[0] = linear(&at, &value);
+        let leaf = settled(&rod, &with(4));
         let found: Vec<f64> = modes_of(&leaf).iter().filter_map(Mode::frequency).collect();
         println!("bending {part}: {found:?} on {:?}", leaf.accuracy.segments);
         close("twice", found[1] / found[0], 1.0, 1e-8);
@@ -142,29 +120,15 @@ fn dense(scenario: &Scenario, state: &State) -> Vec<f64> {
     let grid = discrete(&leaf, state.segments());
     let linear = Linear::new(&grid, &Physics::new(&leaf), state);
     let matrix = linear.scaled(&(&linear.strains + &linear.coupling));
-    let mut values: Vec<f64> = SymmetricEigen::new(matrix)
-        .eigenvalues
-        .iter()
-        .copied()
-        .collect();
+    let values = SymmetricEigen::new(matrix).eigenvalues;
+    let mut values: Vec<f64> = values.iter().copied().collect();
     values.sort_by(f64::total_cmp);
     values
 }
 
-/// The state of a result on one grid.
-fn state_of(scenario: &Scenario, leaf: &Equilibrium) -> State {
-    let scale = Leaf::new(scenario).scale;
-    let nodes = || leaf.shape.rods.iter().flat_map(|rod| &rod.nodes);
-    State::new(
-        leaf.shape.stations.len() - 1,
-        nodes().map(|node| node.position / scale.length).collect(),
-        nodes().map(|node| node.rotation).collect(),
-    )
-}
-
 #[track_caller]
 fn assert_as_dense(name: &str, scenario: &Scenario, options: &Options) {
-    let leaf = solve(scenario, options);
+    let leaf = settled(scenario, options);
     let physics = Physics::new(&Leaf::new(scenario));
     let known = dense(scenario, &state_of(scenario, &leaf));
     let found: Vec<f64> = modes_of(&leaf).iter().map(|mode| mode.eigenvalue).collect();
@@ -180,15 +144,12 @@ fn assert_as_dense(name: &str, scenario: &Scenario, options: &Options) {
 
 #[test]
 fn eigenvalues_are_those_of_a_dense_method() {
-    let on = |segments, count, keep_unstable| Options {
-        method: SemiImplicit {
-            segments: Some(segments),
-            keep_unstable,
-            ..SemiImplicit::default()
-        }
-        .into(),
-        tolerance: Some(1e-12),
-        ..with(count)
+    let on = |segments, count, keep: bool| {
+        let options = Options {
+            tolerance: Some(1e-12),
+            ..with_on(segments, count)
+        };
+        if keep { keeping(options) } else { options }
     };
     assert_as_dense("three veins", &three_veins(), &on(6, 25, false));
     let mut round = three_veins();
@@ -210,7 +171,7 @@ fn eigenvalues_are_those_of_a_dense_method() {
     }
     // All there are.
     assert_as_dense("one vein", &fig04(1), &on(4, 100, false));
-    let flat = scenario("paper/fig10", &["leaf.rods=5".into()]);
+    let flat = scenario("paper/fig10", "leaf.rods=5");
     assert_as_dense("a saddle", &flat, &on(10, 30, true));
 }
 
@@ -222,7 +183,7 @@ fn the_explicit_method_tells_the_same_modes() {
         ..with(4)
     };
     let leaf = fig04(3);
-    let (implicit, explicit) = (solve(&leaf, &with(4)), solve(&leaf, &explicit));
+    let (implicit, explicit) = (settled(&leaf, &with(4)), settled(&leaf, &explicit));
     for (a, b) in modes_of(&implicit).iter().zip(modes_of(&explicit)) {
         let apart = (a.eigenvalue - b.eigenvalue).abs();
         assert!(apart <= a.error.unwrap() + b.error.unwrap() + 1e-7 * a.eigenvalue);
@@ -232,19 +193,10 @@ fn the_explicit_method_tells_the_same_modes() {
 /// Frequencies do not depend on whether half of a leaf was solved for.
 #[test]
 fn half_of_a_leaf_tells_the_modes_of_the_whole() {
-    let entries = ["leaf.rods=4".to_string(), "leaf.fan='symmetric'".into()];
-    let leaf = scenario("paper/fig04", &entries);
-    let half = solve(&leaf, &with(6));
+    let leaf = scenario("paper/fig04", "leaf.rods=4; leaf.fan='symmetric'");
+    let half = settled(&leaf, &with(6));
     assert_eq!(half.model.rods, 2);
-    let whole = Options {
-        method: SemiImplicit {
-            full_model: true,
-            ..SemiImplicit::default()
-        }
-        .into(),
-        ..with(6)
-    };
-    let whole = solve(&leaf, &whole);
+    let whole = settled(&leaf, &in_full(with(6)));
     for (a, b) in modes_of(&half).iter().zip(modes_of(&whole)) {
         let apart = (a.eigenvalue - b.eigenvalue).abs();
         assert!(apart <= a.error.unwrap() + b.error.unwrap());
@@ -255,26 +207,15 @@ fn half_of_a_leaf_tells_the_modes_of_the_whole() {
 
 /// The number of negative eigenvalues listed.
 fn negative(leaf: &Equilibrium) -> usize {
-    modes_of(leaf)
-        .iter()
-        .filter(|mode| mode.eigenvalue < 0.0)
-        .count()
+    let modes = modes_of(leaf).iter();
+    modes.filter(|mode| mode.eigenvalue < 0.0).count()
 }
 
 #[test]
 fn saddles_have_as_many_negative_eigenvalues_as_their_index() {
-    let flat = scenario("paper/fig10", &["leaf.rods=5".into()]);
+    let flat = scenario("paper/fig10", "leaf.rods=5");
     for (segments, index) in [(10, 14), (20, 16), (40, 18)] {
-        let options = Options {
-            method: SemiImplicit {
-                segments: Some(segments),
-                keep_unstable: true,
-                ..SemiImplicit::default()
-            }
-            .into(),
-            ..with(24)
-        };
-        let leaf = solve(&flat, &options);
+        let leaf = settled(&flat, &keeping(with_on(segments, 24)));
         assert_eq!(leaf.stability.negative_eigenvalues, Some(index));
         assert_eq!(negative(&leaf), index, "{segments} segments");
         assert!(modes_of(&leaf).is_sorted_by_key(|mode| mode.eigenvalue));
@@ -286,17 +227,9 @@ fn saddles_have_as_many_negative_eigenvalues_as_their_index() {
 /// Euler's column, P = 4.5 pi^2: it buckles in four ways, two by two alike.
 #[test]
 fn a_round_column_leaves_its_saddle_in_pairs_of_ways() {
-    let mut column = beam(1e-4, [1e4, 1e4]);
+    let mut column = beam(1e-4, [1e4; 2]);
     column.tip_force = [-4.5 * PI * PI, 0.0, 0.0];
-    let options = Options {
-        method: SemiImplicit {
-            keep_unstable: true,
-            ..SemiImplicit::default()
-        }
-        .into(),
-        ..with(6)
-    };
-    let leaf = solve(&column, &options);
+    let leaf = settled(&column, &keeping(with(6)));
     assert_eq!(leaf.stability.negative_eigenvalues, Some(4));
     assert_eq!(negative(&leaf), 4);
     for pair in modes_of(&leaf).chunks(2) {
@@ -305,22 +238,18 @@ fn a_round_column_leaves_its_saddle_in_pairs_of_ways() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(24, None))]
 
     #[test]
     fn random_leaves_have_as_many_negative_eigenvalues_as_their_index(
-        leaf in random::leaves(), keep_unstable: bool,
+        leaf in leaves(), keep_unstable: bool,
     ) {
-        let options = Options {
-method: SemiImplicit {
-            segments: Some(12.max(Leaf::new(&leaf).kinks().len() + 1)),
-            keep_unstable,
-..SemiImplicit::default()
-}
-.into(),
-            ..with(12)
-        };
-        let found = relax(&leaf, &options, &mut |_| {}).unwrap();
+        let segments = 12.max(Leaf::new(&leaf).kinks().len() + 1);
+        let mut options = with_on(segments, 12);
+        if keep_unstable {
+            options = keeping(options);
+        }
+        let found = relaxed(&leaf, &options);
         if found.outcome.is_success() {
             let index = found.stability.negative_eigenvalues.unwrap();
             let negative = negative(&found);
@@ -349,29 +278,14 @@ fn a_leaf_let_go_in_a_mode_keeps_its_frequency() {
         for (node, increment) in pair.shape.iter().enumerate() {
             start.advance(node, increment, SIZE);
         }
-        let h = 1e-3;
-        let seen = 2.0 / h * (0.5 * omega * h).asin();
-        let mut leapfrog = moving_by(Scheme::Explicit, &leaf, &start, h);
-        let positions =
-            |state: &State| -> Vec<f64> { state.x.iter().flat_map(|x| x.to_array()).collect() };
-        let mut worst = 0.0_f64;
-        for k in 1..=40 {
-            let until = h * (100 * k) as f64;
-            leapfrog.advance(until).unwrap();
-            let now = positions(&leapfrog.snapshot().state);
-            let cosine = (seen * until).cos();
-            let (rest, start) = (positions(&state), positions(&start));
-            for ((now, rest), start) in now.iter().zip(&rest).zip(&start) {
-                worst = worst.max((now - rest - cosine * (start - rest)).abs() / SIZE);
-            }
-        }
+        let worst = off_cosine(&leaf, (&state, &start), (omega, 1e-3), (SIZE, 40));
         println!("omega {omega}: within {worst:.1e}");
         assert!(worst < 1e-4, "omega {omega}: {worst:.1e}");
     }
 }
 
 /// Lets the segments carry what their strains tell.
-fn settle_forces(grid: &leafdyn::leaf::DiscreteLeaf, state: &mut State) {
+fn settle_forces(grid: &DiscreteLeaf, state: &mut State) {
     let n = grid.segments();
     for j in 0..grid.rods() {
         for i in 0..n {
@@ -403,10 +317,7 @@ fn shapes_are_orthonormal() {
                     let (p, q) = (first.shape[node], second.shape[node]);
                     let inertia: Inertia = physics.inertia(&grid, j, i);
                     let tensor = inertia.tensor(exact.q[node]);
-                    let [p, q] = [p, q].map(|s| {
-                        let (turn, shift) = (leafdyn::leaf::turn(&s), leafdyn::leaf::shift(&s));
-                        (turn, shift)
-                    });
+                    let [p, q] = [p, q].map(|s| (turn(&s), shift(&s)));
                     product += p.0.dot(tensor * q.0) + inertia.mass * p.1.dot(q.1);
                 }
             }
@@ -427,28 +338,11 @@ fn bits(leaf: &Equilibrium) -> Vec<u64> {
 
 #[test]
 fn modes_are_equal_bit_by_bit_on_any_number_of_threads() {
-    let on = |threads: usize| {
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
-        pool.install(|| {
-            let options = Options {
-                method: SemiImplicit {
-                    segments: Some(32),
-                    ..SemiImplicit::default()
-                }
-                .into(),
-                ..with(2)
-            };
-            solve(&fig04(300), &options)
-        })
-    };
+    let options = with_on(32, 2);
+    let on = |threads| on_threads(threads, || settled(&fig04(300), &options));
     let alone = on(1);
-    assert!(
-        alone.accuracy.segments.last().unwrap() * 300 >= 8192,
-        "too small to be shared out"
-    );
+    let nodes = alone.accuracy.segments.last().unwrap() * 300;
+    assert!(nodes >= 8192, "too small to be shared out");
     for threads in [1, 2] {
         assert_eq!(bits(&on(threads)), bits(&alone), "{threads} threads");
     }
@@ -459,9 +353,9 @@ fn modes_are_equal_bit_by_bit_on_any_number_of_threads() {
 fn no_modes_without_a_potential_or_rest_or_request() {
     let mut rollup = fig04(1);
     rollup.tip_moment = [0.0, 1.0, 0.0];
-    assert!(solve(&rollup, &with(3)).stability.modes.is_none());
+    assert!(settled(&rollup, &with(3)).stability.modes.is_none());
     assert!(
-        solve(&fig04(2), &Options::default())
+        settled(&fig04(2), &Options::default())
             .stability
             .modes
             .is_none()
@@ -470,7 +364,7 @@ fn no_modes_without_a_potential_or_rest_or_request() {
         modes: 3,
         ..Options::default()
     };
-    let leaf = solve(&fig04(3), &options);
+    let leaf = settled(&fig04(3), &options);
     assert_eq!(modes_of(&leaf).len(), 3);
     let many = relax(&fig04(1), &with(101), &mut |_| {});
     assert!(many.unwrap_err().to_string().contains("modes = 101"));
@@ -479,7 +373,7 @@ fn no_modes_without_a_potential_or_rest_or_request() {
 /// Other units, the same leaf.
 #[test]
 fn frequencies_are_in_the_units_of_the_scenario() {
-    let natural = solve(&fig04(3), &with(3));
+    let natural = settled(&fig04(3), &with(3));
     // Lengths times 10, stiffness times 1000, density times 4.
     let mut other = paper_leaf(3, [1000.0; 3], [1000.0; 3], 1.0);
     for rod in &mut other.rods {
@@ -487,11 +381,11 @@ fn frequencies_are_in_the_units_of_the_scenario() {
     }
     // Force over displacement and length: A/L^4.
     other.coupling = vec![[0.0, 0.1, 0.1]; 2];
-    other.dynamics = leafdyn::scenario::Dynamics::default_for(&other.rods);
+    other.dynamics = Dynamics::default_for(&other.rods);
     let density = 4.0 * other.dynamics.mean_density();
     other.dynamics.density = vec![Profile::Constant(density); 3];
     other.dynamics.rotary_inertia = vec![Profile::Constant(density); 3];
-    let other = solve(&other, &with(3));
+    let other = settled(&other, &with(3));
     for (a, b) in modes_of(&natural).iter().zip(modes_of(&other)) {
         close("eigenvalue", 4.0 * b.eigenvalue / a.eigenvalue, 1.0, 1e-9);
     }

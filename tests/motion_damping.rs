@@ -11,18 +11,14 @@
 //! straight unstressed rod change nothing.
 
 mod common;
-#[path = "common/linear.rs"]
-mod linear;
-#[path = "common/motion.rs"]
-mod motion;
 
-use common::paper_leaf;
+use common::motion::{BOTH, Scheme, discrete, explicit, method, released};
+use common::vibration::Linear;
+use common::{order, paper_leaf};
 use leafdyn::leaf::{Leaf, State};
-use leafdyn::motion::{Explicit, Physics};
+use leafdyn::motion::Physics;
 use leafdyn::rotation;
 use leafdyn::scenario::{Profile, Scenario};
-use linear::Linear;
-use motion::{BOTH, Scheme, discrete, method, released};
 
 /// Amplitude: small enough to be linear, large beside rounding.
 const SIZE: f64 = 1e-6;
@@ -86,10 +82,9 @@ fn assert_decays(name: &str, external: f64, internal: f64, modes: &[usize]) {
     let leaf = Leaf::new(&scenario);
     let rest = released(&leaf, 6);
     let physics = Physics::new(&leaf);
-    let linear = Linear::new(&discrete(&leaf, 6), &physics, &rest).modes();
     let all = Linear::new(&discrete(&leaf, 6), &physics, &rest);
-    let explicit = Explicit::new(discrete(&leaf, 6), physics.clone(), &rest, None).unwrap();
-    let stable = explicit.stable_step().step;
+    let linear = all.modes();
+    let stable = explicit(&leaf, &rest, None).stable_step().step;
     for &mode in modes {
         let omega = linear.frequencies[mode];
         let drag = physics.damping + physics.retardation * omega * omega;
@@ -106,7 +101,7 @@ fn assert_decays(name: &str, external: f64, internal: f64, modes: &[usize]) {
                 Scheme::SemiImplicit => 500,
             };
             let errors = [of(few), of(2 * few)];
-            let order = (errors[0] / errors[1]).log2();
+            let order = order(errors[0], errors[1]);
             let ratio = drag / (2.0 * omega);
             let what = format!("{name}, {scheme:?}, mode {mode}, damping ratio {ratio:.2}");
             println!("{what}: order {order:.3}, errors {errors:?}");

@@ -3,13 +3,15 @@
 //! out the books are of second order in the time step, for both methods.
 
 mod common;
-#[path = "common/motion.rs"]
-mod motion;
 
+use common::motion::{
+    BOTH, DAMPINGS, Scheme, curling, explicit, method, ramp, released, rest, three_veins,
+    twisted_rod,
+};
+use common::order;
 use leafdyn::leaf::{Leaf, State};
-use leafdyn::motion::{Energy, Explicit, Physics};
+use leafdyn::motion::Energy;
 use leafdyn::scenario::{Scenario, Schedule};
-use motion::{BOTH, Scheme, discrete, method, ramp, released, rest, three_veins, twisted_rod};
 
 /// Energies at the start and at so many instants until `until`.
 fn energies(
@@ -52,8 +54,7 @@ fn drift(loads: f64, steps: f64) -> (f64, f64) {
     rod.dynamics.tip_force = Schedule::constant([-2.0 * loads, loads, 3.0 * loads]);
     let leaf = Leaf::new(&rod);
     let state = released(&leaf, 8);
-    let explicit = Explicit::new(discrete(&leaf, 8), Physics::new(&leaf), &state, None).unwrap();
-    let h = explicit.longest_step();
+    let h = explicit(&leaf, &state, None).longest_step();
     let all = energies(Scheme::Explicit, &leaf, &state, (h, steps * h), 4000);
     let most = all.iter().map(|e| e.kinetic).fold(0.0, f64::max);
     let balance = balances(&all);
@@ -100,7 +101,7 @@ fn assert_order_on(
         let all = energies(scheme, &leaf, &state, (h, until), 50);
         deviation(&balances(&all))
     });
-    let order = (deviations[0] / deviations[1]).log2();
+    let order = order(deviations[0], deviations[1]);
     println!("{name}, {scheme:?}: order {order:.3}, deviations {deviations:?}");
     assert!((order - 2.0).abs() < 0.05, "{name}, {scheme:?}: {order}");
 }
@@ -115,8 +116,6 @@ fn shaken(mut scenario: Scenario, (external, internal): (f64, f64)) -> Scenario 
     scenario
 }
 
-const DAMPINGS: [(f64, f64); 4] = [(0.0, 0.0), (1.5, 0.0), (0.0, 0.01), (1.5, 0.01)];
-
 #[test]
 fn of_a_shaken_rod() {
     for damping in DAMPINGS {
@@ -127,10 +126,8 @@ fn of_a_shaken_rod() {
 #[test]
 fn of_a_shaken_leaf() {
     for damping in DAMPINGS {
-        assert_second_order(
-            &format!("leaf {damping:?}"),
-            &shaken(three_veins(), damping),
-        );
+        let leaf = shaken(three_veins(), damping);
+        assert_second_order(&format!("leaf {damping:?}"), &leaf);
     }
 }
 
@@ -138,10 +135,7 @@ fn of_a_shaken_leaf() {
 fn of_a_rod_that_curls_and_is_twisted() {
     for damping in DAMPINGS {
         let mut rod = shaken(twisted_rod(), damping);
-        rod.dynamics.rest = Schedule {
-            at: vec![0.0, 2.0],
-            value: vec![1.0, 4.0],
-        };
+        rod.dynamics.rest = curling(4.0);
         rod.dynamics.tip_moment = ramp(2.0, [0.7, -0.8, 0.9]);
         assert_second_order(&format!("curling rod {damping:?}"), &rod);
     }
@@ -152,10 +146,7 @@ fn of_a_rod_that_curls_and_is_twisted() {
 #[test]
 fn of_a_long_row_of_segments() {
     let mut rod = shaken(twisted_rod(), (1.5, 1e-4));
-    rod.dynamics.rest = Schedule {
-        at: vec![0.0, 2.0],
-        value: vec![1.0, 4.0],
-    };
+    rod.dynamics.rest = curling(4.0);
     assert_order_on("300 segments", &rod, Scheme::Explicit, 300, (1e-4, 0.2));
 }
 
@@ -182,10 +173,8 @@ fn nothing_comes_from_nothing() {
     for scheme in BOTH {
         for energy in energies(scheme, &leaf, &state, (2e-3, 1.0), 20) {
             let all = [energy.kinetic, energy.elastic, energy.balance()];
-            assert!(
-                all.iter().all(|e| e.abs() < 1e-20),
-                "{scheme:?}: {energy:?}"
-            );
+            let nothing = all.iter().all(|e| e.abs() < 1e-20);
+            assert!(nothing, "{scheme:?}: {energy:?}");
         }
     }
 }

@@ -4,27 +4,20 @@
 //! dispersion.
 
 mod common;
-#[path = "common/linear.rs"]
-mod linear;
-#[path = "common/motion.rs"]
-mod motion;
 
-use common::{TIMOSHENKO, extrapolate, paper_leaf};
+use common::motion::{
+    CHAIN, SLENDER, beam, chain, discrete, layered, off_cosine, released, rest, three_veins,
+};
+use common::vibration::Linear;
+use common::{TIMOSHENKO, extrapolate, order, table};
 use glam::{DQuat, DVec3};
 use leafdyn::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use leafdyn::motion::Physics;
-use leafdyn::scenario::{Profile, Scenario, Schedule};
-use linear::Linear;
-use motion::{Scheme, discrete, method, released, rest, three_veins};
+use leafdyn::scenario::{Scenario, Schedule};
 
-/// A beam with the slenderness r2 = I/(A L^2) and s2 = EI/(k G A L^2), of unit
-/// length, bending stiffness and mass.
-fn beam(r2: f64, s2: f64) -> Scenario {
-    let mut beam = paper_leaf(1, [1.0; 3], [1.0 / r2, 1.0 / s2, 1.0 / s2], 0.0);
-    beam.rods[0].angle = 0.0;
-    beam.dynamics.rotary_inertia = vec![Profile::Constant(r2)];
-    beam.dynamics.external_damping = 0.0;
-    beam
+/// A beam with the slenderness r2 = I/(A L^2) and s2 = EI/(k G A L^2).
+fn slender(r2: f64, s2: f64) -> Scenario {
+    beam(r2, [1.0 / r2, 1.0 / s2])
 }
 
 /// Frequencies of bending up and down of a straight rod along e1, in the
@@ -44,7 +37,7 @@ fn extrapolated<const K: usize>(name: &str, grids: &[Vec<f64>]) -> [f64; K] {
         let [.., a, b, c] = values[..] else {
             panic!("three grids at least");
         };
-        let order = ((a - b) / (b - c)).log2();
+        let order = order(a - b, b - c);
         println!("{name}, mode {}: order {order:.3}, {values:?}", k + 1);
         assert!((order - 2.0).abs() < 0.1, "{name}, mode {}: {order}", k + 1);
         extrapolate(&values, 0.25)
@@ -62,12 +55,8 @@ fn of_beam<const K: usize>(name: &str, scenario: &Scenario) -> [f64; K] {
 fn assert_near(name: &str, found: &[f64], known: &[f64], within: f64) {
     for (mode, (found, known)) in found.iter().zip(known).enumerate() {
         let error = (found / known - 1.0).abs();
-        println!("{name}, mode {}: {found:.10}, error {error:.1e}", mode + 1);
-        assert!(
-            error < within,
-            "{name}, mode {}: {found} for {known}",
-            mode + 1
-        );
+        println!("{name}, mode {mode}: {found:.10}, error {error:.1e}");
+        assert!(error < within, "{name}, mode {mode}: {found} for {known}");
     }
 }
 
@@ -75,41 +64,28 @@ fn assert_near(name: &str, found: &[f64], known: &[f64], within: f64) {
 /// digits, from its closed form.
 #[test]
 fn clamped_timoshenko_beams() {
-    for (r2, s2, known) in TIMOSHENKO {
+    for [r2, s2, known @ ..] in table::<6>(TIMOSHENKO) {
         let name = format!("r2 = {r2}, s2 = {s2}");
-        let found = of_beam::<4>(&name, &beam(r2, s2));
+        let found = of_beam::<4>(&name, &slender(r2, s2));
         assert_near(&name, &found, &known, 1e-8);
     }
 }
 
-/// Squares of the roots of cos b cosh b = -1.
 #[test]
 fn clamped_beams_so_slender_that_only_bending_counts() {
-    let known = [1.875104068711961_f64, 4.694091132974175, 7.854757438237613].map(|b| b * b);
-    let slender =
-        [2e-4, 1e-4, 5e-5, 2.5e-5].map(|part| of_beam::<3>(&format!("{part}"), &beam(part, part)));
+    let known = SLENDER.map(|b| b * b);
+    let slender = [2e-4, 1e-4, 5e-5, 2.5e-5]
+        .map(|part| of_beam::<3>(&format!("{part}"), &slender(part, part)));
     let found: [f64; 3] =
         std::array::from_fn(|k| extrapolate(&slender.map(|frequencies| frequencies[k]), 0.5));
     assert_near("Euler-Bernoulli", &found, &known, 1e-6);
 }
 
-/// A hanging rod of length, mass and gravity one that hardly bends, by the
-/// stiffness `part`^2, on nested grids that are fine at its clamp.
+/// The lowest frequencies of a hanging chain on nested grids that are fine at its clamp.
 fn hanging(part: f64) -> Vec<Vec<f64>> {
-    let [soft, stiff] = [part * part, 1.0 / (part * part)];
-    let mut rod = paper_leaf(1, [soft; 3], [stiff; 3], 0.0);
-    rod.rods[0].angle = 0.0;
-    rod.dynamics.density = vec![Profile::Constant(1.0)];
-    rod.dynamics.rotary_inertia = vec![Profile::Constant(soft)];
-    rod.gravity = [1.0, 0.0, 0.0];
-    rod.dynamics.gravity = Schedule::constant(rod.gravity);
+    let rod = chain(part);
     let leaf = Leaf::new(&rod);
-    // A layer at the clamp, `part` thick, bends: most segments are there.
-    let growth = 4.2_f64;
-    let nodes: Vec<f64> = (1..48)
-        .map(|i| (growth * i as f64 / 48.0).exp_m1() / growth.exp_m1())
-        .collect();
-    let mut grid = Grid::new(1, &nodes);
+    let mut grid = Grid::new(1, &layered(48)[1..48]);
     let mut found = Vec::new();
     for _ in 0..4 {
         let leaf = DiscreteLeaf::new(&leaf, grid.clone());
@@ -135,10 +111,9 @@ fn hanging_straight(leaf: &DiscreteLeaf) -> State {
     state
 }
 
-/// (j/2)^2 with the zeros j of the Bessel function J0.
 #[test]
 fn a_hanging_chain() {
-    let known = [1.445796490736696_f64, 7.617815585915522].map(f64::sqrt);
+    let known = CHAIN.map(f64::sqrt);
     let ever_softer = [0.02, 0.01, 0.005, 0.0025, 0.00125]
         .map(|part| extrapolated::<2>(&format!("bending {part}"), &hanging(part)));
     let found: [f64; 2] =
@@ -161,35 +136,16 @@ fn assert_vibrates(name: &str, scenario: &Scenario, state: &State, wanted: &[usi
     for &mode in wanted {
         let omega = modes.frequencies[mode];
         let h = 1.5 / fastest;
-        let seen = 2.0 / h * (0.5 * omega * h).asin();
         let start = linear.displaced(state, modes.modes.column(mode).into(), SIZE);
-        let mut leapfrog = method(Scheme::Explicit, &leaf, &start, h);
-        let positions =
-            |state: &State| -> Vec<f64> { state.x.iter().flat_map(|x| x.to_array()).collect() };
-        let (rest, amplitude) = (positions(state), positions(&start));
-        let mut worst = 0.0_f64;
-        for k in 1..=100 {
-            let until = h * (100 * k) as f64;
-            leapfrog.advance(until).unwrap();
-            assert_eq!(leapfrog.steps(), 100 * k);
-            let now = positions(&leapfrog.snapshot().state);
-            let cosine = (seen * until).cos();
-            for ((now, rest), start) in now.iter().zip(&rest).zip(&amplitude) {
-                worst = worst.max((now - rest - cosine * (start - rest)).abs() / SIZE);
-            }
-        }
-        // What the phase would be off without dispersion.
-        let (phase, without) = (seen * 1e4 * h, (omega - seen).abs() * 1e4 * h);
-        println!(
-            "{name}, mode {mode}: omega {omega:.3}, phase {phase:.0} within {worst:.1e}, dispersion {without:.1e}"
-        );
+        let worst = off_cosine(&leaf, (state, &start), (omega, h), (SIZE, 100));
+        println!("{name}, mode {mode}: omega {omega:.3}, within {worst:.1e}");
         assert!(worst < 1e-5, "{name}, mode {mode}: {worst:.1e}");
     }
 }
 
 #[test]
 fn a_beam_in_motion() {
-    let beam = beam(0.0016, 0.00416);
+    let beam = slender(0.0016, 0.00416);
     let leaf = Leaf::new(&beam);
     assert_vibrates("beam", &beam, &released(&leaf, 12), &[0, 3, 20, 40]);
 }

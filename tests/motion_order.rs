@@ -6,17 +6,14 @@
 //! waves too fast for the coarsest steps are hardly there.
 
 mod common;
-#[path = "common/motion.rs"]
-mod motion;
 
-use leafdyn::leaf::{Leaf, State};
-use leafdyn::scenario::{Scenario, Schedule};
-use motion::{
-    BOTH, Scheme, apart, at, distance, limit, method, numbers, ramp, rest, three_veins, twisted_rod,
+use common::motion::{
+    BOTH, DAMPINGS, Scheme, apart, at, curling, distance, limit, method, numbers, ramp, rest,
+    three_veins, twisted_rod,
 };
-
-/// External and internal damping.
-const DAMPINGS: [(f64, f64); 4] = [(0.0, 0.0), (1.5, 0.0), (0.0, 0.01), (1.5, 0.01)];
+use common::order;
+use leafdyn::leaf::{Leaf, State};
+use leafdyn::scenario::Scenario;
 
 /// How equal limits can be: internal damping also takes the fast waves, whose
 /// error falls with the order but is large.
@@ -39,7 +36,7 @@ fn assert_order(name: &str, scenario: &Scenario, far: f64, equal: f64) {
         };
         let found = [1, 2, 4].map(|times| numbers(&on(times)));
         let changes = [0, 1].map(|k| distance(&found[k], &found[k + 1]));
-        let order = (changes[0] / changes[1]).log2();
+        let order = order(changes[0], changes[1]);
         println!("{name}, {scheme:?}: order {order:.3}, changes {changes:?}");
         assert!((order - 2.0).abs() < 0.1, "{name}, {scheme:?}: {order:.3}");
         limit(&found[1], &found[2])
@@ -53,16 +50,21 @@ fn assert_order(name: &str, scenario: &Scenario, far: f64, equal: f64) {
     assert!(between < equal, "{name}: {between:.1e} apart");
 }
 
+/// With every damping.
+fn in_space(name: &str, mut scenario: Scenario, far: f64) {
+    for (external, internal) in DAMPINGS {
+        scenario.dynamics.external_damping = external;
+        scenario.dynamics.internal_damping = internal;
+        let name = format!("{name}, damping {external} {internal}");
+        assert_order(&name, &scenario, far, equal(internal));
+    }
+}
+
 #[test]
 fn a_rod_in_space() {
     let mut rod = twisted_rod();
     rod.dynamics.tip_force = ramp(2.0, [-5.0, 10.0, 16.0]);
-    for (external, internal) in DAMPINGS {
-        rod.dynamics.external_damping = external;
-        rod.dynamics.internal_damping = internal;
-        let name = format!("rod, damping {external} {internal}");
-        assert_order(&name, &rod, 0.4, equal(internal));
-    }
+    in_space("rod", rod, 0.4);
 }
 
 #[test]
@@ -70,22 +72,14 @@ fn a_leaf_in_space() {
     let mut leaf = three_veins();
     leaf.dynamics.tip_force = ramp(2.0, [-8.0, 16.0, 26.0]);
     leaf.dynamics.gravity = ramp(2.0, [0.7, -0.7, -1.3]);
-    for (external, internal) in DAMPINGS {
-        leaf.dynamics.external_damping = external;
-        leaf.dynamics.internal_damping = internal;
-        let name = format!("leaf, damping {external} {internal}");
-        assert_order(&name, &leaf, 0.6, equal(internal));
-    }
+    in_space("leaf", leaf, 0.6);
 }
 
 /// A moment on the tip, and a rest shape that curls up.
 #[test]
 fn a_rod_that_changes_its_rest_shape() {
     let mut rod = twisted_rod();
-    rod.dynamics.rest = Schedule {
-        at: vec![0.0, 2.0],
-        value: vec![1.0, 5.0],
-    };
+    rod.dynamics.rest = curling(5.0);
     rod.dynamics.tip_moment = ramp(2.0, [0.7, -0.8, 0.9]);
     rod.dynamics.external_damping = 1.5;
     rod.dynamics.internal_damping = 0.01;

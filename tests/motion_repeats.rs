@@ -1,15 +1,17 @@
 //! A motion is the same to the last bit on any number of threads, whether it
 //! is looked at on its way or not, and when it goes on from saved numbers.
 
-use leafdyn::leaf::{DiscreteLeaf, Grid, Leaf, State};
-use leafdyn::motion::{Explicit, Method, Physics, SemiImplicit, Steps};
-use leafdyn::relax::start;
+mod common;
+
+use common::motion::{explicit, released, semi_implicit};
+use common::{on_threads, parse};
+use leafdyn::leaf::{Leaf, State};
+use leafdyn::motion::{Method, Steps};
 use leafdyn::scenario::Scenario;
-use rayon::ThreadPoolBuilder;
 
 /// A damped leaf under loads that change.
 fn scenario(rods: usize) -> Scenario {
-    let text = format!(
+    parse(&format!(
         r#"
         name = "leaf"
         leaf = {{ rods = {rods}, length = 1.0, fan = "paper" }}
@@ -20,8 +22,7 @@ fn scenario(rods: usize) -> Scenario {
         internal_damping = 0.001
         gravity = {{ at = [0.0, 1.0], value = [[0, 0, -1], [0, 1, 0]] }}
         "#
-    );
-    Scenario::from_toml(&text).unwrap()
+    ))
 }
 
 /// Everything about a state, bit by bit.
@@ -33,12 +34,9 @@ fn bits(state: &State) -> Vec<u64> {
 }
 
 fn methods(leaf: &Leaf, segments: usize) -> [Box<dyn Method>; 2] {
-    let discrete = DiscreteLeaf::new(leaf, Grid::new(segments, &[]));
-    let state = start(&discrete);
-    let physics = Physics::new(leaf);
-    let explicit = Explicit::new(discrete.clone(), physics.clone(), &state, None).unwrap();
-    let semi_implicit = SemiImplicit::new(discrete, physics, &state, Steps::Error(1e-4));
-    [Box::new(explicit), Box::new(semi_implicit)]
+    let state = released(leaf, segments);
+    let implicit = semi_implicit(leaf, &state, Steps::Error(1e-4));
+    [Box::new(explicit(leaf, &state, None)), Box::new(implicit)]
 }
 
 /// Leaves large enough to be shared out.
@@ -48,8 +46,7 @@ fn on_any_number_of_threads() {
     let leaf = Leaf::new(&scenario);
     for method in 0..2 {
         let run = |threads: usize| {
-            let pool = ThreadPoolBuilder::new().num_threads(threads);
-            pool.build().unwrap().install(|| {
+            on_threads(threads, || {
                 let [explicit, semi_implicit] = methods(&leaf, 300);
                 let (mut method, until) = match method {
                     0 => (explicit, 5e-3),
@@ -90,10 +87,8 @@ fn from_saved_numbers() {
         for method in [&mut through, &mut other] {
             method.advance(0.5).unwrap();
         }
-        assert_eq!(
-            bits(&through.snapshot().state),
-            bits(&other.snapshot().state)
-        );
+        let [a, b] = [&mut through, &mut other].map(|method| bits(&method.snapshot().state));
+        assert_eq!(a, b);
         assert_eq!(through.save(), other.save());
         assert!(!other.restore(&[0.0]));
     }

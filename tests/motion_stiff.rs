@@ -3,15 +3,14 @@
 //! loses its order, and what it damps vanishes with the step.
 
 mod common;
-#[path = "common/motion.rs"]
-mod motion;
 
-use common::{fig04, settle_on};
+use common::motion::{
+    distance, explicit, numbers, ramp, released, rest, semi_implicit, three_veins, twisted_rod,
+};
+use common::{fig04, order, settle_on};
 use leafdyn::leaf::{Leaf, State};
-use leafdyn::motion::{Explicit, Method, Physics, SemiImplicit, Snapshot, Steps};
-use leafdyn::relax::start;
+use leafdyn::motion::{Method, Snapshot, Steps};
 use leafdyn::scenario::{Profile, Scenario, Schedule};
-use motion::{discrete, distance, numbers, ramp, rest, three_veins, twisted_rod};
 
 fn stiff(mut leaf: Scenario, stiffness: f64) -> Scenario {
     for rod in &mut leaf.rods {
@@ -29,8 +28,7 @@ fn pulled(mut leaf: Scenario) -> Scenario {
 
 fn moved(scenario: &Scenario, state: &State, steps: Steps, until: f64) -> (Snapshot, usize) {
     let leaf = Leaf::new(scenario);
-    let grid = discrete(&leaf, state.segments());
-    let mut method = SemiImplicit::new(grid, Physics::new(&leaf), state, steps);
+    let mut method = semi_implicit(&leaf, state, steps);
     if let Err(broken) = method.advance(until) {
         panic!("{steps:?}: {broken:?}");
     }
@@ -50,19 +48,16 @@ fn stiffer_and_stiffer_is_rigid_in_the_end() {
     for leaf in [pulled(twisted_rod()), pulled(three_veins())] {
         let of = |stiffness: f64| {
             let leaf = stiff(leaf.clone(), stiffness);
-            moved(&leaf, &rest(&leaf, 8), Steps::Fixed(0.05), 2.0)
-                .0
-                .state
+            let (end, _) = moved(&leaf, &rest(&leaf, 8), Steps::Fixed(0.05), 2.0);
+            end.state
         };
         let rigid = of(f64::INFINITY);
         let differences = [1e4, 1e6, 1e8].map(|stiffness| apart(&of(stiffness), &rigid));
         println!("{differences:?}, at 1e10 {:.1e}", apart(&of(1e10), &rigid));
         assert!(differences[0] > 1e-5, "they do differ");
         for pair in differences.windows(2) {
-            assert!(
-                (pair[1] * 100.0 / pair[0] - 1.0).abs() < 0.1,
-                "{differences:?}"
-            );
+            let ratio = pair[1] * 100.0 / pair[0];
+            assert!((ratio - 1.0).abs() < 0.1, "{differences:?}");
         }
         assert!(apart(&of(1e10), &rigid) < 1e-8);
     }
@@ -73,8 +68,7 @@ fn far_beyond_the_explicit_step() {
     let scenario = stiff(pulled(three_veins()), 1e8);
     let leaf = Leaf::new(&scenario);
     let state = rest(&scenario, 8);
-    let explicit = Explicit::new(discrete(&leaf, 8), Physics::new(&leaf), &state, None).unwrap();
-    let stable = explicit.stable_step().step;
+    let stable = explicit(&leaf, &state, None).stable_step().step;
     let on = |h: f64| numbers(&moved(&scenario, &state, Steps::Fixed(h), 2.0).0);
     let fine = on(0.002);
     for (h, within) in [(0.25, 0.2), (0.1, 0.04), (0.02, 4e-3)] {
@@ -100,7 +94,7 @@ fn of_second_order_at_any_stiffness() {
                 x.chain(q).collect::<Vec<f64>>()
             });
             let changes = [0, 1].map(|k| distance(&found[k], &found[k + 1]));
-            let order = (changes[0] / changes[1]).log2();
+            let order = order(changes[0], changes[1]);
             println!("{stiffness:e}: order {order:.3}, changes {changes:?}");
             assert!((order - 2.0).abs() < 0.1, "{stiffness}: {order}");
         }
@@ -117,29 +111,21 @@ fn what_it_damps_vanishes_with_the_step() {
         let state = rest(&twisted_rod(), 4);
         let lost = [0.04, 0.02, 0.01, 0.005, 0.0025].map(|h| {
             let leaf = Leaf::new(&rod);
-            let mut method = SemiImplicit::new(
-                discrete(&leaf, 4),
-                Physics::new(&leaf),
-                &state,
-                Steps::Fixed(h),
-            );
+            let mut method = semi_implicit(&leaf, &state, Steps::Fixed(h));
             let start = method.snapshot().energy.balance();
             method.advance(20.0).unwrap();
             method.snapshot().energy.balance() - start
         });
         println!("{stiffness:e}: {lost:?}");
-        assert!(
-            lost.iter().all(|lost| *lost < 0.0),
-            "damped, not fed: {lost:?}"
-        );
+        let damped = lost.iter().all(|lost| *lost < 0.0);
+        assert!(damped, "not fed: {lost:?}");
         assert!(lost.is_sorted(), "less with every step: {lost:?}");
         if stiffness.is_infinite() {
             // What is left of a rigid rod's motion is resolved by these steps.
-            let orders = [3, 4].map(|k| (lost[k - 1] / lost[k]).log2());
-            assert!(
-                orders.iter().all(|order| (2.5..3.2).contains(order)),
-                "{orders:?}"
-            );
+            for k in [3, 4] {
+                let order = order(lost[k - 1], lost[k]);
+                assert!((2.5..3.2).contains(&order), "{order}");
+            }
         }
     }
 }
@@ -170,14 +156,12 @@ fn let_go_with_steps_by_their_error() {
         let mut leaf = fig04(3);
         leaf.dynamics.external_damping = damping;
         let model = Leaf::new(&leaf);
-        let state = start(&discrete(&model, 8));
+        let state = released(&model, 8);
         let (now, steps) = moved(&leaf, &state, Steps::Error(1e-4), 5.0);
         println!("damping {damping}: {steps} steps, {:.2?}", now.energy);
         if damping > 0.0 {
-            let off = now
-                .state
-                .tip(0)
-                .distance(settle_on(&leaf, 8, false).tips[0]);
+            let rest = settle_on(&leaf, 8, false).tips[0];
+            let off = now.state.tip(0).distance(rest);
             assert!(off < 1e-3, "{off}");
         }
     }

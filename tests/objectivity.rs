@@ -7,7 +7,8 @@
 
 mod common;
 
-use common::{paper_leaf, settle};
+use common::random::cases;
+use common::{linear, paper_leaf, settle};
 use glam::{DMat3, DQuat, DVec3};
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::{Profile, Scenario};
@@ -47,10 +48,8 @@ prop_compose! {
             rod.length = lengths[j];
             rod.angle += angles[j];
             rod.rest_curvature = rest[j].map(Profile::Constant);
-            rod.couple_stiffness[2] = Profile::Linear {
-                at: vec![0.0, 0.4, 1.0],
-                value: vec![couple[2], 0.8 * couple[2], 0.5 * couple[2]],
-            };
+            let across = [couple[2], 0.8 * couple[2], 0.5 * couple[2]];
+            rod.couple_stiffness[2] = linear(&[0.0, 0.4, 1.0], &across);
         }
         leaf
     }
@@ -75,52 +74,26 @@ fn assert_mapped(
 ) {
     assert_eq!(a.shape.stations, b.shape.stations);
     assert_eq!(a.accuracy.segments, b.accuracy.segments);
-    let energy = (a.energy.unwrap() - b.energy.unwrap()).abs();
-    assert!(
-        energy <= tolerance * (1.0 + a.energy.unwrap().abs()),
-        "energy off by {energy:.1e}"
-    );
+    let [energy, other] = [a, b].map(|leaf| leaf.energy.unwrap());
+    let allowed = tolerance * (1.0 + energy.abs());
+    let off = (energy - other).abs();
+    assert!(off <= allowed, "energy off by {off:.1e}");
     for (a, b) in a.shape.rods.iter().zip(&b.shape.rods) {
         for (a, b) in a.nodes.iter().zip(&b.nodes) {
             let error = (map * a.position - b.position).length();
             assert!(error <= tolerance, "off by {error:.1e}");
             let error = directors(DMat3::from_quat(a.rotation)) - DMat3::from_quat(b.rotation);
-            let worst = error
-                .to_cols_array()
-                .into_iter()
-                .fold(0.0, |m: f64, e| m.max(e.abs()));
-            assert!(worst <= 10.0 * tolerance, "turned by {worst:.1e}");
+            let mut entries = error.to_cols_array().into_iter();
+            assert!(
+                entries.all(|e| e.abs() <= 10.0 * tolerance),
+                "turned by {error}"
+            );
         }
     }
 }
 
-fn flip(profile: &Profile) -> Profile {
-    match profile {
-        Profile::Constant(value) => Profile::Constant(-value),
-        Profile::Linear { at, value } => Profile::Linear {
-            at: at.clone(),
-            value: value.iter().map(|v| -v).collect(),
-        },
-    }
-}
-
-fn times(profile: &Profile, factor: f64) -> Profile {
-    match profile {
-        Profile::Constant(value) => Profile::Constant(value * factor),
-        Profile::Linear { at, value } => Profile::Linear {
-            at: at.clone(),
-            value: value.iter().map(|v| v * factor).collect(),
-        },
-    }
-}
-
 proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 48,
-        failure_persistence: None,
-        rng_seed: proptest::test_runner::RngSeed::Fixed(7),
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(cases(48, Some(7)))]
 
     #[test]
     fn turned_about_e3(leaf in leaves(), angle in -3.0..3.0_f64) {
@@ -151,7 +124,7 @@ proptest! {
         of.couple_stiffness.swap(1, 2);
         of.force_stiffness.swap(1, 2);
         let [twist, bend_2, bend_3] = of.rest_curvature.clone();
-        of.rest_curvature = [twist, flip(&bend_3), bend_2];
+        of.rest_curvature = [twist, bend_3.scaled(-1.0), bend_2];
         let map = DMat3::from_quat(quarter);
         let (a, b) = (settle(&rod, TOLERANCE), settle(&turned, TOLERANCE));
         assert_mapped(&a, &b, map, |directors| map * directors * map.transpose(), EQUAL);
@@ -187,7 +160,7 @@ proptest! {
         for rod in &mut mirrored.rods {
             rod.angle = -rod.angle;
             for k in [0, 2] {
-                rod.rest_curvature[k] = flip(&rod.rest_curvature[k]);
+                rod.rest_curvature[k] = rod.rest_curvature[k].scaled(-1.0);
             }
         }
         let (a, b) = (settle(&leaf, TOLERANCE), settle(&mirrored, TOLERANCE));
@@ -203,7 +176,7 @@ proptest! {
         mirrored.tip_force[2] *= -1.0;
         for rod in &mut mirrored.rods {
             for k in [0, 1] {
-                rod.rest_curvature[k] = flip(&rod.rest_curvature[k]);
+                rod.rest_curvature[k] = rod.rest_curvature[k].scaled(-1.0);
             }
         }
         let (a, b) = (settle(&leaf, TOLERANCE), settle(&mirrored, TOLERANCE));
@@ -225,9 +198,9 @@ proptest! {
         for rod in &mut scaled.rods {
             rod.length *= length;
             for k in 0..3 {
-                rod.couple_stiffness[k] = times(&rod.couple_stiffness[k], force * length * length);
-                rod.force_stiffness[k] = times(&rod.force_stiffness[k], force);
-                rod.rest_curvature[k] = times(&rod.rest_curvature[k], 1.0 / length);
+                rod.couple_stiffness[k] = rod.couple_stiffness[k].scaled(force * length * length);
+                rod.force_stiffness[k] = rod.force_stiffness[k].scaled(force);
+                rod.rest_curvature[k] = rod.rest_curvature[k].scaled(1.0 / length);
             }
         }
         let a = settle(&leaf, TOLERANCE);

@@ -3,34 +3,25 @@
 
 mod common;
 
-use common::{fig04, paper_leaf};
+use common::{fig04, linear, on, paper_leaf, settled};
 use glam::DVec3;
-use leafdyn::relax::{Options, SemiImplicit, relax};
+use leafdyn::relax::Options;
 use leafdyn::scenario::{Profile, Scenario};
 
 /// Positions at the stations of the coarsest grid, solved on one grid.
 fn positions(scenario: &Scenario, coarsest: usize, times: usize) -> Vec<DVec3> {
     let options = Options {
-        method: SemiImplicit {
-            segments: Some(coarsest * times),
-            ..SemiImplicit::default()
-        }
-        .into(),
         // Iterated to rounding.
         tolerance: Some(1e-12),
-        ..Options::default()
+        ..on(coarsest * times)
     };
-    let leaf = relax(scenario, &options, &mut |_| {}).unwrap();
-    assert!(leaf.outcome.is_success());
+    let leaf = settled(scenario, &options);
     // Every grid halves the one before, kinks or not.
     for (i, sigma) in leaf.shape.stations.iter().step_by(times).enumerate() {
         assert!((sigma - i as f64 / coarsest as f64).abs() < 1e-15);
     }
-    let nodes = leaf
-        .shape
-        .rods
-        .iter()
-        .flat_map(|rod| rod.nodes.iter().step_by(times));
+    let rods = leaf.shape.rods.iter();
+    let nodes = rods.flat_map(|rod| rod.nodes.iter().step_by(times));
     nodes.map(|node| node.position).collect()
 }
 
@@ -43,28 +34,22 @@ fn distance(a: &[DVec3], b: &[DVec3]) -> f64 {
 /// the next, changes from one grid to the next by as much less each time as
 /// its order says.
 fn assert_orders(name: &str, scenario: &Scenario, coarsest: usize) {
-    let mut column: Vec<Vec<DVec3>> = [1, 2, 4, 8, 16, 32, 64]
-        .iter()
-        .map(|times| positions(scenario, coarsest, *times))
-        .collect();
-    for (m, (order, slack)) in [(2.0, 0.01), (4.0, 0.05), (6.0, 0.1), (8.0, 0.6)]
-        .into_iter()
-        .enumerate()
-    {
+    let grids = [1, 2, 4, 8, 16, 32, 64];
+    let mut column = grids
+        .map(|times| positions(scenario, coarsest, times))
+        .to_vec();
+    let orders = [(2.0, 0.01), (4.0, 0.05), (6.0, 0.1), (8.0, 0.6)];
+    for (m, (order, slack)) in orders.into_iter().enumerate() {
         let changes: Vec<f64> = column.windows(2).map(|w| distance(&w[0], &w[1])).collect();
         // Two successive changes above rounding, as fine as possible.
         let rounding = if m < 3 { 1e-12 } else { 3e-14 };
-        let seen = changes
-            .iter()
-            .take_while(|change| **change > rounding)
-            .count();
+        let above = changes.iter().take_while(|change| **change > rounding);
+        let seen = above.count();
         assert!(seen >= 2, "{name}: column {m} changes by {changes:?}");
         let observed = (changes[seen - 2] / changes[seen - 1]).log2();
-        println!("{name}: order {observed:.3} for {order}, changes {changes:?}");
-        assert!(
-            (observed - order).abs() < slack,
-            "{name}: order {observed:.3} instead of {order}, changes {changes:?}"
-        );
+        let what = format!("{name}: order {observed:.3} for {order}, changes {changes:?}");
+        println!("{what}");
+        assert!((observed - order).abs() < slack, "{what}");
         let power = 4f64.powi(m as i32 + 1);
         let next = |w: &[Vec<DVec3>]| {
             let pairs = w[0].iter().zip(&w[1]);
@@ -93,15 +78,9 @@ fn a_leaf_whose_stiffness_has_a_kink() {
     let mut leaf = fig04(5);
     for rod in &mut leaf.rods {
         for k in [1, 2] {
-            rod.couple_stiffness[k] = Profile::Linear {
-                at: vec![0.0, 0.3, 1.0],
-                value: vec![2.0, 0.5, 0.8],
-            };
+            rod.couple_stiffness[k] = linear(&[0.0, 0.3, 1.0], &[2.0, 0.5, 0.8]);
         }
-        rod.rest_curvature[2] = Profile::Linear {
-            at: vec![0.0, 0.3, 1.0],
-            value: vec![0.0, 1.0, -0.5],
-        };
+        rod.rest_curvature[2] = linear(&[0.0, 0.3, 1.0], &[0.0, 1.0, -0.5]);
     }
     assert_orders("kink", &leaf, 10);
 }

@@ -1,52 +1,80 @@
-//! A straight rod under an end moment M is an arc of the angle M L/EI, with no
-//! force in it, whatever its stretch and shear stiffness (closed form).
+//! A straight rod rolled up by a dead moment on its tip; by relaxation and by
+//! shooting.
 
 mod common;
 
 use std::f64::consts::PI;
 
-use common::{TIGHT, close, set_stiffness, set_vector, solve};
+use common::{Both, TIGHT, close, set_stiffness, solve, table, tip_node};
 use glam::DVec3;
 
+/// An arc of the angle M L/EI, with no force in it, whatever its stretch and
+/// shear stiffness (closed form).
 #[test]
 fn every_station_lies_on_the_arc() {
     for moment in [0.5, 1.5, PI, -2.0, 2.0 * PI, 4.0 * PI, 7.0 * PI] {
         for (axial, shear) in [(1000.0, 400.0), (f64::INFINITY, f64::INFINITY), (2.0, 1.0)] {
-            let mut overrides = set_stiffness(axial, shear).to_vec();
-            overrides.push(set_vector("load.tip_moment", DVec3::new(0.0, 0.0, moment)));
-            let leaf = solve("classic/rollup", &overrides);
+            let stiffness = set_stiffness(axial, shear);
+            let entries = format!("{stiffness}; load.tip_moment=[0, 0, {moment:?}]");
+            let leaf = Both::solve("classic/rollup", &entries);
             let what = format!("M = {moment}, EA = {axial}");
-            for (&sigma, node) in leaf.shape.stations.iter().zip(&leaf.shape.rods[0].nodes) {
-                let angle = moment * sigma;
-                let arc = DVec3::new(angle.sin(), 1.0 - angle.cos(), 0.0) / moment;
-                let error = (node.position - arc).length();
-                assert!(error <= 1e-11, "{what}: {error:.1e} at {sigma}");
-                assert!(
-                    error <= leaf.accuracy.error_estimate.unwrap(),
-                    "{what}: {error:.1e}"
-                );
-                // The angles are exact on any grid, full turns included.
-                let tangent = node.rotation * DVec3::X;
-                let exact = DVec3::new(angle.cos(), angle.sin(), 0.0);
-                assert!((tangent - exact).length() < 1e-12, "{what}");
-                assert!(node.n.length() < 1e-11 * moment.abs(), "{what}: {}", node.n);
-                assert!((node.m - moment * DVec3::Z).length() < TIGHT, "{what}");
-                assert!((node.u - moment * DVec3::Z).length() < TIGHT, "{what}");
+            let estimate = leaf.relaxed.accuracy.error_estimate.unwrap();
+            let relaxed = (estimate.min(1e-11), 1e-12);
+            let shapes = leaf.shapes().into_iter().zip([relaxed, (TIGHT, TIGHT)]);
+            for (rods, (within, turned)) in shapes {
+                for (&sigma, node) in leaf.relaxed.shape.stations.iter().zip(&rods[0].nodes) {
+                    let angle = moment * sigma;
+                    let arc = DVec3::new(angle.sin(), 1.0 - angle.cos(), 0.0) / moment;
+                    let error = (node.position - arc).length();
+                    assert!(error <= within, "{what}: {error:.1e} at {sigma}");
+                    // The angles are exact on any grid of the relaxed leaf, full turns included.
+                    let tangent = node.rotation * DVec3::X;
+                    let exact = DVec3::new(angle.cos(), angle.sin(), 0.0);
+                    assert!((tangent - exact).length() < turned, "{what}");
+                    assert!(node.n.length() < 1e-11 * moment.abs(), "{what}: {}", node.n);
+                    assert!((node.m - moment * DVec3::Z).length() < TIGHT, "{what}");
+                    assert!((node.u - moment * DVec3::Z).length() < TIGHT, "{what}");
+                }
             }
             // Strain energy M^2 L/(2 EI) less the work M theta of the dead moment
             // would be the potential; without one, the energy is that of strain.
-            close(&what, leaf.energy.unwrap(), 0.5 * moment * moment, 1e-10);
+            for energy in [leaf.relaxed.energy.unwrap(), leaf.shot.energy] {
+                close(&what, energy, 0.5 * moment * moment, 1e-10);
+            }
         }
     }
 }
 
 #[test]
 fn a_full_circle_comes_back_to_the_clamp_turned_once() {
-    let leaf = solve("classic/rollup", &[]);
-    let tip = leaf.shape.rods[0].nodes.last().unwrap();
+    let leaf = solve("classic/rollup", "");
+    let tip = tip_node(&leaf.shape.rods, 0);
     assert!(tip.position.length() < 1e-11, "{}", tip.position);
     // Turned by 2 pi, its quaternion has gone to the other sheet.
     close("w", tip.rotation.w, -1.0, 1e-12);
     let middle = leaf.shape.rods[0].nodes[leaf.shape.stations.len() / 2].position;
     assert!((middle - DVec3::new(0.0, 1.0 / PI, 0.0)).length() < 1e-11);
+}
+
+/// Wound into coils and pulled aside by a dead force (Ibrahimbegovic 1997): load
+/// factor, tip / L. Collocation on the boundary-value problem.
+const COILS: &str = "
+    0.1  0.041020335261  0.005377090312   -0.109172901932
+    1.0  0.000480324966  0.0000072496847  -0.007644174173
+";
+
+#[test]
+fn one_coil_and_ten_end_where_the_boundary_value_problem_says() {
+    let length = 10.0;
+    for [lambda, wanted @ ..] in table::<4>(COILS) {
+        let (moment, force) = (200.0 * PI * lambda, 50.0 * lambda);
+        let entries =
+            format!("load.tip_moment=[0, 0, {moment:?}]; load.tip_force=[0, 0, {force:?}]");
+        let leaf = Both::solve("classic/helical_rollup", &entries);
+        let wanted = length * DVec3::from_array(wanted);
+        let what = format!("lambda = {lambda}");
+        leaf.tip_is(&what, wanted, length * 1e-12, length * 1e-11);
+        // No potential, so no count of eigenvalues: nothing is claimed.
+        assert_eq!(leaf.relaxed.stability.negative_eigenvalues, None);
+    }
 }

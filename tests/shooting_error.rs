@@ -2,25 +2,19 @@
 //! positions, rotations, forces and moments, whatever accuracy is asked for.
 
 mod common;
-#[path = "common/random.rs"]
-mod random;
 
-use common::{apart, files, scale, settle, shoot_near};
+use common::random::{drawn, leaves};
+use common::{apart, files, found, read, scale, settle, shot_near};
 use leafdyn::bvp::{Options, Solution, Start, solve, solve_within};
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::Scenario;
-use proptest::strategy::{Strategy, ValueTree};
-use proptest::test_runner::TestRunner;
-use random::leaves;
 
 /// All files, the paper's with few veins.
 fn scenes() -> Vec<Scenario> {
-    let paper = files("paper").into_iter().flat_map(|file| {
-        [1, 2, 3, 5].map(|rods| Scenario::read(&file, &[format!("leaf.rods={rods}")]).unwrap())
-    });
-    let classic = files("classic")
-        .into_iter()
-        .map(|file| Scenario::read(&file, &[]).unwrap());
+    let paper = files("paper").into_iter();
+    let paper =
+        paper.flat_map(|file| [1, 2, 3, 5].map(|rods| read(&file, &format!("leaf.rods={rods}"))));
+    let classic = files("classic").into_iter().map(|file| read(&file, ""));
     paper.chain(classic).collect()
 }
 
@@ -56,7 +50,7 @@ fn at_all_tolerances(scenes: &[Scenario], tolerances: &[f64]) -> Vec<f64> {
     let mut ratios = Vec::new();
     for scenario in scenes {
         let relaxed = settle(scenario, 1e-10);
-        let truth = shoot_near(scenario, &relaxed).unwrap();
+        let truth = shot_near(scenario, &relaxed);
         for &tolerance in tolerances {
             let options = Options {
                 tolerance,
@@ -64,19 +58,13 @@ fn at_all_tolerances(scenes: &[Scenario], tolerances: &[f64]) -> Vec<f64> {
                 stations: relaxed.shape.stations.clone(),
             };
             let what = format!("{} at {tolerance:e}", scenario.name);
-            let rough = solve(scenario, start(&relaxed), &options)
-                .unwrap_or_else(|failure| panic!("{what}: {}", failure.reason));
+            let rough = found(scenario, solve(scenario, start(&relaxed), &options));
             ratios.extend(covered(&what, scenario, &rough, &truth));
         }
     }
     ratios.sort_by(f64::total_cmp);
-    println!(
-        "{} estimates / errors: least {:.1}, median {:.1}, most {:.1e}",
-        ratios.len(),
-        ratios[0],
-        ratios[ratios.len() / 2],
-        ratios[ratios.len() - 1]
-    );
+    let [least, median, most] = [0, ratios.len() / 2, ratios.len() - 1].map(|k| ratios[k]);
+    println!("estimates / errors: least {least:.1}, median {median:.1}, most {most:.1e}");
     ratios
 }
 
@@ -89,11 +77,7 @@ fn of_every_scene_at_every_tolerance() {
 
 #[test]
 fn of_random_leaves() {
-    let mut runner = TestRunner::deterministic();
-    let scenes: Vec<Scenario> = (0..60)
-        .map(|_| leaves().new_tree(&mut runner).unwrap().current())
-        .collect();
-    at_all_tolerances(&scenes, &[1e-7, 1e-8, 1e-9, 1e-10]);
+    at_all_tolerances(&drawn(leaves(), 60), &[1e-7, 1e-8, 1e-9, 1e-10]);
 }
 
 /// Asked for an accuracy, it is kept, and estimates are below it.
@@ -101,20 +85,15 @@ fn of_random_leaves() {
 fn within_the_accuracy_asked_for() {
     for scenario in scenes() {
         let relaxed = settle(&scenario, 1e-10);
-        let truth = shoot_near(&scenario, &relaxed).unwrap();
+        let truth = shot_near(&scenario, &relaxed);
         let length = scale(&scenario).length;
         for accuracy in [1e-3, 1e-6, 1e-9] {
-            let found = solve_within(
-                &scenario,
-                start(&relaxed),
-                accuracy,
-                None,
-                &relaxed.shape.stations,
-            )
-            .unwrap();
+            let stations = &relaxed.shape.stations;
+            let shot = solve_within(&scenario, start(&relaxed), accuracy, None, stations);
+            let shot = found(&scenario, shot);
             let what = format!("{} within {accuracy:e}", scenario.name);
-            assert!(found.error.position <= accuracy * length, "{what}");
-            covered(&what, &scenario, &found, &truth);
+            assert!(shot.error.position <= accuracy * length, "{what}");
+            covered(&what, &scenario, &shot, &truth);
         }
     }
 }

@@ -3,25 +3,19 @@
 
 mod common;
 
-use common::{TIGHT, agree, fig04, paper_leaf, parse, settle, shoot_alone, shoot_near, shoot_over};
-use leafdyn::relax::Options;
-use leafdyn::scenario::{Profile, Scenario};
-
-fn linear(at: &[f64], value: &[f64]) -> Profile {
-    Profile::Linear {
-        at: at.to_vec(),
-        value: value.to_vec(),
-    }
-}
+use common::{
+    TIGHT, agree, apart, fig04, found, linear, paper_leaf, relaxed, rod, settle, shoot_near,
+    shoot_over, shot_alone, shot_near, to,
+};
+use leafdyn::bvp::Reason;
+use leafdyn::scenario::Scenario;
 
 /// Relaxed, shot from there, and shot alone.
 #[track_caller]
 fn all_agree(what: &str, leaf: &Scenario) {
     let relaxed = settle(leaf, TIGHT);
-    let near = shoot_near(leaf, &relaxed).unwrap_or_else(|f| panic!("{what}: {}", f.reason));
-    agree(what, leaf, &relaxed, &near, 1e-9);
-    let alone = shoot_alone(leaf, &relaxed.shape.stations)
-        .unwrap_or_else(|f| panic!("{what}: {}", f.reason));
+    agree(what, leaf, &relaxed, &shot_near(leaf, &relaxed), 1e-9);
+    let alone = shot_alone(leaf, &relaxed.shape.stations);
     agree(what, leaf, &relaxed, &alone, 1e-9);
 }
 
@@ -95,7 +89,7 @@ fn angles_beyond_a_turn() {
     }
     all_agree("wound", &leaf);
     let relaxed = settle(&leaf, 1e-8);
-    let shot = shoot_near(&leaf, &relaxed).unwrap();
+    let shot = shot_near(&leaf, &relaxed);
     for (a, b) in relaxed.shape.rods.iter().zip(&shot.rods) {
         for (a, b) in a.nodes.iter().zip(&b.nodes) {
             assert!(a.rotation.dot(b.rotation) > 0.0);
@@ -118,15 +112,14 @@ fn kinks_and_stations_a_rounding_error_apart() {
     let relaxed = settle(&leaf, 1e-10);
     for kinks in [[0.3; 3], [0.3, 0.1 + 0.2, 0.3 - 1e-16]] {
         let leaf = with_kinks(kinks);
-        let near = shoot_near(&leaf, &relaxed).unwrap_or_else(|f| panic!("{}", f.reason));
+        let near = shot_near(&leaf, &relaxed);
         agree("from rest", &leaf, &relaxed, &near, 1e-9);
         for intervals in [10, 20, 30] {
-            let over = shoot_over(Some(intervals), &leaf, &relaxed)
-                .unwrap_or_else(|failure| panic!("{intervals}: {}", failure.reason));
+            let over = found(&leaf, shoot_over(Some(intervals), &leaf, &relaxed));
             agree("over intervals", &leaf, &relaxed, &over, 1e-9);
         }
         let stations: Vec<f64> = (0..=20).map(|i| 1.0 - 0.05 * (20 - i) as f64).collect();
-        let alone = shoot_alone(&leaf, &stations).unwrap_or_else(|f| panic!("{}", f.reason));
+        let alone = shot_alone(&leaf, &stations);
         assert_eq!(alone.stations, stations);
         assert!(alone.rods.iter().all(|rod| rod.nodes.len() == 21));
         let off = alone.rods[0].nodes[20].position - relaxed.tips[0];
@@ -134,41 +127,38 @@ fn kinks_and_stations_a_rounding_error_apart() {
     }
 }
 
+/// The error of a relaxed leaf, which shooting near it tells, and its estimate.
+fn error(leaf: &Scenario, tolerance: f64) -> (f64, f64) {
+    let relaxed = settle(leaf, tolerance);
+    let shot = shot_near(leaf, &relaxed);
+    assert!(shot.error.position < 1e-10);
+    let estimate = relaxed.accuracy.error_estimate.unwrap() / relaxed.shape.rods[0].length;
+    (
+        apart(leaf, &relaxed.shape.rods, &shot.rods).position,
+        estimate,
+    )
+}
+
 /// Relaxed to few digits a leaf is known at few stations, and between them badly
 /// where strong loads confine the bending to layers. From such starts shooting
 /// used to fail, or to end in another equilibrium.
 #[test]
 fn starts_known_at_few_stations() {
-    for (name, sections, loads) in [
-        (
-            "strip",
-            "torsion = 0.17, bending_2 = 0.126, bending_3 = 21.7, axial = { at = [0.0, 0.27, 0.55, 1.0], value = [11000.0, 17000.0, 19000.0, 3800.0] }, shear_2 = 80.0, shear_3 = 9.2",
-            "gravity = [6.9, -24.3, 26.8], tip_force = [-10.4, -2.7, 16.4]",
-        ),
-        (
-            "soft-strip",
-            "torsion = 0.02, bending_2 = 0.01, bending_3 = 1.0, axial = inf, shear_2 = inf, shear_3 = 50.0",
-            "gravity = [3.0, -20.0, 10.0], tip_force = [0.0, 5.0, 5.0]",
-        ),
-        (
-            "round",
-            "torsion = 0.05, bending_2 = 0.05, bending_3 = 0.05, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0",
-            "gravity = [-2.0, 0.5, 20.0]",
-        ),
+    for entries in [
+        "stiffness.torsion=0.17; stiffness.bending_2=0.126; stiffness.bending_3=21.7; \
+         stiffness.axial={at=[0.0, 0.27, 0.55, 1.0], value=[11000.0, 17000.0, 19000.0, 3800.0]}; \
+         stiffness.shear_2=80.0; stiffness.shear_3=9.2; \
+         load.gravity=[6.9, -24.3, 26.8]; load.tip_force=[-10.4, -2.7, 16.4]",
+        "stiffness.torsion=0.02; stiffness.bending_2=0.01; stiffness.axial=inf; \
+         stiffness.shear_2=inf; stiffness.shear_3=50.0; \
+         load.gravity=[3.0, -20.0, 10.0]; load.tip_force=[0.0, 5.0, 5.0]",
+        "stiffness.torsion=0.05; stiffness.bending_2=0.05; stiffness.bending_3=0.05; \
+         load.gravity=[-2.0, 0.5, 20.0]",
     ] {
-        let leaf = parse(&format!(
-            "name = '{name}'\n\
-             leaf = {{ rods = 1, length = 1.26, fan = [1.09] }}\n\
-             stiffness = {{ {sections} }}\n\
-             load = {{ {loads} }}\n"
-        ));
+        let leaf = rod(&format!("leaf.length=1.26; leaf.fan=[1.09]; {entries}"));
         for tolerance in [1e-6, 1e-8] {
-            let relaxed = settle(&leaf, tolerance);
-            let shot = shoot_near(&leaf, &relaxed)
-                .unwrap_or_else(|failure| panic!("{name} {tolerance:e}: {}", failure.reason));
-            let off = common::apart(&leaf, &relaxed.shape.rods, &shot.rods).position;
-            let estimate = relaxed.accuracy.error_estimate.unwrap() / relaxed.shape.rods[0].length;
-            assert!(off <= estimate, "{name}: {off:.1e}, {estimate:.1e}");
+            let (off, estimate) = error(&leaf, tolerance);
+            assert!(off <= estimate, "{entries}: {off:.1e}, {estimate:.1e}");
         }
     }
 }
@@ -177,26 +167,17 @@ fn starts_known_at_few_stations() {
 /// and little memory.
 #[test]
 fn strong_coupling() {
-    for coupling in [1e2, 1e4, 1e5] {
+    let coupled = |coupling: f64| {
         let mut leaf = fig04(5);
         leaf.coupling = vec![[coupling; 3]; 4];
-        let relaxed = settle(&leaf, 1e-8);
-        let shot = shoot_near(&leaf, &relaxed).unwrap();
-        let off = common::apart(&leaf, &relaxed.shape.rods, &shot.rods).position;
-        let estimate = relaxed.accuracy.error_estimate.unwrap();
-        assert!(off <= estimate, "{coupling:e}: {off:.1e}, {estimate:.1e}");
-        assert!(shot.error.position < 1e-10);
-    }
-    let mut glued = fig04(5);
-    glued.coupling = vec![[1e12; 3]; 4];
-    let options = Options {
-        tolerance: Some(1e-2),
-        ..Options::default()
+        leaf
     };
-    let relaxed = leafdyn::relax::relax(&glued, &options, &mut |_| {}).unwrap();
+    for coupling in [1e2, 1e4, 1e5] {
+        let (off, estimate) = error(&coupled(coupling), 1e-8);
+        assert!(off <= estimate, "{coupling:e}: {off:.1e}, {estimate:.1e}");
+    }
+    let glued = coupled(1e12);
+    let relaxed = relaxed(&glued, &to(1e-2));
     let failure = shoot_near(&glued, &relaxed).expect_err("tens of thousands of intervals");
-    assert!(matches!(
-        failure.reason,
-        leafdyn::bvp::Reason::Unbounded { .. }
-    ));
+    assert!(matches!(failure.reason, Reason::Unbounded { .. }));
 }

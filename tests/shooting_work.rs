@@ -3,17 +3,14 @@
 
 mod common;
 
-use common::{scenario, settle, shoot_alone, shoot_near};
+use common::{scenario, settle, shot_alone, shot_near};
 use leafdyn::bvp::Work;
 
 /// Linearisations and corrections to the last one, integration steps to a few.
 #[track_caller]
 fn is(what: &str, work: Work, linearizations: usize, iterations: usize, steps: usize) {
-    assert_eq!(
-        (work.linearizations, work.iterations),
-        (linearizations, iterations),
-        "{what}"
-    );
+    let found = (work.linearizations, work.iterations);
+    assert_eq!(found, (linearizations, iterations), "{what}");
     let found = work.steps;
     assert!(found.abs_diff(steps) <= steps / 10, "{what}: {found} steps");
     // Twelve slopes a step, more only where one was rejected.
@@ -30,8 +27,8 @@ fn from_the_relaxed_leaf() {
         ("fig08", 5, 156),
         ("fig13", 5, 50),
     ] {
-        let leaf = scenario(&format!("paper/{figure}"), &[format!("leaf.rods={rods}")]);
-        let shot = shoot_near(&leaf, &settle(&leaf, 1e-10)).unwrap();
+        let leaf = scenario(&format!("paper/{figure}"), &format!("leaf.rods={rods}"));
+        let shot = shot_near(&leaf, &settle(&leaf, 1e-10));
         is(&format!("{figure}, {rods} veins"), shot.work, 1, 2, steps);
     }
 }
@@ -41,8 +38,8 @@ fn from_the_relaxed_leaf() {
 fn from_arcs() {
     for (figure, linearizations, iterations, steps) in [("fig04", 4, 7, 190), ("fig06", 6, 11, 272)]
     {
-        let leaf = scenario(&format!("paper/{figure}"), &["leaf.rods=5".into()]);
-        let shot = shoot_alone(&leaf, &[0.0, 0.5, 1.0]).unwrap();
+        let leaf = scenario(&format!("paper/{figure}"), "leaf.rods=5");
+        let shot = shot_alone(&leaf, &[0.0, 0.5, 1.0]);
         is(figure, shot.work, linearizations, iterations, steps);
     }
 }

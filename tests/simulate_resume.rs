@@ -5,14 +5,15 @@
 mod workplace;
 
 use std::fs;
-use std::process::{Child, Command, Output, Stdio};
+use std::path::PathBuf;
+use std::process::{Child, Command};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use leafdyn::files::Recording;
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Options, Scheme, Simulation};
-use workplace::{Workplace, leaf, text};
+use workplace::{Run, Workplace, contains, interrupt, leaf};
 
 /// So many outputs are waited for before a run is stopped.
 const OUTPUTS: usize = 20;
@@ -20,7 +21,7 @@ const OUTPUTS: usize = 20;
 const LEFT: [&str; 3] = ["checkpoint.json", "energy.csv.part", "motion.csv.part"];
 
 /// A run that takes about a second by the explicit method.
-const EXPLICIT: [&str; 4] = ["long.toml", "--method", "explicit", "--json"];
+const EXPLICIT: &str = "long.toml --method explicit --json";
 
 const LONG: &str = "
 [dynamics]
@@ -30,14 +31,7 @@ internal_damping = 0.002
 ";
 
 /// And one by the semi-implicit method whose motion is an array.
-const SEMI_IMPLICIT: [&str; 6] = [
-    "fine.toml",
-    "--method",
-    "semi-implicit",
-    "--tolerance",
-    "1e-5",
-    "--json",
-];
+const SEMI_IMPLICIT: &str = "fine.toml --method semi-implicit --tolerance 1e-5 --json";
 
 const FINE: &str = "
 [dynamics]
@@ -63,79 +57,58 @@ fn outputs(place: &Workplace, folder: &str) -> usize {
         return 0;
     };
     let names = entries.map(|entry| entry.unwrap().path());
-    let energy = |path: &std::path::PathBuf| {
+    let energy = |path: &PathBuf| {
         let name = path.file_name().unwrap().to_string_lossy();
         name.contains("energy.csv") && name.ends_with(".part")
     };
-    let bytes = names
-        .filter(energy)
-        .map(|path| fs::read(path).unwrap_or_default());
+    let files = names.filter(energy);
+    let bytes = files.map(|path| fs::read(path).unwrap_or_default());
     let lines = |bytes: Vec<u8>| bytes.iter().filter(|&&byte| byte == b'\n').count();
     bytes.map(lines).sum()
 }
 
 /// Waits until there are so many outputs, and stops the run.
 #[track_caller]
-fn stop(place: &Workplace, folder: &str, child: Child, after: usize) -> Output {
+fn stop(place: &Workplace, child: Child, after: usize) -> Run {
     let start = Instant::now();
-    while outputs(place, folder) <= after {
+    while outputs(place, "out") <= after {
         assert!(start.elapsed() < Duration::from_secs(60), "nothing happens");
         thread::sleep(Duration::from_millis(1));
     }
-    let killed = Command::new("kill")
-        .arg("-INT")
-        .arg(child.id().to_string())
-        .status();
-    assert!(killed.unwrap().success());
-    child.wait_with_output().unwrap()
-}
-
-fn start(place: &Workplace, arguments: &[&str]) -> Child {
-    place
-        .command(&[&["simulate"], arguments].concat())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap()
+    interrupt(&child);
+    Run::from(child.wait_with_output().unwrap()).ends(130)
 }
 
 /// Stops a run in the folder `out`, and checks what it leaves.
 #[track_caller]
-fn stopped(place: &Workplace, arguments: &[&str]) {
-    let arguments = [arguments, &["--out", "out"]].concat();
-    let output = stop(place, "out", start(place, &arguments), OUTPUTS);
-    let said = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(130), "{said}");
-    assert_eq!(text(&output.stdout), "");
-    assert!(said.starts_with("stopped at t = "), "{said}");
-    assert!(said.ends_with("; go on with --resume\n"), "{said}");
+fn stopped(place: &Workplace, arguments: &str) {
+    let child = place.start(&format!("simulate {arguments} --out out"));
+    let Run { out, err, .. } = stop(place, child, OUTPUTS);
+    assert_eq!(out, "");
+    assert!(err.starts_with("stopped at t = "), "{err}");
+    assert!(err.ends_with("; go on with --resume\n"), "{err}");
 }
 
 /// A run that is stopped twice on the way ends like one that is not.
 #[track_caller]
-fn ends_the_same(arguments: &[&str]) {
+fn ends_the_same(arguments: &str) {
     let place = workplace();
-    let whole = place.run(&[&["simulate"], arguments, &["--out", "whole"]].concat());
-    assert_eq!(whole.status.code(), Some(0), "{}", text(&whole.stderr));
+    let whole = place
+        .run(&format!("simulate {arguments} --out whole"))
+        .ends(0);
 
     stopped(&place, arguments);
     let left = place.names("out");
     assert_eq!(left.len(), LEFT.len(), "{left:?}");
-    let resume = [arguments, &["--resume"]].concat();
+    let resume = format!("simulate {arguments} --resume --out out");
     let before = outputs(&place, "out");
-    let again = start(&place, &[&resume[..], &["--out", "out"]].concat());
-    let again = stop(&place, "out", again, before + OUTPUTS);
-    assert_eq!(again.status.code(), Some(130), "{}", text(&again.stderr));
+    stop(&place, place.start(&resume), before + OUTPUTS);
     assert_eq!(place.names("out"), left);
-    let resumed = place.run(&[&["simulate"], &resume[..], &["--out", "out"]].concat());
-    assert_eq!(resumed.status.code(), Some(0), "{}", text(&resumed.stderr));
-    assert_eq!(text(&resumed.stderr), "");
+    let resumed = place.run(&resume).ok();
 
     same_files(&place);
-    assert_eq!(
-        without_wall_seconds(&whole.stdout),
-        without_wall_seconds(&resumed.stdout)
-    );
+    let [whole, resumed] = [whole, resumed].map(|run| without_wall_seconds(&run.out));
+    assert_eq!(whole, resumed);
 }
 
 /// The folders `whole` and `out` hold the same.
@@ -145,19 +118,16 @@ fn same_files(place: &Workplace) {
     assert_eq!(place.names("out"), names);
     assert_eq!(names.len(), 7);
     for name in names {
-        let [a, b] = ["whole", "out"].map(|folder| {
-            let bytes = fs::read(place.path(folder).join(&name)).unwrap();
-            match name.as_str() {
-                "summary.json" => without_wall_seconds(&bytes),
-                _ => bytes,
-            }
+        let [a, b] = ["whole", "out"].map(|folder| match name.as_str() {
+            "summary.json" => without_wall_seconds(&place.read(&format!("{folder}/{name}"))),
+            _ => fs::read(place.path(folder).join(&name)).unwrap(),
         });
         assert!(a == b, "{name} differs");
     }
 }
 
-fn without_wall_seconds(summary: &[u8]) -> Vec<u8> {
-    let lines = text(summary).lines();
+fn without_wall_seconds(summary: &str) -> Vec<u8> {
+    let lines = summary.lines();
     let kept: Vec<&str> = lines
         .filter(|line| !line.contains("wall_seconds"))
         .collect();
@@ -166,12 +136,12 @@ fn without_wall_seconds(summary: &[u8]) -> Vec<u8> {
 
 #[test]
 fn a_stopped_explicit_run_goes_on() {
-    ends_the_same(&EXPLICIT);
+    ends_the_same(EXPLICIT);
 }
 
 #[test]
 fn a_stopped_semi_implicit_run_goes_on() {
-    ends_the_same(&SEMI_IMPLICIT);
+    ends_the_same(SEMI_IMPLICIT);
 }
 
 /// Wherever a run is kept: before its first step, and after its last.
@@ -217,18 +187,14 @@ gravity = { at = [0.0, 1.0], value = [[0, 0, -1], [0, 1, -1]] }
                 }
                 let record = recording.record(&simulation, None).unwrap();
                 recording.finish(&record).unwrap();
-                assert!(
-                    recording.checkpointer().write().is_none(),
-                    "nothing is left to keep"
-                );
+                let kept = recording.checkpointer().write();
+                assert!(kept.is_none(), "nothing is left to keep");
             };
             run("whole", false, None);
             for outputs in [0, 1, 4, 6] {
                 run("out", false, Some(outputs));
-                assert!(
-                    LEFT.iter()
-                        .all(|name| place.path("out").join(name).exists())
-                );
+                let out = place.path("out");
+                assert!(LEFT.iter().all(|name| out.join(name).exists()));
                 run("out", true, None);
                 same_files(&place);
             }
@@ -240,43 +206,35 @@ gravity = { at = [0.0, 1.0], value = [[0, 0, -1], [0, 1, -1]] }
 #[test]
 fn only_the_same_run_is_resumed() {
     let place = workplace();
-    stopped(&place, &EXPLICIT);
+    stopped(&place, EXPLICIT);
     assert_eq!(place.names("out"), LEFT);
     let read = |name: &str| fs::read(place.path("out").join(name)).unwrap();
     let kept = LEFT.map(read);
 
-    let refused = |arguments: &[&str], messages: &[&str]| {
-        let output = place.run(&[&["simulate", "--resume", "--out", "out"], arguments].concat());
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
-        for message in messages {
-            assert!(said.contains(message), "{message} in {said}");
-        }
+    let refused = |arguments: &str, messages: &[&str]| {
+        let run = place.run(&format!("simulate --resume --out out {arguments}"));
+        contains(&run.ends(2).err, messages);
         assert_eq!(place.names("out"), LEFT, "{arguments:?}");
     };
-    let with = |more: &[&'static str]| [&EXPLICIT[..], more].concat();
-    for (arguments, message) in [
-        (with(&["--segments", "8"]), "segments 16, now 8"),
-        (with(&["--step", "1e-3"]), "time step "),
+    for (more, message) in [
+        ("--segments 8", "segments 16, now 8"),
+        ("--step 1e-3", "time step "),
+        ("--tolerance 1e-5", "tolerance 0.000001, now 0.00001"),
+        ("--set leaf.rods=6", "an override of it, has changed"),
+        ("--set name=other", "scenario small, now other"),
+    ] {
+        let messages = ["out/checkpoint.json is of another run", message, "--resume"];
+        refused(&format!("{EXPLICIT} {more}"), &messages);
+    }
+    for (other, message) in [
+        ("leaf.toml", "an override of it, has changed"),
         (
-            with(&["--tolerance", "1e-5"]),
-            "tolerance 0.000001, now 0.00001",
-        ),
-        (
-            with(&["--set", "leaf.rods=6"]),
-            "an override of it, has changed",
-        ),
-        (with(&["--set", "name=other"]), "scenario small, now other"),
-        (vec!["leaf.toml"], "an override of it, has changed"),
-        (
-            vec!["long.toml", "--method", "semi-implicit"],
+            "long.toml --method semi-implicit",
             "method explicit, now semi-implicit",
         ),
     ] {
-        refused(
-            &arguments,
-            &["out/checkpoint.json is of another run", message, "--resume"],
-        );
+        let messages = ["out/checkpoint.json is of another run", message, "--resume"];
+        refused(other, &messages);
     }
     assert_eq!(LEFT.map(read), kept);
 
@@ -289,7 +247,7 @@ fn only_the_same_run_is_resumed() {
         for damaged in [&changed[..], &bytes[..half], &[]] {
             fs::write(&file, damaged).unwrap();
             let message = format!("out/{name} is damaged");
-            refused(&EXPLICIT, &["cannot resume", &message, "to begin anew"]);
+            refused(EXPLICIT, &["cannot resume", &message, "to begin anew"]);
             assert_eq!(fs::read(&file).unwrap(), damaged);
         }
         fs::write(&file, bytes).unwrap();
@@ -298,17 +256,14 @@ fn only_the_same_run_is_resumed() {
         let file = place.path("out").join(name);
         let aside = place.path("aside");
         fs::rename(&file, &aside).unwrap();
-        let arguments = ["simulate", "--resume", "--out", "out"];
-        let output = place.run(&[&arguments[..], &EXPLICIT].concat());
-        assert_eq!(output.status.code(), Some(2));
-        assert!(text(&output.stderr).contains(name));
+        let run = place.run(&format!("simulate --resume --out out {EXPLICIT}"));
+        contains(&run.ends(2).err, &[name]);
         fs::rename(&aside, &file).unwrap();
     }
 
     // A run that begins anew leaves nothing of the one that was kept.
-    let short = ["leaf.toml", "--set", "dynamics.duration=0.1"];
-    let arguments = [&["simulate", "--out", "out"], &short[..]].concat();
-    assert_eq!(place.run(&arguments).status.code(), Some(0));
+    let short = "simulate --out out leaf.toml --set dynamics.duration=0.1";
+    place.run(short).ends(0);
     let left = place.names("out");
     assert!(left.iter().all(|name| !LEFT.contains(&name.as_str())));
 }
@@ -318,7 +273,7 @@ fn only_the_same_run_is_resumed() {
 fn a_run_goes_on_when_there_is_room_on_the_disk_again() {
     let place = Workplace::new();
     let program = assert_cmd::cargo::cargo_bin!("leafdyn");
-    let run = |limit: &str, more: &str| -> Output {
+    let run = |limit: &str, more: &str| -> Run {
         // A file that grows beyond the limit is an error, not a signal.
         let script = format!(
             "trap '' XFSZ; {limit} exec \"$0\" simulate leaf.toml --out out \
@@ -326,19 +281,18 @@ fn a_run_goes_on_when_there_is_room_on_the_disk_again() {
         );
         let mut shell = Command::new("sh");
         let shell = shell.current_dir(place.path(".")).args(["-c", &script]);
-        shell.arg(program).output().unwrap()
+        shell.arg(program).output().unwrap().into()
     };
     // Blocks are of 512 or of 1024 bytes.
-    let output = run("ulimit -f 600;", "");
-    let said = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(said.contains("cannot write out/motion.csv"), "{said}");
-    assert!(said.contains("go on with --resume"), "{said}");
+    let run_out = run("ulimit -f 600;", "").ends(2);
+    contains(
+        &run_out.err,
+        &["cannot write out/motion.csv", "go on with --resume"],
+    );
     assert_eq!(place.names("out"), LEFT);
 
-    let resumed = run("", "--resume");
-    assert_eq!(resumed.status.code(), Some(0), "{}", text(&resumed.stderr));
+    run("", "--resume").ends(0);
     let resumed = fs::read(place.path("out/motion.csv")).unwrap();
-    assert_eq!(run("", "").status.code(), Some(0));
+    run("", "").ends(0);
     assert!(resumed == fs::read(place.path("out/motion.csv")).unwrap());
 }

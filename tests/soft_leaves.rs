@@ -7,70 +7,51 @@
 
 mod common;
 
-use common::{close, path, settle, tip};
+use common::{close, keeping, kept, on, relaxed, scenario, settle, table, tip};
 use glam::DVec3;
-use leafdyn::relax::{Options, Outcome, SemiImplicit, relax};
+use leafdyn::relax::Outcome;
 use leafdyn::scenario::Scenario;
 
 fn figure(name: &str, rods: usize) -> Scenario {
-    let rods = [format!("leaf.rods={rods}")];
-    Scenario::read(&path(&format!("paper/{name}")), &rods).unwrap()
+    scenario(&format!("paper/{name}"), &format!("leaf.rods={rods}"))
 }
 
 /// Figure, veins; energy and tip at rest.
-const RECORDED: [(&str, usize, f64, [f64; 3]); 6] = [
-    (
-        "fig08",
-        5,
-        0.012707455,
-        [0.003612691, 0.000733296, 0.893569494],
-    ),
-    (
-        "fig08",
-        21,
-        0.035680228,
-        [0.002525576, 0.000125742, 0.765109292],
-    ),
-    (
-        "fig09",
-        5,
-        0.002784833,
-        [0.064626247, 0.011616756, -0.917988478],
-    ),
-    (
-        "fig09",
-        21,
-        0.000506082,
-        [0.047088561, 0.002319509, -0.851405789],
-    ),
-    (
-        "fig10",
-        5,
-        0.431110115,
-        [0.907237356, 0.193628790, 0.226331454],
-    ),
-    (
-        "fig10",
-        21,
-        1.835160921,
-        [0.923308913, 0.046094922, 0.231500082],
-    ),
-];
+const RECORDED: &str = "
+     8   5  0.012707455  0.003612691  0.000733296   0.893569494
+     8  21  0.035680228  0.002525576  0.000125742   0.765109292
+     9   5  0.002784833  0.064626247  0.011616756  -0.917988478
+     9  21  0.000506082  0.047088561  0.002319509  -0.851405789
+    10   5  0.431110115  0.907237356  0.193628790   0.226331454
+    10  21  1.835160921  0.923308913  0.046094922   0.231500082
+";
+
+fn recorded() -> Vec<(String, usize, f64, DVec3)> {
+    let rows = table(RECORDED).into_iter();
+    let row = |[figure, rods, energy, x, y, z]: [f64; 6]| {
+        (
+            format!("fig{figure:02}"),
+            rods as usize,
+            energy,
+            DVec3::new(x, y, z),
+        )
+    };
+    rows.map(row).collect()
+}
 
 #[test]
 fn each_comes_to_rest_in_the_stable_equilibrium_recorded() {
     let mut wrong = Vec::new();
-    for (name, rods, energy, recorded) in RECORDED {
-        let leaf = settle(&figure(name, rods), 1e-7);
+    for (name, rods, energy, recorded) in recorded() {
+        let leaf = settle(&figure(&name, rods), 1e-7);
         let what = format!("{name}, {rods} veins");
         assert_eq!(leaf.stability.negative_eigenvalues, Some(0), "{what}");
         assert!(leaf.accuracy.error_estimate.unwrap() <= 1e-7, "{what}");
-        let off = (tip(&leaf) - DVec3::from_array(recorded)).length();
-        if off > 1e-7 || (leaf.energy.unwrap() - energy).abs() > 1e-7 {
+        let tip = tip(&leaf);
+        if (tip - recorded).length() > 1e-7 || (leaf.energy.unwrap() - energy).abs() > 1e-7 {
             wrong.push(format!(
-                "{what}: energy {:.9}, tip {:.9}",
-                leaf.energy.unwrap(),
-                tip(&leaf)
+                "{what}: energy {:.9}, tip {tip:.9}",
+                leaf.energy.unwrap()
             ));
         }
     }
@@ -80,16 +61,13 @@ fn each_comes_to_rest_in_the_stable_equilibrium_recorded() {
 /// The same place at every tolerance: it is not chance that decides.
 #[test]
 fn every_tolerance_ends_in_the_same_equilibrium() {
-    for (name, rods, energy, recorded) in RECORDED {
+    for (name, rods, energy, recorded) in recorded() {
         for tolerance in [1e-3, 1e-5] {
-            let leaf = settle(&figure(name, rods), tolerance);
-            let off = (tip(&leaf) - DVec3::from_array(recorded)).length();
+            let leaf = settle(&figure(&name, rods), tolerance);
+            let off = (tip(&leaf) - recorded).length();
             let what = format!("{name}, {rods} veins at {tolerance:e}");
-            assert!(
-                off <= leaf.accuracy.error_estimate.unwrap() + 1e-7,
-                "{what}: tip {}",
-                tip(&leaf)
-            );
+            let allowed = leaf.accuracy.error_estimate.unwrap() + 1e-7;
+            assert!(off <= allowed, "{what}: tip {}", tip(&leaf));
             close(&what, leaf.energy.unwrap(), energy, 20.0 * tolerance);
         }
     }
@@ -101,28 +79,13 @@ fn every_tolerance_ends_in_the_same_equilibrium() {
 fn the_flat_leaf_of_fig_10_is_a_saddle_and_kept_only_on_request() {
     let flat = figure("fig10", 5);
     for (segments, index) in [(10, 14), (20, 16), (40, 18), (80, 18)] {
-        let options = Options {
-            method: SemiImplicit {
-                segments: Some(segments),
-                keep_unstable: true,
-                ..SemiImplicit::default()
-            }
-            .into(),
-            ..Options::default()
-        };
-        let leaf = relax(&flat, &options, &mut |_| {}).unwrap();
+        let leaf = relaxed(&flat, &keeping(on(segments)));
         assert_eq!(leaf.outcome, Outcome::Saddle, "{segments} segments");
-        assert_eq!(
-            leaf.stability.negative_eigenvalues,
-            Some(index),
-            "{segments} segments"
-        );
+        let found = leaf.stability.negative_eigenvalues;
+        assert_eq!(found, Some(index), "{segments} segments");
         // So soft a state lies elsewhere on every grid, but nearly flat on all.
-        assert!(
-            tip(&leaf).z.abs() < 0.01,
-            "{segments} segments: {}",
-            tip(&leaf)
-        );
+        let tip = tip(&leaf);
+        assert!(tip.z.abs() < 0.01, "{segments} segments: {tip}");
     }
     let left = settle(&flat, 1e-6);
     assert!(tip(&left).z.abs() > 0.1);
@@ -132,16 +95,7 @@ fn the_flat_leaf_of_fig_10_is_a_saddle_and_kept_only_on_request() {
 /// count must be that of grids that resolve it.
 #[test]
 fn a_saddle_on_nested_grids_has_the_index_of_the_finest() {
-    let options = Options {
-        method: SemiImplicit {
-            keep_unstable: true,
-            ..SemiImplicit::default()
-        }
-        .into(),
-        tolerance: Some(1e-6),
-        ..Options::default()
-    };
-    let leaf = relax(&figure("fig10", 5), &options, &mut |_| {}).unwrap();
+    let leaf = kept(&figure("fig10", 5), 1e-6);
     assert_eq!(leaf.outcome, Outcome::Saddle);
     assert_eq!(leaf.stability.negative_eigenvalues, Some(18));
     assert_eq!(leaf.stable(), Some(false));

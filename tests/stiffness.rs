@@ -3,8 +3,8 @@
 
 mod common;
 
-use common::{close, paper_leaf, settle, tip};
-use leafdyn::relax::{Options, SemiImplicit, relax};
+use common::{close, on, paper_leaf, settle, settled, tip};
+use leafdyn::relax::Options;
 
 const STIFFNESSES: [f64; 5] = [1e2, 1e4, 1e6, 1e8, f64::INFINITY];
 
@@ -15,16 +15,10 @@ fn at_most_twelve_steps_on_the_first_grid_and_the_work_is_pinned() {
         for rods in [5, 21] {
             let leaf = paper_leaf(rods, [1.0; 3], [stiffness; 3], 1.0);
             let options = Options {
-                method: SemiImplicit {
-                    segments: Some(8),
-                    ..SemiImplicit::default()
-                }
-                .into(),
                 tolerance: Some(1e-6),
-                ..Options::default()
+                ..on(8)
             };
-            let leaf = relax(&leaf, &options, &mut |_| {}).unwrap();
-            assert!(leaf.outcome.is_success());
+            let leaf = settled(&leaf, &options);
             let steps = leaf.work.steps;
             assert!(steps <= 12, "h = {stiffness}, N = {rods}: {steps} steps");
             if rods == 5 {
@@ -48,12 +42,8 @@ const PINNED: [(usize, usize, usize); 5] = [
 /// Leaves that are ever stiffer approach the rigid one in proportion to 1/h.
 #[test]
 fn the_rigid_leaf_is_the_limit_of_stiff_ones() {
-    let at = |stiffness| {
-        tip(&settle(
-            &paper_leaf(5, [1.0; 3], [stiffness; 3], 1.0),
-            1e-11,
-        ))
-    };
+    let leaf = |stiffness: f64| paper_leaf(5, [1.0; 3], [stiffness; 3], 1.0);
+    let at = |stiffness| tip(&settle(&leaf(stiffness), 1e-11));
     let rigid = at(f64::INFINITY);
     let apart = |stiffness| (at(stiffness) - rigid).length() * stiffness;
     let slope = apart(1e6);

@@ -1,61 +1,78 @@
-//! The result does not depend on the number of threads, to the last bit.
+//! Results do not depend on the number of threads, to the last bit: neither of
+//! relaxation nor of shooting.
 
 mod common;
 
-use common::fig04;
-use leafdyn::relax::{Equilibrium, Options, relax};
-use leafdyn::scenario::Scenario;
-use rayon::ThreadPoolBuilder;
+use common::{bits, fig04, on_threads, scenario, settle};
+use leafdyn::bvp::{self, Start};
+use leafdyn::relax::Equilibrium;
+use leafdyn::scenario::{Profile, Scenario};
 
-fn with_threads(threads: usize, scenario: &Scenario) -> Equilibrium {
-    let pool = ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .unwrap();
-    let options = Options {
-        tolerance: Some(1e-8),
-        ..Options::default()
-    };
-    let leaf = pool.install(|| relax(scenario, &options, &mut |_| {}).unwrap());
-    assert!(leaf.outcome.is_success());
-    leaf
-}
-
-fn bits(leaf: &Equilibrium) -> Vec<u64> {
-    let nodes = leaf.shape.rods.iter().flat_map(|rod| &rod.nodes);
-    nodes
-        .flat_map(|node| {
-            let mut values = node.rotation.to_array().to_vec();
-            for v in [node.position, node.v, node.u, node.n, node.m] {
-                values.extend(v.to_array());
-            }
-            values
-        })
-        .chain(leaf.accuracy.error_estimate)
-        .chain([leaf.energy.unwrap(), leaf.accuracy.residual.unwrap()])
-        .map(f64::to_bits)
-        .collect()
+fn bits_of(numbers: impl IntoIterator<Item = f64>) -> Vec<u64> {
+    numbers.into_iter().map(f64::to_bits).collect()
 }
 
 /// 300 veins: from the second grid on they are shared out among threads. The
 /// softer leaf has to move far, and more threads than cores change nothing.
 #[test]
-fn large_leaves_are_equal_bit_by_bit_on_one_two_and_five_threads() {
+fn large_leaves_are_relaxed_equally_on_one_two_and_five_threads() {
     let mut soft = fig04(150);
     for rod in &mut soft.rods {
-        rod.couple_stiffness[1] = leafdyn::scenario::Profile::Constant(0.05);
+        rod.couple_stiffness[1] = Profile::Constant(0.05);
     }
     for leaf in [fig04(300), soft] {
-        let alone = with_threads(1, &leaf);
+        let on = |threads| on_threads(threads, || settle(&leaf, 1e-8));
+        let bits = |leaf: &Equilibrium| {
+            let numbers = [leaf.energy, leaf.accuracy.residual].map(Option::unwrap);
+            let numbers = bits_of(numbers.into_iter().chain(leaf.accuracy.error_estimate));
+            (bits(&leaf.shape.rods), numbers, leaf.work)
+        };
+        let alone = on(1);
         let finest = alone.accuracy.segments.last().unwrap();
-        assert!(
-            finest * leaf.rods.len() >= 4096,
-            "too small to be shared out"
-        );
+        let nodes = finest * leaf.rods.len();
+        assert!(nodes >= 4096, "too small to be shared out");
         for threads in [2, 5] {
-            let shared = with_threads(threads, &leaf);
-            assert_eq!(bits(&shared), bits(&alone), "{threads} threads");
-            assert_eq!(shared.work, alone.work);
+            assert_eq!(bits(&on(threads)), bits(&alone), "{threads} threads");
+        }
+    }
+}
+
+/// Many veins over one interval, several veins over many, and a continuation.
+#[test]
+fn shooting_finds_equal_bits_on_one_two_and_five_threads() {
+    let relaxed = |leaf: &Scenario| Some(settle(leaf, 1e-8));
+    let many = scenario("paper/fig04", "");
+    let soft = scenario("paper/fig08", "leaf.rods=5; load.tip_force=[5, 0, 0]");
+    let bent = scenario("paper/fig06", "leaf.rods=5");
+    let starts = [relaxed(&many), relaxed(&soft), None];
+    for (leaf, start) in [many, soft, bent].iter().zip(&starts) {
+        let on = |threads| {
+            let start = start.as_ref().map_or(Start::Arcs, |leaf| Start::Leaf {
+                stations: &leaf.shape.stations,
+                rods: &leaf.shape.rods,
+            });
+            let options = bvp::Options {
+                tolerance: 1e-11,
+                intervals: None,
+                stations: (0..=16).map(|i| i as f64 / 16.0).collect(),
+            };
+            let shot = on_threads(threads, || bvp::solve(leaf, start, &options)).unwrap();
+            let numbers = [
+                shot.error.position,
+                shot.error.force,
+                shot.energy,
+                shot.defect,
+            ];
+            let more = [shot.growth, shot.condition]
+                .into_iter()
+                .chain(shot.intervals);
+            let numbers = bits_of(numbers.into_iter().chain(more));
+            (bits(&shot.rods), numbers, shot.work)
+        };
+        let alone = on(1);
+        assert_eq!(alone.1.len() > 6 + 5, leaf.name == "fig08", "intervals");
+        for threads in [2, 5] {
+            assert_eq!(on(threads), alone, "{}, {threads}", leaf.name);
         }
     }
 }

@@ -3,16 +3,13 @@
 //! many modes, and at a fold the branch turns round.
 
 mod common;
-#[path = "common/random.rs"]
-mod random;
 
+use common::random::{drawn, leaves};
+use common::{relaxed, to};
 use leafdyn::branch::{Equations, Family, Kind, Point, Walk, walk};
 use leafdyn::leaf::{DiscreteLeaf, Grid, Leaf, State};
-use leafdyn::relax::{Options, project, relax};
+use leafdyn::relax::project;
 use leafdyn::scenario::Scenario;
-use proptest::strategy::{Strategy, ValueTree};
-use proptest::test_runner::TestRunner;
-use random::leaves;
 
 /// The leaf under loads turned over, from as they are to their opposite times
 /// `MOST`: what was lifted is pressed down.
@@ -26,11 +23,7 @@ fn loaded(leaf: &Scenario, part: f64) -> Scenario {
 }
 
 fn begin(scenario: &Scenario, equations: &mut Equations) -> Option<Point> {
-    let options = Options {
-        tolerance: Some(1e-6),
-        ..Options::default()
-    };
-    let rest = relax(scenario, &options, &mut |_| {}).unwrap();
+    let rest = relaxed(scenario, &to(1e-6));
     let leaf = Leaf::new(scenario);
     let grid = Grid::new(rest.shape.stations.len() - 1, leaf.kinks());
     let state = project(&leaf, &DiscreteLeaf::new(&leaf, grid), &rest.shape.rods);
@@ -48,10 +41,8 @@ fn energy(family: &Family, grid: &Grid, state: &State, fraction: f64) -> f64 {
 
 #[test]
 fn random_branches() {
-    let mut runner = TestRunner::deterministic();
     let (mut points, mut folds, mut crossings, mut missed, mut lost) = (0, 0, 0, 0, 0);
-    for case in 0..60 {
-        let scenario = leaves().new_tree(&mut runner).unwrap().current();
+    for (case, scenario) in drawn(leaves(), 60).into_iter().enumerate() {
         let make = |part: f64| Ok(loaded(&scenario, part));
         let family = Family::new(&make, (1.0, MOST), false).unwrap();
         let leaf = Leaf::new(&scenario);
@@ -84,11 +75,8 @@ fn random_branches() {
         let [start, end] = [&branch.points[0], branch.points.last().unwrap()]
             .map(|point| energy(&family, &grid, &point.state, point.fraction));
         let off = (end - start - sum).abs();
-        assert!(
-            off < 0.02 * (1.0 + scale),
-            "{case}: {off} of {}",
-            end - start
-        );
+        let allowed = 0.02 * (1.0 + scale);
+        assert!(off < allowed, "{case}: {off} of {}", end - start);
 
         for (after, critical) in &branch.critical {
             let (a, b) = (&branch.points[*after], &branch.points[after + 1]);
@@ -106,9 +94,7 @@ fn random_branches() {
         for (k, pair) in branch.points.windows(2).enumerate() {
             let turned = pair[0].tangent.fraction * pair[1].tangent.fraction < 0.0;
             let here = branch.critical.iter().filter(|(after, _)| *after == k);
-            let found = here
-                .filter(|(_, critical)| critical.kind == Kind::Fold)
-                .count();
+            let found = here.filter(|(_, point)| point.kind == Kind::Fold).count();
             if !branch.missed.contains(&k) {
                 assert_eq!(found % 2 == 1, turned, "{case}: {found} folds at {k}");
             }

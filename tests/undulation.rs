@@ -5,7 +5,7 @@ mod common;
 
 use std::f64::consts::PI;
 
-use common::{fig04, scenario, settle};
+use common::{fig04, rod, scenario, settle, settle_on};
 use glam::{DMat3, DQuat, DVec3};
 use leafdyn::relax::{NodeState, RodShape};
 use leafdyn::scenario::Scenario;
@@ -23,15 +23,14 @@ fn sheet(point: impl Fn(f64, f64) -> DVec3) -> Vec<RodShape> {
         n: DVec3::ZERO,
         m: DVec3::ZERO,
     };
-    (0..5)
-        .map(|j| RodShape {
-            length: 1.0,
-            nodes: stations()
-                .iter()
-                .map(|&sigma| node(sigma, 0.5 * j as f64 - 1.0))
-                .collect(),
-        })
-        .collect()
+    let rod = |across: f64| RodShape {
+        length: 1.0,
+        nodes: stations()
+            .iter()
+            .map(|&sigma| node(sigma, across))
+            .collect(),
+    };
+    (0..5).map(|j| rod(0.5 * j as f64 - 1.0)).collect()
 }
 
 fn stations() -> Vec<f64> {
@@ -67,13 +66,11 @@ fn waves_of_a_sine_are_counted_and_measured() {
                 let length = vein.wavelength.unwrap() * waves;
                 assert!((0.95..1.3).contains(&length), "{waves}, {height}: {length}");
             }
-            assert_eq!(
-                found.veins[2],
-                Vein {
-                    half_waves: 0,
-                    ..Vein::default()
-                }
-            );
+            let still = Vein {
+                half_waves: 0,
+                ..Vein::default()
+            };
+            assert_eq!(found.veins[2], still);
         }
     }
 }
@@ -105,10 +102,8 @@ fn droop_and_domes_are_no_waves() {
 #[test]
 fn what_is_below_the_noise_is_no_wave() {
     let leaf = fig04(5);
-    assert_eq!(
-        measure(&leaf, &wavy(2.0, 8e-4)).margin().unwrap().waves(),
-        0.0
-    );
+    let low = measure(&leaf, &wavy(2.0, 8e-4));
+    assert_eq!(low.margin().unwrap().waves(), 0.0);
     let rods = wavy(2.0, 5e-3);
     let unsure = Undulation::at_stations(&leaf, &stations(), &rods, Some(2e-3));
     assert_eq!(unsure.margin().unwrap().waves(), 0.0);
@@ -141,11 +136,8 @@ fn it_does_not_matter_where_the_leaf_lies_and_how_large_it_is() {
     }
     let mut reversed = rods.clone();
     reversed.reverse();
-    for (a, b) in measure(&leaf, &reversed)
-        .veins
-        .iter()
-        .zip(found.veins.iter().rev())
-    {
+    let reversed = measure(&leaf, &reversed);
+    for (a, b) in reversed.veins.iter().zip(found.veins.iter().rev()) {
         same(a, b, 1.0);
     }
     let mut large = rods.clone();
@@ -161,10 +153,7 @@ fn it_does_not_matter_where_the_leaf_lies_and_how_large_it_is() {
 #[test]
 fn the_papers_smooth_leaves_do_not_wave() {
     for figure in ["fig04", "fig05", "fig06"] {
-        let leaf = settle(
-            &scenario(&format!("paper/{figure}"), &["leaf.rods=5".into()]),
-            1e-6,
-        );
+        let leaf = settle(&scenario(&format!("paper/{figure}"), "leaf.rods=5"), 1e-6);
         for vein in &leaf.undulation.veins {
             assert_eq!(vein.waves(), 0.0, "{figure}: {vein:?}");
         }
@@ -175,15 +164,8 @@ fn the_papers_smooth_leaves_do_not_wave() {
 #[test]
 fn the_twist_of_a_rod_is_that_of_its_section() {
     for (twist, hand) in [(2.0, Hand::Right), (-1.5, Hand::Left), (0.0, Hand::None)] {
-        let text = format!(
-            r#"
-            name = "rod"
-            leaf = {{ rods = 1, length = 2.0, fan = [0.4] }}
-            stiffness = {{ torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }}
-            rest = {{ twist = {twist:?} }}
-            "#
-        );
-        let leaf = settle(&common::parse(&text), 1e-9);
+        let twisted = format!("leaf.length=2.0; leaf.fan=[0.4]; rest.twist={twist:?}");
+        let leaf = settle(&rod(&twisted), 1e-9);
         assert!((leaf.undulation.twist() - 2.0 * twist).abs() < 1e-9);
         assert_eq!(leaf.undulation.hand(), hand);
     }
@@ -194,11 +176,7 @@ fn the_twist_of_a_rod_is_that_of_its_section() {
 #[test]
 fn mirror_images_turn_the_other_way() {
     let leaf = |twist: f64| {
-        let entries = [
-            "leaf.rods=5".into(),
-            "leaf.fan='symmetric'".into(),
-            format!("rest.twist={twist:?}"),
-        ];
+        let entries = format!("leaf.rods=5; leaf.fan='symmetric'; rest.twist={twist:?}");
         settle(&scenario("paper/fig13", &entries), 1e-8).undulation
     };
     let (one, other, none) = (leaf(0.7), leaf(-0.7), leaf(0.0));
@@ -213,11 +191,8 @@ fn mirror_images_turn_the_other_way() {
 /// The leaf of docs/undulation.md: what waves, and what does not.
 #[test]
 fn long_margins_on_a_stiff_midrib_wave_and_are_stable() {
-    let relaxed = |entries: &[&str]| {
-        let entries: Vec<String> = entries.iter().map(|entry| entry.to_string()).collect();
-        settle(&scenario("study/undulation", &entries), 1e-5)
-    };
-    let leaf = relaxed(&[]);
+    let relaxed = |entries: &str| settle(&scenario("study/undulation", entries), 1e-5);
+    let leaf = relaxed("");
     assert_eq!(leaf.stable(), Some(true));
     let margin = leaf.undulation.margin().unwrap();
     assert_eq!(margin.waves(), 2.0);
@@ -227,12 +202,12 @@ fn long_margins_on_a_stiff_midrib_wave_and_are_stable() {
     // as sideways.
     let stiff = "stiffness.bending_2=[1, 1, 1, 1, 1, 1000, 1, 1, 1, 1, 1]";
     for entry in ["rest.stretch=1.0", stiff] {
-        let leaf = relaxed(&[entry]);
+        let leaf = relaxed(entry);
         assert_eq!(leaf.stable(), Some(true), "{entry}");
         assert_eq!(leaf.undulation.margin().unwrap().waves(), 0.0, "{entry}");
     }
     // A soft midrib gives way, and the leaf folds up.
-    let folded = relaxed(&["stiffness.bending_2=0.01", "stiffness.bending_3=1.0"]);
+    let folded = relaxed("stiffness.bending_2=0.01; stiffness.bending_3=1.0");
     assert!(folded.tips[0].x < 0.1 && folded.tips[0].z.abs() > 0.5);
 }
 
@@ -241,10 +216,10 @@ fn long_margins_on_a_stiff_midrib_wave_and_are_stable() {
 #[test]
 fn the_papers_soft_leaves_are_saddles_when_flat() {
     for (figure, index) in [("fig08", 45), ("fig09", 6), ("fig10", 18)] {
-        let entries = ["leaf.rods=5".into(), "load.gravity=[0, 0, 0]".into()];
-        let flat = scenario(&format!("paper/{figure}"), &entries);
+        let entries = "leaf.rods=5; load.gravity=[0, 0, 0]";
+        let flat = scenario(&format!("paper/{figure}"), entries);
         for segments in [160, 320] {
-            let leaf = common::settle_on(&flat, segments, true);
+            let leaf = settle_on(&flat, segments, true);
             assert_eq!(leaf.stability.negative_eigenvalues, Some(index), "{figure}");
             assert!(leaf.tips[0].z.abs() < 1e-12);
         }

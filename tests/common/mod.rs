@@ -2,13 +2,18 @@
 //! entries replaced, relaxing it, and comparing with a reference.
 #![allow(dead_code)]
 
+pub mod branch;
+pub mod motion;
+pub mod random;
+pub mod vibration;
+
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use leafdyn::bvp::{self, Failure, Solution, Start};
 use leafdyn::leaf::{Leaf, Scale};
-use leafdyn::relax::{Equilibrium, NodeState, Options, RodShape, SemiImplicit, relax};
+use leafdyn::relax::{Equilibrium, Method, NodeState, Options, RodShape, SemiImplicit, relax};
 use leafdyn::scenario::{Dynamics, Profile, Rod, Scenario, Units};
 use leafdyn::shape::Difference;
 
@@ -22,28 +27,38 @@ pub const SHARP: f64 = 1e-13;
 
 /// The files of a folder of scenarios, in order.
 pub fn files(folder: &str) -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("scenarios")
-        .join(folder);
-    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
-        .unwrap()
-        .map(|file| file.unwrap().path())
-        .collect();
+    let folder = path(folder).with_extension("");
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut files: Vec<PathBuf> = entries.map(|file| file.unwrap().path()).collect();
     files.sort();
     files
 }
 
 /// The path of a scenario that comes with the program, such as `classic/rollup`.
 pub fn path(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("scenarios")
-        .join(format!("{name}.toml"))
+    let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    scenarios.join(format!("{name}.toml"))
 }
 
-/// A scenario that comes with the program, with entries replaced as by `--set`.
+/// Entries `KEY=VALUE` to be replaced as by `--set`, one text with `;` between them.
+pub fn entries(text: &str) -> Vec<String> {
+    let entries = text.split(';').map(str::trim);
+    entries
+        .filter(|e| !e.is_empty())
+        .map(String::from)
+        .collect()
+}
+
+/// A scenario that comes with the program, with [`entries`] replaced.
 #[track_caller]
-pub fn scenario(name: &str, overrides: &[String]) -> Scenario {
-    Scenario::read(&path(name), overrides).unwrap_or_else(|error| panic!("{error}"))
+pub fn scenario(name: &str, overrides: &str) -> Scenario {
+    read(&path(name), overrides)
+}
+
+/// As [`scenario`], of a file.
+#[track_caller]
+pub fn read(file: &Path, overrides: &str) -> Scenario {
+    Scenario::read(file, &entries(overrides)).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// A scenario from text.
@@ -52,66 +67,134 @@ pub fn parse(text: &str) -> Scenario {
     Scenario::from_toml(text).unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
-/// Relaxes at a tolerance; the run must succeed and stay within it.
+/// A straight rod along e1 of length one, and of stiffness one but for stretch
+/// and shear.
+pub const ROD: &str = r#"
+    name = "rod"
+    leaf = { rods = 1, length = 1.0, fan = [0.0] }
+    stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }
+"#;
+
+/// The entries of a rod that neither stretches nor shears.
+pub const RIGID: &str = "stiffness.axial=inf; stiffness.shear_2=inf; stiffness.shear_3=inf";
+
+/// The rod [`ROD`] with [`entries`] replaced.
 #[track_caller]
-pub fn settle(scenario: &Scenario, tolerance: f64) -> Equilibrium {
-    let options = Options {
+pub fn rod(overrides: &str) -> Scenario {
+    let rod = Scenario::from_toml_with(ROD, "rod", &entries(overrides));
+    rod.unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The numbers of a text of lines of columns; `#` begins a comment.
+#[track_caller]
+pub fn table<const COLUMNS: usize>(text: &str) -> Vec<[f64; COLUMNS]> {
+    let lines = text.lines().map(|line| line.split('#').next().unwrap());
+    let rows = lines.filter(|line| !line.trim().is_empty()).map(|line| {
+        let cells = line.split_whitespace().map(|cell| cell.parse().unwrap());
+        let row: Vec<f64> = cells.collect();
+        row.try_into().unwrap_or_else(|_| panic!("{line}"))
+    });
+    rows.collect()
+}
+
+/// Relaxing to a tolerance.
+pub fn to(tolerance: f64) -> Options {
+    Options {
         tolerance: Some(tolerance),
         ..Options::default()
+    }
+}
+
+/// Relaxing on one grid.
+pub fn on(segments: usize) -> Options {
+    Options {
+        method: Method::default().on_grid(Some(segments)),
+        ..Options::default()
+    }
+}
+
+/// With something else asked of the semi-implicit method.
+fn with(options: Options, change: impl Fn(&mut SemiImplicit)) -> Options {
+    let Method::SemiImplicit(mut method) = options.method else {
+        panic!("{:?}", options.method);
     };
-    let leaf = relax(scenario, &options, &mut |_| {}).unwrap();
-    assert!(
-        leaf.outcome.is_success(),
-        "{}: {:?}, {:?}",
-        scenario.name,
-        leaf.outcome,
-        leaf.remark
-    );
+    change(&mut method);
+    Options {
+        method: method.into(),
+        ..options
+    }
+}
+
+/// Stopping at a saddle.
+pub fn keeping(options: Options) -> Options {
+    with(options, |method| method.keep_unstable = true)
+}
+
+/// For the whole leaf, in space.
+pub fn in_full(options: Options) -> Options {
+    with(options, |method| method.full_model = true)
+}
+
+/// Relaxes, with any outcome.
+#[track_caller]
+pub fn relaxed(scenario: &Scenario, options: &Options) -> Equilibrium {
+    relax(scenario, options, &mut |_| {}).unwrap()
+}
+
+/// Relaxes; the run must succeed.
+#[track_caller]
+pub fn settled(scenario: &Scenario, options: &Options) -> Equilibrium {
+    let leaf = relaxed(scenario, options);
+    let (outcome, remark) = (leaf.outcome, &leaf.remark);
+    let what = format!("{}: {outcome:?}, {remark:?}", scenario.name);
+    assert!(outcome.is_success(), "{what}");
     leaf
+}
+
+/// Relaxes to a tolerance; the run must succeed and stay within it.
+#[track_caller]
+pub fn settle(scenario: &Scenario, tolerance: f64) -> Equilibrium {
+    settled(scenario, &to(tolerance))
 }
 
 /// Relaxes on one grid.
 #[track_caller]
 pub fn settle_on(scenario: &Scenario, segments: usize, keep_unstable: bool) -> Equilibrium {
     let options = Options {
-        method: SemiImplicit {
-            segments: Some(segments),
-            keep_unstable,
-            ..SemiImplicit::default()
-        }
-        .into(),
         tolerance: Some(1e-9),
-        ..Options::default()
+        ..on(segments)
     };
-    let leaf = relax(scenario, &options, &mut |_| {}).unwrap();
-    assert!(
-        leaf.outcome.is_success(),
-        "{} on {segments} segments: {:?}, {:?}",
-        scenario.name,
-        leaf.outcome,
-        leaf.remark
-    );
-    leaf
+    match keep_unstable {
+        true => settled(scenario, &keeping(options)),
+        false => settled(scenario, &options),
+    }
+}
+
+/// An equilibrium to a tolerance, kept if it is unstable.
+#[track_caller]
+pub fn kept(scenario: &Scenario, tolerance: f64) -> Equilibrium {
+    settled(scenario, &keeping(to(tolerance)))
 }
 
 /// An equilibrium as it is found by default, or by the full model.
 pub fn rest(scenario: &Scenario, full_model: bool, segments: Option<usize>) -> Equilibrium {
-    let options = Options {
-        method: SemiImplicit {
-            full_model,
-            segments,
-            ..SemiImplicit::default()
-        }
-        .into(),
-        ..Options::default()
-    };
-    relax(scenario, &options, &mut |_| {}).unwrap()
+    let options = segments.map_or(Options::default(), on);
+    match full_model {
+        true => relaxed(scenario, &in_full(options)),
+        false => relaxed(scenario, &options),
+    }
 }
 
-/// A scenario file with entries replaced, relaxed at the tight tolerance.
+/// A scenario file with [`entries`] replaced, relaxed at the tight tolerance.
 #[track_caller]
-pub fn solve(name: &str, overrides: &[String]) -> Equilibrium {
+pub fn solve(name: &str, overrides: &str) -> Equilibrium {
     settle(&scenario(name, overrides), TIGHT)
+}
+
+/// What something comes to on so many threads.
+pub fn on_threads<T: Send>(threads: usize, run: impl FnOnce() -> T + Send) -> T {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+    pool.build().unwrap().install(run)
 }
 
 /// The joint tip, or the only rod's.
@@ -120,13 +203,13 @@ pub fn tip(leaf: &Equilibrium) -> DVec3 {
 }
 
 /// The last node of a rod.
-pub fn tip_node(leaf: &Equilibrium, rod: usize) -> NodeState {
-    *leaf.shape.rods[rod].nodes.last().unwrap()
+pub fn tip_node(rods: &[RodShape], rod: usize) -> NodeState {
+    *rods[rod].nodes.last().unwrap()
 }
 
 /// The angle by which the tip's tangent is turned from e1 towards `axis`.
-pub fn tip_angle(leaf: &Equilibrium, rod: usize, axis: DVec3) -> f64 {
-    let tangent = tip_node(leaf, rod).rotation * DVec3::X;
+pub fn tip_angle(rods: &[RodShape], rod: usize, axis: DVec3) -> f64 {
+    let tangent = tip_node(rods, rod).rotation * DVec3::X;
     tangent.dot(axis).atan2(tangent.x)
 }
 
@@ -163,22 +246,27 @@ pub fn tip_is(what: &str, leaf: &Equilibrium, wanted: DVec3, digits: f64, tolera
     );
 }
 
-/// `--set KEY=VALUE` for a vector.
+/// `KEY=VALUE` for a vector.
 pub fn set_vector(key: &str, v: DVec3) -> String {
     format!("{key}=[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
 }
 
-/// `--set KEY=VALUE` for the three stretch and shear stiffnesses.
-pub fn set_stiffness(axial: f64, shear: f64) -> [String; 3] {
-    let text = |value: f64| match value.is_infinite() {
-        true => "inf".to_string(),
-        false => format!("{value:?}"),
-    };
-    [
-        format!("stiffness.axial={}", text(axial)),
-        format!("stiffness.shear_2={}", text(shear)),
-        format!("stiffness.shear_3={}", text(shear)),
-    ]
+/// [`entries`] of the three stretch and shear stiffnesses.
+pub fn set_stiffness(axial: f64, shear: f64) -> String {
+    format!("stiffness.axial={axial}; stiffness.shear_2={shear}; stiffness.shear_3={shear}")
+}
+
+/// Linear between points, fractions of the length.
+pub fn linear(at: &[f64], value: &[f64]) -> Profile {
+    Profile::Linear {
+        at: at.to_vec(),
+        value: value.to_vec(),
+    }
+}
+
+/// The order of an error that is `coarse` at some step and `fine` at half of it.
+pub fn order(coarse: f64, fine: f64) -> f64 {
+    (coarse / fine).log2()
 }
 
 /// Removes the leading error from values whose error is a series in a quantity
@@ -335,9 +423,96 @@ pub fn shoot_alone(scenario: &Scenario, stations: &[f64]) -> Result<Solution, Fa
     bvp::solve(scenario, Start::Arcs, &options)
 }
 
+/// What shooting has found; the reason where it has not.
+#[track_caller]
+pub fn found(scenario: &Scenario, shot: Result<Solution, Failure>) -> Solution {
+    let (name, rods) = (&scenario.name, scenario.rods.len());
+    shot.unwrap_or_else(|Failure { reason, part, .. }| {
+        panic!("{name}, {rods} veins: {reason}, at {part} of the load")
+    })
+}
+
+/// The boundary-value solution near a relaxed leaf, which must exist.
+#[track_caller]
+pub fn shot_near(scenario: &Scenario, leaf: &Equilibrium) -> Solution {
+    found(scenario, shoot_near(scenario, leaf))
+}
+
+/// The boundary-value solution without any start, which must exist.
+#[track_caller]
+pub fn shot_alone(scenario: &Scenario, stations: &[f64]) -> Solution {
+    let solution = found(scenario, shoot_alone(scenario, stations));
+    let defect = solution.defect;
+    assert!(defect < 1e-11, "{}: {defect:.1e}", scenario.name);
+    solution
+}
+
+/// A leaf at rest by relaxation, and by shooting that knows nothing of it.
+pub struct Both {
+    pub relaxed: Equilibrium,
+    pub shot: Solution,
+}
+
+impl Both {
+    /// A scenario file with [`entries`] replaced.
+    #[track_caller]
+    pub fn solve(name: &str, overrides: &str) -> Both {
+        Both::of(&scenario(name, overrides))
+    }
+
+    #[track_caller]
+    pub fn of(scenario: &Scenario) -> Both {
+        let relaxed = settle(scenario, TIGHT);
+        let shot = shot_alone(scenario, &relaxed.shape.stations);
+        Both { relaxed, shot }
+    }
+
+    /// The shapes that both have found.
+    pub fn shapes(&self) -> [&[RodShape]; 2] {
+        [&self.relaxed.shape.rods, &self.shot.rods]
+    }
+
+    /// As [`tip_is`], of both.
+    #[track_caller]
+    pub fn tip_is(&self, what: &str, wanted: DVec3, digits: f64, tolerance: f64) {
+        tip_is(what, &self.relaxed, wanted, digits, tolerance);
+        let off = tip_node(&self.shot.rods, 0).position - wanted;
+        let error = off.abs().max_element();
+        assert!(
+            error <= tolerance,
+            "{what}, by shooting: off by {error:.1e}"
+        );
+    }
+}
+
 /// The units of a scenario.
 pub fn scale(scenario: &Scenario) -> Scale {
     Leaf::new(scenario).scale
+}
+
+/// Asserts that a leaf found by a reduced model is that of the full one.
+#[track_caller]
+pub fn same(scenario: &Scenario, found: &Equilibrium, full: &Equilibrium) {
+    let off = apart(scenario, &found.shape.rods, &full.shape.rods);
+    // Ends that differ by so much turn a segment of a twentieth by so much more.
+    let rotated = off.rotation < 20.0 * 1e-10;
+    assert!(off.position < 1e-10 && rotated, "{off:?}");
+    assert!(off.force < 1e-8 && off.moment < 1e-8, "{off:?}");
+    let [found, full] = [found, full].map(|leaf| leaf.energy.unwrap());
+    let unit = scale(scenario).moment() * (1.0 + full.abs());
+    let energy = found - full;
+    assert!(energy.abs() < 1e-10 * unit, "{energy:.1e}");
+}
+
+/// Everything about a shape, bit by bit.
+pub fn bits(rods: &[RodShape]) -> Vec<u64> {
+    let nodes = rods.iter().flat_map(|rod| &rod.nodes);
+    let numbers = nodes.flat_map(|node| {
+        let vectors = [node.position, node.v, node.u, node.n, node.m];
+        let vectors = vectors.into_iter().flat_map(|v| v.to_array());
+        vectors.chain(node.rotation.to_array())
+    });
+    numbers.map(f64::to_bits).collect()
 }
 
 /// Largest differences between two shapes in units of length, A/L^2 and A/L.
@@ -368,38 +543,11 @@ pub fn agree(what: &str, scenario: &Scenario, leaf: &Equilibrium, shot: &Solutio
     );
 }
 
-/// Frequencies of the clamped Timoshenko beam, times sqrt(rho A L^4/EI), for r^2 = I/(A L^2)
-/// and s^2 = EI/(k G A L^2): roots of its frequency equation (T. C. Huang, J. Appl.
+/// Slenderness r^2 = I/(A L^2) and s^2 = EI/(k G A L^2); frequencies of the clamped Timoshenko
+/// beam, times sqrt(rho A L^4/EI): roots of its frequency equation (T. C. Huang, J. Appl.
 /// Mech. 28, 1961) to 13 digits.
-pub const TIMOSHENKO: [(f64, f64, [f64; 4]); 3] = [
-    (
-        1e-4,
-        2.6e-4,
-        [
-            3.513078252179,
-            21.90711479483,
-            60.85906859261,
-            117.9269574473,
-        ],
-    ),
-    (
-        0.0016,
-        0.00416,
-        [
-            3.470067483695,
-            20.23985098215,
-            51.63550442718,
-            90.90518380084,
-        ],
-    ),
-    (
-        0.01,
-        0.026,
-        [
-            3.259779790893,
-            15.02362640182,
-            33.03084600553,
-            50.83238503823,
-        ],
-    ),
-];
+pub const TIMOSHENKO: &str = "
+    1e-4    2.6e-4   3.513078252179  21.90711479483  60.85906859261  117.9269574473
+    0.0016  0.00416  3.470067483695  20.23985098215  51.63550442718  90.90518380084
+    0.01    0.026    3.259779790893  15.02362640182  33.03084600553  50.83238503823
+";

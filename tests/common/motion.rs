@@ -1,13 +1,13 @@
 //! Leaves that move: scenarios, starts, methods, and how far apart two motions are.
-#![allow(dead_code)]
 
 use glam::DVec3;
 use leafdyn::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use leafdyn::motion::{Explicit, Method, Physics, SemiImplicit, Snapshot, Steps};
-use leafdyn::relax::{self, Options, relax, start};
-use leafdyn::scenario::{Profile, Rod, Scenario, Schedule};
+use leafdyn::relax::{Equilibrium, Options, start};
+use leafdyn::scenario::{Profile, Scenario, Schedule};
+use leafdyn::simulate::{self, Frame, Simulation};
 
-use crate::common::paper_leaf;
+use crate::common::{on, paper_leaf, settled};
 
 /// Linear from zero at time 0 to `value` at time `until`, then constant.
 pub fn ramp(until: f64, value: [f64; 3]) -> Schedule<[f64; 3]> {
@@ -16,6 +16,17 @@ pub fn ramp(until: f64, value: [f64; 3]) -> Schedule<[f64; 3]> {
         value: vec![[0.0; 3], value],
     }
 }
+
+/// Rest shapes whose curvature grows so many times until time 2.
+pub fn curling(times: f64) -> Schedule<f64> {
+    Schedule {
+        at: vec![0.0, 2.0],
+        value: vec![1.0, times],
+    }
+}
+
+/// External and internal damping.
+pub const DAMPINGS: [(f64, f64); 4] = [(0.0, 0.0), (1.5, 0.0), (0.0, 0.01), (1.5, 0.01)];
 
 /// A twisted rod of three different bending and shear stiffnesses, without
 /// loads and undamped; natural units.
@@ -51,28 +62,48 @@ pub fn at_beginning(scenario: &Scenario) -> Scenario {
     let factor = dynamics.rest.at(0.0);
     for rod in &mut resting.rods {
         for curvature in &mut rod.rest_curvature {
-            *curvature = scaled(curvature, factor);
+            *curvature = curvature.scaled(factor);
         }
     }
     resting
 }
 
-/// A profile times a factor.
-pub fn scaled(profile: &Profile, factor: f64) -> Profile {
-    match profile {
-        Profile::Constant(value) => Profile::Constant(factor * value),
-        Profile::Linear { at, value } => Profile::Linear {
-            at: at.clone(),
-            value: value.iter().map(|v| factor * v).collect(),
-        },
-    }
+/// A straight rod along e1 of unit length, bending stiffness and mass, undamped, with
+/// the rotary inertia r2 = I/(A L^2).
+pub fn beam(r2: f64, [axial, shear]: [f64; 2]) -> Scenario {
+    let mut beam = paper_leaf(1, [1.0; 3], [axial, shear, shear], 0.0);
+    beam.rods[0].angle = 0.0;
+    beam.dynamics.rotary_inertia = vec![Profile::Constant(r2)];
+    beam.dynamics.external_damping = 0.0;
+    beam
 }
 
-/// Every profile of a rod's stiffness.
-pub fn stiffness(rod: &mut Rod) -> impl Iterator<Item = &mut Profile> {
-    rod.couple_stiffness
-        .iter_mut()
-        .chain(&mut rod.force_stiffness)
+/// A hanging rod of length, mass and gravity one that hardly bends, by the
+/// stiffness `part`^2.
+pub fn chain(part: f64) -> Scenario {
+    let [soft, stiff] = [part * part, 1.0 / (part * part)];
+    let mut rod = paper_leaf(1, [soft; 3], [stiff; 3], 0.0);
+    rod.rods[0].angle = 0.0;
+    rod.dynamics.density = vec![Profile::Constant(1.0)];
+    rod.dynamics.rotary_inertia = vec![Profile::Constant(soft)];
+    rod.gravity = [1.0, 0.0, 0.0];
+    rod.dynamics.gravity = Schedule::constant(rod.gravity);
+    rod
+}
+
+/// Squares of two frequencies of a hanging chain: (j/2)^2 with the zeros j of the
+/// Bessel function J0 (H. Lamb, Higher mechanics).
+pub const CHAIN: [f64; 2] = [1.445796490736696, 7.617815585915522];
+
+/// Roots of frequencies of a beam so slender that only bending counts: those of
+/// cos b cosh b = -1 (S. Timoshenko, Vibration problems in engineering).
+pub const SLENDER: [f64; 3] = [1.875104068711961, 4.694091132974175, 7.854757438237613];
+
+/// A layer at the clamp of a chain bends: points that are most of them there.
+pub fn layered(count: u32) -> Vec<f64> {
+    let growth = 4.2_f64;
+    let at = |i: u32| (growth * f64::from(i) / f64::from(count)).exp_m1() / growth.exp_m1();
+    (0..=count).map(at).collect()
 }
 
 /// The leaf of a scenario on a grid.
@@ -84,12 +115,14 @@ pub fn discrete(leaf: &Leaf, segments: usize) -> DiscreteLeaf {
 pub fn rest(scenario: &Scenario, segments: usize) -> State {
     let resting = at_beginning(scenario);
     let options = Options {
-        method: relax::Method::default().on_grid(Some(segments)),
         tolerance: Some(1e-12),
-        ..Options::default()
+        ..on(segments)
     };
-    let found = relax(&resting, &options, &mut |_| {}).unwrap();
-    assert!(found.outcome.is_success(), "{:?}", found.outcome);
+    state_of(scenario, &settled(&resting, &options))
+}
+
+/// The state of a result on one grid.
+pub fn state_of(scenario: &Scenario, found: &Equilibrium) -> State {
     let length = Leaf::new(scenario).scale.length;
     let nodes = || found.shape.rods.iter().flat_map(|rod| &rod.nodes);
     State::new(
@@ -99,9 +132,48 @@ pub fn rest(scenario: &Scenario, segments: usize) -> State {
     )
 }
 
+/// How far, over the amplitude `size`, leapfrog with steps of `h` is from the cosine at which
+/// it should vibrate about a state of rest when it is let go in the shape of a mode
+/// of frequency omega: 2/h asin(omega h/2). Looked at every hundred steps.
+pub fn off_cosine(
+    leaf: &Leaf,
+    (rest, start): (&State, &State),
+    (omega, h): (f64, f64),
+    (size, looks): (f64, usize),
+) -> f64 {
+    let seen = 2.0 / h * (0.5 * omega * h).asin();
+    let mut leapfrog = method(Scheme::Explicit, leaf, start, h);
+    let positions = |s: &State| -> Vec<f64> { s.x.iter().flat_map(|x| x.to_array()).collect() };
+    let (rest, start) = (positions(rest), positions(start));
+    let mut worst = 0.0_f64;
+    for k in 1..=looks {
+        let until = h * (100 * k) as f64;
+        leapfrog.advance(until).unwrap();
+        assert_eq!(leapfrog.steps(), 100 * k);
+        let now = positions(&leapfrog.snapshot().state);
+        let cosine = (seen * until).cos();
+        for ((now, rest), start) in now.iter().zip(&rest).zip(&start) {
+            worst = worst.max((now - rest - cosine * (start - rest)).abs() / size);
+        }
+    }
+    worst
+}
+
 /// The shape from which a leaf is released.
 pub fn released(leaf: &Leaf, segments: usize) -> State {
     start(&discrete(leaf, segments))
+}
+
+/// Explicit motion of a leaf on the state's grid, with steps of `h` or the longest.
+pub fn explicit(leaf: &Leaf, state: &State, h: Option<f64>) -> Explicit {
+    let grid = discrete(leaf, state.segments());
+    Explicit::new(grid, Physics::new(leaf), state, h).unwrap()
+}
+
+/// Semi-implicit motion of a leaf on the state's grid.
+pub fn semi_implicit(leaf: &Leaf, state: &State, steps: Steps) -> SemiImplicit {
+    let grid = discrete(leaf, state.segments());
+    SemiImplicit::new(grid, Physics::new(leaf), state, steps)
 }
 
 /// The two methods.
@@ -115,10 +187,9 @@ pub const BOTH: [Scheme; 2] = [Scheme::Explicit, Scheme::SemiImplicit];
 
 /// A method at time 0 with steps of `h`.
 pub fn method(scheme: Scheme, leaf: &Leaf, state: &State, h: f64) -> Box<dyn Method> {
-    let (physics, grid) = (Physics::new(leaf), discrete(leaf, state.segments()));
     match scheme {
-        Scheme::Explicit => Box::new(Explicit::new(grid, physics, state, Some(h)).unwrap()),
-        Scheme::SemiImplicit => Box::new(SemiImplicit::new(grid, physics, state, Steps::Fixed(h))),
+        Scheme::Explicit => Box::new(explicit(leaf, state, Some(h))),
+        Scheme::SemiImplicit => Box::new(semi_implicit(leaf, state, Steps::Fixed(h))),
     }
 }
 
@@ -130,6 +201,16 @@ pub fn at(scheme: Scheme, leaf: &Leaf, state: &State, h: f64, until: f64) -> Sna
         panic!("{scheme:?}, steps of {h}: {broken:?}");
     }
     method.snapshot()
+}
+
+/// The last frame of a simulation.
+#[track_caller]
+pub fn run(scenario: &Scenario, options: &simulate::Options) -> Frame {
+    let mut simulation = Simulation::new(scenario, options).unwrap();
+    while !simulation.done() {
+        simulation.next_frame().unwrap();
+    }
+    simulation.frame()
 }
 
 /// All positions, rotations and velocities of a snapshot.

@@ -1,10 +1,26 @@
-//! Random leaves.
-#![allow(dead_code)]
+//! Random leaves, at rest and moving, always the same ones.
 
-use leafdyn::scenario::{Profile, Scenario};
+use leafdyn::scenario::{Profile, Scenario, Schedule};
 use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::{RngSeed, TestRunner};
 
-use crate::common::paper_leaf;
+use crate::common::{linear, paper_leaf};
+
+/// So many cases, without a file of those that failed; with a seed always the same.
+pub fn cases(cases: u32, seed: Option<u64>) -> ProptestConfig {
+    let mut config = ProptestConfig::with_cases(cases);
+    config.failure_persistence = None;
+    config.rng_seed = seed.map_or(config.rng_seed, RngSeed::Fixed);
+    config
+}
+
+/// The first so many, always the same.
+pub fn drawn(leaves: impl Strategy<Value = Scenario>, count: usize) -> Vec<Scenario> {
+    let mut runner = TestRunner::deterministic();
+    let mut next = |_| leaves.new_tree(&mut runner).unwrap().current();
+    (0..count).map(&mut next).collect()
+}
 
 fn log_uniform(decades: std::ops::Range<f64>) -> impl Strategy<Value = f64> {
     decades.prop_map(|exponent| 10f64.powf(exponent))
@@ -18,10 +34,7 @@ fn force_stiffness() -> impl Strategy<Value = f64> {
 fn profile(value: f64, (kink, bend): (f64, f64), on: bool) -> Profile {
     match on {
         false => Profile::Constant(value),
-        true => Profile::Linear {
-            at: vec![0.0, kink, 1.0],
-            value: vec![value, bend * value, 0.6 * value],
-        },
+        true => linear(&[0.0, kink, 1.0], &[value, bend * value, 0.6 * value]),
     }
 }
 
@@ -65,10 +78,10 @@ fn crooked(most: impl Strategy<Value = f64>) -> impl Strategy<Value = Profile> {
     (most, knots, prop::bool::weighted(0.4)).prop_map(|(value, (first, second, a, b, c), on)| {
         match on && value.is_finite() {
             false => Profile::Constant(value),
-            true => Profile::Linear {
-                at: vec![0.0, first, second, 1.0],
-                value: vec![value, a * value, b * value, c * value],
-            },
+            true => linear(
+                &[0.0, first, second, 1.0],
+                &[value, a * value, b * value, c * value],
+            ),
         }
     })
 }
@@ -113,6 +126,72 @@ prop_compose! {
         if leaf.rods.len() == 1 {
             leaf.tip_moment = tip_moment;
         }
+        leaf
+    }
+}
+
+/// Constant, or with two of four kinks, some close together, that make its
+/// values up to thrice as large.
+fn mover_profile(decades: std::ops::Range<f64>) -> impl Strategy<Value = Profile> {
+    let [first, second] = [[0.2, 0.22], [0.6, 0.85]].map(|of| prop::sample::select(of.to_vec()));
+    let knots = (first, second, 0.4..2.5, 0.4..2.5, 0.4..2.5);
+    (log_uniform(decades), knots, prop::bool::weighted(0.5)).prop_map(
+        |(value, (first, second, a, b, c), crooked)| match crooked {
+            false => Profile::Constant(value),
+            true => linear(
+                &[0.0, first, second, 1.0],
+                &[value, a * value, b * value, c * value],
+            ),
+        },
+    )
+}
+
+prop_compose! {
+    fn moving_rods(count: usize)(
+        couple in prop::collection::vec(prop::array::uniform3(mover_profile(-1.0..1.0)), count),
+        force in prop::collection::vec(prop::array::uniform3(mover_profile(1.0..4.0)), count),
+        rest in prop::array::uniform3(-1.0..1.0),
+        lengths in prop::collection::vec(0.99..1.01, count),
+        density in prop::collection::vec(mover_profile(-0.3..0.3), count),
+        radius in prop::collection::vec(log_uniform(-2.0..-0.5), count),
+    ) -> Scenario {
+        let mut leaf = paper_leaf(count, [1.0; 3], [1.0; 3], 0.0);
+        for (j, rod) in leaf.rods.iter_mut().enumerate() {
+            rod.length = lengths[j];
+            rod.couple_stiffness = couple[j].clone();
+            rod.force_stiffness = force[j].clone();
+            rod.rest_curvature = rest.map(Profile::Constant);
+        }
+        let dynamics = &mut leaf.dynamics;
+        let squared = radius.iter().map(|radius| 0.25 * radius * radius);
+        let both = density.iter().zip(squared);
+        dynamics.rotary_inertia = both.map(|(density, squared)| density.scaled(squared)).collect();
+        dynamics.density = density;
+        leaf
+    }
+}
+
+prop_compose! {
+    /// One to four veins, each its own: stiffness over two decades in bending
+    /// and three in stretch and shear, sections slender and stout, coupling
+    /// over five decades. Undamped. They stand close together, so that even
+    /// the strongest coupling does not throw them about.
+    pub fn movers()(count in 1..5_usize)(
+        leaf in moving_rods(count),
+        coupling in log_uniform(-1.0..4.0),
+        parts in prop::collection::vec(prop::array::uniform3(0.0..1.0), count - 1),
+        gravity in prop::array::uniform3(-0.3..0.3),
+        joined in any::<bool>(),
+    ) -> Scenario {
+        let mut leaf: Scenario = leaf;
+        leaf.joined = joined;
+        for rod in &mut leaf.rods {
+            rod.angle *= 0.02;
+        }
+        leaf.coupling = parts.iter().map(|gap| gap.map(|part: f64| coupling * part)).collect();
+        leaf.gravity = gravity;
+        leaf.dynamics.gravity = Schedule::constant(gravity);
+        leaf.dynamics.external_damping = 0.0;
         leaf
     }
 }

@@ -3,13 +3,60 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output, Stdio};
 
+use serde_json::Value;
 use tempfile::TempDir;
 
 /// A folder to run in, with a small leaf in `leaf.toml`.
 pub struct Workplace {
     folder: TempDir,
+}
+
+/// How a run ended and what it printed.
+pub struct Run {
+    pub status: Option<i32>,
+    pub out: String,
+    pub err: String,
+}
+
+impl From<Output> for Run {
+    fn from(output: Output) -> Run {
+        Run {
+            status: output.status.code(),
+            out: String::from_utf8(output.stdout).unwrap(),
+            err: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+}
+
+impl Run {
+    /// Asserts the exit status.
+    #[track_caller]
+    pub fn ends(self, status: i32) -> Run {
+        assert_eq!(self.status, Some(status), "{}{}", self.out, self.err);
+        self
+    }
+
+    /// Asserts success, without a word on standard error.
+    #[track_caller]
+    pub fn ok(self) -> Run {
+        assert_eq!(self.err, "");
+        self.ends(0)
+    }
+
+    /// Asserts that the report has all of these parts.
+    #[track_caller]
+    pub fn says(self, parts: &[&str]) -> Run {
+        contains(&self.out, parts);
+        self
+    }
+
+    /// Standard output as JSON.
+    #[track_caller]
+    pub fn json(&self) -> Value {
+        serde_json::from_str(&self.out).unwrap_or_else(|_| panic!("{}{}", self.out, self.err))
+    }
 }
 
 impl Workplace {
@@ -23,14 +70,49 @@ impl Workplace {
         self.folder.path().join(name)
     }
 
-    pub fn command(&self, arguments: &[&str]) -> Command {
+    /// The program with arguments between blanks, to be run here; those that
+    /// begin with `scenarios/` are files that come with it.
+    pub fn command(&self, arguments: &str) -> Command {
+        let package = Path::new(env!("CARGO_MANIFEST_DIR"));
         let mut command = Command::new(assert_cmd::cargo::cargo_bin!("leafdyn"));
-        command.current_dir(self.folder.path()).args(arguments);
+        for argument in arguments.split_whitespace() {
+            match argument.starts_with("scenarios/") {
+                true => command.arg(package.join(argument)),
+                false => command.arg(argument),
+            };
+        }
+        command.current_dir(self.folder.path());
         command
     }
 
-    pub fn run(&self, arguments: &[&str]) -> Output {
-        self.command(arguments).output().unwrap()
+    pub fn run(&self, arguments: &str) -> Run {
+        self.command(arguments).output().unwrap().into()
+    }
+
+    /// A run on so many threads.
+    pub fn run_on(&self, threads: &str, arguments: &str) -> Run {
+        let mut command = self.command(arguments);
+        let command = command.env("RAYON_NUM_THREADS", threads);
+        command.output().unwrap().into()
+    }
+
+    /// Starts a run whose output is kept.
+    pub fn start(&self, arguments: &str) -> Child {
+        let mut command = self.command(arguments);
+        let command = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.spawn().unwrap()
+    }
+
+    /// A run that is refused: status 2, the message, nothing printed, and
+    /// nothing written.
+    #[track_caller]
+    pub fn refuses(&self, arguments: &str, message: &str) {
+        let before = self.names(".");
+        let run = self.run(arguments);
+        assert_eq!(run.status, Some(2), "{arguments}: {}", run.err);
+        assert_eq!(run.out, "", "{arguments}");
+        assert!(run.err.contains(message), "{message} in {}", run.err);
+        assert_eq!(self.names("."), before, "{arguments}");
     }
 
     /// Names in a folder, sorted; hidden ones too.
@@ -42,6 +124,94 @@ impl Workplace {
         names.sort();
         names
     }
+
+    #[track_caller]
+    pub fn read(&self, file: &str) -> String {
+        fs::read_to_string(self.path(file)).unwrap_or_else(|error| panic!("{file}: {error}"))
+    }
+
+    #[track_caller]
+    pub fn json(&self, file: &str) -> Value {
+        serde_json::from_str(&self.read(file)).unwrap()
+    }
+
+    /// A picture's SVG, which must be whole, as its PNG must be.
+    #[track_caller]
+    pub fn picture(&self, name: &str) -> String {
+        let png = fs::read(self.path(&format!("{name}.png"))).unwrap();
+        let (start, end) = (b"\x89PNG\r\n\x1a\n", b"IEND");
+        assert!(png.starts_with(start) && png[..png.len() - 4].ends_with(end));
+        let svg = self.read(&format!("{name}.svg"));
+        assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>\n"));
+        svg
+    }
+
+    /// Cells of a CSV file that must have these columns.
+    #[track_caller]
+    pub fn table(&self, file: &str, columns: &str) -> Vec<Vec<String>> {
+        let text = self.read(file);
+        let mut lines = text.lines();
+        assert_eq!(lines.next(), Some(columns));
+        let row = |line: &str| line.split(',').map(String::from).collect();
+        lines.map(row).collect()
+    }
+
+    /// As [`Workplace::table`], of numbers.
+    #[track_caller]
+    pub fn numbers(&self, file: &str, columns: &str) -> Vec<Vec<f64>> {
+        let number = |cell: String| cell.parse().unwrap();
+        let row = |row: Vec<String>| row.into_iter().map(number).collect();
+        let table = self.table(file, columns);
+        table.into_iter().map(row).collect()
+    }
+}
+
+/// Asserts that a text has all of these parts.
+#[track_caller]
+pub fn contains(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "{part} in {text}");
+    }
+}
+
+/// The help of a verb must name these options and exit statuses, one a line.
+#[track_caller]
+pub fn help_names(verb: &str, parts: &str) {
+    let run = Workplace::new().run(&format!("{verb} --help")).ok();
+    let help: Vec<&str> = run.out.split_whitespace().collect();
+    let parts: Vec<&str> = parts.lines().map(str::trim).collect();
+    contains(&help.join(" "), &parts);
+}
+
+/// Asks for what every line of a table names, `arguments => message`: each is
+/// refused in a folder of its own.
+#[track_caller]
+pub fn all_refused(common: &str, table: &str) {
+    for line in table.trim().lines() {
+        let (arguments, message) = line.split_once("=>").unwrap();
+        let arguments = format!("{common} {arguments}");
+        Workplace::new().refuses(&arguments, message.trim());
+    }
+}
+
+/// The numbers of a JSON list.
+#[track_caller]
+pub fn floats(value: &Value) -> Vec<f64> {
+    let list = value.as_array().expect("a list");
+    list.iter().map(|number| number.as_f64().unwrap()).collect()
+}
+
+/// What a JSON object tells, but for times.
+pub fn timeless(mut object: Value) -> Value {
+    object["wall_seconds"] = Value::Null;
+    object
+}
+
+/// Interrupts a run as Ctrl-C does.
+pub fn interrupt(child: &Child) {
+    let mut kill = Command::new("kill");
+    let kill = kill.arg("-INT").arg(child.id().to_string());
+    assert!(kill.status().unwrap().success());
 }
 
 /// A leaf of the paper with so many rods.
@@ -76,13 +246,4 @@ gravity = [0.0, 0.0, -1.0]
 tolerance = 1e-6
 "#
     )
-}
-
-pub fn text(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).unwrap()
-}
-
-pub fn is_whole_png(file: &Path) -> bool {
-    let bytes = fs::read(file).unwrap();
-    bytes.starts_with(b"\x89PNG\r\n\x1a\n") && bytes[..bytes.len() - 4].ends_with(b"IEND")
 }

@@ -1,6 +1,5 @@
 //! Small vibrations of a leaf at rest: its stiffness and mass matrices, from
 //! the second derivatives of the segments, and the frequencies they give.
-#![allow(dead_code)]
 
 use glam::{DMat3, DVec3};
 use leafdyn::leaf::{DiscreteLeaf, State};

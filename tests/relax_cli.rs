@@ -1,0 +1,360 @@
+//! What scripts rely on when they relax a leaf: streams, files and exit
+//! statuses of the command line, by either method, with modes and without.
+
+mod workplace;
+
+use std::fs;
+
+use serde_json::{Value, json};
+use workplace::{Run, Workplace, all_refused, contains, floats, help_names, leaf};
+
+const FILES: [&str; 4] = [
+    "centerlines.csv",
+    "figure.png",
+    "figure.svg",
+    "summary.json",
+];
+
+const MODES: &str = "mode,eigenvalue,error,frequency,rod,sigma,dx,dy,dz,rx,ry,rz";
+
+#[test]
+fn help_names_every_option() {
+    help_names(
+        "relax",
+        "--method
+        --segments
+        --tolerance
+        --set
+        --out
+        --json
+        --keep-unstable
+        --modes
+        semi-implicit",
+    );
+}
+
+#[test]
+fn a_leaf_comes_to_rest_and_is_written_down() {
+    let place = Workplace::new();
+    place.run("relax leaf.toml").ok().says(&[
+        "small: 5 veins",
+        "stable equilibrium",
+        "tip",
+        "energy",
+        "error",
+        "out/small",
+    ]);
+    assert_eq!(place.names("out/small"), FILES);
+    let csv = place.read("out/small/centerlines.csv");
+    assert!(csv.starts_with("rod,sigma,s,x,y,z,qw,"));
+    place.picture("out/small/figure");
+    let summary = place.json("out/small/summary.json");
+    let stations = summary["stations"].as_array().unwrap().len();
+    assert_eq!(csv.lines().count(), 1 + 5 * stations);
+}
+
+#[test]
+fn json_is_alone_on_standard_output() {
+    let place = Workplace::new();
+    let run = place.run("relax leaf.toml --json --out here/below").ends(0);
+    let summary = run.json();
+    assert_eq!(summary["scenario"], "small");
+    assert_eq!(summary["method"], "semi-implicit");
+    assert_eq!(summary["outcome"], "converged");
+    assert_eq!(summary["rods"], 5);
+    assert_eq!(summary["stable"], true);
+    assert_eq!(summary["positions"].as_array().unwrap().len(), 5);
+    assert_eq!(run.out, place.read("here/below/summary.json"));
+}
+
+#[test]
+fn overrides_reach_the_scenario() {
+    let run = Workplace::new().run("relax leaf.toml --json --set leaf.rods=3 --tolerance 1e-5");
+    assert_eq!(run.json()["rods"], 3);
+    assert_eq!(run.json()["tolerance"], 1e-5);
+}
+
+#[test]
+fn a_single_grid_claims_no_accuracy() {
+    let place = Workplace::new();
+    let run = place.run("relax leaf.toml --json --segments 8");
+    let summary = run.json();
+    assert_eq!(summary["segments"], json!([8]));
+    assert_eq!(summary["error_estimate"], Value::Null);
+    let success = summary["outcome"] == "converged";
+    assert_eq!(run.status, Some(if success { 0 } else { 1 }));
+    // A remark goes to standard error.
+    assert!(success || !run.err.is_empty());
+    assert_eq!(place.names("out/small"), FILES, "written all the same");
+}
+
+#[test]
+fn bad_requests_are_refused_before_anything_is_written() {
+    all_refused(
+        "relax",
+        "leaf.toml --method newton => newton
+        leaf.toml --method newton => semi-implicit
+        leaf.toml --method implicit => implicit
+        leaf.toml --method implicit => semi-implicit
+        absent.toml => absent.toml
+        leaf.toml --tolerance 0 => tolerance
+        leaf.toml --tolerance -1 => tolerance
+        leaf.toml --segments few => --segments
+        => SCENARIO
+        leaf.toml --modes 101 => --modes
+        leaf.toml --modes -1 => --modes
+        leaf.toml --modes all => --modes
+        leaf.toml --method shooting --segments 8 => --segments 8: shooting has no grid
+        leaf.toml --intervals 4 => add --method shooting
+        leaf.toml --method explicit --keep-unstable => --keep-unstable: explicit motion leaves unstable equilibria; use --method semi-implicit
+        leaf.toml --method shooting --intervals 0 => --intervals 0: allowed are 1 to 4096",
+    );
+    all_refused("grow", "leaf.toml => grow");
+    let place = Workplace::new();
+    fs::write(place.path("plain"), "a file").unwrap();
+    for message in [
+        "error: cannot write to the folder plain/out: plain is not a folder",
+        "--out DIR",
+    ] {
+        place.refuses("relax leaf.toml --out plain/out", message);
+    }
+    place.refuses("relax leaf.toml --json --out plain", "is not a folder");
+}
+
+/// A run by shooting into `out`: its report and `summary.json`.
+fn shoot(place: &Workplace, arguments: &str, status: i32) -> (String, Value) {
+    let run = place.run(&format!("relax {arguments} --method shooting --out out"));
+    let Run { out, err, .. } = run.ends(status);
+    assert_eq!(err, "");
+    assert_eq!(place.names("out"), FILES);
+    (out, place.json("out/summary.json"))
+}
+
+#[test]
+fn shooting_finds_a_stable_leaf() {
+    let place = Workplace::new();
+    let (report, summary) = shoot(&place, "leaf.toml", 0);
+    let found = "found    stable equilibrium";
+    let parts = [", by single shooting", " corrections, "];
+    contains(&report, &["method shooting", found, parts[0], parts[1]]);
+    assert_eq!(summary["method"], "shooting");
+    assert_eq!(summary["outcome"], "converged");
+    assert_eq!(summary["segments"], json!([]));
+    assert_eq!(summary["intervals"], 1);
+    assert_eq!(summary["stable"], true);
+    contains(&place.picture("out/figure"), &["by single shooting"]);
+}
+
+#[test]
+fn intervals_are_as_asked() {
+    let (report, summary) = shoot(&Workplace::new(), "leaf.toml --intervals 4", 0);
+    contains(&report, &["by multiple shooting over 4 intervals"]);
+    assert_eq!(summary["intervals"], 4);
+}
+
+#[test]
+fn shooting_finds_a_saddle_and_calls_it_unstable() {
+    let fig10 = "scenarios/paper/fig10.toml --set leaf.rods=5";
+    let (report, summary) = shoot(&Workplace::new(), fig10, 0);
+    contains(&report, &["unstable equilibrium of index 18"]);
+    assert_eq!(summary["outcome"], "saddle");
+    assert_eq!(summary["stable"], false);
+    assert_eq!(summary["negative_eigenvalues"], 18);
+}
+
+#[test]
+fn a_failure_of_shooting_shows_no_numbers_that_are_none() {
+    let place = Workplace::new();
+    let column = "scenarios/classic/cantilever_tip.toml --set load.tip_force=[1e5,0,1]";
+    let (report, summary) = shoot(&place, &format!("{column} --intervals 1"), 1);
+    contains(
+        &report,
+        &["found    no equilibrium\n", "use more intervals"],
+    );
+    for part in ["NaN", "inf", "residual", "energy", "tip  "] {
+        assert!(!report.contains(part), "{part} in {report}");
+    }
+    assert_eq!(summary["outcome"], "not-at-rest");
+    for key in ["residual", "energy", "error_estimate", "stable"] {
+        assert_eq!(summary[key], Value::Null, "{key}");
+    }
+    contains(&place.picture("out/figure"), &["how far shooting came"]);
+}
+
+fn summary(place: &Workplace, arguments: &str) -> Value {
+    let run = place.run(&format!("relax leaf.toml --json {arguments}"));
+    run.ends(0).json()
+}
+
+#[test]
+fn three_eigenvalues_are_told_unasked() {
+    let place = Workplace::new();
+    let summary = summary(&place, "");
+    let eigenvalues = floats(&summary["lowest_eigenvalues"]);
+    assert_eq!(eigenvalues.len(), 3);
+    assert!(eigenvalues[0] > 0.0 && eigenvalues.is_sorted());
+    let errors = floats(&summary["eigenvalue_errors"]);
+    assert!(errors.iter().zip(&eigenvalues).all(|(e, l)| *e < 1e-3 * l));
+    assert_eq!(place.names("out/small"), FILES);
+
+    let wanted = format!("modes    lowest frequencies {:.4}", eigenvalues[0].sqrt());
+    let report = place.run("relax leaf.toml");
+    report.says(&[&wanted[..wanted.len() - 1]]);
+}
+
+#[test]
+fn modes_are_written_and_drawn_on_request() {
+    let place = Workplace::new();
+    let run = place.run("relax leaf.toml --modes 4").ends(0);
+    run.says(&["figure.png, modes.csv, modes.svg, modes.png"]);
+    let names = place.names("out/small");
+    assert_eq!(names.len(), FILES.len() + 3, "{names:?}");
+
+    let summary = place.json("out/small/summary.json");
+    let eigenvalues = floats(&summary["lowest_eigenvalues"]);
+    let stations = summary["stations"].as_array().unwrap().len();
+    let rows = place.numbers("out/small/modes.csv", MODES);
+    assert_eq!(rows.len(), 4 * 5 * stations);
+    for (k, rows) in rows.chunks(5 * stations).enumerate() {
+        for row in rows {
+            assert_eq!(row[0], (k + 1) as f64);
+            assert_eq!(row[1], eigenvalues[k]);
+            assert_eq!(row[3], eigenvalues[k].sqrt());
+            // The base is clamped.
+            assert!(row[5] > 0.0 || row[6..].iter().all(|value| *value == 0.0));
+        }
+        let far = |row: &Vec<f64>| row[6..9].iter().map(|d| d * d).sum::<f64>().sqrt();
+        let largest = rows.iter().map(far).fold(0.0, f64::max);
+        // On the finest grid it is 1.
+        assert!((0.7..1.0 + 1e-12).contains(&largest), "{largest}");
+    }
+    let svg = place.picture("out/small/modes");
+    assert_eq!(svg.matches("<g id=\"mode\">").count(), 4);
+    assert_eq!(svg.matches("ω = ").count(), 4);
+    assert!(!svg.contains("NaN") && !svg.contains("unstable"));
+
+    // Of the leaf that is there now nothing like it is known.
+    place.run("relax leaf.toml");
+    assert_eq!(place.names("out/small"), FILES);
+}
+
+#[test]
+fn no_modes_are_null() {
+    let place = Workplace::new();
+    for arguments in [
+        "--modes 0",
+        "--method shooting",
+        "--set leaf.rods=1 --set load.tip_moment=[0,0,1]",
+    ] {
+        let summary = summary(&place, arguments);
+        assert_eq!(summary["lowest_eigenvalues"], Value::Null, "{arguments}");
+        assert_eq!(summary["eigenvalue_errors"], Value::Null, "{arguments}");
+        assert_eq!(place.names("out/small"), FILES, "{arguments}");
+    }
+    let run = place.run("relax leaf.toml --modes 0");
+    assert!(!run.out.contains("modes"));
+}
+
+#[test]
+fn one_grid_has_eigenvalues_without_errors() {
+    let place = Workplace::new();
+    let summary = summary(&place, "--segments 8 --modes 2");
+    assert_eq!(floats(&summary["lowest_eigenvalues"]).len(), 2);
+    assert_eq!(summary["eigenvalue_errors"], Value::Null);
+    assert_eq!(place.table("out/small/modes.csv", MODES)[0][2], "");
+}
+
+/// The flat shape of this soft leaf is a saddle.
+#[test]
+fn unstable_modes_are_told_and_marked() {
+    let place = Workplace::new();
+    let soft = "--set leaf.rods=1 --set leaf.fan=[0.0] --set load.gravity=[0,0,0]";
+    let pushed = "--set load.tip_force=[-3,0,0] --keep-unstable --modes 3";
+    place
+        .run(&format!("relax leaf.toml {soft} {pushed}"))
+        .says(&[
+            "2 negative eigenvalues",
+            "modes    growth rates ",
+            "; lowest frequencies ",
+        ]);
+    let svg = place.read("out/small/modes.svg");
+    assert_eq!(svg.matches("unstable: grows at ").count(), 2);
+    assert_eq!(svg.matches("ω = ").count(), 1);
+    let cells = &place.table("out/small/modes.csv", MODES)[0];
+    assert!(cells[1].starts_with('-') && cells[3].is_empty());
+}
+
+#[cfg(unix)]
+mod unix {
+    use std::process::{Child, Stdio};
+    use std::time::{Duration, Instant};
+    use std::{io, thread};
+
+    use super::*;
+    use workplace::interrupt;
+
+    /// A reader that has gone must not make the program panic.
+    #[test]
+    fn closed_standard_output_is_no_error() {
+        for arguments in ["relax leaf.toml", "relax leaf.toml --json"] {
+            let (reader, writer) = io::pipe().unwrap();
+            drop(reader);
+            let place = Workplace::new();
+            let output = place.command(arguments).stdout(writer).output().unwrap();
+            Run::from(output).ok();
+            assert_eq!(place.names("out/small"), FILES);
+        }
+    }
+
+    #[test]
+    fn full_standard_output_is_an_error() {
+        let Ok(full) = fs::OpenOptions::new().write(true).open("/dev/full") else {
+            return;
+        };
+        let place = Workplace::new();
+        let mut command = place.command("relax leaf.toml --json");
+        let run = Run::from(command.stdout(full).output().unwrap()).ends(2);
+        contains(&run.err, &["cannot write to standard output"]);
+    }
+
+    /// A leaf so wide that nobody waits for it.
+    fn start_long_run(place: &Workplace) -> Child {
+        fs::write(place.path("leaf.toml"), leaf("wide", 20_000)).unwrap();
+        place.start("relax leaf.toml --tolerance 1e-10")
+    }
+
+    #[test]
+    fn an_interrupt_stops_at_once_and_leaves_nothing() {
+        let place = Workplace::new();
+        let child = start_long_run(&place);
+        // Long enough to be in the solver, short enough not to be done.
+        thread::sleep(Duration::from_millis(700));
+        interrupt(&child);
+        let run = Run::from(child.wait_with_output().unwrap()).ends(130);
+        assert_eq!(run.out, "");
+        assert_eq!(place.names("."), ["leaf.toml"]);
+    }
+
+    #[test]
+    fn an_interrupt_while_writing_leaves_only_whole_files() {
+        let place = Workplace::new();
+        // Many rods on a fine grid: a large table, which takes a while to write.
+        fs::write(place.path("leaf.toml"), leaf("large", 500)).unwrap();
+        let mut command = place.command("relax leaf.toml --segments 256");
+        let child = command.stdout(Stdio::null()).spawn().unwrap();
+        let folder = place.path("out/large");
+        let unfinished = |name: &String| name.ends_with(".part");
+        let start = Instant::now();
+        while !folder.is_dir() || !place.names("out/large").iter().any(unfinished) {
+            let waited = start.elapsed();
+            assert!(waited < Duration::from_secs(60), "nothing is written");
+            thread::sleep(Duration::from_millis(1));
+        }
+        interrupt(&child);
+        Run::from(child.wait_with_output().unwrap()).ends(130);
+        let names = place.names("out/large");
+        assert!(names.len() < FILES.len(), "{names:?}: interrupted too late");
+        let whole = |name: &String| FILES.contains(&name.as_str());
+        assert!(names.iter().all(whole), "{names:?}");
+    }
+}
