@@ -30,8 +30,6 @@ pub struct DiscreteLeaf {
     pub load_factor: f64,
     /// The loads.
     pub loads: Loads,
-    /// Whether it is solved in its plane.
-    pub(super) planar: bool,
 }
 
 /// Dead loads.
@@ -68,7 +66,6 @@ impl DiscreteLeaf {
                 tip_force: leaf.tip_force,
                 tip_moment: leaf.tip_moment,
             },
-            planar: leaf.planar,
         }
     }
 
@@ -76,22 +73,15 @@ impl DiscreteLeaf {
     pub fn with_leaf(&self, leaf: &Leaf) -> Self {
         DiscreteLeaf {
             leaf: leaf.clone(),
-            planar: leaf.planar,
             ..self.clone()
         }
     }
 
     /// The same, in space if it was in its plane.
     pub fn in_space(&self) -> Self {
-        DiscreteLeaf {
-            planar: false,
-            ..self.clone()
-        }
-    }
-
-    /// Whether it is solved in its plane.
-    pub fn planar(&self) -> bool {
-        self.planar
+        let mut spatial = self.clone();
+        spatial.leaf.planar = false;
+        spatial
     }
 
     /// The smallest compliance of any segment, in units of L^2/A.

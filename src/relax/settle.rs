@@ -203,7 +203,7 @@ impl Run<'_, '_> {
                 pushes,
                 solver: Definite {
                     direct: None,
-                    space: (leaf.planar() && self.levels.is_empty())
+                    space: (leaf.leaf.planar() && self.levels.is_empty())
                         .then(|| System::new(&leaf.in_space())),
                 },
                 most_evaluations: begun + allowed,

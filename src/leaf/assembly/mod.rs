@@ -44,7 +44,7 @@ impl DiscreteLeaf {
     pub fn assemble_stiffening(&self, state: &State, dropped: DVec3, system: &mut System) {
         for (j, rod) in system.rods.iter_mut().enumerate() {
             rod.rhs.fill([0.0; 6]);
-            match self.planar {
+            match self.leaf.planar {
                 false => self.stiffen_spatial(j, state, dropped, &mut rod.rhs),
                 true => self.stiffen_planar(j, state, dropped, &mut rod.rhs),
             }
@@ -56,7 +56,7 @@ impl DiscreteLeaf {
     /// rod, nodes 1 to n), written over `next`.
     pub fn advance(&self, state: &State, solution: &System, step: f64, next: &mut State) {
         next.clone_from(state);
-        match self.planar {
+        match self.leaf.planar {
             false => self.advance_spatial(state, solution, step, next),
             true => self.advance_planar(state, solution, step, next),
         }

@@ -87,7 +87,7 @@ impl System {
         System {
             rods: (0..rods)
                 .map(|j| RodSystem {
-                    matrix: RodMatrix::new(n, joined, leaf.planar),
+                    matrix: RodMatrix::new(n, joined, leaf.leaf.planar),
                     mass: (1..=n).map(|i| leaf.mass(j, i)).collect(),
                     rhs: zeros(),
                     solution: zeros(),

@@ -67,27 +67,8 @@ impl System {
     /// plus `inertia` (mass times velocity over time step), to the relative
     /// accuracy `tolerance` in the energy norm.
     pub fn solve(&mut self, inertia: Option<(&[Vec<Increment>], f64)>, tolerance: f64) -> Solved {
-        let last = self.segments - 1;
-        let joined = self.joined;
-        each_rod(self.parallel, &mut self.rods, |j, rod| {
-            rod.residual.copy_from_slice(&rod.rhs);
-            if let Some((velocity, per_step)) = inertia {
-                for ((r, v), m) in rod.residual.iter_mut().zip(&velocity[j]).zip(&rod.mass) {
-                    for c in 0..6 {
-                        r[c] += m[c / 3] * v[c] * per_step;
-                    }
-                }
-            }
-        });
-        let mut tip_residual = [0.0; 3];
-        if joined {
-            for rod in &mut self.rods {
-                for c in 0..3 {
-                    tip_residual[c] += rod.residual[last][3 + c];
-                    rod.residual[last][3 + c] = 0.0;
-                }
-            }
-        }
+        let (last, joined) = (self.segments - 1, self.joined);
+        let mut tip_residual = self.load_residual(inertia);
         if !self.coupled {
             self.precondition(tip_residual);
             for rod in &mut self.rods {
@@ -172,6 +153,32 @@ impl System {
             }
         }
         Solved::Yes(iterations)
+    }
+
+    /// Makes the right-hand side plus `inertia` the residual; returns that of a
+    /// joint tip.
+    fn load_residual(&mut self, inertia: Option<(&[Vec<Increment>], f64)>) -> [f64; 3] {
+        let last = self.segments - 1;
+        each_rod(self.parallel, &mut self.rods, |j, rod| {
+            rod.residual.copy_from_slice(&rod.rhs);
+            if let Some((velocity, per_step)) = inertia {
+                for ((r, v), m) in rod.residual.iter_mut().zip(&velocity[j]).zip(&rod.mass) {
+                    for c in 0..6 {
+                        r[c] += m[c / 3] * v[c] * per_step;
+                    }
+                }
+            }
+        });
+        let mut tip_residual = [0.0; 3];
+        if self.joined {
+            for rod in &mut self.rods {
+                for c in 0..3 {
+                    tip_residual[c] += rod.residual[last][3 + c];
+                    rod.residual[last][3 + c] = 0.0;
+                }
+            }
+        }
+        tip_residual
     }
 
     /// z = B^-1 residual, complete with the tip's displacement in every rod's

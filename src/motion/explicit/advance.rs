@@ -1,9 +1,13 @@
 //! Motion to a given time, snapshots, and numbers to go on from.
 
 use super::Explicit;
+use crate::leaf::State;
 use crate::motion::energy_balance::{Exchange, measure};
+use crate::motion::kernel::{Forces, GROUP};
 use crate::motion::method::{Method, Snapshot, Stopped, Velocity};
+use crate::motion::nodes::vector;
 use crate::rod::RESOLVED_TURN;
+use glam::DVec3;
 
 /// Part of a step that is rounding.
 const NO_TIME: f64 = 1e-9;
@@ -16,6 +20,46 @@ const BENDING_CHECKED: usize = 200;
 const ENERGY_CHECKED: usize = 1000;
 
 impl Explicit {
+    /// Forces of all segments at the present positions, rod by rod. Strains
+    /// become the last step's if they are to be remembered.
+    pub(super) fn forces(&mut self, remember: bool) -> Vec<DVec3> {
+        let (law, segments) = (self.law(remember), self.leaf.segments());
+        let mut forces = Vec::with_capacity(self.rods.len() * segments);
+        for (rod, positions) in self.rods.iter_mut().zip(&self.positions) {
+            self.arch.dispatch(Forces {
+                segments,
+                positions,
+                motion: &rod.motion,
+                material: &rod.material,
+                past: &mut rod.past,
+                law,
+                forces: &mut forces,
+            });
+        }
+        forces.into_iter().map(DVec3::from).collect()
+    }
+
+    /// Positions, rotations and segment forces now.
+    pub fn now(&mut self) -> State {
+        let mut state = self.state();
+        state.n = self.forces(false);
+        state
+    }
+
+    /// Positions and rotations now.
+    pub(super) fn state(&self) -> State {
+        let n = self.leaf.segments();
+        let nodes =
+            || (0..self.rods.len()).flat_map(|j| (GROUP..=GROUP + n).map(move |at| (j, at)));
+        State::new(
+            n,
+            nodes()
+                .map(|(j, at)| vector(&self.positions[j].x, at))
+                .collect(),
+            nodes().map(|(j, at)| self.rods[j].rotation(at)).collect(),
+        )
+    }
+
     fn judge(&mut self) -> Result<(), Stopped> {
         let now = self.snapshot();
         (self.balance).judge(&self.leaf, &self.physics, &now, self.step, OTHERWISE)?;

@@ -27,7 +27,7 @@ use rayon::prelude::*;
 use super::energy_balance::{EnergyBalance, Exchange};
 use super::fictitious;
 use super::friction::rates;
-use super::kernel::{self, Block, Forces, GROUP, Law, Neighbour, Positions, RodLoads, Step};
+use super::kernel::{self, Block, GROUP, Law, Neighbour, Positions, RodLoads, Step};
 use super::method::{Method, Snapshot};
 use super::nodes::{self, Rod, vector};
 use super::physics::Physics;
@@ -361,45 +361,5 @@ impl Explicit {
             }
         }
         std::mem::swap(&mut self.positions, &mut self.next);
-    }
-
-    /// Forces of all segments at the present positions, rod by rod. Strains
-    /// become the last step's if they are to be remembered.
-    fn forces(&mut self, remember: bool) -> Vec<DVec3> {
-        let (law, segments) = (self.law(remember), self.leaf.segments());
-        let mut forces = Vec::with_capacity(self.rods.len() * segments);
-        for (rod, positions) in self.rods.iter_mut().zip(&self.positions) {
-            self.arch.dispatch(Forces {
-                segments,
-                positions,
-                motion: &rod.motion,
-                material: &rod.material,
-                past: &mut rod.past,
-                law,
-                forces: &mut forces,
-            });
-        }
-        forces.into_iter().map(DVec3::from).collect()
-    }
-
-    /// Positions, rotations and segment forces now.
-    pub fn now(&mut self) -> State {
-        let mut state = self.state();
-        state.n = self.forces(false);
-        state
-    }
-
-    /// Positions and rotations now.
-    fn state(&self) -> State {
-        let n = self.leaf.segments();
-        let nodes =
-            || (0..self.rods.len()).flat_map(|j| (GROUP..=GROUP + n).map(move |at| (j, at)));
-        State::new(
-            n,
-            nodes()
-                .map(|(j, at)| vector(&self.positions[j].x, at))
-                .collect(),
-            nodes().map(|(j, at)| self.rods[j].rotation(at)).collect(),
-        )
     }
 }
