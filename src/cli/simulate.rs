@@ -3,18 +3,16 @@
 use std::path::Path;
 use std::time::Instant;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::files::Recording;
-use crate::report::OutputError;
+use crate::report::{self, OutputError, numbers::brief};
 use crate::simulate::{Options, Scheme, Simulation, Stopped};
-
-use crate::report;
 
 use super::progress::ProgressLine;
 use super::request::Request;
 use super::{Refusal, Status, checkpoint_on_interrupt, note, show_checkpoint};
-use crate::report::numbers::brief;
 
 /// Follow a leaf as it moves: its shape, velocities and energies in time.
 ///
@@ -27,8 +25,8 @@ pub struct Simulate {
     request: Request,
 
     /// How the leaf is moved; left out: explicit, unless a rod is rigid
-    #[arg(long, value_name = "NAME", value_enum)]
-    method: Option<MethodName>,
+    #[arg(long, value_name = "NAME", value_parser = method_parser())]
+    method: Option<Scheme>,
 
     /// N segments a rod; left out: 16, or as many as the rest shape needs
     #[arg(long, value_name = "N")]
@@ -43,27 +41,19 @@ pub struct Simulate {
     resume: bool,
 }
 
-/// The methods by the names users type.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum MethodName {
-    Explicit,
-    SemiImplicit,
-}
-
-impl From<MethodName> for Scheme {
-    fn from(name: MethodName) -> Self {
-        match name {
-            MethodName::Explicit => Scheme::Explicit,
-            MethodName::SemiImplicit => Scheme::SemiImplicit,
-        }
-    }
+/// The methods by their names.
+fn method_parser() -> impl TypedValueParser<Value = Scheme> {
+    let methods = [Scheme::Explicit, Scheme::SemiImplicit];
+    let named = move |word: String| methods.into_iter().find(|method| method.name() == word);
+    PossibleValuesParser::new(methods.map(Scheme::name))
+        .try_map(move |word| named(word).ok_or("is no method"))
 }
 
 impl Simulate {
     pub fn run(self) -> Result<Status, Refusal> {
         let (scenario, folder) = self.request.open()?;
         let options = Options {
-            scheme: self.method.map(Scheme::from),
+            scheme: self.method,
             segments: self.segments,
             step: self.step,
             tolerance: self.request.tolerance,

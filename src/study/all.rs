@@ -4,9 +4,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
-use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, relax};
+use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax, serialize_index};
 use crate::scenario::Scenario;
-use crate::shape::{RodShape, serialize_positions, serialize_tips};
+use crate::shape::serialize_tips;
 
 /// Starts that are relaxed at once, between two looks at what is new.
 const BATCH: usize = 16;
@@ -54,7 +54,7 @@ impl Serialize for Found {
         #[derive(Serialize)]
         struct Keys<'a> {
             energy: Option<f64>,
-            stable: Option<bool>,
+            #[serde(flatten, serialize_with = "serialize_index")]
             negative_eigenvalues: Option<usize>,
             #[serde(flatten, serialize_with = "serialize_tips")]
             tips: &'a [DVec3],
@@ -62,22 +62,19 @@ impl Serialize for Found {
             segments: &'a [usize],
             starts: usize,
             plain: bool,
-            stations: &'a [f64],
-            #[serde(serialize_with = "serialize_positions")]
-            positions: &'a [RodShape],
+            #[serde(flatten)]
+            shape: &'a Shape,
         }
         let leaf = &self.equilibrium;
         Keys {
             energy: leaf.energy,
-            stable: leaf.stable(),
             negative_eigenvalues: leaf.stability.negative_eigenvalues,
             tips: &leaf.tips,
             error_estimate: leaf.accuracy.error_estimate,
             segments: &leaf.accuracy.segments,
             starts: self.starts,
             plain: self.plain,
-            stations: &leaf.shape.stations,
-            positions: &leaf.shape.rods,
+            shape: &leaf.shape,
         }
         .serialize(serializer)
     }

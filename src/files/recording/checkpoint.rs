@@ -49,7 +49,7 @@ impl Identity {
     }
 
     /// What tells runs apart, with numbers as people read them.
-    fn told(&self) -> [(&'static str, String); 7] {
+    fn described(&self) -> [(&'static str, String); 7] {
         let number = |digits: &str| number(digits).map_or("?".into(), |number| number.to_string());
         let step = self.step.as_deref();
         [
@@ -68,8 +68,8 @@ impl Identity {
 
     /// The first difference from what is asked for now, in words.
     fn difference(&self, asked: &Identity) -> Option<String> {
-        let mut told = self.told().into_iter().zip(asked.told());
-        let ((what, its), (_, now)) = told.find(|(its, now)| its != now)?;
+        let mut both = self.described().into_iter().zip(asked.described());
+        let ((what, its), (_, now)) = both.find(|(its, now)| its != now)?;
         Some(match what {
             "content" => "the scenario, or an override of it, has changed".into(),
             _ => format!("{what} {its}, now {now}"),

@@ -63,7 +63,7 @@ pub fn trace(
     };
     let first = relax(&scenario, &options, &mut |_| {})?;
     let leaf = Leaf::new(&scenario);
-    let (grid, state) = beginning(&family, &leaf, &first, request.segments)?;
+    let (grid, state) = initial_state(&family, &leaf, &first, request.segments)?;
     let mut trace = Trace {
         scenario: scenario.name.clone(),
         keys: keys.clone(),
@@ -110,7 +110,7 @@ const FINEST: usize = 128;
 
 /// The grid on which branches are followed, and the first equilibrium near it:
 /// as asked for, or one on which the index is that of the finest.
-fn beginning(
+fn initial_state(
     family: &Family,
     leaf: &Leaf,
     first: &Equilibrium,
@@ -124,7 +124,8 @@ fn beginning(
         None => 2 * grid.segments(),
         Some(wanted) => crate::relax::check_segments(leaf, Some(wanted), wanted)?,
     };
-    while grid.segments() < wanted || segments.is_none() && unsettled(family, &grid, &state, first)
+    while grid.segments() < wanted
+        || segments.is_none() && index_differs(family, &grid, &state, first)
     {
         let discrete = DiscreteLeaf::new(leaf, grid.clone());
         state = branch::prolonged(&discrete, &state);
@@ -134,7 +135,7 @@ fn beginning(
 }
 
 /// Whether the index on a grid is another than on the finest.
-fn unsettled(family: &Family, grid: &Grid, state: &State, first: &Equilibrium) -> bool {
+fn index_differs(family: &Family, grid: &Grid, state: &State, first: &Equilibrium) -> bool {
     if grid.segments() >= FINEST {
         return false;
     }
