@@ -19,6 +19,20 @@ const NAME_BESIDE: f64 = 42.0;
 const AFTER_LABELS: f64 = 13.0;
 const FARTHEST_NAME: f64 = 53.0;
 
+/// A curve with a name.
+pub struct Curve {
+    pub name: &'static str,
+    pub color: Color,
+    pub points: Vec<(f64, f64)>,
+}
+
+impl Curve {
+    /// Its values upwards.
+    pub fn values(&self) -> impl Iterator<Item = f64> {
+        self.points.iter().map(|point| point.1)
+    }
+}
+
 /// A panel between two axes.
 pub struct Axes {
     pub cell: Cell,

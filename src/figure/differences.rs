@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::axes::Axes;
+use super::axes::{Axes, Curve};
 use super::axis::{Axis, Ticks};
 use super::colors::{CURVES, Color, NOTE};
 use super::drawing::{Drawing, Stroke};
@@ -27,86 +27,60 @@ const ZERO_STRIP: f64 = 30.0;
 /// Stations are marked if there are no more.
 const MOST_MARKED: usize = 70;
 
-/// One quantity along the veins.
-struct Curve {
-    name: &'static str,
-    color: Color,
-    /// Stations and differences.
-    points: Vec<(f64, f64)>,
-    /// Up to which the solutions are called the same.
-    allowed: Option<f64>,
-}
-
-impl Curve {
-    /// Positions in units of `unit`, the rest in the scenario's.
-    fn of(quantity: Quantity, check: &Check, unit: f64, color: Color) -> Self {
-        let (name, unit, allowed) = match quantity {
-            Quantity::Position => {
-                let allowed = check.allowed() / unit;
-                ("position, in lengths L", unit, Some(allowed))
-            }
-            Quantity::Rotation => ("rotation, in radians", 1.0, Some(check.allowed_rotation())),
-            Quantity::Force => ("force, in the scenario's unit", 1.0, None),
-            Quantity::Moment => ("moment, in the scenario's unit", 1.0, None),
-        };
-        let values = check.along.iter().map(|found| quantity.of(found) / unit);
-        Curve {
-            name,
-            color,
-            points: check
-                .relaxed
-                .shape
-                .stations
-                .iter()
-                .copied()
-                .zip(values)
-                .collect(),
-            allowed,
+/// A quantity along the veins, and up to which difference of it the solutions
+/// are called the same. Positions are in units of `unit`, the rest in the
+/// scenario's.
+fn curve(quantity: Quantity, check: &Check, unit: f64, color: Color) -> (Curve, Option<f64>) {
+    let (name, unit, allowed) = match quantity {
+        Quantity::Position => {
+            let allowed = check.allowed() / unit;
+            ("position, in lengths L", unit, Some(allowed))
         }
-    }
-
-    fn values(&self) -> impl Iterator<Item = f64> {
-        self.points.iter().map(|point| point.1)
-    }
+        Quantity::Rotation => ("rotation, in radians", 1.0, Some(check.allowed_rotation())),
+        Quantity::Force => ("force, in the scenario's unit", 1.0, None),
+        Quantity::Moment => ("moment, in the scenario's unit", 1.0, None),
+    };
+    let values = check.along.iter().map(|found| quantity.of(found) / unit);
+    let stations = check.relaxed.shape.stations.iter().copied();
+    let points = stations.zip(values).collect();
+    let curve = Curve {
+        name,
+        color,
+        points,
+    };
+    (curve, allowed)
 }
 
 /// Draws the panel below `start`.
 pub fn draw(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
-    let curves: Vec<Curve> = Quantity::ALL
-        .into_iter()
-        .zip(CURVES)
-        .map(|(quantity, color)| Curve::of(quantity, check, unit, color))
-        .collect();
+    let quantities = Quantity::ALL.into_iter().zip(CURVES);
+    let (curves, allowed): (Vec<Curve>, Vec<Option<f64>>) = quantities
+        .map(|(quantity, color)| curve(quantity, check, unit, color))
+        .unzip();
     let mut cell = Cell::beside_key(start + PANEL_TITLE, FRAME_HEIGHT, KEY);
-    title(
-        page,
-        cell.corner,
-        "(e)",
-        "largest difference of all veins at each station",
-    );
+    let what = "largest difference of all veins at each station";
+    title(page, cell.corner, "(e)", what);
     let stations = Axis {
         apart: Some(50.0),
         ..Axis::linear("σ, fraction of each vein's length", 0.0, 1.0)
     };
     let mut across = stations.clone();
-    if curves
-        .iter()
-        .any(|curve| curve.values().any(|value| value == 0.0))
-    {
+    let mut values = curves.iter().flat_map(Curve::values);
+    if values.any(|value| value == 0.0) {
         cell.size.y -= ZERO_STRIP;
         across.labelled = false;
         draw_zeros(page, &curves, cell, stations);
     }
-    let allowed = curves.iter().filter_map(|curve| curve.allowed);
-    let values = curves.iter().flat_map(Curve::values).chain(allowed);
+    let values = curves.iter().flat_map(Curve::values);
+    let values = values.chain(allowed.iter().flatten().copied());
     let axes = Axes {
         cell,
         across,
         up: Axis::logarithmic("", values, FEWEST_DECADES),
     };
     axes.draw(page);
-    for curve in &curves {
-        if let Some(allowed) = curve.allowed {
+    for (curve, allowed) in curves.iter().zip(allowed) {
+        if let Some(allowed) = allowed {
             let stroke = Stroke::new(curve.color, 1.0).dashed(true);
             axes.curve(page, &[(0.0, allowed), (1.0, allowed)], stroke);
         }

@@ -1,8 +1,8 @@
 //! Where the energy of a moving leaf is, in time.
 
-use super::axes::Axes;
+use super::axes::{Axes, Curve};
 use super::axis::Axis;
-use super::colors::{CURVES, Color, INK};
+use super::colors::{CURVES, INK};
 use super::drawing::{Drawing, Stroke};
 use super::header;
 use super::key::Key;
@@ -18,19 +18,6 @@ const BETWEEN: f64 = 30.0;
 const BOTTOM: f64 = 4.0;
 /// Right of the panels, for the key.
 const KEY: f64 = 200.0;
-
-/// One energy in time.
-struct Curve {
-    name: &'static str,
-    color: Color,
-    points: Vec<(f64, f64)>,
-}
-
-impl Curve {
-    fn values(&self) -> impl Iterator<Item = f64> {
-        self.points.iter().map(|point| point.1)
-    }
-}
 
 /// What all pictures say of a simulation.
 pub fn notes(record: &Record) -> Vec<String> {

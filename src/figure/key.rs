@@ -12,7 +12,7 @@ use super::page::{Cell, LEFT, RIGHT, TEXT_SIZE, TICK_SIZE};
 const GAP: f64 = 7.0;
 const LINE: f64 = 15.0;
 /// Between entries, one below the other or one beside the other.
-const BETWEEN: f64 = 9.0;
+const BETWEEN: f64 = 7.0;
 const BESIDE: f64 = 20.0;
 const ROW: f64 = 20.0;
 const SAMPLE_HEIGHT: f64 = 12.0;

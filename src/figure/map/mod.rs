@@ -50,10 +50,9 @@ pub fn draw(map: &Map) -> Drawing {
         end = draw_key(page, map, NOTE_BASE + 20.0);
     });
     let axes: Vec<Varied> = map.request.axes.iter().map(Varied::of).collect();
-    drawing.height = match axes.as_slice() {
-        [x] => draw_strips(&mut drawing, map, x, end),
-        [x, y, ..] => draw_panels(&mut drawing, map, x, y, end),
-        [] => end,
+    drawing.height = match axes.split_first() {
+        Some((x, more)) => draw_panels(&mut drawing, map, x, more.first(), end),
+        None => end,
     };
     drawing
 }
@@ -156,68 +155,79 @@ fn count(map: &Map, method: MapMethod) -> String {
     format!("{right} of {} right", map.request.cells())
 }
 
-fn draw_panel(page: &mut Drawing, map: &Map, method: MapMethod, panel: &Panel) {
-    panel.draw(page, &tiles(map, method));
-    if method == MapMethod::ExplicitMotion && has_step_axis(map) {
-        panel.draw_bound(page, &map.request);
-    }
-}
-
-/// One axis: a strip for every method. Returns the height of the page.
-fn draw_strips(drawing: &mut Drawing, map: &Map, x: &Varied, start: f64) -> f64 {
-    let mut cell = Cell {
-        corner: DVec2::new(LEFT + METHOD, start + 10.0),
-        size: DVec2::new(WIDTH - RIGHT - COUNT - LEFT - METHOD, STRIP),
+/// A panel for every method or, with one axis, a strip. Returns the height of
+/// the page.
+fn draw_panels(
+    drawing: &mut Drawing,
+    map: &Map,
+    x: &Varied,
+    y: Option<&Varied>,
+    start: f64,
+) -> f64 {
+    let methods = &map.request.methods;
+    let columns = match y {
+        Some(_) => methods.len().clamp(1, MOST_COLUMNS),
+        None => 1,
     };
-    let methods = &map.request.methods;
-    for (i, &method) in methods.iter().enumerate() {
-        drawing.group(method.word(), |page| {
-            let [left, right] = cell.midline();
-            let air = DVec2::new(10.0, 0.0);
-            page.beside(left - air, method.word(), TEXT_SIZE, Anchor::End, INK);
-            let count = count(map, method);
-            page.beside(right + air, &count, TICK_SIZE, Anchor::Start, NOTE);
-            let last = i + 1 == methods.len();
-            let panel = Panel::new(cell, x, None, last);
-            draw_panel(page, map, method, &panel);
-        });
-        cell.corner.y += STRIP + STRIP_GAP;
-    }
-    let below = cell.corner.y - STRIP_GAP + TICKS + 16.0;
-    let middle = DVec2::new(cell.middle().x, below);
-    drawing.label(middle, &x.axis.title(), TEXT_SIZE, Anchor::Middle, INK);
-    below + 12.0
-}
-
-/// Two axes: a panel for every method. Returns the height of the page.
-fn draw_panels(drawing: &mut Drawing, map: &Map, x: &Varied, y: &Varied, start: f64) -> f64 {
-    let methods = &map.request.methods;
-    let columns = methods.len().clamp(1, MOST_COLUMNS);
-    let left = LEFT + 18.0;
-    let room = WIDTH - RIGHT - left - (columns - 1) as f64 * GAP;
-    let width = (room / columns as f64).min(WIDEST);
-    let size = DVec2::new(width, SHAPE * width);
-    let pitch = size + DVec2::new(GAP, PANEL_TITLE + TICKS + 6.0);
-    let rows = methods.len().div_ceil(columns);
+    let (corner, size, pitch) = match y {
+        Some(_) => {
+            let left = LEFT + 18.0;
+            let room = WIDTH - RIGHT - left - (columns - 1) as f64 * GAP;
+            let width = (room / columns as f64).min(WIDEST);
+            let size = DVec2::new(width, SHAPE * width);
+            let pitch = size + DVec2::new(GAP, PANEL_TITLE + TICKS + 6.0);
+            (DVec2::new(left, start + PANEL_TITLE), size, pitch)
+        }
+        None => {
+            let left = LEFT + METHOD;
+            let size = DVec2::new(WIDTH - RIGHT - COUNT - left, STRIP);
+            let pitch = DVec2::new(0.0, STRIP + STRIP_GAP);
+            (DVec2::new(left, start + 10.0), size, pitch)
+        }
+    };
+    let mut last = Cell { corner, size };
     for (i, &method) in methods.iter().enumerate() {
         let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
-        let corner = DVec2::new(left, start + PANEL_TITLE) + place * pitch;
+        let cell = Cell {
+            corner: corner + place * pitch,
+            size,
+        };
+        let labelled = y.is_some() || i + 1 == methods.len();
         drawing.group(method.word(), |page| {
-            let base = corner - DVec2::new(0.0, 8.0);
-            page.label(base, method.word(), TEXT_SIZE, Anchor::Start, INK);
-            let base = base + DVec2::new(size.x, 0.0);
-            page.label(base, &count(map, method), TICK_SIZE, Anchor::End, NOTE);
-            let panel = Panel::new(Cell { corner, size }, x, Some(y), true);
-            draw_panel(page, map, method, &panel);
+            draw_method(page, map, method, cell, y.is_some());
+            let panel = Panel::new(cell, x, y, labelled);
+            panel.draw(page, &tiles(map, method));
+            if method == MapMethod::ExplicitMotion && has_step_axis(map) {
+                panel.draw_bound(page, &map.request);
+            }
         });
+        last = cell;
     }
-    let across = columns as f64 * pitch.x - GAP;
-    let end = start + rows as f64 * pitch.y - 6.0;
-    let below = DVec2::new(left + 0.5 * across, end + 12.0);
+    let end = last.end().y + TICKS;
+    let across = columns as f64 * (size.x + GAP) - GAP;
+    let below = DVec2::new(corner.x + 0.5 * across, end + 12.0);
     drawing.label(below, &x.axis.title(), TEXT_SIZE, Anchor::Middle, INK);
-    let beside = DVec2::new(24.0, 0.5 * (start + PANEL_TITLE + end - TICKS));
-    drawing.upright_label(beside, &y.axis.title(), TEXT_SIZE, INK);
+    if let Some(y) = y {
+        let beside = DVec2::new(24.0, 0.5 * (corner.y + last.end().y));
+        drawing.upright_label(beside, &y.axis.title(), TEXT_SIZE, INK);
+    }
     end + NAME
+}
+
+/// A method's name and how often it was right, above a panel or beside a strip.
+fn draw_method(page: &mut Drawing, map: &Map, method: MapMethod, cell: Cell, above: bool) {
+    let (name, count) = (method.word(), count(map, method));
+    if above {
+        let base = cell.corner - DVec2::new(0.0, 8.0);
+        page.label(base, name, TEXT_SIZE, Anchor::Start, INK);
+        let base = base.with_x(cell.end().x);
+        page.label(base, &count, TICK_SIZE, Anchor::End, NOTE);
+    } else {
+        let [left, right] = cell.midline();
+        let air = DVec2::new(10.0, 0.0);
+        page.beside(left - air, name, TEXT_SIZE, Anchor::End, INK);
+        page.beside(right + air, &count, TICK_SIZE, Anchor::Start, NOTE);
+    }
 }
 
 #[cfg(test)]
