@@ -70,7 +70,7 @@ fn help_names_every_option_and_exit_status() {
         --set
         --out
         --json
-        relaxed-shooting
+        shooting-from-rest
         0 charted
         do not confirm the reference
         2 the request was refused",
@@ -80,7 +80,7 @@ fn help_names_every_option_and_exit_status() {
 #[test]
 fn a_leaf_is_charted_and_written_down() {
     let place = Workplace::new();
-    let methods = "semi-implicit,semi-implicit-grid,single-shooting,relaxed-shooting";
+    let methods = "semi-implicit,semi-implicit-grid,single-shooting,shooting-from-rest";
     let run = place.run(&format!("chart {TWO} --seconds 0.05 --methods {methods}"));
     run.ok().says(&[
         "small: 2 veins joined at the tip, speed against accuracy",
@@ -103,7 +103,7 @@ fn a_leaf_is_charted_and_written_down() {
 #[test]
 fn table_and_json_say_the_same_and_the_front_is_not_beaten() {
     let place = Workplace::new();
-    let methods = "semi-implicit,semi-implicit-grid,relaxed-shooting";
+    let methods = "semi-implicit,semi-implicit-grid,shooting-from-rest";
     let (rows, chart) = chart(&place, TWO, methods);
     assert_eq!(chart["scenario"], "small");
     assert_eq!(chart["rods"], 2);
@@ -182,7 +182,7 @@ fn single_grids_are_of_second_order() {
 
 #[test]
 fn tolerances_are_kept_and_estimates_are_bounds() {
-    let methods = "semi-implicit,explicit,single-shooting,multiple-shooting,relaxed-shooting";
+    let methods = "semi-implicit,explicit,single-shooting,shooting,shooting-from-rest";
     let (rows, chart) = chart(&Workplace::new(), TWO, methods);
     let floor = chart["reference"]["known_within"].as_f64().unwrap();
     assert_eq!(rows.len(), 50);
@@ -206,7 +206,7 @@ fn tolerances_are_kept_and_estimates_are_bounds() {
 fn all_but_times_is_the_same_every_time() {
     let place = Workplace::new();
     let two = || {
-        let methods = "semi-implicit,semi-implicit-grid,relaxed-shooting";
+        let methods = "semi-implicit,semi-implicit-grid,shooting-from-rest";
         let (mut rows, _) = chart(&place, TWO, methods);
         let timed = |column: &str| column.starts_with("seconds") || column == "runs";
         for row in &mut rows {
@@ -222,7 +222,7 @@ fn all_but_times_is_the_same_every_time() {
 fn what_fails_is_shown_with_the_reason() {
     let place = Workplace::new();
     let pulled = "scenarios/paper/fig08.toml --set leaf.rods=5 --set load.tip_force=[5,0,0]";
-    let (rows, chart) = chart(&place, pulled, "single-shooting,relaxed-shooting");
+    let (rows, chart) = chart(&place, pulled, "single-shooting,shooting-from-rest");
     let single = of(&rows, "single-shooting");
     assert_eq!(single.len(), 10, "failures are not left out");
     assert_eq!(single[0]["outcome"], "not-at-rest");
@@ -234,7 +234,7 @@ fn what_fails_is_shown_with_the_reason() {
     }
     let remark = chart["runs"][0]["remark"].as_str().unwrap();
     contains(remark, &["use more intervals"]);
-    let relaxed = of(&rows, "relaxed-shooting");
+    let relaxed = of(&rows, "shooting-from-rest");
     assert!(relaxed.iter().any(|row| row["pareto"] == "true"));
     contains(&place.picture("out/chart"), &[">not-at-rest</text>"]);
 }
@@ -254,10 +254,10 @@ fn where_errors_tell_little_it_is_said() {
 #[test]
 fn a_saddle_is_no_solution() {
     let column = "scenarios/classic/elastica_buckled.toml";
-    let methods = "semi-implicit,multiple-shooting";
+    let methods = "semi-implicit,shooting";
     let (rows, chart) = chart(&Workplace::new(), column, methods);
     assert_eq!(chart["reference"]["confirmed"], true);
-    for row in of(&rows, "multiple-shooting") {
+    for row in of(&rows, "shooting") {
         assert_eq!(row["outcome"], "saddle");
         assert!(number(row, "true_error").unwrap() > 1e-2);
         assert_eq!(row["pareto"], "false");
@@ -282,7 +282,7 @@ fn what_a_method_cannot_do_is_told_and_the_others_are_charted() {
 #[test]
 fn profiles_with_knots_anywhere_have_a_reference_at_every_station() {
     let knots = "stiffness.bending_2={at=[0.0,0.3,0.37,1.0],value=[1.0,0.9,0.3,0.2]}";
-    let methods = "semi-implicit,semi-implicit-grid,relaxed-shooting";
+    let methods = "semi-implicit,semi-implicit-grid,shooting-from-rest";
     let leaf = format!("{TWO} --set {knots}");
     let (rows, chart) = chart(&Workplace::new(), &leaf, methods);
     assert_eq!(chart["reference"]["confirmed"], true);
@@ -364,7 +364,7 @@ fn malformed_tables_are_refused_with_file_and_line() {
 #[test]
 fn cost_is_charted_against_the_number_of_veins() {
     let place = Workplace::new();
-    let methods = "--methods semi-implicit,semi-implicit-grid,relaxed-shooting";
+    let methods = "--methods semi-implicit,semi-implicit-grid,shooting-from-rest";
     let how = "--seconds 0.05 --rods 3,2 --tolerance 1e-3";
     let run = place.run(&format!("chart {TWO} {methods} {how}")).ends(0);
     run.says(&[
@@ -391,8 +391,8 @@ fn cost_is_charted_against_the_number_of_veins() {
             "semi-implicit 3",
             "semi-implicit-grid 2",
             "semi-implicit-grid 3",
-            "relaxed-shooting 2",
-            "relaxed-shooting 3",
+            "shooting-from-rest 2",
+            "shooting-from-rest 3",
         ]
     );
     for row in &rows {

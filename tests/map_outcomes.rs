@@ -4,12 +4,17 @@
 mod common;
 
 use common::{entries, path};
+use leafdyn::relax::Method;
 use leafdyn::study::{Base, Confidence, MapMethod, MapOutcome, MapRequest, MapRow};
 
-use MapMethod::{
-    Explicit, ExplicitMotion, SemiImplicit, Shooting, ShootingFromRest, SingleShooting,
-};
 use MapOutcome::{Diverged, NotConverged, OtherEquilibrium, OutOfTime, Right, Saddle};
+
+const SEMI_IMPLICIT: MapMethod = MapMethod::ToRest(Method::ALL[0]);
+const EXPLICIT: MapMethod = MapMethod::ToRest(Method::ALL[1]);
+const EXPLICIT_MOTION: MapMethod = MapMethod::ExplicitMotion;
+const SINGLE_SHOOTING: MapMethod = MapMethod::ToRest(Method::ALL[2]);
+const SHOOTING: MapMethod = MapMethod::ToRest(Method::ALL[3]);
+const SHOOTING_FROM_REST: MapMethod = MapMethod::ToRest(Method::ALL[4]);
 
 const H: &str = "stiffness.axial+stiffness.shear_2+stiffness.shear_3";
 
@@ -57,7 +62,7 @@ fn explicit_motion_is_right_only_below_its_bound_and_where_little_is_stretched()
         ("1", "5e-3", NotConverged, "still moves"),
     ] {
         let values = [(H, h), ("method.step", step)];
-        let rows = cell("fig04", set, &values, &[ExplicitMotion], LONG);
+        let rows = cell("fig04", set, &values, &[EXPLICIT_MOTION], LONG);
         expect(&rows, &[outcome]);
         assert!(rows[0].detail.contains(says), "{}", rows[0].detail);
         assert_eq!(rows[0].reference, Confidence::Confirmed);
@@ -73,11 +78,11 @@ fn soft(bending: &str, load: &str, methods: &[MapMethod], seconds: f64) -> Vec<M
 #[test]
 fn all_methods_are_right_on_a_stiff_leaf() {
     let methods = [
-        SemiImplicit,
-        Explicit,
-        SingleShooting,
-        Shooting,
-        ShootingFromRest,
+        SEMI_IMPLICIT,
+        EXPLICIT,
+        SINGLE_SHOOTING,
+        SHOOTING,
+        SHOOTING_FROM_REST,
     ];
     let rows = soft("1", "-1", &methods, LONG);
     expect(&rows, &[Right; 5]);
@@ -89,7 +94,7 @@ fn all_methods_are_right_on_a_stiff_leaf() {
 
 #[test]
 fn shooting_from_arcs_stays_on_the_flat_branch_of_a_softer_leaf() {
-    let methods = [SemiImplicit, SingleShooting, Shooting, ShootingFromRest];
+    let methods = [SEMI_IMPLICIT, SINGLE_SHOOTING, SHOOTING, SHOOTING_FROM_REST];
     let rows = soft("0.056234132519", "-1e-3", &methods, LONG);
     expect(&rows, &[Right, Saddle, Saddle, Right]);
     assert_eq!(rows[1].index, Some(2));
@@ -102,10 +107,10 @@ fn shooting_from_arcs_stays_on_the_flat_branch_of_a_softer_leaf() {
 
 #[test]
 fn single_shooting_loses_a_soft_heavy_leaf() {
-    let rows = soft("3.16227766017e-3", "-10", &[SingleShooting], SHORT);
+    let rows = soft("3.16227766017e-3", "-10", &[SINGLE_SHOOTING], SHORT);
     let outcome = rows[0].outcome;
     assert!([OutOfTime, NotConverged].contains(&outcome), "{rows:?}");
-    let rows = soft("3.16227766017e-3", "-10", &[ShootingFromRest], LONG);
+    let rows = soft("3.16227766017e-3", "-10", &[SHOOTING_FROM_REST], LONG);
     expect(&rows, &[Right]);
 }
 
@@ -114,21 +119,21 @@ fn single_shooting_loses_a_soft_heavy_leaf() {
 fn only_explicit_methods_feel_how_stiff_a_leaf_is() {
     let set = "leaf.rods=3; method.step=1e-3";
     let methods = [
-        SemiImplicit,
-        ExplicitMotion,
-        SingleShooting,
-        Shooting,
-        ShootingFromRest,
+        SEMI_IMPLICIT,
+        EXPLICIT_MOTION,
+        SINGLE_SHOOTING,
+        SHOOTING,
+        SHOOTING_FROM_REST,
     ];
     let rows = cell("fig04", set, &[(H, "1e10")], &methods, LONG);
     expect(&rows, &[Right, Diverged, Right, Right, Right]);
-    let rows = cell("fig04", set, &[(H, "1e10")], &[Explicit], SHORT);
+    let rows = cell("fig04", set, &[(H, "1e10")], &[EXPLICIT], SHORT);
     expect(&rows, &[OutOfTime]);
-    let rows = cell("fig04", set, &[(H, "1e4")], &[Explicit], LONG);
+    let rows = cell("fig04", set, &[(H, "1e4")], &[EXPLICIT], LONG);
     expect(&rows, &[OtherEquilibrium]);
     let rigid = format!("{set}; stiffness.axial=inf");
     let values = [("stiffness.shear_2", "100")];
-    let rows = cell("fig04", &rigid, &values, &[SemiImplicit, Explicit], LONG);
+    let rows = cell("fig04", &rigid, &values, &[SEMI_IMPLICIT, EXPLICIT], LONG);
     expect(&rows, &[Right, MapOutcome::Refused]);
 }
 
@@ -139,11 +144,11 @@ fn shooting_from_arcs_takes_saddles_for_answers_around_fig_10() {
         let values = [("stiffness.bending_2", bending), ("load.gravity[2]", load)];
         cell("fig10", "leaf.rods=5", &values, methods, LONG)
     };
-    let methods = [SemiImplicit, SingleShooting, Shooting, ShootingFromRest];
+    let methods = [SEMI_IMPLICIT, SINGLE_SHOOTING, SHOOTING, SHOOTING_FROM_REST];
     let rows = around("0.1", "-0.002", &methods);
     expect(&rows, &[Right, Saddle, Saddle, Right]);
     assert_eq!(rows[2].index, Some(18));
-    let rows = around("0.158489319246", "-0.2", &[SemiImplicit, Explicit]);
+    let rows = around("0.158489319246", "-0.2", &[SEMI_IMPLICIT, EXPLICIT]);
     expect(&rows, &[Right, OtherEquilibrium]);
     // The default is not at the least energy there.
     assert!(rows[1].energy.unwrap() < rows[0].energy.unwrap() - 0.1);

@@ -8,6 +8,7 @@ use super::drawing::Drawing;
 use super::header;
 use super::markers::Marker;
 use super::page::{HEADER, LEFT};
+use crate::relax::Method;
 use crate::report::numbers::power_of_ten;
 use crate::report::words::contender;
 use crate::study::{Chart, Contender, Peer, Row, Scaling};
@@ -120,14 +121,14 @@ fn places(series: &[Series]) -> (Vec<f64>, Vec<f64>) {
 
 /// Colour, the same for methods of one kind, and marker of a contender.
 fn style(who: Contender) -> (Color, Marker) {
-    match who {
-        Contender::SemiImplicit => (BLUE, Marker::Circle),
-        Contender::SemiImplicitGrid => (SKY, Marker::Square),
-        Contender::Explicit => (VERMILION, Marker::Circle),
-        Contender::ExplicitGrid => (ORANGE, Marker::Square),
-        Contender::SingleShooting => (GREEN, Marker::Triangle),
-        Contender::MultipleShooting => (PURPLE, Marker::Wedge),
-        Contender::RelaxedShooting => (SLATE, Marker::Diamond),
+    match (who.method, who.one_grid) {
+        (Method::SemiImplicit(_), false) => (BLUE, Marker::Circle),
+        (Method::SemiImplicit(_), true) => (SKY, Marker::Square),
+        (Method::Explicit { .. }, false) => (VERMILION, Marker::Circle),
+        (Method::Explicit { .. }, true) => (ORANGE, Marker::Square),
+        (Method::SingleShooting, _) => (GREEN, Marker::Triangle),
+        (Method::Shooting { .. }, _) => (PURPLE, Marker::Wedge),
+        (Method::ShootingFromRest { .. }, _) => (SLATE, Marker::Diamond),
     }
 }
 
@@ -137,9 +138,9 @@ fn contenders(rows: &[(usize, &Row)], over_veins: bool) -> Vec<Series> {
     let of = |who: Contender| {
         let (color, marker) = style(who);
         let mut series = Series {
-            name: match who {
-                Contender::SemiImplicit => format!("{} (default)", contender(who)),
-                _ => contender(who).into(),
+            name: match who.is_default() {
+                true => format!("{} (default)", contender(who)),
+                false => contender(who).into(),
             },
             color,
             dashed: false,

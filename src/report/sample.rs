@@ -12,8 +12,8 @@ use crate::relax::{
 use crate::shape::Difference;
 use crate::simulate::{Frame, Moment, Record, Scheme, Still};
 use crate::study::{
-    Base, Chart, Check, Confidence, Contender, Ending, Map, MapMethod, MapOutcome, MapRequest,
-    MapRow, Peer, Reference, Row, Scaling, ScalingRow, Setting, Shot, Spread,
+    Base, Chart, Check, Confidence, Ending, Map, MapMethod, MapOutcome, MapRequest, MapRow, Peer,
+    Reference, Row, Scaling, ScalingRow, Setting, Shot, Spread,
 };
 use crate::undulation::{Undulation, Vein};
 
@@ -153,7 +153,7 @@ pub fn map() -> Map {
     .unwrap();
     let row = |cell: usize, method: MapMethod| {
         let outcome = match method {
-            MapMethod::SemiImplicit if cell < 5 => MapOutcome::Right,
+            MapMethod::ToRest(Method::SemiImplicit(_)) if cell < 5 => MapOutcome::Right,
             _ => MapOutcome::ALL[cell],
         };
         let rests = !matches!(
@@ -280,7 +280,8 @@ fn spread(median: f64) -> Spread {
     }
 }
 
-fn row(contender: Contender, knob: Setting, seconds: f64, error: f64) -> Row {
+fn row(contender: &str, knob: Setting, seconds: f64, error: f64) -> Row {
+    let contender = contender.parse().unwrap();
     Row {
         seconds: Some(spread(seconds)),
         steps: Some(8),
@@ -292,8 +293,8 @@ fn row(contender: Contender, knob: Setting, seconds: f64, error: f64) -> Row {
     }
 }
 
-fn not_run(contender: Contender, knob: Setting) -> Row {
-    Row::without_result(contender, knob, Ending::NotRun)
+fn not_run(contender: &str, knob: Setting) -> Row {
+    Row::without_result(contender.parse().unwrap(), knob, Ending::NotRun)
 }
 
 /// A chart of few points, two failures and a peer.
@@ -325,20 +326,20 @@ pub fn chart() -> Chart {
         }),
         remarks: vec!["1 row of --peers is about another leaf, and left out".into()],
         rows: vec![
-            row(Contender::SemiImplicit, Tolerance(1e-2), 1e-3, 1e-4),
-            row(Contender::SemiImplicit, Tolerance(1e-6), 2e-3, 1e-8),
+            row("semi-implicit", Tolerance(1e-2), 1e-3, 1e-4),
+            row("semi-implicit", Tolerance(1e-6), 2e-3, 1e-8),
             Row {
                 error_estimate: None,
-                ..row(Contender::SemiImplicitGrid, Segments(4), 5e-4, 9e-3)
+                ..row("semi-implicit-grid", Segments(4), 5e-4, 9e-3)
             },
-            row(Contender::Explicit, Tolerance(1e-2), 2e-2, 1e-4),
-            not_run(Contender::Explicit, Tolerance(1e-11)),
+            row("explicit", Tolerance(1e-2), 2e-2, 1e-4),
+            not_run("explicit", Tolerance(1e-11)),
             Row {
                 true_error: None,
                 error_estimate: None,
                 ending: Ending::Ended(Outcome::NotAtRest),
                 remark: Some("perturbations grow".into()),
-                ..row(Contender::SingleShooting, Tolerance(1e-6), 7e-2, 1.0)
+                ..row("single-shooting", Tolerance(1e-6), 7e-2, 1.0)
             },
         ],
         peers: vec![
@@ -360,10 +361,10 @@ pub fn scaling() -> Scaling {
         tolerance: 1e-6,
         unconfirmed: Vec::new(),
         rows: vec![
-            found(5, row(Contender::SemiImplicit, knob, 1e-3, 1e-8)),
-            found(15, row(Contender::SemiImplicit, knob, 3e-3, 1e-8)),
-            found(5, row(Contender::Explicit, knob, 3e-2, 1e-8)),
-            found(15, not_run(Contender::Explicit, knob)),
+            found(5, row("semi-implicit", knob, 1e-3, 1e-8)),
+            found(15, row("semi-implicit", knob, 3e-3, 1e-8)),
+            found(5, row("explicit", knob, 3e-2, 1e-8)),
+            found(15, not_run("explicit", knob)),
         ],
     }
 }

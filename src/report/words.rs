@@ -1,7 +1,7 @@
 //! Sentences about a result that the figure and the command line share.
 
 use crate::branch::{End, Stuck};
-use crate::relax::{Equilibrium, Outcome};
+use crate::relax::{Equilibrium, Method, Outcome};
 use crate::study::{Contender, Verdict};
 
 /// How the run ended and what was found, in one phrase.
@@ -59,14 +59,14 @@ pub fn headline(verdict: &Verdict) -> &'static str {
 
 /// A way to bring a leaf to rest, as a chart names it.
 pub fn contender(contender: Contender) -> &'static str {
-    match contender {
-        Contender::SemiImplicit => "semi-implicit, extrapolated",
-        Contender::SemiImplicitGrid => "semi-implicit, single grids",
-        Contender::Explicit => "explicit, extrapolated",
-        Contender::ExplicitGrid => "explicit, single grids",
-        Contender::SingleShooting => "single shooting",
-        Contender::MultipleShooting => "multiple shooting",
-        Contender::RelaxedShooting => "shooting from the relaxed leaf",
+    match (contender.method, contender.one_grid) {
+        (Method::SemiImplicit(_), false) => "semi-implicit, extrapolated",
+        (Method::SemiImplicit(_), true) => "semi-implicit, single grids",
+        (Method::Explicit { .. }, false) => "explicit, extrapolated",
+        (Method::Explicit { .. }, true) => "explicit, single grids",
+        (Method::SingleShooting, _) => "single shooting",
+        (Method::Shooting { .. }, _) => "multiple shooting",
+        (Method::ShootingFromRest { .. }, _) => "shooting from the relaxed leaf",
     }
 }
 

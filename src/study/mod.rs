@@ -7,6 +7,7 @@ mod judge;
 mod map;
 mod trace;
 mod vary;
+mod words;
 
 pub use all::{All, Found, all};
 pub use chart::{
@@ -16,10 +17,11 @@ pub use chart::{
 pub use check::{Check, CheckOptions, Place, Quantity, Shot, Verdict, check};
 pub use map::{
     CELL_SECONDS, Confidence, Map, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow, MapShow,
-    UnknownWord, map,
+    map,
 };
 pub use trace::{
     Law, MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceError, TracePoint,
     TraceRequest, trace,
 };
 pub use vary::{Base, Keys, Knob, Knobs, Target, Varied, Vary, VaryError};
+pub use words::UnknownWord;

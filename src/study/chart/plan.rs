@@ -4,27 +4,18 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
+use crate::relax::Method;
 use crate::scenario::Scenario;
+use crate::study::words::words;
 
 /// A way to bring a leaf to rest, with one knob for its accuracy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Contender {
-    /// Semi-implicit on nested grids with extrapolation: what
-    /// [`crate::relax::relax`] does unless told otherwise.
-    SemiImplicit,
-    /// Semi-implicit on one grid.
-    SemiImplicitGrid,
-    /// Explicit on nested grids with extrapolation.
-    Explicit,
-    /// Explicit on one grid.
-    ExplicitGrid,
-    /// The boundary-value problem from arcs, over one interval.
-    SingleShooting,
-    /// The boundary-value problem from arcs, over as many intervals as the
-    /// growth of perturbations needs.
-    MultipleShooting,
-    /// The boundary-value problem from a coarsely relaxed leaf.
-    RelaxedShooting,
+pub struct Contender {
+    /// The method; whether it has one grid says the knob.
+    pub method: Method,
+    /// Whether it is on one grid, whose segments are then its knob, and not on
+    /// nested grids with extrapolation.
+    pub one_grid: bool,
 }
 
 /// What is set to make a contender more accurate.
@@ -43,54 +34,49 @@ const TOLERANCES: [f64; 10] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1
 pub(super) const SEGMENTS: [usize; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
 
 impl Contender {
-    /// All of them.
-    pub const ALL: [Contender; 7] = [
-        Contender::SemiImplicit,
-        Contender::SemiImplicitGrid,
-        Contender::Explicit,
-        Contender::ExplicitGrid,
-        Contender::SingleShooting,
-        Contender::MultipleShooting,
-        Contender::RelaxedShooting,
-    ];
+    /// All of them; the first is the default.
+    pub const ALL: [Contender; 7] = {
+        const fn of(method: usize, one_grid: bool) -> Contender {
+            Contender {
+                method: Method::ALL[method],
+                one_grid,
+            }
+        }
+        [
+            of(0, false),
+            of(0, true),
+            of(1, false),
+            of(1, true),
+            of(2, false),
+            of(3, false),
+            of(4, false),
+        ]
+    };
 
     /// The word used on the command line and in files.
     pub fn word(self) -> &'static str {
-        match self {
-            Contender::SemiImplicit => "semi-implicit",
-            Contender::SemiImplicitGrid => "semi-implicit-grid",
-            Contender::Explicit => "explicit",
-            Contender::ExplicitGrid => "explicit-grid",
-            Contender::SingleShooting => "single-shooting",
-            Contender::MultipleShooting => "multiple-shooting",
-            Contender::RelaxedShooting => "relaxed-shooting",
+        match (self.method, self.one_grid) {
+            (Method::SemiImplicit(_), true) => "semi-implicit-grid",
+            (Method::Explicit { .. }, true) => "explicit-grid",
+            (method, _) => method.word(),
         }
     }
 
-    /// Whether it is what a relaxation does unless told otherwise.
+    /// Whether it is what [`crate::relax::relax`] does unless told otherwise.
     pub fn is_default(self) -> bool {
-        self == Contender::SemiImplicit
-    }
-
-    /// Whether its knob is the number of segments of its only grid.
-    pub fn on_one_grid(self) -> bool {
-        matches!(self, Contender::SemiImplicitGrid | Contender::ExplicitGrid)
+        self == Contender::ALL[0]
     }
 
     /// The settings of its knob that are charted, from coarse to fine.
     pub fn knobs(self) -> Vec<Setting> {
-        match self.on_one_grid() {
+        match self.one_grid {
             true => SEGMENTS.map(Setting::Segments).to_vec(),
             false => TOLERANCES.map(Setting::Tolerance).to_vec(),
         }
     }
 }
 
-impl Serialize for Contender {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.word())
-    }
-}
+words!(Contender);
 
 impl Serialize for Setting {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -141,10 +127,15 @@ mod tests {
     }
 
     #[test]
-    fn every_contender_has_its_own_word() {
-        let mut words = Contender::ALL.map(Contender::word).to_vec();
-        words.sort_unstable();
-        words.dedup();
-        assert_eq!(words.len(), Contender::ALL.len());
+    fn every_contender_has_its_own_word_and_old_words_are_understood() {
+        for contender in Contender::ALL {
+            assert_eq!(contender.word().parse(), Ok(contender));
+        }
+        for (old, new) in [
+            ("multiple-shooting", "shooting"),
+            ("relaxed-shooting", "shooting-from-rest"),
+        ] {
+            assert_eq!(old.parse::<Contender>().unwrap().word(), new);
+        }
     }
 }

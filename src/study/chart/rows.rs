@@ -5,7 +5,7 @@ use super::plan::{Cell, Contender};
 use super::reference::Reference;
 use super::timing::{Measured, Spread};
 use super::{Ending, Row};
-use crate::relax::Outcome;
+use crate::relax::{Method, Outcome};
 use crate::scenario::Scenario;
 use crate::study::judge::{Answer, common, longest};
 
@@ -79,7 +79,7 @@ fn is_elsewhere(i: usize, judged: &[Judged], unit: f64) -> bool {
     if error <= ELSEWHERE {
         return false;
     }
-    if !this.cell.contender.on_one_grid() {
+    if !this.cell.contender.one_grid {
         let estimate = answer.error_estimate.map(|estimate| estimate / unit);
         return estimate.is_some_and(|estimate| estimate < MUCH_LESS * error);
     }
@@ -151,7 +151,7 @@ pub fn remarks(
     let mut remarks = Vec::new();
     if contenders
         .iter()
-        .any(|contender| matches!(contender, Contender::Explicit | Contender::ExplicitGrid))
+        .any(|contender| matches!(contender.method, Method::Explicit { .. }))
     {
         remarks.push(
             "explicit relaxation has no knob for its time step: it takes the longest stable one"
@@ -257,9 +257,9 @@ mod tests {
     }
 
     /// The rows of a contender that found this at its first settings.
-    fn judged(contender: Contender, mut measured: Vec<Measured>) -> Vec<Row> {
+    fn judged(contender: &str, mut measured: Vec<Measured>) -> Vec<Row> {
         let scenario = scenario();
-        let cells = plan::cells(&scenario, &[contender]);
+        let cells = plan::cells(&scenario, &[contender.parse().unwrap()]);
         measured.resize_with(cells.len(), || Measured {
             found: None,
             seconds: Vec::new(),
@@ -271,7 +271,7 @@ mod tests {
     #[test]
     fn errors_are_relative_and_remarks_are_for_failures() {
         let row = &judged(
-            Contender::SemiImplicit,
+            "semi-implicit",
             vec![found(Outcome::Converged, 2e-4, Some(3e-4))],
         )[0];
         assert_eq!(row.true_error, Some(1e-4));
@@ -283,7 +283,7 @@ mod tests {
     #[test]
     fn what_ends_elsewhere_is_no_success() {
         let rows = judged(
-            Contender::MultipleShooting,
+            "shooting",
             vec![
                 found(Outcome::Converged, 0.5, Some(1e-3)),
                 found(Outcome::Saddle, 0.5, Some(1e-3)),
@@ -319,14 +319,14 @@ mod tests {
     fn a_coarse_grid_is_not_called_another_equilibrium() {
         let at = |shift| found(Outcome::Converged, shift, None);
         let coarse = vec![at(1.6), at(0.4), at(0.1), at(0.025)];
-        let rows = judged(Contender::SemiImplicitGrid, coarse);
+        let rows = judged("semi-implicit-grid", coarse);
         assert!(rows[..4].iter().all(|row| row.ending.is_success()));
         let elsewhere = vec![at(0.52), at(0.51), at(0.505)];
-        let rows = judged(Contender::SemiImplicitGrid, elsewhere);
+        let rows = judged("semi-implicit-grid", elsewhere);
         let other = Ending::OtherEquilibrium;
         assert!(rows[..3].iter().all(|row| row.ending == other));
         let astray = vec![at(0.4), at(0.1), at(0.5), at(6e-3)];
-        let rows = judged(Contender::SemiImplicitGrid, astray);
+        let rows = judged("semi-implicit-grid", astray);
         let astray: Vec<bool> = rows.iter().map(|row| row.ending == other).collect();
         assert_eq!(astray[..4], [false, false, true, false]);
     }
@@ -337,14 +337,14 @@ mod tests {
             found: Some(Err(RelaxError::Rigid)),
             seconds: Vec::new(),
         };
-        let mut rows = judged(Contender::Explicit, (0..10).map(refused).collect());
+        let mut rows = judged("explicit", (0..10).map(refused).collect());
         assert!(rows.iter().all(|row| row.ending == Ending::Refused));
         let semi_implicit = vec![
             found(Outcome::Converged, 2e-4, Some(1e-5)),
             found(Outcome::Converged, 2e-12, Some(1e-15)),
         ];
-        rows.extend(judged(Contender::SemiImplicit, semi_implicit));
-        let contenders = [Contender::Explicit, Contender::SemiImplicit];
+        rows.extend(judged("semi-implicit", semi_implicit));
+        let contenders = ["explicit", "semi-implicit"].map(|word| word.parse().unwrap());
         let mut reference = Reference {
             confirmed: true,
             told: String::new(),

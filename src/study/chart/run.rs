@@ -1,6 +1,6 @@
 //! One run of one cell.
 
-use super::plan::{Cell, Contender, Setting};
+use super::plan::{Cell, Setting};
 use crate::bvp::{self, Reason};
 use crate::relax::{Method, Options, Outcome, RelaxError};
 use crate::scenario::Scenario;
@@ -20,20 +20,12 @@ pub fn run(cell: &Cell) -> Result<(Answer, f64), RelaxError> {
         Setting::Tolerance(tolerance) => (Some(tolerance), None),
         Setting::Segments(segments) => (None, Some(segments)),
     };
-    let method = match cell.contender {
-        Contender::SemiImplicit | Contender::SemiImplicitGrid => {
-            Method::default().on_grid(segments)
-        }
-        Contender::Explicit | Contender::ExplicitGrid => Method::Explicit { segments },
-        Contender::SingleShooting => Method::SingleShooting,
-        Contender::MultipleShooting => Method::Shooting { intervals: None },
-        Contender::RelaxedShooting => {
-            let accuracy = tolerance.unwrap_or(cell.scenario.tolerance);
-            return shoot_from_rest(cell.scenario, accuracy);
-        }
-    };
+    if let Method::ShootingFromRest { .. } = cell.contender.method {
+        let accuracy = tolerance.unwrap_or(cell.scenario.tolerance);
+        return shoot_from_rest(cell.scenario, accuracy);
+    }
     let options = Options {
-        method,
+        method: cell.contender.method.on_grid(segments),
         tolerance,
         ..Options::default()
     };

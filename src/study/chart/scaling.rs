@@ -4,7 +4,7 @@ use super::plan::{Cell, Contender, SEGMENTS, Setting};
 use super::reference;
 use super::run::run;
 use super::{ChartError, ChartOptions, Ending, Row, Turn, alone, rows, timing};
-use crate::relax::{MAX_NODES, Outcome, RelaxError, check_tolerance};
+use crate::relax::{MAX_NODES, Method, Outcome, RelaxError, check_tolerance};
 use crate::scenario::Scenario;
 use crate::study::judge::{Answer, longest};
 use serde::Serialize;
@@ -79,7 +79,7 @@ fn measure(
     progress: &mut (dyn FnMut(&Turn) + Send),
 ) -> Result<Found, RelaxError> {
     let mut contenders = options.contenders.iter();
-    let any_grid = contenders.any(|contender| contender.on_one_grid());
+    let any_grid = contenders.any(|contender| contender.one_grid);
     let mut unconfirmed = Vec::new();
     let leaves = leaves.iter().map(|&scenario| {
         let (found, reference) = reference::find(scenario, Vec::new())?.unzip();
@@ -102,7 +102,7 @@ fn measure(
     let (mut cells, mut of_leaf, mut rows) = (Vec::new(), Vec::new(), Vec::new());
     for &contender in &options.contenders {
         for leaf in &leaves {
-            let knob = match (contender.on_one_grid(), leaf.grid) {
+            let knob = match (contender.one_grid, leaf.grid) {
                 (false, _) => Setting::Tolerance(tolerance),
                 (true, Some(segments)) => Setting::Segments(segments),
                 (true, None) => {
@@ -142,7 +142,10 @@ fn accurate_grid(scenario: &Scenario, reference: &Answer, tolerance: f64) -> Opt
     let accurate = |&segments: &usize| {
         let cell = Cell {
             scenario,
-            contender: Contender::SemiImplicitGrid,
+            contender: Contender {
+                method: Method::default(),
+                one_grid: true,
+            },
             knob: Setting::Segments(segments),
         };
         let Ok((answer, _)) = run(&cell) else {

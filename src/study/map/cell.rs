@@ -103,22 +103,22 @@ impl<'a> Cell<'a> {
 
     fn answer(&self, method: MapMethod) -> (Found, f64) {
         let segments = self.knobs.segments;
-        if method == MapMethod::SemiImplicit && segments.is_none() {
+        let (scenario, tolerance) = (self.scenario, self.tolerance);
+        if let (MapMethod::ToRest(Method::SemiImplicit(_)), None) = (method, segments) {
             return self.relaxed.clone();
         }
-        let (scenario, tolerance) = (self.scenario, self.tolerance);
         within(self.limit, |deadline| match method {
-            MapMethod::SemiImplicit => {
-                let method = Method::default().on_grid(segments);
-                relaxed(scenario, method, tolerance, deadline)
-            }
-            MapMethod::Explicit => {
-                relaxed(scenario, Method::Explicit { segments }, tolerance, deadline)
-            }
             MapMethod::ExplicitMotion => motion::answer(scenario, self.knobs, tolerance, deadline),
-            MapMethod::SingleShooting => self.shoot(Start::Arcs, tolerance, Some(1), deadline),
-            MapMethod::Shooting => self.shoot(Start::Arcs, tolerance, None, deadline),
-            MapMethod::ShootingFromRest => self.shoot_from_rest(tolerance, deadline),
+            MapMethod::ToRest(method) => match method {
+                Method::SingleShooting => self.shoot(Start::Arcs, tolerance, Some(1), deadline),
+                Method::Shooting { intervals } => {
+                    self.shoot(Start::Arcs, tolerance, intervals, deadline)
+                }
+                Method::ShootingFromRest { .. } => self.shoot_from_rest(tolerance, deadline),
+                Method::SemiImplicit(_) | Method::Explicit { .. } => {
+                    relaxed(scenario, method.on_grid(segments), tolerance, deadline)
+                }
+            },
         })
     }
 

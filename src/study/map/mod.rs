@@ -12,7 +12,7 @@ mod request;
 mod row;
 
 pub use request::{CELL_SECONDS, MapRefused, MapRequest};
-pub use row::{Confidence, MapMethod, MapOutcome, MapRow, MapShow, UnknownWord};
+pub use row::{Confidence, MapMethod, MapOutcome, MapRow, MapShow};
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};

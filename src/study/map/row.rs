@@ -1,48 +1,55 @@
 //! What is said of one method in one cell: a closed set of words, and numbers.
 
-use std::fmt;
-use std::str::FromStr;
+use std::cmp::Ordering;
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use serde::{Deserialize, Serialize, Serializer};
+
+use crate::relax::Method;
+use crate::study::words::words;
 
 /// The methods that are compared, in the order of the rows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum MapMethod {
-    /// The relaxation by linearly implicit motion, the program's default.
-    SemiImplicit,
-    /// The relaxation by explicit motion.
-    Explicit,
+    /// A method that brings the leaf to rest. Shooting from rest starts from what
+    /// the default finds at the same tolerance.
+    ToRest(Method),
     /// Explicit motion with one time step for the scenario's duration.
     ExplicitMotion,
-    /// The boundary-value problem in one piece, from arcs.
-    SingleShooting,
-    /// The boundary-value problem over as many intervals as it needs, from arcs.
-    Shooting,
-    /// The same from the relaxed leaf.
-    ShootingFromRest,
 }
 
 impl MapMethod {
     /// All of them.
     pub const ALL: [MapMethod; 6] = [
-        MapMethod::SemiImplicit,
-        MapMethod::Explicit,
+        MapMethod::ToRest(Method::ALL[0]),
+        MapMethod::ToRest(Method::ALL[1]),
         MapMethod::ExplicitMotion,
-        MapMethod::SingleShooting,
-        MapMethod::Shooting,
-        MapMethod::ShootingFromRest,
+        MapMethod::ToRest(Method::ALL[2]),
+        MapMethod::ToRest(Method::ALL[3]),
+        MapMethod::ToRest(Method::ALL[4]),
     ];
 
     /// The word used on the command line and in `map.csv`.
     pub fn word(self) -> &'static str {
         match self {
-            MapMethod::SemiImplicit => "semi-implicit",
-            MapMethod::Explicit => "explicit",
+            MapMethod::ToRest(method) => method.word(),
             MapMethod::ExplicitMotion => "explicit-motion",
-            MapMethod::SingleShooting => "single-shooting",
-            MapMethod::Shooting => "shooting",
-            MapMethod::ShootingFromRest => "shooting-from-rest",
         }
+    }
+
+    fn place(self) -> Option<usize> {
+        MapMethod::ALL.iter().position(|method| *method == self)
+    }
+}
+
+impl Ord for MapMethod {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.place().cmp(&other.place())
+    }
+}
+
+impl PartialOrd for MapMethod {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
     }
 }
 
@@ -148,51 +155,6 @@ impl MapShow {
             MapShow::Waves => "waves",
         }
     }
-}
-
-/// A word that is none of those allowed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{found}: must be one of {}", allowed.join(", "))]
-pub struct UnknownWord {
-    /// The word.
-    pub found: String,
-    /// The words there are.
-    pub allowed: Vec<&'static str>,
-}
-
-macro_rules! words {
-    ($($type:ty),*) => {$(
-        impl fmt::Display for $type {
-            fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                f.write_str(self.word())
-            }
-        }
-
-        impl FromStr for $type {
-            type Err = UnknownWord;
-
-            fn from_str(text: &str) -> Result<Self, UnknownWord> {
-                let found = Self::ALL.into_iter().find(|it| it.word() == text);
-                found.ok_or_else(|| UnknownWord {
-                    found: text.into(),
-                    allowed: Self::ALL.map(|it| it.word()).to_vec(),
-                })
-            }
-        }
-
-        impl Serialize for $type {
-            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                serializer.serialize_str(self.word())
-            }
-        }
-
-        impl<'de> Deserialize<'de> for $type {
-            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                let word = String::deserialize(deserializer)?;
-                word.parse().map_err(de::Error::custom)
-            }
-        }
-    )*};
 }
 
 words!(MapMethod, MapOutcome, Confidence, MapShow);

@@ -1,0 +1,52 @@
+//! Words for what is one of a few: a method, an outcome.
+
+/// A word that is none of those allowed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{found}: must be one of {}", allowed.join(", "))]
+pub struct UnknownWord {
+    /// The word.
+    pub found: String,
+    /// The words there are.
+    pub allowed: Vec<&'static str>,
+}
+
+/// Lets types with `ALL` and `word()` be written and read by their words, on the
+/// command line and in files.
+macro_rules! words {
+    ($($type:ty),*) => {$(
+        impl std::fmt::Display for $type {
+            fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str(self.word())
+            }
+        }
+
+        impl std::str::FromStr for $type {
+            type Err = $crate::study::words::UnknownWord;
+
+            fn from_str(text: &str) -> Result<Self, Self::Err> {
+                // Methods are known by words of earlier releases too.
+                let word = $crate::relax::Method::named(text).map_or(text, |it| it.word());
+                let found = Self::ALL.into_iter().find(|it| it.word() == word);
+                found.ok_or_else(|| $crate::study::words::UnknownWord {
+                    found: text.into(),
+                    allowed: Self::ALL.map(|it| it.word()).to_vec(),
+                })
+            }
+        }
+
+        impl serde::Serialize for $type {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                serializer.serialize_str(self.word())
+            }
+        }
+
+        impl<'de> serde::Deserialize<'de> for $type {
+            fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                let word = <String as serde::Deserialize>::deserialize(deserializer)?;
+                word.parse().map_err(serde::de::Error::custom)
+            }
+        }
+    )*};
+}
+
+pub(super) use words;
