@@ -1,9 +1,10 @@
 //! How fast the explicit method steps, and how the explicit relaxation compares
 //! with the semi-implicit one. `cargo bench --bench explicit`.
 
-use leafdyn::leaf::{DiscreteLeaf, Grid, Leaf};
-use leafdyn::motion::{Explicit, Method, Physics};
-use leafdyn::relax::{self, Options, relax, start};
+use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf};
+use leafdyn::internals::motion::{Explicit, Method, Physics};
+use leafdyn::internals::relax::start;
+use leafdyn::relax::{self, Options, relax};
 use leafdyn::scenario::Scenario;
 use std::path::Path;
 use std::time::Instant;
@@ -30,7 +31,7 @@ const REPEATS: usize = 15;
 
 fn read(figure: &str, rods: usize) -> Scenario {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/paper/{figure}.toml"));
-    Scenario::read(&file, &[format!("leaf.rods={rods}")]).expect("the scenario is sound")
+    Scenario::read_with(&file, &[format!("leaf.rods={rods}")]).expect("the scenario is sound")
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

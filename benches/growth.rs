@@ -53,7 +53,7 @@ fn main() {
     let mut smallest = None;
     for rods in RODS {
         let entry = [format!("leaf.rods={rods}")];
-        let leaf = Scenario::read(Path::new("scenarios/paper/fig04.toml"), &entry)
+        let leaf = Scenario::read_with(Path::new("scenarios/paper/fig04.toml"), &entry)
             .expect("the scenario is valid");
         let (one, all) = (fastest(&leaf, 1), fastest(&leaf, threads));
         let unknowns = 6 * rods * one.accuracy.segments.last().expect("at least one grid");

@@ -2,8 +2,9 @@
 //! where the time of a whole run goes. One thread, all in the same run:
 //! `cargo bench --bench linear_solvers`.
 
-use leafdyn::leaf::{DiscreteLeaf, Grid, Leaf, Solved, SparsePattern, State, System};
-use leafdyn::relax::{Equilibrium, Options, relax, start};
+use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, Solved, SparsePattern, State, System};
+use leafdyn::internals::relax::start;
+use leafdyn::relax::{Equilibrium, Options, relax};
 use leafdyn::scenario::Scenario;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -93,7 +94,8 @@ fn iterations(solved: Solved) -> usize {
 
 fn fig04(rods: usize) -> Scenario {
     let rods = [format!("leaf.rods={rods}")];
-    Scenario::read(Path::new("scenarios/paper/fig04.toml"), &rods).expect("the scenario is valid")
+    Scenario::read_with(Path::new("scenarios/paper/fig04.toml"), &rods)
+        .expect("the scenario is valid")
 }
 
 /// The state after some Newton steps, and room for its equation.

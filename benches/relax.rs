@@ -14,7 +14,8 @@ const TOLERANCES: [f64; 3] = [1e-4, 1e-6, 1e-8];
 
 fn fig04(rods: usize) -> Scenario {
     let rods = [format!("leaf.rods={rods}")];
-    Scenario::read(Path::new("scenarios/paper/fig04.toml"), &rods).expect("the scenario is valid")
+    Scenario::read_with(Path::new("scenarios/paper/fig04.toml"), &rods)
+        .expect("the scenario is valid")
 }
 
 fn benchmark(criterion: &mut Criterion) {

@@ -2,7 +2,7 @@
 //! that grows with the number of veins: Fig. 4's leaf to 1e-10.
 //! `cargo bench --bench shooting`.
 
-use leafdyn::bvp::{self, Solution, Start};
+use leafdyn::internals::bvp::{self, Solution, Start};
 use leafdyn::relax::{Equilibrium, Options, relax};
 use leafdyn::scenario::Scenario;
 use leafdyn::shape::Difference;
@@ -52,7 +52,7 @@ fn main() {
     println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     for rods in RODS {
         let entry = [format!("leaf.rods={rods}")];
-        let leaf = Scenario::read(Path::new("scenarios/paper/fig04.toml"), &entry)
+        let leaf = Scenario::read_with(Path::new("scenarios/paper/fig04.toml"), &entry)
             .expect("the scenario is valid");
         let options = Options {
             tolerance: Some(ACCURACY),

@@ -1,33 +1,34 @@
 //! How a leaf of coupled Cosserat rods comes to rest: its shape, an error bar
 //! on it, and whether it is stable.
 //!
-//! From TOML to a tip position with its error and its stability:
+//! From a file to a tip position with its error and its stability:
 //!
 //! ```
-//! use leafdyn::relax::{Options, relax};
 //! use leafdyn::scenario::Scenario;
 //!
-//! let five_veins = r#"
-//!     name = "five-veins"
-//!     leaf = { rods = 5, length = 1.0, fan = "paper" }
-//!     stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }
-//!     coupling = { y = 1.0, z = 1.0 }
-//!     load = { gravity = [0.0, 0.0, -1.0] }
-//! "#;
-//! let scenario = Scenario::from_toml(five_veins)?;
-//! let leaf = relax(&scenario, &Options::default(), &mut |_| {})?;
-//! println!("tip {} within {:?}, stable: {:?}", leaf.tips[0], leaf.error_estimate, leaf.stable());
-//! # let known = glam::DVec3::new(0.9380015618466, 0.1994657673678, -0.1459779858328);
-//! # let error = leaf.error_estimate.expect("several grids were used");
-//! # assert!((leaf.tips[0] - known).length() <= error && error <= scenario.tolerance);
+//! let leaf = Scenario::read("scenarios/paper/fig04.toml")?.relax()?;
+//! let error = leaf.accuracy.error_estimate;
+//! println!("tip {} within {error:?}, stable: {:?}", leaf.tips[0], leaf.stable());
+//! # assert!(error.is_some_and(|error| error <= leaf.accuracy.tolerance));
 //! # assert_eq!(leaf.stable(), Some(true));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`Scenario::read`](scenario::Scenario::read) takes a file instead,
-//! [`relax::Options`] a tolerance or a fixed grid, the closure is told how far
-//! a long run has come, and [`files::write_all`] writes the files that the
-//! program `leafdyn` writes. What comes back is a [`relax::Equilibrium`].
+//! What comes back is a [`relax::Equilibrium`]; as JSON it is what the program
+//! writes. [`Scenario::relaxation`](scenario::Scenario::relaxation) takes a tolerance,
+//! a method or a fixed grid, says how far a long run has come, and can be cancelled.
+//! By task:
+//!
+//! | to | call |
+//! | --- | --- |
+//! | state a leaf | [`Scenario::read`](scenario::Scenario::read), [`from_toml`](scenario::Scenario::from_toml) |
+//! | bring it to rest | [`Scenario::relax`](scenario::Scenario::relax), [`relaxation`](scenario::Scenario::relaxation) |
+//! | have it confirmed by an independent method | [`study::check()`] |
+//! | find its other equilibria | [`study::all()`] |
+//! | follow one as a number varies, through folds | [`study::trace()`] |
+//! | see it move | [`simulate::Simulation`] |
+//! | see where methods fail, or how fast they are | [`study::map()`], [`study::chart()`] |
+//! | write the files of the program | [`files::write_all`] (feature `cli`) |
 //!
 //! # The model
 //!
@@ -35,9 +36,10 @@
 //! vein with the tissue around it. They start in one point as a fan, end in one
 //! point, the tip, and pull on their neighbours through the tissue between
 //! them. The model, the numbers of equations and figures used throughout this
-//! crate, and the leaves in `scenarios/paper` are those of the paper that
-//! proposed it for orchids of the genus *Epipactis* and solved its equations
-//! with scipy's `solve_bvp`.
+//! crate, and the leaves in `scenarios/paper` are those of "the paper"
+//! (Acta Biotheoretica, doi 10.1007/s10441-020-09397-6) that proposed it for
+//! orchids of the genus *Epipactis* and solved its equations with scipy's
+//! `solve_bvp`.
 //!
 //! A rod is a curve r(s), 0 <= s <= L, with a frame of directors
 //! R = \[d1 d2 d3\]; d1 points along the unstrained rod, d2 lies in the plane of
@@ -83,21 +85,21 @@
 //! A scenario may be in any consistent units, and results come in the same.
 //! Inside, lengths are in units of the longest rod L, forces in A/L^2, moments
 //! and energies in A/L, where A is the mean bending stiffness
-//! ([`leaf::Scale`]): no threshold depends on the units. The paper's own
+//! ([`scenario::Scale`]): no threshold depends on the units. The paper's own
 //! scaling, lengths by L0, forces by H0, moments by A0/L0, leaves the equations
 //! above in their form only if H0 L0^2/A0 = 1; `scenarios/paper` is written so.
 //!
 //! # From the equations to the answer
 //!
-//! **The element** ([`rod`], [`rotation`]). Positions and unit quaternions live
-//! at the nodes of a [`leaf::Grid`]. Each segment is oriented by the geodesic
+//! **The element** (`rod`, `rotation`). Positions and unit quaternions live
+//! at the nodes of a grid. Each segment is oriented by the geodesic
 //! midpoint of its two nodal rotations and has an energy in the strains
 //! v = R^T (x1 - x0)/ds and u = log(q0^* q1)/ds. Its minimum is the implicit
 //! midpoint rule on eqs (1) to (6). The force each segment carries is an unknown of
 //! its own (the mixed form), eliminated again segment by segment, so that
 //! Newton's method does not feel how stiff a rod is in stretch and shear.
 //!
-//! **The leaf** ([`leaf`]). All last nodes are one shared point: the tip cannot
+//! **The leaf** (`leaf`). All last nodes are one shared point: the tip cannot
 //! open, and needs neither penalty nor multiplier. Gravity and coupling act at
 //! the nodes. Newton's equations are solved rod by rod: every rod's own chain of
 //! 6 x 6 blocks (3 x 3 in the plane) is factorised in linear time, and conjugate gradients account
@@ -121,7 +123,7 @@
 //! started from the one before, and Richardson extrapolation removes one term
 //! of the series with every grid. The last correction, times a safety factor
 //! that falls as the corrections do, is the error estimate
-//! ([`relax::Equilibrium::error_estimate`]); what is left of unfinished
+//! ([`relax::Accuracy::error_estimate`]); what is left of unfinished
 //! iterations and of rounding is added. Grids are refined until it is below the
 //! tolerance. A column of the table that does not show its order is not
 //! extrapolated. Kinks of a profile are nodes of every grid.
@@ -130,7 +132,7 @@
 //! rest is factorised as L D L^T; the negative pivots number its negative
 //! eigenvalues, the Morse index. Index zero means: stable. A leaf that
 //! rests at a saddle is pushed off along its unstable mode and relaxed on; what
-//! was met is told ([`relax::Equilibrium::saddle`]). How a run ended is one of a
+//! was met stands in [`relax::Stability::saddle`]. How a run ended is one of a
 //! few words, [`relax::Outcome`].
 //!
 //! **Undulation** ([`undulation`]). Half-waves of each vein out of the leaf's
@@ -138,13 +140,13 @@
 //! waves that the paper's linear theory predicts from the axial force it
 //! carries.
 //!
-//! **Modes** ([`modes`]). The lowest eigenvalues of K x = lambda M x with that
+//! **Modes** (`modes`). The lowest eigenvalues of K x = lambda M x with that
 //! Hessian and the masses of the leaf in motion: squared frequencies, or negative
 //! where the leaf is unstable. A Lanczos method finds them from one factorisation,
 //! and the pivots of a second one tell whether any was missed. Over the grids they
-//! are extrapolated as positions are ([`relax::Equilibrium::modes`]).
+//! are extrapolated as positions are ([`relax::Stability::modes`]).
 //!
-//! **The independent road** ([`bvp`]). The same equations (1) to (6) with (a) to
+//! **The independent road** (`bvp`). The same equations (1) to (6) with (a) to
 //! (e) as a boundary-value problem: 13 functions per rod, integrated from the
 //! base by a Runge-Kutta method of order 8 together with their sensitivities, and
 //! brought to satisfy the conditions at the tip by Newton's method over as many
@@ -153,7 +155,7 @@
 //! relaxation; the two share neither grid nor element nor linear algebra.
 //!
 //! **Branches** ([`study::trace()`]). An equilibrium is followed through a number
-//! of its scenario by arclength ([`branch`]), so that folds are no obstacle. Where
+//! of its scenario by arclength (`branch`), so that folds are no obstacle. Where
 //! its Morse index changes the matrix is singular; bordered by the modes that
 //! become neutral it is not, and the place is found to rounding on each grid, and
 //! extrapolated. Branches that cross there can be followed as well.
@@ -170,44 +172,82 @@
 //!
 //! # Layout
 //!
-//! [`scenario`] (TOML to a checked [`scenario::Scenario`]) and [`rotation`],
-//! [`rod`], [`leaf`], [`shape`], [`undulation`], [`bvp`], [`motion`], [`modes`],
-//! [`relax`], [`branch`], [`simulate`],
-//! [`study`], [`report`] (console, JSON, tables), [`figure`], [`files`]: each module uses those named
+//! [`scenario`] (TOML to a checked [`scenario::Scenario`]) and `rotation`,
+//! `rod`, `leaf`, [`shape`], [`undulation`], `bvp`, `motion`, `modes`,
+//! [`relax`], `branch`, [`simulate`],
+//! [`study`], `report` (console, JSON, tables), `figure`, [`files`]: each module uses those named
 //! before it and knows nothing of those after it.
 //!
-//! [`motion`] moves a leaf on the same grid in time, without units: by an
+//! `motion` moves a leaf on the same grid in time, without units: by an
 //! explicit method with short, cheap steps, or by a semi-implicit one that
-//! takes any stiffness. Both behind one trait, [`motion::Method`], keep the
+//! takes any stiffness. Both behind one trait, `motion::Method`, keep the
 //! balance of energy, and can be saved and restored to the last bit.
 //!
 //! [`simulate`] follows the leaf of a scenario for its duration, from where
-//! the scenario says, and hands out a [`simulate::Frame`] at every output. An
+//! the scenario says, and hands out a [`simulate::Frame`] at every output. A
 //! [`files::Recording`] writes these to files as they come, and can stop and
 //! resume.
 
 #![warn(missing_docs)]
 
-pub mod branch;
-pub mod bvp;
+mod branch;
+mod bvp;
 #[cfg(feature = "cli")]
 pub mod cli;
 #[cfg(feature = "cli")]
-pub mod figure;
+mod figure;
 #[cfg(feature = "cli")]
 pub mod files;
-pub mod leaf;
-pub mod modes;
-pub mod motion;
-pub mod newton;
-pub mod numbers;
+mod leaf;
+mod limit;
+mod modes;
+mod motion;
+mod newton;
+mod numbers;
 pub mod relax;
 #[cfg(feature = "cli")]
-pub mod report;
-pub mod rod;
-pub mod rotation;
+mod report;
+mod rod;
+mod rotation;
 pub mod scenario;
 pub mod shape;
 pub mod simulate;
 pub mod study;
 pub mod undulation;
+
+/// What this project's own tests and benchmarks reach besides: it may change with
+/// any release.
+#[doc(hidden)]
+pub mod internals {
+    pub mod branch {
+        pub use crate::branch::{Equations, Family, Kind, Point, Walk, walk};
+    }
+    pub mod bvp {
+        pub use crate::bvp::{
+            Failure, Neutral, Options, Reason, Solution, Start, Work, solve, solve_within,
+        };
+    }
+    pub mod leaf {
+        pub use crate::leaf::{
+            DiscreteLeaf, Grid, Leaf, Scale, Solved, SparsePattern, State, System, shift, turn,
+        };
+    }
+    pub mod modes {
+        pub use crate::modes::lowest;
+    }
+    pub mod motion {
+        pub use crate::motion::{
+            Energy, Explicit, Inertia, Method, Physics, SemiImplicit, Snapshot, Steps, Stopped,
+        };
+    }
+    pub mod rod {
+        pub use crate::rod::{Ends, PlanarSegment, Section, Segment};
+    }
+    pub mod rotation {
+        pub use crate::rotation::{exp, log, outer};
+    }
+    pub mod relax {
+        pub use crate::relax::index::project;
+        pub use crate::relax::start::start;
+    }
+}

@@ -2,8 +2,8 @@
 //! differentiation, applied to the element's functional written out again.
 
 use glam::{DMat3, DQuat, DVec3};
-use leafdyn::rod::{Ends, Section, Segment};
-use leafdyn::rotation;
+use leafdyn::internals::rod::{Ends, Section, Segment};
+use leafdyn::internals::rotation;
 use nalgebra::{SMatrix, SVector};
 use num_dual::{DualNum, hessian};
 use proptest::prelude::*;

@@ -417,7 +417,7 @@ fn errors_carry_values() {
 fn files_that_cannot_be_read() {
     let folder = tempfile::tempdir().unwrap();
     let message = |path: &Path| {
-        let message = Scenario::read(path, &[]).unwrap_err().to_string();
+        let message = Scenario::read(path).unwrap_err().to_string();
         let rest = message.strip_prefix(path.to_str().unwrap());
         rest.unwrap_or_else(|| panic!("{message}")).to_string()
     };

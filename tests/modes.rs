@@ -14,9 +14,9 @@ use common::{
     TIMOSHENKO, close, extrapolate, fig04, in_full, keeping, linear, on_threads, paper_leaf,
     relaxed, scenario, settled, table,
 };
-use leafdyn::leaf::{DiscreteLeaf, Leaf, State, shift, turn};
-use leafdyn::modes;
-use leafdyn::motion::{Inertia, Physics};
+use leafdyn::internals::leaf::{DiscreteLeaf, Leaf, State, shift, turn};
+use leafdyn::internals::modes;
+use leafdyn::internals::motion::{Inertia, Physics};
 use leafdyn::relax::{Equilibrium, Method, Mode, Options, relax};
 use leafdyn::scenario::{Dynamics, Profile, Scenario, Schedule};
 use nalgebra::SymmetricEigen;

@@ -15,9 +15,9 @@ mod common;
 use common::motion::{BOTH, Scheme, discrete, explicit, method, released};
 use common::vibration::Linear;
 use common::{order, paper_leaf};
-use leafdyn::leaf::{Leaf, State};
-use leafdyn::motion::Physics;
-use leafdyn::rotation;
+use leafdyn::internals::leaf::{Leaf, State};
+use leafdyn::internals::motion::Physics;
+use leafdyn::internals::rotation;
 use leafdyn::scenario::{Profile, Scenario};
 
 /// Amplitude: small enough to be linear, large beside rounding.

@@ -9,8 +9,8 @@ use common::motion::{
     twisted_rod,
 };
 use common::order;
-use leafdyn::leaf::{Leaf, State};
-use leafdyn::motion::Energy;
+use leafdyn::internals::leaf::{Leaf, State};
+use leafdyn::internals::motion::Energy;
 use leafdyn::scenario::{Scenario, Schedule};
 
 /// Energies at the start and at so many instants until `until`.

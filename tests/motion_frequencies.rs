@@ -11,8 +11,8 @@ use common::motion::{
 use common::vibration::Linear;
 use common::{TIMOSHENKO, extrapolate, order, table};
 use glam::{DQuat, DVec3};
-use leafdyn::leaf::{DiscreteLeaf, Grid, Leaf, State};
-use leafdyn::motion::Physics;
+use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use leafdyn::internals::motion::Physics;
 use leafdyn::scenario::{Scenario, Schedule};
 
 /// A beam with the slenderness r2 = I/(A L^2) and s2 = EI/(k G A L^2).

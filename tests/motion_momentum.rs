@@ -10,8 +10,8 @@ mod common;
 use common::motion::{discrete, explicit, released};
 use common::parse;
 use glam::DVec3;
-use leafdyn::leaf::{DiscreteLeaf, Leaf};
-use leafdyn::motion::{Method, Physics, Snapshot};
+use leafdyn::internals::leaf::{DiscreteLeaf, Leaf};
+use leafdyn::internals::motion::{Method, Physics, Snapshot};
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Options, Refused, Scheme, Simulation};
 

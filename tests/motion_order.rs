@@ -12,7 +12,7 @@ use common::motion::{
     three_veins, twisted_rod,
 };
 use common::order;
-use leafdyn::leaf::{Leaf, State};
+use leafdyn::internals::leaf::{Leaf, State};
 use leafdyn::scenario::Scenario;
 
 /// How equal limits can be: internal damping also takes the fast waves, whose

@@ -5,8 +5,8 @@ mod common;
 
 use common::motion::{explicit, released, semi_implicit};
 use common::{on_threads, parse};
-use leafdyn::leaf::{Leaf, State};
-use leafdyn::motion::{Method, Steps};
+use leafdyn::internals::leaf::{Leaf, State};
+use leafdyn::internals::motion::{Method, Steps};
 use leafdyn::scenario::Scenario;
 
 /// A damped leaf under loads that change.

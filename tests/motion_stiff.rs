@@ -8,8 +8,8 @@ use common::motion::{
     distance, explicit, numbers, ramp, released, rest, semi_implicit, three_veins, twisted_rod,
 };
 use common::{fig04, order, settle_on};
-use leafdyn::leaf::{Leaf, State};
-use leafdyn::motion::{Method, Snapshot, Steps};
+use leafdyn::internals::leaf::{Leaf, State};
+use leafdyn::internals::motion::{Method, Snapshot, Steps};
 use leafdyn::scenario::{Profile, Scenario, Schedule};
 
 fn stiff(mut leaf: Scenario, stiffness: f64) -> Scenario {

@@ -19,7 +19,7 @@ fn files() -> Vec<PathBuf> {
 }
 
 fn read(path: &Path) -> Scenario {
-    Scenario::read(path, &[]).unwrap_or_else(|error| panic!("{error}"))
+    Scenario::read(path).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]
@@ -71,7 +71,7 @@ fn what_the_comments_offer_works() {
             for given in line.split("--set ").skip(1) {
                 let given = given.split_whitespace().next().unwrap();
                 let given = given.trim_end_matches([':', ',', '.', ';', ')']);
-                let leaf = Scenario::read(&path, &[given.to_string()]);
+                let leaf = Scenario::read_with(&path, &[given.to_string()]);
                 leaf.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
                 offered += 1;
             }

@@ -53,7 +53,7 @@ fn on_fans_made_of_the_classic_problems() {
     for file in &files("classic") {
         for rods in [2, 3, 5] {
             let fan = entries(&format!("leaf.rods={rods}; leaf.fan='symmetric'"));
-            if let Ok(fan) = Scenario::read(file, &fan) {
+            if let Ok(fan) = Scenario::read_with(file, &fan) {
                 accepted += 1;
                 both_agree(&fan, CLOSE);
             }

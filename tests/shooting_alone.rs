@@ -8,7 +8,7 @@ use common::{
     TIGHT, agree, apart, files, found, in_lab, path, read, scenario, settle, shoot_over, shot_alone,
 };
 use glam::DVec3;
-use leafdyn::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use leafdyn::relax::RodShape;
 use leafdyn::scenario::Scenario;
 

@@ -5,7 +5,7 @@ mod common;
 
 use common::random::{drawn, leaves};
 use common::{apart, files, found, read, scale, settle, shot_near};
-use leafdyn::bvp::{Options, Solution, Start, solve, solve_within};
+use leafdyn::internals::bvp::{Options, Solution, Start, solve, solve_within};
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::Scenario;
 

@@ -7,7 +7,7 @@ use common::{
     TIGHT, agree, apart, fig04, found, linear, paper_leaf, relaxed, rod, settle, shoot_near,
     shoot_over, shot_alone, shot_near, to,
 };
-use leafdyn::bvp::Reason;
+use leafdyn::internals::bvp::Reason;
 use leafdyn::scenario::Scenario;
 
 /// Relaxed, shot from there, and shot alone.

@@ -10,7 +10,7 @@ use common::{
     agree, close, files, kept, paper_leaf, read, scenario, settle, shot_alone, shot_near, tip,
 };
 use glam::DVec3;
-use leafdyn::bvp::{Neutral, Reason, Solution};
+use leafdyn::internals::bvp::{Neutral, Reason, Solution};
 use leafdyn::scenario::Scenario;
 
 const STATIONS: [f64; 9] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];

@@ -5,7 +5,7 @@
 mod common;
 
 use common::{agree, apart, found, scenario, settle, shoot_over, shot_near};
-use leafdyn::bvp::{Reason, Solution, Start, solve_within};
+use leafdyn::internals::bvp::{Reason, Solution, Start, solve_within};
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::Scenario;
 

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{scenario, settle, shot_alone, shot_near};
-use leafdyn::bvp::Work;
+use leafdyn::internals::bvp::Work;
 
 /// Linearisations and corrections to the last one, integration steps to a few.
 #[track_caller]

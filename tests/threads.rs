@@ -4,7 +4,7 @@
 mod common;
 
 use common::{bits, fig04, on_threads, scenario, settle};
-use leafdyn::bvp::{self, Start};
+use leafdyn::internals::bvp::{self, Start};
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::{Profile, Scenario};
 

@@ -6,9 +6,9 @@ mod common;
 
 use common::random::{drawn, leaves};
 use common::{relaxed, to};
-use leafdyn::branch::{Equations, Family, Kind, Point, Walk, walk};
-use leafdyn::leaf::{DiscreteLeaf, Grid, Leaf, State};
-use leafdyn::relax::project;
+use leafdyn::internals::branch::{Equations, Family, Kind, Point, Walk, walk};
+use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use leafdyn::internals::relax::project;
 use leafdyn::scenario::Scenario;
 
 /// The leaf under loads turned over, from as they are to their opposite times

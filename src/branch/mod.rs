@@ -28,9 +28,9 @@ mod refine;
 mod switch;
 mod walk;
 
-pub use critical::{Critical, Kind, locate};
+pub use critical::{Critical, Kind};
 pub use equations::{Equations, Stuck};
-pub use family::{Family, OutOfRange};
+pub use family::Family;
 pub use refine::{Refined, refine, refine_critical};
 pub use switch::switch;
 pub use walk::{Branch, End, Walk, walk};

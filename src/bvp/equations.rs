@@ -15,8 +15,8 @@ use glam::{DMat3, DQuat, DVec3};
 
 use super::arcs::{self, Arc};
 pub use super::state::{RodState, STATE, TANGENT};
+use crate::limit::Limit;
 use crate::scenario::{Profile, Scenario};
-use std::time::Instant;
 
 /// The boundary-value problem of a leaf, dimensionless.
 ///
@@ -46,7 +46,7 @@ pub struct Equations<'a> {
     /// the rods of the scenario.
     pub softened: f64,
     /// When to give up solving them.
-    pub deadline: Option<Instant>,
+    pub limit: Limit,
 }
 
 /// Derivatives of one rod's slopes by its own state, in blocks of three.
@@ -129,7 +129,7 @@ impl<'a> Equations<'a> {
             lengths,
             part: 1.0,
             softened: 1.0,
-            deadline: None,
+            limit: Limit::default(),
         }
     }
 

@@ -12,7 +12,6 @@ use super::intervals::{Flight, Units, choose, fly, sensitivities};
 use super::march::March;
 use super::trajectory::{Nodes, Trajectory};
 use serde::Serialize;
-use std::time::Instant;
 
 /// Iterations before a solution is given up.
 const MAX_ITERATIONS: usize = 60;
@@ -227,7 +226,7 @@ impl<'e, 'a> Newton<'e, 'a> {
     }
 
     fn fly(&mut self, nodes: &Nodes, tolerance: f64, linear: bool) -> Result<Vec<Flight>, Stuck> {
-        if (self.equations.deadline).is_some_and(|deadline| Instant::now() >= deadline) {
+        if self.equations.limit.reached() {
             return Err(Stuck::NoProgress(f64::INFINITY));
         }
         let flights = fly(self.equations, nodes, tolerance, linear).map_err(Stuck::Unbounded)?;

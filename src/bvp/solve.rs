@@ -6,9 +6,9 @@ use super::equations::Equations;
 use super::newton::{Newton, Work};
 use super::solution::{Failure, Options, Reason, Solution, Start};
 use super::trajectory::Trajectory;
+use crate::limit::Limit;
 use crate::scenario::Scenario;
 use crate::shape::Difference;
-use std::time::Instant;
 
 /// The error is estimated by comparing with a solution whose local errors may
 /// be larger by this factor.
@@ -37,10 +37,17 @@ pub fn solve_within(
     intervals: Option<usize>,
     stations: &[f64],
 ) -> Result<Solution, Failure> {
-    solve_before(scenario, start, accuracy, intervals, stations, None)
+    solve_before(
+        scenario,
+        start,
+        accuracy,
+        intervals,
+        stations,
+        &Limit::default(),
+    )
 }
 
-/// As [`solve_within`], but Newton's method converges no more after a deadline.
+/// As [`solve_within`], but Newton's method gives up at a limit.
 ///
 /// # Errors
 /// If no solution is found: why, and how far it came.
@@ -50,7 +57,7 @@ pub fn solve_before(
     accuracy: f64,
     intervals: Option<usize>,
     stations: &[f64],
-    deadline: Option<Instant>,
+    limit: &Limit,
 ) -> Result<Solution, Failure> {
     let longest = scenario
         .rods
@@ -62,14 +69,14 @@ pub fn solve_before(
         intervals,
         stations: stations.to_vec(),
     };
-    let mut solution = solve_once(scenario, start, &asked, deadline)?;
+    let mut solution = solve_once(scenario, start, &asked, limit)?;
     while solution.error.position > accuracy * longest && asked.tolerance > LEAST_LOCAL {
         asked.tolerance = (SHARPER * asked.tolerance).max(LEAST_LOCAL);
         let from = Start::Leaf {
             stations,
             rods: &solution.rods,
         };
-        let sharper = solve_once(scenario, from, &asked, deadline)?;
+        let sharper = solve_once(scenario, from, &asked, limit)?;
         let mut work = solution.work;
         work.add(sharper.work);
         solution = Solution { work, ..sharper };
@@ -82,17 +89,17 @@ pub fn solve_before(
 /// # Errors
 /// If no solution is found: why, and how far it came.
 pub fn solve(scenario: &Scenario, start: Start, options: &Options) -> Result<Solution, Failure> {
-    solve_once(scenario, start, options, None)
+    solve_once(scenario, start, options, &Limit::default())
 }
 
 fn solve_once(
     scenario: &Scenario,
     start: Start,
     options: &Options,
-    deadline: Option<Instant>,
+    limit: &Limit,
 ) -> Result<Solution, Failure> {
     let mut equations = Equations::new(scenario);
-    equations.deadline = deadline;
+    equations.limit = limit.clone();
     let mut work = Work::default();
     let found = match start {
         Start::Arcs => from_arcs(&mut equations, options.intervals, &mut work),

@@ -127,7 +127,7 @@ impl Relax {
             tolerance: self.request.tolerance,
             modes: self.modes.unwrap_or(MODES),
             mode_shapes: self.modes.is_some_and(|count| count > 0),
-            deadline: None,
+            ..Options::default()
         };
         let mut line = ProgressLine::new(&scenario.name);
         Ok(relax::relax(scenario, &options, &mut |progress| {

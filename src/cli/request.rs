@@ -40,7 +40,7 @@ impl Request {
     /// The scenario, and the folder for the files; refused before the run if
     /// nothing could be written there.
     pub fn open(&self) -> Result<(Scenario, PathBuf), Refusal> {
-        let scenario = Scenario::read(&self.scenario, &self.overrides)?;
+        let scenario = Scenario::read_with(&self.scenario, &self.overrides)?;
         let folder = self.folder(&scenario.name)?;
         Ok((scenario, folder))
     }
@@ -64,7 +64,7 @@ impl Request {
     /// The scenario with one entry more overridden.
     pub fn with(&self, entry: &str) -> Result<Scenario, Refusal> {
         let overrides = [self.overrides.as_slice(), &[entry.into()]].concat();
-        Ok(Scenario::read(&self.scenario, &overrides)?)
+        Ok(Scenario::read_with(&self.scenario, &overrides)?)
     }
 
     /// Writes the files and shows the result: as JSON, or as a report that is

@@ -18,4 +18,4 @@ pub use grid::Grid;
 pub use reduce::{half_of, whole_of};
 pub use sparse::{Bordered, SparseError, SparseFactor, SparsePattern};
 pub use state::{Field, Increment, State, shift, turn};
-pub use system::{Solved, Sums, System};
+pub use system::{Solved, System};

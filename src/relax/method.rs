@@ -17,7 +17,7 @@ pub enum Method {
         /// fine as the tolerance needs.
         segments: Option<usize>,
     },
-    /// The boundary-value problem in one piece ([`crate::bvp`]), from arcs by
+    /// The boundary-value problem in one piece (module `bvp`), from arcs by
     /// continuation. Finds equilibria, stable or not.
     SingleShooting,
     /// The boundary-value problem by multiple shooting, from arcs by continuation.

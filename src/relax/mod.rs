@@ -3,12 +3,13 @@
 
 mod equilibrium;
 mod grids;
-mod index;
+pub(crate) mod index;
 mod method;
 mod methods;
 mod modes;
 mod options;
 pub(crate) mod prolong;
+mod request;
 mod result;
 pub(crate) mod richardson;
 mod run;
@@ -18,21 +19,22 @@ mod settle;
 mod shape;
 mod solve;
 mod stability;
-mod start;
+pub(crate) mod start;
 
+pub use crate::limit::Limit;
 pub use crate::newton::Work;
 pub use crate::shape::{NodeState, RodShape};
-pub use equilibrium::{
-    Accuracy, Equilibrium, Mode, Model, Outcome, Saddle, Shape, Stability, serialize_index,
-};
-pub use index::{index_near, project};
+pub(crate) use equilibrium::serialize_index;
+pub use equilibrium::{Accuracy, Equilibrium, Mode, Model, Outcome, Saddle, Shape, Stability};
+pub(crate) use index::{index_near, project};
 pub use method::{Method, SemiImplicit, UnknownMethod};
-pub use methods::shooting::check_intervals;
+pub(crate) use methods::shooting::check_intervals;
 pub use options::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
     check_tolerance,
 };
-pub use segments::check_segments;
+pub use request::Relaxation;
+pub(crate) use segments::check_segments;
 pub(crate) use shape::node as node_state;
 pub use solve::relax;
-pub use start::start;
+pub(crate) use start::start;

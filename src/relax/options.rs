@@ -1,7 +1,7 @@
 //! What is asked of a relaxation, and what cannot be asked.
 
+use crate::limit::Limit;
 use crate::relax::method::Method;
-use std::time::Instant;
 
 /// What is asked of a relaxation.
 #[derive(Clone, Debug, Default)]
@@ -16,15 +16,8 @@ pub struct Options {
     /// Whether their shapes are wanted. Without them modes are left out where
     /// the leaf is large, and are known a little less accurately.
     pub mode_shapes: bool,
-    /// When to give up, at rest or not: the leaf is then not at rest. Looked at
-    /// where progress is told and between grids, so that a run may end a little
-    /// later.
-    pub deadline: Option<Instant>,
-}
-
-/// Whether it is too late to go on.
-pub(crate) fn past(deadline: Option<Instant>) -> bool {
-    deadline.is_some_and(|deadline| Instant::now() >= deadline)
+    /// When to give up, at rest or not: the leaf is then not at rest.
+    pub limit: Limit,
 }
 
 /// How far a running relaxation has come.

@@ -5,7 +5,7 @@ use crate::leaf::{DiscreteLeaf, Leaf, State, System, whole_of};
 use crate::newton::{Stop, Work};
 use crate::relax::equilibrium::Saddle;
 use crate::relax::method::Method;
-use crate::relax::options::{Options, Progress, past};
+use crate::relax::options::{Options, Progress};
 use crate::relax::richardson::Richardson;
 
 /// Segments of the coarsest grid, in two panels or more if profiles have kinks.
@@ -128,7 +128,7 @@ impl<'a, 'o> Run<'a, 'o> {
 
     /// Whether the time allowed is over.
     pub fn late(&self) -> bool {
-        past(self.options.deadline)
+        self.options.limit.reached()
     }
 
     /// Estimate of the error of the best values, relative to the leaf's length:

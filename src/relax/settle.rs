@@ -129,7 +129,7 @@ impl Run<'_, '_> {
             work: &mut self.work,
             progress: &mut told(&mut *self.progress, leaf.segments()),
             moved: false,
-            deadline: self.options.deadline,
+            limit: &self.options.limit,
         };
         let mut system = System::new(&leaf);
         let stop = explicit::settle(&leaf, &mut state, &mut system, &mut request);
@@ -207,7 +207,7 @@ impl Run<'_, '_> {
                         .then(|| System::new(&leaf.in_space())),
                 },
                 most_evaluations: begun + allowed,
-                deadline: self.options.deadline,
+                limit: &self.options.limit,
                 convex_only,
                 moved: false,
             };

@@ -41,8 +41,13 @@ impl Scenario {
         check::check(&Raw::parse(text, file, overrides)?)
     }
 
-    /// Reads and checks the file at `path`, with the entries `overrides` replaced.
-    pub fn read(path: &Path, overrides: &[String]) -> Result<Scenario, ScenarioError> {
+    /// Reads and checks the file at `path`.
+    pub fn read(path: impl AsRef<Path>) -> Result<Scenario, ScenarioError> {
+        Scenario::read_with(path.as_ref(), &[])
+    }
+
+    /// As [`Scenario::read`], with the entries `overrides` replaced.
+    pub fn read_with(path: &Path, overrides: &[String]) -> Result<Scenario, ScenarioError> {
         Scenario::from_toml_with(&text(path)?, &path.display().to_string(), overrides)
     }
 }

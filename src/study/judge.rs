@@ -10,6 +10,7 @@ use std::time::Instant;
 
 use crate::bvp::{self, Solution, Start};
 use crate::leaf::{Grid, Leaf};
+use crate::limit::Limit;
 use crate::relax::{self, Equilibrium, Method, Options, Outcome, RelaxError, Work, index_near};
 use crate::scenario::Scenario;
 use crate::shape::{Difference, RodShape};
@@ -215,14 +216,14 @@ pub fn grid_error(
     scenario: &Scenario,
     segments: usize,
     tolerance: f64,
-    deadline: Option<Instant>,
+    limit: &Limit,
 ) -> Option<f64> {
     const SAFETY: f64 = 2.0;
     let on = |segments: usize| {
         let options = Options {
             method: Method::default().on_grid(Some(segments)),
             tolerance: Some(tolerance),
-            deadline,
+            limit: limit.clone(),
             ..Options::default()
         };
         let leaf = Answer::relaxed(scenario, &options).ok()?;

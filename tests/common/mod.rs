@@ -11,8 +11,8 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use leafdyn::bvp::{self, Failure, Solution, Start};
-use leafdyn::leaf::{Leaf, Scale};
+use leafdyn::internals::bvp::{self, Failure, Solution, Start};
+use leafdyn::internals::leaf::{Leaf, Scale};
 use leafdyn::relax::{Equilibrium, Method, NodeState, Options, RodShape, SemiImplicit, relax};
 use leafdyn::scenario::{Dynamics, Profile, Rod, Scenario, Units};
 use leafdyn::shape::Difference;
@@ -58,7 +58,7 @@ pub fn scenario(name: &str, overrides: &str) -> Scenario {
 /// As [`scenario`], of a file.
 #[track_caller]
 pub fn read(file: &Path, overrides: &str) -> Scenario {
-    Scenario::read(file, &entries(overrides)).unwrap_or_else(|error| panic!("{error}"))
+    Scenario::read_with(file, &entries(overrides)).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// A scenario from text.

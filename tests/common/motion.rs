@@ -1,9 +1,10 @@
 //! Leaves that move: scenarios, starts, methods, and how far apart two motions are.
 
 use glam::DVec3;
-use leafdyn::leaf::{DiscreteLeaf, Grid, Leaf, State};
-use leafdyn::motion::{Explicit, Method, Physics, SemiImplicit, Snapshot, Steps};
-use leafdyn::relax::{Equilibrium, Options, start};
+use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use leafdyn::internals::motion::{Explicit, Method, Physics, SemiImplicit, Snapshot, Steps};
+use leafdyn::internals::relax::start;
+use leafdyn::relax::{Equilibrium, Options};
 use leafdyn::scenario::{Profile, Scenario, Schedule};
 use leafdyn::simulate::{self, Frame, Simulation};
 

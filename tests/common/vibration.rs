@@ -2,9 +2,9 @@
 //! the second derivatives of the segments, and the frequencies they give.
 
 use glam::{DMat3, DVec3};
-use leafdyn::leaf::{DiscreteLeaf, State};
-use leafdyn::motion::{Inertia, Physics};
-use leafdyn::rotation::outer;
+use leafdyn::internals::leaf::{DiscreteLeaf, State};
+use leafdyn::internals::motion::{Inertia, Physics};
+use leafdyn::internals::rotation::outer;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// A leaf with its nodes' freedoms numbered: turns about and shifts along the

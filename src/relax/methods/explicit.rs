@@ -13,13 +13,13 @@
 //! constant damping when that was chosen best.
 
 use crate::leaf::{DiscreteLeaf, Leaf, SparsePattern, State, System};
+use crate::limit::Limit;
 use crate::motion::{Explicit, Method, Physics, Stopped};
 use crate::newton::{Stop, Work};
-use crate::relax::options::{RelaxError, past};
+use crate::relax::options::RelaxError;
 use crate::relax::saddle;
 use crate::scenario::Rod;
 use glam::DVec3;
-use std::time::Instant;
 
 /// Time between looks at the moving leaf, in units of sqrt(rho L^4/A).
 const LOOK: f64 = 0.25;
@@ -70,7 +70,7 @@ pub struct Request<'a> {
     /// Whether the leaf's energy was not convex on its way.
     pub moved: bool,
     /// When to give up.
-    pub deadline: Option<Instant>,
+    pub limit: &'a Limit,
 }
 
 /// Refuses what explicit motion cannot do.
@@ -126,7 +126,7 @@ fn find_valley(
 ) -> Result<(), Stop> {
     let (mut fastest, mut convex) = (0.0_f64, 0);
     while motion.time() < LONGEST_MOTION {
-        look_ahead(motion, request.deadline)?;
+        look_ahead(motion, request.limit)?;
         let now = motion.snapshot();
         fastest = fastest.max(now.energy.kinetic);
         let slow = now.energy.kinetic <= SLOW * fastest;
@@ -137,7 +137,7 @@ fn find_valley(
         if slow && convex >= CONVEX {
             break;
         }
-        if motion.steps() > most_steps || past(request.deadline) {
+        if motion.steps() > most_steps || request.limit.reached() {
             return Err(Stop::StepLimit);
         }
         (request.progress)(motion.steps(), leaf.residual(&now.state));
@@ -146,12 +146,12 @@ fn find_valley(
 }
 
 /// Moves on to the next look. On fine grids of stiff rods that takes long: with
-/// a deadline the way is made in pieces.
-fn look_ahead(motion: &mut Explicit, deadline: Option<Instant>) -> Result<(), Stop> {
+/// a limit the way is made in pieces.
+fn look_ahead(motion: &mut Explicit, limit: &Limit) -> Result<(), Stop> {
     let begin = motion.time();
-    let pieces = match deadline {
-        Some(_) => (LOOK / (STEPS_PER_PIECE * motion.longest_step())).ceil(),
-        None => 1.0,
+    let pieces = match limit.is_none() {
+        false => (LOOK / (STEPS_PER_PIECE * motion.longest_step())).ceil(),
+        true => 1.0,
     };
     for piece in 1..=pieces as usize {
         motion
@@ -160,7 +160,7 @@ fn look_ahead(motion: &mut Explicit, deadline: Option<Instant>) -> Result<(), St
                 Stopped::Unresolved { .. } => Stop::Unresolved,
                 _ => Stop::Stuck,
             })?;
-        if past(deadline) {
+        if limit.reached() {
             return Err(Stop::StepLimit);
         }
     }
@@ -220,7 +220,7 @@ fn descend(
             }
             balanced *= (0.5 * accuracy / remaining).max(1e-3);
         }
-        if motion.steps() > most_steps || past(request.deadline) {
+        if motion.steps() > most_steps || request.limit.reached() {
             return Err(Stop::StepLimit);
         }
     }

@@ -13,12 +13,11 @@
 //! to follow it.
 
 use crate::leaf::{DiscreteLeaf, Increment, State, System};
+use crate::limit::Limit;
 use crate::newton::{
     Definite, Equations, Newton, ROUNDING, Stop, Work, at_saddle, cg_tolerance, converged,
 };
-use crate::relax::options::past;
 use crate::rod::RESOLVED_TURN;
-use std::time::Instant;
 
 /// Damping c: critical for the lowest bending mode of a single rod, whose
 /// frequency is 3.516 (canonical value beta_1^2 of the clamped-free beam).
@@ -92,7 +91,7 @@ pub struct Relaxation<'a> {
     /// Count of force evaluations at which to give up.
     pub most_evaluations: usize,
     /// When to give up.
-    pub deadline: Option<Instant>,
+    pub limit: &'a Limit,
     /// Whether to give up at once if the leaf has to move.
     pub convex_only: bool,
     /// Whether the leaf had to move: its energy was not convex on the way.
@@ -170,7 +169,7 @@ impl Relaxation<'_> {
         self.work.force_evaluations += 1;
 
         for step in 0..MAX_STEPS {
-            if self.work.force_evaluations > self.most_evaluations || past(self.deadline) {
+            if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
                 break;
             }
             // A positive definite matrix and its solution, with as long a time

@@ -92,7 +92,7 @@ fn shoot(
         tolerance,
         intervals,
         grid.sigma(),
-        options.deadline,
+        &options.limit,
     );
     let work = match &found {
         Ok(solution) => solution.work,

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::bvp::{self, Reason, Start};
+use crate::limit::Limit;
 use crate::relax::{self, Method, Options, Outcome};
 use crate::scenario::Scenario;
 use crate::study::judge::{
@@ -40,8 +41,8 @@ impl<'a> Cell<'a> {
     pub fn new(varied: &'a Varied, tolerance: Option<f64>, limit: Duration) -> Self {
         let scenario = &varied.scenario;
         let tolerance = tolerance.unwrap_or(scenario.tolerance);
-        let relaxed = within(limit, |deadline| {
-            relaxed(scenario, Method::default(), tolerance, deadline)
+        let relaxed = within(limit, |limit| {
+            relaxed(scenario, Method::default(), tolerance, limit)
         });
         let mut cell = Cell {
             scenario,
@@ -53,7 +54,7 @@ impl<'a> Cell<'a> {
             confidence: Confidence::None,
         };
         let sharp = (SHARPER * tolerance).max(SHARPEST);
-        let (shot, _) = within(limit, |deadline| cell.shoot_from_rest(sharp, deadline));
+        let (shot, _) = within(limit, |limit| cell.shoot_from_rest(sharp, limit));
         if let Ok(relaxed) = &cell.relaxed.0 {
             let (confidence, reference) = confirm(relaxed, shot.ok());
             (cell.confidence, cell.reference) = (confidence, Some(reference));
@@ -107,29 +108,23 @@ impl<'a> Cell<'a> {
         if let (MapMethod::ToRest(Method::SemiImplicit(_)), None) = (method, segments) {
             return self.relaxed.clone();
         }
-        within(self.limit, |deadline| match method {
-            MapMethod::ExplicitMotion => motion::answer(scenario, self.knobs, tolerance, deadline),
+        within(self.limit, |limit| match method {
+            MapMethod::ExplicitMotion => motion::answer(scenario, self.knobs, tolerance, limit),
             MapMethod::ToRest(method) => match method {
-                Method::SingleShooting => self.shoot(Start::Arcs, tolerance, Some(1), deadline),
+                Method::SingleShooting => self.shoot(Start::Arcs, tolerance, Some(1), limit),
                 Method::Shooting { intervals } => {
-                    self.shoot(Start::Arcs, tolerance, intervals, deadline)
+                    self.shoot(Start::Arcs, tolerance, intervals, limit)
                 }
-                Method::ShootingFromRest { .. } => self.shoot_from_rest(tolerance, deadline),
+                Method::ShootingFromRest { .. } => self.shoot_from_rest(tolerance, limit),
                 Method::SemiImplicit(_) | Method::Explicit { .. } => {
-                    relaxed(scenario, method.on_grid(segments), tolerance, deadline)
+                    relaxed(scenario, method.on_grid(segments), tolerance, limit)
                 }
             },
         })
     }
 
     /// Solves the boundary-value problem.
-    fn shoot(
-        &self,
-        start: Start,
-        accuracy: f64,
-        intervals: Option<usize>,
-        deadline: Instant,
-    ) -> Found {
+    fn shoot(&self, start: Start, accuracy: f64, intervals: Option<usize>, limit: &Limit) -> Found {
         let segments = match &self.relaxed.0 {
             Ok(relaxed) => relaxed.stations.len() - 1,
             Err(_) => SEGMENTS,
@@ -137,15 +132,7 @@ impl<'a> Cell<'a> {
         let grid = fine_grid(self.scenario, segments);
         let others = motion::stations(self.scenario, self.knobs);
         let stations = union([grid.sigma(), &others].concat());
-        let deadline = Some(deadline);
-        let solved = bvp::solve_before(
-            self.scenario,
-            start,
-            accuracy,
-            intervals,
-            &stations,
-            deadline,
-        );
+        let solved = bvp::solve_before(self.scenario, start, accuracy, intervals, &stations, limit);
         let solution = solved.map_err(|failure| {
             let outcome = match failure.reason {
                 Reason::Unbounded { .. } => MapOutcome::Diverged,
@@ -179,9 +166,9 @@ impl<'a> Cell<'a> {
         })
     }
 
-    fn shoot_from_rest(&self, accuracy: f64, deadline: Instant) -> Found {
+    fn shoot_from_rest(&self, accuracy: f64, limit: &Limit) -> Found {
         match &self.relaxed.0 {
-            Ok(relaxed) => self.shoot(relaxed.as_start(), accuracy, None, deadline),
+            Ok(relaxed) => self.shoot(relaxed.as_start(), accuracy, None, limit),
             Err((outcome, why)) => Err((
                 *outcome,
                 format!("the leaf to start from is not at rest: {why}"),
@@ -220,8 +207,8 @@ impl<'a> Cell<'a> {
 
     /// Whether the equilibrium near an answer is not the reference.
     fn is_elsewhere(&self, answer: &Answer, reference: &Answer, distance: f64) -> bool {
-        let (near, _) = within(self.limit, |deadline| {
-            self.shoot(answer.as_start(), self.tolerance, None, deadline)
+        let (near, _) = within(self.limit, |limit| {
+            self.shoot(answer.as_start(), self.tolerance, None, limit)
         });
         match near {
             Ok(near) if near.distance(answer) < Some(distance) => {
@@ -234,8 +221,8 @@ impl<'a> Cell<'a> {
 
 /// Lets a method run, told when to give up; returns also the seconds it took.
 /// What takes longer than it may is out of time, whatever it found.
-fn within(limit: Duration, run: impl FnOnce(Instant) -> Found) -> (Found, f64) {
-    let (found, seconds) = timed(|| run(Instant::now() + limit));
+fn within(limit: Duration, run: impl FnOnce(&Limit) -> Found) -> (Found, f64) {
+    let (found, seconds) = timed(|| run(&Limit::at(Instant::now() + limit)));
     let limit = limit.as_secs_f64();
     match seconds > limit {
         true => {
@@ -247,11 +234,11 @@ fn within(limit: Duration, run: impl FnOnce(Instant) -> Found) -> (Found, f64) {
 }
 
 /// Relaxes, perhaps on one grid. That tells no error: a finer grid does.
-fn relaxed(scenario: &Scenario, method: Method, tolerance: f64, deadline: Instant) -> Found {
+fn relaxed(scenario: &Scenario, method: Method, tolerance: f64, limit: &Limit) -> Found {
     let options = Options {
         method,
         tolerance: Some(tolerance),
-        deadline: Some(deadline),
+        limit: limit.clone(),
         ..Options::default()
     };
     let leaf = relax::relax(scenario, &options, &mut |_| {});
@@ -270,7 +257,7 @@ fn relaxed(scenario: &Scenario, method: Method, tolerance: f64, deadline: Instan
     }
     if answer.error_estimate.is_none() {
         let segments = method.segments();
-        let error = segments.and_then(|n| grid_error(scenario, n, tolerance, Some(deadline)));
+        let error = segments.and_then(|n| grid_error(scenario, n, tolerance, limit));
         let Some(error) = error else {
             let why = "the error of the grid cannot be told: a finer one finds no rest";
             return Err((MapOutcome::NotConverged, why.into()));

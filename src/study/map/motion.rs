@@ -1,9 +1,8 @@
 //! Explicit motion with one time step, whether that is stable or not: what a
 //! plain simulation of the damped leaf would answer.
 
-use std::time::Instant;
-
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use crate::limit::Limit;
 use crate::motion::{Explicit, Method, Physics, Stopped};
 use crate::relax::{self, Outcome, Work, index_near, node_state, start};
 use crate::scenario::Scenario;
@@ -23,7 +22,7 @@ const LOOK: f64 = 1000.0;
 
 /// Released from where a relaxation starts, the leaf moves for the scenario's
 /// duration under the loads of its dynamics, in steps of `method.step`.
-pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, deadline: Instant) -> Found {
+pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) -> Found {
     let refused = |why: String| Err((MapOutcome::Refused, why));
     let Some(step) = knobs.step else {
         return refused("explicit motion needs method.step".into());
@@ -70,7 +69,7 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, deadline: Insta
                 ),
             };
         }
-        if Instant::now() >= deadline {
+        if limit.reached() {
             // What is late is out of time, whatever is said here.
             return failed(MapOutcome::OutOfTime, "still moving".into());
         }
@@ -89,7 +88,7 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, deadline: Insta
         return failed(MapOutcome::NotConverged, "slow, but not at rest".into());
     }
     let length = leaf.scale.length;
-    let error = grid_error(scenario, segments, tolerance, Some(deadline));
+    let error = grid_error(scenario, segments, tolerance, limit);
     let estimate = error.unwrap_or(SAME_PLACE * length) + tolerance * length;
     Ok(Answer {
         outcome: Outcome::Converged,

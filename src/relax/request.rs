@@ -1,0 +1,143 @@
+//! A relaxation as a user of the library asks for it.
+
+use crate::relax::equilibrium::Equilibrium;
+use crate::relax::method::Method;
+use crate::relax::options::{Options, Progress, RelaxError};
+use crate::relax::solve::relax;
+use crate::scenario::Scenario;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+/// A relaxation to be: what is not said is as the scenario and the program's
+/// defaults have it. Made by [`Scenario::relaxation`].
+#[must_use = "nothing is solved before `run`"]
+pub struct Relaxation<'a> {
+    scenario: &'a Scenario,
+    options: Options,
+    progress: Box<dyn FnMut(&Progress) + 'a>,
+}
+
+impl Scenario {
+    /// Finds how the leaf comes to rest, to the scenario's tolerance.
+    ///
+    /// # Errors
+    /// Requests that cannot be met; how the run itself ended is the result's
+    /// [`Outcome`](crate::relax::Outcome).
+    pub fn relax(&self) -> Result<Equilibrium, RelaxError> {
+        self.relaxation().run()
+    }
+
+    /// The same with wishes:
+    ///
+    /// ```
+    /// use leafdyn::relax::Method;
+    /// # let scenario = leafdyn::scenario::Scenario::from_toml(
+    /// #     r#"
+    /// #     name = "cantilever"
+    /// #     leaf = { rods = 1, length = 1.0, fan = [0.0] }
+    /// #     stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }
+    /// #     load = { tip_force = [0.0, 0.0, -1.0] }
+    /// #     "#,
+    /// # )?;
+    /// let leaf = scenario.relaxation().tolerance(1e-8).modes(3).run()?;
+    /// assert!(leaf.accuracy.error_estimate < Some(1e-8));
+    ///
+    /// let shooting = Method::Shooting { intervals: None };
+    /// let same = scenario.relaxation().method(shooting).tolerance(1e-8).run()?;
+    /// assert!((leaf.tips[0] - same.tips[0]).length() < 1e-8);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn relaxation(&self) -> Relaxation<'_> {
+        Relaxation {
+            scenario: self,
+            options: Options::default(),
+            progress: Box::new(|_| {}),
+        }
+    }
+}
+
+impl<'a> Relaxation<'a> {
+    /// By this method, with its options.
+    pub fn method(mut self, method: Method) -> Self {
+        self.options.method = method;
+        self
+    }
+
+    /// On one grid of so many segments a rod, without extrapolation and so without
+    /// an error estimate.
+    pub fn grid(mut self, segments: usize) -> Self {
+        self.options.method = self.options.method.on_grid(Some(segments));
+        self
+    }
+
+    /// To this accuracy of the centerlines, relative to the longest rod.
+    pub fn tolerance(mut self, tolerance: f64) -> Self {
+        self.options.tolerance = Some(tolerance);
+        self
+    }
+
+    /// With so many of the lowest modes of vibration.
+    pub fn modes(mut self, count: usize) -> Self {
+        self.options.modes = count;
+        self.options.mode_shapes = count > 0;
+        self
+    }
+
+    /// Giving up, not at rest, when so much time is over.
+    pub fn time_limit(mut self, time: Duration) -> Self {
+        self.options.limit.deadline = Some(Instant::now() + time);
+        self
+    }
+
+    /// Giving up, not at rest, as soon as `cancel` is `true`, which another thread
+    /// may make it.
+    pub fn cancel(mut self, cancel: Arc<AtomicBool>) -> Self {
+        self.options.limit.cancel = Some(cancel);
+        self
+    }
+
+    /// Saying how far it has come in every step.
+    pub fn progress(mut self, progress: impl FnMut(&Progress) + 'a) -> Self {
+        self.progress = Box::new(progress);
+        self
+    }
+
+    /// Lets the leaf come to rest.
+    ///
+    /// # Errors
+    /// As [`Scenario::relax`].
+    pub fn run(mut self) -> Result<Equilibrium, RelaxError> {
+        relax(self.scenario, &self.options, &mut self.progress)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::relax::Outcome;
+
+    #[test]
+    fn a_cancelled_run_says_that_it_is_not_at_rest() {
+        let scenario = Scenario::from_toml(
+            r#"
+            name = "fan"
+            leaf = { rods = 3, length = 1.0, fan = "symmetric" }
+            stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }
+            load = { gravity = [0.0, 0.0, -1.0] }
+            "#,
+        )
+        .unwrap();
+        let cancel = Arc::new(AtomicBool::new(true));
+        let steps = std::cell::Cell::new(0);
+        for method in [Method::default(), Method::Explicit { segments: None }] {
+            let leaf = (scenario.relaxation().method(method))
+                .cancel(cancel.clone())
+                .progress(|_| steps.set(steps.get() + 1))
+                .run()
+                .unwrap();
+            assert_eq!(leaf.outcome, Outcome::NotAtRest, "{method:?}");
+        }
+        assert!(steps.get() < 10);
+    }
+}
