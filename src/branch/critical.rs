@@ -9,7 +9,7 @@ use crate::leaf::{Field, State};
 /// Modes held besides those that change their sign: neutral ones may be there.
 const MORE: usize = 2;
 
-/// Evaluations on the way to a zero.
+/// Evaluations in the search for a zero.
 const EVALUATIONS: usize = 40;
 
 /// Accuracy of a zero, as a part of the step in which it lies.
@@ -51,7 +51,7 @@ pub struct Critical {
     /// All modes of the border.
     pub held: Vec<Field>,
     /// Which of the sorted eigenvalues of H is zero, and its change with the
-    /// way along the tangent.
+    /// distance along the tangent.
     pub which: usize,
     /// That change.
     pub slope: f64,
@@ -89,7 +89,7 @@ pub fn locate(
         }
     }
     found.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-    // Each takes its own share of the change, in the order of the way.
+    // Each takes its own share of the change, in their order along the branch.
     let mut before = a.index;
     let up = b.index > a.index;
     let mut all: Vec<Critical> = Vec::new();
@@ -131,11 +131,11 @@ struct Sample {
 const DRIVEN: f64 = 1e-6;
 
 impl Search<'_, '_> {
-    fn at(&mut self, way: f64) -> Result<Sample, Stuck> {
+    fn at(&mut self, distance: f64) -> Result<Sample, Stuck> {
         let t = &self.from.tangent;
         let (state, fraction) = (&self.from.state, self.from.fraction);
-        let moved = (self.equations).moved(state, fraction, &t.increments, way)?;
-        let fraction = fraction + way * t.fraction;
+        let moved = (self.equations).moved(state, fraction, &t.increments, distance)?;
+        let fraction = fraction + distance * t.fraction;
         let deflated = (self.equations).deflated(&moved, fraction, t, self.held)?;
         Ok(sample(deflated))
     }
@@ -144,16 +144,16 @@ impl Search<'_, '_> {
     fn zero(
         &mut self,
         which: usize,
-        mut way: [f64; 2],
+        mut distance: [f64; 2],
         mut value: [f64; 2],
         indices: [usize; 2],
     ) -> Result<(f64, Critical), Stuck> {
-        let whole = way[1] - way[0];
+        let whole = distance[1] - distance[0];
         let mut slope = (value[1] - value[0]) / whole;
         let mut best: Option<(f64, Sample)> = None;
-        let (mut last, mut last_value) = (way[1], value[1]);
+        let (mut last, mut last_value) = (distance[1], value[1]);
         for _ in 0..EVALUATIONS {
-            let at = (way[0] * value[1] - way[1] * value[0]) / (value[1] - value[0]);
+            let at = (distance[0] * value[1] - distance[1] * value[0]) / (value[1] - value[0]);
             let sample = self.at(at)?;
             let now = sample.eigenvalues[which];
             let done = (at - last).abs() < ACCURACY * whole || now == 0.0;
@@ -171,13 +171,13 @@ impl Search<'_, '_> {
             }
             (last, last_value) = (at, now);
             if now * value[1] < 0.0 {
-                way[0] = way[1];
+                distance[0] = distance[1];
                 value[0] = value[1];
             } else {
                 let shrunk = 1.0 - now / value[1];
                 value[0] *= if shrunk > 0.0 { shrunk } else { 0.5 };
             }
-            (way[1], value[1]) = (at, now);
+            (distance[1], value[1]) = (at, now);
         }
         let (at, sample) = best.ok_or(Stuck::NotConverged)?;
         let kept = (self.held, &self.from.tangent);
@@ -257,8 +257,8 @@ impl Critical {
             from: &from,
             held: &self.held,
         };
-        let (mut way, mut slope) = (0.0, self.slope);
-        let mut best = search.at(way)?;
+        let (mut distance, mut slope) = (0.0, self.slope);
+        let mut best = search.at(distance)?;
         let mut value = best.eigenvalues[self.which];
         let mut worse = 0;
         for _ in 0..EVALUATIONS {
@@ -266,12 +266,12 @@ impl Critical {
             if !step.is_finite() || step.abs() > 1.0 {
                 return Err(Stuck::NotConverged);
             }
-            let next = search.at(way + step)?;
+            let next = search.at(distance + step)?;
             let after = next.eigenvalues[self.which];
             if step.abs() > LOCAL {
                 slope = (after - value) / step;
             }
-            (way, value) = (way + step, after);
+            (distance, value) = (distance + step, after);
             match after.abs() < best.eigenvalues[self.which].abs() {
                 true => best = next,
                 false => worse += 1,

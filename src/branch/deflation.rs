@@ -27,7 +27,7 @@ pub struct Deflated {
     pub h: DMatrix<f64>,
     /// X of the border: the modes.
     pub modes: Vec<Field>,
-    /// How the modes feel the parameter: zero at a bifurcation, not at a fold.
+    /// The forces that the parameter exerts on the modes: zero at a bifurcation, not at a fold.
     pub drive: DVector<f64>,
     /// How the forces change with it.
     pub rate: Field,

@@ -49,13 +49,13 @@ pub enum Stuck {
     TooLarge,
 }
 
-/// The equations of a family of leaves on a grid, with room for their solution.
+/// The equations of a family of leaves on a grid, with the memory to solve them.
 pub struct Equations<'a> {
     /// The leaves.
     pub family: &'a Family<'a>,
     /// The same with softened matrices, where these decide what is critical.
-    /// Newton's method needs the true ones: next to a singularity of the softened
-    /// it would not converge.
+    /// Newton's method needs the true ones: near singular points of the softened it
+    /// would not converge.
     pub softened: Option<Family<'a>>,
     /// The grid.
     pub grid: Grid,
@@ -86,7 +86,7 @@ pub(super) struct Linear {
 struct Pair {
     forces: Field,
     rate: Field,
-    /// Negative eigenvalues, where the factorisation tells them.
+    /// Negative eigenvalues, where the factorisation counts them.
     index: Option<usize>,
 }
 

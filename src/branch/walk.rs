@@ -74,7 +74,7 @@ pub struct Branch {
 }
 
 /// Follows a branch from its first point in the direction of its tangent, as
-/// long as the parameter is within its range. `progress` is told each point.
+/// long as the parameter is within its range. `progress` is called with each point.
 pub fn walk(
     equations: &mut Equations,
     first: Point,
@@ -121,7 +121,7 @@ pub fn walk(
             let found = locate(equations, &now, &next.point, next.step).unwrap_or_default();
             let changes: usize = found.iter().map(|critical| critical.modes.len()).sum();
             if changes != next.point.index.abs_diff(now.index) {
-                // A change that nothing on the way explains: this is another
+                // A change that nothing in between explains: this is another
                 // branch, passing nearby.
                 if next.step > UNEXPLAINED * how.longest {
                     step = 0.5 * next.step;

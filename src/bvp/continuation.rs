@@ -8,13 +8,13 @@ use super::newton::{Newton, Work};
 use super::solution::Reason;
 use super::trajectory::Trajectory;
 
-/// Accuracy along the way.
+/// Accuracy of the solutions on the way.
 const ROUGH: f64 = 1e-6;
 
-/// Smallest part of the way made at once.
+/// Smallest step, as a part of the whole change.
 const LEAST_STEP: f64 = 1e-4;
 
-/// Slopes of single rods evaluated before a way is given up: some seconds.
+/// Slopes of single rods evaluated before a strategy is given up: some seconds.
 const BUDGET: usize = 4_000_000;
 
 /// Stations at which a solution is kept for the next one to start from, per
@@ -27,35 +27,35 @@ const TURN: f64 = 0.3;
 const LEAST_INTERVALS: usize = 8;
 const MOST_INTERVALS: usize = 256;
 
-/// A way that ended before the scenario's leaf was reached.
-pub struct Lost {
+/// A continuation that ended before the scenario's leaf was reached.
+pub struct Interrupted {
     /// Why.
     pub reason: Reason,
-    /// How much of the way was made.
+    /// How much of the change was made.
     pub part: f64,
-    /// The last solution on it.
+    /// The last solution.
     pub near: Trajectory,
 }
 
-/// Ways from the arcs' leaf to the scenario's, in the order they are tried.
-/// The last one may come out far from where it began.
-const WAYS: [Way; 3] = [
-    Way {
+/// How the arcs' leaf is changed into the scenario's, in the order they are tried.
+/// The last one may end far from where it began.
+const STRATEGIES: [Strategy; 3] = [
+    Strategy {
         stiff: false,
         far: false,
     },
-    Way {
+    Strategy {
         stiff: true,
         far: false,
     },
-    Way {
+    Strategy {
         stiff: false,
         far: true,
     },
 ];
 
 #[derive(Clone, Copy)]
-struct Way {
+struct Strategy {
     /// Over rods that are at first as stiff in all directions as in the stiffest.
     stiff: bool,
     /// Whether Newton's method may go far in one step.
@@ -68,28 +68,28 @@ pub fn from_arcs(
     equations: &mut Equations,
     intervals: Option<usize>,
     work: &mut Work,
-) -> Result<Trajectory, Lost> {
+) -> Result<Trajectory, Interrupted> {
     let mut first = None;
-    for way in WAYS {
-        match way.follow(equations, intervals, work) {
+    for strategy in STRATEGIES {
+        match strategy.follow(equations, intervals, work) {
             Ok(near) => return Ok(near),
             Err(failure) => first = first.or(Some(failure)),
         }
     }
-    Err(first.expect("there is a way"))
+    Err(first.expect("there is a strategy"))
 }
 
-impl Way {
+impl Strategy {
     fn follow(
         self,
         equations: &mut Equations,
         intervals: Option<usize>,
         work: &mut Work,
-    ) -> Result<Trajectory, Lost> {
+    ) -> Result<Trajectory, Interrupted> {
         equations.part = 0.0;
         equations.softened = if self.stiff { 0.0 } else { 1.0 };
         let unstressed = Trajectory::unstressed(equations, ROUGH);
-        let mut near = unstressed.map_err(|error| Lost {
+        let mut near = unstressed.map_err(|error| Interrupted {
             reason: unbounded(error),
             part: 0.0,
             near: Trajectory::straight(equations),
@@ -104,20 +104,20 @@ impl Way {
             false => &[|equations, part| equations.part = part],
         };
         for stage in stages {
-            near = self.go(*stage, equations, near, intervals, work)?;
+            near = self.follow_stage(*stage, equations, near, intervals, work)?;
         }
         Ok(near)
     }
 
-    /// Goes one stage, trying all of it first.
-    fn go(
+    /// Changes the equations by one stage, all of it at first.
+    fn follow_stage(
         self,
         stage: Stage,
         equations: &mut Equations,
         mut near: Trajectory,
         intervals: Option<usize>,
         work: &mut Work,
-    ) -> Result<Trajectory, Lost> {
+    ) -> Result<Trajectory, Interrupted> {
         let (mut part, mut step) = (0.0, 1.0);
         let mut before: Option<(Trajectory, f64)> = None;
         let (begun, rods) = (work.slopes, equations.rods());
@@ -137,7 +137,7 @@ impl Way {
                 }
                 Err(_) if step > LEAST_STEP && spent(work) < BUDGET => step *= 0.5,
                 Err(reason) => {
-                    return Err(Lost { reason, part, near });
+                    return Err(Interrupted { reason, part, near });
                 }
             }
         }

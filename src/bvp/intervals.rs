@@ -95,8 +95,8 @@ impl Units {
     }
 }
 
-/// One interval flown through.
-pub struct Flight {
+/// An interval that was integrated over.
+pub struct Integrated {
     /// The state at its end.
     pub end: Vec<f64>,
     /// The linearised equations along it, if asked for.
@@ -108,12 +108,12 @@ pub struct Flight {
 }
 
 /// Integrates over all intervals, in parallel.
-pub fn fly(
+pub fn integrate(
     equations: &Equations,
     nodes: &Nodes,
     tolerance: f64,
     linearise: bool,
-) -> Result<Vec<Flight>, Unbounded> {
+) -> Result<Vec<Integrated>, Unbounded> {
     let kinks = equations.kinks();
     (0..nodes.states.len())
         .into_par_iter()
@@ -132,7 +132,7 @@ pub fn fly(
                     }
                 }
             }
-            Ok(Flight {
+            Ok(Integrated {
                 end: integrator.y,
                 steps,
                 count,
@@ -148,18 +148,18 @@ pub fn fly(
 pub fn sensitivities(
     equations: &Equations,
     units: &Units,
-    flights: &[Flight],
+    integrated: &[Integrated],
     growth: &mut Vec<f64>,
 ) -> Vec<Mat<f64>> {
     let rods = equations.rods();
-    let tasks: Vec<(usize, usize)> = (0..flights.len())
+    let tasks: Vec<(usize, usize)> = (0..integrated.len())
         .flat_map(|k| (0..rods).map(move |j| (k, j)))
         .collect();
     let columns: Vec<Columns> = tasks
         .into_par_iter()
         .map(|(k, j)| match k {
-            0 => Columns::of::<6>(equations, &flights[k].steps, j),
-            _ => Columns::of::<TANGENT>(equations, &flights[k].steps, j),
+            0 => Columns::of::<6>(equations, &integrated[k].steps, j),
+            _ => Columns::of::<TANGENT>(equations, &integrated[k].steps, j),
         })
         .collect();
     columns
@@ -272,8 +272,8 @@ fn begin(equations: &Equations, near: &Trajectory, sigma: &[f64]) -> Vec<Vec<f64
             sigma: vec![sigma[k - 1], here],
             states: vec![near.at(sigma[k - 1])],
         };
-        match fly(equations, &before, START, false) {
-            Ok(mut flights) => flights.remove(0).end,
+        match integrate(equations, &before, START, false) {
+            Ok(mut integrated) => integrated.remove(0).end,
             Err(_) => near.at(here),
         }
     };

@@ -1,5 +1,5 @@
-//! The independent road to the same equilibrium: the paper's boundary-value
-//! problem by multiple shooting.
+//! The same equilibrium independently: the paper's boundary-value problem by
+//! multiple shooting.
 //!
 //! It shares with the relaxation only the checked scenario and the
 //! constitutive law: no grid, no element, no linear algebra. What both find is
@@ -34,7 +34,7 @@
 //! into the scenario's.
 //!
 //! **Error.** Every problem is solved with two tolerances; the difference is the
-//! estimate ([`Solution::error`]). Near a bifurcation [`Solution::neutral`] tells
+//! estimate ([`Solution::error`]). Near a bifurcation [`Solution::neutral`] says
 //! how the leaf could move without resistance.
 
 mod arcs;

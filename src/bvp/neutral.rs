@@ -63,9 +63,9 @@ impl Newton<'_, '_> {
         for (y, increment) in nudged.states.iter_mut().zip(&direction) {
             self.units.advance(y, increment, NUDGE / largest);
         }
-        let fly =
+        let sampled =
             |nodes: &Nodes| Trajectory::sampled(self.equations, nodes, stations, NUDGE * NUDGE);
-        let (at, beside) = (fly(&self.nodes).ok()?, fly(&nudged).ok()?);
+        let (at, beside) = (sampled(&self.nodes).ok()?, sampled(&nudged).ok()?);
         let (at, beside) = (at.shape(self.equations), beside.shape(self.equations));
         let mut displacement: Vec<Vec<DVec3>> = at
             .iter()

@@ -8,7 +8,7 @@
 
 use super::dop853::Unbounded;
 use super::equations::{Equations, RodState};
-use super::intervals::{Flight, Units, choose, fly, sensitivities};
+use super::intervals::{Integrated, Units, choose, integrate, sensitivities};
 use super::march::March;
 use super::trajectory::{Nodes, Trajectory};
 use serde::Serialize;
@@ -85,8 +85,8 @@ pub struct Newton<'e, 'a> {
     pub work: Work,
 }
 
-/// What a flight through all intervals misses.
-struct Missed {
+/// By how much the unknowns do not solve the equations.
+struct Residuals {
     /// End of each interval minus the beginning of the next.
     defects: Vec<Vec<f64>>,
     /// The tip's conditions.
@@ -130,8 +130,8 @@ impl<'e, 'a> Newton<'e, 'a> {
     pub fn solve(&mut self, tolerance: f64) -> Result<(), Stuck> {
         let mut factor: f64 = 1.0;
         let mut fresh = false;
-        let mut missed = match self.march {
-            Some(_) => self.miss(&self.nodes.clone(), tolerance)?,
+        let mut residuals = match self.march {
+            Some(_) => self.residuals_at(&self.nodes.clone(), tolerance)?,
             None => {
                 fresh = true;
                 self.linearize(tolerance)?
@@ -139,7 +139,7 @@ impl<'e, 'a> Newton<'e, 'a> {
         };
         let mut size = f64::INFINITY;
         'iterations: for _ in 0..MAX_ITERATIONS {
-            let step = self.correction(&missed);
+            let step = self.correction(&residuals);
             size = largest(&step);
             if !size.is_finite() {
                 break;
@@ -151,7 +151,7 @@ impl<'e, 'a> Newton<'e, 'a> {
             }
             let (trial, next, ratio) = loop {
                 let trial = self.moved(&step, factor);
-                let attempt = self.miss(&trial, tolerance).ok().map(|next| {
+                let attempt = self.residuals_at(&trial, tolerance).ok().map(|next| {
                     let remaining = largest(&self.correction(&next));
                     (next, remaining)
                 });
@@ -168,7 +168,7 @@ impl<'e, 'a> Newton<'e, 'a> {
                         break (trial, next, 0.0);
                     }
                     _ if !fresh => {
-                        missed = self.linearize(tolerance)?;
+                        residuals = self.linearize(tolerance)?;
                         fresh = true;
                         continue 'iterations;
                     }
@@ -196,10 +196,10 @@ impl<'e, 'a> Newton<'e, 'a> {
                 break;
             }
             if factor == 1.0 && ratio <= KEEP {
-                missed = next;
+                residuals = next;
                 fresh = false;
             } else {
-                missed = self.linearize(tolerance)?;
+                residuals = self.linearize(tolerance)?;
                 fresh = true;
             }
         }
@@ -207,52 +207,61 @@ impl<'e, 'a> Newton<'e, 'a> {
     }
 
     /// Linearises at the present unknowns.
-    fn linearize(&mut self, tolerance: f64) -> Result<Missed, Stuck> {
-        let flights = self.fly(&self.nodes.clone(), tolerance, true)?;
-        let missed = self.missed(&self.nodes, &flights);
+    fn linearize(&mut self, tolerance: f64) -> Result<Residuals, Stuck> {
+        let integrated = self.integrate(&self.nodes.clone(), tolerance, true)?;
+        let residuals = self.residuals(&self.nodes, &integrated);
         self.growth.clear();
-        let maps = sensitivities(self.equations, &self.units, &flights, &mut self.growth);
+        let maps = sensitivities(self.equations, &self.units, &integrated, &mut self.growth);
         self.work.linearizations += 1;
         self.march = March::new(self.equations, &self.units, maps);
         match self.march {
-            Some(_) => Ok(missed),
+            Some(_) => Ok(residuals),
             None => Err(Stuck::NoProgress(f64::INFINITY)),
         }
     }
 
-    fn miss(&mut self, nodes: &Nodes, tolerance: f64) -> Result<Missed, Stuck> {
-        let flights = self.fly(nodes, tolerance, false)?;
-        Ok(self.missed(nodes, &flights))
+    fn residuals_at(&mut self, nodes: &Nodes, tolerance: f64) -> Result<Residuals, Stuck> {
+        let integrated = self.integrate(nodes, tolerance, false)?;
+        Ok(self.residuals(nodes, &integrated))
     }
 
-    fn fly(&mut self, nodes: &Nodes, tolerance: f64, linear: bool) -> Result<Vec<Flight>, Stuck> {
+    fn integrate(
+        &mut self,
+        nodes: &Nodes,
+        tolerance: f64,
+        linear: bool,
+    ) -> Result<Vec<Integrated>, Stuck> {
         if self.equations.limit.reached() {
             return Err(Stuck::NoProgress(f64::INFINITY));
         }
-        let flights = fly(self.equations, nodes, tolerance, linear).map_err(Stuck::Unbounded)?;
-        self.work.steps += flights.iter().map(|flight| flight.count).sum::<usize>();
-        self.work.slopes += flights
+        let integrated =
+            integrate(self.equations, nodes, tolerance, linear).map_err(Stuck::Unbounded)?;
+        self.work.steps += integrated
             .iter()
-            .map(|flight| flight.evaluations)
+            .map(|interval| interval.count)
             .sum::<usize>();
-        Ok(flights)
+        self.work.slopes += integrated
+            .iter()
+            .map(|interval| interval.evaluations)
+            .sum::<usize>();
+        Ok(integrated)
     }
 
-    fn missed(&self, nodes: &Nodes, flights: &[Flight]) -> Missed {
-        let (last, inner) = flights.split_last().expect("there is an interval");
-        Missed {
+    fn residuals(&self, nodes: &Nodes, integrated: &[Integrated]) -> Residuals {
+        let (last, inner) = integrated.split_last().expect("there is an interval");
+        Residuals {
             defects: inner
                 .iter()
                 .zip(&nodes.states[1..])
-                .map(|(flight, begin)| self.units.difference(&flight.end, begin))
+                .map(|(interval, begin)| self.units.difference(&interval.end, begin))
                 .collect(),
             conditions: self.equations.tip_conditions(&last.end),
         }
     }
 
-    fn correction(&self, missed: &Missed) -> Vec<Vec<f64>> {
+    fn correction(&self, residuals: &Residuals) -> Vec<Vec<f64>> {
         let march = self.march.as_ref().expect("linearised before");
-        march.solve(&missed.defects, &march.scaled(&missed.conditions))
+        march.solve(&residuals.defects, &march.scaled(&residuals.conditions))
     }
 
     fn moved(&self, step: &[Vec<f64>], factor: f64) -> Nodes {
@@ -264,7 +273,7 @@ impl<'e, 'a> Newton<'e, 'a> {
     }
 }
 
-impl Missed {
+impl Residuals {
     fn largest(&self, march: Option<&March>) -> f64 {
         let tip = march.map(|march| march.scaled(&self.conditions));
         let defects = self.defects.iter().chain(&tip).flatten();

@@ -160,9 +160,9 @@ impl fmt::Display for Neutral {
 pub struct Failure {
     /// Why.
     pub reason: Reason,
-    /// How much of the way from the arcs' leaf to the scenario's was made.
+    /// How much of the change from the arcs' leaf to the scenario's was made.
     pub part: f64,
-    /// How far it came: the last shape on that way, at the stations.
+    /// The last shape that was reached, at the stations.
     pub rods: Vec<RodShape>,
     /// Work done.
     pub work: Work,

@@ -1,6 +1,6 @@
 //! From a start to a solution with an error estimate.
 
-use super::continuation::{Lost, from_arcs};
+use super::continuation::{Interrupted, from_arcs};
 use super::dop853::Unbounded;
 use super::equations::Equations;
 use super::newton::{Newton, Work};
@@ -26,7 +26,7 @@ const SHARPER: f64 = 1e-2;
 
 /// Solves the boundary-value problem of a scenario with an estimated error of
 /// the positions below `accuracy` (relative to the longest rod), or as far as
-/// double precision carries: [`Solution::error`] tells.
+/// double precision allows: see [`Solution::error`].
 ///
 /// # Errors
 /// If no solution is found: why, and how far it came.
@@ -105,23 +105,23 @@ fn solve_once(
         Start::Arcs => from_arcs(&mut equations, options.intervals, &mut work),
         Start::Leaf { stations, rods } => Ok(Trajectory::of_leaf(&equations, stations, rods)),
     };
-    let lost = |equations: &Equations, lost: Lost, work: Work| {
-        let states = options.stations.iter().map(|&sigma| lost.near.at(sigma));
+    let failure = |equations: &Equations, end: Interrupted, work: Work| {
+        let states = options.stations.iter().map(|&sigma| end.near.at(sigma));
         let near = Trajectory::new(equations, options.stations.clone(), states.collect());
         Failure {
-            reason: lost.reason,
-            part: lost.part,
+            reason: end.reason,
+            part: end.part,
             rods: near.shape(equations),
             work,
         }
     };
     let near = match found {
         Ok(near) => near,
-        Err(way) => return Err(lost(&equations, way, work)),
+        Err(end) => return Err(failure(&equations, end, work)),
     };
     let failed = |reason: Reason, near: Trajectory, work: Work| {
         let part = 1.0;
-        lost(&equations, Lost { reason, part, near }, work)
+        failure(&equations, Interrupted { reason, part, near }, work)
     };
     let mut newton = match Newton::near(&equations, &near, options.intervals) {
         Ok(newton) => newton,

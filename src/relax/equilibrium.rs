@@ -8,12 +8,12 @@ use crate::undulation::Undulation;
 use glam::DVec3;
 use serde::{Serialize, Serializer};
 
-/// How a run ended: one word per way.
+/// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// At rest in a stable equilibrium, within the tolerance.
     Converged,
-    /// As `Converged`, but a saddle was met on the way: the leaf was pushed
+    /// As `Converged`, but a saddle was met before: the leaf was pushed
     /// off along the unstable mode and came to rest elsewhere.
     ConvergedAfterSaddle,
     /// At rest within the tolerance in an unstable equilibrium, and kept
@@ -59,7 +59,7 @@ impl Serialize for Outcome {
     }
 }
 
-/// A saddle that was met on the way to rest, and left.
+/// A saddle that was met before rest, and left.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Saddle {
     /// Its energy.

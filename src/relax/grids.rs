@@ -10,11 +10,11 @@ use crate::relax::segments::{COARSEST_TURN, FINEST};
 use crate::relax::settle::{BUDGET, InitialGuess, Settled};
 use crate::relax::stability::Judged;
 
-/// Two grids on which the leaf moved far are said to land in the same place
+/// Two grids on which the leaf moved far are said to have settled in the same place
 /// if no station differs by more than this, in lengths.
 const SAME_PLACE: f64 = 0.05;
 
-/// The finest grid on which landing places are compared.
+/// The finest grid on which such places are compared.
 const FINEST_LANDING: usize = 256;
 
 /// The finest grid that is tried when coarser ones do not resolve the bending.
@@ -27,7 +27,7 @@ const BETWEEN: f64 = 30.0;
 impl Run<'_, '_> {
     /// From the start to rest, on as many grids as the tolerance needs.
     pub fn solve(&mut self, grid: Grid) -> End {
-        if let Err(stop) = self.land(grid) {
+        if let Err(stop) = self.settle_from_start(grid) {
             return End::Failed(stop);
         }
         loop {
@@ -41,7 +41,7 @@ impl Run<'_, '_> {
             if self.late() {
                 return End::Failed(Stop::StepLimit);
             }
-            let level = self.levels.last().expect("the leaf has landed");
+            let level = self.levels.last().expect("the leaf has settled");
             let finer = level.leaf.grid.refined();
             let nodes = self.leaf.rods() * finer.segments();
             if self.segments().is_some()
@@ -72,9 +72,9 @@ impl Run<'_, '_> {
     }
 
     /// From the start to rest on the first grid that resolves it. A leaf that
-    /// had to move far must land in the same place on two grids.
-    fn land(&mut self, mut grid: Grid) -> Result<(), Stop> {
-        let mut landed: Option<Level> = None;
+    /// had to move far must settle in the same place on two grids.
+    fn settle_from_start(&mut self, mut grid: Grid) -> Result<(), Stop> {
+        let mut before: Option<Level> = None;
         loop {
             let settled = self.settle(grid.clone(), InitialGuess::Start);
             let Settled { level, stop, moved } = settled;
@@ -82,7 +82,7 @@ impl Run<'_, '_> {
             let fixed = self.segments().is_some();
             let last = fixed || finer.segments() > FINEST_LANDING || self.late();
             match stop {
-                // Where a leaf that moves lands is not for so coarse a grid to say.
+                // So coarse a grid cannot decide where a leaf that moves settles.
                 _ if self.too_coarse(level.leaf.segments())
                     && (moved
                         || !matches!(stop, Stop::Rest(_))
@@ -96,14 +96,14 @@ impl Run<'_, '_> {
                     return Ok(());
                 }
                 Stop::Rest(_) => {
-                    if let Some(coarser) = landed.take()
+                    if let Some(coarser) = before.take()
                         && distance(&coarser, &level) < SAME_PLACE
                     {
                         self.push(coarser);
                         self.push(level);
                         return Ok(());
                     }
-                    landed = Some(level);
+                    before = Some(level);
                 }
                 Stop::Unresolved
                     if finer.segments() <= FINEST_RESOLVING
@@ -111,13 +111,13 @@ impl Run<'_, '_> {
                         && self.spent <= BUDGET
                         && !self.late() =>
                 {
-                    landed = None;
+                    before = None;
                 }
                 _ if last || self.spent > BUDGET => {
                     self.push(level);
                     return Err(stop);
                 }
-                _ => landed = None,
+                _ => before = None,
             }
             grid = finer;
         }

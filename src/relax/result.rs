@@ -105,7 +105,7 @@ fn centerlines(level: &Level) -> Vec<Centerline> {
 /// Values carried per node through the extrapolation: position, quaternion, n, m.
 const FIELDS: usize = 13;
 
-/// Stations at which a result is told, if it is known there.
+/// Stations at which a result is given, if it is known there.
 const STATIONS: usize = 8;
 
 /// All nodal fields, in the scenario's units, with `columns` extrapolations: at
@@ -115,14 +115,14 @@ fn fields(levels: &[&Level], columns: usize) -> (Vec<f64>, Vec<RodShape>) {
     let first = levels[0];
     let (n, length) = (first.leaf.segments(), first.leaf.leaf.scale.length);
     let used = &levels[levels.len() - 1 - columns..];
-    let told = match levels {
+    let reported = match levels {
         [_, second, ..] if n < STATIONS => second,
         _ => first,
     };
     let rods = (0..first.leaf.rods())
         .map(|j| {
             let mut nodes = extrapolated(used, j, n);
-            let stations = told.leaf.segments();
+            let stations = reported.leaf.segments();
             if stations > n {
                 let from = used.len().min(levels.len() - 1);
                 let finer = extrapolated(&used[used.len() - from..], j, stations);
@@ -137,11 +137,13 @@ fn fields(levels: &[&Level], columns: usize) -> (Vec<f64>, Vec<RodShape>) {
             let nodes = nodes.iter().enumerate();
             RodShape {
                 length: first.leaf.leaf.length(j) * length,
-                nodes: nodes.map(|(i, v)| unpack(&told.leaf, j, i, v)).collect(),
+                nodes: nodes
+                    .map(|(i, v)| unpack(&reported.leaf, j, i, v))
+                    .collect(),
             }
         })
         .collect();
-    (told.leaf.grid.sigma().to_vec(), rods)
+    (reported.leaf.grid.sigma().to_vec(), rods)
 }
 
 /// The nodal fields of rod `j` at the ends of `n` parts.

@@ -5,7 +5,7 @@
 const ORDER_SLACK: f64 = 1.5;
 
 /// Changes of the first column that shrink to less than this part of what its
-/// order tells are not those of a ds^2 series either.
+/// order indicates are not those of a ds^2 series either.
 const LEAST_RATIO: f64 = 0.68;
 
 /// A further column that changes the values by more than this part of what the

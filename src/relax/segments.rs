@@ -18,7 +18,7 @@ const LOOSE: f64 = 1e-3;
 /// tolerance may come to.
 pub const COARSEST_TURN: f64 = 0.8;
 
-/// Whether the leaf settles in the valley it starts in: where the way to rest is
+/// Whether the leaf settles in the valley it starts in: where the path to rest is
 /// Newton's, nothing keeps it from leaving saddles, and nothing disturbs it.
 fn settles_where_it_starts(method: Method) -> bool {
     matches!(method, Method::SemiImplicit(how) if !how.keep_unstable && how.disturbance.is_none())

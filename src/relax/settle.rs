@@ -127,7 +127,7 @@ impl Run<'_, '_> {
             accuracy: self.accuracy(&leaf),
             near_rest,
             work: &mut self.work,
-            progress: &mut told(&mut *self.progress, leaf.segments()),
+            progress: &mut step_reporter(&mut *self.progress, leaf.segments()),
             moved: false,
             limit: &self.options.limit,
         };
@@ -149,7 +149,7 @@ impl Run<'_, '_> {
     ) -> Settled {
         let accuracy = self.accuracy(&leaf);
         let mut system = System::new(&leaf);
-        let progress = &mut told(&mut *self.progress, leaf.segments());
+        let progress = &mut step_reporter(&mut *self.progress, leaf.segments());
         let stop = moment::settle(
             &mut leaf,
             &mut state,
@@ -169,7 +169,7 @@ impl Run<'_, '_> {
             accuracy: self.accuracy(&leaf),
             iterations: saddle::MAX_ITERATIONS,
             work: &mut self.work,
-            progress: &mut told(&mut *self.progress, leaf.segments()),
+            progress: &mut step_reporter(&mut *self.progress, leaf.segments()),
         };
         let mut system = System::new(&leaf);
         let stop = saddle::newton(&leaf, &mut state, &mut system, newton);
@@ -197,7 +197,7 @@ impl Run<'_, '_> {
                 state,
                 accuracy,
                 work: &mut self.work,
-                progress: &mut told(&mut *self.progress, leaf.segments()),
+                progress: &mut step_reporter(&mut *self.progress, leaf.segments()),
                 near_rest,
                 cg_tolerance,
                 pushes,
@@ -247,7 +247,10 @@ impl Run<'_, '_> {
 }
 
 /// Reports the steps on a grid of so many segments.
-fn told(progress: &mut dyn FnMut(&Progress), grid: usize) -> impl FnMut(usize, f64) + use<'_> {
+fn step_reporter(
+    progress: &mut dyn FnMut(&Progress),
+    grid: usize,
+) -> impl FnMut(usize, f64) + use<'_> {
     move |step, residual| {
         progress(&Progress {
             grid,

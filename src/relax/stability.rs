@@ -27,7 +27,7 @@ impl Run<'_, '_> {
     /// they must be as many as on the grid before. At one that is not wanted,
     /// the leaf is pushed off and the grids begin anew from where it lands.
     pub fn judge_stability(&mut self) -> Judged {
-        let level = self.levels.last().expect("the leaf has landed");
+        let level = self.levels.last().expect("the leaf has settled");
         if level.leaf.tip_moment() != DVec3::ZERO {
             return Judged::Known;
         }
@@ -61,7 +61,7 @@ impl Run<'_, '_> {
                 Judged::Refine
             };
         }
-        let mut level = self.levels.pop().expect("the leaf has landed");
+        let mut level = self.levels.pop().expect("the leaf has settled");
         let exact = saddle::polish(&level.leaf, &mut level.state, &mut system, &mut self.work);
         self.index = exact.or(self.index);
         let Some(index @ 1..) = self.index else {

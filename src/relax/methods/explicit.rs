@@ -2,7 +2,7 @@
 //!
 //! First the leaf moves as the relaxation's leaf does, with true masses and
 //! damping and every motion resolved, until it is in a valley of its energy:
-//! that decides which equilibrium it finds. Then only the way to the bottom
+//! that decides which equilibrium it finds. Then only the descent to the bottom
 //! matters, and masses and damping are chosen for speed: masses that make the
 //! fastest motions of all segments alike ([`crate::motion`]), and damping at the
 //! rate 3/t, begun anew whenever the leaf moves uphill. (So damped, motion comes
@@ -44,12 +44,12 @@ const STEPS_PER_PIECE: f64 = 2000.0;
 /// Accuracy that rounding allows.
 const LEAST_ACCURACY: f64 = 1e-10;
 
-/// Unbalanced forces at which the remaining way is first measured, over the
+/// Unbalanced forces at which the remaining distance is first measured, over the
 /// accuracy wanted.
 const FIRST_BALANCE: f64 = 0.1;
 
 /// Looks without progress after which only rounding is left, if the remaining
-/// way is no longer than this.
+/// distance is no longer than this.
 const STAGNATION: usize = 50;
 const LONGEST_REMAINING: f64 = 1e-6;
 
@@ -67,7 +67,7 @@ pub struct Request<'a> {
     pub work: &'a mut Work,
     /// Told steps and the largest unbalanced force or moment.
     pub progress: &'a mut dyn FnMut(usize, f64),
-    /// Whether the leaf's energy was not convex on its way.
+    /// Whether the leaf's energy was not convex where it moved.
     pub moved: bool,
     /// When to give up.
     pub limit: &'a Limit,
@@ -146,7 +146,7 @@ fn find_valley(
 }
 
 /// Moves on to the next look. On fine grids of stiff rods that takes long: with
-/// a limit the way is made in pieces.
+/// a limit it is made in pieces.
 fn look_ahead(motion: &mut Explicit, limit: &Limit) -> Result<(), Stop> {
     let begin = motion.time();
     let pieces = match limit.is_none() {
@@ -167,7 +167,7 @@ fn look_ahead(motion: &mut Explicit, limit: &Limit) -> Result<(), Stop> {
     Ok(())
 }
 
-/// To the bottom of the valley; returns what is left of the way.
+/// To the bottom of the valley; returns the distance that is left.
 fn descend(
     leaf: &DiscreteLeaf,
     motion: &mut Explicit,

@@ -51,7 +51,7 @@ const ENERGY_SLACK: f64 = 1e-9;
 
 /// Smallest compliance (units of L^2/A) of a leaf that is moved by its strain
 /// energy. A stiffer one is first settled with this compliance, which also
-/// tells the forces it carries, and then made stiff.
+/// gives the forces it carries, and then made stiff.
 const MOVING_COMPLIANCE: f64 = 2e-3;
 
 /// The load stretches a softened leaf by no more than about this.
@@ -84,7 +84,7 @@ pub struct Relaxation<'a> {
     /// Relative accuracy of the conjugate gradients in the first step.
     pub cg_tolerance: f64,
     /// How often it was pushed off saddles before: each time it is softened
-    /// less, since a softened leaf may find its way back.
+    /// less, since a softened leaf may return.
     pub pushes: i32,
     /// The linear solver.
     pub solver: Definite,
@@ -94,7 +94,7 @@ pub struct Relaxation<'a> {
     pub limit: &'a Limit,
     /// Whether to give up at once if the leaf has to move.
     pub convex_only: bool,
-    /// Whether the leaf had to move: its energy was not convex on the way.
+    /// Whether the leaf had to move: its energy was not convex where it moved.
     pub moved: bool,
 }
 
