@@ -26,6 +26,7 @@ use super::energy_balance::{EnergyBalance, Exchange, measure};
 use super::method::{Method, Snapshot, Stopped, Velocity};
 use super::physics::{Inertia, Physics};
 use crate::leaf::{DiscreteLeaf, SparsePattern, State, System};
+use crate::newton::Definite;
 use crate::rod::Section;
 
 /// Spectral radius rho_inf at infinite frequency: what remains in a step of what
@@ -86,7 +87,7 @@ pub struct SemiImplicit {
     /// Power of internal friction at the last step.
     friction_power: f64,
     system: System,
-    direct: Option<SparsePattern>,
+    solver: Definite,
     state: State,
     trial: State,
     next: State,
@@ -115,7 +116,7 @@ impl SemiImplicit {
             past_step: 0.0,
             friction_power: 0.0,
             system,
-            direct: None,
+            solver: Definite::default(),
             state: state.clone(),
             trial: state.clone(),
             next: state.clone(),
@@ -230,7 +231,7 @@ impl Method for SemiImplicit {
             self.step,
             self.past_step,
             self.friction_power,
-            f64::from(u8::from(self.direct.is_some())),
+            f64::from(u8::from(self.solver.direct.is_some())),
         ];
         numbers.extend(self.balance.save());
         numbers.extend(self.state.x.iter().flat_map(|x| x.to_array()));
@@ -277,7 +278,7 @@ impl Method for SemiImplicit {
         }
         // The solver in use decides the last digits, too.
         self.leaf.assemble(&self.state, &mut self.system);
-        self.direct = match direct {
+        self.solver.direct = match direct {
             true => SparsePattern::new(&self.system).ok(),
             false => None,
         };

@@ -5,7 +5,8 @@ use glam::{DMat3, DVec3};
 use super::super::friction::rates;
 use super::super::physics::Inertia;
 use super::{ALPHA_F, ALPHA_M, BETA, GAMMA, SemiImplicit, Steps};
-use crate::leaf::{Solved, SparsePattern, State, System};
+use crate::leaf::{State, System};
+use crate::newton::Work;
 use crate::rotation;
 
 /// Newton iterations in a step, and the size of the last (radians, lengths),
@@ -33,25 +34,9 @@ impl SemiImplicit {
     /// Factorises and solves; false if the matrix is not positive definite.
     pub(super) fn solve(&mut self) -> bool {
         self.factorizations += 1;
-        if self.direct.is_none() {
-            if !self.system.factorize(0.0) {
-                return false;
-            }
-            match self.system.solve(None, CG_TOLERANCE) {
-                Solved::Yes(_) => return true,
-                Solved::Indefinite(_) => return false,
-                Solved::TooSlow(_) => self.direct = SparsePattern::new(&self.system).ok(),
-            }
-        }
-        let Some(Ok(mut factor)) = (self.direct.as_ref()).map(|p| p.factorize(&self.system, 0.0))
-        else {
-            return false;
-        };
-        let positive = factor.negative() == 0;
-        if positive {
-            factor.solve(&mut self.system, None);
-        }
-        positive
+        let mut uncounted = Work::default();
+        self.solver
+            .solve(&mut self.system, 0.0, None, CG_TOLERANCE, &mut uncounted)
     }
 
     /// Turn and shift of a node from the state to the trial; none of a base,

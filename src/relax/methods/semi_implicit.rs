@@ -154,9 +154,8 @@ impl Relaxation<'_> {
 
     /// Damped motion until rest.
     fn move_to_rest(&mut self, leaf: &DiscreteLeaf, system: &mut System, accuracy: f64) -> Stop {
-        let n = leaf.segments();
         let mut trial = self.state.clone();
-        let mut velocity = vec![vec![[0.0; 6]; n]; leaf.rods()];
+        let mut velocity = vec![vec![[0.0; 6]; leaf.segments()]; leaf.rods()];
         let mut next_velocity = velocity.clone();
         let mut pace = Pace {
             dt: f64::INFINITY,
@@ -180,10 +179,7 @@ impl Relaxation<'_> {
                     return Stop::Saddle;
                 }
                 self.moved = true;
-                if self.convex_only {
-                    return Stop::Stuck;
-                }
-                if !pace.shorten() {
+                if self.convex_only || !pace.shorten() {
                     return Stop::Stuck;
                 }
             }
@@ -224,9 +220,6 @@ impl Relaxation<'_> {
                     pace.dt = f64::INFINITY;
                 } else if part == 1.0 {
                     pace.lengthen();
-                }
-                if pace.dt > LONGEST_STEP {
-                    pace.dt = f64::INFINITY;
                 }
             } else {
                 resting = false;
@@ -288,5 +281,8 @@ impl Pace {
     fn lengthen(&mut self) {
         self.dt *= self.growth;
         self.growth = (2.0 * self.growth).min(MAX_GROWTH);
+        if self.dt > LONGEST_STEP {
+            self.dt = f64::INFINITY;
+        }
     }
 }
