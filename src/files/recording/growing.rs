@@ -53,18 +53,22 @@ pub fn kept_path(file: &Path) -> PathBuf {
 }
 
 impl GrowingFile {
-    pub fn begin(file: PathBuf) -> Result<Self, OutputError> {
-        match Draft::begin(&file) {
-            Ok((draft, out)) => Ok(GrowingFile {
-                file,
-                draft,
-                out,
-                bytes: 0,
-                checksum: Checksum::new(),
-                buffer: Vec::new(),
-            }),
-            Err(reason) => Err(OutputError::File { file, reason }),
-        }
+    /// Begins a file with these bytes.
+    pub fn begin(file: PathBuf, start: &[u8]) -> Result<Self, OutputError> {
+        let (draft, out) = match Draft::begin(&file) {
+            Ok(begun) => begun,
+            Err(reason) => return Err(OutputError::File { file, reason }),
+        };
+        let mut begun = GrowingFile {
+            file,
+            draft,
+            out,
+            bytes: 0,
+            checksum: Checksum::new(),
+            buffer: Vec::new(),
+        };
+        begun.append(|out| out.write_all(start))?;
+        Ok(begun)
     }
 
     /// Goes on with a kept file where it had this extent. Nothing is changed if it
@@ -180,8 +184,8 @@ mod tests {
     fn a_kept_file_goes_on_where_it_was() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.csv");
-        let mut file = GrowingFile::begin(path.clone()).unwrap();
-        let extent = write(&mut file, "one two ");
+        let mut file = GrowingFile::begin(path.clone(), b"one ").unwrap();
+        let extent = write(&mut file, "two ");
         write(&mut file, "and a half-written thr");
         file.unfinished().keep().unwrap();
         drop(file);
@@ -197,9 +201,7 @@ mod tests {
     #[test]
     fn an_unfinished_file_that_is_dropped_is_removed() {
         let folder = tempfile::tempdir().unwrap();
-        let mut file = GrowingFile::begin(folder.path().join("a.csv")).unwrap();
-        write(&mut file, "one");
-        drop(file);
+        drop(GrowingFile::begin(folder.path().join("a.csv"), b"one").unwrap());
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

@@ -13,7 +13,6 @@ mod growing;
 mod motion;
 
 use std::fs;
-use std::io;
 use std::mem;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -87,13 +86,11 @@ impl Recording {
     pub fn begin(folder: &Path, simulation: &mut Simulation) -> Result<Self, OutputError> {
         atomic::make_folder(folder)?;
         let (form, size) = form(simulation);
-        let motion = GrowingFile::begin(folder.join(form.file_name()))?;
-        let energy = GrowingFile::begin(folder.join(energy::FILE_NAME))?;
-        let mut recording = Recording::with(folder, simulation, motion, energy);
-        let append = |start: Vec<u8>| move |out: &mut Vec<u8>| io::Result::Ok(out.extend(start));
         let start = form.start(size, outputs(simulation));
-        recording.motion.append(append(start))?;
-        recording.energy.append(append(header::<energy::Row>()))?;
+        let motion = GrowingFile::begin(folder.join(form.file_name()), &start)?;
+        let start = header::<energy::Row>();
+        let energy = GrowingFile::begin(folder.join(energy::FILE_NAME), &start)?;
+        let mut recording = Recording::with(folder, simulation, motion, energy);
         let frame = simulation.frame();
         recording.add(simulation, &frame)?;
         Ok(recording)
