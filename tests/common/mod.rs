@@ -1,29 +1,28 @@
 //! What the tests share: reading a scenario file with some
 //! entries replaced, relaxing it, and comparing with a reference.
-#![allow(dead_code)]
+// Every file of tests takes a part of it.
+#![allow(dead_code, unused_imports)]
 
 pub mod branch;
 pub mod motion;
 pub mod random;
+mod shot;
 pub mod vibration;
 
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
+pub use branch::{NEUTRAL, critical, critical_of_rigid};
 use glam::DVec3;
-use leafdyn::internals::bvp::{self, Failure, Solution, Start};
 use leafdyn::internals::leaf::{Leaf, Scale};
 use leafdyn::relax::{Equilibrium, Method, NodeState, Options, RodShape, SemiImplicit, relax};
 use leafdyn::scenario::{Dynamics, Profile, Rod, Scenario, Units};
 use leafdyn::shape::Difference;
+pub use shot::*;
 
 /// The tolerance at which canonical values are checked: small enough for the
 /// digits they are given with, large enough for double precision.
 pub const TIGHT: f64 = 1e-11;
-
-/// Local error of the integration at which boundary-value solutions are
-/// compared with others: as small as rounding allows.
-pub const SHARP: f64 = 1e-13;
 
 /// The files of a folder of scenarios, in order.
 pub fn files(folder: &str) -> Vec<PathBuf> {
@@ -282,57 +281,6 @@ pub fn extrapolate(values: &[f64], part: f64) -> f64 {
     column[0]
 }
 
-/// By how much, relatively, critical loads may be off: see [`critical`].
-pub const NEUTRAL: f64 = 1e-6;
-
-/// The critical value between `low` and `high` of a load that `unstable`
-/// judges on a grid of so many segments: bisected on four nested grids, each
-/// to the last digit, and extrapolated.
-///
-/// An eigenvalue counts as negative only where it can be told from zero, so
-/// that critical loads come out too high by the part [`NEUTRAL`] at most.
-#[track_caller]
-pub fn critical(
-    low: f64,
-    high: f64,
-    coarsest: usize,
-    unstable: impl Fn(f64, usize) -> bool,
-) -> f64 {
-    let on_grid = |segments| {
-        let (mut low, mut high) = (low, high);
-        assert!(!unstable(low, segments), "unstable at {low} already");
-        assert!(unstable(high, segments), "stable at {high} still");
-        for _ in 0..45 {
-            let middle = 0.5 * (low + high);
-            if unstable(middle, segments) {
-                high = middle;
-            } else {
-                low = middle;
-            }
-        }
-        0.5 * (low + high)
-    };
-    let values = [1, 2, 4, 8].map(|times| on_grid(coarsest * times));
-    extrapolate(&values, 0.25)
-}
-
-/// As [`critical`], for an inextensible and unshearable leaf: the limit of
-/// leaves of ever larger stretch and shear stiffness, which is passed on.
-#[track_caller]
-pub fn critical_of_rigid(
-    low: f64,
-    high: f64,
-    coarsest: usize,
-    unstable: impl Fn(f64, usize, f64) -> bool,
-) -> f64 {
-    let values = [1e4, 2e4, 4e4].map(|stiffness| {
-        critical(low, high, coarsest, |load, segments| {
-            unstable(load, segments, stiffness)
-        })
-    });
-    extrapolate(&values, 0.5)
-}
-
 /// A leaf of the paper: equal veins of unit length in its fan, couplings
 /// (0, 1, 1), weight along -e3. To be changed at will.
 pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -> Scenario {
@@ -390,101 +338,6 @@ pub fn distance(a: &Equilibrium, b: &Equilibrium) -> f64 {
     largest
 }
 
-/// Solves the boundary-value problem, starting from a relaxed leaf.
-pub fn shoot_near(scenario: &Scenario, leaf: &Equilibrium) -> Result<Solution, Failure> {
-    shoot_over(None, scenario, leaf)
-}
-
-/// As [`shoot_near`], over so many intervals.
-pub fn shoot_over(
-    intervals: Option<usize>,
-    scenario: &Scenario,
-    leaf: &Equilibrium,
-) -> Result<Solution, Failure> {
-    let start = Start::Leaf {
-        stations: &leaf.shape.stations,
-        rods: &leaf.shape.rods,
-    };
-    let options = bvp::Options {
-        tolerance: SHARP,
-        intervals,
-        stations: leaf.shape.stations.clone(),
-    };
-    bvp::solve(scenario, start, &options)
-}
-
-/// Solves the boundary-value problem without any start.
-pub fn shoot_alone(scenario: &Scenario, stations: &[f64]) -> Result<Solution, Failure> {
-    let options = bvp::Options {
-        tolerance: SHARP,
-        intervals: None,
-        stations: stations.to_vec(),
-    };
-    bvp::solve(scenario, Start::Arcs, &options)
-}
-
-/// What shooting has found; the reason where it has not.
-#[track_caller]
-pub fn found(scenario: &Scenario, shot: Result<Solution, Failure>) -> Solution {
-    let (name, rods) = (&scenario.name, scenario.rods.len());
-    shot.unwrap_or_else(|Failure { reason, part, .. }| {
-        panic!("{name}, {rods} veins: {reason}, at {part} of the load")
-    })
-}
-
-/// The boundary-value solution near a relaxed leaf, which must exist.
-#[track_caller]
-pub fn shot_near(scenario: &Scenario, leaf: &Equilibrium) -> Solution {
-    found(scenario, shoot_near(scenario, leaf))
-}
-
-/// The boundary-value solution without any start, which must exist.
-#[track_caller]
-pub fn shot_alone(scenario: &Scenario, stations: &[f64]) -> Solution {
-    let solution = found(scenario, shoot_alone(scenario, stations));
-    let defect = solution.defect;
-    assert!(defect < 1e-11, "{}: {defect:.1e}", scenario.name);
-    solution
-}
-
-/// A leaf at rest by relaxation, and by shooting that knows nothing of it.
-pub struct Both {
-    pub relaxed: Equilibrium,
-    pub shot: Solution,
-}
-
-impl Both {
-    /// A scenario file with [`entries`] replaced.
-    #[track_caller]
-    pub fn solve(name: &str, overrides: &str) -> Both {
-        Both::of(&scenario(name, overrides))
-    }
-
-    #[track_caller]
-    pub fn of(scenario: &Scenario) -> Both {
-        let relaxed = settle(scenario, TIGHT);
-        let shot = shot_alone(scenario, &relaxed.shape.stations);
-        Both { relaxed, shot }
-    }
-
-    /// The shapes that both have found.
-    pub fn shapes(&self) -> [&[RodShape]; 2] {
-        [&self.relaxed.shape.rods, &self.shot.rods]
-    }
-
-    /// As [`tip_is`], of both.
-    #[track_caller]
-    pub fn tip_is(&self, what: &str, wanted: DVec3, digits: f64, tolerance: f64) {
-        tip_is(what, &self.relaxed, wanted, digits, tolerance);
-        let off = tip_node(&self.shot.rods, 0).position - wanted;
-        let error = off.abs().max_element();
-        assert!(
-            error <= tolerance,
-            "{what}, by shooting: off by {error:.1e}"
-        );
-    }
-}
-
 /// The units of a scenario.
 pub fn scale(scenario: &Scenario) -> Scale {
     Leaf::new(scenario).scale
@@ -528,19 +381,6 @@ pub fn apart(scenario: &Scenario, a: &[RodShape], b: &[RodShape]) -> Difference 
         force: difference.force / scale.force(),
         moment: difference.moment / scale.moment(),
     }
-}
-
-/// Asserts that a relaxed leaf and its boundary-value solution are the same to
-/// `position`, and to ten times that in rotation, force, moment, and energy.
-#[track_caller]
-pub fn agree(what: &str, scenario: &Scenario, leaf: &Equilibrium, shot: &Solution, position: f64) {
-    let found = apart(scenario, &leaf.shape.rods, &shot.rods);
-    let energy = (leaf.energy.unwrap() - shot.energy).abs() / scale(scenario).moment();
-    let others = [found.rotation, found.force, found.moment, energy];
-    assert!(
-        found.position <= position && others.iter().all(|value| *value <= 10.0 * position),
-        "{what}: {found:?}, energy {energy:.1e}"
-    );
 }
 
 /// Slenderness r^2 = I/(A L^2) and s^2 = EI/(k G A L^2); frequencies of the clamped Timoshenko
