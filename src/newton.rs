@@ -4,6 +4,7 @@
 use crate::leaf::{DiscreteLeaf, Increment, Solved, SparsePattern, State, System};
 use crate::rod::RESOLVED_TURN;
 use serde::Serialize;
+use std::ops::Add;
 
 /// An increment (radians, lengths) below this that does not shrink is rounding.
 pub const ROUNDING: f64 = 1e-9;
@@ -42,6 +43,19 @@ pub struct Work {
     pub force_evaluations: usize,
     /// Iterations of the conjugate gradients, all steps together.
     pub cg_iterations: usize,
+}
+
+impl Add for Work {
+    type Output = Work;
+
+    fn add(self, other: Work) -> Work {
+        Work {
+            steps: self.steps + other.steps,
+            factorizations: self.factorizations + other.factorizations,
+            force_evaluations: self.force_evaluations + other.force_evaluations,
+            cg_iterations: self.cg_iterations + other.cg_iterations,
+        }
+    }
 }
 
 /// How an iteration or a motion on one grid stopped.

@@ -28,7 +28,7 @@ pub(crate) use equilibrium::serialize_index;
 pub use equilibrium::{Accuracy, Equilibrium, Mode, Model, Outcome, Saddle, Shape, Stability};
 pub(crate) use index::{index_near, project};
 pub use method::{Method, SemiImplicit, UnknownMethod};
-pub(crate) use methods::shooting::check_intervals;
+pub(crate) use methods::shooting::{START as SHOOTING_START, check_intervals};
 pub use options::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
     check_tolerance,

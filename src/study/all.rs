@@ -4,6 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
+use super::judge::common;
 use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax, serialize_index};
 use crate::scenario::Scenario;
 use crate::shape::serialize_tips;
@@ -170,20 +171,10 @@ impl All {
 }
 
 fn same(a: &Equilibrium, b: &Equilibrium) -> bool {
-    let longest = a
-        .shape
-        .rods
-        .iter()
-        .fold(0.0_f64, |m, rod| m.max(rod.length));
     let errors = [a, b].map(|leaf| leaf.accuracy.error_estimate.unwrap_or(0.0));
-    let within = (SAME * longest).max(2.0 * (errors[0] + errors[1]));
+    let within = (SAME * a.shape.longest()).max(2.0 * (errors[0] + errors[1]));
     // Their grids may differ: compared at the stations that both have.
-    let both: Vec<(usize, usize)> = (a.shape.stations.iter().enumerate())
-        .filter_map(|(i, sigma)| {
-            let near = |other: &f64| (other - sigma).abs() < 1e-12;
-            Some((i, b.shape.stations.iter().position(near)?))
-        })
-        .collect();
+    let both = common(&a.shape.stations, &b.shape.stations);
     a.shape.rods.iter().zip(&b.shape.rods).all(|(a, b)| {
         both.iter()
             .all(|&(i, j)| a.nodes[i].position.distance(b.nodes[j].position) < within)

@@ -5,10 +5,9 @@
 //! What is right is decided by two methods that share nothing: the relaxed leaf,
 //! and the solution of the boundary-value problem that starts from it.
 
-use std::ops::Add;
 use std::time::Instant;
 
-use crate::bvp::{self, Solution, Start};
+use crate::bvp::{Solution, Start};
 use crate::leaf::{Grid, Leaf};
 use crate::limit::Limit;
 use crate::relax::{self, Equilibrium, Method, Options, Outcome, RelaxError, Work, index_near};
@@ -137,32 +136,6 @@ impl Answer {
     /// The bound on its error; infinite if it has none.
     pub fn error(&self) -> f64 {
         self.error_estimate.unwrap_or(f64::INFINITY)
-    }
-}
-
-/// What shooting does, in the words of a relaxation: corrections are steps,
-/// linearisations factorisations, evaluations of all slopes those of all forces.
-impl From<bvp::Work> for Work {
-    fn from(work: bvp::Work) -> Self {
-        Work {
-            steps: work.iterations,
-            factorizations: work.linearizations,
-            force_evaluations: work.slopes,
-            cg_iterations: 0,
-        }
-    }
-}
-
-impl Add for Work {
-    type Output = Work;
-
-    fn add(self, other: Work) -> Work {
-        Work {
-            steps: self.steps + other.steps,
-            factorizations: self.factorizations + other.factorizations,
-            force_evaluations: self.force_evaluations + other.force_evaluations,
-            cg_iterations: self.cg_iterations + other.cg_iterations,
-        }
     }
 }
 

@@ -69,12 +69,22 @@ pub fn from_rest(
     };
     let mut found = shoot(scenario, options, intervals, tolerance, start);
     found.stability.saddle = rest.stability.saddle;
-    found.work.steps += rest.work.steps;
-    found.work.factorizations += rest.work.factorizations;
-    found.work.force_evaluations += rest.work.force_evaluations;
-    found.work.cg_iterations += rest.work.cg_iterations;
+    found.work = rest.work + found.work;
     found.wall_seconds += rest.wall_seconds;
     Ok(found)
+}
+
+/// What shooting does, in the words of a relaxation: corrections are steps,
+/// linearisations factorisations, evaluations of all slopes those of all forces.
+impl From<bvp::Work> for Work {
+    fn from(work: bvp::Work) -> Self {
+        Work {
+            steps: work.iterations,
+            factorizations: work.linearizations,
+            force_evaluations: work.slopes,
+            cg_iterations: 0,
+        }
+    }
 }
 
 fn shoot(
@@ -138,12 +148,7 @@ fn shoot(
         },
         undulation: Undulation::at_stations(scenario, &stations, &found.rods, error),
         model: Model::new(veins, (veins, false), &[], [None; 2]),
-        work: Work {
-            steps: work.iterations,
-            factorizations: work.linearizations,
-            force_evaluations: work.slopes,
-            cg_iterations: 0,
-        },
+        work: work.into(),
         wall_seconds: clock.elapsed().as_secs_f64(),
         shape: Shape {
             stations,

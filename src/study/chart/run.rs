@@ -2,13 +2,9 @@
 
 use super::plan::{Cell, Setting};
 use crate::bvp::{self, Reason};
-use crate::relax::{Method, Options, Outcome, RelaxError};
+use crate::relax::{Method, Options, Outcome, RelaxError, SHOOTING_START};
 use crate::scenario::Scenario;
 use crate::study::judge::{Answer, timed};
-
-/// Tolerance to which a leaf is relaxed that shooting starts from: the coarsest
-/// grids do, and Newton's method does the rest faster than finer ones.
-const START: f64 = 1e-3;
 
 /// Runs a cell; returns also the time from the checked scenario to the result,
 /// in seconds.
@@ -37,7 +33,7 @@ pub fn run(cell: &Cell) -> Result<(Answer, f64), RelaxError> {
 /// else takes time: eigenvalues are not counted.
 fn shoot_from_rest(scenario: &Scenario, accuracy: f64) -> Result<(Answer, f64), RelaxError> {
     let options = Options {
-        tolerance: Some(START),
+        tolerance: Some(SHOOTING_START),
         ..Options::default()
     };
     let (found, seconds) = timed(|| {
