@@ -9,7 +9,7 @@ use clap::{Args, ValueHint};
 
 use crate::files;
 use crate::files::Journal;
-use crate::report::OutputError;
+use crate::report::FileError;
 use crate::study::{
     self, CELL_SECONDS, Map as Cells, MapMethod, MapRequest, MapRow, MapShow, Vary,
 };
@@ -180,7 +180,7 @@ impl Map {
         let mut journal = Journal::open(folder, &name, request, known)?;
         let mut line = ProgressLine::new(&request.base.scenario().name);
         let (mut rows, mut finished) = (Vec::new(), 0);
-        let mut failed: Option<OutputError> = None;
+        let mut failed: Option<FileError> = None;
         study::map(request, &todo, &mut |new| {
             failed = journal.append(request, &new).err();
             rows.extend(new);
@@ -219,18 +219,6 @@ fn shards(folder: &Path) -> Vec<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn shards_share_all_cells() {
-        let parts: Vec<Shard> = (1..=3).map(|i| format!("{i}/3").parse().unwrap()).collect();
-        for cell in 0..10 {
-            assert_eq!(parts.iter().filter(|part| part.has(cell)).count(), 1);
-        }
-        assert_eq!(parts[1].file_name(), "map-2-of-3.csv");
-        for bad in ["0/3", "4/3", "3", "a/b", "1/0", "-1/2"] {
-            assert!(bad.parse::<Shard>().is_err(), "{bad}");
-        }
-    }
 
     #[test]
     fn only_files_of_shards_are_taken_for_them() {

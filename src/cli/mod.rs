@@ -18,7 +18,7 @@ use clap::{Parser, Subcommand};
 
 use crate::files;
 use crate::files::Checkpointer;
-use crate::report::OutputError;
+use crate::report::FileError;
 
 /// How a leaf of coupled elastic veins comes to rest, with an error bar and a statement of stability, and how it moves.
 #[derive(Debug, Parser)]
@@ -134,7 +134,7 @@ fn checkpoint_on_interrupt(checkpointer: Checkpointer) {
 }
 
 /// Says where a simulation that was kept can go on, or why it cannot.
-fn show_checkpoint(kept: &Result<f64, OutputError>) -> Status {
+fn show_checkpoint(kept: &Result<f64, FileError>) -> Status {
     match kept {
         Ok(time) => {
             let time = crate::report::numbers::brief(*time);

@@ -7,7 +7,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::files::Recording;
-use crate::report::{self, OutputError, numbers::brief};
+use crate::report::{self, FileError, numbers::brief};
 use crate::simulate::{Options, Scheme, Simulation, Stopped};
 
 use super::progress::ProgressLine;
@@ -102,7 +102,7 @@ impl Simulate {
 fn record(
     simulation: &mut Simulation,
     recording: &mut Recording,
-) -> Result<Option<Stopped>, OutputError> {
+) -> Result<Option<Stopped>, FileError> {
     let scenario = simulation.leaf().scenario();
     let duration = scenario.dynamics.duration;
     let mut line = ProgressLine::new(&scenario.name);

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use crate::report::OutputError;
+use crate::report::FileError;
 
 /// Large enough that a centerline file of a wide leaf is not written in crumbs.
 const BUFFER_BYTES: usize = 1 << 16;
@@ -94,7 +94,7 @@ fn draft_path(file: &Path) -> PathBuf {
 }
 
 /// Makes the output folder and those above it.
-pub(super) fn make_folder(folder: &Path) -> Result<(), OutputError> {
+pub(super) fn make_folder(folder: &Path) -> Result<(), FileError> {
     match fs::create_dir_all(folder) {
         Ok(()) => Ok(()),
         Err(reason) => Err(blocked(folder, nearest_existing(folder), reason)),
@@ -103,7 +103,7 @@ pub(super) fn make_folder(folder: &Path) -> Result<(), OutputError> {
 
 /// Whether files could be written to `folder`, without leaving anything
 /// there: a long computation should not end at a closed door.
-pub fn check_writable(folder: &Path) -> Result<(), OutputError> {
+pub fn check_writable(folder: &Path) -> Result<(), FileError> {
     let existing = nearest_existing(folder);
     let probe = draft_path(&existing.join("probe"));
     match File::create(&probe).and_then(|_| fs::remove_file(&probe)) {
@@ -112,16 +112,16 @@ pub fn check_writable(folder: &Path) -> Result<(), OutputError> {
     }
 }
 
-fn blocked(folder: &Path, existing: PathBuf, reason: io::Error) -> OutputError {
-    let folder = folder.to_path_buf();
-    if existing.is_dir() {
-        OutputError::Unwritable { folder, reason }
-    } else {
-        OutputError::NotAFolder {
-            folder,
-            obstacle: existing,
-        }
-    }
+fn blocked(folder: &Path, existing: PathBuf, reason: io::Error) -> FileError {
+    let (folder, obstacle) = (folder.display(), existing.display());
+    FileError(match existing.is_dir() {
+        true => format!(
+            "cannot write to the folder {folder}: {reason}; make it writable or name another with --out DIR"
+        ),
+        false => format!(
+            "cannot write to the folder {folder}: {obstacle} is not a folder; name another with --out DIR"
+        ),
+    })
 }
 
 /// `path`, or the nearest thing above it that exists.

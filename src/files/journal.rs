@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use crate::files::atomic;
-use crate::report::{Format, Json, MapFileError, OutputError, lines, table};
+use crate::report::{FileError, Format, Json, lines, table};
 use crate::study::{Map, MapRequest, MapRow};
 
 /// What says which map the rows beside it are of.
@@ -19,28 +19,30 @@ const JSON: &str = "map.json";
 ///
 /// # Errors
 /// If the folder has another map.
-pub fn belongs(folder: &Path, request: &MapRequest) -> Result<bool, MapFileError> {
+pub fn belongs(folder: &Path, request: &MapRequest) -> Result<bool, FileError> {
     let file = folder.join(JSON);
+    let other = |file: &Path, what: &str| {
+        let change = "name another folder with --out DIR, or remove the map there";
+        let why = format!("is of another map: its {what} is not the same; {change}");
+        Err(FileError::unfit(file, &why))
+    };
     match fs::read(&file) {
         Ok(bytes) => {
             let there: Value = serde_json::from_slice(&bytes).unwrap_or_default();
             let ours = serde_json::to_value(request).unwrap_or_default();
             match difference(&there["request"], &ours) {
                 None => Ok(true),
-                Some(what) => Err(MapFileError::OtherMap { file, what }),
+                Some(what) => other(&file, &what),
             }
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             let rows = folder.join("map.csv");
             match rows.exists() {
-                true => Err(MapFileError::OtherMap {
-                    file: rows,
-                    what: "request, without map.json,".into(),
-                }),
+                true => other(&rows, "request, without map.json,"),
                 false => Ok(false),
             }
         }
-        Err(reason) => Err(MapFileError::Unreadable { file, reason }),
+        Err(reason) => Err(FileError::read(&file, reason)),
     }
 }
 
@@ -49,14 +51,14 @@ pub fn belongs(folder: &Path, request: &MapRequest) -> Result<bool, MapFileError
 ///
 /// # Errors
 /// If the folder has another map, or cannot be written to.
-pub fn claim(folder: &Path, map: &Map) -> Result<(), MapFileError> {
+pub fn claim(folder: &Path, map: &Map) -> Result<(), FileError> {
     if belongs(folder, &map.request)? {
         return Ok(());
     }
     let file = folder.join(JSON);
     atomic::make_folder(folder)?;
     atomic::write_file(&file, |out| Json(JSON).write(map, out))
-        .map_err(|reason| OutputError::File { file, reason }.into())
+        .map_err(|reason| FileError::write(&file, reason))
 }
 
 /// The first key whose values are not the same.
@@ -89,12 +91,12 @@ impl Journal {
         name: &str,
         request: &MapRequest,
         known: &[MapRow],
-    ) -> Result<Self, OutputError> {
+    ) -> Result<Self, FileError> {
         write_rows(folder, name, request, known)?;
         let path = folder.join(name);
         match OpenOptions::new().append(true).open(&path) {
             Ok(file) => Ok(Journal { path, file }),
-            Err(reason) => Err(OutputError::File { file: path, reason }),
+            Err(reason) => Err(FileError::write(&path, reason)),
         }
     }
 
@@ -102,12 +104,9 @@ impl Journal {
     ///
     /// # Errors
     /// If they cannot be written.
-    pub fn append(&mut self, request: &MapRequest, rows: &[MapRow]) -> Result<(), OutputError> {
+    pub fn append(&mut self, request: &MapRequest, rows: &[MapRow]) -> Result<(), FileError> {
         let written = lines(request, rows).and_then(|bytes| self.file.write_all(&bytes));
-        written.map_err(|reason| OutputError::File {
-            file: self.path.clone(),
-            reason,
-        })
+        written.map_err(|reason| FileError::write(&self.path, reason))
     }
 }
 
@@ -120,48 +119,9 @@ pub fn write_rows(
     name: &str,
     request: &MapRequest,
     rows: &[MapRow],
-) -> Result<(), OutputError> {
+) -> Result<(), FileError> {
     atomic::make_folder(folder)?;
     let file = folder.join(name);
     atomic::write_file(&file, |out| out.write_all(&table(request, rows)?))
-        .map_err(|reason| OutputError::File { file, reason })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::report::{read_rows, sample};
-
-    #[test]
-    fn rows_are_added_to_what_is_known() {
-        let map = sample::map();
-        let folder = tempfile::tempdir().unwrap();
-        let (known, new) = map.rows.split_at(4);
-        let mut journal = Journal::open(folder.path(), "map.csv", &map.request, known).unwrap();
-        let file = folder.path().join("map.csv");
-        assert_eq!(read_rows(&file, &map.request).unwrap(), known);
-        journal.append(&map.request, new).unwrap();
-        assert_eq!(read_rows(&file, &map.request).unwrap(), map.rows);
-    }
-
-    #[test]
-    fn more_methods_are_more_rows_of_the_same_map() {
-        let map = sample::map();
-        let folder = tempfile::tempdir().unwrap();
-        claim(folder.path(), &map).unwrap();
-        let mut other = map.clone();
-        other.request.methods.pop();
-        claim(folder.path(), &other).unwrap();
-        other.request.axes.pop();
-        let refused = claim(folder.path(), &other).unwrap_err().to_string();
-        assert!(refused.contains("vary"), "{refused}");
-    }
-
-    #[test]
-    fn rows_whose_map_is_not_told_are_left_alone() {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("map.csv"), "mine").unwrap();
-        let refused = claim(folder.path(), &sample::map()).unwrap_err();
-        assert!(refused.to_string().contains("without map.json"));
-    }
+        .map_err(|reason| FileError::write(&file, reason))
 }

@@ -11,39 +11,33 @@ use std::path::{Path, PathBuf};
 
 pub use atomic::{abandon_unfinished, check_writable};
 pub use journal::{Journal, belongs, claim, write_rows};
-pub use peers::{PeersError, read_peers};
-pub use recording::{CannotResume, Checkpointer, Recording};
+pub use peers::read_peers;
+pub use recording::{Checkpointer, Recording};
 
 use crate::figure::{self, Picture};
 use crate::relax::Equilibrium;
-use crate::report::{
-    Centerlines, ChartTable, Format, Json, MapTable, ModesTable, OutputError, ScalingTable,
-    TraceTable, Written,
-};
+use crate::report::table::Table;
+use crate::report::{self, FileError, Format, Json, Written};
 use crate::simulate::Record;
 use crate::study::{All, Chart, Check, Map, Scaling, Trace};
 
 impl Written for Equilibrium {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
         &Json("summary.json"),
-        &Centerlines,
+        &Table("centerlines.csv", report::centerlines),
         &Picture::svg("figure.svg", figure::leaf),
         &Picture::png("figure.png", figure::leaf),
     ];
 
     const MORE: &'static [&'static dyn Format<Self>] = &[
-        &ModesTable,
+        &Table("modes.csv", report::modes_table),
         &Picture::svg("modes.svg", figure::modes),
         &Picture::png("modes.png", figure::modes),
     ];
 
     fn has_more(&self) -> bool {
-        let stability = &self.stability;
-        stability.mode_shapes
-            && stability
-                .modes
-                .as_ref()
-                .is_some_and(|modes| !modes.is_empty())
+        let modes = self.stability.modes.as_deref();
+        self.stability.mode_shapes && modes.is_some_and(|modes| !modes.is_empty())
     }
 }
 
@@ -58,7 +52,7 @@ impl Written for Check {
 impl Written for Map {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
         &Json("map.json"),
-        &MapTable,
+        &Table("map.csv", report::map_table),
         &Picture::svg("map.svg", figure::map),
         &Picture::png("map.png", figure::map),
     ];
@@ -75,7 +69,7 @@ impl Written for All {
 impl Written for Trace {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
         &Json("trace.json"),
-        &TraceTable,
+        &Table("trace.csv", report::trace_table),
         &Picture::svg("trace.svg", figure::trace),
         &Picture::png("trace.png", figure::trace),
     ];
@@ -94,7 +88,7 @@ impl Written for Record {
 impl Written for Chart {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
         &Json("chart.json"),
-        &ChartTable,
+        &Table("chart.csv", report::chart_table),
         &Picture::svg("chart.svg", figure::chart),
         &Picture::png("chart.png", figure::chart),
     ];
@@ -103,7 +97,7 @@ impl Written for Chart {
 /// Its numbers are also in the JSON of its chart.
 impl Written for Scaling {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &ScalingTable,
+        &Table("chart_rods.csv", report::scaling_table),
         &Picture::svg("chart_rods.svg", figure::scaling),
         &Picture::png("chart_rods.png", figure::scaling),
     ];
@@ -111,13 +105,13 @@ impl Written for Scaling {
 
 /// Writes every format of a result into `folder`, which is made if it is not
 /// there, and returns the paths written.
-pub fn write_all<R: Written>(folder: &Path, result: &R) -> Result<Vec<PathBuf>, OutputError> {
+pub fn write_all<R: Written>(folder: &Path, result: &R) -> Result<Vec<PathBuf>, FileError> {
     atomic::make_folder(folder)?;
     let write_one = |format: &&'static dyn Format<R>| {
         let file = folder.join(format.file_name());
         atomic::write_file(&file, |out| format.write(result, out))
             .map(|()| file.clone())
-            .map_err(|reason| OutputError::File { file, reason })
+            .map_err(|reason| FileError::write(&file, reason))
     };
     let more = if result.has_more() { R::MORE } else { &[] };
     let written = R::FORMATS.iter().chain(more).map(write_one).collect();

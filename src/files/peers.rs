@@ -1,11 +1,10 @@
 //! Tables of measurements of other programs, as `benches/peers` writes them.
 
 use std::fs::File;
-use std::io::{self, Read};
-use std::path::{Path, PathBuf};
+use std::io::Read;
+use std::path::Path;
 
-use thiserror::Error;
-
+use crate::report::FileError;
 use crate::study::PeerRow;
 
 /// Columns that a table must have, in any order.
@@ -16,56 +15,23 @@ const COLUMNS: [&str; 7] = [
 /// Most bytes of a table.
 const MOST_BYTES: u64 = 16 << 20;
 
-/// A table that cannot be read.
-#[derive(Debug, Error)]
-pub enum PeersError {
-    /// The file cannot be read.
-    #[error("--peers: cannot read {}: {reason}", file.display())]
-    Unreadable {
-        /// The file.
-        file: PathBuf,
-        /// What the system says.
-        reason: io::Error,
-    },
-    /// The file is larger than any table of measurements.
-    #[error("--peers: {} is larger than {} MB: it is no table of measurements", file.display(), MOST_BYTES >> 20)]
-    TooLarge {
-        /// The file.
-        file: PathBuf,
-    },
-    /// A line is not as it should be.
-    #[error("--peers: {}:{line}: {problem}", file.display())]
-    Malformed {
-        /// The file.
-        file: PathBuf,
-        /// Its line, counted from 1.
-        line: u64,
-        /// What is wrong, and what is allowed.
-        problem: String,
-    },
-}
-
 /// Reads a table.
 ///
 /// # Errors
 /// If it is not one, with the line.
-pub fn read_peers(file: &Path) -> Result<Vec<PeerRow>, PeersError> {
-    let unreadable = |reason| PeersError::Unreadable {
-        file: file.into(),
-        reason,
-    };
+pub fn read_peers(file: &Path) -> Result<Vec<PeerRow>, FileError> {
+    let refused = |what: String| FileError(format!("--peers: {what}"));
     let mut bytes = Vec::new();
     File::open(file)
         .and_then(|open| open.take(MOST_BYTES + 1).read_to_end(&mut bytes))
-        .map_err(unreadable)?;
+        .map_err(|reason| refused(FileError::read(file, reason).to_string()))?;
+    let shown = file.display();
     if bytes.len() as u64 > MOST_BYTES {
-        return Err(PeersError::TooLarge { file: file.into() });
+        let most = MOST_BYTES >> 20;
+        let what = format!("{shown} is larger than {most} MB: it is no table of measurements");
+        return Err(refused(what));
     }
-    parse(&bytes).map_err(|(line, problem)| PeersError::Malformed {
-        file: file.into(),
-        line,
-        problem,
-    })
+    parse(&bytes).map_err(|(line, problem)| refused(format!("{shown}:{line}: {problem}")))
 }
 
 /// Rows, or a line and what is wrong with it.
@@ -165,33 +131,11 @@ mod tests {
 
     const HEADER: &str = "program,scenario,rods,knob,seconds,error,outcome\n";
 
-    fn rows(lines: &str) -> Vec<PeerRow> {
-        parse(format!("{HEADER}{lines}").as_bytes()).unwrap()
-    }
-
     #[track_caller]
     fn refused(text: &[u8], line: u64, part: &str) {
         let (at, problem) = parse(text).unwrap_err();
         assert_eq!(at, line, "{problem}");
         assert!(problem.contains(part), "{part} in {problem}");
-    }
-
-    #[test]
-    fn rows_are_read_as_they_are_written() {
-        let rows = rows("solve_bvp,fig04,5,tol=0.001,0.2671,5.487e-06,converged\n");
-        assert_eq!(
-            rows,
-            [PeerRow {
-                program: "solve_bvp".into(),
-                scenario: "fig04".into(),
-                rods: 5,
-                knob: "tol=0.001".into(),
-                seconds: 0.2671,
-                error: Some(5.487e-6),
-                outcome: "converged".into(),
-            }]
-        );
-        assert!(parse(HEADER.as_bytes()).unwrap().is_empty());
     }
 
     #[test]

@@ -3,11 +3,7 @@
 
 use std::io::{self, Write};
 
-use super::Format;
 use crate::relax::{Equilibrium, NodeState};
-
-/// `centerlines.csv`: one row per rod and station.
-pub struct Centerlines;
 
 /// Names of the columns. Rods are numbered from 1; strains and stress
 /// resultants are components along the directors.
@@ -16,27 +12,19 @@ const HEADER: [&str; 22] = [
     "n1", "n2", "n3", "m1", "m2", "m3",
 ];
 
-impl Format<Equilibrium> for Centerlines {
-    fn file_name(&self) -> &'static str {
-        "centerlines.csv"
-    }
-
-    fn write(&self, equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
-        let mut table = csv::WriterBuilder::new()
-            .has_headers(false)
-            .from_writer(out);
-        table.write_record(HEADER)?;
-        for (index, rod) in equilibrium.shape.rods.iter().enumerate() {
-            for (&sigma, node) in equilibrium.shape.stations.iter().zip(&rod.nodes) {
-                table.serialize((index + 1, sigma, sigma * rod.length, columns(node)))?;
-            }
+/// `centerlines.csv`: one row per rod and station.
+pub fn centerlines(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
+    let mut table = csv::WriterBuilder::new()
+        .has_headers(false)
+        .from_writer(out);
+    table.write_record(HEADER)?;
+    for (index, rod) in equilibrium.shape.rods.iter().enumerate() {
+        for (&sigma, node) in equilibrium.shape.stations.iter().zip(&rod.nodes) {
+            table.serialize((index + 1, sigma, sigma * rod.length, columns(node)))?;
         }
-        table.flush()
     }
+    table.flush()
 }
-
-/// `modes.csv`: one row per mode, rod and station.
-pub struct ModesTable;
 
 /// Names of the columns. Modes and rods are numbered from 1; displacements and
 /// rotation vectors are along the lab axes.
@@ -55,33 +43,28 @@ const MODES_HEADER: [&str; 12] = [
     "rz",
 ];
 
-impl Format<Equilibrium> for ModesTable {
-    fn file_name(&self) -> &'static str {
-        "modes.csv"
-    }
-
-    fn write(&self, equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
-        let mut table = csv::WriterBuilder::new()
-            .has_headers(false)
-            .from_writer(out);
-        table.write_record(MODES_HEADER)?;
-        let stations = &equilibrium.shape.stations;
-        for (index, mode) in equilibrium.stability.modes.iter().flatten().enumerate() {
-            let of_mode = (index + 1, mode.eigenvalue, mode.error, mode.frequency());
-            let rods = mode.displacement.iter().zip(&mode.rotation);
-            for (rod, (displacement, rotation)) in rods.enumerate() {
-                // Stations are every so many-th node.
-                let stride = (displacement.len() - 1) / (stations.len() - 1).max(1);
-                for (station, &sigma) in stations.iter().enumerate() {
-                    let node = station * stride;
-                    let [d, r] = [displacement[node], rotation[node]];
-                    let shape = [d.x, d.y, d.z, r.x, r.y, r.z].map(|value| value + 0.0);
-                    table.serialize((of_mode, rod + 1, sigma, shape))?;
-                }
+/// `modes.csv`: one row per mode, rod and station.
+pub fn modes_table(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
+    let mut table = csv::WriterBuilder::new()
+        .has_headers(false)
+        .from_writer(out);
+    table.write_record(MODES_HEADER)?;
+    let stations = &equilibrium.shape.stations;
+    for (index, mode) in equilibrium.stability.modes.iter().flatten().enumerate() {
+        let of_mode = (index + 1, mode.eigenvalue, mode.error, mode.frequency());
+        let rods = mode.displacement.iter().zip(&mode.rotation);
+        for (rod, (displacement, rotation)) in rods.enumerate() {
+            // Stations are every so many-th node.
+            let stride = (displacement.len() - 1) / (stations.len() - 1).max(1);
+            for (station, &sigma) in stations.iter().enumerate() {
+                let node = station * stride;
+                let [d, r] = [displacement[node], rotation[node]];
+                let shape = [d.x, d.y, d.z, r.x, r.y, r.z].map(|value| value + 0.0);
+                table.serialize((of_mode, rod + 1, sigma, shape))?;
             }
         }
-        table.flush()
     }
+    table.flush()
 }
 
 /// The columns from `x` on.
@@ -100,34 +83,4 @@ fn columns(node: &NodeState) -> [f64; 19] {
     ]
     // Adding zero turns -0 into 0.
     .map(|value| value + 0.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::report::sample;
-
-    #[test]
-    fn header_and_rows() {
-        let mut leaf = sample::fan(3, 4);
-        leaf.shape.rods[2].length = 2.0;
-        leaf.shape.rods[2].nodes[4].m.z = 1e-7 / 3.0;
-        let mut bytes = Vec::new();
-        Centerlines.write(&leaf, &mut bytes).unwrap();
-        let text = String::from_utf8(bytes).unwrap();
-        let lines: Vec<&str> = text.lines().collect();
-        assert_eq!(
-            lines[0],
-            "rod,sigma,s,x,y,z,qw,qx,qy,qz,v1,v2,v3,u1,u2,u3,n1,n2,n3,m1,m2,m3"
-        );
-        assert_eq!(lines.len(), 1 + 3 * 5);
-        assert!(lines[1].starts_with("1,0.0,0.0,0.0,0.0,"), "{}", lines[1]);
-
-        let last: Vec<&str> = lines[15].split(',').collect();
-        let node = &leaf.shape.rods[2].nodes[4];
-        assert_eq!(last.len(), HEADER.len());
-        assert_eq!(last[..3], ["3", "1.0", "2.0"]);
-        let numbers: Vec<f64> = last[3..].iter().map(|cell| cell.parse().unwrap()).collect();
-        assert_eq!(numbers, columns(node), "every digit is kept");
-    }
 }

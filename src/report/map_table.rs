@@ -7,12 +7,8 @@ use std::path::Path;
 
 use csv::StringRecord;
 
-use super::MapFileError;
-use crate::report::Format;
+use super::FileError;
 use crate::study::{Map, MapRequest, MapRow};
-
-/// `map.csv`: one row per cell and method.
-pub struct MapTable;
 
 /// The columns after those of the varied keys.
 const COLUMNS: [&str; 15] = [
@@ -33,14 +29,9 @@ const COLUMNS: [&str; 15] = [
     "reference",
 ];
 
-impl Format<Map> for MapTable {
-    fn file_name(&self) -> &'static str {
-        "map.csv"
-    }
-
-    fn write(&self, map: &Map, out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(&table(&map.request, &map.rows)?)
-    }
+/// `map.csv`: one row per cell and method.
+pub fn map_table(map: &Map, out: &mut dyn Write) -> io::Result<()> {
+    out.write_all(&table(&map.request, &map.rows)?)
 }
 
 fn header(request: &MapRequest) -> StringRecord {
@@ -74,11 +65,8 @@ pub fn lines(request: &MapRequest, rows: &[MapRow]) -> io::Result<Vec<u8>> {
 /// Reads the rows of a file; header lines may repeat, as in files that were
 /// joined. A last line without an end is what a run that was killed was about
 /// to write, and is left out.
-pub fn read_rows(file: &Path, request: &MapRequest) -> Result<Vec<MapRow>, MapFileError> {
-    let bytes = fs::read(file).map_err(|reason| MapFileError::Unreadable {
-        file: file.into(),
-        reason,
-    })?;
+pub fn read_rows(file: &Path, request: &MapRequest) -> Result<Vec<MapRow>, FileError> {
+    let bytes = fs::read(file).map_err(|reason| FileError::read(file, reason))?;
     let whole = bytes.iter().rposition(|&byte| byte == b'\n');
     let bytes = &bytes[..whole.map_or(0, |end| end + 1)];
     let cells: HashMap<Vec<String>, usize> = (0..request.cells())
@@ -91,10 +79,11 @@ pub fn read_rows(file: &Path, request: &MapRequest) -> Result<Vec<MapRow>, MapFi
         .from_reader(bytes);
     let mut rows = Vec::new();
     for (count, record) in table.records().enumerate() {
-        let refuse = |line: u64, why: String| MapFileError::OtherRow {
-            file: file.into(),
-            line,
-            why,
+        let refuse = |line: u64, why: String| {
+            FileError(format!(
+                "{}:{line}: is no row of this map: {why}; give the same --vary as when it was made, or another --out DIR",
+                file.display()
+            ))
         };
         let record = record.map_err(|error| refuse(count as u64 + 1, error.to_string()))?;
         let line = record.position().map_or(0, csv::Position::line);
@@ -137,63 +126,4 @@ fn row(
             _ => error.to_string(),
         })?;
     Ok(MapRow { cell, ..row })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::report::sample;
-
-    #[test]
-    fn rows_come_back_as_they_were() {
-        let map = sample::map();
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("map.csv");
-        let text = String::from_utf8(table(&map.request, &map.rows).unwrap()).unwrap();
-        assert_eq!(
-            text.lines().nth(1),
-            Some(
-                "1.0,-0.1,semi-implicit,right,\"said of cell 0, \"\"quoted\"\"\",0,0.9,0.0,\
-                 -0.3333333333333333,-1.5e-7,1e-9,2e-9,0.0,0.01,-0.5,0.012345,confirmed"
-            )
-        );
-        fs::write(&file, text).unwrap();
-        assert_eq!(read_rows(&file, &map.request).unwrap(), map.rows);
-    }
-
-    #[test]
-    fn joined_files_are_read_and_a_half_written_row_is_not() {
-        let map = sample::map();
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("joined.csv");
-        let (first, second) = map.rows.split_at(5);
-        let mut bytes = table(&map.request, first).unwrap();
-        bytes.extend(table(&map.request, second).unwrap());
-        bytes.truncate(bytes.len() - 3);
-        fs::write(&file, &bytes).unwrap();
-        let read = read_rows(&file, &map.request).unwrap();
-        assert_eq!(read, map.rows[..map.rows.len() - 1]);
-    }
-
-    #[test]
-    fn rows_of_other_maps_are_refused() {
-        let map = sample::map();
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("map.csv");
-        let good = String::from_utf8(table(&map.request, &map.rows).unwrap()).unwrap();
-        for (bad, why) in [
-            (
-                good.replace("load.gravity[2]", "load.gravity[1]"),
-                "columns",
-            ),
-            (good.replace("\n1.0,", "\n1.5,"), "no cell 1.5"),
-            (good.replace(",right,", ",perfect,"), "other-equilibrium"),
-            (good.replace(",confirmed", ""), "columns"),
-            ("nonsense\n".into(), "columns"),
-        ] {
-            fs::write(&file, &bad).unwrap();
-            let message = read_rows(&file, &map.request).unwrap_err().to_string();
-            assert!(message.contains(why), "{why}: {message}");
-        }
-    }
 }

@@ -22,18 +22,18 @@ pub mod words;
 use std::io::{self, Write};
 
 pub use all::report as all_report;
-pub use centerlines::{Centerlines, ModesTable};
+pub use centerlines::{centerlines, modes_table};
 pub use chart::report as chart_report;
-pub use chart_table::{ChartTable, ScalingTable};
+pub use chart_table::{chart_table, scaling_table};
 pub use check::report as check_report;
-pub use error::{MapFileError, OutputError};
+pub use error::FileError;
 pub use json::Json;
 pub use map::{Told as MapTold, report as map_report};
-pub use map_table::{MapTable, lines, read_rows, table};
+pub use map_table::{lines, map_table, read_rows, table};
 pub use relax::report as relax_report;
 pub use simulate::report as simulate_report;
 pub use trace::report as trace_report;
-pub use trace_table::TraceTable;
+pub use trace_table::trace_table;
 
 /// One way to write a result down.
 pub trait Format<R> {

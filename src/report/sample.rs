@@ -1,90 +1,45 @@
-//! Results to test the formats with: arcs that fan out and meet in a tip.
-
-use std::f64::consts::PI;
+//! Results to test reports and figures with: a small leaf at rest and in motion,
+//! and studies of it that are made up.
 
 use glam::{DQuat, DVec3};
 
 use crate::bvp::{self, Neutral, Solution};
-use crate::motion::{Energy, StableStep, Velocity};
-use crate::relax::{
-    self, Accuracy, Equilibrium, Method, Model, NodeState, Outcome, RodShape, Stability, Work,
-};
+use crate::relax::{self, Equilibrium, Method, Outcome};
+use crate::scenario::Scenario;
 use crate::shape::Difference;
-use crate::simulate::{Frame, Moment, Record, Scheme, Still};
+use crate::simulate::{self, Frame, Moment, Record, Simulation, Still, stills};
 use crate::study::{
     Base, Chart, Check, Confidence, Ending, Map, MapMethod, MapOutcome, MapRequest, MapRow, Peer,
     Reference, Row, Scaling, ScalingRow, Setting, Shot, Spread,
 };
-use crate::undulation::{Undulation, Vein};
 
-/// A fan of `rods` arcs of length 1, given at `segments` + 1 stations.
+fn scenario(name: &str, rods: usize) -> Scenario {
+    let text = format!(
+        r#"
+        name = "{name}"
+        leaf = {{ rods = {rods}, length = 1.0, fan = "symmetric" }}
+        stiffness = {{ torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }}
+        coupling = {{ y = 0.1, z = 0.1 }}
+        load = {{ gravity = [0.0, 0.0, -1.0] }}
+        dynamics = {{ duration = 10.0, output_interval = 0.1 }}
+    "#
+    );
+    let text = match rods {
+        1 => text.replace("coupling = { y = 0.1, z = 0.1 }", ""),
+        _ => text,
+    };
+    Scenario::from_toml(&text).unwrap()
+}
+
+/// A leaf at rest on one grid, with an error estimate as of several.
 pub fn fan(rods: usize, segments: usize) -> Equilibrium {
-    let stations: Vec<f64> = (0..=segments).map(|i| i as f64 / segments as f64).collect();
-    let angle = |rod: usize| (2.0 * (rod as f64 + 0.5) / rods as f64 - 1.0) * PI / 3.0;
-    let point = |rod: usize, sigma: f64| {
-        let angle = angle(rod);
-        let side = if angle.abs() < 1e-9 {
-            0.0
-        } else {
-            ((angle * (1.0 - 2.0 * sigma)).cos() - angle.cos()) / (2.0 * angle)
-        };
-        DVec3::new(0.95 * sigma, side, -0.15 * sigma * sigma)
+    let options = relax::Options {
+        method: Method::default().on_grid(Some(segments)),
+        ..relax::Options::default()
     };
-    let node = |rod: usize, sigma: f64| NodeState {
-        position: point(rod, sigma),
-        rotation: DQuat::from_rotation_z(angle(rod) * (1.0 - 2.0 * sigma)),
-        v: DVec3::X,
-        u: DVec3::new(0.0, 0.0, -2.0 * angle(rod)),
-        n: DVec3::new(0.1, 0.2, 0.3),
-        m: DVec3::new(0.4, 0.5, 0.6),
-    };
-    let shape = |rod: usize| RodShape {
-        length: 1.0,
-        nodes: stations.iter().map(|&sigma| node(rod, sigma)).collect(),
-    };
-    let shapes: Vec<RodShape> = (0..rods).map(shape).collect();
-    let curves = shapes
-        .iter()
-        .map(|shape| shape.nodes.iter().map(|node| node.position).collect())
-        .collect();
-    Equilibrium {
-        scenario: "fan".into(),
-        method: Method::default(),
-        outcome: Outcome::Converged,
-        remark: None,
-        rod_count: rods,
-        accuracy: Accuracy {
-            segments: vec![segments],
-            intervals: None,
-            tolerance: 1e-6,
-            residual: Some(1e-13),
-            error_estimate: Some(3e-9),
-        },
-        energy: Some(11.07),
-        tips: vec![point(0, 1.0)],
-        tip_force_sum: DVec3::ZERO,
-        stability: Stability {
-            negative_eigenvalues: Some(0),
-            ..Stability::default()
-        },
-        undulation: Undulation {
-            veins: vec![Vein::default(); rods],
-        },
-        model: Model::default(),
-        work: Work {
-            steps: 8,
-            factorizations: 9,
-            force_evaluations: 9,
-            cg_iterations: 40,
-        },
-        wall_seconds: 0.01,
-        shape: relax::Shape {
-            stations,
-            rods: shapes,
-            joined: true,
-            curves,
-        },
-    }
+    let mut leaf = relax::relax(&scenario("fan", rods), &options, &mut |_| {}).unwrap();
+    leaf.accuracy.error_estimate = Some(3e-9);
+    leaf
 }
 
 /// A check of that fan whose boundary-value solution is turned about x by
@@ -194,80 +149,32 @@ pub fn map() -> Map {
     Map::new(request, rows.collect())
 }
 
-/// That fan at a time, swinging up and down.
-pub fn frame(rods: usize, segments: usize, time: f64) -> Frame {
-    let leaf = fan(rods, segments);
-    let nodes = || leaf.shape.rods.iter().flat_map(|rod| &rod.nodes);
-    let swing = DVec3::new(1.0, 1.0, 2.0 * time.cos());
-    let turn = DQuat::from_rotation_y(0.1 * time.sin());
-    let positions: Vec<DVec3> = nodes().map(|node| node.position * swing).collect();
-    let moving = |x: &DVec3| Velocity {
-        angular: DVec3::new(0.1, -0.2, 0.3 * time.sin()),
-        linear: DVec3::new(0.0, 0.0, -x.z * time.sin() / 3.0),
+/// That leaf let go, and followed for 10 units of time.
+pub fn swing(rods: usize, segments: usize) -> (Simulation, Vec<Frame>) {
+    let options = simulate::Options {
+        segments: Some(segments),
+        ..simulate::Options::default()
     };
-    Frame {
-        time,
-        steps: (100.0 * time) as usize,
-        rods,
-        velocities: positions.iter().map(moving).collect(),
-        positions,
-        rotations: nodes().map(|node| turn * node.rotation).collect(),
-        energy: moment(time).energy,
+    let mut swing = Simulation::new(&scenario("swing", rods), &options).unwrap();
+    let mut frames = vec![swing.frame()];
+    while !swing.done() {
+        frames.push(swing.next_frame().unwrap());
     }
+    (swing, frames)
 }
 
-/// The energies of a damped swing at a time.
-pub fn moment(time: f64) -> Moment {
-    let left = (-0.1 * time).exp();
-    let (fast, high) = (time.sin().powi(2), time.cos().powi(2));
-    Moment {
-        time,
-        steps: (100.0 * time) as usize,
-        energy: Energy {
-            kinetic: left * fast,
-            elastic: 0.7 * left * high,
-            coupling: 0.1 * left * high,
-            potential: 0.2 * left * high - 3.0,
-            dissipated: 1.0 - left + 1e-5 * time.sin(),
-            work: 0.0,
-        },
-        tip: DVec3::new(0.95, 0.0, -0.3 * time.cos()),
-    }
-}
-
-/// A swing followed for 10 units of time.
+/// The record of it.
 pub fn record(rods: usize, segments: usize) -> Record {
-    let moments: Vec<Moment> = (0..=100).map(|i| moment(0.1 * f64::from(i))).collect();
+    let (swing, frames) = swing(rods, segments);
+    let moments: Vec<Moment> = frames.iter().map(|frame| Moment::of(frame, true)).collect();
     let still = |moment: usize| Still {
         moment,
-        curves: frame(rods, segments, moments[moment].time)
-            .positions
-            .chunks(segments + 1)
-            .map(<[DVec3]>::to_vec)
+        curves: (0..rods)
+            .map(|rod| frames[moment].centerline(rod).to_vec())
             .collect(),
     };
-    Record {
-        scenario: "swing".into(),
-        scheme: Scheme::Explicit,
-        stopped: None,
-        rods,
-        joined: true,
-        length: 1.0,
-        segments,
-        tolerance: 1e-6,
-        duration: 10.0,
-        time: 10.0,
-        time_step: Some(9e-3),
-        stable_step: Some(StableStep {
-            step: 1e-2,
-            limit: "shear with rotation",
-        }),
-        steps: 1000,
-        stills: [0, 10, 25, 40, 55, 70, 85, 100].map(still).into(),
-        tips: vec![moments[100].tip],
-        moments,
-        wall_seconds: 0.1,
-    }
+    let stills = stills(&moments, 8, 1.0).into_iter().map(still).collect();
+    Record::new(&swing, None, moments, stills)
 }
 
 fn spread(median: f64) -> Spread {

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::Written;
+use super::{Format, Written};
 
 /// Lines of a report, each with its name; one without a name continues the one
 /// above.
@@ -37,6 +37,22 @@ pub fn written<R: Written>(result: &R, folder: &Path) -> String {
 pub fn named<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.collect();
     format!("{}: {}", folder.display(), names.join(", "))
+}
+
+/// A table of a result in a file of this name.
+pub struct Table<R>(
+    pub &'static str,
+    pub fn(&R, &mut dyn Write) -> io::Result<()>,
+);
+
+impl<R> Format<R> for Table<R> {
+    fn file_name(&self) -> &'static str {
+        self.0
+    }
+
+    fn write(&self, result: &R, out: &mut dyn Write) -> io::Result<()> {
+        (self.1)(result, out)
+    }
 }
 
 /// Writes a table of flat rows as CSV; the names of their fields are the header.

@@ -4,12 +4,8 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
-use super::Format;
 use super::table::{append_csv, header};
 use crate::study::{PointKind, Trace, TracePoint};
-
-/// `trace.csv`: one row per branch and point.
-pub struct TraceTable;
 
 /// A row; the number that varies stands in `value`. Branches and points are
 /// numbered from 1. The tip is the joint one, or the first rod's.
@@ -64,17 +60,11 @@ impl Row {
     }
 }
 
-impl Format<Trace> for TraceTable {
-    fn file_name(&self) -> &'static str {
-        "trace.csv"
-    }
-
-    fn write(&self, trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
-        // Even of a trace without points.
-        out.write_all(&header::<Row>())?;
-        let branches = trace.branches.iter().enumerate();
-        let rows =
-            branches.flat_map(|(b, branch)| branch.points.iter().map(move |p| Row::of(b, p)));
-        append_csv(rows, out)
-    }
+/// `trace.csv`: one row per branch and point.
+pub fn trace_table(trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
+    // Even of a trace without points.
+    out.write_all(&header::<Row>())?;
+    let branches = trace.branches.iter().enumerate();
+    let rows = branches.flat_map(|(b, branch)| branch.points.iter().map(move |p| Row::of(b, p)));
+    append_csv(rows, out)
 }

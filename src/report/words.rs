@@ -82,14 +82,3 @@ pub fn branch_end(end: &End) -> &'static str {
         End::Stuck(_) => "lost",
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_number_of_intervals_is_told_where_there_are_several() {
-        assert_eq!(shooting(1), "single shooting");
-        assert_eq!(shooting(12), "multiple shooting over 12 intervals");
-    }
-}

@@ -9,13 +9,26 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::error::CannotResume;
-use super::growing::Extent;
 use crate::files::checksum::Checksum;
-use crate::report::json;
+use crate::report::{FileError, json};
 use crate::simulate::Simulation;
 
 pub const FILE_NAME: &str = "checkpoint.json";
+
+const BEGIN_ANEW: &str = "leave out --resume to begin anew";
+
+/// A file is not what was written: how that is known.
+pub fn damaged(file: &Path, what: &str) -> FileError {
+    let file = file.display();
+    FileError(format!(
+        "cannot resume: {file} is damaged: {what}; {BEGIN_ANEW}"
+    ))
+}
+
+/// A file cannot be read or written.
+pub fn unreadable(file: &Path, reason: io::Error) -> FileError {
+    FileError(format!("cannot resume: {}: {reason}", file.display()))
+}
 
 /// Digits of a number.
 const DIGITS: usize = 16;
@@ -77,6 +90,14 @@ impl Identity {
     }
 }
 
+/// How much of a file was written, as a checkpoint has it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Extent {
+    pub file: String,
+    pub bytes: u64,
+    pub checksum: String,
+}
+
 /// The keys, in the order in which they are written.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoint {
@@ -121,28 +142,26 @@ impl Checkpoint {
     }
 
     /// The checkpoint in a folder, if it is whole and of the run asked for.
-    pub fn read(folder: &Path, asked: &Identity) -> Result<Self, CannotResume> {
-        let file = folder.join(FILE_NAME);
-        let text = match fs::read(&file) {
-            Ok(text) => text,
-            Err(reason) if reason.kind() == io::ErrorKind::NotFound => {
-                return Err(CannotResume::Absent { file });
+    pub fn read(folder: &Path, asked: &Identity) -> Result<Self, FileError> {
+        let file = &folder.join(FILE_NAME);
+        let text = fs::read(file).map_err(|reason| match reason.kind() {
+            io::ErrorKind::NotFound => {
+                let change = format!("{BEGIN_ANEW}, or name the folder with --out DIR");
+                let file = file.display();
+                FileError(format!("cannot resume: there is no {file}; {change}"))
             }
-            Err(reason) => return Err(CannotResume::Unreadable { file, reason }),
-        };
-        let found: Checkpoint = match serde_json::from_slice(&text) {
-            Ok(found) => found,
-            Err(error) => {
-                let what = error.to_string();
-                return Err(CannotResume::Damaged { file, what });
-            }
-        };
+            _ => unreadable(file, reason),
+        })?;
+        let found: Checkpoint =
+            serde_json::from_slice(&text).map_err(|error| damaged(file, &error.to_string()))?;
         if found.checksum != found.sum() {
-            let what = "its content does not match its checksum".into();
-            return Err(CannotResume::Damaged { file, what });
+            return Err(damaged(file, "its content does not match its checksum"));
         }
         match found.run.difference(asked) {
-            Some(what) => Err(CannotResume::Other { file, what }),
+            Some(what) => Err(FileError(format!(
+                "cannot resume: {} is of another run: {what}; ask for the same run, or {BEGIN_ANEW}",
+                file.display()
+            ))),
             None => Ok(found),
         }
     }
@@ -232,7 +251,7 @@ mod tests {
             changed[at] = if changed[at] == b'7' { b'8' } else { b'7' };
             fs::write(&file, &changed).unwrap();
             match Checkpoint::read(folder.path(), &identity()) {
-                Err(CannotResume::Damaged { .. }) => (),
+                Err(error) if error.to_string().contains(" is damaged: ") => (),
                 // The time is not used, nor is white space.
                 Ok(read) => assert_eq!(
                     Checkpoint { time: 0.3, ..read },
@@ -245,7 +264,7 @@ mod tests {
         }
         fs::write(&file, &text[..text.len() / 2]).unwrap();
         let read = Checkpoint::read(folder.path(), &identity());
-        assert!(matches!(read, Err(CannotResume::Damaged { .. })));
+        assert!(read.unwrap_err().to_string().contains(" is damaged: "));
     }
 
     #[test]

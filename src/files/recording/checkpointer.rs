@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use super::checkpoint::{self, Checkpoint};
 use super::growing::Unfinished;
 use crate::files::atomic;
-use crate::report::OutputError;
+use crate::report::FileError;
 
 /// Where a simulation was at its last output.
 pub struct Latest {
@@ -31,13 +31,13 @@ impl Checkpointer {
     /// Writes `checkpoint.json`, and gives the unfinished files the names under
     /// which a resumed run looks for them. Returns the time of the checkpoint;
     /// `None` if there is nothing to go on from.
-    pub fn write(&self) -> Option<Result<f64, OutputError>> {
+    pub fn write(&self) -> Option<Result<f64, FileError>> {
         write(&mut self.latest())
     }
 
     /// As [`Checkpointer::write`], and no recording goes on ever after: for a
     /// program about to exit.
-    pub fn write_and_stop(&self) -> Option<Result<f64, OutputError>> {
+    pub fn write_and_stop(&self) -> Option<Result<f64, FileError>> {
         let mut latest = self.latest();
         let written = write(&mut latest);
         mem::forget(latest);
@@ -45,7 +45,7 @@ impl Checkpointer {
     }
 }
 
-fn write(latest: &mut Option<Latest>) -> Option<Result<f64, OutputError>> {
+fn write(latest: &mut Option<Latest>) -> Option<Result<f64, FileError>> {
     let latest = latest.take()?;
     let file = latest.folder.join(checkpoint::FILE_NAME);
     let checkpoint = latest.checkpoint.with_state(&latest.state);
@@ -58,6 +58,6 @@ fn write(latest: &mut Option<Latest>) -> Option<Result<f64, OutputError>> {
     });
     Some(match written {
         Ok(()) => Ok(checkpoint.time),
-        Err(reason) => Err(OutputError::File { file, reason }),
+        Err(reason) => Err(FileError::write(&file, reason)),
     })
 }

@@ -87,7 +87,7 @@ mod tests {
 
     #[test]
     fn moments_are_read_back_to_the_last_digit() {
-        let mut moments: Vec<Moment> = (0..9).map(|i| sample::moment(0.1 * i as f64)).collect();
+        let mut moments = sample::record(3, 4).moments;
         moments[3].energy.potential = f64::MIN_POSITIVE / 3.0;
         moments[4].energy.potential = -1e300 / 3.0;
         moments[5].energy.work = f64::INFINITY;

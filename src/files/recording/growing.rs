@@ -5,20 +5,10 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
-
-use super::error::CannotResume;
+use super::checkpoint::{Extent, damaged, unreadable};
 use crate::files::atomic::{self, Draft};
 use crate::files::checksum::Checksum;
-use crate::report::OutputError;
-
-/// How much of a file was written, as a checkpoint has it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Extent {
-    pub file: String,
-    pub bytes: u64,
-    pub checksum: String,
-}
+use crate::report::FileError;
 
 /// A file that grows.
 pub struct GrowingFile {
@@ -54,10 +44,10 @@ pub fn kept_path(file: &Path) -> PathBuf {
 
 impl GrowingFile {
     /// Begins a file with these bytes.
-    pub fn begin(file: PathBuf, start: &[u8]) -> Result<Self, OutputError> {
+    pub fn begin(file: PathBuf, start: &[u8]) -> Result<Self, FileError> {
         let (draft, out) = match Draft::begin(&file) {
             Ok(begun) => begun,
-            Err(reason) => return Err(OutputError::File { file, reason }),
+            Err(reason) => return Err(FileError::write(&file, reason)),
         };
         let mut begun = GrowingFile {
             file,
@@ -73,7 +63,7 @@ impl GrowingFile {
 
     /// Goes on with a kept file where it had this extent. Nothing is changed if it
     /// is not what was kept.
-    pub fn resume(file: PathBuf, extent: &Extent) -> Result<Self, CannotResume> {
+    pub fn resume(file: PathBuf, extent: &Extent) -> Result<Self, FileError> {
         let kept = kept_path(&file);
         let resume = || -> io::Result<Option<Self>> {
             let mut out = OpenOptions::new().read(true).write(true).open(&kept)?;
@@ -102,14 +92,8 @@ impl GrowingFile {
                 buffer,
             }))
         };
-        match resume() {
-            Ok(Some(file)) => Ok(file),
-            Ok(None) => Err(CannotResume::Damaged {
-                file: kept,
-                what: "it is not as checkpoint.json says".into(),
-            }),
-            Err(reason) => Err(CannotResume::Unreadable { file: kept, reason }),
-        }
+        let resumed = resume().map_err(|reason| unreadable(&kept, reason))?;
+        resumed.ok_or_else(|| damaged(&kept, "it is not as checkpoint.json says"))
     }
 
     pub fn unfinished(&self) -> Unfinished {
@@ -132,7 +116,7 @@ impl GrowingFile {
     pub fn append(
         &mut self,
         fill: impl FnOnce(&mut Vec<u8>) -> io::Result<()>,
-    ) -> Result<(), OutputError> {
+    ) -> Result<(), FileError> {
         self.buffer.clear();
         let filled = fill(&mut self.buffer).and_then(|()| self.out.write_all(&self.buffer));
         filled.map_err(|reason| self.failed(reason))?;
@@ -142,7 +126,7 @@ impl GrowingFile {
     }
 
     /// Replaces the beginning of the file, as the last thing that is written.
-    pub fn replace_start(&mut self, bytes: &[u8]) -> Result<(), OutputError> {
+    pub fn replace_start(&mut self, bytes: &[u8]) -> Result<(), FileError> {
         let replaced = self.out.rewind().and_then(|()| self.out.write_all(bytes));
         replaced.map_err(|reason| self.failed(reason))
     }
@@ -151,21 +135,20 @@ impl GrowingFile {
     pub fn read<T>(
         &self,
         read: impl FnOnce(BufReader<File>) -> io::Result<T>,
-    ) -> Result<T, OutputError> {
+    ) -> Result<T, FileError> {
         let opened = File::open(self.draft.path()).map(BufReader::new);
         opened.and_then(read).map_err(|reason| self.failed(reason))
     }
 
     /// Gives the file its name, and returns its path.
-    pub fn finish(&mut self) -> Result<PathBuf, OutputError> {
+    pub fn finish(&mut self) -> Result<PathBuf, FileError> {
         let finished = atomic::rename(self.draft.path(), &self.file);
         finished.map_err(|reason| self.failed(reason))?;
         Ok(self.file.clone())
     }
 
-    fn failed(&self, reason: io::Error) -> OutputError {
-        let file = self.file.clone();
-        OutputError::File { file, reason }
+    fn failed(&self, reason: io::Error) -> FileError {
+        FileError::write(&self.file, reason)
     }
 }
 

@@ -8,7 +8,6 @@
 mod checkpoint;
 mod checkpointer;
 mod energy;
-mod error;
 mod growing;
 mod motion;
 
@@ -20,14 +19,13 @@ use std::time::Duration;
 use glam::DVec3;
 
 pub use checkpointer::Checkpointer;
-pub use error::CannotResume;
 
 use super::{atomic, write_all};
-use crate::report::OutputError;
+use crate::report::FileError;
 use crate::report::table::header;
 use crate::scenario;
 use crate::simulate::{Frame, Moment, Record, Simulation, Still, Stopped, stills};
-use checkpoint::{Checkpoint, Identity};
+use checkpoint::{Checkpoint, Identity, damaged};
 use checkpointer::Latest;
 use growing::{GrowingFile, kept_path};
 use motion::{Form, Size};
@@ -83,7 +81,7 @@ impl Recording {
     ///
     /// # Errors
     /// If they cannot be written.
-    pub fn begin(folder: &Path, simulation: &mut Simulation) -> Result<Self, OutputError> {
+    pub fn begin(folder: &Path, simulation: &mut Simulation) -> Result<Self, FileError> {
         atomic::make_folder(folder)?;
         let (form, size) = form(simulation);
         let start = form.start(size, outputs(simulation));
@@ -102,14 +100,15 @@ impl Recording {
     /// # Errors
     /// If there is no checkpoint, or it does not fit. Nothing that was kept is
     /// lost then.
-    pub fn resume(folder: &Path, simulation: &mut Simulation) -> Result<Self, CannotResume> {
+    pub fn resume(folder: &Path, simulation: &mut Simulation) -> Result<Self, FileError> {
         let found = Checkpoint::read(folder, &Identity::of(simulation))?;
-        let damaged = |name: &str, what: &str| CannotResume::Damaged {
-            file: folder.join(name),
-            what: what.into(),
-        };
         let state = found.state().filter(|state| simulation.restore(state));
-        state.ok_or_else(|| damaged(checkpoint::FILE_NAME, "it does not fit the leaf"))?;
+        state.ok_or_else(|| {
+            damaged(
+                &folder.join(checkpoint::FILE_NAME),
+                "it does not fit the leaf",
+            )
+        })?;
         let (form, _) = form(simulation);
         let motion = GrowingFile::resume(folder.join(form.file_name()), &found.motion)?;
         let energy = GrowingFile::resume(folder.join(energy::FILE_NAME), &found.energy)?;
@@ -117,7 +116,7 @@ impl Recording {
         let moments = recording.energy.read(energy::read).ok();
         recording.moments = moments
             .filter(|moments| moments.len() == simulation.frames().1 + 1)
-            .ok_or_else(|| damaged(energy::FILE_NAME, "outputs are missing"))?;
+            .ok_or_else(|| damaged(&folder.join(energy::FILE_NAME), "outputs are missing"))?;
         recording.wall = Duration::from_nanos(found.wall_nanoseconds);
         recording.update_checkpointer(simulation);
         Ok(recording)
@@ -154,7 +153,7 @@ impl Recording {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn add(&mut self, simulation: &Simulation, frame: &Frame) -> Result<(), OutputError> {
+    pub fn add(&mut self, simulation: &Simulation, frame: &Frame) -> Result<(), FileError> {
         let moment = Moment::of(frame, self.joined);
         let (form, stations) = (self.form, &self.stations);
         self.motion.append(|out| form.write(frame, stations, out))?;
@@ -186,7 +185,7 @@ impl Recording {
         &mut self,
         simulation: &Simulation,
         stopped: Option<Stopped>,
-    ) -> Result<Record, OutputError> {
+    ) -> Result<Record, FileError> {
         let longest = scenario::longest(&simulation.leaf().scenario().rods);
         let chosen = stills(&self.moments, STILLS, longest);
         let (form, size) = (self.form, self.size);
@@ -209,7 +208,7 @@ impl Recording {
     ///
     /// # Errors
     /// If a file cannot be written; a checkpoint can then still be.
-    pub fn finish(&mut self, record: &Record) -> Result<Vec<PathBuf>, OutputError> {
+    pub fn finish(&mut self, record: &Record) -> Result<Vec<PathBuf>, FileError> {
         let mut files = write_all(&self.folder, record)?;
         // From here on there is nothing left to go on from.
         let mut latest = self.checkpointer.latest();

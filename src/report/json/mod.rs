@@ -1,8 +1,5 @@
 //! JSON, for scripts: compact, numbers that are not finite as null.
 
-#[cfg(test)]
-mod summary;
-
 use std::io::{self, Write};
 
 use serde::Serialize;
@@ -65,19 +62,50 @@ impl Formatter for Layout {
 
 #[cfg(test)]
 mod tests {
-    use crate::report::Format;
+    use super::*;
+    use crate::report::sample;
 
-    pub fn text<R>(format: &dyn Format<R>, result: &R) -> String {
+    /// And numbers keep every digit, or are null.
+    #[test]
+    fn keys_and_their_order_are_fixed() {
+        let wanted = [
+            "scenario",
+            "method",
+            "outcome",
+            "rods",
+            "segments",
+            "tolerance",
+            "residual",
+            "error_estimate",
+            "energy",
+            "tip",
+            "tip_force_sum",
+            "stable",
+            "negative_eigenvalues",
+            "lowest_eigenvalues",
+            "eigenvalue_errors",
+            "undulation",
+            "model",
+            "shear_effect",
+            "stretch_effect",
+            "work",
+            "wall_seconds",
+            "stations",
+            "positions",
+        ];
+        let mut leaf = sample::fan(5, 8);
+        leaf.energy = Some(0.1 + 0.2);
+        leaf.accuracy.residual = Some(f64::INFINITY);
         let mut bytes = Vec::new();
-        format.write(result, &mut bytes).unwrap();
-        String::from_utf8(bytes).unwrap()
-    }
-
-    /// Keys of the outermost object, in the order written.
-    pub fn keys(text: &str) -> Vec<&str> {
-        text.lines()
-            .filter_map(|line| line.strip_prefix("  \""))
-            .map(|line| line.split('"').next().unwrap())
-            .collect()
+        write(&leaf, &mut bytes).unwrap();
+        let text = String::from_utf8(bytes).unwrap();
+        let lines = text.lines().filter_map(|line| line.strip_prefix("  \""));
+        let keys: Vec<&str> = lines.map(|line| line.split('"').next().unwrap()).collect();
+        assert_eq!(keys, wanted);
+        assert!(
+            text.contains("\n  \"energy\": 0.30000000000000004,\n"),
+            "{text}"
+        );
+        assert!(text.contains("\n  \"residual\": null,\n"), "{text}");
     }
 }

@@ -1,10 +1,7 @@
 //! Force against displacement, as a tensile test measures it.
 
+use glam::DVec3;
 use serde::{Serialize, Serializer};
-
-use super::result::TraceBranch;
-use crate::scenario::Key;
-use crate::study::{Keys, Target};
 
 /// The straight line through the forces on a tip against its displacements
 /// along them: Hooke's law, and how well it holds.
@@ -26,26 +23,16 @@ pub struct Law {
 }
 
 impl Law {
-    /// Of a branch along which a component of the force on the joint tip
-    /// varies; `None` along others, or with fewer than three points.
-    pub(super) fn of(keys: &Keys, branch: &TraceBranch, cross_section: Option<f64>) -> Option<Law> {
-        let [
-            Target::Entry {
-                key: Key::TipForce,
-                index: Some(axis),
-            },
-        ] = keys.targets()
-        else {
-            return None;
-        };
-        let first = branch.points.first()?;
-        let [tip] = first.tips[..] else {
-            return None;
-        };
-        let points: Vec<(f64, f64)> = branch
-            .points
-            .iter()
-            .map(|point| (point.tips[0][*axis] - tip[*axis], point.value))
+    /// Of forces along an axis and the tips under them; `None` with fewer than
+    /// three.
+    pub(super) fn of(
+        axis: usize,
+        points: &[(f64, DVec3)],
+        cross_section: Option<f64>,
+    ) -> Option<Law> {
+        let (_, tip) = *points.first()?;
+        let points: Vec<(f64, f64)> = (points.iter())
+            .map(|(force, moved)| (moved[axis] - tip[axis], *force))
             .collect();
         let count = points.len() as f64;
         if points.len() < 3 {
@@ -63,7 +50,7 @@ impl Law {
             forces.clone().fold(f64::NEG_INFINITY, f64::max) - forces.fold(f64::INFINITY, f64::min);
         let length = tip.length();
         Some(Law {
-            axis: *axis,
+            axis,
             slope,
             r_squared: xy * xy / (xx * yy),
             deviation: points.iter().map(off).fold(0.0, f64::max) / range,
@@ -81,36 +68,16 @@ fn serialize_axis<S: Serializer>(axis: &usize, serializer: S) -> Result<S::Ok, S
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::branch::End;
-    use crate::study::trace::{PointKind, TracePoint};
-    use crate::undulation::Undulation;
-    use glam::DVec3;
 
-    fn branch(tip: impl Fn(f64) -> f64) -> TraceBranch {
-        let point = |force: f64| TracePoint {
-            point: 1,
-            kind: PointKind::Regular,
-            value: force,
-            value_error: None,
-            tips: vec![DVec3::new(tip(force), 0.0, 0.0)],
-            error: None,
-            energy: 0.0,
-            index: 0,
-            undulation: Undulation::default(),
-            curves: Vec::new(),
-        };
-        TraceBranch {
-            from: None,
-            points: (0..=10).map(|k| point(0.1 * f64::from(k))).collect(),
-            end: End::Reached,
-            remark: None,
-        }
+    fn law(tip: impl Fn(f64) -> f64, cross_section: Option<f64>) -> Law {
+        let forces = (0..=10).map(|k| 0.1 * f64::from(k));
+        let points: Vec<_> = forces.map(|f| (f, DVec3::new(tip(f), 0.0, 0.0))).collect();
+        Law::of(0, &points, cross_section).unwrap()
     }
 
     #[test]
     fn a_spring_is_a_spring() {
-        let keys: Keys = "load.tip_force[0]".parse().unwrap();
-        let law = Law::of(&keys, &branch(|f| 2.0 + f / 3.0), Some(0.5)).unwrap();
+        let law = law(|f| 2.0 + f / 3.0, Some(0.5));
         assert!((law.slope - 3.0).abs() < 1e-12 && (law.r_squared - 1.0).abs() < 1e-12);
         assert!(law.deviation < 1e-12);
         assert!((law.young.unwrap() - 12.0).abs() < 1e-10);
@@ -118,10 +85,7 @@ mod tests {
 
     #[test]
     fn what_bends_away_from_the_line_is_said() {
-        let keys: Keys = "load.tip_force[0]".parse().unwrap();
-        let law = Law::of(&keys, &branch(|f| 2.0 + f + f * f), None).unwrap();
+        let law = law(|f| 2.0 + f + f * f, None);
         assert!(law.r_squared < 0.99 && law.deviation > 0.02);
-        let other: Keys = "load.gravity[2]".parse().unwrap();
-        assert_eq!(Law::of(&other, &branch(|f| f), None), None);
     }
 }

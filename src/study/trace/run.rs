@@ -15,8 +15,9 @@ use crate::branch::{
 };
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::relax::{Equilibrium, Options, SemiImplicit, node_state, project, relax};
-use crate::scenario::Scenario;
+use crate::scenario::{Key, Scenario};
 use crate::shape::RodShape;
+use crate::study::Target;
 use crate::undulation::Undulation;
 
 /// Longest step along a branch where few values are asked for.
@@ -99,10 +100,29 @@ pub fn trace(
     }
     let branches = &trace.branches;
     trace.complete = !branches.is_empty() && branches.iter().all(|branch| branch.end.complete());
-    let first = branches.first();
-    trace.law = first.and_then(|branch| Law::of(keys, branch, request.cross_section));
+    trace.law = branches.first().and_then(|branch| law(request, branch));
     trace.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(trace)
+}
+
+/// Force against displacement, if it is one component of the force on the joint
+/// tip that varies.
+fn law(request: &TraceRequest, branch: &TraceBranch) -> Option<Law> {
+    let [
+        Target::Entry {
+            key: Key::TipForce,
+            index: Some(axis),
+        },
+    ] = request.vary.keys.targets()
+    else {
+        return None;
+    };
+    let points = branch.points.iter().map(|point| match point.tips[..] {
+        [tip] => Some((point.value, tip)),
+        _ => None,
+    });
+    let points: Option<Vec<(f64, DVec3)>> = points.collect();
+    Law::of(*axis, &points?, request.cross_section)
 }
 
 /// The finest grid on which branches are followed unless told otherwise.
