@@ -187,11 +187,10 @@ impl Relaxation<'_> {
             let size = turn.max(shift);
             let part = (MAX_TURN / turn).min(MAX_SHIFT / shift).min(1.0);
             leaf.advance(&self.state, system, part, &mut trial);
-            let mut energy = sums.energy;
             let next = leaf.assemble(&trial, system);
             self.work.force_evaluations += 1;
             (self.progress)(step, size);
-            let mut next_energy = next.energy;
+            let (mut energy, mut next_energy) = (sums.energy, next.energy);
             if pace.dt.is_finite() {
                 energy += system.kinetic_energy(&velocity);
                 system.velocity(part, pace.dt, &mut next_velocity);
