@@ -58,7 +58,7 @@ impl Cli {
 fn as_typed(refusal: Refusal) -> Refusal {
     let text = refusal.to_string();
     match text.split_once(" = ") {
-        Some((option @ ("segments" | "intervals" | "modes" | "method"), rest)) => {
+        Some((option @ ("segments" | "intervals" | "modes" | "method" | "step"), rest)) => {
             format!("--{option} {rest}").into()
         }
         _ => refusal,

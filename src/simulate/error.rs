@@ -21,14 +21,14 @@ pub enum Refused {
         rigid: bool,
     },
     /// The time step is not positive.
-    #[error("step {found}: must be greater than 0")]
+    #[error("step = {found}: must be greater than 0")]
     NotPositive {
         /// The step asked for.
         found: f64,
     },
     /// The time step is too long for the explicit method.
     #[error(
-        "step {found}: the explicit method is stable up to {stable:.3e}, because of {limit}: \
+        "step = {found}: the explicit method is stable up to {stable:.3e}, because of {limit}: \
          use a shorter step, or the semi-implicit method, or leave the step out"
     )]
     Unstable {
