@@ -409,9 +409,9 @@ fn cost_is_charted_against_the_number_of_veins() {
 fn bad_requests_are_refused_before_anything_is_written() {
     all_refused(
         "chart",
-        "leaf.toml --seconds 0 => --seconds 0: must be greater than 0
-        leaf.toml --seconds -1 => --seconds -1
-        leaf.toml --seconds nan => --seconds NaN
+        "leaf.toml --seconds 0 => seconds 0: must be greater than 0
+        leaf.toml --seconds -1 => seconds -1
+        leaf.toml --seconds nan => seconds NaN
         leaf.toml --seconds 1e9 => at most 86400
         leaf.toml --methods newton => semi-implicit-grid
         leaf.toml --tolerance 1e-3 => --rods

@@ -230,8 +230,8 @@ fn bad_requests_are_refused_before_anything_is_written() {
         --methods explicit-motion => method.step
         --set method.step=0 => greater than 0
         --set method.steps=1 => method.step and method.segments
-        --cell-seconds 0 => --cell-seconds
-        --tolerance 1 => --tolerance
+        --cell-seconds 0 => cell-seconds
+        --tolerance 1 => tolerance
         --shard 3/2 => I/K
         --shard 1/2 --draw a.csv => --draw
         --set leaf.rods=0 => rods

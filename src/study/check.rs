@@ -7,6 +7,7 @@ pub use shot::Shot;
 use serde::Serialize;
 
 use super::judge::{fine_grid, timed};
+use super::words::words;
 use crate::bvp::{self, Solution, Start};
 use crate::relax::{
     self, Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit, index_near,
@@ -57,15 +58,16 @@ pub enum Quantity {
     Moment,
 }
 
-impl Quantity {
-    /// All of them.
-    pub const ALL: [Quantity; 4] = [
-        Quantity::Position,
-        Quantity::Rotation,
-        Quantity::Force,
-        Quantity::Moment,
-    ];
+words! {
+    Quantity {
+        Position = "position",
+        Rotation = "rotation",
+        Force = "force",
+        Moment = "moment",
+    }
+}
 
+impl Quantity {
     /// Its part of a difference.
     pub fn of(self, difference: &Difference) -> f64 {
         match self {
@@ -73,16 +75,6 @@ impl Quantity {
             Quantity::Rotation => difference.rotation,
             Quantity::Force => difference.force,
             Quantity::Moment => difference.moment,
-        }
-    }
-
-    /// The word used in `check.json`.
-    pub fn word(self) -> &'static str {
-        match self {
-            Quantity::Position => "position",
-            Quantity::Rotation => "rotation",
-            Quantity::Force => "force",
-            Quantity::Moment => "moment",
         }
     }
 }
@@ -317,14 +309,6 @@ mod tests {
         }
         check.compare();
         check
-    }
-
-    #[test]
-    fn both_roads_end_in_the_same_place() {
-        let check = fan();
-        assert_eq!(check.verdict, Verdict::Agree);
-        assert_eq!(check.within_estimates, Some(true));
-        assert_eq!(check.allowed(), 2.0 * check.tolerance);
     }
 
     #[test]

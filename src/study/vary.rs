@@ -301,7 +301,7 @@ fn between(from: f64, to: f64, i: usize, last: usize, log: bool) -> f64 {
 pub enum VaryError {
     /// Not of the form.
     #[error(
-        "--vary {given}: {why}; write KEY=FROM..TO[:COUNT][log], as in stiffness.bending_2=1..1e-5:12log"
+        "{given}: {why}; write KEY=FROM..TO[:COUNT][log], as in stiffness.bending_2=1..1e-5:12log"
     )]
     Form {
         /// What was given.

@@ -10,10 +10,28 @@ pub struct UnknownWord {
     pub allowed: Vec<&'static str>,
 }
 
-/// Lets types with `ALL` and `word()` be written and read by their words, on the
-/// command line and in files.
+/// Gives enums their words: `ALL` and `word()`, from which all else follows.
 macro_rules! words {
-    ($($type:ty),*) => {$(
+    ($($type:ident { $($variant:ident = $word:literal),* $(,)? })*) => {$(
+        impl $type {
+            /// All of them.
+            pub const ALL: [$type; [$($word),*].len()] = [$($type::$variant),*];
+
+            /// The word for it on the command line and in files.
+            pub fn word(self) -> &'static str {
+                match self {
+                    $($type::$variant => $word),*
+                }
+            }
+        }
+
+        $crate::study::words::read_and_write!($type);
+    )*};
+}
+
+/// Lets types with `ALL` and `word()` be written and read by their words.
+macro_rules! read_and_write {
+    ($type:ty) => {
         impl std::fmt::Display for $type {
             fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
                 f.write_str(self.word())
@@ -46,7 +64,7 @@ macro_rules! words {
                 word.parse().map_err(serde::de::Error::custom)
             }
         }
-    )*};
+    };
 }
 
-pub(super) use words;
+pub(super) use {read_and_write, words};

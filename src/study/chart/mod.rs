@@ -56,7 +56,7 @@ pub enum ChartError {
     #[error(transparent)]
     Relax(#[from] RelaxError),
     /// The time allowed is out of range.
-    #[error("--seconds {found}: must be greater than 0 and at most {MOST_SECONDS}")]
+    #[error("seconds {found}: must be greater than 0 and at most {MOST_SECONDS}")]
     Seconds {
         /// The time asked for.
         found: f64,

@@ -6,7 +6,7 @@ use serde::{Serialize, Serializer};
 
 use crate::relax::Method;
 use crate::scenario::Scenario;
-use crate::study::words::words;
+use crate::study::words::read_and_write;
 
 /// A way to bring a leaf to rest, with one knob for its accuracy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,7 +76,7 @@ impl Contender {
     }
 }
 
-words!(Contender);
+read_and_write!(Contender);
 
 impl Serialize for Setting {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

@@ -7,6 +7,7 @@ use serde::{Serialize, Serializer};
 use super::cell::{Cell, one_line};
 use super::motion;
 use super::row::{Confidence, MapMethod, MapOutcome, MapRow};
+use crate::relax::check_tolerance;
 use crate::study::vary::{Base, Keys, Knob, Vary, VaryError};
 
 /// Most cells of a map.
@@ -30,54 +31,10 @@ pub struct MapRequest {
     pub cell_seconds: f64,
 }
 
-/// A map that cannot be made.
+/// A map that cannot be made: why, in a sentence.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum MapRefused {
-    /// No axis, or too many.
-    #[error("{found} times --vary: a map has one or two axes")]
-    Axes {
-        /// How many.
-        found: usize,
-    },
-    /// One number on both axes, or twice on one.
-    #[error("--vary {key}: varies twice")]
-    Twice {
-        /// The number.
-        key: String,
-    },
-    /// Too many cells.
-    #[error("{found} cells: at most {MOST_CELLS} are allowed; lower the counts of --vary")]
-    Cells {
-        /// How many.
-        found: usize,
-    },
-    /// Not a time.
-    #[error("--cell-seconds {found}: must be greater than 0 and at most 1e6")]
-    Seconds {
-        /// The time.
-        found: f64,
-    },
-    /// Explicit motion without a time step.
-    #[error(
-        "--methods explicit-motion: needs a time step: --set method.step=STEP or --vary method.step=FROM..TO"
-    )]
-    NoStep,
-    /// Nothing to run.
-    #[error("--methods: name one at least")]
-    NoMethods,
-    /// The tolerance is out of range.
-    #[error("--tolerance {found}: allowed are 1e-12 to 0.1")]
-    Tolerance {
-        /// The tolerance.
-        found: f64,
-    },
-    /// A number that is not there to vary.
-    #[error("--vary {message}")]
-    Entry {
-        /// What is missing.
-        message: String,
-    },
-}
+#[error("{0}")]
+pub struct MapRefused(String);
 
 impl MapRequest {
     /// Checks what is asked. Without `methods`: all, explicit motion only if
@@ -92,34 +49,34 @@ impl MapRequest {
         tolerance: Option<f64>,
         cell_seconds: f64,
     ) -> Result<Self, MapRefused> {
+        let refuse = |why: String| Err(MapRefused(why));
         if !(1..=2).contains(&axes.len()) {
-            return Err(MapRefused::Axes { found: axes.len() });
+            return refuse(format!("{} axes: a map has one or two axes", axes.len()));
         }
         let targets: Vec<_> = axes.iter().flat_map(|axis| axis.keys.targets()).collect();
         for (i, target) in targets.iter().enumerate() {
             if targets[..i].contains(target) {
-                let key = target.to_string();
-                return Err(MapRefused::Twice { key });
+                return refuse(format!("{target}: varies twice"));
             }
         }
-        let found = axes.iter().map(|axis| axis.values.len()).product();
+        let found: usize = axes.iter().map(|axis| axis.values.len()).product();
         if found > MOST_CELLS {
-            return Err(MapRefused::Cells { found });
+            let allowed = format!("at most {MOST_CELLS} are allowed; lower the counts of the axes");
+            return refuse(format!("{found} cells: {allowed}"));
         }
         if !(cell_seconds > 0.0 && cell_seconds <= 1e6) {
-            let found = cell_seconds;
-            return Err(MapRefused::Seconds { found });
+            let allowed = "must be greater than 0 and at most 1e6";
+            return refuse(format!("cell-seconds {cell_seconds}: {allowed}"));
         }
-        if let Some(found) = tolerance
-            && !(1e-12..=0.1).contains(&found)
-        {
-            return Err(MapRefused::Tolerance { found });
+        if let Some(tolerance) = tolerance {
+            check_tolerance(tolerance).map_err(|why| MapRefused(why.to_string()))?;
         }
         let steps = base.knobs().step.is_some() || axes.iter().any(|a| a.keys.sets(Knob::Step));
         let methods = match methods {
             Some(mut methods) => {
                 if methods.contains(&MapMethod::ExplicitMotion) && !steps {
-                    return Err(MapRefused::NoStep);
+                    let needs = "needs a time step: set or vary method.step";
+                    return refuse(format!("explicit-motion: {needs}"));
                 }
                 methods.sort();
                 methods.dedup();
@@ -130,7 +87,7 @@ impl MapRequest {
                 .collect(),
         };
         if methods.is_empty() {
-            return Err(MapRefused::NoMethods);
+            return refuse("no methods: name one at least".into());
         }
         let request = MapRequest {
             base,
@@ -149,8 +106,7 @@ impl MapRequest {
         let last = self.base.at(&self.values(self.cells() - 1));
         match (first, last) {
             (Err(VaryError::Key { key, why }), Err(VaryError::Key { .. })) => {
-                let message = format!("{key}: {why}");
-                Err(MapRefused::Entry { message })
+                Err(MapRefused(format!("{key}: {why}")))
             }
             _ => Ok(()),
         }

@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use serde::{Deserialize, Serialize, Serializer};
 
 use crate::relax::Method;
-use crate::study::words::words;
+use crate::study::words::{read_and_write, words};
 
 /// The methods that are compared, in the order of the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -75,34 +75,6 @@ pub enum MapOutcome {
     OutOfTime,
 }
 
-impl MapOutcome {
-    /// All of them.
-    pub const ALL: [MapOutcome; 8] = [
-        MapOutcome::Right,
-        MapOutcome::OtherEquilibrium,
-        MapOutcome::Saddle,
-        MapOutcome::Inaccurate,
-        MapOutcome::NotConverged,
-        MapOutcome::Diverged,
-        MapOutcome::Refused,
-        MapOutcome::OutOfTime,
-    ];
-
-    /// The word used in `map.csv`.
-    pub fn word(self) -> &'static str {
-        match self {
-            MapOutcome::Right => "right",
-            MapOutcome::OtherEquilibrium => "other-equilibrium",
-            MapOutcome::Saddle => "saddle",
-            MapOutcome::Inaccurate => "inaccurate",
-            MapOutcome::NotConverged => "not-converged",
-            MapOutcome::Diverged => "diverged",
-            MapOutcome::Refused => "refused",
-            MapOutcome::OutOfTime => "out-of-time",
-        }
-    }
-}
-
 /// What there is to compare with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Confidence {
@@ -116,24 +88,6 @@ pub enum Confidence {
     None,
 }
 
-impl Confidence {
-    /// All of them.
-    pub const ALL: [Confidence; 3] = [
-        Confidence::Confirmed,
-        Confidence::Unconfirmed,
-        Confidence::None,
-    ];
-
-    /// The word used in `map.csv`.
-    pub fn word(self) -> &'static str {
-        match self {
-            Confidence::Confirmed => "confirmed",
-            Confidence::Unconfirmed => "unconfirmed",
-            Confidence::None => "none",
-        }
-    }
-}
-
 /// What the figure of a map shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MapShow {
@@ -144,20 +98,29 @@ pub enum MapShow {
     Waves,
 }
 
-impl MapShow {
-    /// Both.
-    pub const ALL: [MapShow; 2] = [MapShow::Outcomes, MapShow::Waves];
+read_and_write!(MapMethod);
 
-    /// The word used on the command line.
-    pub fn word(self) -> &'static str {
-        match self {
-            MapShow::Outcomes => "outcomes",
-            MapShow::Waves => "waves",
-        }
+words! {
+    MapOutcome {
+        Right = "right",
+        OtherEquilibrium = "other-equilibrium",
+        Saddle = "saddle",
+        Inaccurate = "inaccurate",
+        NotConverged = "not-converged",
+        Diverged = "diverged",
+        Refused = "refused",
+        OutOfTime = "out-of-time",
+    }
+    Confidence {
+        Confirmed = "confirmed",
+        Unconfirmed = "unconfirmed",
+        None = "none",
+    }
+    MapShow {
+        Outcomes = "outcomes",
+        Waves = "waves",
     }
 }
-
-words!(MapMethod, MapOutcome, Confidence, MapShow);
 
 /// One method in one cell: a row of `map.csv`, in the order of its columns.
 /// Lengths are relative to the longest rod but for the tip.
