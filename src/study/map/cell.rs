@@ -12,16 +12,12 @@ use crate::study::judge::{
 use crate::study::vary::{Knobs, Varied};
 
 use super::motion;
-use super::row::{Confidence, MapMethod, MapOutcome, MapRow};
+use super::row::{Confidence, Found, MapMethod, MapOutcome, MapRow};
 
 /// The reference is sharper than what it judges by this factor, as far as
 /// double precision allows.
 const SHARPER: f64 = 1e-2;
 const SHARPEST: f64 = 1e-12;
-
-/// An answer at rest within the tolerance, or why there is none: an outcome and
-/// a sentence.
-pub type Found = Result<Answer, (MapOutcome, String)>;
 
 /// What a cell's leaf is solved with.
 pub struct Cell<'a> {

@@ -10,8 +10,7 @@ use crate::shape::RodShape;
 use crate::study::judge::{Answer, SAME_PLACE, fine_grid, grid_error};
 use crate::undulation::Undulation;
 
-use super::cell::Found;
-use super::row::MapOutcome;
+use super::row::{Found, MapOutcome};
 use crate::study::vary::{Knobs, Varied};
 
 /// Segments a rod where none are asked for: as in a simulation.

@@ -5,6 +5,7 @@ use std::cmp::Ordering;
 use serde::{Deserialize, Serialize, Serializer};
 
 use crate::relax::Method;
+use crate::study::judge::Answer;
 use crate::study::words::{read_and_write, words};
 
 /// The methods that are compared, in the order of the rows.
@@ -74,6 +75,10 @@ pub enum MapOutcome {
     /// The time allowed was over.
     OutOfTime,
 }
+
+/// An answer at rest within the tolerance, or why there is none: an outcome and
+/// a sentence.
+pub type Found = Result<Answer, (MapOutcome, String)>;
 
 /// What there is to compare with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
