@@ -126,7 +126,11 @@ pub fn map() -> Map {
         let row = MapRow {
             detail: format!("said of cell {cell}, \"quoted\""),
             seconds: 0.012345,
-            ..MapRow::without_answer(cell, method, outcome, reference)
+            cell,
+            method,
+            outcome,
+            reference,
+            ..MapRow::default()
         };
         if !rests {
             return row;

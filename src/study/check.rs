@@ -154,7 +154,11 @@ impl Check {
 
     fn judge(&self) -> Verdict {
         let solution = match self.shot.as_ref().map(|shot| &shot.found) {
-            None => return Verdict::NotCompared(why_not_at_rest(&self.relaxed)),
+            None => {
+                let why = (self.relaxed.remark.as_ref()).map(|remark| format!(": {remark}"));
+                let why = why.unwrap_or_default();
+                return Verdict::NotCompared(format!("the relaxation did not come to rest{why}"));
+            }
             Some(Err(failure)) => return Verdict::NotCompared(failure.reason.to_string()),
             Some(Ok(solution)) => solution,
         };
@@ -259,14 +263,6 @@ fn shoot(scenario: &Scenario, relaxed: &Equilibrium, intervals: Option<usize>) -
         },
         found,
         wall_seconds,
-    }
-}
-
-fn why_not_at_rest(relaxed: &Equilibrium) -> String {
-    let why = "the relaxation did not come to rest";
-    match &relaxed.remark {
-        Some(remark) => format!("{why}: {remark}"),
-        None => why.into(),
     }
 }
 

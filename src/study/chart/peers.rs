@@ -129,40 +129,35 @@ pub fn about(
 mod tests {
     use super::*;
 
-    fn row(
-        program: &str,
-        scenario: &str,
-        rods: usize,
-        knob: &str,
-        seconds: f64,
-        error: Option<f64>,
-        outcome: &str,
-    ) -> PeerRow {
+    /// program, scenario, rods, knob, seconds, error, outcome.
+    fn row(text: &str) -> PeerRow {
+        let cell: Vec<&str> = text.split(',').collect();
         PeerRow {
-            program: program.into(),
-            scenario: scenario.into(),
-            rods,
-            knob: knob.into(),
-            seconds,
-            error,
-            outcome: outcome.into(),
+            program: cell[0].into(),
+            scenario: cell[1].into(),
+            rods: cell[2].parse().unwrap(),
+            knob: cell[3].into(),
+            seconds: cell[4].parse().unwrap(),
+            error: cell[5].parse().ok(),
+            outcome: cell[6].into(),
         }
     }
 
     #[test]
     fn equal_rows_are_taken_together_and_others_counted() {
         let rows = [
-            row("a", "leaf", 5, "n=10", 3.0, Some(4e-3), "converged"),
-            row("a", "leaf", 5, "n=10", 1.0, Some(4e-3), "converged"),
-            row("a", "leaf", 5, "n=10", 2.0, Some(4e-3), "converged"),
-            row("a", "leaf", 5, "n=10 own-law", 2.0, Some(6e-3), "at-rest"),
-            row("a", "leaf", 5, "n=20", 2.0, None, "not-converged newton"),
-            row("a", "leaf", 5, "n=30", 2.0, None, "converged"),
-            row("a", "leaf", 5, "n=30 steps=9", 2.0, None, "completed"),
-            row("a", "leaf", 7, "n=10", 2.0, Some(1e-3), "converged"),
-            row("a", "tree", 5, "n=10", 2.0, Some(1e-3), "converged"),
-            row("a", "tree", 5, "n=20", 2.0, Some(1e-3), "converged"),
-        ];
+            "a,leaf,5,n=10,3,4e-3,converged",
+            "a,leaf,5,n=10,1,4e-3,converged",
+            "a,leaf,5,n=10,2,4e-3,converged",
+            "a,leaf,5,n=10 own-law,2,6e-3,at-rest",
+            "a,leaf,5,n=20,2,,not-converged newton",
+            "a,leaf,5,n=30,2,,converged",
+            "a,leaf,5,n=30 steps=9,2,,completed",
+            "a,leaf,7,n=10,2,1e-3,converged",
+            "a,tree,5,n=10,2,1e-3,converged",
+            "a,tree,5,n=20,2,1e-3,converged",
+        ]
+        .map(row);
         let (peers, remarks) = about(&rows, "leaf", 5, 2.0);
         let names: Vec<(&str, &str)> = peers
             .iter()

@@ -55,49 +55,42 @@ pub fn find(
     };
     let shot = solved.map(|solution| Answer::of_solution(scenario, solution, SMALLEST_TOLERANCE));
     let unit = longest(scenario);
-    Ok(match (relaxed, shot) {
+    let estimate = |answer: &Answer| answer.error() / unit;
+    let mut reference = Reference {
+        confirmed: false,
+        told: String::new(),
+        known_within: 0.0,
+        relaxation_estimate: relaxed.as_ref().map(estimate),
+        shooting_estimate: shot.as_ref().ok().map(estimate),
+        difference: None,
+        neutral,
+    };
+    let (told, answer) = match (relaxed, shot) {
         (Some(leaf), Ok(shot)) => {
-            let (reference, answer) = both(leaf, shot, unit);
-            Some((
-                Reference {
-                    neutral,
-                    ..reference
-                },
-                answer,
-            ))
+            let distance = leaf.distance(&shot);
+            reference.difference = distance.map(|distance| distance / unit);
+            reference.confirmed = distance.is_some_and(|apart| leaf.confirms(&shot, apart));
+            choose(leaf, shot, reference.confirmed)
         }
         (Some(leaf), Err(failure)) => {
-            let estimate = leaf.error() / unit;
-            let reference = Reference {
-                confirmed: false,
-                told: format!(
-                    "the relaxed leaf: shooting does not confirm it, {}",
-                    failure.reason
-                ),
-                known_within: estimate,
-                relaxation_estimate: Some(estimate),
-                shooting_estimate: None,
-                difference: None,
-                neutral,
-            };
-            Some((reference, leaf))
+            let why = &failure.reason;
+            let told = format!("the relaxed leaf: shooting does not confirm it, {why}");
+            (told, leaf)
         }
-        (None, Ok(shot)) => {
-            let estimate = shot.error() / unit;
-            let reference = Reference {
-                confirmed: false,
-                told: "the boundary-value solution from arcs: the relaxation does not come to rest"
-                    .into(),
-                known_within: estimate,
-                relaxation_estimate: None,
-                shooting_estimate: Some(estimate),
-                difference: None,
-                neutral,
-            };
-            Some((reference, shot))
-        }
-        (None, Err(_)) => None,
-    })
+        (None, Ok(shot)) => (
+            "the boundary-value solution from arcs: the relaxation does not come to rest".into(),
+            shot,
+        ),
+        (None, Err(_)) => return Ok(None),
+    };
+    let estimates = [reference.relaxation_estimate, reference.shooting_estimate];
+    let better = (estimates.into_iter().flatten()).fold(f64::INFINITY, f64::min);
+    reference.told = told;
+    reference.known_within = match reference.difference {
+        Some(difference) if reference.confirmed => better.max(difference),
+        _ => better,
+    };
+    Ok(Some((reference, answer)))
 }
 
 /// The most accurate relaxation that comes to rest.
@@ -123,33 +116,19 @@ fn best_relaxed(scenario: &Scenario) -> Result<Option<Answer>, RelaxError> {
 
 /// The boundary-value solution, which is known at all stations, if both agree;
 /// otherwise the one that claims to be better.
-fn both(leaf: Answer, shot: Answer, unit: f64) -> (Reference, Answer) {
-    let [relaxation, shooting] = [&leaf, &shot].map(|answer| answer.error() / unit);
-    let distance = leaf.distance(&shot);
-    let confirmed = distance.is_some_and(|distance| leaf.confirms(&shot, distance));
-    let difference = distance.map(|distance| distance / unit);
-    let better = relaxation.min(shooting);
-    let told = match (confirmed, relaxation < shooting) {
-        (true, _) => "relaxation and shooting agree within their error estimates",
-        (false, true) => "the relaxed leaf: shooting finds another shape",
-        (false, false) => "the boundary-value solution: the relaxed leaf has another shape",
+fn choose(leaf: Answer, shot: Answer, confirmed: bool) -> (String, Answer) {
+    let (told, answer) = match (confirmed, leaf.error() < shot.error()) {
+        (true, _) => (
+            "relaxation and shooting agree within their error estimates",
+            shot,
+        ),
+        (false, true) => ("the relaxed leaf: shooting finds another shape", leaf),
+        (false, false) => (
+            "the boundary-value solution: the relaxed leaf has another shape",
+            shot,
+        ),
     };
-    let reference = Reference {
-        confirmed,
-        told: told.into(),
-        known_within: match difference {
-            Some(difference) if confirmed => better.max(difference),
-            _ => better,
-        },
-        relaxation_estimate: Some(relaxation),
-        shooting_estimate: Some(shooting),
-        difference,
-        neutral: None,
-    };
-    match confirmed || shooting <= relaxation {
-        true => (reference, shot),
-        false => (reference, leaf),
-    }
+    (told.into(), answer)
 }
 
 #[cfg(test)]
@@ -166,23 +145,20 @@ mod tests {
         "#;
         let scenario = Scenario::from_toml(leaf).unwrap();
         let relaxed = best_relaxed(&scenario).unwrap().unwrap();
-        let (reference, mut elsewhere) = find(&scenario, Vec::new()).unwrap().unwrap();
-        assert!(reference.confirmed, "{}", reference.told);
-        assert!(reference.known_within < 1e-11);
-        for rod in &mut elsewhere.rods {
-            for node in &mut rod.nodes {
-                node.position.z += 1e-6;
-            }
+        let (_, mut elsewhere) = find(&scenario, Vec::new()).unwrap().unwrap();
+        for node in elsewhere.rods.iter_mut().flat_map(|rod| &mut rod.nodes) {
+            node.position.z += 1e-6;
         }
-        for (error, shot_is_better) in [(1e-16, true), (1e-7, false)] {
+        for (error, is_taken) in [(1e-16, true), (1e-7, false)] {
             elsewhere.error_estimate = Some(error);
-            let (reference, taken) = both(relaxed.clone(), elsewhere.clone(), 2.0);
-            assert!(!reference.confirmed);
-            assert_eq!(taken.rods == elsewhere.rods, shot_is_better);
+            let apart = relaxed.distance(&elsewhere).unwrap();
+            assert!(!relaxed.confirms(&elsewhere, apart));
+            let (_, taken) = choose(relaxed.clone(), elsewhere.clone(), false);
+            assert_eq!(taken.rods == elsewhere.rods, is_taken);
         }
         // An estimate that is as large as the difference confirms little, but
         // truly.
         elsewhere.error_estimate = Some(3e-6);
-        assert!(both(relaxed, elsewhere, 2.0).0.confirmed);
+        assert!(relaxed.confirms(&elsewhere, 1e-6));
     }
 }

@@ -63,7 +63,10 @@ impl<'a> Cell<'a> {
         let (found, seconds) = self.answer(method);
         let blank = MapRow {
             seconds,
-            ..MapRow::without_answer(cell, method, MapOutcome::Refused, self.confidence)
+            cell,
+            method,
+            reference: self.confidence,
+            ..MapRow::default()
         };
         let answer = match found {
             Ok(answer) => answer,

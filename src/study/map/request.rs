@@ -6,7 +6,7 @@ use serde::{Serialize, Serializer};
 
 use super::cell::{Cell, one_line};
 use super::motion;
-use super::row::{Confidence, MapMethod, MapOutcome, MapRow};
+use super::row::{MapMethod, MapRow};
 use crate::relax::check_tolerance;
 use crate::study::vary::{Base, Keys, Knob, Vary, VaryError};
 
@@ -158,7 +158,9 @@ impl MapRequest {
                 let detail = one_line(&refused.to_string());
                 let refused = |&method: &MapMethod| MapRow {
                     detail: detail.clone(),
-                    ..MapRow::without_answer(cell, method, MapOutcome::Refused, Confidence::None)
+                    cell,
+                    method,
+                    ..MapRow::default()
                 };
                 return methods.iter().map(refused).collect();
             }

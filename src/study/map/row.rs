@@ -42,6 +42,12 @@ impl MapMethod {
     }
 }
 
+impl Default for MapMethod {
+    fn default() -> Self {
+        MapMethod::ALL[0]
+    }
+}
+
 impl Ord for MapMethod {
     fn cmp(&self, other: &Self) -> Ordering {
         self.place().cmp(&other.place())
@@ -55,7 +61,7 @@ impl PartialOrd for MapMethod {
 }
 
 /// How a method fared.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum MapOutcome {
     /// At rest where the reference is, as closely as both say they know.
     Right,
@@ -71,6 +77,7 @@ pub enum MapOutcome {
     /// Values grew out of all bounds, or no step lowered the energy.
     Diverged,
     /// The method or the format refuses such a leaf.
+    #[default]
     Refused,
     /// The time allowed was over.
     OutOfTime,
@@ -81,7 +88,7 @@ pub enum MapOutcome {
 pub type Found = Result<Answer, (MapOutcome, String)>;
 
 /// What there is to compare with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Confidence {
     /// Relaxation and shooting from there agree within both error estimates,
     /// and so do their numbers of negative eigenvalues.
@@ -90,6 +97,7 @@ pub enum Confidence {
     /// equilibrium, otherwise the relaxation.
     Unconfirmed,
     /// The relaxation did not come to rest.
+    #[default]
     None,
 }
 
@@ -129,7 +137,7 @@ words! {
 
 /// One method in one cell: a row of `map.csv`, in the order of its columns.
 /// Lengths are relative to the longest rod but for the tip.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MapRow {
     /// The cell, counted along the last axis first; in the table its values tell.
     #[serde(skip)]
@@ -190,33 +198,6 @@ fn microseconds<S: Serializer>(seconds: &f64, serializer: S) -> Result<S::Ok, S:
 }
 
 impl MapRow {
-    /// Of a method that found no equilibrium.
-    pub fn without_answer(
-        cell: usize,
-        method: MapMethod,
-        outcome: MapOutcome,
-        reference: Confidence,
-    ) -> Self {
-        MapRow {
-            cell,
-            method,
-            outcome,
-            detail: String::new(),
-            index: None,
-            tip_x: None,
-            tip_y: None,
-            tip_z: None,
-            energy: None,
-            error: None,
-            error_estimate: None,
-            margin_waves: None,
-            margin_amplitude: None,
-            twist: None,
-            seconds: 0.0,
-            reference,
-        }
-    }
-
     /// Waves along the margins of a stable equilibrium; `None` where the
     /// method found none.
     pub fn stable_waves(&self) -> Option<f64> {
