@@ -53,13 +53,22 @@ impl Cli {
     }
 }
 
-/// The options of a relaxation as they are typed: a message of the library about
-/// `segments = 2` is one about `--segments 2`.
+/// A message of the library about an option as it is typed: `segments = 2: ...` is
+/// about `--segments 2`.
 fn as_typed(refusal: Refusal) -> Refusal {
+    const OPTIONS: [&str; 7] = [
+        "cell-seconds",
+        "intervals",
+        "method",
+        "modes",
+        "seconds",
+        "segments",
+        "step",
+    ];
     let text = refusal.to_string();
-    match text.split_once(" = ") {
-        Some((option @ ("segments" | "intervals" | "modes" | "method" | "step"), rest)) => {
-            format!("--{option} {rest}").into()
+    match text.split_once(' ') {
+        Some((option, rest)) if OPTIONS.contains(&option) => {
+            format!("--{option} {}", rest.trim_start_matches("= ")).into()
         }
         _ => refusal,
     }
