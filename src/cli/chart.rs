@@ -15,7 +15,7 @@ use crate::report;
 
 use super::progress::ProgressLine;
 use super::request::Request;
-use super::{Refusal, Status, note};
+use super::{Refusal, Status};
 
 /// Measure every method over its own accuracy, and chart time against true error.
 ///
@@ -99,25 +99,21 @@ impl Chart {
             chart.scaling = Some(study::scaling(&leaves, tolerance, &options, &mut progress)?);
         }
         drop(line);
-        if self.request.json {
-            for remark in &chart.remarks {
-                note(&format!("{}: {remark}", chart.scenario));
-            }
+        for remark in &chart.remarks {
+            self.request.remark(&chart.scenario, Some(remark));
         }
         let scaled = match &chart.scaling {
             Some(scaling) => files::write_all(&folder, scaling).map(drop),
             None => Ok(()),
         };
-        self.request.deliver(&chart, &folder, |folder| {
+        let scaling = chart.scaling.iter();
+        let mut confirmed = scaling.map(|scaling| scaling.unconfirmed.is_empty());
+        let success = chart.confirmed() && confirmed.all(|confirmed| confirmed);
+        let status = self.request.deliver(&chart, &folder, success, |folder| {
             report::chart_report(&chart, folder.filter(|_| scaled.is_ok()))
         })?;
         scaled?;
-        let scaling = chart.scaling.as_ref();
-        let scaled = scaling.is_none_or(|scaling| scaling.unconfirmed.is_empty());
-        Ok(match chart.confirmed() && scaled {
-            true => Status::Success,
-            false => Status::Failure,
-        })
+        Ok(status)
     }
 
     /// The leaves of `--rods`.

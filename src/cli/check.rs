@@ -8,7 +8,7 @@ use crate::report;
 
 use super::progress::ProgressLine;
 use super::request::Request;
-use super::{Refusal, Status, note};
+use super::{Refusal, Status};
 
 /// Relax a leaf, solve its boundary-value problem by shooting from there, and compare.
 ///
@@ -39,15 +39,12 @@ impl Check {
         let mut line = ProgressLine::new(&scenario.name);
         let check = study::check(&scenario, &options, &mut |progress| line.update(progress))?;
         drop(line);
-        if let (true, Verdict::NotCompared(reason)) = (self.request.json, &check.verdict) {
-            note(&format!("{}: {reason}", scenario.name));
+        if let Verdict::NotCompared(reason) = &check.verdict {
+            self.request.remark(&scenario.name, Some(reason));
         }
-        self.request.deliver(&check, &folder, |folder| {
+        let success = matches!(check.verdict, Verdict::Agree);
+        self.request.deliver(&check, &folder, success, |folder| {
             report::check_report(&check, folder)
-        })?;
-        Ok(match check.verdict {
-            Verdict::Agree => Status::Success,
-            Verdict::Differ | Verdict::NotCompared(_) => Status::Failure,
         })
     }
 }

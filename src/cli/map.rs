@@ -121,10 +121,12 @@ impl Map {
                     report::map_report(&map, told, &folder.join(name).display().to_string());
                 show(report.as_bytes())?;
             }
-            None => self.request.deliver(&map, &folder, |folder| {
-                let files = folder.map(|folder| report::table::written(&map, folder));
-                report::map_report(&map, told, &files.unwrap_or_default())
-            })?,
+            None => {
+                return self.request.deliver(&map, &folder, true, |folder| {
+                    let files = folder.map(|folder| report::table::written(&map, folder));
+                    report::map_report(&map, told, &files.unwrap_or_default())
+                });
+            }
         }
         Ok(Status::Success)
     }

@@ -105,6 +105,15 @@ enum Status {
     Refused = 2,
 }
 
+impl Status {
+    fn of(success: bool) -> Self {
+        match success {
+            true => Status::Success,
+            false => Status::Failure,
+        }
+    }
+}
+
 /// Status of a run ended by Ctrl-C: 128 and the number of the signal.
 const INTERRUPTED: i32 = 130;
 

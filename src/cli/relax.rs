@@ -12,7 +12,7 @@ use crate::study;
 
 use super::progress::ProgressLine;
 use super::request::Request;
-use super::{Refusal, Status, note};
+use super::{Refusal, Status};
 
 /// Eigenvalues that are told unasked.
 const MODES: usize = 3;
@@ -75,16 +75,13 @@ impl Relax {
             return self.all(&scenario, &folder);
         }
         let equilibrium = self.solve(&scenario)?;
-        if let (true, Some(remark)) = (self.request.json, &equilibrium.remark) {
-            note(&format!("{}: {remark}", equilibrium.scenario));
-        }
-        self.request.deliver(&equilibrium, &folder, |folder| {
-            report::relax_report(&equilibrium, folder)
-        })?;
-        Ok(match equilibrium.outcome.is_success() {
-            true => Status::Success,
-            false => Status::Failure,
-        })
+        let (name, remark) = (&equilibrium.scenario, equilibrium.remark.as_ref());
+        self.request.remark(name, remark);
+        let success = equilibrium.outcome.is_success();
+        self.request
+            .deliver(&equilibrium, &folder, success, |folder| {
+                report::relax_report(&equilibrium, folder)
+            })
     }
 
     /// The method with its own options; refused where they do not fit each other.
@@ -152,11 +149,9 @@ impl Relax {
             },
         )?;
         drop(line);
-        self.request
-            .deliver(&all, folder, |folder| report::all_report(&all, folder))?;
-        Ok(match all.found.is_empty() {
-            false => Status::Success,
-            true => Status::Failure,
+        let success = !all.found.is_empty();
+        self.request.deliver(&all, folder, success, |folder| {
+            report::all_report(&all, folder)
         })
     }
 }

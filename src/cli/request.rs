@@ -1,6 +1,7 @@
 //! What every verb is asked and how it delivers: a scenario, a folder, files
 //! and what is shown.
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueHint};
@@ -10,7 +11,7 @@ use crate::report::Written;
 use crate::scenario::Scenario;
 use crate::study::Base;
 
-use super::{Refusal, show};
+use super::{Refusal, Status, note, show};
 
 /// What every verb is asked.
 #[derive(Debug, Args)]
@@ -67,19 +68,27 @@ impl Request {
         Ok(Scenario::read_with(&self.scenario, &overrides)?)
     }
 
+    /// A remark on a result, beside the JSON that scripts read.
+    pub fn remark(&self, scenario: &str, remark: Option<impl Display>) {
+        if let (true, Some(remark)) = (self.json, remark) {
+            note(&format!("{scenario}: {remark}"));
+        }
+    }
+
     /// Writes the files and shows the result: as JSON, or as a report that is
     /// told the folder if there are files in it. What was found is shown even
-    /// if the files could not be written.
+    /// if the files could not be written. Returns whether it is a success.
     pub fn deliver<R: Written>(
         &self,
         result: &R,
         folder: &Path,
+        success: bool,
         report: impl FnOnce(Option<&Path>) -> String,
-    ) -> Result<(), Refusal> {
+    ) -> Result<Status, Refusal> {
         let written = files::write_all(folder, result);
         self.show(result, || report(written.is_ok().then_some(folder)))?;
         written?;
-        Ok(())
+        Ok(Status::of(success))
     }
 
     /// Shows a result: as JSON, or as a report.

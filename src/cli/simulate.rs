@@ -12,7 +12,7 @@ use crate::simulate::{Options, Scheme, Simulation, Stopped};
 
 use super::progress::ProgressLine;
 use super::request::Request;
-use super::{Refusal, Status, checkpoint_on_interrupt, note, show_checkpoint};
+use super::{Refusal, Status, checkpoint_on_interrupt, show_checkpoint};
 
 /// Follow a leaf as it moves: its shape, velocities and energies in time.
 ///
@@ -82,19 +82,14 @@ impl Simulate {
     ) -> Result<Status, Refusal> {
         let stopped = record(simulation, recording)?;
         let record = recording.record(simulation, stopped)?;
-        if let (true, Some(stopped)) = (self.request.json, stopped) {
-            note(&format!("{}: {stopped}", record.scenario));
-        }
+        self.request.remark(&record.scenario, stopped);
         let written = recording.finish(&record);
         self.request.show(&record, || {
             let files = written.as_ref().ok().map(|files| (folder, &files[..]));
             report::simulate_report(&record, files)
         })?;
         written?;
-        Ok(match stopped {
-            None => Status::Success,
-            Some(_) => Status::Failure,
-        })
+        Ok(Status::of(stopped.is_none()))
     }
 }
 

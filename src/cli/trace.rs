@@ -8,7 +8,7 @@ use crate::report;
 
 use super::progress::ProgressLine;
 use super::request::Request;
-use super::{Refusal, Status, note};
+use super::{Refusal, Status};
 
 /// Follow an equilibrium through one number of the scenario: through folds, with the Morse index along the way.
 ///
@@ -72,16 +72,11 @@ impl Trace {
         })
         .map_err(name_option)?;
         drop(line);
-        if let (true, Some(remark)) = (self.request.json, &trace.remark) {
-            note(&format!("{name}: {remark}"));
-        }
-        self.request.deliver(&trace, &folder, |folder| {
-            report::trace_report(&trace, folder)
-        })?;
-        Ok(match trace.complete {
-            true => Status::Success,
-            false => Status::Failure,
-        })
+        self.request.remark(&name, trace.remark.as_ref());
+        self.request
+            .deliver(&trace, &folder, trace.complete, |folder| {
+                report::trace_report(&trace, folder)
+            })
     }
 }
 

@@ -88,11 +88,11 @@ fn write_rows<R: Serialize>(
     table.flush()
 }
 
-/// The header of a table that may have no rows, or not yet.
-pub fn header<R: Serialize + Default>() -> Vec<u8> {
+/// The header of a table of such rows, which may have none yet.
+pub fn header(row: impl Serialize) -> Vec<u8> {
     let mut table = Vec::new();
     // Writing to memory cannot fail.
-    let _ = write_csv([R::default()], &mut table);
+    let _ = write_csv([row], &mut table);
     let end = table.iter().position(|&byte| byte == b'\n');
     table.truncate(end.map_or(0, |end| end + 1));
     table

@@ -63,7 +63,7 @@ impl Row {
 /// `trace.csv`: one row per branch and point.
 pub fn trace_table(trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
     // Even of a trace without points.
-    out.write_all(&header::<Row>())?;
+    out.write_all(&header(Row::default()))?;
     let branches = trace.branches.iter().enumerate();
     let rows = branches.flat_map(|(b, branch)| branch.points.iter().map(move |p| Row::of(b, p)));
     append_csv(rows, out)

@@ -200,17 +200,10 @@ fn number(digits: &str) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::sample;
 
     fn identity() -> Identity {
-        Identity {
-            version: "0.1.0".into(),
-            scenario: "leaf".into(),
-            content: "0".into(),
-            method: "explicit".into(),
-            segments: 16,
-            step: Some(digits(0.1)),
-            tolerance: digits(1e-6),
-        }
+        Identity::of(&sample::swing(1, 4).0)
     }
 
     fn written() -> (tempfile::TempDir, Checkpoint) {
@@ -276,10 +269,10 @@ mod tests {
             read.unwrap_err().to_string()
         };
         asked.step = None;
-        assert!(told(&asked).contains(": time step 0.1, now left to the tolerance;"));
+        assert!(told(&asked).contains(", now left to the tolerance;"));
         asked.content = "1".into();
         assert!(told(&asked).contains(": the scenario, or an override of it, has changed;"));
         asked.version = "9.0.0".into();
-        assert!(told(&asked).contains(" of another run: version 0.1.0, now 9.0.0;"));
+        assert!(told(&asked).contains(", now 9.0.0; ask for the same run"));
     }
 }

@@ -86,7 +86,7 @@ impl Recording {
         let (form, size) = form(simulation);
         let start = form.start(size, outputs(simulation));
         let motion = GrowingFile::begin(folder.join(form.file_name()), &start)?;
-        let start = header::<energy::Row>();
+        let start = header(energy::Row::default());
         let energy = GrowingFile::begin(folder.join(energy::FILE_NAME), &start)?;
         let mut recording = Recording::with(folder, simulation, motion, energy);
         let frame = simulation.frame();

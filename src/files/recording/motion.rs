@@ -88,7 +88,7 @@ impl Form {
     /// What stands before the first of so many outputs.
     pub fn start(self, size: Size, outputs: usize) -> Vec<u8> {
         match self {
-            Form::Table => header::<Row>(),
+            Form::Table => header(Row::default()),
             Form::Array => npy_header(size, outputs),
         }
     }
