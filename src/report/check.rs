@@ -2,37 +2,35 @@
 
 use std::path::Path;
 
+use glam::DVec3;
+
 use crate::bvp::Solution;
-use crate::report::numbers::power_of_ten;
-use crate::report::words::{equilibrium_of_index, headline, shooting};
 use crate::study::{Check, Place, Quantity, Verdict};
 
-use super::numbers::{bound, decimals, eigenvalues, grids, point, seconds, significant, veins};
+use super::numbers::{
+    bound, decimals, eigenvalues, grids, point, power_of_ten, seconds, significant, veins,
+};
 use super::relax::found;
-use super::table::{lay_out, written};
+use super::table::{Lines, lay_out, under, written};
+use super::words::{equilibrium_of_index, headline, shooting};
 
 /// The verdict, what both methods found, and how far they are apart.
 pub fn report(check: &Check, folder: Option<&Path>) -> String {
+    let relaxed = &check.relaxed;
     let mut lines = vec![("verdict", judgement(check))];
     lines.extend(both(check));
-    lines.extend(differences(check));
-    lines.extend(errors(check));
+    lines.extend(under("differ", differences(check)));
+    lines.extend(under("error", errors(check)));
     if let Some(solution) = check.solution() {
         lines.extend(shooting_itself(solution));
     }
     // Why the leaf is not at rest is in the verdict.
-    if let (Some(remark), true) = (&check.relaxed.remark, check.shot.is_some()) {
+    if let (Some(remark), true) = (&relaxed.remark, check.shot.is_some()) {
         lines.push(("remark", remark.clone()));
     }
-    if let Some(folder) = folder {
-        lines.push(("written", written(check, folder)));
-    }
-    let relaxed = &check.relaxed;
-    let heading = format!(
-        "{}: {}, relaxed and by shooting",
-        relaxed.scenario,
-        veins(relaxed)
-    );
+    lines.extend(folder.map(|folder| ("written", written(check, folder))));
+    let veins = veins(relaxed);
+    let heading = format!("{}: {veins}, relaxed and by shooting", relaxed.scenario);
     lay_out(&heading, &lines)
 }
 
@@ -51,127 +49,87 @@ fn judgement(check: &Check) -> String {
 }
 
 /// What each method found, and when.
-fn both(check: &Check) -> Vec<(&'static str, String)> {
+fn both(check: &Check) -> Lines {
     let relaxed = &check.relaxed;
-    let mut lines = vec![(
-        "relaxed",
-        format!("{} in {}", found(relaxed), seconds(relaxed.wall_seconds)),
-    )];
-    lines.push((
-        "shooting",
-        match &check.shot {
-            Some(shot) => {
-                let found = match shot.found {
-                    Ok(_) => format!(
-                        "{}{}",
-                        equilibrium_of_index(shot.negative_eigenvalues),
-                        eigenvalues(shot.negative_eigenvalues)
-                    ),
-                    Err(_) => "no solution".into(),
-                };
-                format!("{found} in {}", seconds(shot.wall_seconds))
-            }
-            None => "not tried".into(),
-        },
-    ));
+    let found = format!("{} in {}", found(relaxed), seconds(relaxed.wall_seconds));
+    let mut lines = vec![("relaxed", found)];
+    let shot = check.shot.as_ref().map(|shot| {
+        let index = shot.negative_eigenvalues;
+        let found = match shot.found {
+            Ok(_) => equilibrium_of_index(index) + &eigenvalues(index),
+            Err(_) => "no solution".into(),
+        };
+        format!("{found} in {}", seconds(shot.wall_seconds))
+    });
+    lines.push(("shooting", shot.unwrap_or_else(|| "not tried".into())));
+    let place = |tip: &DVec3| point(tip.to_array(), decimals(relaxed));
     if let [tip] = relaxed.tips.as_slice() {
-        let tip = point(tip.to_array(), decimals(relaxed));
-        lines.push(("tip", format!("{tip} relaxed")));
+        lines.push(("tip", format!("{} relaxed", place(tip))));
         if let Some([tip]) = check.shot.as_ref().map(|shot| shot.tips.as_slice()) {
-            let tip = point(tip.to_array(), decimals(relaxed));
-            lines.push(("", format!("{tip} by shooting")));
+            lines.push(("", format!("{} by shooting", place(tip))));
         }
     }
-    let relaxed = significant(relaxed.energy.unwrap_or(f64::NAN));
-    lines.push((
-        "energy",
-        match check.solution() {
-            Some(solution) => format!(
-                "{relaxed} relaxed, {} by shooting",
-                significant(solution.energy)
-            ),
-            None => format!("{relaxed} relaxed"),
-        },
-    ));
+    let mut energy = significant(relaxed.energy.unwrap_or(f64::NAN)) + " relaxed";
+    if let Some(solution) = check.solution() {
+        energy += &format!(", {} by shooting", significant(solution.energy));
+    }
+    lines.push(("energy", energy));
     lines
 }
 
 /// The largest differences, and where they are.
-fn differences(check: &Check) -> Vec<(&'static str, String)> {
+fn differences(check: &Check) -> Vec<String> {
     let Some(difference) = &check.difference else {
         return Vec::new();
     };
-    let mut lines: Vec<(&str, String)> = Quantity::ALL
-        .into_iter()
-        .map(|quantity| {
-            let found = quantity.of(difference);
-            let unit = match quantity {
-                Quantity::Rotation => " rad",
-                _ => "",
-            };
-            let word = quantity.word();
-            let line = match check.farthest(quantity) {
-                Some(place) if found > 0.0 => format!(
-                    "{word}s by {}{unit} at most, {}",
-                    power_of_ten(found),
-                    whereabouts(place, check.relaxed.shape.rods.len())
-                ),
-                _ => format!("{word}s not at all"),
-            };
-            ("", line)
-        })
-        .collect();
-    lines[0].0 = "differ";
-    lines
-}
-
-fn whereabouts(place: Place, rods: usize) -> String {
-    let Place { rod, sigma } = place;
-    match rods {
-        1 => format!("at {sigma:.3} of the length"),
-        _ => format!("in vein {} at {sigma:.3} of its length", rod + 1),
-    }
+    let line = |quantity: Quantity| {
+        let (word, largest) = (quantity.word(), quantity.of(difference));
+        let unit = match quantity {
+            Quantity::Rotation => " rad",
+            _ => "",
+        };
+        match check.farthest(quantity) {
+            Some(Place { rod, sigma }) if largest > 0.0 => {
+                let place = match check.relaxed.shape.rods.len() {
+                    1 => format!("at {sigma:.3} of the length"),
+                    _ => format!("in vein {} at {sigma:.3} of its length", rod + 1),
+                };
+                let largest = power_of_ten(largest);
+                format!("{word}s by {largest}{unit} at most, {place}")
+            }
+            _ => format!("{word}s not at all"),
+        }
+    };
+    Quantity::ALL.into_iter().map(line).collect()
 }
 
 /// What both methods say about their own errors.
-fn errors(check: &Check) -> Vec<(&'static str, String)> {
+fn errors(check: &Check) -> Vec<String> {
     let relaxed = &check.relaxed;
-    let mut lines = vec![(
-        "error",
-        match relaxed.accuracy.error_estimate {
-            Some(error) => format!(
-                "relaxed: positions within {}, from {}",
-                bound(error),
-                grids(relaxed)
-            ),
-            None => "relaxed: not known".into(),
-        },
-    )];
+    let mut lines = vec![match relaxed.accuracy.error_estimate {
+        Some(error) => {
+            let (error, grids) = (bound(error), grids(relaxed));
+            format!("relaxed: positions within {error}, from {grids}")
+        }
+        None => "relaxed: not known".into(),
+    }];
     if let Some(Solution { error, .. }) = check.solution() {
-        lines.push((
-            "",
-            format!(
-                "shooting: positions within {}, rotations {}, forces {}, moments {}",
-                bound(error.position),
-                match error.rotation {
-                    0.0 => bound(0.0),
-                    rotation => format!("{} rad", bound(rotation)),
-                },
-                bound(error.force),
-                bound(error.moment)
-            ),
+        let unit = if error.rotation == 0.0 { "" } else { " rad" };
+        let [position, rotation, force, moment] =
+            [error.position, error.rotation, error.force, error.moment].map(bound);
+        lines.push(format!(
+            "shooting: positions within {position}, rotations {rotation}{unit}, forces {force}, moments {moment}"
         ));
     }
-    match check.within_estimates {
-        Some(true) => lines.push(("", "positions differ by no more than both errors".into())),
-        Some(false) => lines.push(("", "positions differ by more than both errors".into())),
-        None => (),
-    }
+    lines.extend(check.within_estimates.map(|within| {
+        let than = if within { "no more than" } else { "more than" };
+        format!("positions differ by {than} both errors")
+    }));
     lines
 }
 
 /// How the shooting went.
-fn shooting_itself(solution: &Solution) -> Vec<(&'static str, String)> {
+fn shooting_itself(solution: &Solution) -> Lines {
     let mut lines = vec![
         (
             "growth",
@@ -190,9 +148,7 @@ fn shooting_itself(solution: &Solution) -> Vec<(&'static str, String)> {
             ),
         ),
     ];
-    if let Some(neutral) = &solution.neutral {
-        lines.push(("neutral", neutral.to_string()));
-    }
+    lines.extend((solution.neutral.iter()).map(|neutral| ("neutral", neutral.to_string())));
     lines
 }
 

@@ -35,23 +35,15 @@ pub fn report(equilibrium: &Equilibrium, folder: Option<&Path>) -> String {
         }
         lines.push(("energy", significant(energy)));
     }
-    if let Some(waves) = waves(equilibrium) {
-        lines.push(("waves", waves));
-    }
+    lines.extend(waves(equilibrium).map(|waves| ("waves", waves)));
     lines.push(("error", error(equilibrium)));
-    if let Some(modes) = modes(equilibrium) {
-        lines.push(("modes", modes));
-    }
+    lines.extend(modes(equilibrium).map(|modes| ("modes", modes)));
     if !equilibrium.accuracy.segments.is_empty() {
         lines.push(("model", equilibrium.model.description.clone()));
     }
     lines.push(("work", work(equilibrium)));
-    if let Some(folder) = folder {
-        lines.push(("written", written(equilibrium, folder)));
-    }
-    if let Some(remark) = &equilibrium.remark {
-        lines.push(("remark", remark.clone()));
-    }
+    lines.extend(folder.map(|folder| ("written", written(equilibrium, folder))));
+    lines.extend((equilibrium.remark.iter()).map(|remark| ("remark", remark.clone())));
     let heading = format!(
         "{}: {}, method {}",
         equilibrium.scenario,

@@ -6,7 +6,7 @@ use crate::report::numbers::power_of_ten;
 use crate::simulate::Record;
 
 use super::numbers::{brief, point, seconds, significant, veins_of};
-use super::table::{lay_out, named};
+use super::table::{Lines, lay_out, named};
 
 /// Decimals of a position, relative to the longest rod.
 const DECIMALS: f64 = 7.0;
@@ -72,12 +72,12 @@ fn step(record: &Record) -> String {
 }
 
 /// The energies at the end, and what should not have changed.
-fn energy(record: &Record) -> Vec<(&'static str, String)> {
+fn energy(record: &Record) -> Lines {
     let (Some(first), Some(last)) = (record.moments.first(), record.moments.last()) else {
         return Vec::new();
     };
     let e = &last.energy;
-    let shown = [
+    let parts = [
         ("kinetic", e.kinetic),
         ("elastic", e.elastic),
         ("coupling", e.coupling),
@@ -85,23 +85,12 @@ fn energy(record: &Record) -> Vec<(&'static str, String)> {
         ("dissipated", e.dissipated),
         ("work put in", e.work),
     ];
-    let parts: Vec<String> = shown
-        .into_iter()
-        .map(|(name, value)| format!("{name} {}", brief(value)))
-        .collect();
+    let parts = parts.map(|(name, value)| format!("{name} {}", brief(value)));
     let (start, end) = (first.energy.balance(), e.balance());
-    vec![
-        ("energy", parts.join(", ")),
-        (
-            "balance",
-            format!(
-                "{} at the start, {} at the end: changed by {}",
-                significant(start),
-                significant(end),
-                brief(end - start)
-            ),
-        ),
-    ]
+    let change = brief(end - start);
+    let [start, end] = [start, end].map(significant);
+    let balance = format!("{start} at the start, {end} at the end: changed by {change}");
+    vec![("energy", parts.join(", ")), ("balance", balance)]
 }
 
 fn tip(record: &Record) -> Option<(&'static str, String)> {
