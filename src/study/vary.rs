@@ -121,10 +121,7 @@ impl FromStr for Target {
         if let Some(knob) = Knob::from_path(text) {
             return Ok(Target::Knob(knob));
         }
-        let refuse = |why: String| VaryError::Key {
-            key: text.into(),
-            why,
-        };
+        let refuse = |why: String| VaryError::Key(format!("{text}: {why}"));
         let (path, index) = match text.strip_suffix(']').and_then(|rest| rest.split_once('[')) {
             Some((path, index)) => {
                 let index = index.trim().parse();
@@ -234,10 +231,7 @@ impl FromStr for Vary {
     type Err = VaryError;
 
     fn from_str(given: &str) -> Result<Self, VaryError> {
-        let refuse = |why: &'static str| VaryError::Form {
-            given: given.into(),
-            why,
-        };
+        let refuse = |why: &str| VaryError::Form(format!("{given}: {why}"));
         let (keys, range) = given.split_once('=').ok_or_else(|| refuse("has no ="))?;
         let keys: Keys = keys.parse()?;
         let range = range.trim();
@@ -300,23 +294,11 @@ fn between(from: f64, to: f64, i: usize, last: usize, log: bool) -> f64 {
 #[derive(Debug, thiserror::Error)]
 pub enum VaryError {
     /// Not of the form.
-    #[error(
-        "{given}: {why}; write KEY=FROM..TO[:COUNT][log], as in stiffness.bending_2=1..1e-5:12log"
-    )]
-    Form {
-        /// What was given.
-        given: String,
-        /// What is wrong.
-        why: &'static str,
-    },
+    #[error("{0}; write KEY=FROM..TO[:COUNT][log], as in stiffness.bending_2=1..1e-5:12log")]
+    Form(String),
     /// A key that cannot vary.
-    #[error("{key}: {why}")]
-    Key {
-        /// The key as given.
-        key: String,
-        /// What is wrong.
-        why: String,
-    },
+    #[error("{0}")]
+    Key(String),
     /// The setting of a method cannot be this.
     #[error("{0}")]
     Knob(String),

@@ -56,11 +56,8 @@ pub enum ChartError {
     #[error(transparent)]
     Relax(#[from] RelaxError),
     /// The time allowed is out of range.
-    #[error("seconds {found}: must be greater than 0 and at most {MOST_SECONDS}")]
-    Seconds {
-        /// The time asked for.
-        found: f64,
-    },
+    #[error("seconds {0}: must be greater than 0 and at most {MOST_SECONDS}")]
+    Seconds(f64),
     /// The one thread that all runs have cannot be started.
     #[error("cannot start a thread: {0}")]
     Thread(#[from] rayon::ThreadPoolBuildError),
@@ -109,7 +106,7 @@ fn alone<R: Send>(
     work: impl FnOnce() -> Result<R, RelaxError> + Send,
 ) -> Result<R, ChartError> {
     if !(seconds > 0.0 && seconds <= MOST_SECONDS) {
-        return Err(ChartError::Seconds { found: seconds });
+        return Err(ChartError::Seconds(seconds));
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     Ok(pool.install(work)?)

@@ -105,9 +105,7 @@ impl MapRequest {
         let first = self.base.at(&self.values(0));
         let last = self.base.at(&self.values(self.cells() - 1));
         match (first, last) {
-            (Err(VaryError::Key { key, why }), Err(VaryError::Key { .. })) => {
-                Err(MapRefused(format!("{key}: {why}")))
-            }
+            (Err(VaryError::Key(why)), Err(VaryError::Key(_))) => Err(MapRefused(why)),
             _ => Ok(()),
         }
     }

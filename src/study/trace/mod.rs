@@ -48,23 +48,11 @@ pub struct TraceRequest {
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
     /// The number cannot be followed.
-    #[error("{keys}: {why}")]
-    Vary {
-        /// The number.
-        keys: String,
-        /// Why not.
-        why: String,
-    },
+    #[error("{0}")]
+    Vary(String),
     /// An option has a value it cannot have.
-    #[error("{option} {found}: must be {needed}")]
-    Option {
-        /// The option.
-        option: &'static str,
-        /// Its value.
-        found: String,
-        /// What it must be.
-        needed: &'static str,
-    },
+    #[error("{0}")]
+    Option(String),
     /// The scenario at the start of the range is refused.
     #[error(transparent)]
     Scenario(#[from] VaryError),
@@ -77,10 +65,7 @@ impl TraceRequest {
     /// Whether it can be met, as far as can be told before.
     pub(super) fn check(&self) -> Result<(), TraceError> {
         let keys = &self.vary.keys;
-        let refuse = |why: &str| TraceError::Vary {
-            keys: keys.to_string(),
-            why: why.into(),
-        };
+        let refuse = |why: &str| TraceError::Vary(format!("{keys}: {why}"));
         if keys.is_whole() {
             return Err(refuse(
                 "a whole number has nothing between its values to follow",
@@ -107,20 +92,14 @@ impl TraceRequest {
             return Err(refuse(NO_MOMENT));
         }
         if self.most_points < 2 {
-            return Err(TraceError::Option {
-                option: "points",
-                found: self.most_points.to_string(),
-                needed: "2 or more",
-            });
+            let why = format!("points {}: must be 2 or more", self.most_points);
+            return Err(TraceError::Option(why));
         }
         if let Some(area) = self.cross_section
             && !(area > 0.0 && area.is_finite())
         {
-            return Err(TraceError::Option {
-                option: "cross-section",
-                found: format!("{area:?}"),
-                needed: "greater than 0",
-            });
+            let why = format!("cross-section {area:?}: must be greater than 0");
+            return Err(TraceError::Option(why));
         }
         Ok(())
     }

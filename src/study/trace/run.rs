@@ -47,10 +47,7 @@ pub fn trace(
         request.base.at(&[(keys, value)])?;
     }
     let family = Family::new(&make, (ends[0], ends[1]), vary.log);
-    let family = family.map_err(|out| TraceError::Vary {
-        keys: keys.to_string(),
-        why: out.to_string(),
-    })?;
+    let family = family.map_err(|out| TraceError::Vary(format!("{keys}: {out}")))?;
     let scenario = request.base.at(&[(keys, ends[0])])?.scenario;
     let tolerance = request.tolerance.unwrap_or(scenario.tolerance);
     let options = Options {

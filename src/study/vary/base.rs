@@ -131,8 +131,8 @@ impl Base {
         let now = |key: Key| changed.get(key.path()).or(self.entries.get(key.path()));
         let refuse = |why: String| {
             let index = Some(index);
-            let key = Target::Entry { key, index }.to_string();
-            Err(VaryError::Key { key, why })
+            let key = Target::Entry { key, index };
+            Err(VaryError::Key(format!("{key}: {why}")))
         };
         let rods = match now(Key::Rods) {
             Some(Value::Integer(rods)) => *rods as usize,
@@ -162,10 +162,8 @@ impl Base {
 /// The setting of a method by its path, and its value.
 fn setting(path: &str, value: &str) -> Result<(Knob, f64), VaryError> {
     let Some(knob) = Knob::from_path(path) else {
-        return Err(VaryError::Key {
-            key: path.into(),
-            why: format!("methods have {}", Knob::ALL.map(Knob::path).join(" and ")),
-        });
+        let all = Knob::ALL.map(Knob::path).join(" and ");
+        return Err(VaryError::Key(format!("{path}: methods have {all}")));
     };
     let number = value.parse();
     let number = number.map_err(|_| VaryError::knob(knob, format_args!("{value}"), "a number"))?;
