@@ -58,11 +58,9 @@ impl Add for Work {
     }
 }
 
-/// How an iteration or a motion on one grid stopped.
+/// Why an iteration or a motion on one grid did not come to a stable rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stop {
-    /// At rest; the error that is left of the iteration.
-    Rest(f64),
     /// At rest although the energy has a direction of descent there.
     Saddle,
     /// A segment bends by more than the grid can resolve.
@@ -84,10 +82,9 @@ pub fn converged(
     (accuracy, rounding): (f64, f64),
 ) -> Option<f64> {
     let rate = (size / previous).min(1.0);
-    let quadratic = if previous.is_finite() {
-        size * (rate * rate)
-    } else {
-        10.0 * size * size
+    let quadratic = match previous.is_finite() {
+        true => size * (rate * rate),
+        false => 10.0 * size * size,
     };
     let remaining = quadratic.max(cg_tolerance * size);
     match size < rounding && rate > SHRINKS {
@@ -113,7 +110,6 @@ pub fn cg_tolerance(previous: f64, loosest: f64) -> f64 {
 /// over the factorised rods, or directly from when on these proved too slow.
 #[derive(Default)]
 pub struct Definite {
-    /// Pattern of the direct factorisation, once that had to take over.
     pub direct: Option<SparsePattern>,
     /// Of a leaf in its plane: room for its matrix in space, which must be positive
     /// definite wherever that in the plane is, lest the leaf in space move.
@@ -186,18 +182,13 @@ pub enum Equations<'s> {
     /// Whatever the signs of the pivots, by a sparse factorisation whose pattern
     /// is kept; increments are shortened to the given size. It goes to the next
     /// equilibrium, stable or not, as the solver of a boundary-value problem would.
-    AnySign {
-        /// Largest rotation (radians) or displacement (lengths) in one step.
-        largest: f64,
-    },
+    AnySign { largest: f64 },
     /// Of a single rod under a dead moment: with the exact, unsymmetric matrix.
     Unsymmetric,
     /// With a positive definite matrix, shifted where it is not; an increment
     /// above the given size ends the iteration.
     Definite {
-        /// The linear solver.
         solver: &'s mut Definite,
-        /// Largest rotation (radians) or displacement (lengths) in one step.
         largest: f64,
         /// Relative accuracy of the conjugate gradients in the first step.
         cg_tolerance: f64,
@@ -206,11 +197,9 @@ pub enum Equations<'s> {
 
 /// What is asked of an iteration.
 pub struct Newton<'a> {
-    /// Wanted accuracy of positions and rotations.
+    /// Of positions and rotations.
     pub accuracy: f64,
-    /// Most iterations.
     pub iterations: usize,
-    /// Work done so far.
     pub work: &'a mut Work,
     /// Told the size of every step.
     pub progress: &'a mut dyn FnMut(usize, f64),
@@ -227,23 +216,26 @@ struct Linear<'s> {
 }
 
 impl Newton<'_> {
-    /// Newton's method from a state. The last factorisation is left in the system.
+    /// Newton's method from a state: the error that is left of the iteration. The
+    /// last factorisation is left in the system.
     pub fn solve(
         self,
         leaf: &DiscreteLeaf,
         state: &mut State,
         system: &mut System,
         equations: Equations,
-    ) -> Stop {
-        let space = match &equations {
-            Equations::Definite { solver, .. } if solver.space.is_some() => Some(leaf.in_space()),
-            _ => None,
-        };
-        let (longest, refused) = match equations {
-            Equations::AnySign { largest } => (largest, f64::INFINITY),
-            Equations::Unsymmetric => (f64::INFINITY, f64::INFINITY),
-            Equations::Definite { largest, .. } => (f64::INFINITY, largest),
-        };
+    ) -> Result<f64, Stop> {
+        let (mut longest, mut refused, mut space) = (f64::INFINITY, f64::INFINITY, None);
+        match &equations {
+            Equations::AnySign { largest } => longest = *largest,
+            Equations::Unsymmetric => {}
+            Equations::Definite {
+                solver, largest, ..
+            } => {
+                refused = *largest;
+                space = solver.space.is_some().then(|| leaf.in_space());
+            }
+        }
         let any_sign = longest.is_finite();
         let mut linear = Linear {
             equations,
@@ -257,33 +249,31 @@ impl Newton<'_> {
             let turn = leaf.assemble(state, system).turn;
             self.work.force_evaluations += 1;
             if turn > RESOLVED_TURN {
-                return Stop::Unresolved;
+                return Err(Stop::Unresolved);
             }
             let solved = linear.solve(space.as_ref(), (state, previous), system, self.work);
-            let Some(tolerance) = solved else {
-                return Stop::Stuck;
-            };
+            let tolerance = solved.ok_or(Stop::Stuck)?;
             let (turn, shift) = system.largest();
             let size = turn.max(shift);
             if !size.is_finite() || size > refused {
-                return Stop::Stuck;
+                return Err(Stop::Stuck);
             }
             leaf.advance(state, system, (longest / size).min(1.0), &mut next);
             std::mem::swap(state, &mut next);
             self.work.steps += 1;
             (self.progress)(step, size);
             if any_sign && size < NEUTRAL_STEP && leaf.residual(state) < BALANCED {
-                return Stop::Rest(size.min(self.accuracy));
+                return Ok(size.min(self.accuracy));
             }
             if linear.shift > 0.0 {
                 if at_saddle(leaf, state, size) {
-                    return Stop::Saddle;
+                    return Err(Stop::Saddle);
                 }
             } else if size < longest
                 && let Some(remaining) =
                     converged(size, previous, tolerance, (self.accuracy, ROUNDING))
             {
-                return Stop::Rest(remaining);
+                return Ok(remaining);
             }
             linear.shift /= 10.0;
             if linear.shift < LEAST_SHIFT {
@@ -291,10 +281,10 @@ impl Newton<'_> {
             }
             previous = size;
         }
-        match any_sign {
+        Err(match any_sign {
             true => Stop::StepLimit,
             false => Stop::Stuck,
-        }
+        })
     }
 }
 

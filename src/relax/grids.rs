@@ -5,10 +5,9 @@ use crate::newton::Stop;
 use crate::relax::method::Method;
 use crate::relax::options::MAX_NODES;
 use crate::relax::prolong::{between, predict, prolong};
-use crate::relax::run::{End, Level, Run, positions};
+use crate::relax::run::{Level, Run, positions};
 use crate::relax::segments::{COARSEST_TURN, FINEST};
 use crate::relax::settle::{BUDGET, InitialGuess, Settled};
-use crate::relax::stability::Judged;
 
 /// Two grids on which the leaf moved far are said to have settled in the same place
 /// if no station differs by more than this, in lengths.
@@ -25,21 +24,16 @@ const FINEST_RESOLVING: usize = 2048;
 const BETWEEN: f64 = 30.0;
 
 impl Run<'_, '_> {
-    /// From the start to rest, on as many grids as the tolerance needs.
-    pub fn solve(&mut self, grid: Grid) -> End {
-        if let Err(stop) = self.settle_from_start(grid) {
-            return End::Failed(stop);
-        }
+    /// From the start to rest, on as many grids as the tolerance needs; returns
+    /// whether the finest grid allowed reaches it.
+    pub fn solve(&mut self, grid: Grid) -> Result<bool, Stop> {
+        self.settle_from_start(grid)?;
         loop {
-            if self.accurate() || self.accurate_with_between() {
-                match self.judge_stability() {
-                    Judged::Known => return End::Rest,
-                    Judged::Refine => {}
-                    Judged::Failed(stop) => return End::Failed(stop),
-                }
+            if (self.accurate() || self.accurate_with_between()) && self.judge_stability()? {
+                return Ok(true);
             }
             if self.late() {
-                return End::Failed(Stop::StepLimit);
+                return Err(Stop::StepLimit);
             }
             let level = self.levels.last().expect("the leaf has settled");
             let finer = level.leaf.grid.refined();
@@ -49,20 +43,16 @@ impl Run<'_, '_> {
                 || nodes > MAX_NODES
                 || self.beyond_rounding(finer.segments())
             {
-                return match self.judge_stability() {
-                    Judged::Failed(stop) => End::Failed(stop),
-                    _ => End::NotAccurate,
-                };
+                self.judge_stability()?;
+                return Ok(false);
             }
             let mut state = prolong(&level.leaf, &level.state);
             if let [.., coarse, middle] = self.levels.as_slice() {
                 predict(&coarse.state, &middle.state, &mut state);
             }
-            let Settled { level, stop, .. } = self.settle(finer, InitialGuess::Coarser(state));
+            let Settled { level, rest, .. } = self.settle(finer, InitialGuess::Coarser(state));
             self.push(level);
-            if !matches!(stop, Stop::Rest(_)) {
-                return End::Failed(stop);
-            }
+            rest?;
         }
     }
 
@@ -77,25 +67,19 @@ impl Run<'_, '_> {
         let mut before: Option<Level> = None;
         loop {
             let settled = self.settle(grid.clone(), InitialGuess::Start);
-            let Settled { level, stop, moved } = settled;
+            let Settled { level, rest, moved } = settled;
             let finer = grid.refined();
             let fixed = self.segments().is_some();
             let last = fixed || finer.segments() > FINEST_LANDING || self.late();
-            match stop {
+            match rest {
                 // So coarse a grid cannot decide where a leaf that moves settles.
                 _ if self.too_coarse(level.leaf.segments())
-                    && (moved
-                        || !matches!(stop, Stop::Rest(_))
-                        || largest_turn(&level) > COARSEST_TURN) => {}
-                _ if self.whole.is_some() && !matches!(stop, Stop::Rest(_)) => {
-                    self.push(level);
-                    return Err(stop);
-                }
-                Stop::Rest(_) if !moved || last => {
+                    && (moved || rest.is_err() || largest_turn(&level) > COARSEST_TURN) => {}
+                Ok(_) if !moved || last => {
                     self.push(level);
                     return Ok(());
                 }
-                Stop::Rest(_) => {
+                Ok(_) => {
                     if let Some(coarser) = before.take()
                         && distance(&coarser, &level) < SAME_PLACE
                     {
@@ -105,19 +89,20 @@ impl Run<'_, '_> {
                     }
                     before = Some(level);
                 }
-                Stop::Unresolved
-                    if finer.segments() <= FINEST_RESOLVING
-                        && !fixed
-                        && self.spent <= BUDGET
-                        && !self.late() =>
-                {
+                Err(stop) => {
+                    let given_up = self.spent > BUDGET
+                        || match stop {
+                            Stop::Unresolved => {
+                                fixed || finer.segments() > FINEST_RESOLVING || self.late()
+                            }
+                            _ => last,
+                        };
+                    if self.whole.is_some() || given_up {
+                        self.push(level);
+                        return Err(stop);
+                    }
                     before = None;
                 }
-                _ if last || self.spent > BUDGET => {
-                    self.push(level);
-                    return Err(stop);
-                }
-                _ => before = None,
             }
             grid = finer;
         }
@@ -130,9 +115,7 @@ impl Run<'_, '_> {
         let [.., coarse, middle, fine] = self.levels.as_slice() else {
             return false;
         };
-        let near = self
-            .error()
-            .is_some_and(|error| error <= BETWEEN * self.tolerance);
+        let near = (self.error()).is_some_and(|error| error <= BETWEEN * self.tolerance);
         let clean = (self.table.best()).is_some_and(|best| best.columns + 1 == self.levels.len());
         if !near || !clean || !matches!(self.options.method, Method::SemiImplicit(_)) {
             return false;
@@ -142,20 +125,20 @@ impl Run<'_, '_> {
         let grid = coarse.leaf.grid.tripled();
         // Stability is judged on the finest grid.
         let last = self.last.take();
-        let Settled { level, stop, .. } = self.settle(grid, InitialGuess::Finer(state));
+        let Settled { level, rest, .. } = self.settle(grid, InitialGuess::Finer(state));
         self.last = last;
-        if !matches!(stop, Stop::Rest(_)) {
+        if rest.is_err() {
             return false;
         }
         let without = self.table.clone();
         self.between = Some(level);
         self.tabulate();
         self.change = self.table.judged_by(&without);
-        if self.accurate() {
-            return true;
+        let accurate = self.accurate();
+        if !accurate {
+            self.drop_between();
         }
-        self.drop_between();
-        false
+        accurate
     }
 }
 

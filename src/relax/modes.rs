@@ -4,12 +4,12 @@
 use crate::leaf::{DiscreteLeaf, State, System, shift, turn};
 use crate::modes::{self, Eigenpair};
 use crate::motion::Physics;
-use crate::newton::{Newton, Stop, Work};
+use crate::newton::{Newton, Work};
 use crate::relax::equilibrium::Mode;
 use crate::relax::prolong::{predict, prolong};
 use crate::relax::richardson::Richardson;
 use crate::relax::run::{Level, Run};
-use crate::relax::saddle;
+use crate::relax::saddle::ANY_SIGN;
 use glam::DVec3;
 
 /// Unknowns of the finest grid on which modes are looked for unless their
@@ -46,10 +46,8 @@ const STILL: f64 = 1e-6;
 pub fn lowest(run: &Run) -> Option<Vec<Mode>> {
     let options = run.options;
     let finest = run.levels.last()?;
-    if options.modes == 0 || finest.leaf.tip_moment() != DVec3::ZERO {
-        return None;
-    }
-    if unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes {
+    let large = unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes;
+    if options.modes == 0 || finest.leaf.tip_moment() != DVec3::ZERO || large {
         return None;
     }
     let levels = levels(run)?;
@@ -59,7 +57,10 @@ pub fn lowest(run: &Run) -> Option<Vec<Mode>> {
     // The finest first: what is too large for it need not be begun.
     let pairs = on(finest)?;
     let first = levels.len().saturating_sub(GRIDS);
-    let mut series = Series::new(pairs.len());
+    let mut series = Series {
+        grids: Vec::new(),
+        count: pairs.len(),
+    };
     for level in &levels[first..levels.len() - 1] {
         match on(level) {
             Some(pairs) => series.push(&pairs),
@@ -74,17 +75,14 @@ pub fn lowest(run: &Run) -> Option<Vec<Mode>> {
     }
     let rounding = modes::rounding(&finest.leaf);
     let unit = physics.time.powi(-2);
-    let modes = series.judged().into_iter().zip(shapes);
-    Some(
-        modes
-            .map(|((eigenvalue, error), (displacement, rotation))| Mode {
-                eigenvalue: eigenvalue * unit,
-                error: error.map(|error| (error + rounding) * unit),
-                displacement,
-                rotation,
-            })
-            .collect(),
-    )
+    let mode =
+        |((eigenvalue, error), (displacement, rotation)): ((f64, Option<f64>), Shape)| Mode {
+            eigenvalue: eigenvalue * unit,
+            error: error.map(|error| (error + rounding) * unit),
+            displacement,
+            rotation,
+        };
+    Some(series.judged().into_iter().zip(shapes).map(mode).collect())
 }
 
 /// The grids on which modes are looked for.
@@ -101,27 +99,26 @@ fn unknowns(leaf: &DiscreteLeaf) -> usize {
     6 * leaf.rods() * leaf.segments()
 }
 
-/// Goes on to finer grids until the eigenvalues are as accurate as the shape.
-fn refine(run: &Run, series: &mut Series, on: impl Fn(&Level) -> Option<Vec<Eigenpair>>) {
+/// Goes on to finer grids until the eigenvalues are as accurate as the shape, or as
+/// far as it goes.
+fn refine(
+    run: &Run,
+    series: &mut Series,
+    on: impl Fn(&Level) -> Option<Vec<Eigenpair>>,
+) -> Option<()> {
     let mut finer: Vec<Level> = Vec::new();
     while finer.len() < MORE_GRIDS && !series.accurate(run.tolerance) && !run.late() {
         let levels: Vec<&Level> = run.levels.iter().chain(&finer).collect();
-        let [.., last] = levels.as_slice() else {
-            return;
-        };
+        let last = levels.last()?;
         if 2 * unknowns(&last.leaf) > MANY_MORE_UNKNOWNS {
-            return;
+            break;
         }
         let before = levels.len().checked_sub(2).map(|k| &levels[k].state);
-        let Some(next) = settle(last, before, run.tolerance) else {
-            return;
-        };
-        let Some(pairs) = on(&next) else {
-            return;
-        };
-        series.push(&pairs);
+        let next = settle(last, before, run.tolerance)?;
+        series.push(&on(&next)?);
         finer.push(next);
     }
+    Some(())
 }
 
 /// The same equilibrium on the next finer grid.
@@ -139,9 +136,8 @@ fn settle(last: &Level, before: Option<&State>, tolerance: f64) -> Option<Level>
         work: &mut Work::default(),
         progress: &mut |_, _| {},
     };
-    let stop = saddle::newton(&leaf, &mut state, &mut system, newton);
-    let near = guess.shift_to(&state) < SAME_PLACE;
-    (matches!(stop, Stop::Rest(_)) && near).then_some(Level { leaf, state })
+    (newton.solve(&leaf, &mut state, &mut system, ANY_SIGN)).ok()?;
+    (guess.shift_to(&state) < SAME_PLACE).then_some(Level { leaf, state })
 }
 
 /// Eigenvalues on nested grids, each extrapolated on its own.
@@ -151,16 +147,9 @@ struct Series {
 }
 
 impl Series {
-    fn new(count: usize) -> Self {
-        Series {
-            grids: Vec::new(),
-            count,
-        }
-    }
-
     fn push(&mut self, pairs: &[Eigenpair]) {
-        self.grids
-            .push(pairs.iter().map(|pair| pair.eigenvalue).collect());
+        let values = pairs.iter().map(|pair| pair.eigenvalue);
+        self.grids.push(values.collect());
     }
 
     /// The size an eigenvalue's error is measured with.

@@ -6,7 +6,7 @@ use crate::relax::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, St
 use crate::relax::method::Method;
 use crate::relax::prolong::lagrange;
 use crate::relax::richardson::Richardson;
-use crate::relax::run::{End, Level, Run};
+use crate::relax::run::{Level, Run};
 use crate::relax::shape;
 use crate::shape::{NodeState, RodShape};
 use crate::undulation::{Centerline, Undulation};
@@ -225,11 +225,13 @@ fn unpack(leaf: &DiscreteLeaf, j: usize, i: usize, values: &[f64]) -> NodeState 
     node
 }
 
-/// How a run ended: a word, and a sentence where one helps.
-pub fn outcome(run: &Run, end: End) -> (Outcome, Option<String>) {
+/// How a run ended, at rest (to the tolerance or not) or stopped before: a word, and
+/// a sentence where one helps.
+pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) {
     let finest = run.levels.last().map_or(0, |level| level.leaf.segments());
+    let explicit = matches!(run.options.method, Method::Explicit { .. });
     match end {
-        End::Rest => (
+        Ok(true) => (
             match (run.index, run.saddle) {
                 (Some(1..), _) => Outcome::Saddle,
                 (_, Some(_)) => Outcome::ConvergedAfterSaddle,
@@ -240,7 +242,7 @@ pub fn outcome(run: &Run, end: End) -> (Outcome, Option<String>) {
                 false => "a dead moment has no potential, so that no count of eigenvalues decides stability: it is not stated".into(),
             }),
         ),
-        End::NotAccurate => (
+        Ok(false) => (
             Outcome::ToleranceNotReached,
             Some(match run.beyond_rounding(2 * finest) {
                 true => "rounding and unfinished iterations leave more than the tolerance on any grid: ask for a larger one".into(),
@@ -249,23 +251,23 @@ pub fn outcome(run: &Run, end: End) -> (Outcome, Option<String>) {
                 ),
             }),
         ),
-        End::Failed(stop) => (
-            match stop {
-                Stop::Stuck => Outcome::Diverged,
-                _ => Outcome::NotAtRest,
-            },
+        Err(Stop::Stuck) => (
+            Outcome::Diverged,
+            Some(format!(
+                "no step lowers the energy on {finest} segments: use more segments, or raise the softest stiffness or lower the load"
+            )),
+        ),
+        Err(stop) => (
+            Outcome::NotAtRest,
             Some(match stop {
                 Stop::StepLimit if run.late() => format!(
                     "the time allowed was over before rest on {finest} segments: allow more"
                 ),
-                Stop::StepLimit if matches!(run.options.method, Method::Explicit { .. }) => format!(
+                Stop::StepLimit if explicit => format!(
                     "the step limit came before rest on {finest} segments: use fewer, or the semi-implicit method"
                 ),
                 Stop::Unresolved => format!(
                     "a vein bends by more than a right angle within one of {finest} segments: use more segments or smaller loads"
-                ),
-                Stop::Stuck => format!(
-                    "no step lowers the energy on {finest} segments: use more segments, or raise the softest stiffness or lower the load"
                 ),
                 _ => format!(
                     "the step limit came before rest on {finest} segments: the load may admit no stable equilibrium; lower it"

@@ -2,7 +2,7 @@
 //! and the error estimate of their extrapolation.
 
 use crate::leaf::{DiscreteLeaf, Leaf, State, System, whole_of};
-use crate::newton::{Stop, Work};
+use crate::newton::Work;
 use crate::relax::equilibrium::Saddle;
 use crate::relax::method::Method;
 use crate::relax::options::{Options, Progress};
@@ -27,16 +27,6 @@ const ROUNDING: f64 = 4e-15;
 pub struct Level {
     pub leaf: DiscreteLeaf,
     pub state: State,
-}
-
-/// How a run over the grids ended.
-pub enum End {
-    /// At rest; the finest grid's last increments were below the accuracy.
-    Rest,
-    /// At rest, but not to the tolerance on the finest grid allowed.
-    NotAccurate,
-    /// Not at rest on the finest grid tried.
-    Failed(Stop),
 }
 
 /// What is asked, and what was found so far.
@@ -162,22 +152,17 @@ impl<'a, 'o> Run<'a, 'o> {
 
     /// Adds the next finer grid.
     pub fn push(&mut self, level: Level) {
-        self.drop_between();
-        let segments = level.leaf.segments();
-        let stride = match self.levels.first() {
-            Some(first) => segments / first.leaf.segments(),
-            None => 1,
-        };
-        self.table.push(segments, positions(&level, stride));
+        self.between = None;
+        self.change = None;
         self.levels.push(level);
+        self.tabulate();
     }
 
     /// Leaves the grid between out, as where refinement goes on.
     pub fn drop_between(&mut self) {
-        if self.between.take().is_some() {
-            self.change = None;
-            self.tabulate();
-        }
+        self.between = None;
+        self.change = None;
+        self.tabulate();
     }
 
     /// The grids that are extrapolated, from coarse to fine.
@@ -215,12 +200,11 @@ pub fn complete(reduced: &Leaf, whole: &Leaf, level: &Level) -> Level {
 /// Positions of all rods at every `stride`-th node, dimensionless.
 pub fn positions(level: &Level, stride: usize) -> Vec<f64> {
     let n = level.leaf.segments();
-    (0..level.leaf.rods())
-        .flat_map(|j| {
-            (0..=n)
-                .step_by(stride)
-                .map(move |i| level.state.base(j) + i)
-        })
-        .flat_map(|k| level.state.x[k].to_array())
-        .collect()
+    let nodes = |j: usize| {
+        (0..=n)
+            .step_by(stride)
+            .map(move |i| level.state.base(j) + i)
+    };
+    let nodes = (0..level.leaf.rods()).flat_map(nodes);
+    nodes.flat_map(|k| level.state.x[k].to_array()).collect()
 }

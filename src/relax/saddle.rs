@@ -1,7 +1,7 @@
 //! Saddles: counting their negative eigenvalues, finding them, leaving them.
 
 use crate::leaf::{DiscreteLeaf, Solved, SparsePattern, State, System};
-use crate::newton::{Equations, Newton, Stop, Work};
+use crate::newton::{Equations, Newton, Work};
 use crate::relax::equilibrium::Saddle;
 
 /// Size of the push off a saddle: largest rotation (radians) or displacement
@@ -10,9 +10,6 @@ const PUSH: f64 = 0.03;
 
 /// Steps of inverse iteration; the mode need not be accurate, only unstable.
 const MODE_ITERATIONS: usize = 6;
-
-/// Newton iterations towards a saddle.
-pub const MAX_ITERATIONS: usize = 200;
 
 /// Largest rotation or displacement in one of them.
 const MAX_STEP: f64 = 0.5;
@@ -42,11 +39,8 @@ pub fn index(
     Some(pattern.factorize(system, shift).ok()?.negative())
 }
 
-/// Newton's method whatever the signs of the pivots, with steps of bounded size.
-pub fn newton(leaf: &DiscreteLeaf, state: &mut State, system: &mut System, newton: Newton) -> Stop {
-    let largest = MAX_STEP;
-    newton.solve(leaf, state, system, Equations::AnySign { largest })
-}
+/// Whatever the signs of the pivots, with steps of bounded size.
+pub const ANY_SIGN: Equations = Equations::AnySign { largest: MAX_STEP };
 
 /// Newton iterations that make a saddle exact.
 const POLISH_ITERATIONS: usize = 20;
@@ -73,9 +67,8 @@ pub fn polish(
         work,
         progress: &mut |_, _| {},
     };
-    let stop = newton(leaf, &mut exact, system, iteration);
-    let moved = state.shift_to(&exact);
-    if !matches!(stop, Stop::Rest(_)) || moved >= POLISH_DISTANCE {
+    let found = iteration.solve(leaf, &mut exact, system, ANY_SIGN);
+    if found.is_err() || state.shift_to(&exact) >= POLISH_DISTANCE {
         return None;
     }
     *state = exact;

@@ -30,6 +30,9 @@ pub const BUDGET: usize = 3_000_000;
 /// whatever was spent before.
 const LEAST_EVALUATIONS: usize = 600;
 
+/// Newton iterations towards an equilibrium of any kind.
+const MAX_ITERATIONS: usize = 200;
+
 /// Saddles that are left before the run is given up.
 pub const MAX_SADDLES: i32 = 10;
 
@@ -51,10 +54,9 @@ pub enum InitialGuess {
 
 /// A leaf that has settled on a grid, or not.
 pub struct Settled {
-    /// Where it is.
     pub level: Level,
-    /// How it stopped.
-    pub stop: Stop,
+    /// The error that is left of the iteration.
+    pub rest: Result<f64, Stop>,
     /// Whether it had to move, not only to settle in the valley it was in.
     pub moved: bool,
 }
@@ -63,7 +65,7 @@ impl Run<'_, '_> {
     /// Settles on one grid; leaves saddles unless they are wanted.
     pub fn settle(&mut self, grid: Grid, guess: InitialGuess) -> Settled {
         self.last = None;
-        let leaf = DiscreteLeaf::new(self.leaf, grid);
+        let mut leaf = DiscreteLeaf::new(self.leaf, grid);
         let near_rest = matches!(guess, InitialGuess::Coarser(_) | InitialGuess::Finer(_));
         let cg_tolerance = match guess {
             InitialGuess::Start | InitialGuess::Pushed(_) => FAR_FROM_REST,
@@ -72,22 +74,49 @@ impl Run<'_, '_> {
             // is to be removed one of soft ones: a small part of the energy.
             InitialGuess::Finer(_) => 1e-8,
         };
-        let state = match guess {
+        let mut state = match guess {
             InitialGuess::Start => self.start(&leaf),
             InitialGuess::Coarser(state)
             | InitialGuess::Finer(state)
             | InitialGuess::Pushed(state) => state,
         };
-        if let Method::Explicit { .. } = self.options.method {
-            return self.settle_explicitly(leaf, state, near_rest);
+        let explicit = matches!(self.options.method, Method::Explicit { .. });
+        let follows = leaf.tip_moment() != DVec3::ZERO;
+        if !explicit && !follows && !self.keeps_unstable() {
+            return self.settle_in_a_valley(leaf, state, near_rest, cg_tolerance);
         }
-        if leaf.tip_moment() != DVec3::ZERO {
-            return self.settle_under_moment(leaf, state, near_rest);
-        }
-        if self.keeps_unstable() {
-            return self.settle_anywhere(leaf, state);
-        }
-        self.settle_in_a_valley(leaf, state, near_rest, cg_tolerance)
+        let accuracy = self.accuracy(&leaf);
+        let mut system = System::new(&leaf);
+        let progress = &mut step_reporter(&mut *self.progress, leaf.segments());
+        let (work, mut moved) = (&mut self.work, false);
+        let rest = if explicit {
+            let mut request = explicit::Request {
+                accuracy,
+                near_rest,
+                work,
+                progress,
+                moved,
+                limit: &self.options.limit,
+            };
+            let rest = explicit::settle(&leaf, &mut state, &mut system, &mut request);
+            moved = request.moved;
+            self.remaining = self.remaining.max(rest.unwrap_or(0.0));
+            rest
+        } else {
+            let newton = Newton {
+                accuracy,
+                iterations: MAX_ITERATIONS,
+                work,
+                progress,
+            };
+            match follows {
+                true => moment::settle(&mut leaf, &mut state, &mut system, near_rest, newton),
+                // To the next equilibrium, stable or not.
+                false => newton.solve(&leaf, &mut state, &mut system, saddle::ANY_SIGN),
+            }
+        };
+        let level = Level { leaf, state };
+        Settled { level, rest, moved }
     }
 
     /// Where a leaf starts that nothing is known of.
@@ -115,66 +144,6 @@ impl Run<'_, '_> {
             None if self.too_coarse(first) => ITERATION_PART_FROM_COARSE * self.tolerance,
             None => ITERATION_PART * self.tolerance,
         }
-    }
-
-    fn settle_explicitly(
-        &mut self,
-        leaf: DiscreteLeaf,
-        mut state: State,
-        near_rest: bool,
-    ) -> Settled {
-        let mut request = explicit::Request {
-            accuracy: self.accuracy(&leaf),
-            near_rest,
-            work: &mut self.work,
-            progress: &mut step_reporter(&mut *self.progress, leaf.segments()),
-            moved: false,
-            limit: &self.options.limit,
-        };
-        let mut system = System::new(&leaf);
-        let stop = explicit::settle(&leaf, &mut state, &mut system, &mut request);
-        let moved = request.moved;
-        if let Stop::Rest(remaining) = stop {
-            self.remaining = self.remaining.max(remaining);
-        }
-        let level = Level { leaf, state };
-        Settled { level, stop, moved }
-    }
-
-    fn settle_under_moment(
-        &mut self,
-        mut leaf: DiscreteLeaf,
-        mut state: State,
-        near_rest: bool,
-    ) -> Settled {
-        let accuracy = self.accuracy(&leaf);
-        let mut system = System::new(&leaf);
-        let progress = &mut step_reporter(&mut *self.progress, leaf.segments());
-        let stop = moment::settle(
-            &mut leaf,
-            &mut state,
-            &mut system,
-            accuracy,
-            near_rest,
-            &mut self.work,
-            progress,
-        );
-        let (level, moved) = (Level { leaf, state }, false);
-        Settled { level, stop, moved }
-    }
-
-    /// Goes to the next equilibrium, stable or not.
-    fn settle_anywhere(&mut self, leaf: DiscreteLeaf, mut state: State) -> Settled {
-        let newton = Newton {
-            accuracy: self.accuracy(&leaf),
-            iterations: saddle::MAX_ITERATIONS,
-            work: &mut self.work,
-            progress: &mut step_reporter(&mut *self.progress, leaf.segments()),
-        };
-        let mut system = System::new(&leaf);
-        let stop = saddle::newton(&leaf, &mut state, &mut system, newton);
-        let (level, moved) = (Level { leaf, state }, false);
-        Settled { level, stop, moved }
     }
 
     /// Settles by the semi-implicit method.
@@ -212,28 +181,27 @@ impl Run<'_, '_> {
                 moved: false,
             };
             let before = relaxation.work.force_evaluations;
-            let stop = relaxation.settle(&leaf, &mut system);
+            let rest = relaxation.settle(&leaf, &mut system);
             let spent = relaxation.work.force_evaluations - before;
             moved |= relaxation.moved;
             let direct = relaxation.solver.direct.is_some();
             state = relaxation.state;
             self.spent += nodes * spent;
-            if let Stop::Rest(remaining) = stop {
+            if let Ok(remaining) = rest {
                 self.remaining = self.remaining.max(remaining);
                 if self.levels.is_empty() && !direct {
                     self.effects = effects(&leaf, &state, &mut system);
                 }
             }
-            let rests = matches!(stop, Stop::Rest(_));
-            if stop != Stop::Saddle || convex_only {
-                self.last = (!direct && rests).then_some(system);
+            if rest != Err(Stop::Saddle) || convex_only {
+                self.last = (!direct && rest.is_ok()).then_some(system);
                 let level = Level { leaf, state };
-                return Settled { level, stop, moved };
+                return Settled { level, rest, moved };
             }
             match saddle::polish(&leaf, &mut state, &mut system, &mut self.work) {
                 Some(0) => {
-                    let (level, stop) = (Level { leaf, state }, Stop::Rest(accuracy));
-                    return Settled { level, stop, moved };
+                    let (level, rest) = (Level { leaf, state }, Ok(accuracy));
+                    return Settled { level, rest, moved };
                 }
                 Some(index) => self.saddle = Some(saddle_of(&leaf, &state, index)),
                 None => {}
@@ -241,8 +209,8 @@ impl Run<'_, '_> {
             saddle::push_off(&leaf, &mut state, &mut system, &mut self.work);
             (near_rest, cg_tolerance) = (false, FAR_FROM_REST);
         }
-        let (level, stop) = (Level { leaf, state }, Stop::StepLimit);
-        Settled { level, stop, moved }
+        let (level, rest) = (Level { leaf, state }, Err(Stop::StepLimit));
+        Settled { level, rest, moved }
     }
 }
 

@@ -1,14 +1,14 @@
 //! From a scenario and what is asked to the leaf at rest.
 
 use crate::leaf::{Grid, Leaf};
-use crate::newton::Work;
+use crate::newton::{Stop, Work};
 use crate::relax::equilibrium::Equilibrium;
 use crate::relax::method::Method;
 use crate::relax::methods::{explicit, shooting};
 use crate::relax::modes;
 use crate::relax::options::{MOST_MODES, Options, Progress, RelaxError, check_tolerance};
 use crate::relax::result;
-use crate::relax::run::{End, Run};
+use crate::relax::run::Run;
 use crate::relax::segments::{check_segments, least, reducible};
 use crate::scenario::Scenario;
 use std::time::Instant;
@@ -26,9 +26,8 @@ pub fn relax(
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
     check_tolerance(tolerance)?;
     if options.modes > MOST_MODES {
-        return Err(RelaxError::Modes {
-            found: options.modes,
-        });
+        let found = options.modes;
+        return Err(RelaxError::Modes { found });
     }
     match options.method {
         Method::SemiImplicit(_) | Method::Explicit { .. } => {
@@ -64,21 +63,17 @@ fn relax_on_grids(
     if let Method::Explicit { .. } = options.method {
         explicit::check(&leaf)?;
     }
-    let (method, segments) = (options.method, options.method.segments());
-    let first = check_segments(&leaf, segments, least(method, tolerance))?;
-    let reduced = match reducible(method) {
-        true => leaf.reduced(),
-        false => None,
-    };
+    let method = options.method;
+    let first = check_segments(&leaf, method.segments(), least(method, tolerance))?;
+    let reduced = reducible(method).then(|| leaf.reduced()).flatten();
     let grid = Grid::new(first, leaf.kinks());
     let mut work = Work::default();
     if let Some(reduced) = &reduced {
         let mut run = Run::new(reduced, options, tolerance, progress);
         run.whole = Some(&leaf);
         let end = run.solve(grid.clone());
-        if matches!(end, End::Rest | End::NotAccurate) && run.index == Some(0) {
-            let run = run.completed(&leaf);
-            return Ok(finished(run, end, clock));
+        if end.is_ok() && run.index == Some(0) {
+            return Ok(finished(run.completed(&leaf), end, clock));
         }
         // The reduced model fails, as the leaf moves out of its valley, breaks the
         // mirror, or leaves the plane: solve the full leaf.
@@ -92,11 +87,10 @@ fn relax_on_grids(
 
 /// The result of a run, and of a leaf at rest its modes, which are not counted
 /// in the time of the solution.
-fn finished(run: Run, end: End, clock: Instant) -> Equilibrium {
-    let at_rest = matches!(end, End::Rest | End::NotAccurate);
+fn finished(run: Run, end: Result<bool, Stop>, clock: Instant) -> Equilibrium {
     let (outcome, remark) = result::outcome(&run, end);
     let seconds = clock.elapsed().as_secs_f64();
-    let modes = if at_rest { modes::lowest(&run) } else { None };
+    let modes = end.ok().and_then(|_| modes::lowest(&run));
     let mut found = result::equilibrium(run, outcome, remark, seconds);
     found.stability.modes = modes;
     found

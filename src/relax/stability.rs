@@ -12,32 +12,23 @@ use glam::DVec3;
 /// is larger than this one step before rest is stable at rest.
 const CLEARLY: f64 = 1e-2;
 
-/// What came of counting the negative eigenvalues.
-pub enum Judged {
-    /// They are as many as they are wanted to be, as far as they can be counted.
-    Known,
-    /// Finer grids are needed.
-    Refine,
-    /// The leaf is not at rest where it was.
-    Failed(Stop),
-}
-
 impl Run<'_, '_> {
     /// Counts the negative eigenvalues on the finest grid. At a wanted saddle
     /// they must be as many as on the grid before. At one that is not wanted,
-    /// the leaf is pushed off and the grids begin anew from where it lands.
-    pub fn judge_stability(&mut self) -> Judged {
+    /// the leaf is pushed off and the grids begin anew from where it lands. Returns
+    /// whether stability is known, as far as it can be: else finer grids are needed.
+    pub fn judge_stability(&mut self) -> Result<bool, Stop> {
         let level = self.levels.last().expect("the leaf has settled");
         if level.leaf.tip_moment() != DVec3::ZERO {
-            return Judged::Known;
+            return Ok(true);
         }
         if let Some(whole) = self.whole {
             let Level { leaf, state } = complete(self.leaf, whole, level);
             let mut system = System::new(&leaf);
             self.index = saddle::index(&leaf, &state, &mut system, 0.0, &mut self.work);
             return match self.index {
-                Some(0) => Judged::Known,
-                _ => Judged::Failed(Stop::Saddle),
+                Some(0) => Ok(true),
+                _ => Err(Stop::Saddle),
             };
         }
         let before = self.index;
@@ -46,45 +37,41 @@ impl Run<'_, '_> {
             self.work.factorizations += 1;
             if system.stable_without_coupling(-CLEARLY) {
                 self.index = Some(0);
-                return Judged::Known;
+                return Ok(true);
             }
         }
         let mut system = System::new(&level.leaf);
         self.index = saddle::index(&level.leaf, &level.state, &mut system, 0.0, &mut self.work);
         if !matches!(self.index, Some(1..)) {
-            return Judged::Known;
+            return Ok(true);
         }
         if self.keeps_unstable() {
-            return if before == self.index || self.segments().is_some() {
-                Judged::Known
-            } else {
-                Judged::Refine
-            };
+            return Ok(before == self.index || self.segments().is_some());
         }
         let mut level = self.levels.pop().expect("the leaf has settled");
         let exact = saddle::polish(&level.leaf, &mut level.state, &mut system, &mut self.work);
         self.index = exact.or(self.index);
         let Some(index @ 1..) = self.index else {
             self.levels.push(level);
-            return Judged::Known;
+            return Ok(true);
         };
         self.saddle = Some(saddle_of(&level.leaf, &level.state, index));
         self.pushes += 1;
         if self.pushes > MAX_SADDLES {
             self.levels.push(level);
-            return Judged::Failed(Stop::StepLimit);
+            return Err(Stop::StepLimit);
         }
         let mut state = level.state;
         saddle::push_off(&level.leaf, &mut state, &mut system, &mut self.work);
         let grid = level.leaf.grid.clone();
-        let Settled { level, stop, .. } = self.settle(grid, InitialGuess::Pushed(state));
+        let Settled { level, rest, .. } = self.settle(grid, InitialGuess::Pushed(state));
         self.levels.clear();
         self.table = Richardson::default();
         self.push(level);
-        match stop {
-            Stop::Rest(_) if self.segments().is_some() => self.judge_stability(),
-            Stop::Rest(_) => Judged::Refine,
-            stop => Judged::Failed(stop),
+        rest?;
+        match self.segments() {
+            Some(_) => self.judge_stability(),
+            None => Ok(false),
         }
     }
 }

@@ -59,27 +59,23 @@ const BUDGET: usize = 600_000_000;
 
 /// What is asked and counted.
 pub struct Request<'a> {
-    /// Wanted accuracy of positions and rotations.
+    /// Of positions and rotations.
     pub accuracy: f64,
     /// Whether the state only has to be corrected.
     pub near_rest: bool,
-    /// Work done so far.
     pub work: &'a mut Work,
     /// Told steps and the largest unbalanced force or moment.
     pub progress: &'a mut dyn FnMut(usize, f64),
     /// Whether the leaf's energy was not convex where it moved.
     pub moved: bool,
-    /// When to give up.
     pub limit: &'a Limit,
 }
 
 /// Refuses what explicit motion cannot do.
 pub fn check(leaf: &Leaf) -> Result<(), RelaxError> {
     let rigid = |rod: &Rod| {
-        let stiffness = rod.force_stiffness.iter();
-        stiffness
-            .fold(0.0_f64, |m, h| m.max(h.max_abs()))
-            .is_infinite()
+        let stiffest = (rod.force_stiffness.iter()).fold(0.0_f64, |m, h| m.max(h.max_abs()));
+        stiffest.is_infinite()
     };
     if leaf.scenario().rods.iter().any(rigid) {
         return Err(RelaxError::Rigid);
@@ -96,11 +92,9 @@ pub fn settle(
     state: &mut State,
     system: &mut System,
     request: &mut Request,
-) -> Stop {
-    let Ok(mut motion) = Explicit::new(leaf.clone(), Physics::at_rest(&leaf.leaf), state, None)
-    else {
-        return Stop::Stuck;
-    };
+) -> Result<f64, Stop> {
+    let motion = Explicit::new(leaf.clone(), Physics::at_rest(&leaf.leaf), state, None);
+    let mut motion = motion.map_err(|_| Stop::Stuck)?;
     let most_steps = BUDGET / (leaf.rods() * leaf.segments());
     let settled = match request.near_rest {
         true => Ok(()),
@@ -110,10 +104,7 @@ pub fn settle(
     request.work.steps += motion.steps();
     request.work.force_evaluations += motion.steps();
     *state = motion.now();
-    match settled {
-        Ok(remaining) => Stop::Rest(remaining),
-        Err(settled) => settled,
-    }
+    settled
 }
 
 /// Damped motion into the valley in which the leaf will come to rest.
@@ -199,24 +190,18 @@ fn descend(
             return Err(Stop::Stuck);
         }
         (request.progress)(motion.steps(), residual);
-        looks_since_best = if residual < 0.5 * best {
-            0
-        } else {
-            looks_since_best + 1
-        };
-        if looks_since_best == 0 {
-            best = residual;
+        looks_since_best += 1;
+        if residual < 0.5 * best {
+            (best, looks_since_best) = (residual, 0);
         }
         if residual <= balanced || looks_since_best > STAGNATION {
             let remaining = remaining(leaf, &state, system, request.work);
-            if remaining <= accuracy {
+            let stagnates = looks_since_best > STAGNATION;
+            if remaining <= accuracy || stagnates && remaining <= LONGEST_REMAINING {
                 return Ok(remaining);
             }
-            if looks_since_best > STAGNATION {
-                return match remaining <= LONGEST_REMAINING {
-                    true => Ok(remaining),
-                    false => Err(Stop::StepLimit),
-                };
+            if stagnates {
+                return Err(Stop::StepLimit);
             }
             balanced *= (0.5 * accuracy / remaining).max(1e-3);
         }

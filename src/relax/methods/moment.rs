@@ -7,7 +7,7 @@
 //! exact, unsymmetric tangent.
 
 use crate::leaf::{DiscreteLeaf, State, System};
-use crate::newton::{Equations, Newton, Stop, Work};
+use crate::newton::{Equations, Newton, Stop};
 
 /// Rotation of the tip (radians) that one load step may bring about by bending.
 const TURN_PER_STEP: f64 = 1.0;
@@ -26,61 +26,44 @@ pub fn settle(
     leaf: &mut DiscreteLeaf,
     state: &mut State,
     system: &mut System,
-    accuracy: f64,
     near_rest: bool,
-    work: &mut Work,
-    progress: &mut dyn FnMut(usize, f64),
-) -> Stop {
+    how: Newton,
+) -> Result<f64, Stop> {
+    let mut newton = |leaf: &DiscreteLeaf, state: &mut State, accuracy| {
+        let newton = Newton {
+            accuracy,
+            iterations: MAX_ITERATIONS,
+            work: how.work,
+            progress: how.progress,
+        };
+        newton.solve(leaf, state, system, Equations::Unsymmetric)
+    };
     if near_rest {
-        return newton(leaf, state, system, accuracy, work, progress);
+        return newton(leaf, state, how.accuracy);
     }
-    let softest = leaf
-        .sections
-        .iter()
-        .map(|s| s.couple_stiffness.min_element())
-        .fold(f64::INFINITY, f64::min);
+    let stiffness = (leaf.sections.iter()).map(|s| s.couple_stiffness.min_element());
+    let softest = stiffness.fold(f64::INFINITY, f64::min);
     let turn = leaf.leaf.tip_moment.length() * leaf.leaf.length(0) / softest;
     let mut step = 1.0 / (turn / TURN_PER_STEP).ceil().max(1.0);
     let (mut reached, mut before) = (0.0, state.clone());
     while reached < 1.0 {
         leaf.load_factor = (reached + step).min(1.0);
-        let wanted = if leaf.load_factor < 1.0 {
-            STEP_ACCURACY
-        } else {
-            accuracy
+        let wanted = match leaf.load_factor < 1.0 {
+            true => STEP_ACCURACY,
+            false => how.accuracy,
         };
-        match newton(leaf, state, system, wanted, work, progress) {
-            Stop::Rest(remaining) => {
-                if leaf.load_factor == 1.0 {
-                    return Stop::Rest(remaining);
-                }
+        match newton(leaf, state, wanted) {
+            Ok(remaining) if leaf.load_factor == 1.0 => return Ok(remaining),
+            Ok(_) => {
                 reached = leaf.load_factor;
                 before.clone_from(state);
             }
-            Stop::Unresolved => return Stop::Unresolved,
-            failed if step < SMALLEST_STEP => return failed,
-            _ => {
+            Err(stop) if stop == Stop::Unresolved || step < SMALLEST_STEP => return Err(stop),
+            Err(_) => {
                 step /= 2.0;
                 state.clone_from(&before);
             }
         }
     }
-    Stop::StepLimit
-}
-
-fn newton(
-    leaf: &DiscreteLeaf,
-    state: &mut State,
-    system: &mut System,
-    accuracy: f64,
-    work: &mut Work,
-    progress: &mut dyn FnMut(usize, f64),
-) -> Stop {
-    let newton = Newton {
-        accuracy,
-        iterations: MAX_ITERATIONS,
-        work,
-        progress,
-    };
-    newton.solve(leaf, state, system, Equations::Unsymmetric)
+    Err(Stop::StepLimit)
 }

@@ -70,11 +70,9 @@ const STIFF_ITERATIONS: usize = 12;
 
 /// The state of a leaf that is being relaxed on one grid, and what for.
 pub struct Relaxation<'a> {
-    /// The state.
     pub state: State,
-    /// Wanted accuracy of positions and rotations.
+    /// Of positions and rotations.
     pub accuracy: f64,
-    /// Work done so far.
     pub work: &'a mut Work,
     /// Told the size of every step.
     pub progress: &'a mut dyn FnMut(usize, f64),
@@ -86,11 +84,9 @@ pub struct Relaxation<'a> {
     /// How often it was pushed off saddles before: each time it is softened
     /// less, since a softened leaf may return.
     pub pushes: i32,
-    /// The linear solver.
     pub solver: Definite,
     /// Count of force evaluations at which to give up.
     pub most_evaluations: usize,
-    /// When to give up.
     pub limit: &'a Limit,
     /// Whether to give up at once if the leaf has to move.
     pub convex_only: bool,
@@ -100,44 +96,40 @@ pub struct Relaxation<'a> {
 
 impl Relaxation<'_> {
     /// Lets the leaf come to rest.
-    pub fn settle(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Stop {
+    pub fn settle(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Result<f64, Stop> {
         let stiffest = leaf.stiffest();
         let load = leaf.leaf.tip_force.length() + leaf.leaf.gravity.length();
         let moving = (MOVING_COMPLIANCE * 0.1_f64.powi(self.pushes)).min(MOVING_STRETCH / load);
         if stiffest >= moving {
             return self.move_to_rest(leaf, system, self.accuracy);
         }
-        if self.near_rest {
-            let before = self.state.clone();
-            match self.newton(leaf, system) {
-                Stop::Stuck => self.state = before,
-                settled => return settled,
-            }
-        }
         let mut floor = moving;
+        let mut soften = !self.near_rest;
         loop {
-            let soft = self.move_to_rest(&leaf.softened(floor), system, SOFT_ACCURACY);
-            if !matches!(soft, Stop::Rest(_)) {
-                return soft;
+            if soften {
+                self.move_to_rest(&leaf.softened(floor), system, SOFT_ACCURACY)?;
             }
             let before = self.state.clone();
             match self.newton(leaf, system) {
-                Stop::Stuck => self.state = before,
+                Err(Stop::Stuck) => self.state = before,
                 settled => return settled,
             }
-            // From here to the stiffness wanted is too far: go on stiffer.
-            floor *= STIFFER;
-            if floor <= stiffest {
-                return self.move_to_rest(leaf, system, self.accuracy);
+            if soften {
+                // From here to the stiffness wanted is too far: go on stiffer.
+                floor *= STIFFER;
+                if floor <= stiffest {
+                    return self.move_to_rest(leaf, system, self.accuracy);
+                }
+                if floor < SMALLEST_MOVING_COMPLIANCE {
+                    return Err(Stop::Stuck);
+                }
             }
-            if floor < SMALLEST_MOVING_COMPLIANCE {
-                return Stop::Stuck;
-            }
+            soften = true;
         }
     }
 
     /// Newton's method in the mixed form, for a leaf that is nearly at rest.
-    fn newton(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Stop {
+    fn newton(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Result<f64, Stop> {
         let newton = Newton {
             accuracy: self.accuracy,
             iterations: STIFF_ITERATIONS,
@@ -153,7 +145,12 @@ impl Relaxation<'_> {
     }
 
     /// Damped motion until rest.
-    fn move_to_rest(&mut self, leaf: &DiscreteLeaf, system: &mut System, accuracy: f64) -> Stop {
+    fn move_to_rest(
+        &mut self,
+        leaf: &DiscreteLeaf,
+        system: &mut System,
+        accuracy: f64,
+    ) -> Result<f64, Stop> {
         let mut trial = self.state.clone();
         let mut velocity = vec![vec![[0.0; 6]; leaf.segments()]; leaf.rods()];
         let mut next_velocity = velocity.clone();
@@ -176,11 +173,11 @@ impl Relaxation<'_> {
             let tolerance = cg_tolerance(previous, self.cg_tolerance);
             while !self.solve(leaf, space.as_ref(), system, pace.dt, &velocity, tolerance) {
                 if resting {
-                    return Stop::Saddle;
+                    return Err(Stop::Saddle);
                 }
                 self.moved = true;
                 if self.convex_only || !pace.shorten() {
-                    return Stop::Stuck;
+                    return Err(Stop::Stuck);
                 }
             }
             let (turn, shift) = system.largest();
@@ -199,14 +196,14 @@ impl Relaxation<'_> {
             let slack = ENERGY_SLACK * (1.0 + energy.abs());
             if !next_energy.is_finite() || next_energy > energy + slack {
                 if !pace.shorten() {
-                    return Stop::Stuck;
+                    return Err(Stop::Stuck);
                 }
                 sums = leaf.assemble(&self.state, system);
                 self.work.force_evaluations += 1;
                 continue;
             }
             if next.turn > RESOLVED_TURN {
-                return Stop::Unresolved;
+                return Err(Stop::Unresolved);
             }
             std::mem::swap(&mut self.state, &mut trial);
             sums = next;
@@ -226,12 +223,12 @@ impl Relaxation<'_> {
                     && let Some(remaining) =
                         converged(size, previous, tolerance, (accuracy, ROUNDING))
                 {
-                    return Stop::Rest(remaining);
+                    return Ok(remaining);
                 }
             }
             previous = size;
         }
-        Stop::StepLimit
+        Err(Stop::StepLimit)
     }
 
     /// Factorises and solves for a time step of `dt`; false if the matrix is
@@ -247,10 +244,9 @@ impl Relaxation<'_> {
         tolerance: f64,
     ) -> bool {
         let inertia = dt.is_finite().then_some((velocity, 1.0 / dt));
-        let shift = if dt.is_finite() {
-            (1.0 / dt + DAMPING) / dt
-        } else {
-            leaf.neutral_shift()
+        let shift = match dt.is_finite() {
+            true => (1.0 / dt + DAMPING) / dt,
+            false => leaf.neutral_shift(),
         };
         let (solver, work) = (&mut self.solver, &mut *self.work);
         solver.convex_in_space(space, &self.state, shift, work)
@@ -267,10 +263,9 @@ struct Pace {
 impl Pace {
     /// Takes a shorter step; false if that is too short to be worth it.
     fn shorten(&mut self) -> bool {
-        self.dt = if self.dt.is_finite() {
-            self.dt / 4.0
-        } else {
-            FIRST_STEP
+        self.dt = match self.dt.is_finite() {
+            true => self.dt / 4.0,
+            false => FIRST_STEP,
         };
         self.growth = 1.0;
         self.dt >= SHORTEST_STEP
