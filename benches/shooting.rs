@@ -22,16 +22,13 @@ fn fastest(leaf: &Scenario, relaxed: &Equilibrium, threads: usize) -> (f64, Solu
         .num_threads(threads)
         .build()
         .expect("threads can be started");
-    let start = Start::Leaf {
-        stations: &relaxed.shape.stations,
-        rods: &relaxed.shape.rods,
-    };
+    let (stations, rods) = (&relaxed.shape.stations[..], &relaxed.shape.rods[..]);
+    let start = Start::Leaf { stations, rods };
+    let options = bvp::Options::new(start, stations, bvp::Precision::Error(ACCURACY));
     (0..2 + RODS_IN_ALL / leaf.rods.len())
         .map(|_| {
             let clock = Instant::now();
-            let solution = pool.install(|| {
-                bvp::solve_within(leaf, start, ACCURACY, None, &relaxed.shape.stations)
-            });
+            let solution = pool.install(|| bvp::solve(leaf, &options));
             let milliseconds = 1e3 * clock.elapsed().as_secs_f64();
             (milliseconds, solution.expect("the leaf has a solution"))
         })

@@ -224,7 +224,7 @@ pub mod internals {
     }
     pub mod bvp {
         pub use crate::bvp::{
-            Failure, Neutral, Options, Reason, Solution, Start, Work, solve, solve_within,
+            Failure, Neutral, Options, Precision, Reason, Solution, Start, Work, solve,
         };
     }
     pub mod leaf {

@@ -5,7 +5,7 @@ mod common;
 
 use common::random::{drawn, leaves};
 use common::{apart, files, found, read, scale, settle, shot_near};
-use leafdyn::internals::bvp::{Options, Solution, Start, solve, solve_within};
+use leafdyn::internals::bvp::{Options, Precision, Solution, Start, solve};
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::Scenario;
 
@@ -18,11 +18,11 @@ fn scenes() -> Vec<Scenario> {
     paper.chain(classic).collect()
 }
 
-fn start(leaf: &Equilibrium) -> Start<'_> {
-    Start::Leaf {
-        stations: &leaf.shape.stations,
-        rods: &leaf.shape.rods,
-    }
+#[track_caller]
+fn shot(scenario: &Scenario, leaf: &Equilibrium, precision: Precision) -> Solution {
+    let (stations, rods) = (&leaf.shape.stations[..], &leaf.shape.rods[..]);
+    let options = Options::new(Start::Leaf { stations, rods }, stations, precision);
+    found(scenario, solve(scenario, &options))
 }
 
 /// Asserts that no error is beyond its estimate, but for what the truth itself
@@ -52,13 +52,8 @@ fn at_all_tolerances(scenes: &[Scenario], tolerances: &[f64]) -> Vec<f64> {
         let relaxed = settle(scenario, 1e-10);
         let truth = shot_near(scenario, &relaxed);
         for &tolerance in tolerances {
-            let options = Options {
-                tolerance,
-                intervals: None,
-                stations: relaxed.shape.stations.clone(),
-            };
             let what = format!("{} at {tolerance:e}", scenario.name);
-            let rough = found(scenario, solve(scenario, start(&relaxed), &options));
+            let rough = shot(scenario, &relaxed, Precision::LocalError(tolerance));
             ratios.extend(covered(&what, scenario, &rough, &truth));
         }
     }
@@ -88,9 +83,7 @@ fn within_the_accuracy_asked_for() {
         let truth = shot_near(&scenario, &relaxed);
         let length = scale(&scenario).length;
         for accuracy in [1e-3, 1e-6, 1e-9] {
-            let stations = &relaxed.shape.stations;
-            let shot = solve_within(&scenario, start(&relaxed), accuracy, None, stations);
-            let shot = found(&scenario, shot);
+            let shot = shot(&scenario, &relaxed, Precision::Error(accuracy));
             let what = format!("{} within {accuracy:e}", scenario.name);
             assert!(shot.error.position <= accuracy * length, "{what}");
             covered(&what, &scenario, &shot, &truth);

@@ -5,7 +5,7 @@
 mod common;
 
 use common::{agree, apart, found, scenario, settle, shoot_over, shot_near};
-use leafdyn::internals::bvp::{Reason, Solution, Start, solve_within};
+use leafdyn::internals::bvp::{Options, Precision, Reason, Solution, Start, solve};
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::Scenario;
 
@@ -92,12 +92,10 @@ fn the_accuracy_asked_for_is_reached() {
         let leaf = soft(figure, load);
         let relaxed = settle(&leaf, 1e-10);
         for accuracy in [1e-4, 1e-7, 1e-10] {
-            let start = Start::Leaf {
-                stations: &relaxed.shape.stations,
-                rods: &relaxed.shape.rods,
-            };
-            let shot = solve_within(&leaf, start, accuracy, None, &relaxed.shape.stations);
-            let shot = found(&leaf, shot);
+            let (stations, rods) = (&relaxed.shape.stations[..], &relaxed.shape.rods[..]);
+            let start = Start::Leaf { stations, rods };
+            let options = Options::new(start, stations, Precision::Error(accuracy));
+            let shot = found(&leaf, solve(&leaf, &options));
             assert!(shot.error.position <= accuracy);
             let off = apart(&leaf, &relaxed.shape.rods, &shot.rods);
             let both = accuracy + relaxed.accuracy.error_estimate.unwrap();

@@ -2,7 +2,6 @@
 //! that rests in arcs, whose solution is known, by continuation to the
 //! scenario's.
 
-use super::dop853::Unbounded;
 use super::equations::Equations;
 use super::newton::{Newton, Work};
 use super::solution::Reason;
@@ -39,27 +38,17 @@ pub struct Interrupted {
 
 /// How the arcs' leaf is changed into the scenario's, in the order they are tried.
 /// The last one may end far from where it began.
-const STRATEGIES: [Strategy; 3] = [
-    Strategy {
-        stiff: false,
-        far: false,
-    },
-    Strategy {
-        stiff: true,
-        far: false,
-    },
-    Strategy {
-        stiff: false,
-        far: true,
-    },
-];
+const STRATEGIES: [Strategy; 3] = [Strategy::Near, Strategy::Stiff, Strategy::Far];
 
-#[derive(Clone, Copy)]
-struct Strategy {
-    /// Over rods that are at first as stiff in all directions as in the stiffest.
-    stiff: bool,
-    /// Whether Newton's method may go far in one step.
-    far: bool,
+#[derive(Clone, Copy, PartialEq)]
+enum Strategy {
+    /// Newton's method goes not far in one step.
+    Near,
+    /// Nor does it here, over rods that are at first as stiff in all
+    /// directions as in the stiffest.
+    Stiff,
+    /// It may go far.
+    Far,
 }
 
 /// Follows the equilibrium from the arcs' leaf to the scenario's. Returns a
@@ -87,26 +76,21 @@ impl Strategy {
         work: &mut Work,
     ) -> Result<Trajectory, Interrupted> {
         equations.part = 0.0;
-        equations.softened = if self.stiff { 0.0 } else { 1.0 };
+        let stiff = self == Strategy::Stiff;
+        equations.softened = if stiff { 0.0 } else { 1.0 };
         let unstressed = Trajectory::unstressed(equations, ROUGH);
-        let mut near = unstressed.map_err(|error| Interrupted {
-            reason: unbounded(error),
+        let near = unstressed.map_err(|unbounded| Interrupted {
+            reason: unbounded.into(),
             part: 0.0,
             near: Trajectory::straight(equations),
         })?;
-        let stages: &[Stage] = match self.stiff {
-            true => &[
-                |equations, part| equations.part = part,
-                |equations, part| {
-                    equations.softened = part;
-                },
-            ],
-            false => &[|equations, part| equations.part = part],
-        };
-        for stage in stages {
-            near = self.follow_stage(*stage, equations, near, intervals, work)?;
+        let load: Stage = |equations| &mut equations.part;
+        let near = self.follow_stage(load, equations, near, intervals, work)?;
+        if !stiff {
+            return Ok(near);
         }
-        Ok(near)
+        let soften: Stage = |equations| &mut equations.softened;
+        self.follow_stage(soften, equations, near, intervals, work)
     }
 
     /// Changes the equations by one stage, all of it at first.
@@ -124,7 +108,7 @@ impl Strategy {
         while part < 1.0 {
             let spent = |work: &Work| (work.slopes - begun) * rods;
             let next = if step >= 1.0 - part { 1.0 } else { part + step };
-            stage(equations, next);
+            *stage(equations) = next;
             let predicted = match &before {
                 Some((earlier, at)) => near.beyond(equations, earlier, (next - part) / (part - at)),
                 None => near.clone(),
@@ -156,20 +140,19 @@ impl Strategy {
             let turns = (near.turn(equations) / TURN).ceil() as usize;
             turns.clamp(LEAST_INTERVALS, MOST_INTERVALS)
         });
-        let mut newton = Newton::near(equations, near, Some(count)).map_err(unbounded)?;
-        newton.only_near = !self.far;
-        let solved = newton.solve(ROUGH);
-        work.add(newton.work);
-        solved.map_err(|stuck| newton.reason(stuck))?;
+        let mut newton = Newton::near(equations, near, Some(count), work)?;
+        newton.only_near = self != Strategy::Far;
+        newton.solve(ROUGH)?;
         let stations = STATIONS * count.max(LEAST_INTERVALS);
         let stations: Vec<f64> = (0..=stations).map(|i| i as f64 / stations as f64).collect();
-        Trajectory::sampled(equations, &newton.nodes, &stations, ROUGH).map_err(unbounded)
+        Ok(Trajectory::sampled(
+            equations,
+            &newton.nodes,
+            &stations,
+            ROUGH,
+        )?)
     }
 }
 
 /// What is changed from 0 to 1 along a stage.
-type Stage = fn(&mut Equations, f64);
-
-fn unbounded(Unbounded { sigma }: Unbounded) -> Reason {
-    Reason::Unbounded { sigma }
-}
+type Stage = for<'e> fn(&'e mut Equations) -> &'e mut f64;

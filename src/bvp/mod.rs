@@ -53,5 +53,5 @@ mod tableau;
 mod trajectory;
 
 pub use newton::Work;
-pub use solution::{Failure, Neutral, Options, Reason, Solution, Start};
-pub use solve::{solve, solve_before, solve_within};
+pub use solution::{Failure, Neutral, Options, Precision, Reason, Solution, Start};
+pub use solve::solve;

@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 
-use super::dop853::Unbounded;
 use super::intervals::GROWTH;
 use super::newton::{Newton, Stuck};
 use super::solution::{Neutral, Reason};
@@ -31,7 +30,7 @@ impl Newton<'_, '_> {
     /// What being stuck means.
     pub fn reason(&self, stuck: Stuck) -> Reason {
         let correction = match stuck {
-            Stuck::Unbounded(Unbounded { sigma }) => return Reason::Unbounded { sigma },
+            Stuck::Unbounded(unbounded) => return unbounded.into(),
             Stuck::NoProgress(correction) => correction,
         };
         match self.neutral(&STATIONS) {

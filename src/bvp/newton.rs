@@ -10,6 +10,7 @@ use super::dop853::Unbounded;
 use super::equations::{Equations, RodState};
 use super::intervals::{Integrated, Units, choose, integrate, sensitivities};
 use super::march::March;
+use super::solution::Reason;
 use super::trajectory::{Nodes, Trajectory};
 use serde::Serialize;
 
@@ -57,7 +58,6 @@ impl Work {
 }
 
 /// Why Newton's method did not converge.
-#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stuck {
     /// An initial-value problem has no bounded solution from the start on.
     Unbounded(Unbounded),
@@ -81,8 +81,8 @@ pub struct Newton<'e, 'a> {
     pub growth: Vec<f64>,
     /// Largest defect at the last evaluation, in the units.
     pub defect: f64,
-    /// Work so far.
-    pub work: Work,
+    /// Work, added up.
+    work: &'e mut Work,
 }
 
 /// By how much the unknowns do not solve the equations.
@@ -100,6 +100,7 @@ impl<'e, 'a> Newton<'e, 'a> {
         equations: &'e Equations<'a>,
         near: &Trajectory,
         intervals: Option<usize>,
+        work: &'e mut Work,
     ) -> Result<Self, Unbounded> {
         let mut nodes = match intervals {
             Some(count) => {
@@ -122,20 +123,21 @@ impl<'e, 'a> Newton<'e, 'a> {
             march: None,
             growth: Vec::new(),
             defect: f64::INFINITY,
-            work: Work::default(),
+            work,
         })
     }
 
     /// Solves to the accuracy of an integration with `tolerance`.
-    pub fn solve(&mut self, tolerance: f64) -> Result<(), Stuck> {
+    pub fn solve(&mut self, tolerance: f64) -> Result<(), Reason> {
+        self.iterate(tolerance).map_err(|stuck| self.reason(stuck))
+    }
+
+    fn iterate(&mut self, tolerance: f64) -> Result<(), Stuck> {
         let mut factor: f64 = 1.0;
-        let mut fresh = false;
-        let mut residuals = match self.march {
-            Some(_) => self.residuals_at(&self.nodes.clone(), tolerance)?,
-            None => {
-                fresh = true;
-                self.linearize(tolerance)?
-            }
+        let mut fresh = self.march.is_none();
+        let mut residuals = match fresh {
+            false => self.residuals_at(&self.nodes.clone(), tolerance)?,
+            true => self.linearize(tolerance)?,
         };
         let mut size = f64::INFINITY;
         'iterations: for _ in 0..MAX_ITERATIONS {
@@ -144,36 +146,25 @@ impl<'e, 'a> Newton<'e, 'a> {
             if !size.is_finite() {
                 break;
             }
-            if fresh {
-                factor = (2.0 * factor).min(1.0);
-            } else {
-                factor = 1.0;
-            }
+            factor = if fresh { (2.0 * factor).min(1.0) } else { 1.0 };
             let (trial, next, ratio) = loop {
                 let trial = self.moved(&step, factor);
-                let attempt = self.residuals_at(&trial, tolerance).ok().map(|next| {
+                if let Ok(next) = self.residuals_at(&trial, tolerance) {
                     let remaining = largest(&self.correction(&next));
-                    (next, remaining)
-                });
-                match attempt {
-                    Some((next, remaining))
-                        if remaining <= (1.0 - 0.25 * factor) * size || remaining <= tolerance =>
-                    {
+                    if remaining <= (1.0 - 0.25 * factor) * size || remaining <= tolerance {
                         break (trial, next, remaining / size);
                     }
                     // Too small to shrink: nothing but the integrator's noise.
-                    Some((next, remaining))
-                        if size <= NOISE * tolerance && remaining <= NOISE * tolerance =>
-                    {
+                    if size <= NOISE * tolerance && remaining <= NOISE * tolerance {
                         break (trial, next, 0.0);
                     }
-                    _ if !fresh => {
-                        residuals = self.linearize(tolerance)?;
-                        fresh = true;
-                        continue 'iterations;
-                    }
-                    _ => factor *= 0.5,
                 }
+                if !fresh {
+                    residuals = self.linearize(tolerance)?;
+                    fresh = true;
+                    continue 'iterations;
+                }
+                factor *= 0.5;
                 if factor < LEAST_FACTOR || self.only_near {
                     break 'iterations;
                 }
@@ -195,13 +186,13 @@ impl<'e, 'a> Newton<'e, 'a> {
             if self.only_near && ratio > NEAR {
                 break;
             }
-            if factor == 1.0 && ratio <= KEEP {
-                residuals = next;
-                fresh = false;
+            let keep = factor == 1.0 && ratio <= KEEP;
+            residuals = if keep {
+                next
             } else {
-                residuals = self.linearize(tolerance)?;
-                fresh = true;
-            }
+                self.linearize(tolerance)?
+            };
+            fresh = !keep;
         }
         Err(Stuck::NoProgress(size))
     }
@@ -236,14 +227,10 @@ impl<'e, 'a> Newton<'e, 'a> {
         }
         let integrated =
             integrate(self.equations, nodes, tolerance, linear).map_err(Stuck::Unbounded)?;
-        self.work.steps += integrated
-            .iter()
-            .map(|interval| interval.count)
-            .sum::<usize>();
-        self.work.slopes += integrated
-            .iter()
-            .map(|interval| interval.evaluations)
-            .sum::<usize>();
+        for interval in &integrated {
+            self.work.steps += interval.count;
+            self.work.slopes += interval.evaluations;
+        }
         Ok(integrated)
     }
 

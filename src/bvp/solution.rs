@@ -4,7 +4,9 @@ use std::fmt;
 
 use glam::DVec3;
 
+use super::dop853::Unbounded;
 use super::newton::Work;
+use crate::limit::Limit;
 use crate::shape::{Difference, RodShape};
 
 /// Displacements below this part of the largest are not worth telling.
@@ -24,15 +26,42 @@ pub enum Start<'s> {
     },
 }
 
+/// How precise a solution is to be.
+#[derive(Clone, Copy, Debug)]
+pub enum Precision {
+    /// Estimated error of the positions relative to the longest rod, or as far
+    /// as double precision allows: see [`Solution::error`].
+    Error(f64),
+    /// Local error allowed per integration step, in dimensionless form.
+    LocalError(f64),
+}
+
 /// What is asked of the shooting.
 #[derive(Clone, Debug)]
-pub struct Options {
-    /// Local error allowed per integration step, in dimensionless form.
-    pub tolerance: f64,
+pub struct Options<'s> {
+    /// Where it starts from.
+    pub start: Start<'s>,
+    /// Fractions of the length at which the solution is wanted, from 0 to 1.
+    pub stations: &'s [f64],
+    /// How precise it is to be.
+    pub precision: Precision,
     /// Number of intervals; `None`: as many as the growth of perturbations needs.
     pub intervals: Option<usize>,
-    /// Fractions of the length at which the solution is wanted, from 0 to 1.
-    pub stations: Vec<f64>,
+    /// When Newton's method gives up.
+    pub limit: Limit,
+}
+
+impl<'s> Options<'s> {
+    /// Over as many intervals as needed, without a limit.
+    pub fn new(start: Start<'s>, stations: &'s [f64], precision: Precision) -> Self {
+        Options {
+            start,
+            stations,
+            precision,
+            intervals: None,
+            limit: Limit::default(),
+        }
+    }
 }
 
 /// A direction that the equations leave undetermined, or nearly so: the leaf
@@ -94,6 +123,12 @@ pub enum Reason {
     },
     /// The equations are singular.
     Singular(Neutral),
+}
+
+impl From<Unbounded> for Reason {
+    fn from(Unbounded { sigma }: Unbounded) -> Self {
+        Reason::Unbounded { sigma }
+    }
 }
 
 impl fmt::Display for Reason {

@@ -1,12 +1,10 @@
 //! From a start to a solution with an error estimate.
 
 use super::continuation::{Interrupted, from_arcs};
-use super::dop853::Unbounded;
 use super::equations::Equations;
 use super::newton::{Newton, Work};
-use super::solution::{Failure, Options, Reason, Solution, Start};
+use super::solution::{Failure, Options, Precision, Reason, Solution, Start};
 use super::trajectory::Trajectory;
-use crate::limit::Limit;
 use crate::scenario::Scenario;
 use crate::shape::Difference;
 
@@ -24,154 +22,104 @@ const MOST_LOCAL: f64 = 1e-9;
 /// Factor between attempts to reach the accuracy.
 const SHARPER: f64 = 1e-2;
 
-/// Solves the boundary-value problem of a scenario with an estimated error of
-/// the positions below `accuracy` (relative to the longest rod), or as far as
-/// double precision allows: see [`Solution::error`].
-///
-/// # Errors
-/// If no solution is found: why, and how far it came.
-pub fn solve_within(
-    scenario: &Scenario,
-    start: Start,
-    accuracy: f64,
-    intervals: Option<usize>,
-    stations: &[f64],
-) -> Result<Solution, Failure> {
-    solve_before(
-        scenario,
-        start,
-        accuracy,
-        intervals,
-        stations,
-        &Limit::default(),
-    )
-}
-
-/// As [`solve_within`], but Newton's method gives up at a limit.
-///
-/// # Errors
-/// If no solution is found: why, and how far it came.
-pub fn solve_before(
-    scenario: &Scenario,
-    start: Start,
-    accuracy: f64,
-    intervals: Option<usize>,
-    stations: &[f64],
-    limit: &Limit,
-) -> Result<Solution, Failure> {
-    let longest = scenario
-        .rods
-        .iter()
-        .map(|rod| rod.length)
-        .fold(0.0, f64::max);
-    let mut asked = Options {
-        tolerance: (LOCAL_PART * accuracy).clamp(LEAST_LOCAL, MOST_LOCAL),
-        intervals,
-        stations: stations.to_vec(),
-    };
-    let mut solution = solve_once(scenario, start, &asked, limit)?;
-    while solution.error.position > accuracy * longest && asked.tolerance > LEAST_LOCAL {
-        asked.tolerance = (SHARPER * asked.tolerance).max(LEAST_LOCAL);
-        let from = Start::Leaf {
-            stations,
-            rods: &solution.rods,
-        };
-        let sharper = solve_once(scenario, from, &asked, limit)?;
-        let mut work = solution.work;
-        work.add(sharper.work);
-        solution = Solution { work, ..sharper };
-    }
-    Ok(solution)
-}
-
 /// Solves the boundary-value problem of a scenario.
 ///
 /// # Errors
 /// If no solution is found: why, and how far it came.
-pub fn solve(scenario: &Scenario, start: Start, options: &Options) -> Result<Solution, Failure> {
-    solve_once(scenario, start, options, &Limit::default())
+pub fn solve(scenario: &Scenario, options: &Options) -> Result<Solution, Failure> {
+    let accuracy = match options.precision {
+        Precision::Error(accuracy) => accuracy,
+        Precision::LocalError(tolerance) => {
+            return solve_once(scenario, options.start, tolerance, options);
+        }
+    };
+    let lengths = scenario.rods.iter().map(|rod| rod.length);
+    let longest = lengths.fold(0.0, f64::max);
+    let mut tolerance = (LOCAL_PART * accuracy).clamp(LEAST_LOCAL, MOST_LOCAL);
+    let mut solution = solve_once(scenario, options.start, tolerance, options)?;
+    while solution.error.position > accuracy * longest && tolerance > LEAST_LOCAL {
+        tolerance = (SHARPER * tolerance).max(LEAST_LOCAL);
+        let (stations, rods) = (options.stations, &solution.rods[..]);
+        let start = Start::Leaf { stations, rods };
+        let mut sharper = solve_once(scenario, start, tolerance, options)?;
+        sharper.work.add(solution.work);
+        solution = sharper;
+    }
+    Ok(solution)
 }
 
+/// Solves with one tolerance, and a coarser one to compare with.
 fn solve_once(
     scenario: &Scenario,
     start: Start,
+    tolerance: f64,
     options: &Options,
-    limit: &Limit,
 ) -> Result<Solution, Failure> {
     let mut equations = Equations::new(scenario);
-    equations.limit = limit.clone();
+    equations.limit = options.limit.clone();
     let mut work = Work::default();
     let found = match start {
         Start::Arcs => from_arcs(&mut equations, options.intervals, &mut work),
         Start::Leaf { stations, rods } => Ok(Trajectory::of_leaf(&equations, stations, rods)),
     };
-    let failure = |equations: &Equations, end: Interrupted, work: Work| {
-        let states = options.stations.iter().map(|&sigma| end.near.at(sigma));
-        let near = Trajectory::new(equations, options.stations.clone(), states.collect());
-        Failure {
-            reason: end.reason,
-            part: end.part,
-            rods: near.shape(equations),
-            work,
-        }
+    let end = match found {
+        Err(end) => end,
+        Ok(near) => match solve_near(&equations, &near, tolerance, options, &mut work) {
+            Ok(solution) => return Ok(Solution { work, ..solution }),
+            Err(reason) => Interrupted {
+                reason,
+                part: 1.0,
+                near,
+            },
+        },
     };
-    let near = match found {
-        Ok(near) => near,
-        Err(end) => return Err(failure(&equations, end, work)),
-    };
-    let failed = |reason: Reason, near: Trajectory, work: Work| {
-        let part = 1.0;
-        failure(&equations, Interrupted { reason, part, near }, work)
-    };
-    let mut newton = match Newton::near(&equations, &near, options.intervals) {
-        Ok(newton) => newton,
-        Err(Unbounded { sigma }) => return Err(failed(Reason::Unbounded { sigma }, near, work)),
-    };
-    let settled = settle(&mut newton, options);
-    work.add(newton.work);
-    let (coarse, fine) = match settled {
-        Ok(solutions) => solutions,
-        Err(reason) => return Err(failed(reason, near, work)),
-    };
-    let (rods, tip) = (fine.shape(&equations), fine.tip());
-    let energy = tip[tip.len() - 1] + equations.tip_potential(tip);
-    // Steps that end at the same stations share their errors, which the
-    // difference then does not show: it is not less than a local error.
-    let difference = Difference::between(&coarse.shape(&equations), &rods);
-    let (force, local) = (equations.force, options.tolerance);
-    let error = Difference {
-        position: difference.position + local * equations.length,
-        rotation: difference.rotation + local,
-        force: difference.force + local * newton.units.total_force() * force,
-        moment: difference.moment
-            + local * newton.units.largest_moment() * force * equations.length,
-    };
-    Ok(Solution {
-        stations: options.stations.clone(),
-        error,
-        rods,
-        energy: energy * equations.force * equations.length,
-        defect: newton.defect,
-        growth: newton.growth.iter().map(|growth| growth.log10()).sum(),
-        condition: newton.condition(),
-        neutral: newton.neutral(&options.stations),
-        intervals: newton.nodes.sigma,
+    let states = options.stations.iter().map(|&sigma| end.near.at(sigma));
+    let near = Trajectory::new(&equations, options.stations.to_vec(), states.collect());
+    Err(Failure {
+        reason: end.reason,
+        part: end.part,
+        rods: near.shape(&equations),
         work,
     })
 }
 
-/// Solves at two tolerances.
-fn settle(newton: &mut Newton, options: &Options) -> Result<(Trajectory, Trajectory), Reason> {
-    let mut at = |tolerance: f64| {
-        let solved = newton.solve(tolerance);
-        solved.map_err(|stuck| newton.reason(stuck))?;
-        Trajectory::sampled(
-            newton.equations,
-            &newton.nodes,
-            &options.stations,
-            tolerance,
-        )
-        .map_err(|Unbounded { sigma }| Reason::Unbounded { sigma })
+fn solve_near(
+    equations: &Equations,
+    near: &Trajectory,
+    tolerance: f64,
+    options: &Options,
+    work: &mut Work,
+) -> Result<Solution, Reason> {
+    let stations = options.stations;
+    let mut newton = Newton::near(equations, near, options.intervals, work)?;
+    let mut at = |tolerance: f64| -> Result<Trajectory, Reason> {
+        newton.solve(tolerance)?;
+        let sampled = Trajectory::sampled(equations, &newton.nodes, stations, tolerance);
+        Ok(sampled?)
     };
-    Ok((at(COARSER * options.tolerance)?, at(options.tolerance)?))
+    let (coarse, fine) = (at(COARSER * tolerance)?, at(tolerance)?);
+    let (rods, tip) = (fine.shape(equations), fine.tip());
+    let energy = tip[tip.len() - 1] + equations.tip_potential(tip);
+    // Steps that end at the same stations share their errors, which the
+    // difference then does not show: it is not less than a local error.
+    let difference = Difference::between(&coarse.shape(equations), &rods);
+    let (length, force) = (equations.length, equations.force);
+    let error = Difference {
+        position: difference.position + tolerance * length,
+        rotation: difference.rotation + tolerance,
+        force: difference.force + tolerance * newton.units.total_force() * force,
+        moment: difference.moment + tolerance * newton.units.largest_moment() * force * length,
+    };
+    Ok(Solution {
+        stations: stations.to_vec(),
+        error,
+        rods,
+        energy: energy * force * length,
+        defect: newton.defect,
+        growth: newton.growth.iter().map(|growth| growth.log10()).sum(),
+        condition: newton.condition(),
+        neutral: newton.neutral(stations),
+        intervals: newton.nodes.sigma,
+        work: Work::default(),
+    })
 }

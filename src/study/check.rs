@@ -248,9 +248,12 @@ fn shoot(scenario: &Scenario, relaxed: &Equilibrium, intervals: Option<usize>) -
         stations: &relaxed.shape.stations,
         rods: &relaxed.shape.rods,
     };
-    let accuracy = relaxed.accuracy.tolerance;
-    let (found, wall_seconds) =
-        timed(|| bvp::solve_within(scenario, start, accuracy, intervals, grid.sigma()));
+    let precision = bvp::Precision::Error(relaxed.accuracy.tolerance);
+    let options = bvp::Options {
+        intervals,
+        ..bvp::Options::new(start, grid.sigma(), precision)
+    };
+    let (found, wall_seconds) = timed(|| bvp::solve(scenario, &options));
     let rods = found.as_ref().map_or(&[][..], |solution| &solution.rods);
     let ends = rods.iter().take(relaxed.tips.len());
     Shot {

@@ -1,7 +1,7 @@
 //! Leaves by shooting, alone and beside the relaxed ones.
 
 use glam::DVec3;
-use leafdyn::internals::bvp::{self, Failure, Solution, Start};
+use leafdyn::internals::bvp::{self, Failure, Precision::LocalError, Solution, Start};
 use leafdyn::relax::{Equilibrium, RodShape};
 use leafdyn::scenario::Scenario;
 
@@ -27,21 +27,16 @@ pub fn shoot_over(
         rods: &leaf.shape.rods,
     };
     let options = bvp::Options {
-        tolerance: SHARP,
         intervals,
-        stations: leaf.shape.stations.clone(),
+        ..bvp::Options::new(start, &leaf.shape.stations, LocalError(SHARP))
     };
-    bvp::solve(scenario, start, &options)
+    bvp::solve(scenario, &options)
 }
 
 /// Solves the boundary-value problem without any start.
 pub fn shoot_alone(scenario: &Scenario, stations: &[f64]) -> Result<Solution, Failure> {
-    let options = bvp::Options {
-        tolerance: SHARP,
-        intervals: None,
-        stations: stations.to_vec(),
-    };
-    bvp::solve(scenario, Start::Arcs, &options)
+    let options = bvp::Options::new(Start::Arcs, stations, LocalError(SHARP));
+    bvp::solve(scenario, &options)
 }
 
 /// What shooting has found; the reason where it has not.

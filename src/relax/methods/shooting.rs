@@ -96,14 +96,12 @@ fn shoot(
 ) -> Equilibrium {
     let clock = Instant::now();
     let grid = station_grid(scenario);
-    let found = bvp::solve_before(
-        scenario,
-        start,
-        tolerance,
+    let asked = bvp::Options {
         intervals,
-        grid.sigma(),
-        &options.limit,
-    );
+        limit: options.limit.clone(),
+        ..bvp::Options::new(start, grid.sigma(), bvp::Precision::Error(tolerance))
+    };
+    let found = bvp::solve(scenario, &asked);
     let work = match &found {
         Ok(solution) => solution.work,
         Err(failure) => failure.work,

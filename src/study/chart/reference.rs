@@ -48,7 +48,8 @@ pub fn find(
     let known = relaxed.iter().flat_map(|leaf| &leaf.stations);
     let stations = union(wanted.into_iter().chain(known.copied()).collect());
     let start = relaxed.as_ref().map_or(Start::Arcs, Answer::as_start);
-    let solved = bvp::solve_within(scenario, start, SMALLEST_TOLERANCE, None, &stations);
+    let precision = bvp::Precision::Error(SMALLEST_TOLERANCE);
+    let solved = bvp::solve(scenario, &bvp::Options::new(start, &stations, precision));
     let neutral = match &solved {
         Ok(solution) => solution.neutral.as_ref().map(ToString::to_string),
         Err(_) => None,

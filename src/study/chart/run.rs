@@ -38,9 +38,9 @@ fn shoot_from_rest(scenario: &Scenario, accuracy: f64) -> Result<(Answer, f64), 
     };
     let (found, seconds) = timed(|| {
         let rest = Answer::relaxed(scenario, &options)?;
-        let shot = rest
-            .at_rest()
-            .then(|| bvp::solve_within(scenario, rest.as_start(), accuracy, None, &rest.stations));
+        let precision = bvp::Precision::Error(accuracy);
+        let asked = bvp::Options::new(rest.as_start(), &rest.stations, precision);
+        let shot = rest.at_rest().then(|| bvp::solve(scenario, &asked));
         Ok((rest, shot))
     });
     let (rest, shot) = found?;

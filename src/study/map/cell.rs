@@ -131,7 +131,12 @@ impl<'a> Cell<'a> {
         let grid = fine_grid(self.scenario, segments);
         let others = motion::stations(self.scenario, self.knobs);
         let stations = union([grid.sigma(), &others].concat());
-        let solved = bvp::solve_before(self.scenario, start, accuracy, intervals, &stations, limit);
+        let options = bvp::Options {
+            intervals,
+            limit: limit.clone(),
+            ..bvp::Options::new(start, &stations, bvp::Precision::Error(accuracy))
+        };
+        let solved = bvp::solve(self.scenario, &options);
         let solution = solved.map_err(|failure| {
             let outcome = match failure.reason {
                 Reason::Unbounded { .. } => MapOutcome::Diverged,
