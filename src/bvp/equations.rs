@@ -16,7 +16,7 @@ use glam::{DMat3, DQuat, DVec3};
 use super::arcs::{self, Arc};
 pub use super::state::{RodState, STATE, TANGENT};
 use crate::limit::Limit;
-use crate::scenario::{Profile, Scenario};
+use crate::scenario::{Profile, Scenario, longest};
 
 /// The boundary-value problem of a leaf, dimensionless.
 ///
@@ -78,7 +78,7 @@ impl<'a> Equations<'a> {
     /// Of a checked scenario.
     pub fn new(scenario: &'a Scenario) -> Self {
         let rods = &scenario.rods;
-        let length = rods.iter().fold(0.0_f64, |m, rod| m.max(rod.length));
+        let length = longest(rods);
         let logs: f64 = rods
             .iter()
             .flat_map(|rod| &rod.couple_stiffness[1..])

@@ -5,7 +5,7 @@ use super::equations::Equations;
 use super::newton::{Newton, Work};
 use super::solution::{Failure, Options, Precision, Reason, Solution, Start};
 use super::trajectory::Trajectory;
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, longest};
 use crate::shape::Difference;
 
 /// The error is estimated by comparing with a solution whose local errors may
@@ -33,8 +33,7 @@ pub fn solve(scenario: &Scenario, options: &Options) -> Result<Solution, Failure
             return solve_once(scenario, options.start, tolerance, options);
         }
     };
-    let lengths = scenario.rods.iter().map(|rod| rod.length);
-    let longest = lengths.fold(0.0, f64::max);
+    let longest = longest(&scenario.rods);
     let mut tolerance = (LOCAL_PART * accuracy).clamp(LEAST_LOCAL, MOST_LOCAL);
     let mut solution = solve_once(scenario, options.start, tolerance, options)?;
     while solution.error.position > accuracy * longest && tolerance > LEAST_LOCAL {

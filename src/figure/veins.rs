@@ -64,9 +64,8 @@ pub struct Veins {
 
 impl Veins {
     pub fn of(equilibrium: &Equilibrium) -> Self {
-        let lengths = equilibrium.shape.rods.iter().map(|rod| rod.length);
-        let longest = lengths.fold(0.0, f64::max);
-        Veins::through(&equilibrium.shape.curves, &equilibrium.tips, longest)
+        let shape = &equilibrium.shape;
+        Veins::through(&shape.curves, &equilibrium.tips, shape.longest())
     }
 
     /// Veins through these points, with the longest rod as the unit.

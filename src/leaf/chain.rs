@@ -30,7 +30,7 @@ pub const fn first(b: usize) -> usize {
 }
 
 /// The 3 x 3 matrix of a tip, rows first.
-pub type Tip = [[f64; 3]; 3];
+pub type Tip = Block<3>;
 
 /// The matrix of one rod, nodes 1 to n, without the coupling to others.
 #[derive(Clone, Debug)]
@@ -249,7 +249,7 @@ impl RodMatrix {
         }
     }
 
-    /// The chain of a rod in space.
+    /// The chain, of a rod in space.
     pub fn spatial(&self) -> &Chain<SPATIAL> {
         match self {
             RodMatrix::Spatial(chain, _) => chain,
@@ -292,27 +292,11 @@ impl RodMatrix {
 
 /// Solves a symmetric 3 x 3 system by L D L^T; `None` if not positive definite.
 #[derive(Clone, Copy, Debug)]
-pub struct TipFactor([[f64; 3]; 3]);
+pub struct TipFactor(Tip);
 
 impl TipFactor {
     pub fn new(mut a: Tip) -> Option<Self> {
-        for k in 0..3 {
-            if a[k][k].is_nan() || a[k][k] <= 0.0 {
-                return None;
-            }
-            let inverse = 1.0 / a[k][k];
-            for r in k + 1..3 {
-                let l = a[k][r] * inverse;
-                for c in r..3 {
-                    a[r][c] -= l * a[k][c];
-                }
-            }
-            for c in k + 1..3 {
-                a[k][c] *= inverse;
-            }
-            a[k][k] = inverse;
-        }
-        Some(TipFactor(a))
+        eliminate(&mut a, 3, false).then_some(TipFactor(a))
     }
 
     pub fn solve(&self, mut b: [f64; 3]) -> [f64; 3] {

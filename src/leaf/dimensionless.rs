@@ -2,7 +2,7 @@
 
 use crate::rod::Section;
 use crate::rotation;
-use crate::scenario::{Rod, Scale, Scenario};
+use crate::scenario::{Dynamics, Profile, Rod, Scale, Scenario};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -24,15 +24,22 @@ pub struct Leaf {
     pub(super) planar: bool,
     /// The units.
     pub scale: Scale,
-    /// Gravity per unit length.
-    pub gravity: DVec3,
-    /// Dead force on the tip.
-    pub tip_force: DVec3,
-    /// Dead moment on the tip of a single rod.
-    pub tip_moment: DVec3,
+    /// The loads at rest.
+    pub loads: Loads,
     kinks: Vec<f64>,
     /// The smallest couple stiffness, mid-rod.
     softest: f64,
+}
+
+/// Dead loads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Loads {
+    /// Gravity per unit length.
+    pub gravity: DVec3,
+    /// Force on the joint tip, or on every free one.
+    pub tip_force: DVec3,
+    /// Moment on the tip of a single rod.
+    pub tip_moment: DVec3,
 }
 
 impl Leaf {
@@ -44,42 +51,38 @@ impl Leaf {
     /// The same in given units, in which leaves that differ in length or
     /// stiffness can be compared.
     pub fn in_units(scenario: &Scenario, scale: Scale) -> Self {
-        let length = scale.length;
-        let mut kinks: Vec<f64> = scenario
-            .rods
-            .iter()
-            .flat_map(|rod| {
-                [
-                    &rod.couple_stiffness,
-                    &rod.force_stiffness,
-                    &rod.rest_curvature,
-                ]
-                .into_iter()
-                .flatten()
-                .chain([&rod.rest_stretch])
-                .flat_map(|profile| profile.kinks().iter().copied())
-            })
-            .collect();
-        // So are those of the masses, which only matter to a leaf that moves.
-        let dynamics = &scenario.dynamics;
-        let masses = dynamics.density.iter().chain(&dynamics.rotary_inertia);
-        kinks.extend(masses.flat_map(|profile| profile.kinks()));
+        let rods = scenario.rods.iter();
+        let profiles = rods.flat_map(|rod| {
+            let triples = [
+                &rod.couple_stiffness,
+                &rod.force_stiffness,
+                &rod.rest_curvature,
+            ];
+            triples.into_iter().flatten().chain([&rod.rest_stretch])
+        });
+        // Those of the masses only matter to a leaf that moves.
+        let Dynamics {
+            density,
+            rotary_inertia,
+            ..
+        } = &scenario.dynamics;
+        let profiles = profiles.chain(density).chain(rotary_inertia);
+        let mut kinks: Vec<f64> = profiles.flat_map(Profile::kinks).copied().collect();
         kinks.sort_by(f64::total_cmp);
         kinks.dedup();
-        let softest = scenario
-            .rods
-            .iter()
-            .flat_map(|rod| &rod.couple_stiffness)
-            .fold(f64::INFINITY, |m, profile| m.min(profile.at(0.5)));
+        let couple = scenario.rods.iter().flat_map(|rod| &rod.couple_stiffness);
+        let softest = couple.fold(f64::INFINITY, |m, profile| m.min(profile.at(0.5)));
         let vector = |a: [f64; 3], unit: f64| DVec3::from_array(a) / unit;
         Leaf {
             scenario: Arc::new(scenario.clone()),
             mirrored: false,
             planar: false,
             scale,
-            gravity: vector(scenario.gravity, scale.force() / length),
-            tip_force: vector(scenario.tip_force, scale.force()),
-            tip_moment: vector(scenario.tip_moment, scale.moment()),
+            loads: Loads {
+                gravity: vector(scenario.gravity, scale.force() / scale.length),
+                tip_force: vector(scenario.tip_force, scale.force()),
+                tip_moment: vector(scenario.tip_moment, scale.moment()),
+            },
             kinks,
             softest: softest / scale.stiffness,
         }
@@ -93,11 +96,7 @@ impl Leaf {
     /// Number of rods: all, or those of the half.
     pub fn rods(&self) -> usize {
         let rods = self.scenario.rods.len();
-        if self.mirrored {
-            rods.div_ceil(2)
-        } else {
-            rods
-        }
+        rods.div_ceil(if self.mirrored { 2 } else { 1 })
     }
 
     /// Whether it is solved in its plane.
@@ -150,9 +149,7 @@ impl Leaf {
     /// `width` of the rod.
     pub fn section(&self, j: usize, sigma: f64, width: f64) -> Section {
         let rod = self.rod(j);
-        let at = |p: &[crate::scenario::Profile; 3]| {
-            DVec3::new(p[0].at(sigma), p[1].at(sigma), p[2].at(sigma))
-        };
+        let at = |p: &[Profile; 3]| DVec3::from_array(p.each_ref().map(|p| p.at(sigma)));
         let share = self.share(j);
         Section {
             ds: self.length(j) * width,

@@ -1,7 +1,7 @@
 //! The discretised leaf: its segments, loads and coupling.
 
 use super::chain::{Block, turns};
-use super::dimensionless::Leaf;
+use super::dimensionless::{Leaf, Loads};
 use super::grid::Grid;
 use super::state::State;
 use crate::rod::{Ends, Section, Segment};
@@ -32,17 +32,6 @@ pub struct DiscreteLeaf {
     pub loads: Loads,
 }
 
-/// Dead loads.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Loads {
-    /// Gravity per unit length.
-    pub gravity: DVec3,
-    /// Force on the joint tip, or on every free one.
-    pub tip_force: DVec3,
-    /// Moment on the tip of a single rod.
-    pub tip_moment: DVec3,
-}
-
 impl DiscreteLeaf {
     /// Discretises `leaf` on `grid`.
     pub fn new(leaf: &Leaf, grid: Grid) -> Self {
@@ -61,11 +50,7 @@ impl DiscreteLeaf {
             coupling,
             weights,
             load_factor: 1.0,
-            loads: Loads {
-                gravity: leaf.gravity,
-                tip_force: leaf.tip_force,
-                tip_moment: leaf.tip_moment,
-            },
+            loads: leaf.loads,
         }
     }
 
@@ -107,12 +92,14 @@ impl DiscreteLeaf {
     /// squared frequency of any bending mode, and above what rounding and
     /// unfinished iterations make of a neutral mode's zero.
     pub fn neutral_shift(&self) -> f64 {
-        let stiffest = self
-            .sections
-            .iter()
-            .fold(0.0_f64, |m, s| m.max(s.condensing.max_element()));
-        let rounding = f64::EPSILON * stiffest * (self.segments() * self.segments()) as f64;
-        1e-7 + 4.0 * rounding
+        1e-7 + 4.0 * self.rounding()
+    }
+
+    /// What rounding may do to the eigenvalues of the matrix.
+    pub fn rounding(&self) -> f64 {
+        let sections = self.sections.iter();
+        let stiffest = sections.fold(0.0_f64, |m, s| m.max(s.condensing.max_element()));
+        f64::EPSILON * stiffest * (self.segments() * self.segments()) as f64
     }
 
     /// Segments per rod.

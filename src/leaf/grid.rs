@@ -17,59 +17,47 @@ impl Grid {
     /// `segments` segments shared out among the panels between `kinks`
     /// (ascending, inside (0, 1)) by their widths, at least one each.
     pub fn new(segments: usize, kinks: &[f64]) -> Self {
-        let edges: Vec<f64> = std::iter::once(0.0)
-            .chain(kinks.iter().copied())
-            .chain(std::iter::once(1.0))
-            .collect();
+        let edges = [&[0.0], kinks, &[1.0]].concat();
         let widths: Vec<f64> = edges.windows(2).map(|w| w[1] - w[0]).collect();
         let mut counts = vec![1_usize; widths.len()];
         for _ in widths.len()..segments {
             // The next segment goes where the segments are longest.
-            let longest = (0..widths.len())
-                .max_by(|&a, &b| {
-                    (widths[a] / counts[a] as f64).total_cmp(&(widths[b] / counts[b] as f64))
-                })
-                .expect("at least one panel");
-            counts[longest] += 1;
+            let width = |panel: usize| widths[panel] / counts[panel] as f64;
+            let longest = (0..widths.len()).max_by(|&a, &b| width(a).total_cmp(&width(b)));
+            counts[longest.expect("at least one panel")] += 1;
         }
-        let (mut sigma, mut each) = (vec![0.0], Vec::new());
-        for ((start, width), count) in edges.iter().zip(&widths).zip(&counts) {
-            sigma.extend((1..=*count).map(|i| start + width * i as f64 / *count as f64));
-            each.extend(std::iter::repeat_n(width / *count as f64, *count));
+        let mut grid = Grid {
+            sigma: vec![0.0],
+            widths: Vec::new(),
+        };
+        for ((start, width), count) in edges.iter().zip(widths).zip(counts) {
+            let nodes = (1..=count).map(|i| start + width * i as f64 / count as f64);
+            grid.sigma.extend(nodes);
+            grid.widths.extend(vec![width / count as f64; count]);
         }
-        *sigma.last_mut().expect("at least one node") = 1.0;
-        Grid {
-            sigma,
-            widths: each,
-        }
+        *grid.sigma.last_mut().expect("at least one node") = 1.0;
+        grid
     }
 
     /// The same grid with every segment halved.
     pub fn refined(&self) -> Self {
-        let mut sigma = Vec::with_capacity(2 * self.sigma.len() - 1);
-        for pair in self.sigma.windows(2) {
-            sigma.extend([pair[0], 0.5 * (pair[0] + pair[1])]);
-        }
-        sigma.push(1.0);
-        let widths = self.widths.iter().flat_map(|width| [0.5 * width; 2]);
-        Grid {
-            sigma,
-            widths: widths.collect(),
-        }
+        self.cut(|a, b, _| [a, 0.5 * (a + b)])
     }
 
     /// The same grid with every segment cut in three.
     pub fn tripled(&self) -> Self {
-        let mut sigma = Vec::with_capacity(3 * self.sigma.len() - 2);
-        for (pair, width) in self.sigma.windows(2).zip(&self.widths) {
-            let third = width / 3.0;
-            sigma.extend([pair[0], pair[0] + third, pair[1] - third]);
-        }
-        sigma.push(1.0);
-        let widths = self.widths.iter().flat_map(|width| [width / 3.0; 3]);
+        self.cut(|a, b, third| [a, a + third, b - third])
+    }
+
+    /// With every segment cut in N, at what `nodes` makes of its ends and the
+    /// new width.
+    fn cut<const N: usize>(&self, nodes: impl Fn(f64, f64, f64) -> [f64; N]) -> Self {
+        let widths = self.widths.iter().map(|width| width / N as f64);
+        let segments = self.sigma.windows(2).zip(widths.clone());
+        let starts = segments.flat_map(|(ends, width)| nodes(ends[0], ends[1], width));
         Grid {
-            sigma,
-            widths: widths.collect(),
+            sigma: starts.chain([1.0]).collect(),
+            widths: widths.flat_map(|width| [width; N]).collect(),
         }
     }
 
@@ -95,13 +83,8 @@ impl Grid {
 
     /// Trapezoidal weight of node `i` as a fraction of the length.
     pub fn weight(&self, i: usize) -> f64 {
-        let left = if i > 0 { self.width(i - 1) } else { 0.0 };
-        let right = if i < self.segments() {
-            self.width(i)
-        } else {
-            0.0
-        };
-        0.5 * (left + right)
+        let width = |i: usize| self.widths.get(i).copied().unwrap_or(0.0);
+        0.5 * (width(i.wrapping_sub(1)) + width(i))
     }
 }
 
@@ -110,23 +93,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn panels_meet_at_the_kinks() {
-        let grid = Grid::new(8, &[0.3]);
-        assert_eq!(grid.segments(), 8);
-        assert!(grid.sigma().contains(&0.3));
-        assert!(grid.refined().sigma().contains(&0.3));
-        assert_eq!(grid.refined().segments(), 16);
-    }
-
-    #[test]
-    fn weights_add_to_one() {
+    fn panels_meet_at_the_kinks_and_weights_add_to_one() {
         let grid = Grid::new(11, &[0.2, 0.25, 0.9]);
-        let sum: f64 = (0..=11).map(|i| grid.weight(i)).sum();
-        assert!((sum - 1.0).abs() < 1e-15);
-    }
-
-    #[test]
-    fn more_kinks_than_segments_still_gives_one_segment_a_panel() {
+        for (grid, segments) in [(grid.refined(), 22), (grid.tripled(), 33), (grid, 11)] {
+            assert_eq!(grid.segments(), segments);
+            assert!(
+                [0.2, 0.25, 0.9]
+                    .iter()
+                    .all(|kink| grid.sigma().contains(kink))
+            );
+            let sum: f64 = (0..=segments).map(|i| grid.weight(i)).sum();
+            assert!((sum - 1.0).abs() < 1e-15);
+        }
+        // However many kinks there are, every panel has a segment.
         assert_eq!(Grid::new(1, &[0.25, 0.5]).segments(), 3);
     }
 }

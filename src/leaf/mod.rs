@@ -12,8 +12,8 @@ mod state;
 mod system;
 
 pub use crate::scenario::Scale;
-pub use dimensionless::Leaf;
-pub use discrete::{DiscreteLeaf, Loads};
+pub use dimensionless::{Leaf, Loads};
+pub use discrete::DiscreteLeaf;
 pub use grid::Grid;
 pub use reduce::{half_of, whole_of};
 pub use sparse::{Bordered, SparseError, SparseFactor, SparsePattern};

@@ -58,17 +58,17 @@ impl SparsePattern {
 
     /// The same with so many dense rows and columns at the end.
     pub fn bordered(system: &System, rows: usize) -> Result<Self, SparseError> {
-        let (rods, n) = (system.rods.len(), system.segments());
+        let (rods, n) = (system.rods.len(), system.segments);
         let mut nodes = Vec::with_capacity(rods * n);
         dissect((0, rods), (0, n), &mut nodes);
         let mut first = vec![0; rods * n];
         let mut size = 0;
         for (j, i) in nodes {
             first[j * n + i] = size;
-            size += if system.joined() && i + 1 == n { 3 } else { 6 };
+            size += if system.joined && i + 1 == n { 3 } else { 6 };
         }
-        let tip = system.joined().then_some(size);
-        size += if system.joined() { 3 } else { 0 };
+        let tip = system.joined.then_some(size);
+        size += if system.joined { 3 } else { 0 };
         let border = size;
         size += rows;
         let unknowns = Unknowns {
@@ -221,11 +221,22 @@ impl SparseFactor<'_> {
     pub fn solve(&mut self, system: &mut System, inertia: Option<(&[Vec<Increment>], f64)>) {
         let unknowns = &self.pattern.unknowns;
         let mut b = vec![0.0; self.pattern.size];
-        system.each_rhs(inertia, |j, i, rhs| unknowns.gather(j, i, rhs, &mut b));
+        for (j, rod) in system.rods.iter().enumerate() {
+            for (i, mut rhs) in rod.rhs.iter().copied().enumerate() {
+                if let Some((velocity, per_step)) = inertia {
+                    for c in 0..6 {
+                        rhs[c] += rod.mass[i][c / 3] * velocity[j][i][c] * per_step;
+                    }
+                }
+                unknowns.gather(j, i, &rhs, &mut b);
+            }
+        }
         self.solve_vector(&mut b);
-        system.each_solution(|j, i, solution: &mut Increment| {
-            *solution = unknowns.scatter(j, i, &b);
-        });
+        for (j, rod) in system.rods.iter_mut().enumerate() {
+            for (i, solution) in rod.solution.iter_mut().enumerate() {
+                *solution = unknowns.scatter(j, i, &b);
+            }
+        }
     }
 
     /// Solves the bordered system for forces `rhs`, and `below` in the rows of
@@ -240,14 +251,10 @@ impl SparseFactor<'_> {
         }
         b[self.pattern.border..].copy_from_slice(below);
         self.solve_vector(&mut b);
-        let nodes = |j: usize, rod: &Vec<Increment>| {
-            let nodes = 0..rod.len();
-            nodes.map(|i| unknowns.scatter(j, i, &b)).collect()
-        };
+        let n = self.pattern.unknowns.segments;
+        let nodes = |j: usize| (0..n).map(|i| unknowns.scatter(j, i, &b)).collect();
         Bordered {
-            increments: (rhs.iter().enumerate())
-                .map(|(j, rod)| nodes(j, rod))
-                .collect(),
+            increments: (0..rhs.len()).map(nodes).collect(),
             multipliers: b[self.pattern.border..].to_vec(),
         }
     }
@@ -315,7 +322,7 @@ fn triangle(
     shift: f64,
     side: Side,
 ) -> Result<SparseColMat<usize, f64>, SparseError> {
-    let n = system.segments();
+    let n = system.segments;
     let mut entries = Vec::new();
     let size = first_border + border.len();
     let mut add = |a: usize, b: usize, value: f64| {

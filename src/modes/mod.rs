@@ -126,13 +126,6 @@ pub fn lowest(
     Ok(pairs)
 }
 
-/// What rounding may do to the eigenvalues of the matrix.
-fn rounding_of_matrix(leaf: &DiscreteLeaf) -> f64 {
-    let sections = leaf.sections.iter();
-    let stiffest = sections.fold(0.0_f64, |m, s| m.max(s.condensing.max_element()));
-    f64::EPSILON * stiffest * (leaf.segments() * leaf.segments()) as f64
-}
-
 impl Vibration<'_> {
     /// K - shift M, factorised.
     fn factorize(&mut self, shift: f64) -> Result<SparseFactor<'_>, SparseError> {
@@ -193,7 +186,7 @@ impl Vibration<'_> {
         lowest: f64,
     ) -> Result<Missing, ModesError> {
         let last = found[count - 1].eigenvalue;
-        let rounding = rounding_of_matrix(self.leaf);
+        let rounding = self.leaf.rounding();
         for part in BELOW {
             let below = last - (part * (last - lowest)).max(4.0 * rounding);
             let there = self.factorize(below)?.negative();

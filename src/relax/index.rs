@@ -18,7 +18,7 @@ const FINEST: usize = 1024;
 /// count does not settle.
 pub fn index_near(scenario: &Scenario, grid: Grid, rods: &[RodShape]) -> Option<usize> {
     let leaf = Leaf::new(scenario);
-    if leaf.tip_moment != DVec3::ZERO {
+    if leaf.loads.tip_moment != DVec3::ZERO {
         return None;
     }
     let mut discrete = DiscreteLeaf::new(&leaf, grid);

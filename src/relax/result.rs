@@ -237,7 +237,7 @@ pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) 
                 (_, Some(_)) => Outcome::ConvergedAfterSaddle,
                 _ => Outcome::Converged,
             },
-            run.index.is_none().then(|| match run.leaf.tip_moment == DVec3::ZERO {
+            run.index.is_none().then(|| match run.leaf.loads.tip_moment == DVec3::ZERO {
                 true => "the leaf is too large to count its negative eigenvalues: its stability is not known".into(),
                 false => "a dead moment has no potential, so that no count of eigenvalues decides stability: it is not stated".into(),
             }),

@@ -73,7 +73,7 @@ pub fn check_segments(
 
 /// Segments of the coarsest grid.
 pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
-    let moment = leaf.tip_moment.length();
+    let moment = leaf.loads.tip_moment.length();
     let turn = (0..leaf.rods())
         .map(|j| {
             let section = leaf.section(j, 0.5, 1.0);

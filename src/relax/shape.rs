@@ -26,7 +26,7 @@ pub fn node(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> NodeState
         let right = if i < n { leaf.grid.width(i) } else { 0.0 };
         let mut load = leaf.load(state, j, i).0;
         if i == n && (j == 0 || !leaf.leaf.joined()) {
-            load -= leaf.leaf.tip_force;
+            load -= leaf.leaf.loads.tip_force;
         }
         (
             carried(i - 1) - load * (left / (left + right)),

@@ -56,19 +56,9 @@ pub fn seconds(time: f64) -> String {
     }
 }
 
-/// Length of the longest rod.
-pub fn longest_rod(equilibrium: &Equilibrium) -> f64 {
-    equilibrium
-        .shape
-        .rods
-        .iter()
-        .map(|rod| rod.length)
-        .fold(0.0, f64::max)
-}
-
 /// As many decimals of a position as the error leaves, and one more.
 pub fn decimals(equilibrium: &Equilibrium) -> usize {
-    let relative = 10f64.powi(-DIGITS) * longest_rod(equilibrium);
+    let relative = 10f64.powi(-DIGITS) * equilibrium.shape.longest();
     let error = equilibrium
         .accuracy
         .error_estimate

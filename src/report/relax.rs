@@ -6,7 +6,7 @@ use crate::relax::{Equilibrium, Mode, Outcome};
 use crate::report::words::{shooting, verdict};
 
 use super::numbers::{
-    bound, brief, decimals, eigenvalues, grids, longest_rod, point, seconds, significant, veins,
+    bound, brief, decimals, eigenvalues, grids, point, seconds, significant, veins,
 };
 use super::table::{lay_out, written};
 
@@ -70,7 +70,7 @@ fn error(equilibrium: &Equilibrium) -> String {
         Some(count) => format!("by {}", shooting(count)),
         None => format!("from {}", grids(equilibrium)),
     };
-    let wanted = bound(equilibrium.accuracy.tolerance * longest_rod(equilibrium));
+    let wanted = bound(equilibrium.accuracy.tolerance * equilibrium.shape.longest());
     match equilibrium.accuracy.error_estimate {
         Some(error) => format!(
             "positions within {} (wanted {wanted}), {source}",

@@ -11,7 +11,7 @@ use crate::bvp::{Solution, Start};
 use crate::leaf::{Grid, Leaf};
 use crate::limit::Limit;
 use crate::relax::{self, Equilibrium, Method, Options, Outcome, RelaxError, Work, index_near};
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, longest};
 use crate::shape::{Difference, RodShape};
 use crate::undulation::Undulation;
 
@@ -78,7 +78,7 @@ impl Answer {
     pub fn of_solution(scenario: &Scenario, solution: Solution, accuracy: f64) -> Self {
         let error = solution.error.position;
         Answer {
-            outcome: match error > accuracy * longest(scenario) {
+            outcome: match error > accuracy * longest(&scenario.rods) {
                 true => Outcome::ToleranceNotReached,
                 false => Outcome::Converged,
             },
@@ -146,12 +146,6 @@ pub fn timed<T>(run: impl FnOnce() -> T) -> (T, f64) {
     (found, clock.elapsed().as_secs_f64())
 }
 
-/// Length of the longest rod: the unit of all relative errors.
-pub fn longest(scenario: &Scenario) -> f64 {
-    let lengths = scenario.rods.iter().map(|rod| rod.length);
-    lengths.fold(0.0, f64::max)
-}
-
 /// A grid of at least so many segments on which eigenvalues can be counted.
 pub fn fine_grid(scenario: &Scenario, segments: usize) -> Grid {
     let leaf = Leaf::new(scenario);
@@ -203,7 +197,7 @@ pub fn grid_error(
         leaf.outcome.is_success().then_some(leaf)
     };
     let apart = on(segments)?.distance(&on(2 * segments)?)?;
-    Some((SAFETY * apart).min(SAME_PLACE * longest(scenario)))
+    Some((SAFETY * apart).min(SAME_PLACE * longest(&scenario.rods)))
 }
 
 /// Places in two ascending lists of the stations that are in both.

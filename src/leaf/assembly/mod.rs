@@ -14,9 +14,8 @@ impl DiscreteLeaf {
     /// Assembles matrix and right-hand side of Newton's equations into
     /// `system`.
     pub fn assemble(&self, state: &State, system: &mut System) -> Sums {
-        let parallel = system.parallel();
         system.moment = self.tip_moment();
-        each_rod(parallel, &mut system.rods, |j, rod| {
+        each_rod(system.parallel, &mut system.rods, |j, rod| {
             let rhs = &mut rod.rhs;
             rod.sums = match &mut rod.matrix {
                 RodMatrix::Spatial(chain, _) => {

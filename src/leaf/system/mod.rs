@@ -52,10 +52,10 @@ pub(crate) struct RodSystem {
 pub struct System {
     pub(crate) rods: Vec<RodSystem>,
     p: Vec<Vec<Increment>>,
-    joined: bool,
+    pub(super) joined: bool,
     coupled: bool,
-    parallel: bool,
-    segments: usize,
+    pub(super) parallel: bool,
+    pub(super) segments: usize,
     tip: Option<TipFactor>,
     /// E: coupling of gap g at nodes 1..n, none where the leaf has none.
     pub(super) springs: Vec<Vec<DVec3>>,
@@ -68,11 +68,11 @@ pub struct System {
 /// that the result does not depend on the number of threads.
 pub(super) fn each_rod<T: Send>(parallel: bool, rods: &mut [T], f: impl Fn(usize, &mut T) + Sync) {
     if parallel {
-        rods.par_iter_mut()
-            .enumerate()
-            .for_each(|(j, rod)| f(j, rod));
+        let rods = rods.par_iter_mut().enumerate();
+        rods.for_each(|(j, rod)| f(j, rod));
     } else {
-        rods.iter_mut().enumerate().for_each(|(j, rod)| f(j, rod));
+        let rods = rods.iter_mut().enumerate();
+        rods.for_each(|(j, rod)| f(j, rod));
     }
 }
 
@@ -84,6 +84,14 @@ impl System {
         let joined = leaf.leaf.joined() && rods > 1;
         let zeros = || vec![[0.0; 6]; n];
         let coupled = leaf.coupled();
+        let springs = |g: usize| {
+            // A node in the plane of the mirror does not answer a pull across it.
+            let answer = match leaf.leaf.in_plane(g) {
+                true => DVec3::new(1.0, 0.0, 1.0),
+                false => DVec3::ONE,
+            };
+            (1..=n).map(|i| answer * leaf.spring(g - 1, i)).collect()
+        };
         System {
             rods: (0..rods)
                 .map(|j| RodSystem {
@@ -105,20 +113,9 @@ impl System {
             parallel: rods * n >= PARALLEL_NODES && rods > 1 && rayon::current_num_threads() > 1,
             segments: n,
             tip: None,
-            springs: if coupled {
-                (1..rods)
-                    .map(|g| {
-                        // A node in the plane of the mirror does not answer a
-                        // pull across it.
-                        let answer = match leaf.leaf.in_plane(g) {
-                            true => DVec3::new(1.0, 0.0, 1.0),
-                            false => DVec3::ONE,
-                        };
-                        (1..=n).map(|i| answer * leaf.spring(g - 1, i)).collect()
-                    })
-                    .collect()
-            } else {
-                Vec::new()
+            springs: match coupled {
+                true => (1..rods).map(springs).collect(),
+                false => Vec::new(),
             },
             moment: DVec3::ZERO,
         }
@@ -129,51 +126,13 @@ impl System {
         matches!(self.rods[0].matrix, RodMatrix::Spatial(..))
     }
 
-    pub(super) fn joined(&self) -> bool {
-        self.joined
-    }
-
-    pub(super) fn segments(&self) -> usize {
-        self.segments
-    }
-
-    /// Calls `f` with rod, node (from 0) and right-hand side, `inertia` added.
-    pub(super) fn each_rhs(
-        &self,
-        inertia: Option<(&[Vec<Increment>], f64)>,
-        mut f: impl FnMut(usize, usize, &Increment),
-    ) {
-        for (j, rod) in self.rods.iter().enumerate() {
-            for (i, rhs) in rod.rhs.iter().enumerate() {
-                let mut rhs = *rhs;
-                if let Some((velocity, per_step)) = inertia {
-                    for c in 0..6 {
-                        rhs[c] += rod.mass[i][c / 3] * velocity[j][i][c] * per_step;
-                    }
-                }
-                f(j, i, &rhs);
-            }
-        }
-    }
-
-    /// Calls `f` with rod, node (from 0) and solution.
-    pub(super) fn each_solution(&mut self, mut f: impl FnMut(usize, usize, &mut Increment)) {
-        for (j, rod) in self.rods.iter_mut().enumerate() {
-            for (i, solution) in rod.solution.iter_mut().enumerate() {
-                f(j, i, solution);
-            }
-        }
-    }
-
     /// Adds to the equations of node `i` (from 1) of rod `j`: to the matrix a
     /// rotary and a translational part on its diagonal, to the right-hand side
     /// a moment and a force. What inertia adds in a time step.
     pub fn add(&mut self, j: usize, i: usize, matrix: (DMat3, f64), rhs: (DVec3, DVec3)) {
         let rod = &mut self.rods[j];
-        let (block, increment) = (
-            &mut rod.matrix.spatial_mut().diagonal[i - 1],
-            &mut rod.rhs[i - 1],
-        );
+        let block = &mut rod.matrix.spatial_mut().diagonal[i - 1];
+        let increment = &mut rod.rhs[i - 1];
         for c in 0..3 {
             for r in 0..3 {
                 block[r][c] += matrix.0.col(c)[r];
@@ -227,12 +186,10 @@ impl System {
     pub fn stable_without_coupling(&mut self, shift: f64) -> bool {
         for (j, rod) in self.rods.iter_mut().enumerate() {
             for gap in [j.wrapping_sub(1), j] {
-                if let Some(springs) = self.springs.get(gap) {
-                    for (block, spring) in rod.matrix.spatial_mut().diagonal.iter_mut().zip(springs)
-                    {
-                        for c in 0..3 {
-                            block[3 + c][3 + c] -= spring[c];
-                        }
+                let springs = self.springs.get(gap).into_iter().flatten();
+                for (block, spring) in rod.matrix.spatial_mut().diagonal.iter_mut().zip(springs) {
+                    for c in 0..3 {
+                        block[3 + c][3 + c] -= spring[c];
                     }
                 }
             }
@@ -272,15 +229,6 @@ impl System {
             .collect()
     }
 
-    pub(super) fn parallel(&self) -> bool {
-        self.parallel
-    }
-
-    /// Increment of node `i` (from 1) of rod `j` in the last solution.
-    pub fn increment(&self, j: usize, i: usize) -> &Increment {
-        &self.rods[j].solution[i - 1]
-    }
-
     /// Largest rotation and largest displacement of the last solution.
     pub fn largest(&self) -> (f64, f64) {
         let (mut turn, mut shift) = (0.0_f64, 0.0_f64);
@@ -298,10 +246,8 @@ impl System {
         let of = |(v, m): (&Increment, &[f64; 2])| {
             0.5 * (m[0] * dot(&v[..3], &v[..3]) + m[1] * dot(&v[3..], &v[3..]))
         };
-        self.rods
-            .iter()
-            .zip(velocity)
-            .map(|(rod, v)| v.iter().zip(&rod.mass).map(of).sum::<f64>())
+        let rods = self.rods.iter().zip(velocity);
+        rods.map(|(rod, v)| v.iter().zip(&rod.mass).map(of).sum::<f64>())
             .sum()
     }
 

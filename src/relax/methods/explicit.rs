@@ -80,7 +80,7 @@ pub fn check(leaf: &Leaf) -> Result<(), RelaxError> {
     if leaf.scenario().rods.iter().any(rigid) {
         return Err(RelaxError::Rigid);
     }
-    if leaf.tip_moment != DVec3::ZERO {
+    if leaf.loads.tip_moment != DVec3::ZERO {
         return Err(RelaxError::Follows);
     }
     Ok(())

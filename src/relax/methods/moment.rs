@@ -43,7 +43,7 @@ pub fn settle(
     }
     let stiffness = (leaf.sections.iter()).map(|s| s.couple_stiffness.min_element());
     let softest = stiffness.fold(f64::INFINITY, f64::min);
-    let turn = leaf.leaf.tip_moment.length() * leaf.leaf.length(0) / softest;
+    let turn = leaf.leaf.loads.tip_moment.length() * leaf.leaf.length(0) / softest;
     let mut step = 1.0 / (turn / TURN_PER_STEP).ceil().max(1.0);
     let (mut reached, mut before) = (0.0, state.clone());
     while reached < 1.0 {

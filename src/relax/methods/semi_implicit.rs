@@ -98,7 +98,7 @@ impl Relaxation<'_> {
     /// Lets the leaf come to rest.
     pub fn settle(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Result<f64, Stop> {
         let stiffest = leaf.stiffest();
-        let load = leaf.leaf.tip_force.length() + leaf.leaf.gravity.length();
+        let load = leaf.leaf.loads.tip_force.length() + leaf.leaf.loads.gravity.length();
         let moving = (MOVING_COMPLIANCE * 0.1_f64.powi(self.pushes)).min(MOVING_STRETCH / load);
         if stiffest >= moving {
             return self.move_to_rest(leaf, system, self.accuracy);

@@ -7,7 +7,7 @@ use crate::relax::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, St
 use crate::relax::index::index_near;
 use crate::relax::options::{MAX_INTERVALS, Options, RelaxError};
 use crate::relax::segments::coarsest;
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, longest};
 use crate::shape::RodShape;
 use crate::undulation::Undulation;
 use glam::DVec3;
@@ -171,10 +171,9 @@ struct Found {
 
 /// What a solution says.
 fn solved(scenario: &Scenario, grid: &Grid, solution: Solution, asked: Accuracy) -> Found {
-    let longest = (scenario.rods.iter().map(|rod| rod.length)).fold(0.0, f64::max);
     let index = index_near(scenario, grid.clone(), &solution.rods);
     let (outcome, remark) = match index {
-        _ if solution.error.position > asked.tolerance * longest => (
+        _ if solution.error.position > asked.tolerance * longest(&scenario.rods) => (
             Outcome::ToleranceNotReached,
             Some("double precision does not carry more through this leaf: ask for a larger tolerance".into()),
         ),

@@ -20,9 +20,8 @@ pub use result::{Chart, Decade, Ending, Row};
 pub use scaling::{Scaling, ScalingRow, scaling};
 pub use timing::{Spread, Turn};
 
-use super::judge::longest;
 use crate::relax::RelaxError;
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, longest};
 
 /// What is asked of a chart.
 #[derive(Clone, Debug)]
@@ -81,7 +80,12 @@ pub fn chart(
         Ok((reference, rows, rounds))
     })?;
     let rods = scenario.rods.len();
-    let (peers, others) = peers::about(&options.peers, &scenario.name, rods, longest(scenario));
+    let (peers, others) = peers::about(
+        &options.peers,
+        &scenario.name,
+        rods,
+        longest(&scenario.rods),
+    );
     let mut remarks = rows::remarks(&rows, &options.contenders, reference.as_ref());
     remarks.extend(others);
     let chart = Chart {

@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use crate::bvp::{self, Start};
 use crate::relax::{Options, Outcome, RelaxError, SMALLEST_TOLERANCE};
-use crate::scenario::Scenario;
-use crate::study::judge::{Answer, longest, union};
+use crate::scenario::{Scenario, longest};
+use crate::study::judge::{Answer, union};
 
 /// Tolerances of the relaxation: first one that most leaves reach, then the
 /// best, or else one that asks for fewer grids to come to rest on.
@@ -55,7 +55,7 @@ pub fn find(
         Err(_) => None,
     };
     let shot = solved.map(|solution| Answer::of_solution(scenario, solution, SMALLEST_TOLERANCE));
-    let unit = longest(scenario);
+    let unit = longest(&scenario.rods);
     let estimate = |answer: &Answer| answer.error() / unit;
     let mut reference = Reference {
         confirmed: false,

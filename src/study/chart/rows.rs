@@ -6,8 +6,8 @@ use super::reference::Reference;
 use super::timing::{Measured, Spread};
 use super::{Ending, Row};
 use crate::relax::{Method, Outcome};
-use crate::scenario::Scenario;
-use crate::study::judge::{Answer, common, longest};
+use crate::scenario::{Scenario, longest};
+use crate::study::judge::{Answer, common};
 
 /// Errors above this are not of discretisation if the run's own estimate is
 /// less than half as large: it is another equilibrium.
@@ -53,7 +53,7 @@ pub fn rows(
     measured: &[Measured],
     reference: Option<&Answer>,
 ) -> Vec<Row> {
-    let unit = longest(scenario);
+    let unit = longest(&scenario.rods);
     let judged = cells.iter().zip(measured).map(|(cell, measured)| {
         let mut judged = Judged {
             cell,
@@ -126,7 +126,7 @@ fn row(judged: &Judged, elsewhere: bool) -> Row {
         _ if elsewhere => Ending::OtherEquilibrium,
         outcome => Ending::Ended(outcome),
     };
-    let unit = longest(cell.scenario);
+    let unit = longest(&cell.scenario.rods);
     Row {
         steps: Some(run.work.steps),
         factorizations: Some(run.work.factorizations),

@@ -5,8 +5,8 @@ use super::reference;
 use super::run::run;
 use super::{ChartError, ChartOptions, Ending, Row, Turn, alone, rows, timing};
 use crate::relax::{MAX_NODES, Method, Outcome, RelaxError, check_tolerance};
-use crate::scenario::Scenario;
-use crate::study::judge::{Answer, longest};
+use crate::scenario::{Scenario, longest};
+use crate::study::judge::Answer;
 use serde::Serialize;
 
 /// Cost against the number of veins.
@@ -152,7 +152,7 @@ fn accurate_grid(scenario: &Scenario, reference: &Answer, tolerance: f64) -> Opt
             return false;
         };
         let distance = answer.distance(reference);
-        let within = |distance: f64| distance / longest(scenario) <= tolerance;
+        let within = |distance: f64| distance / longest(&scenario.rods) <= tolerance;
         answer.at_rest() && distance.is_some_and(within)
     };
     SEGMENTS.into_iter().take_while(fits).find(accurate)

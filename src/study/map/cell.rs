@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 use crate::bvp::{self, Reason, Start};
 use crate::limit::Limit;
 use crate::relax::{self, Method, Options, Outcome};
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, longest};
 use crate::study::judge::{
-    Answer, SAME_PLACE, SEGMENTS, fine_grid, grid_error, index_at, longest, timed, union,
+    Answer, SAME_PLACE, SEGMENTS, fine_grid, grid_error, index_at, timed, union,
 };
 use crate::study::vary::{Knobs, Varied};
 
@@ -78,7 +78,7 @@ impl<'a> Cell<'a> {
                 };
             }
         };
-        let length = longest(self.scenario);
+        let length = longest(&self.scenario.rods);
         let reference = self.reference.as_ref();
         let distance = reference.and_then(|it| it.distance(&answer));
         let (outcome, detail) = self.judge(&answer, distance);
@@ -201,7 +201,7 @@ impl<'a> Cell<'a> {
         };
         let text = format!(
             "{:.1e} lengths from the reference, {lower}; {note}",
-            distance / longest(self.scenario)
+            distance / longest(&self.scenario.rods)
         );
         match self.is_elsewhere(answer, reference, distance) {
             true => (MapOutcome::OtherEquilibrium, text),
@@ -218,7 +218,7 @@ impl<'a> Cell<'a> {
             Ok(near) if near.distance(answer) < Some(distance) => {
                 near.distance(reference) > Some(0.5 * distance)
             }
-            _ => distance > SAME_PLACE * longest(self.scenario),
+            _ => distance > SAME_PLACE * longest(&self.scenario.rods),
         }
     }
 }

@@ -83,7 +83,7 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
     }
     let rods = shape(&DiscreteLeaf::new(&leaf, grid.clone()), &end.state);
     let index = index_near(scenario, grid.clone(), &rods);
-    if index.is_none() && leaf.tip_moment == glam::DVec3::ZERO {
+    if index.is_none() && leaf.loads.tip_moment == glam::DVec3::ZERO {
         return failed(MapOutcome::NotConverged, "slow, but not at rest".into());
     }
     let length = leaf.scale.length;
