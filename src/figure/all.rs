@@ -1,8 +1,7 @@
 //! All shapes of a leaf that were found, lowest energy first.
 
 use super::drawing::Drawing;
-use super::header;
-use super::page::title;
+use super::page::{new_page, title};
 use super::small::{SIDE, SmallPanels};
 use super::veins::Veins;
 use crate::study::All;
@@ -27,7 +26,7 @@ pub fn draw(all: &All) -> Drawing {
     if all.found.len() > MOST {
         notes.push(format!("the first {MOST} drawn"));
     }
-    let mut drawing = header::page(SIDE, &name, &notes, shapes.first());
+    let mut drawing = new_page(SIDE, &name, &notes, shapes.first());
     drawing.height = panels.end();
     for (index, (found, veins)) in shown.iter().zip(&shapes).enumerate() {
         let stability = match found.equilibrium.stability.negative_eigenvalues {

@@ -4,8 +4,9 @@
 use glam::DVec2;
 
 use super::axis::{Axis, Direction, Tick};
-use super::colors::{Color, FRAME, GRID, INK, NOTE};
-use super::drawing::{Anchor, Drawing, Path, Step, Stroke, rectangle};
+use super::drawing::{
+    Anchor, Color, Drawing, FRAME, GRID, INK, NOTE, Path, Step, Stroke, rectangle,
+};
 use super::font::Font;
 use super::markers::Marker;
 use super::page::{Cell, TEXT_SIZE, TICK_SIZE};

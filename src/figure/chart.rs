@@ -3,11 +3,9 @@
 
 use super::axis::{Axis, Ticks};
 use super::chart_panel::{ChartPanel, Failure, Point, Series};
-use super::colors::{BLUE, Color, GREEN, ORANGE, PURPLE, SKY, SLATE, VERMILION};
-use super::drawing::Drawing;
-use super::header;
+use super::drawing::{BLUE, Color, Drawing, GREEN, ORANGE, PURPLE, SKY, SLATE, VERMILION};
 use super::markers::Marker;
-use super::page::{HEADER, LEFT};
+use super::page::{HEADER, LEFT, new_page};
 use crate::relax::Method;
 use crate::report::numbers::power_of_ten;
 use crate::report::words::contender;
@@ -107,7 +105,7 @@ fn times(values: impl Iterator<Item = f64>) -> Axis {
 }
 
 fn page(title: &str, notes: &[String], panel: &ChartPanel) -> Drawing {
-    let mut drawing = header::page(LEFT, title, notes, None);
+    let mut drawing = new_page(LEFT, title, notes, None);
     drawing.height = (HEADER + panel.height()).ceil();
     drawing.group("chart", |page| panel.draw(page, HEADER));
     drawing

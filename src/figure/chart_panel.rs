@@ -4,12 +4,10 @@ use glam::DVec2;
 
 use super::axes::Axes;
 use super::axis::Axis;
-use super::colors::{Color, INK, NOTE, SHADOW};
-use super::drawing::{Anchor, Drawing, Stroke, circle, rectangle};
+use super::drawing::{Anchor, Color, Drawing, INK, NOTE, SHADOW, Stroke, circle, rectangle};
 use super::font::Font;
-use super::key::Key;
 use super::markers::Marker;
-use super::page::{Cell, PANEL_AXIS, TICK_SIZE};
+use super::page::{Cell, Key, PANEL_AXIS, TICK_SIZE};
 
 const FRAME_HEIGHT: f64 = 430.0;
 /// Right of the frame, for the key and the names of lanes.

@@ -3,14 +3,11 @@
 
 use glam::DVec2;
 
-use super::colors::{INK, vein_color};
 use super::differences;
-use super::drawing::{Anchor, Drawing, Stroke};
+use super::drawing::{Anchor, Drawing, INK, Stroke, vein_color};
 use super::font::Font;
-use super::header::{NOTE_BASE, header};
-use super::key::KeyRows;
 use super::markers::dot;
-use super::page::{HEADER, LEFT, RIGHT, TEXT_SIZE, WIDTH};
+use super::page::{HEADER, KeyRows, LEFT, NOTE_BASE, RIGHT, TEXT_SIZE, WIDTH, header};
 use super::panels::Panels;
 use super::veins::Veins;
 use crate::report::words::{equilibrium_of_index, headline, verdict};

@@ -4,11 +4,9 @@ use glam::DVec2;
 
 use super::axes::{Axes, Curve};
 use super::axis::{Axis, Ticks};
-use super::colors::{CURVES, Color, NOTE};
-use super::drawing::{Drawing, Stroke};
-use super::key::Key;
+use super::drawing::{CURVES, Color, Drawing, NOTE, Stroke};
 use super::markers::Marker;
-use super::page::{Cell, PANEL_AXIS, PANEL_TITLE, title};
+use super::page::{Cell, Key, PANEL_AXIS, PANEL_TITLE, title};
 use crate::report::numbers::power_of_ten;
 use crate::study::{Check, Quantity};
 

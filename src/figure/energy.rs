@@ -2,11 +2,8 @@
 
 use super::axes::{Axes, Curve};
 use super::axis::Axis;
-use super::colors::{CURVES, INK};
-use super::drawing::{Drawing, Stroke};
-use super::header;
-use super::key::Key;
-use super::page::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, title};
+use super::drawing::{CURVES, Drawing, INK, Stroke};
+use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, new_page, title};
 use crate::motion::Energy;
 use crate::report::numbers::short;
 use crate::simulate::Record;
@@ -37,7 +34,7 @@ pub fn draw(record: &Record) -> Drawing {
     let name = format!("{}: energy in time", record.scenario);
     let upper = HEADER + PANEL_TITLE;
     let lower = upper + ENERGIES + BETWEEN + PANEL_TITLE;
-    let mut drawing = header::page(LEFT, &name, &notes(record), None);
+    let mut drawing = new_page(LEFT, &name, &notes(record), None);
     drawing.height = lower + BALANCE + PANEL_AXIS + BOTTOM;
     let end = match record.time {
         time if time > 0.0 => time,

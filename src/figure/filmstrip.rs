@@ -2,11 +2,9 @@
 
 use glam::DVec3;
 
-use super::colors::NOTE;
-use super::drawing::{Drawing, Stroke, polyline};
+use super::drawing::{Drawing, NOTE, Stroke, polyline};
 use super::energy::notes;
-use super::header;
-use super::page::title;
+use super::page::{new_page, title};
 use super::small::{SIDE, SmallPanels};
 use super::veins::{Veins, is_near};
 use crate::report::numbers::short;
@@ -24,7 +22,7 @@ pub fn draw(record: &Record) -> Drawing {
     let mut notes = notes(record);
     notes.extend(shapes.first().map(Veins::notes).unwrap_or_default());
     notes.push(format!("a square of the grid is {} L wide", panels.step));
-    let mut drawing = header::page(SIDE, &name, &notes, shapes.first());
+    let mut drawing = new_page(SIDE, &name, &notes, shapes.first());
     drawing.height = panels.end();
     let mut since = record.stills.first().map_or(0, |still| still.moment);
     for (index, (veins, still)) in shapes.iter().zip(&record.stills).enumerate() {

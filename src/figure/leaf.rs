@@ -1,8 +1,7 @@
 //! A leaf at rest.
 
 use super::drawing::Drawing;
-use super::header;
-use super::page::{HEADER, LEFT};
+use super::page::{HEADER, LEFT, new_page};
 use super::panels::Panels;
 use super::veins::Veins;
 use crate::relax::Equilibrium;
@@ -13,7 +12,7 @@ use crate::report::words::{shooting, verdict};
 pub fn draw(leaf: &Equilibrium) -> Drawing {
     let veins = Veins::of(leaf);
     let panels = Panels::below(HEADER, &veins);
-    let mut drawing = header::page(LEFT, &leaf.scenario, &notes(leaf, &veins), Some(&veins));
+    let mut drawing = new_page(LEFT, &leaf.scenario, &notes(leaf, &veins), Some(&veins));
     drawing.description = format!("{}: {}", leaf.scenario, verdict(leaf));
     drawing.height = panels.end().ceil();
     panels.draw(&mut drawing, &veins);

@@ -3,8 +3,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::colors::{Color, DOT, INK, WHITE};
-use super::drawing::{Drawing, Stroke, circle, polygon, rectangle};
+use super::drawing::{Color, DOT, Drawing, INK, Stroke, WHITE, circle, polygon, rectangle};
 use super::veins::Veins;
 
 /// The shape of a marked point.

@@ -2,10 +2,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::colors::{DOT, FRAME};
-use super::drawing::{Anchor, Drawing, Stroke};
-use super::header;
-use super::page::{TEXT_SIZE, title};
+use super::drawing::{Anchor, DOT, Drawing, FRAME, Stroke};
+use super::page::{TEXT_SIZE, new_page, title};
 use super::small::{SIDE, SmallPanels};
 use super::veins::Veins;
 use crate::relax::{Equilibrium, Mode};
@@ -36,7 +34,7 @@ pub fn draw(equilibrium: &Equilibrium) -> Drawing {
     });
     notes.push("grey: at rest".into());
     notes.extend(rest.notes());
-    let mut drawing = header::page(SIDE, &name, &notes, Some(&rest));
+    let mut drawing = new_page(SIDE, &name, &notes, Some(&rest));
     drawing.height = panels.end();
     for (index, (mode, veins)) in drawn.iter().zip(&shapes).enumerate() {
         drawing.group("mode", |page| {

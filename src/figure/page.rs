@@ -1,9 +1,12 @@
-//! How pages are laid out.
+//! How pages are laid out: sizes, cells and titles of panels, the header, and
+//! keys to what is drawn.
 
+use super::drawing::{Anchor, Color, Drawing, INK, NOTE, Stroke, rectangle, vein_color};
+use super::font::Font;
+use super::markers::Marker;
+use super::markers::{clamp_marker, tip_marker};
+use super::veins::Veins;
 use glam::DVec2;
-
-use super::colors::{INK, NOTE};
-use super::drawing::{Anchor, Drawing};
 
 pub const WIDTH: f64 = 900.0;
 pub const LEFT: f64 = 64.0;
@@ -58,4 +61,184 @@ pub fn title(page: &mut Drawing, corner: DVec2, letter: &str, text: &str) {
     page.label(base, letter, TEXT_SIZE, Anchor::Start, INK);
     let base = base + DVec2::new(24.0, 0.0);
     page.label(base, text, TEXT_SIZE, Anchor::Start, NOTE);
+}
+
+const TITLE_BASE: f64 = 38.0;
+/// Base line of the notes.
+pub const NOTE_BASE: f64 = 60.0;
+
+/// A page as wide as usual whose header says this; its text begins at `left`.
+pub fn new_page(left: f64, title: &str, notes: &[String], leaf: Option<&Veins>) -> Drawing {
+    let mut drawing = Drawing::new(WIDTH, title);
+    drawing.group("header", |page| header(page, left, title, notes, leaf));
+    drawing
+}
+
+/// Draws the title, as much of it as fits, the notes and, of a leaf, the key to
+/// its veins. The text begins at `left`.
+pub fn header(page: &mut Drawing, left: f64, title: &str, notes: &[String], leaf: Option<&Veins>) {
+    let font = Font::embedded();
+    let right = match leaf {
+        Some(veins) => key(page, veins, &font) - 20.0,
+        None => page.width - RIGHT,
+    };
+    let title = font.shortened(title, TITLE_SIZE, right - left);
+    let base = DVec2::new(left, TITLE_BASE);
+    page.label(base, &title, TITLE_SIZE, Anchor::Start, INK);
+    // Spaces that SVG does not collapse.
+    let notes = notes.join("\u{a0}\u{a0}·\u{a0}\u{a0}");
+    let base = DVec2::new(left, NOTE_BASE);
+    page.label(base, &notes, TEXT_SIZE, Anchor::Start, NOTE);
+}
+
+/// Draws the key at the right end of the header; returns where it starts.
+fn key(page: &mut Drawing, veins: &Veins, font: &Font) -> f64 {
+    const MIDDLE: f64 = 32.0;
+    const BAR: DVec2 = DVec2::new(120.0, 9.0);
+    const BAR_STEPS: u32 = 60;
+    let mut x = page.width - RIGHT;
+    let text_before = |page: &mut Drawing, x: &mut f64, text: &str| {
+        page.beside(DVec2::new(*x, MIDDLE), text, TEXT_SIZE, Anchor::End, NOTE);
+        *x -= font.width(text, TEXT_SIZE) + 6.0;
+    };
+    if veins.count > 1 {
+        text_before(page, &mut x, &veins.count.to_string());
+        x -= BAR.x;
+        let corner = DVec2::new(x, MIDDLE - 0.5 * BAR.y);
+        let part = DVec2::new(BAR.x / f64::from(BAR_STEPS), BAR.y);
+        for i in 0..BAR_STEPS {
+            let color = vein_color(f64::from(i) / f64::from(BAR_STEPS - 1));
+            // Each part reaches under the next: no gaps between them.
+            let overlap = if i + 1 < BAR_STEPS { 0.5 } else { 0.0 };
+            let start = corner + f64::from(i) * DVec2::new(part.x, 0.0);
+            let size = part + DVec2::new(overlap, 0.0);
+            page.shape(rectangle(start, size), color, None);
+        }
+        x -= 6.0;
+        text_before(page, &mut x, "vein 1");
+        x -= 16.0;
+    }
+    let tips = if veins.tips.len() > 1 { "tips" } else { "tip" };
+    text_before(page, &mut x, tips);
+    tip_marker(page, DVec2::new(x - 3.0, MIDDLE));
+    x -= 26.0;
+    text_before(page, &mut x, "clamp");
+    clamp_marker(page, DVec2::new(x - 3.0, MIDDLE));
+    x - 10.0
+}
+
+/// Between a sample and its name.
+const GAP: f64 = 7.0;
+const LINE: f64 = 15.0;
+/// Between entries, one below the other or one beside the other.
+const BETWEEN: f64 = 7.0;
+const BESIDE: f64 = 20.0;
+const ROW: f64 = 20.0;
+const SAMPLE_HEIGHT: f64 = 12.0;
+
+/// Samples with their names, one below the other beside a panel.
+pub struct Key {
+    /// Left end and middle of the next entry's first line.
+    at: DVec2,
+}
+
+impl Key {
+    const SAMPLE: f64 = 26.0;
+
+    pub fn beside(panel: Cell) -> Self {
+        Key {
+            at: DVec2::new(panel.end().x + 14.0, panel.corner.y + 8.0),
+        }
+    }
+
+    /// A sample, what it is, and what else there is to say, in as many lines as
+    /// these need.
+    pub fn entry(
+        &mut self,
+        page: &mut Drawing,
+        name: &str,
+        note: &str,
+        sample: impl FnOnce(&mut Drawing, Cell),
+    ) {
+        let font = Font::embedded();
+        sample(page, sample_cell(self.at, Self::SAMPLE));
+        let left = self.at.x + Self::SAMPLE + GAP;
+        let room = page.width - 6.0 - left;
+        for (text, color) in [(name, INK), (note, NOTE)] {
+            for line in font.wrapped(text, TICK_SIZE, room) {
+                let line = font.shortened(&line, TICK_SIZE, room);
+                let at = DVec2::new(left, self.at.y);
+                page.beside(at, &line, TICK_SIZE, Anchor::Start, color);
+                self.at.y += LINE;
+            }
+        }
+        self.at.y += BETWEEN;
+    }
+
+    /// The same of a line.
+    pub fn line(&mut self, page: &mut Drawing, name: &str, note: &str, stroke: Stroke) {
+        self.entry(page, name, note, |page, cell| {
+            let [from, to] = cell.midline();
+            page.line(from, to, stroke);
+        });
+    }
+
+    /// The same of marked points.
+    pub fn marker(
+        &mut self,
+        page: &mut Drawing,
+        name: &str,
+        note: &str,
+        marker: Marker,
+        color: Color,
+    ) {
+        self.entry(page, name, note, |page, cell| {
+            marker.draw(page, cell.middle(), color);
+        });
+    }
+}
+
+/// Samples with their names, one after the other in rows above the panels.
+pub struct KeyRows {
+    at: DVec2,
+    sample: f64,
+}
+
+impl KeyRows {
+    /// Rows whose first has its base line at `base`, with samples of this width.
+    pub fn at(base: f64, sample: f64) -> Self {
+        KeyRows {
+            at: DVec2::new(LEFT, base - 0.36 * TEXT_SIZE),
+            sample,
+        }
+    }
+
+    /// A sample and what it is.
+    pub fn entry(
+        &mut self,
+        page: &mut Drawing,
+        name: &str,
+        sample: impl FnOnce(&mut Drawing, Cell),
+    ) {
+        let width = self.sample + GAP + Font::embedded().width(name, TEXT_SIZE);
+        if self.at.x > LEFT && self.at.x + width > page.width - RIGHT {
+            self.at = DVec2::new(LEFT, self.at.y + ROW);
+        }
+        sample(page, sample_cell(self.at, self.sample));
+        let text = self.at + DVec2::new(self.sample + GAP, 0.0);
+        page.beside(text, name, TEXT_SIZE, Anchor::Start, INK);
+        self.at.x += width + BESIDE;
+    }
+
+    /// Where the last row ends.
+    pub fn end(&self) -> f64 {
+        self.at.y + 18.0
+    }
+}
+
+fn sample_cell(at: DVec2, width: f64) -> Cell {
+    Cell {
+        corner: at - DVec2::new(0.0, 0.5 * SAMPLE_HEIGHT),
+        size: DVec2::new(width, SAMPLE_HEIGHT),
+    }
 }

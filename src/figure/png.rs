@@ -6,8 +6,7 @@ use tiny_skia::{
     FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Stroke as Pen, StrokeDash, Transform,
 };
 
-use super::colors::Color;
-use super::drawing::{Anchor, DASHES, Drawing, Label, Mark, Path, Step, Stroke};
+use super::drawing::{Anchor, Color, DASHES, Drawing, Label, Mark, Path, Step, Stroke};
 use super::font::Font;
 
 /// Pixels per unit of the page.

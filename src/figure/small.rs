@@ -2,10 +2,10 @@
 
 use glam::{DVec2, DVec3};
 
+use super::axis::round_step;
 use super::drawing::Drawing;
 use super::page::{Cell, HEADER, PANEL_TITLE, WIDTH};
 use super::space::{Camera, Room, Scene, surrounding_box};
-use super::ticks::round_step;
 use super::veins::Veins;
 
 const COLUMNS: usize = 4;

@@ -3,11 +3,12 @@
 
 use glam::{DVec2, DVec3};
 
-use super::colors::{FLOOR, FRAME, GRID, INK, NOTE, SHADOW};
-use super::drawing::{Anchor, Drawing, Step, Stroke, polygon, polyline};
+use super::axis::{multiples, round_step};
+use super::drawing::{
+    Anchor, Drawing, FLOOR, FRAME, GRID, INK, NOTE, SHADOW, Step, Stroke, polygon, polyline,
+};
 use super::markers::leaf_markers;
 use super::page::{Cell, TEXT_SIZE, TICK_SIZE};
-use super::ticks::{multiples, round_step};
 use super::veins::{Piece, Vein, Veins};
 
 /// Where the viewer stands: degrees from the xi axis, and above the floor.

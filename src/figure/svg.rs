@@ -4,8 +4,7 @@ use std::io::{self, Write};
 
 use glam::DVec2;
 
-use super::colors::Color;
-use super::drawing::{Anchor, DASHES, Drawing, Label, Mark, Path, Step, Stroke};
+use super::drawing::{Anchor, Color, DASHES, Drawing, Label, Mark, Path, Step, Stroke};
 
 /// Writes the whole file.
 pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {

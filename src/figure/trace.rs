@@ -5,12 +5,9 @@ use glam::{DVec2, DVec3};
 
 use super::axes::Axes;
 use super::axis::Axis;
-use super::colors::{CURVES, INK};
-use super::drawing::{Anchor, Drawing, Stroke};
-use super::header;
-use super::key::Key;
+use super::drawing::{Anchor, CURVES, Drawing, INK, Stroke};
 use super::markers::Marker;
-use super::page::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, title};
+use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, new_page, title};
 use super::small::SmallPanels;
 use super::veins::Veins;
 use crate::report::numbers::{power_of_ten, short};
@@ -49,7 +46,7 @@ pub fn draw(trace: &Trace) -> Drawing {
     let below = diagram.end().y + PANEL_AXIS;
     let panels = SmallPanels::holding(shapes.iter(), shown.len()).below(below + law);
     let name = format!("{}: equilibria along {}", trace.scenario, trace.keys);
-    let mut drawing = header::page(LEFT, &name, &notes(trace), None);
+    let mut drawing = new_page(LEFT, &name, &notes(trace), None);
     drawing.height = panels.end();
     drawing.group("branches", |page| {
         draw_branches(page, trace, &shown, diagram);

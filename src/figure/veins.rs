@@ -2,8 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::colors::{Color, vein_color};
-use super::drawing::{Path, Step};
+use super::drawing::{Color, Path, Step, vein_color};
 use crate::relax::{Equilibrium, RodShape};
 
 /// Of a wider leaf, only some veins are drawn: more would not be told apart.

@@ -5,11 +5,10 @@ mod panel;
 
 use glam::DVec2;
 
-use super::colors::{INK, NOTE};
-use super::drawing::{Anchor, Drawing};
-use super::header::{NOTE_BASE, header};
-use super::key::KeyRows;
-use super::page::{Cell, LEFT, PANEL_TITLE, RIGHT, TEXT_SIZE, TICK_SIZE, WIDTH};
+use super::drawing::{Anchor, Drawing, INK, NOTE};
+use super::page::{
+    Cell, KeyRows, LEFT, NOTE_BASE, PANEL_TITLE, RIGHT, TEXT_SIZE, TICK_SIZE, WIDTH, header,
+};
 use crate::study::{Confidence, Knob, Map, MapMethod, MapOutcome, MapRow, MapShow};
 use panel::{Panel, Tile, Varied};
 

@@ -4,8 +4,9 @@ use glam::DVec2;
 
 use crate::figure::axes::Axes;
 use crate::figure::axis::{Axis, Ticks};
-use crate::figure::colors::{Color, FRAME, INK, WHITE, vein_color};
-use crate::figure::drawing::{Anchor, Drawing, Stroke, circle, rectangle};
+use crate::figure::drawing::{
+    Anchor, Color, Drawing, FRAME, INK, Stroke, WHITE, circle, rectangle, vein_color,
+};
 use crate::figure::page::Cell;
 use crate::study::{Confidence, Knob, MapOutcome, MapRequest, Vary};
 
