@@ -115,7 +115,7 @@ pub fn measure(
     budget: f64,
     progress: &mut (dyn FnMut(&Turn) + Send),
 ) -> (Vec<Measured>, usize) {
-    let mut tell = |cell: &Cell, round: usize, rounds: usize| {
+    let mut run = |cell: &Cell, round: usize, rounds: usize| {
         progress(&Turn {
             rods: cell.scenario.rods.len(),
             contender: cell.contender,
@@ -123,6 +123,7 @@ pub fn measure(
             round,
             rounds,
         });
+        run(cell)
     };
     let longest = budget.max(SLOW);
     let mut too_slow = Vec::new();
@@ -130,8 +131,7 @@ pub fn measure(
     for cell in cells {
         let mut seconds = Vec::new();
         let found = (!too_slow.contains(&cell.contender)).then(|| {
-            tell(cell, 1, FEWEST);
-            let (run, time) = run(cell)?;
+            let (run, time) = run(cell, 1, FEWEST)?;
             seconds.push(time);
             if time > longest {
                 too_slow.push(cell.contender);
@@ -140,33 +140,31 @@ pub fn measure(
         });
         measured.push(Measured { found, seconds });
     }
-    let mut again = |measured: &mut [Measured], round: usize, rounds: usize, part: &[bool]| {
-        let cells = cells.iter().zip(measured).zip(part);
-        for ((cell, measured), _) in cells.filter(|(_, part)| **part) {
-            tell(cell, round, rounds);
-            // What ran once runs again.
-            if let Ok((_, time)) = run(cell) {
-                measured.seconds.push(time);
-            }
+    let mut again = |measured: &mut Measured, cell: &Cell, round: usize, rounds: usize| {
+        // What ran once runs again.
+        if let Ok((_, time)) = run(cell, round, rounds) {
+            measured.seconds.push(time);
         }
     };
     let is_fast = |cell: &Measured| cell.seconds.first().is_some_and(|&time| time < SLOW);
-    let fast: Vec<bool> = measured.iter().map(is_fast).collect();
     for round in 1..FEWEST {
-        again(&mut measured, round + 1, FEWEST, &fast);
+        for (cell, measured) in cells.iter().zip(&mut measured) {
+            if is_fast(measured) {
+                again(measured, cell, round + 1, FEWEST);
+            }
+        }
     }
-    let share = budget / fast.iter().filter(|fast| **fast).count().max(1) as f64;
-    let repeats: Vec<usize> = measured
-        .iter()
+    let share = budget / measured.iter().filter(|cell| is_fast(cell)).count().max(1) as f64;
+    let repeats: Vec<usize> = (measured.iter())
         .map(|cell| repeats(&cell.seconds, share))
         .collect();
     let rest = repeats.iter().copied().max().unwrap_or(0);
     for round in 0..rest {
-        let part = repeats
-            .iter()
-            .map(|&repeats| takes_part(round, repeats, rest));
-        let part: Vec<bool> = part.collect();
-        again(&mut measured, FEWEST + round + 1, FEWEST + rest, &part);
+        for ((cell, measured), repeats) in cells.iter().zip(&mut measured).zip(&repeats) {
+            if takes_part(round, *repeats, rest) {
+                again(measured, cell, FEWEST + round + 1, FEWEST + rest);
+            }
+        }
     }
     for cell in &mut measured {
         cell.seconds.sort_by(f64::total_cmp);
