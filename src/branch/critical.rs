@@ -2,7 +2,7 @@
 
 use super::deflation::Deflated;
 use super::equations::{Equations, Stuck};
-use super::field::{add, dot, plus, times};
+use super::field::{combined, dot, plus, times};
 use super::{Point, Tangent};
 use crate::leaf::{Field, State};
 
@@ -36,13 +36,10 @@ pub enum Kind {
 /// A point of a branch at which the matrix is singular.
 #[derive(Clone, Debug)]
 pub struct Critical {
-    /// The state.
     pub state: State,
     /// The parameter, as a fraction of its range.
     pub fraction: f64,
-    /// The direction of the branch.
     pub tangent: Tangent,
-    /// What it is.
     pub kind: Kind,
     /// Morse index before and after.
     pub indices: [usize; 2],
@@ -53,15 +50,11 @@ pub struct Critical {
     /// Which of the sorted eigenvalues of H is zero, and its change with the
     /// distance along the tangent.
     pub which: usize,
-    /// That change.
     pub slope: f64,
 }
 
 /// The critical points between two points of a branch, the second of them
 /// found by a step of the given length from the first.
-///
-/// # Errors
-/// If the branch cannot be followed between them.
 pub fn locate(
     equations: &mut Equations,
     a: &Point,
@@ -81,7 +74,7 @@ pub fn locate(
         let values = [0, 1].map(|k| ends[k].eigenvalues[which]);
         let large = values[0].abs().max(values[1].abs()) > NEUTRAL;
         if values[0] * values[1] < 0.0 && large {
-            let (at, critical) = search.zero(which, [0.0, step], values, [a.index, b.index])?;
+            let (at, critical) = search.zero(which, [0.0, step], values)?;
             match found.iter_mut().find(|(s, _)| (s - at).abs() < SAME * step) {
                 Some((_, same)) => same.modes.extend(critical.modes),
                 None => found.push((at, critical)),
@@ -91,24 +84,19 @@ pub fn locate(
     found.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     // Each takes its own share of the change, in their order along the branch.
     let mut before = a.index;
-    let up = b.index > a.index;
-    let mut all: Vec<Critical> = Vec::new();
-    for (_, mut critical) in found {
+    for (_, critical) in &mut found {
         let change = critical.modes.len();
-        let after = match up {
+        let after = match b.index > a.index {
             true => before + change,
             false => before.saturating_sub(change),
         };
         critical.indices = [before, after];
         before = after;
-        all.push(critical);
-    }
-    for critical in &mut all {
-        if critical.modes.len() > 1 {
+        if change > 1 {
             critical.kind = Kind::Branching;
         }
     }
-    Ok(all)
+    Ok(found.into_iter().map(|(_, critical)| critical).collect())
 }
 
 /// Points along the tangent of one, and the eigenvalues of H there.
@@ -137,7 +125,15 @@ impl Search<'_, '_> {
         let moved = (self.equations).moved(state, fraction, &t.increments, distance)?;
         let fraction = fraction + distance * t.fraction;
         let deflated = (self.equations).deflated(&moved, fraction, t, self.held)?;
-        Ok(sample(deflated))
+        let eigen = deflated.h.clone().symmetric_eigen();
+        let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+        order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+        let vector = |&k: &usize| eigen.eigenvectors.column(k).iter().copied().collect();
+        Ok(Sample {
+            eigenvalues: order.iter().map(|&k| eigen.eigenvalues[k]).collect(),
+            vectors: order.iter().map(vector).collect(),
+            deflated,
+        })
     }
 
     /// The zero of one eigenvalue by the method of Anderson and Bjorck.
@@ -146,7 +142,6 @@ impl Search<'_, '_> {
         which: usize,
         mut distance: [f64; 2],
         mut value: [f64; 2],
-        indices: [usize; 2],
     ) -> Result<(f64, Critical), Stuck> {
         let whole = distance[1] - distance[0];
         let mut slope = (value[1] - value[0]) / whole;
@@ -160,10 +155,8 @@ impl Search<'_, '_> {
             if (at - last).abs() > LOCAL * whole {
                 slope = (now - last_value) / (at - last);
             }
-            if best
-                .as_ref()
-                .is_none_or(|(_, held)| now.abs() <= held.eigenvalues[which].abs())
-            {
+            let least = best.as_ref().map(|(_, best)| best.eigenvalues[which].abs());
+            if least.is_none_or(|least| now.abs() <= least) {
                 best = Some((at, sample));
             }
             if done {
@@ -180,71 +173,37 @@ impl Search<'_, '_> {
             (distance[1], value[1]) = (at, now);
         }
         let (at, sample) = best.ok_or(Stuck::NotConverged)?;
-        let kept = (self.held, &self.from.tangent);
-        Ok((
-            at,
-            critical(self.equations, sample, which, slope, kept, indices),
-        ))
+        Ok((at, self.critical(sample, which, slope)))
     }
-}
 
-fn sample(deflated: Deflated) -> Sample {
-    let eigen = deflated.h.clone().symmetric_eigen();
-    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
-    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
-    Sample {
-        eigenvalues: order.iter().map(|&k| eigen.eigenvalues[k]).collect(),
-        vectors: order
-            .iter()
-            .map(|&k| eigen.eigenvectors.column(k).iter().copied().collect())
-            .collect(),
-        deflated,
-    }
-}
-
-fn critical(
-    equations: &Equations,
-    sample: Sample,
-    which: usize,
-    slope: f64,
-    (held, tangent): (&[Field], &Tangent),
-    indices: [usize; 2],
-) -> Critical {
-    let vector = &sample.vectors[which];
-    let mut mode = times(&sample.deflated.modes[0], 0.0);
-    for (part, other) in vector.iter().zip(&sample.deflated.modes) {
-        add(&mut mode, *part, other);
-    }
-    let norm = equations.product(&mode, &mode).sqrt();
-    let drive: f64 = vector
-        .iter()
-        .zip(sample.deflated.drive.iter())
-        .map(|(v, d)| v * d)
-        .sum();
-    let rate = &sample.deflated.rate;
-    let most = (dot(rate, rate) * dot(&mode, &mode)).sqrt();
-    Critical {
-        kind: match drive.abs() > DRIVEN * most.max(slope.abs()) {
-            true => Kind::Fold,
-            false => Kind::Branching,
-        },
-        state: sample.deflated.state,
-        fraction: sample.deflated.fraction,
-        tangent: tangent.clone(),
-        indices,
-        modes: vec![times(&mode, 1.0 / norm)],
-        held: held.to_vec(),
-        which,
-        slope,
+    /// What a sample at a zero says.
+    fn critical(&self, sample: Sample, which: usize, slope: f64) -> Critical {
+        let (vector, deflated) = (&sample.vectors[which], sample.deflated);
+        let mode = combined(vector, &deflated.modes);
+        let norm = self.equations.product(&mode, &mode).sqrt();
+        let parts = vector.iter().zip(deflated.drive.iter());
+        let drive: f64 = parts.map(|(v, d)| v * d).sum();
+        let most = (dot(&deflated.rate, &deflated.rate) * dot(&mode, &mode)).sqrt();
+        Critical {
+            kind: match drive.abs() > DRIVEN * most.max(slope.abs()) {
+                true => Kind::Fold,
+                false => Kind::Branching,
+            },
+            state: deflated.state,
+            fraction: deflated.fraction,
+            tangent: self.from.tangent.clone(),
+            indices: [self.from.index; 2],
+            modes: vec![times(&mode, 1.0 / norm)],
+            held: self.held.to_vec(),
+            which,
+            slope,
+        }
     }
 }
 
 impl Critical {
     /// The same point on another grid or of a softened matrix, near the given
     /// state, by the secant method.
-    ///
-    /// # Errors
-    /// If it is not there.
     pub fn again(&self, equations: &mut Equations) -> Result<Critical, Stuck> {
         let from = Point {
             state: self.state.clone(),
@@ -280,17 +239,11 @@ impl Critical {
                 break;
             }
         }
-        let sample = best;
-        let mut found = critical(
-            search.equations,
-            sample,
-            self.which,
-            slope,
-            (&self.held, &self.tangent),
-            self.indices,
-        );
-        found.kind = self.kind;
-        Ok(found)
+        Ok(Critical {
+            kind: self.kind,
+            indices: self.indices,
+            ..search.critical(best, self.which, slope)
+        })
     }
 
     /// Change of the eigenvalue with the parameter, but at a fold, where it is

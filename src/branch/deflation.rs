@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::equations::{Equations, ITERATIONS, LARGEST, Linear, Stuck, at_rest, factorized};
-use super::field::{add, dot, is_finite, largest, plus, times};
+use super::field::{add, combined, dot, is_finite, largest, plus, times};
 use super::{Point, Tangent};
 use crate::leaf::{Bordered, Field, SparsePattern, State, System};
 
@@ -19,9 +19,7 @@ const SHIFT: f64 = 1e-9;
 
 /// A point found in the presence of modes that are nearly neutral.
 pub struct Deflated {
-    /// The state.
     pub state: State,
-    /// The parameter.
     pub fraction: f64,
     /// H of the border: minus the eigenvalues, in the limit, on its diagonal.
     pub h: DMatrix<f64>,
@@ -37,9 +35,6 @@ impl Equations<'_> {
     /// The point of the branch in a plane, where the matrix may be singular:
     /// it is bordered by the masses times `modes`, and what these cannot decide
     /// is left as it is.
-    ///
-    /// # Errors
-    /// If there is no point.
     pub fn deflated(
         &mut self,
         state: &State,
@@ -64,13 +59,9 @@ impl Equations<'_> {
             let forces = solve(&linear.forces, &none);
             let rate = solve(&linear.rate, &none);
             let zero = times(&linear.forces, 0.0);
-            let columns: Vec<Bordered> = (0..p)
-                .map(|i| {
-                    let mut unit = none.clone();
-                    unit[i] = 1.0;
-                    solve(&zero, &unit)
-                })
-                .collect();
+            let unit = |i: usize| (0..p).map(|k| if k == i { 1.0 } else { 0.0 }).collect();
+            let units: Vec<Vec<f64>> = (0..p).map(unit).collect();
+            let columns: Vec<Bordered> = units.iter().map(|unit| solve(&zero, unit)).collect();
             drop(solve);
             let h = DMatrix::from_fn(p, p, |r, c| {
                 0.5 * (columns[c].multipliers[r] + columns[r].multipliers[c])
@@ -82,10 +73,7 @@ impl Equations<'_> {
                     h,
                     drive: DVector::from_vec(rate.multipliers),
                     rate: linear.rate,
-                    modes: columns
-                        .into_iter()
-                        .map(|column| column.increments)
-                        .collect(),
+                    modes: columns.into_iter().map(|it| it.increments).collect(),
                 });
             }
             let step = bordered_step(&linear, &h, (&forces, &rate, &columns), (&dual, own))?;
@@ -112,9 +100,7 @@ impl Equations<'_> {
             let pattern = SparsePattern::bordered(&self.system, rows);
             self.bordered = Some((rows, pattern.map_err(|_| Stuck::TooLarge)?));
         }
-        let Some((_, pattern)) = &self.bordered else {
-            return Err(Stuck::TooLarge);
-        };
+        let (_, pattern) = self.bordered.as_ref().ok_or(Stuck::TooLarge)?;
         self.factorizations += 1;
         let factor = pattern.factorize_bordered(&self.system, 0.0, border);
         let mut factor = factor.map_err(|_| Stuck::TooLarge)?;
@@ -123,9 +109,6 @@ impl Equations<'_> {
 
     /// The `count` modes whose eigenvalues are next to zero at a point, by
     /// inverse iteration of a subspace; of mass one, the next to zero first.
-    ///
-    /// # Errors
-    /// If the point cannot be linearised.
     pub fn soft_modes(&mut self, point: &Point, count: usize) -> Result<Vec<Field>, Stuck> {
         let mut state = point.state.clone();
         self.linearise(&mut state, point.fraction)?;
@@ -149,29 +132,17 @@ impl Equations<'_> {
                 modes[k] = times(&modes[k], 1.0 / norm);
             }
             let momenta: Vec<Field> = modes.iter().map(|mode| self.momentum(mode)).collect();
-            let images: Vec<Field> = momenta
-                .iter()
-                .map(|momentum| factor.solve_bordered(momentum, &[]).increments)
-                .collect();
+            let image = |momentum| factor.solve_bordered(momentum, &[]).increments;
+            let images: Vec<Field> = momenta.iter().map(image).collect();
             let ritz = DMatrix::from_fn(count, count, |r, c| {
                 0.5 * (dot(&momenta[r], &images[c]) + dot(&momenta[c], &images[r]))
             });
             let eigen = ritz.symmetric_eigen();
             let mut order: Vec<usize> = (0..count).collect();
-            order.sort_by(|&a, &b| {
-                let [a, b] = [a, b].map(|k| eigen.eigenvalues[k].abs());
-                b.total_cmp(&a)
-            });
-            modes = order
-                .iter()
-                .map(|&k| {
-                    let mut mode = times(&modes[0], 0.0);
-                    for (l, other) in modes.iter().enumerate() {
-                        add(&mut mode, eigen.eigenvectors[(l, k)], other);
-                    }
-                    mode
-                })
-                .collect();
+            let size = |k: usize| eigen.eigenvalues[k].abs();
+            order.sort_by(|&a, &b| size(b).total_cmp(&size(a)));
+            let mode = |&k: &usize| combined(eigen.eigenvectors.column(k).as_slice(), &modes);
+            modes = order.iter().map(mode).collect();
             // Forces again, for the next inverse iteration.
             if !modes.iter().all(is_finite) {
                 return Err(Stuck::NotConverged);
@@ -199,20 +170,15 @@ fn bordered_step(
     (dual, own): (&Field, f64),
 ) -> Result<(Field, f64), Stuck> {
     let p = columns.len();
-    let mut matrix = DMatrix::zeros(p + 1, p + 1);
+    let mut matrix = h.clone().resize(p + 1, p + 1, 0.0);
     let mut right = DVector::zeros(p + 1);
     for r in 0..p {
-        for c in 0..p {
-            matrix[(r, c)] = h[(r, c)];
-        }
         matrix[(r, p)] = rate.multipliers[r];
         matrix[(p, r)] = dot(dual, &columns[r].increments);
         // What is below rounding decides nothing.
-        let force = forces.multipliers[r];
-        right[r] = -if force.abs() < linear.noise {
-            0.0
-        } else {
-            force
+        right[r] = match -forces.multipliers[r] {
+            force if force.abs() < linear.noise => -0.0,
+            force => force,
         };
     }
     matrix[(p, p)] = dot(dual, &rate.increments) + own;

@@ -82,19 +82,8 @@ pub(super) struct Linear {
     pub noise: f64,
 }
 
-/// Solutions of one matrix for two right-hand sides.
-struct Pair {
-    forces: Field,
-    rate: Field,
-    /// Negative eigenvalues, where the factorisation counts them.
-    index: Option<usize>,
-}
-
 impl<'a> Equations<'a> {
     /// Room for the equations of `family` on `grid`.
-    ///
-    /// # Errors
-    /// If the family has no leaf at the start of its range.
     pub fn new(family: &'a Family<'a>, grid: Grid) -> Result<Self, OutOfRange> {
         let system = family.with(0.0, &grid, System::new)?;
         let one = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
@@ -113,9 +102,6 @@ impl<'a> Equations<'a> {
     }
 
     /// The same on the grid with all segments halved.
-    ///
-    /// # Errors
-    /// As [`Equations::new`].
     pub fn refined(&self) -> Result<Self, OutOfRange> {
         Equations::new(self.family, self.grid.refined())
     }
@@ -149,9 +135,6 @@ impl<'a> Equations<'a> {
     }
 
     /// The state that lies `step` further along a direction.
-    ///
-    /// # Errors
-    /// If the family has no leaf at `fraction`.
     pub fn moved(
         &mut self,
         state: &State,
@@ -214,9 +197,9 @@ impl<'a> Equations<'a> {
         })
     }
 
-    /// Solves for both right-hand sides with K + shift M: rod by rod if that
-    /// goes, or directly.
-    fn solve(&mut self, linear: &Linear) -> Result<Pair, Stuck> {
+    /// Solves for the forces and their rate with K + shift M: rod by rod if that
+    /// goes, or directly, which counts the negative eigenvalues, too.
+    fn solve(&mut self, linear: &Linear) -> Result<(Field, Field, Option<usize>), Stuck> {
         let shift = linear.shift;
         self.factorizations += 1;
         if self.rodwise {
@@ -227,31 +210,22 @@ impl<'a> Equations<'a> {
                     matches!(found, Solved::Yes(_)).then(|| self.system.solution())
                 };
                 if let (Some(forces), Some(rate)) = (solved(&linear.forces), solved(&linear.rate)) {
-                    return Ok(Pair {
-                        forces,
-                        rate,
-                        index: None,
-                    });
+                    return Ok((forces, rate, None));
                 }
             }
             self.rodwise = false;
             self.factorizations += 1;
         }
         let mut factor = factorized(&mut self.pattern, &self.system, shift)?;
-        Ok(Pair {
-            forces: factor.solve_bordered(&linear.forces, &[]).increments,
-            rate: factor.solve_bordered(&linear.rate, &[]).increments,
-            index: Some(factor.negative()),
-        })
+        let forces = factor.solve_bordered(&linear.forces, &[]).increments;
+        let rate = factor.solve_bordered(&linear.rate, &[]).increments;
+        Ok((forces, rate, Some(factor.negative())))
     }
 
     /// Newton's method back to the branch within the plane normal to `normal`
     /// through the given state; with no normal, at the given parameter. Returns
     /// the point, with its tangent so that it goes on along `normal`, and the
     /// number of iterations.
-    ///
-    /// # Errors
-    /// If there is no point.
     pub fn correct(
         &mut self,
         state: &State,
@@ -263,12 +237,12 @@ impl<'a> Equations<'a> {
         let mut previous = f64::INFINITY;
         for iteration in 1..=ITERATIONS {
             let linear = self.linearise(&mut state, fraction)?;
-            let pair = self.solve(&linear)?;
+            let (forces, rate, counted) = self.solve(&linear)?;
             let step = match &dual {
                 None => 0.0,
-                Some((dual, own)) => -dot(dual, &pair.forces) / (dot(dual, &pair.rate) + own),
+                Some((dual, own)) => -dot(dual, &forces) / (dot(dual, &rate) + own),
             };
-            let increments = plus(&pair.forces, step, &pair.rate);
+            let increments = plus(&forces, step, &rate);
             let size = largest(&increments).max(step.abs());
             if !is_finite(&increments) || !step.is_finite() || size > LARGEST {
                 return Err(Stuck::NotConverged);
@@ -278,28 +252,25 @@ impl<'a> Equations<'a> {
             if at_rest(size, previous) {
                 let (family, grid) = (self.family, &self.grid);
                 family.with(fraction, grid, |leaf| clamp(leaf, &mut state))?;
-                let tangent = self.normalised(Tangent {
-                    increments: pair.rate,
+                let mut tangent = self.normalised(Tangent {
+                    increments: rate,
                     fraction: 1.0,
                 });
-                let tangent = match normal {
-                    Some(normal) if self.along(&tangent, normal) < 0.0 => reversed(tangent),
-                    _ => tangent,
-                };
+                if normal.is_some_and(|normal| self.along(&tangent, normal) < 0.0) {
+                    tangent = reversed(tangent);
+                }
                 // The matrix at hand is that of the state before.
-                let index = match pair.index {
+                let index = match counted {
                     Some(index) if size < SAME_INDEX => index,
                     _ => self.index(&state, fraction)?,
                 };
-                return Ok((
-                    Point {
-                        state,
-                        fraction,
-                        tangent,
-                        index,
-                    },
-                    iteration,
-                ));
+                let point = Point {
+                    state,
+                    fraction,
+                    tangent,
+                    index,
+                };
+                return Ok((point, iteration));
             }
             previous = size;
         }

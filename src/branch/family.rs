@@ -30,9 +30,6 @@ pub struct OutOfRange(pub String);
 impl<'a> Family<'a> {
     /// The leaves `make` gives, from one value of the parameter to another (in
     /// equal quotients if `log`), in the units of the first.
-    ///
-    /// # Errors
-    /// If there is no leaf at either end.
     pub fn new(
         make: &'a (dyn Fn(f64) -> Result<Scenario, String> + Sync),
         (from, to): (f64, f64),
@@ -77,17 +74,11 @@ impl<'a> Family<'a> {
     }
 
     /// The scenario there.
-    ///
-    /// # Errors
-    /// If there is none.
     pub fn scenario(&self, fraction: f64) -> Result<Scenario, OutOfRange> {
         (self.make)(self.value(fraction)).map_err(OutOfRange)
     }
 
     /// Does something with the leaf there, on a grid.
-    ///
-    /// # Errors
-    /// If there is none.
     pub fn with<R>(
         &self,
         fraction: f64,

@@ -1,21 +1,14 @@
 //! Sums over the increments of a leaf.
 
 use crate::leaf::{Field, Increment};
-
-fn each(a: &Field, b: &Field, mut f: impl FnMut(&Increment, &Increment)) {
-    for (a, b) in a.iter().zip(b) {
-        for (a, b) in a.iter().zip(b) {
-            f(a, b);
-        }
-    }
-}
+use crate::relax::prolong::lagrange;
 
 /// The work of forces on increments.
 pub fn dot(forces: &Field, increments: &Field) -> f64 {
     let mut sum = 0.0;
-    each(forces, increments, |f, d| {
+    for (f, d) in forces.iter().flatten().zip(increments.iter().flatten()) {
         sum += (0..6).map(|c| f[c] * d[c]).sum::<f64>();
-    });
+    }
     sum
 }
 
@@ -28,11 +21,9 @@ pub fn plus(a: &Field, factor: f64, b: &Field) -> Field {
 
 /// a <- a + factor b.
 pub fn add(a: &mut Field, factor: f64, b: &Field) {
-    for (a, b) in a.iter_mut().zip(b) {
-        for (a, b) in a.iter_mut().zip(b) {
-            for c in 0..6 {
-                a[c] += factor * b[c];
-            }
+    for (a, b) in a.iter_mut().flatten().zip(b.iter().flatten()) {
+        for c in 0..6 {
+            a[c] += factor * b[c];
         }
     }
 }
@@ -41,6 +32,15 @@ pub fn add(a: &mut Field, factor: f64, b: &Field) {
 pub fn times(a: &Field, factor: f64) -> Field {
     let of = |a: &Increment| a.map(|a| factor * a);
     a.iter().map(|rod| rod.iter().map(of).collect()).collect()
+}
+
+/// The sum of fields, each times its part.
+pub fn combined(parts: &[f64], fields: &[Field]) -> Field {
+    let mut sum = times(&fields[0], 0.0);
+    for (part, field) in parts.iter().zip(fields) {
+        add(&mut sum, *part, field);
+    }
+    sum
 }
 
 /// The largest component.
@@ -77,10 +77,7 @@ fn prolong_rod(rod: &[Increment]) -> Vec<Increment> {
             let t = k as f64 / 2.0 - first as f64;
             let mut sum = [0.0; 6];
             for i in 0..count {
-                let others = (0..count).filter(|&o| o != i);
-                let weight: f64 = others
-                    .map(|o| (t - o as f64) / (i as f64 - o as f64))
-                    .product();
+                let weight = lagrange(count, i, t);
                 let value = at(first + i);
                 for c in 0..6 {
                     sum[c] += weight * value[c];

@@ -31,24 +31,19 @@ const NEARLY_RIGID: f64 = 1.01e5;
 pub struct Refined {
     /// The parameter, as a fraction of its range.
     pub fraction: f64,
-    /// Energy, in the family's units.
+    /// In the family's units, as the tips of all rods.
     pub energy: f64,
-    /// Tips of all rods, in the family's units.
     pub tips: Vec<[f64; 3]>,
-    /// Bound on the error of the tips, or null on one grid.
+    /// Bound on the error of the tips; `None` on one grid.
     pub error: Option<f64>,
     /// Bound on the error of the parameter, as a fraction of its range.
     pub fraction_error: Option<f64>,
-    /// The state on the finest grid.
+    /// The state on the finest grid, and that grid.
     pub state: State,
-    /// That grid.
     pub grid: Grid,
 }
 
 /// A regular point to the given accuracy of its tips, on as many grids as it takes.
-///
-/// # Errors
-/// If it is not there on the grid it was found on.
 pub fn refine(
     family: &Family,
     grid: &Grid,
@@ -95,9 +90,6 @@ pub fn refine(
 }
 
 /// A critical point, on four grids.
-///
-/// # Errors
-/// If it is not there on the grid it was found on.
 pub fn refine_critical(family: &Family, grid: &Grid, found: &Critical) -> Result<Refined, Stuck> {
     let mut table = Table::default();
     let mut equations = Equations::new(family, grid.clone())?;
@@ -106,9 +98,8 @@ pub fn refine_critical(family: &Family, grid: &Grid, found: &Critical) -> Result
     for level in 0..CRITICAL_GRIDS {
         if level > 0 {
             let before = &equations.grid;
-            let state = family.with(critical.fraction, before, |leaf| {
-                prolong(leaf, &critical.state)
-            })?;
+            let on_finer = |leaf: &_| prolong(leaf, &critical.state);
+            let state = family.with(critical.fraction, before, on_finer)?;
             equations = equations.refined()?;
             let tangent = equations.normalised(Tangent {
                 increments: prolong_field(&critical.tangent.increments),
@@ -120,39 +111,31 @@ pub fn refine_critical(family: &Family, grid: &Grid, found: &Critical) -> Result
                 held: critical.held.iter().map(prolong_field).collect(),
                 ..critical.clone()
             };
-            match finer.again(&mut equations) {
-                Ok(found) => {
-                    critical = found;
-                    reached.clone_from(&equations.grid);
-                }
-                Err(_) => break,
-            }
+            let Ok(found) = finer.again(&mut equations) else {
+                break;
+            };
+            critical = found;
+            reached.clone_from(&equations.grid);
         }
-        let rigid = family.with(critical.fraction, &equations.grid, |leaf| {
-            leaf.stiffest() * NEARLY_RIGID < 1.0
+        let (rigid, rounding) = family.with(critical.fraction, &equations.grid, |leaf| {
+            let rigid = leaf.stiffest() * NEARLY_RIGID < 1.0;
+            let limit = if rigid {
+                1.0 / SOFTENING
+            } else {
+                f64::INFINITY
+            };
+            let condensing = leaf.sections.iter().map(|it| it.condensing.max_element());
+            let stiffest = condensing.fold(0.0_f64, |most, it| most.max(it.min(limit)));
+            let segments = leaf.segments() as f64;
+            let rounding = f64::EPSILON * stiffest * segments * segments / critical.steepness();
+            (rigid, rounding)
         })?;
-        table.rounding =
-            table
-                .rounding
-                .max(family.with(critical.fraction, &equations.grid, |leaf| {
-                    let stiffest = leaf.sections.iter().fold(0.0_f64, |most, section| {
-                        let limit = if rigid {
-                            1.0 / SOFTENING
-                        } else {
-                            f64::INFINITY
-                        };
-                        most.max(section.condensing.max_element().min(limit))
-                    });
-                    let segments = leaf.segments() as f64;
-                    f64::EPSILON * stiffest * segments * segments / critical.steepness()
-                })?);
-        match rigid {
-            false => table.push(&equations, &critical.state, critical.fraction)?,
-            true => {
-                let fraction = unsoftened(family, &equations.grid, &critical)?;
-                table.push(&equations, &critical.state, fraction)?;
-            }
-        }
+        table.rounding = table.rounding.max(rounding);
+        let fraction = match rigid {
+            false => critical.fraction,
+            true => unsoftened(family, &equations.grid, &critical)?,
+        };
+        table.push(&equations, &critical.state, fraction)?;
         // A finer grid would only add rounding.
         if (table.fraction.best()).is_some_and(|best| best.error < table.rounding.max(EXACT)) {
             break;
@@ -189,9 +172,8 @@ struct Table {
 
 impl Table {
     fn push(&mut self, equations: &Equations, state: &State, fraction: f64) -> Result<(), Stuck> {
-        let energy = equations
-            .family
-            .with(fraction, &equations.grid, |leaf| leaf.energy(state))?;
+        let family = equations.family;
+        let energy = family.with(fraction, &equations.grid, |leaf| leaf.energy(state))?;
         let tips = (0..state.rods()).flat_map(|j| state.tip(j).to_array());
         let segments = state.segments();
         self.tips.push(segments, tips.collect());

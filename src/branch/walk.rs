@@ -91,22 +91,22 @@ pub fn walk(
     let mut step = FIRST * how.longest;
     progress(&now);
     while branch.points.len() < how.most {
-        let mut reason = Stuck::NotConverged;
-        let found = match advance(equations, &now, step) {
-            Ok(found) if how.accepts(equations, &now, &found, step) => Some(found),
-            Ok(_) => None,
-            Err(stuck) => {
-                reason = stuck;
-                None
+        let found = advance(equations, &now, step).and_then(|found| {
+            match how.accepts(equations, &now, &found, step) {
+                true => Ok(found),
+                false => Err(Stuck::NotConverged),
             }
-        };
-        let Some(mut next) = found else {
-            step *= 0.5;
-            if step < SHORTEST * how.longest {
-                branch.end = End::Stuck(reason);
-                return branch;
+        });
+        let mut next = match found {
+            Ok(found) => found,
+            Err(reason) => {
+                step *= 0.5;
+                if step < SHORTEST * how.longest {
+                    branch.end = End::Stuck(reason);
+                    return branch;
+                }
+                continue;
             }
-            continue;
         };
         let turned = equations.along(&now.tangent, &next.point.tangent);
         let edge = match arrive_at_edge(equations, &now, &mut next, step) {
@@ -138,12 +138,8 @@ pub fn walk(
         now = next.point;
         progress(&now);
         branch.points.push(now.clone());
-        if let Some(end) = edge {
+        if let Some(end) = edge.or(closed.then_some(End::Closed)) {
             branch.end = end;
-            return branch;
-        }
-        if closed {
-            branch.end = End::Closed;
             return branch;
         }
         if next.iterations <= FEW && turned > STRAIGHT {
@@ -179,9 +175,7 @@ fn advance(equations: &mut Equations, now: &Point, step: f64) -> Result<Found, S
     let fraction = now.fraction + step * tangent.fraction;
     let state = equations.moved(&now.state, now.fraction, &tangent.increments, step)?;
     let (point, iterations) = equations.correct(&state, fraction, Some(tangent))?;
-    let drift = state
-        .shift_to(&point.state)
-        .max((point.fraction - fraction).abs());
+    let drift = (state.shift_to(&point.state)).max((point.fraction - fraction).abs());
     Ok(Found {
         point,
         iterations,
@@ -204,26 +198,19 @@ fn arrive_at_edge(
         _ => return Ok(None),
     };
     let part = (edge - now.fraction) / (next.point.fraction - now.fraction);
-    next.point = arrive(equations, now, part * step, edge)?;
     next.step = part * step;
-    Ok(Some(end))
-}
-
-/// The point at an end of the range, about `step` away.
-fn arrive(equations: &mut Equations, now: &Point, step: f64, edge: f64) -> Result<Point, Stuck> {
-    let state = equations.moved(&now.state, now.fraction, &now.tangent.increments, step)?;
-    let (mut point, _) = equations.correct(&state, edge, None)?;
-    if equations.along(&point.tangent, &now.tangent) < 0.0 {
-        point.tangent = reversed(point.tangent);
+    let increments = &now.tangent.increments;
+    let state = equations.moved(&now.state, now.fraction, increments, next.step)?;
+    (next.point, _) = equations.correct(&state, edge, None)?;
+    if equations.along(&next.point.tangent, &now.tangent) < 0.0 {
+        next.point.tangent = reversed(next.point.tangent.clone());
     }
-    Ok(point)
+    Ok(Some(end))
 }
 
 /// Distance of two points: of the shapes, or in the parameter.
 fn distance(a: &Point, b: &Point) -> f64 {
-    a.state
-        .shift_to(&b.state)
-        .max((a.fraction - b.fraction).abs())
+    (a.state.shift_to(&b.state)).max((a.fraction - b.fraction).abs())
 }
 
 impl Tangent {

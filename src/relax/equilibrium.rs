@@ -9,7 +9,8 @@ use glam::DVec3;
 use serde::{Serialize, Serializer};
 
 /// How a run ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Outcome {
     /// At rest in a stable equilibrium, within the tolerance.
     Converged,
@@ -50,12 +51,6 @@ impl Outcome {
             self,
             Outcome::Converged | Outcome::ConvergedAfterSaddle | Outcome::Saddle
         )
-    }
-}
-
-impl Serialize for Outcome {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.word())
     }
 }
 
@@ -163,8 +158,7 @@ impl Mode {
 
     /// Whether the eigenvalue cannot be told from zero.
     pub fn is_neutral(&self) -> bool {
-        self.error
-            .is_some_and(|error| self.eigenvalue.abs() <= error)
+        (self.error).is_some_and(|error| self.eigenvalue.abs() <= error)
     }
 }
 
@@ -276,8 +270,7 @@ pub struct Equilibrium {
 impl Equilibrium {
     /// Whether the equilibrium is stable: no negative eigenvalue.
     pub fn stable(&self) -> Option<bool> {
-        let index = self.stability.negative_eigenvalues;
-        index.map(|count| count == 0)
+        (self.stability.negative_eigenvalues).map(|count| count == 0)
     }
 }
 

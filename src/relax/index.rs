@@ -5,7 +5,7 @@ use crate::newton::Work;
 use crate::relax::prolong::prolong;
 use crate::relax::saddle;
 use crate::scenario::Scenario;
-use crate::shape::RodShape;
+use crate::shape::{NodeState, RodShape};
 use glam::DVec3;
 
 /// The finest grid on which eigenvalues are counted.
@@ -41,21 +41,14 @@ pub fn index_near(scenario: &Scenario, grid: Grid, rods: &[RodShape]) -> Option<
 
 /// The state of the discrete leaf at the given nodes.
 pub fn project(leaf: &Leaf, discrete: &DiscreteLeaf, rods: &[RodShape]) -> State {
+    let scale = leaf.scale;
     let nodes = || rods.iter().flat_map(|rod| &rod.nodes);
-    let mut state = State::new(
-        discrete.segments(),
-        nodes()
-            .map(|node| node.position / leaf.scale.length)
-            .collect(),
-        nodes().map(|node| node.rotation).collect(),
-    );
-    state.n = rods
-        .iter()
-        .flat_map(|rod| rod.nodes.windows(2))
-        .map(|ends| {
-            let force = |i: usize| ends[i].rotation * ends[i].n;
-            0.5 * (force(0) + force(1)) / leaf.scale.force()
-        })
-        .collect();
+    let x = nodes().map(|node| node.position / scale.length).collect();
+    let q = nodes().map(|node| node.rotation).collect();
+    let mut state = State::new(discrete.segments(), x, q);
+    let ends = rods.iter().flat_map(|rod| rod.nodes.windows(2));
+    let force = |node: &NodeState| node.rotation * node.n;
+    let middle = |ends: &[_]| 0.5 * (force(&ends[0]) + force(&ends[1])) / scale.force();
+    state.n = ends.map(middle).collect();
     state
 }

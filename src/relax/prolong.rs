@@ -14,12 +14,11 @@ pub fn prolong(leaf: &DiscreteLeaf, state: &State) -> State {
         let force = |i: usize| state.n[j * n + i];
         // Spatial curvature and force at a node: from the segments beside it,
         // or extrapolated from the two next to an end.
-        let curvatures: Vec<DVec3> = (0..n)
-            .map(|i| {
-                let segment = leaf.segment(state, j, i, force(i));
-                segment.frame * segment.u
-            })
-            .collect();
+        let curved = |i: usize| {
+            let segment = leaf.segment(state, j, i, force(i));
+            segment.frame * segment.u
+        };
+        let curvatures: Vec<DVec3> = (0..n).map(curved).collect();
         let nodal = |value: &dyn Fn(usize) -> DVec3, i: usize| match i {
             _ if n == 1 => value(0),
             0 => 1.5 * value(0) - 0.5 * value(1),
@@ -41,18 +40,15 @@ pub fn prolong(leaf: &DiscreteLeaf, state: &State) -> State {
             // q' = u q / 2 with u spatial.
             let slope = |u: DVec3, q: DQuat| DQuat::from_xyzw(u.x, u.y, u.z, 0.0) * q * 0.5;
             let bend = (slope(curvature(i), q0) - slope(curvature(i + 1), q1)) * (section.ds / 8.0);
-            let turned = ((q0 + q1) * 0.5 + bend).normalize();
             x.extend([state.x[k], middle]);
-            q.extend([q0, turned]);
-            let before = if i > 0 {
-                force(i - 1)
-            } else {
-                2.0 * force(0) - force(1.min(n - 1))
+            q.extend([q0, ((q0 + q1) * 0.5 + bend).normalize()]);
+            let before = match i {
+                0 => 2.0 * force(0) - force(1.min(n - 1)),
+                _ => force(i - 1),
             };
-            let after = if i + 1 < n {
-                force(i + 1)
-            } else {
-                2.0 * force(i) - force(i.saturating_sub(1))
+            let after = match i + 1 < n {
+                true => force(i + 1),
+                false => 2.0 * force(i) - force(i.saturating_sub(1)),
             };
             let eighth = 0.125 * (after - before);
             forces.extend([force(i) - eighth, force(i) + eighth]);

@@ -19,16 +19,15 @@ pub fn equilibrium(
     remark: Option<String>,
     wall_seconds: f64,
 ) -> Equilibrium {
-    let Some(finest) = run.levels.last() else {
-        unreachable!("a run leaves at least the grid it failed on")
-    };
-    let scale = run.leaf.scale;
+    let finest = run.levels.last().expect("the grid it failed on, at least");
+    let (scenario, scale) = (run.leaf.scenario(), run.leaf.scale);
     let best = run.table.best();
-    let columns = best.as_ref().map_or(0, |best| best.columns);
+    let columns = best.map_or(0, |best| best.columns);
     let series = run.series();
     let (stations, rods) = fields(&series, columns);
     let joined = run.leaf.joined();
     let tips = rods.iter().take(if joined { 1 } else { rods.len() });
+    let tips = tips.filter_map(|rod| rod.nodes.last());
     let mut energies = Richardson::default();
     for level in &series {
         energies.push(level.leaf.segments(), vec![level.leaf.energy(&level.state)]);
@@ -38,16 +37,13 @@ pub fn equilibrium(
     let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
     let segments: Vec<usize> = series.iter().map(|level| level.leaf.segments()).collect();
     Equilibrium {
-        scenario: run.leaf.scenario().name.clone(),
+        scenario: scenario.name.clone(),
         method: run.options.method,
         outcome,
         remark,
         rod_count: rods.len(),
         energy: Some(energies.column(columns)[0] * scale.moment()),
-        tips: tips
-            .filter_map(|rod| rod.nodes.last())
-            .map(|node| node.position)
-            .collect(),
+        tips: tips.map(|node| node.position).collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
         stability: Stability {
             negative_eigenvalues: run.index,
@@ -55,13 +51,7 @@ pub fn equilibrium(
             mode_shapes: run.options.mode_shapes,
             saddle: run.saddle,
         },
-        undulation: Undulation::of(
-            run.leaf.scenario(),
-            &lines,
-            &stations,
-            &rods,
-            error_estimate,
-        ),
+        undulation: Undulation::of(scenario, &lines, &stations, &rods, error_estimate),
         model: Model::new(
             rods.len(),
             (run.solved, run.planar),
@@ -91,14 +81,10 @@ pub fn equilibrium(
 /// All nodes of a level, in units of the scenario.
 fn centerlines(level: &Level) -> Vec<Centerline> {
     let (n, length) = (level.leaf.segments(), level.leaf.leaf.scale.length);
-    (0..level.leaf.rods())
-        .map(|j| {
-            let base = level.state.base(j);
-            let nodes = base..=base + n;
-            nodes
-                .map(|k| (level.state.x[k] * length, level.state.q[k]))
-                .collect()
-        })
+    let node = |k: usize| (level.state.x[k] * length, level.state.q[k]);
+    let bases = (0..level.leaf.rods()).map(|j| level.state.base(j));
+    bases
+        .map(|base| (base..=base + n).map(node).collect())
         .collect()
 }
 
@@ -125,21 +111,20 @@ fn fields(levels: &[&Level], columns: usize) -> (Vec<f64>, Vec<RodShape>) {
             let stations = reported.leaf.segments();
             if stations > n {
                 let from = used.len().min(levels.len() - 1);
-                let finer = extrapolated(&used[used.len() - from..], j, stations);
+                let mut finer = extrapolated(&used[used.len() - from..], j, stations);
                 let stride = stations / n;
                 for (i, node) in nodes.iter_mut().enumerate() {
                     for (value, finer) in node.iter_mut().zip(&finer[i * stride]) {
                         *value -= finer;
                     }
                 }
-                nodes = interpolated(&nodes, finer);
+                interpolate(&nodes, &mut finer);
+                nodes = finer;
             }
-            let nodes = nodes.iter().enumerate();
+            let node = |(i, values): (usize, &[f64; FIELDS])| unpack(&reported.leaf, j, i, values);
             RodShape {
                 length: first.leaf.leaf.length(j) * length,
-                nodes: nodes
-                    .map(|(i, v)| unpack(&reported.leaf, j, i, v))
-                    .collect(),
+                nodes: nodes.iter().enumerate().map(node).collect(),
             }
         })
         .collect();
@@ -153,7 +138,7 @@ fn extrapolated(levels: &[&Level], j: usize, n: usize) -> Vec<[f64; FIELDS]> {
     for level in levels {
         let stride = level.leaf.segments() / n;
         let node = |i: usize| shape::node(&level.leaf, &level.state, j, i * stride);
-        let values = (0..=n).flat_map(|i| pack((&node(i), &reference[i])));
+        let values = (0..=n).flat_map(|i| pack(&node(i), reference[i]));
         table.push(level.leaf.segments(), values.collect());
     }
     table.column(levels.len() - 1).as_chunks().0.to_vec()
@@ -165,24 +150,19 @@ fn rotations(level: &Level, j: usize, n: usize) -> Vec<DQuat> {
     let mut rotations: Vec<DQuat> = Vec::new();
     for i in 0..=n {
         let q = level.state.q[level.state.base(j) + i * stride];
-        let before = rotations.last().copied().unwrap_or(q);
-        rotations.push(if q.dot(before) < 0.0 { -q } else { q });
+        rotations.push(alike(q, rotations.last().copied().unwrap_or(q)));
     }
     rotations
 }
 
 /// Adds to `nodes` what `corrections` at fewer of them are in between.
-fn interpolated(
-    corrections: &[[f64; FIELDS]],
-    mut nodes: Vec<[f64; FIELDS]>,
-) -> Vec<[f64; FIELDS]> {
+fn interpolate(corrections: &[[f64; FIELDS]], nodes: &mut [[f64; FIELDS]]) {
     let count = corrections.len().min(5);
     let width = (corrections.len() - 1) as f64 / (nodes.len() - 1) as f64;
     for (k, values) in nodes.iter_mut().enumerate() {
         let at = k as f64 * width;
-        let begin = (at as usize)
-            .saturating_sub(1)
-            .min(corrections.len() - count);
+        let before = (at as usize).saturating_sub(1);
+        let begin = before.min(corrections.len() - count);
         for a in 0..count {
             let weight = lagrange(count, a, at - begin as f64);
             for (value, correction) in values.iter_mut().zip(&corrections[begin + a]) {
@@ -190,20 +170,20 @@ fn interpolated(
             }
         }
     }
-    nodes
 }
 
-fn pack((node, reference): (&NodeState, &DQuat)) -> [f64; FIELDS] {
+fn pack(node: &NodeState, reference: DQuat) -> [f64; FIELDS] {
     // A rotation's two quaternions must not be mixed up between grids.
-    let q = if node.rotation.dot(*reference) < 0.0 {
-        -node.rotation
-    } else {
-        node.rotation
-    };
+    let q = alike(node.rotation, reference);
     let (x, n, m) = (node.position, node.n, node.m);
     [
         x.x, x.y, x.z, q.x, q.y, q.z, q.w, n.x, n.y, n.z, m.x, m.y, m.z,
     ]
+}
+
+/// That quaternion of a rotation which is nearer to another.
+fn alike(q: DQuat, other: DQuat) -> DQuat {
+    if q.dot(other) < 0.0 { -q } else { q }
 }
 
 fn unpack(leaf: &DiscreteLeaf, j: usize, i: usize, values: &[f64]) -> NodeState {

@@ -41,29 +41,21 @@ pub fn least(method: Method, tolerance: f64) -> usize {
 
 /// Segments of a grid: so many as asked for, or at least `least`, as many as
 /// the kinks of the profiles, the rest shape and the tip moment need.
-///
-/// # Errors
-/// If that is too few or too many.
 pub fn check_segments(
     leaf: &Leaf,
     asked: Option<usize>,
     least: usize,
 ) -> Result<usize, RelaxError> {
     let panels = leaf.kinks().len() + 1;
-    let segments = match asked {
-        Some(found) if found < panels => {
-            return Err(RelaxError::TooFewSegments {
-                found,
-                least: panels,
-            });
-        }
-        Some(segments) => segments,
-        None => coarsest(leaf, least).max(panels),
-    };
-    let nodes = leaf.rods().saturating_mul(segments);
+    let found = asked.unwrap_or_else(|| coarsest(leaf, least).max(panels));
+    let (rods, segments, least) = (leaf.rods(), found, panels);
+    let nodes = rods.saturating_mul(segments);
+    if found < least {
+        return Err(RelaxError::TooFewSegments { found, least });
+    }
     if nodes > MAX_NODES {
         return Err(RelaxError::TooManyNodes {
-            rods: leaf.rods(),
+            rods,
             segments,
             nodes,
         });
@@ -74,13 +66,12 @@ pub fn check_segments(
 /// Segments of the coarsest grid.
 pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
     let moment = leaf.loads.tip_moment.length();
-    let turn = (0..leaf.rods())
-        .map(|j| {
-            let section = leaf.section(j, 0.5, 1.0);
-            (section.rest_curvature.length() + moment / section.couple_stiffness.min_element())
-                * leaf.length(j)
-        })
-        .fold(0.0, f64::max);
+    let turn = |j: usize| {
+        let section = leaf.section(j, 0.5, 1.0);
+        let bending = moment / section.couple_stiffness.min_element();
+        (section.rest_curvature.length() + bending) * leaf.length(j)
+    };
+    let turn = (0..leaf.rods()).map(turn).fold(0.0, f64::max);
     let mut segments = least;
     while (segments as f64) * COARSEST_TURN < turn && segments < FINEST {
         segments *= 2;

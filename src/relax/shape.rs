@@ -28,10 +28,8 @@ pub fn node(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> NodeState
         if i == n && (j == 0 || !leaf.leaf.joined()) {
             load -= leaf.leaf.loads.tip_force;
         }
-        (
-            carried(i - 1) - load * (left / (left + right)),
-            segment(i - 1).2,
-        )
+        let force = carried(i - 1) - load * (left / (left + right));
+        (force, segment(i - 1).2)
     };
     let mut node = NodeState {
         position: state.x[k],

@@ -1,5 +1,6 @@
 //! From a scenario and what is asked to the leaf at rest.
 
+use crate::bvp::Start;
 use crate::leaf::{Grid, Leaf};
 use crate::newton::{Stop, Work};
 use crate::relax::equilibrium::Equilibrium;
@@ -29,26 +30,30 @@ pub fn relax(
         let found = options.modes;
         return Err(RelaxError::Modes { found });
     }
-    match options.method {
+    let intervals = match options.method {
         Method::SemiImplicit(_) | Method::Explicit { .. } => {
-            relax_on_grids(scenario, options, tolerance, progress)
+            return relax_on_grids(scenario, options, tolerance, progress);
         }
-        Method::SingleShooting => shooting::from_arcs(scenario, options, Some(1), tolerance),
-        Method::Shooting { intervals } => {
-            shooting::from_arcs(scenario, options, intervals, tolerance)
-        }
-        Method::ShootingFromRest { intervals } => {
-            shooting::check_intervals(intervals)?;
-            let rest = Options {
-                method: Method::default(),
-                tolerance: Some(shooting::START),
-                modes: 0,
-                ..options.clone()
-            };
-            let rest = relax(scenario, &rest, progress)?;
-            shooting::from_rest(scenario, options, intervals, tolerance, rest)
-        }
+        Method::SingleShooting => Some(1),
+        Method::Shooting { intervals } | Method::ShootingFromRest { intervals } => intervals,
+    };
+    shooting::check_intervals(intervals)?;
+    if !matches!(options.method, Method::ShootingFromRest { .. }) {
+        let arcs = Start::Arcs;
+        return Ok(shooting::shoot(
+            scenario, options, intervals, tolerance, arcs,
+        ));
     }
+    let rest = Options {
+        method: Method::default(),
+        tolerance: Some(shooting::START),
+        modes: 0,
+        ..options.clone()
+    };
+    let rest = relax(scenario, &rest, progress)?;
+    Ok(shooting::from_rest(
+        scenario, options, intervals, tolerance, rest,
+    ))
 }
 
 /// Relaxes on nested grids.

@@ -2,7 +2,6 @@
 
 use crate::leaf::System;
 use crate::newton::Stop;
-use crate::relax::richardson::Richardson;
 use crate::relax::run::{Level, Run, complete};
 use crate::relax::saddle::{self, saddle_of};
 use crate::relax::settle::{InitialGuess, MAX_SADDLES, Settled};
@@ -66,7 +65,6 @@ impl Run<'_, '_> {
         let grid = level.leaf.grid.clone();
         let Settled { level, rest, .. } = self.settle(grid, InitialGuess::Pushed(state));
         self.levels.clear();
-        self.table = Richardson::default();
         self.push(level);
         rest?;
         match self.segments() {

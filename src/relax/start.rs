@@ -19,13 +19,10 @@ pub fn start(leaf: &DiscreteLeaf) -> State {
 /// chords differ: what is missing to the mean chord is made up by stretching.
 fn arcs(leaf: &DiscreteLeaf) -> State {
     let model = &leaf.leaf;
-    let angles: Vec<f64> = (0..leaf.rods())
-        .map(|j| model.scenario().rods[j].angle)
-        .collect();
-    let sum: DVec3 = angles
-        .iter()
-        .map(|phi| DVec3::new(phi.cos(), phi.sin(), 0.0))
-        .sum();
+    let rods = &model.scenario().rods;
+    let angles: Vec<f64> = (0..leaf.rods()).map(|j| rods[j].angle).collect();
+    let towards = |phi: f64| DVec3::new(phi.cos(), phi.sin(), 0.0);
+    let sum: DVec3 = angles.iter().map(|phi| towards(*phi)).sum();
     let mean = if sum.length() > 1e-9 * angles.len() as f64 {
         sum.y.atan2(sum.x)
     } else {
@@ -39,8 +36,7 @@ fn arcs(leaf: &DiscreteLeaf) -> State {
     let chords: f64 = (0..leaf.rods())
         .map(|j| model.grown(j, 1.0) * sinc(opening(angles[j])))
         .sum();
-    let direction = DVec3::new(mean.cos(), mean.sin(), 0.0);
-    let tip = direction * (chords / leaf.rods() as f64);
+    let tip = towards(mean) * (chords / leaf.rods() as f64);
     let (mut x, mut q) = (Vec::new(), Vec::new());
     for (j, &phi) in angles.iter().enumerate() {
         let (delta, length) = (opening(phi), model.grown(j, 1.0));
@@ -48,8 +44,7 @@ fn arcs(leaf: &DiscreteLeaf) -> State {
         let part = |sigma: f64| model.grown(j, sigma) / length;
         let arc = |sigma: f64| {
             // A chord leaves half-way between the tangents at its ends.
-            let turned = phi - delta * sigma;
-            DVec3::new(turned.cos(), turned.sin(), 0.0) * (length * sigma * sinc(delta * sigma))
+            towards(phi - delta * sigma) * (length * sigma * sinc(delta * sigma))
         };
         let missing = tip - arc(1.0);
         for &sigma in leaf.grid.sigma() {
@@ -93,10 +88,7 @@ const ACROSS: usize = 3;
 /// the lift tells: a smooth pattern that is another for every number but the
 /// sign, which alternates, and the same on all grids. A joint tip stays joint.
 pub fn disturb(leaf: &DiscreteLeaf, number: usize, state: &mut State) {
-    let (pattern, sign) = (
-        number / 2,
-        if number.is_multiple_of(2) { 1.0 } else { -1.0 },
-    );
+    let (pattern, sign) = (number / 2, [1.0, -1.0][number % 2]);
     // Multiples of the golden ratio spread evenly: no chance.
     let golden = |k: usize| 2.0 * (k as f64 * 0.618_033_988_749_895).fract() - 1.0;
     let size = sign * STEEPEST * (1 + pattern % SIZES) as f64 / SIZES as f64;

@@ -10,7 +10,6 @@ use crate::relax::segments::coarsest;
 use crate::scenario::{Scenario, longest};
 use crate::shape::RodShape;
 use crate::undulation::Undulation;
-use glam::DVec3;
 use std::time::Instant;
 
 /// Segments between stations, at least.
@@ -37,17 +36,6 @@ pub fn check_intervals(intervals: Option<usize>) -> Result<(), RelaxError> {
     }
 }
 
-/// Solves the boundary-value problem from arcs.
-pub fn from_arcs(
-    scenario: &Scenario,
-    options: &Options,
-    intervals: Option<usize>,
-    tolerance: f64,
-) -> Result<Equilibrium, RelaxError> {
-    check_intervals(intervals)?;
-    Ok(shoot(scenario, options, intervals, tolerance, Start::Arcs))
-}
-
 /// Solves the boundary-value problem from a leaf that is roughly at `rest`; where
 /// it is not, that is the result.
 pub fn from_rest(
@@ -56,12 +44,12 @@ pub fn from_rest(
     intervals: Option<usize>,
     tolerance: f64,
     rest: Equilibrium,
-) -> Result<Equilibrium, RelaxError> {
+) -> Equilibrium {
     if matches!(rest.outcome, Outcome::NotAtRest | Outcome::Diverged) {
-        return Ok(Equilibrium {
+        return Equilibrium {
             method: options.method,
             ..rest
-        });
+        };
     }
     let start = Start::Leaf {
         stations: &rest.shape.stations,
@@ -71,7 +59,7 @@ pub fn from_rest(
     found.stability.saddle = rest.stability.saddle;
     found.work = rest.work + found.work;
     found.wall_seconds += rest.wall_seconds;
-    Ok(found)
+    found
 }
 
 /// What shooting does, in the words of a relaxation: corrections are steps,
@@ -87,7 +75,8 @@ impl From<bvp::Work> for Work {
     }
 }
 
-fn shoot(
+/// Solves the boundary-value problem from a start.
+pub fn shoot(
     scenario: &Scenario,
     options: &Options,
     intervals: Option<usize>,
@@ -96,84 +85,73 @@ fn shoot(
 ) -> Equilibrium {
     let clock = Instant::now();
     let grid = station_grid(scenario);
+    let stations = grid.sigma().to_vec();
     let asked = bvp::Options {
         intervals,
         limit: options.limit.clone(),
-        ..bvp::Options::new(start, grid.sigma(), bvp::Precision::Error(tolerance))
+        ..bvp::Options::new(start, &stations, bvp::Precision::Error(tolerance))
     };
     let found = bvp::solve(scenario, &asked);
-    let work = match &found {
-        Ok(solution) => solution.work,
-        Err(failure) => failure.work,
-    };
-    let accuracy = Accuracy {
+    let mut accuracy = Accuracy {
         segments: Vec::new(),
         intervals: None,
         tolerance,
         residual: None,
         error_estimate: None,
     };
-    let found = match found {
-        Ok(solution) => solved(scenario, &grid, solution, accuracy),
-        Err(failure) => lost(failure, accuracy),
+    let (mut energy, mut index) = (None, None);
+    let ((outcome, remark), work, rods) = match found {
+        Ok(solution) => {
+            accuracy.intervals = Some(solution.intervals.len() - 1);
+            accuracy.residual = Some(solution.defect);
+            accuracy.error_estimate = Some(solution.error.position);
+            energy = Some(solution.energy);
+            index = index_near(scenario, grid, &solution.rods);
+            let said = solved(scenario, &solution, index, tolerance);
+            (said, solution.work, solution.rods)
+        }
+        Err(failure) => (lost(&failure), failure.work, failure.rods),
     };
-    let stations = grid.sigma().to_vec();
-    let error = found.accuracy.error_estimate;
-    let tips: Vec<_> = found
-        .rods
-        .iter()
-        .filter_map(|rod| rod.nodes.last())
-        .collect();
+    let tips: Vec<_> = rods.iter().filter_map(|rod| rod.nodes.last()).collect();
     let listed = if scenario.joined { 1 } else { tips.len() };
-    let veins = found.rods.len();
+    let curve = |rod: &RodShape| rod.nodes.iter().map(|node| node.position).collect();
     Equilibrium {
         scenario: scenario.name.clone(),
         method: options.method,
-        outcome: found.outcome,
-        remark: found.remark,
-        rod_count: veins,
-        accuracy: found.accuracy,
-        energy: found.energy,
+        outcome,
+        remark,
+        rod_count: rods.len(),
+        energy,
         tips: tips.iter().take(listed).map(|node| node.position).collect(),
-        tip_force_sum: tips
-            .iter()
-            .map(|node| node.rotation * node.n)
-            .sum::<DVec3>(),
+        tip_force_sum: tips.iter().map(|node| node.rotation * node.n).sum(),
         stability: Stability {
-            negative_eigenvalues: found.index,
+            negative_eigenvalues: index,
             mode_shapes: options.mode_shapes,
             ..Stability::default()
         },
-        undulation: Undulation::at_stations(scenario, &stations, &found.rods, error),
-        model: Model::new(veins, (veins, false), &[], [None; 2]),
+        undulation: Undulation::at_stations(scenario, &stations, &rods, accuracy.error_estimate),
+        accuracy,
+        model: Model::new(rods.len(), (rods.len(), false), &[], [None; 2]),
         work: work.into(),
         wall_seconds: clock.elapsed().as_secs_f64(),
         shape: Shape {
             stations,
             joined: scenario.joined,
-            curves: (found.rods.iter())
-                .map(|rod| rod.nodes.iter().map(|node| node.position).collect())
-                .collect(),
-            rods: found.rods,
+            curves: rods.iter().map(curve).collect(),
+            rods,
         },
     }
 }
 
-/// What a boundary-value solver found, solved or not.
-struct Found {
-    outcome: Outcome,
-    remark: Option<String>,
-    accuracy: Accuracy,
-    energy: Option<f64>,
-    index: Option<usize>,
-    rods: Vec<RodShape>,
-}
-
 /// What a solution says.
-fn solved(scenario: &Scenario, grid: &Grid, solution: Solution, asked: Accuracy) -> Found {
-    let index = index_near(scenario, grid.clone(), &solution.rods);
+fn solved(
+    scenario: &Scenario,
+    solution: &Solution,
+    index: Option<usize>,
+    tolerance: f64,
+) -> (Outcome, Option<String>) {
     let (outcome, remark) = match index {
-        _ if solution.error.position > asked.tolerance * longest(&scenario.rods) => (
+        _ if solution.error.position > tolerance * longest(&scenario.rods) => (
             Outcome::ToleranceNotReached,
             Some("double precision does not carry more through this leaf: ask for a larger tolerance".into()),
         ),
@@ -187,36 +165,19 @@ fn solved(scenario: &Scenario, grid: &Grid, solution: Solution, asked: Accuracy)
             Some("the number of negative eigenvalues is not known: a dead moment has no energy, or the leaf is too fine to count them".into()),
         ),
     };
-    Found {
-        outcome,
-        remark: remark.or(solution.neutral.as_ref().map(|neutral| neutral.to_string())),
-        accuracy: Accuracy {
-            intervals: Some(solution.intervals.len() - 1),
-            residual: Some(solution.defect),
-            error_estimate: Some(solution.error.position),
-            ..asked
-        },
-        energy: Some(solution.energy),
-        index,
-        rods: solution.rods,
-    }
+    let neutral = solution.neutral.as_ref().map(|neutral| neutral.to_string());
+    (outcome, remark.or(neutral))
 }
 
 /// What a failure says: how far it came, and why not further.
-fn lost(failure: bvp::Failure, accuracy: Accuracy) -> Found {
+fn lost(failure: &bvp::Failure) -> (Outcome, Option<String>) {
     let way = match failure.part {
         part if part < 1.0 => format!(" (at {part:.4} of the way from arcs to this leaf)"),
         _ => String::new(),
     };
-    Found {
-        outcome: match failure.reason {
-            Reason::Singular(_) => Outcome::Singular,
-            _ => Outcome::NotAtRest,
-        },
-        remark: Some(format!("{}{way}", failure.reason)),
-        accuracy,
-        energy: None,
-        index: None,
-        rods: failure.rods,
-    }
+    let outcome = match failure.reason {
+        Reason::Singular(_) => Outcome::Singular,
+        _ => Outcome::NotAtRest,
+    };
+    (outcome, Some(format!("{}{way}", failure.reason)))
 }
