@@ -75,19 +75,21 @@ impl<'e, 'a> Integrator<'e, 'a> {
 
     /// Bound on the step by what perturbations do.
     fn longest_step(&self) -> f64 {
+        let force = |j| RodState::read(&self.y, j).n.length();
         let rate = (0..self.equations.rods())
-            .map(|j| {
-                let force = RodState::read(&self.y, j).n.length();
-                self.equations.rate(j, force)
-            })
+            .map(|j| self.equations.rate(j, force(j)))
             .fold(1.0, f64::max);
         let longest = LONGEST_STEP[0] * (self.tolerance / 1e-13).powf(0.125);
         longest.min(LONGEST_STEP[1]) / rate
     }
 
-    /// Whether there is still a way to go to `until`.
-    pub fn before(&self, until: f64) -> bool {
-        self.sigma < until
+    /// All steps to `end`; what they are is told after each.
+    pub fn run(&mut self, end: f64, mut told: impl FnMut(&Self)) -> Result<(), Unbounded> {
+        while self.sigma < end {
+            self.step(end)?;
+            told(self);
+        }
+        Ok(())
     }
 
     /// One step towards `until`, never beyond it.
@@ -106,10 +108,8 @@ impl<'e, 'a> Integrator<'e, 'a> {
             }
             self.attempt(h);
             let error = self.error(h);
-            let bounded = self.next[..self.next.len() - 1]
-                .iter()
-                .all(|value| value.abs() < MAX_STATE);
-            if !bounded || !error.is_finite() {
+            let mut state = self.next[..self.next.len() - 1].iter();
+            if !state.all(|value| value.abs() < MAX_STATE) || !error.is_finite() {
                 self.step = 0.1 * h;
                 continue;
             }
@@ -120,11 +120,7 @@ impl<'e, 'a> Integrator<'e, 'a> {
             }
             let proposed = h * factor.clamp(0.2, 5.0);
             // A step cut short by `until` says little about the next.
-            self.step = if last {
-                self.step.max(proposed)
-            } else {
-                proposed
-            };
+            self.step = proposed.max(if last { self.step } else { 0.0 });
             self.width = h;
             self.sigma = if last { until } else { self.sigma + h };
             self.accept();
@@ -149,12 +145,8 @@ impl<'e, 'a> Integrator<'e, 'a> {
     fn error(&self, h: f64) -> f64 {
         let weighted = |weights: &[f64; STAGES]| {
             norm(self.equations, &self.y, &self.next, |i| {
-                let sum: f64 = weights
-                    .iter()
-                    .zip(&self.slopes)
-                    .map(|(weight, slopes)| weight * slopes[i])
-                    .sum();
-                h * sum
+                let terms = weights.iter().zip(&self.slopes);
+                h * terms.map(|(w, slopes)| w * slopes[i]).sum::<f64>()
             })
         };
         let (fifth, third) = (weighted(&E5), weighted(&E3));
@@ -195,7 +187,7 @@ fn norm(equations: &Equations, y: &[f64], next: &[f64], value: impl Fn(usize) ->
     let mut largest: f64 = 0.0;
     for j in 0..equations.rods() {
         let (a, b) = (RodState::read(y, j), RodState::read(next, j));
-        let soft = equations.softest(j);
+        let soft = equations.softest[j];
         let unit = |a: glam::DVec3, b: glam::DVec3| soft + a.length().max(b.length());
         let (force, moment) = (unit(a.n, b.n), unit(a.m, b.m));
         let sum: f64 = (0..STATE)
@@ -269,9 +261,7 @@ mod tests {
 
     fn to(equations: &Equations, end: f64, tolerance: f64) -> (Vec<f64>, usize) {
         let mut integrator = Integrator::new(equations, 0.0, clamped(equations, 1.0), tolerance);
-        while integrator.before(end) {
-            integrator.step(end).unwrap();
-        }
+        integrator.run(end, |_| ()).unwrap();
         assert_eq!(integrator.sigma, end);
         (integrator.y, integrator.evaluations)
     }
@@ -323,9 +313,7 @@ mod tests {
         let equations = Equations::new(&scenario);
         let mut integrator = Integrator::new(&equations, 0.0, clamped(&equations, 1.0), 1e-10);
         for stop in [0.3, 0.1 + 0.2, 0.3 + 1e-15, 1.0] {
-            while integrator.before(stop) {
-                integrator.step(stop).unwrap();
-            }
+            integrator.run(stop, |_| ()).unwrap();
             assert_eq!(integrator.sigma, stop);
         }
         let straight = to(&equations, 1.0, 1e-10).0;
@@ -339,12 +327,7 @@ mod tests {
         scenario.coupling = vec![[1e9; 3]];
         let equations = Equations::new(&scenario);
         let mut integrator = Integrator::new(&equations, 0.0, clamped(&equations, 1.0), 1e-8);
-        let failed = loop {
-            assert!(integrator.before(1.0), "it was to grow");
-            if let Err(unbounded) = integrator.step(1.0) {
-                break unbounded;
-            }
-        };
+        let failed = integrator.run(1.0, |_| ()).expect_err("it was to grow");
         assert!(failed.sigma > 0.0 && failed.sigma < 0.5, "{failed:?}");
     }
 }

@@ -29,16 +29,19 @@ pub struct Equations<'a> {
     pub length: f64,
     /// Unit of force, A/L^2, with A the geometric mean of A2 and A3 mid-rod.
     pub force: f64,
-    lengths: Vec<f64>,
+    /// Of the rods.
+    pub lengths: Vec<f64>,
     coupling: Vec<DVec3>,
     gravity: DVec3,
     tip_force: DVec3,
     tip_moment: DVec3,
     /// The smallest couple stiffness along each rod.
-    softest: Vec<f64>,
+    pub softest: Vec<f64>,
     /// Rate per sigma at which the coupling makes perturbations of each rod grow.
     coupled_rate: Vec<f64>,
     arcs: Vec<Arc>,
+    /// Fractions of the length where a profile has a kink, ascending.
+    kinks: Vec<f64>,
     /// Between 0, a leaf without loads that rests in the shape of arcs with a
     /// common tip, and 1, the leaf of the scenario.
     pub part: f64,
@@ -79,25 +82,22 @@ impl<'a> Equations<'a> {
     pub fn new(scenario: &'a Scenario) -> Self {
         let rods = &scenario.rods;
         let length = longest(rods);
-        let logs: f64 = rods
-            .iter()
-            .flat_map(|rod| &rod.couple_stiffness[1..])
-            .map(|stiffness| stiffness.at(0.5).ln())
-            .sum();
+        let bending = rods.iter().flat_map(|rod| &rod.couple_stiffness[1..]);
+        let logs: f64 = bending.map(|stiffness| stiffness.at(0.5).ln()).sum();
         let stiffness = (logs / (2 * rods.len()) as f64).exp();
         let force = stiffness / (length * length);
         let lengths: Vec<f64> = rods.iter().map(|rod| rod.length / length).collect();
-        let coupling: Vec<DVec3> = lengths
-            .windows(2)
-            .zip(&scenario.coupling)
+        let coupling: Vec<DVec3> = (lengths.windows(2).zip(&scenario.coupling))
             .map(|(gap, kappa)| {
                 DVec3::from_array(*kappa) * (0.5 * (gap[0] + gap[1]) * length * length / force)
             })
             .collect();
-        let softest: Vec<f64> = rods
-            .iter()
-            .map(|rod| rod.couple_stiffness.iter().map(Profile::min))
-            .map(|stiffness| stiffness.fold(f64::INFINITY, f64::min) / (force * length * length))
+        let least = |profiles: &[Profile; 3]| {
+            let each = profiles.iter().map(Profile::min);
+            each.fold(f64::INFINITY, f64::min)
+        };
+        let softest: Vec<f64> = (rods.iter())
+            .map(|rod| least(&rod.couple_stiffness) / (force * length * length))
             .collect();
         let coupled_rate = (0..rods.len())
             .map(|j| {
@@ -107,8 +107,7 @@ impl<'a> Equations<'a> {
                 // Neighbours that move the other way double the pull; against
                 // it a rod bends, r'''' = -pull r, or stretches, r'' = pull r.
                 let pull = 2.0 * lengths[j] * pull.max_element();
-                let stiffness = rods[j].force_stiffness.iter().map(Profile::min);
-                let stiffness = stiffness.fold(f64::INFINITY, f64::min) / force;
+                let stiffness = least(&rods[j].force_stiffness) / force;
                 let bend = (pull * lengths[j] * lengths[j] / softest[j]).sqrt().sqrt();
                 // Forces have the longer arms of a vein that has grown.
                 let grown = rods[j].rest_stretch.max_abs().sqrt();
@@ -126,6 +125,7 @@ impl<'a> Equations<'a> {
             tip_moment: DVec3::from_array(scenario.tip_moment) / (force * length),
             softest,
             arcs: arcs::arcs(scenario, &lengths),
+            kinks: kinks(scenario),
             lengths,
             part: 1.0,
             softened: 1.0,
@@ -151,19 +151,9 @@ impl<'a> Equations<'a> {
         tension.max(self.coupled_rate[j])
     }
 
-    /// Length of rod `j`.
-    pub fn rod_length(&self, j: usize) -> f64 {
-        self.lengths[j]
-    }
-
     /// Length at rest of rod `j` from the base up to `sigma`, with its growth.
     pub fn grown(&self, j: usize, sigma: f64) -> f64 {
         self.lengths[j] * self.scenario.rods[j].rest_stretch.integral(sigma)
-    }
-
-    /// Smallest couple stiffness of rod `j`.
-    pub fn softest(&self, j: usize) -> f64 {
-        self.softest[j]
     }
 
     /// Coupling of gap `g`: force per unit displacement and unit of sigma.
@@ -177,22 +167,10 @@ impl<'a> Equations<'a> {
         self.coupling[g] != DVec3::ZERO
     }
 
-    /// Fractions of the length where a profile has a kink, ascending.
-    pub fn kinks(&self) -> Vec<f64> {
-        let mut kinks: Vec<f64> = (self.scenario.rods.iter())
-            .flat_map(|rod| {
-                let (a, h, u) = (
-                    &rod.couple_stiffness,
-                    &rod.force_stiffness,
-                    &rod.rest_curvature,
-                );
-                a.iter().chain(h).chain(u).chain([&rod.rest_stretch])
-            })
-            .flat_map(|profile| profile.kinks().iter().copied())
-            .collect();
-        kinks.sort_by(f64::total_cmp);
-        kinks.dedup();
-        kinks
+    /// Where an integration ends a step: at the kinks on the way, and at `to`.
+    pub fn stops(&self, from: f64, to: f64) -> impl Iterator<Item = f64> {
+        let kinks = self.kinks.iter().copied();
+        kinks.filter(move |s| *s > from && *s < to).chain([to])
     }
 
     /// The state at the base for given forces and moments: conditions (a) and (c).
@@ -205,6 +183,15 @@ impl<'a> Equations<'a> {
         }
     }
 
+    /// A flat state at the base without stress.
+    pub fn clamped(&self) -> Vec<f64> {
+        let mut y = vec![0.0; self.size()];
+        for j in 0..self.rods() {
+            self.base(j, DVec3::ZERO, DVec3::ZERO).write(&mut y, j);
+        }
+        y
+    }
+
     fn material(&self, j: usize, sigma: f64) -> Material {
         let rod = &self.scenario.rods[j];
         let at = |p: &[Profile; 3]| DVec3::new(p[0].at(sigma), p[1].at(sigma), p[2].at(sigma));
@@ -213,7 +200,6 @@ impl<'a> Equations<'a> {
             let stiffest = stiffness.max_element();
             stiffness = stiffest * (stiffness / stiffest).powf(self.softened);
         }
-        let flexibility = self.force * self.length * self.length * stiffness.recip();
         let (arc, part) = (&self.arcs[j], self.part);
         let stretch = rod.rest_stretch.at(sigma);
         // Where it is the scenario's, the law is not to be rounded.
@@ -227,7 +213,7 @@ impl<'a> Equations<'a> {
         };
         Material {
             compliance: self.force * at(&rod.force_stiffness).recip(),
-            flexibility,
+            flexibility: self.force * self.length * self.length * stiffness.recip(),
             rest_strain,
             rest_curvature,
         }
@@ -302,8 +288,7 @@ impl<'a> Equations<'a> {
     pub fn tip_conditions(&self, y: &[f64]) -> Vec<f64> {
         let rods: Vec<RodState> = (0..self.rods()).map(|j| RodState::read(y, j)).collect();
         let force: DVec3 = rods.iter().map(|rod| rod.n).sum();
-        rods.iter()
-            .enumerate()
+        (rods.iter().enumerate())
             .flat_map(|(j, rod)| {
                 let first = match (self.scenario.joined, j) {
                     (true, 0) => force - self.part * self.tip_force,
@@ -329,6 +314,21 @@ impl<'a> Equations<'a> {
             .sum();
         -self.part * work
     }
+}
+
+fn kinks(scenario: &Scenario) -> Vec<f64> {
+    let profiles = scenario.rods.iter().flat_map(|rod| {
+        let (a, h, u) = (
+            &rod.couple_stiffness,
+            &rod.force_stiffness,
+            &rod.rest_curvature,
+        );
+        a.iter().chain(h).chain(u).chain([&rod.rest_stretch])
+    });
+    let mut kinks: Vec<f64> = profiles.flat_map(Profile::kinks).copied().collect();
+    kinks.sort_by(f64::total_cmp);
+    kinks.dedup();
+    kinks
 }
 
 /// The matrix \[a\] with \[a\] b = a x b.

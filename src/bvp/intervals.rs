@@ -37,8 +37,8 @@ impl Units {
     pub fn new(equations: &Equations, near: &Trajectory) -> Self {
         let (force, moment) = (0..equations.rods())
             .map(|j| {
-                let (n, m) = near.largest(j);
-                (equations.softest(j) + n, equations.softest(j) + m)
+                let ((n, m), soft) = (near.largest(j), equations.softest[j]);
+                (soft + n, soft + m)
             })
             .unzip();
         Units { force, moment }
@@ -114,7 +114,6 @@ pub fn integrate(
     tolerance: f64,
     linearise: bool,
 ) -> Result<Vec<Integrated>, Unbounded> {
-    let kinks = equations.kinks();
     (0..nodes.states.len())
         .into_par_iter()
         .map(|k| {
@@ -122,15 +121,13 @@ pub fn integrate(
             let y = nodes.states[k].clone();
             let mut integrator = Integrator::new(equations, begin, y, tolerance);
             let (mut steps, mut count) = (Vec::new(), 0);
-            let inside = kinks.iter().copied().filter(|s| *s > begin && *s < end);
-            for stop in inside.chain([end]) {
-                while integrator.before(stop) {
-                    integrator.step(stop)?;
+            for stop in equations.stops(begin, end) {
+                integrator.run(stop, |integrator| {
                     count += 1;
                     if linearise {
-                        steps.push(LinearStep::of(equations, &integrator));
+                        steps.push(LinearStep::of(equations, integrator));
                     }
-                }
+                })?;
             }
             Ok(Integrated {
                 end: integrator.y,
@@ -152,25 +149,21 @@ pub fn sensitivities(
     growth: &mut Vec<f64>,
 ) -> Vec<Mat<f64>> {
     let rods = equations.rods();
-    let tasks: Vec<(usize, usize)> = (0..integrated.len())
-        .flat_map(|k| (0..rods).map(move |j| (k, j)))
-        .collect();
-    let columns: Vec<Columns> = tasks
+    let columns: Vec<(usize, Vec<f64>)> = (0..integrated.len() * rods)
         .into_par_iter()
-        .map(|(k, j)| match k {
-            0 => Columns::of::<6>(equations, &integrated[k].steps, j),
-            _ => Columns::of::<TANGENT>(equations, &integrated[k].steps, j),
+        .map(|task| match (&integrated[task / rods].steps, task % rods) {
+            (steps, j) if task < rods => effects::<6>(equations, steps, j),
+            (steps, j) => effects::<TANGENT>(equations, steps, j),
         })
         .collect();
-    columns
-        .chunks(rods)
-        .map(|columns| {
-            let kinds = columns[0].kinds;
+    (columns.chunks(rods).enumerate())
+        .map(|(k, columns)| {
+            let kinds = if k == 0 { 6 } else { TANGENT };
             let mut matrix = Mat::zeros(TANGENT * rods, kinds * rods);
             let mut largest: f64 = 1.0;
-            for (j, column) in columns.iter().enumerate() {
-                for (i, row) in column.rows.chunks(kinds).enumerate() {
-                    let row_index = TANGENT * column.first + i;
+            for (j, (first, rows)) in columns.iter().enumerate() {
+                for (i, row) in rows.chunks(kinds).enumerate() {
+                    let row_index = TANGENT * first + i;
                     for (k, value) in row.iter().enumerate() {
                         let from = TANGENT * j + TANGENT - kinds + k;
                         matrix[(row_index, kinds * j + k)] =
@@ -187,25 +180,18 @@ pub fn sensitivities(
         .collect()
 }
 
-/// Effects of the perturbations of one rod, without units.
-struct Columns {
-    first: usize,
-    kinds: usize,
-    rows: Vec<f64>,
-}
-
-impl Columns {
-    fn of<const W: usize>(equations: &Equations, steps: &[LinearStep], j: usize) -> Self {
-        let mut perturbations = Perturbations::<W>::unit(group(equations, j), j);
-        for step in steps {
-            perturbations.advance(equations, step);
-        }
-        Columns {
-            first: perturbations.rods.start,
-            kinds: W,
-            rows: perturbations.rows.concat(),
-        }
+/// Effects of the perturbations of rod `j`, without units, from the first rod on
+/// that feels them.
+fn effects<const W: usize>(
+    equations: &Equations,
+    steps: &[LinearStep],
+    j: usize,
+) -> (usize, Vec<f64>) {
+    let mut perturbations = Perturbations::<W>::unit(group(equations, j), j);
+    for step in steps {
+        perturbations.advance(equations, step);
     }
+    (perturbations.rods.start, perturbations.rows.concat())
 }
 
 /// Chooses intervals over which no perturbation grows by more than [`GROWTH`].
@@ -215,7 +201,6 @@ impl Columns {
 /// Fails where so many intervals would be needed that it is hopeless.
 pub fn choose(equations: &Equations, near: &Trajectory) -> Result<Nodes, Unbounded> {
     let mut sigma = vec![0.0];
-    let kinks = equations.kinks();
     'intervals: loop {
         let begin = sigma[sigma.len() - 1];
         if sigma.len() * equations.rods() > MOST_PIECES.max(equations.rods()) {
@@ -225,8 +210,8 @@ pub fn choose(equations: &Equations, near: &Trajectory) -> Result<Nodes, Unbound
         let mut rods: Vec<Perturbations<TANGENT>> = (0..equations.rods())
             .map(|j| Perturbations::unit(j..j + 1, j))
             .collect();
-        for stop in kinks.iter().copied().filter(|s| *s > begin).chain([1.0]) {
-            while integrator.before(stop) {
+        for stop in equations.stops(begin, 1.0) {
+            while integrator.sigma < stop {
                 let before = integrator.sigma;
                 let failed = integrator.step(stop).is_err();
                 let grown = failed || {
@@ -237,11 +222,8 @@ pub fn choose(equations: &Equations, near: &Trajectory) -> Result<Nodes, Unbound
                     })
                 };
                 if grown {
-                    let end = if before > begin {
-                        before
-                    } else {
-                        integrator.sigma
-                    };
+                    let enough = before > begin;
+                    let end = if enough { before } else { integrator.sigma };
                     if end <= begin || end >= 1.0 {
                         break 'intervals;
                     }

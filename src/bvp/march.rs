@@ -28,70 +28,48 @@ pub struct March {
     singular_values: Vec<f64>,
     right: Mat<f64>,
     joined: bool,
-    total_force: f64,
     units: Units,
 }
 
 impl March {
     /// Marches the sensitivities to the tip. `None` if they are not finite.
     pub fn new(equations: &Equations, units: &Units, maps: Vec<Mat<f64>>) -> Option<Self> {
-        let (mut bases, mut growths): (Vec<Mat<f64>>, Vec<Mat<f64>>) = (Vec::new(), Vec::new());
+        let (mut bases, mut growths) = (Vec::new(), Vec::new());
         let mut reached = maps[0].clone();
         for map in &maps[1..] {
             let qr = reached.qr();
-            bases.push(qr.compute_thin_Q());
+            let basis = qr.compute_thin_Q();
+            reached = map * &basis;
+            bases.push(basis);
             growths.push(qr.thin_R().to_owned());
-            reached = map * bases.last().expect("one was just made");
         }
-        let mut march = March {
-            maps,
-            bases,
-            growths,
-            left: Mat::new(),
-            singular_values: Vec::new(),
-            right: Mat::new(),
-            joined: equations.joined(),
-            total_force: units.total_force(),
-            units: units.clone(),
-        };
-        let rows: Vec<Vec<f64>> = (0..reached.ncols())
-            .map(|c| march.tip(reached.col(c)))
+        let joined = equations.joined();
+        let columns: Vec<Vec<f64>> = (reached.col_iter())
+            .map(|column| tip(joined, units, column))
             .collect();
-        let tip = Mat::from_fn(reached.ncols(), reached.ncols(), |i, c| rows[c][i]);
+        let tip = Mat::from_fn(columns.len(), columns.len(), |i, c| columns[c][i]);
         if !tip.is_all_finite() {
             return None;
         }
         let svd = tip.svd().ok()?;
-        march.left = svd.U().to_owned();
-        march.right = svd.V().to_owned();
-        march.singular_values = svd.S().column_vector().iter().copied().collect();
-        Some(march)
-    }
-
-    /// Linearised tip conditions of a perturbation there.
-    fn tip(&self, at_tip: ColRef<f64>) -> Vec<f64> {
-        let rods = at_tip.nrows() / TANGENT;
-        let get = |j: usize, k: usize| at_tip[TANGENT * j + k];
-        (0..rods)
-            .flat_map(|j| (0..6).map(move |k| (j, k)))
-            .map(|(j, k)| match k {
-                0..3 if self.joined && j == 0 => {
-                    let force = |j: usize| get(j, 6 + k) * self.units.of(TANGENT * j + 6);
-                    (0..rods).map(force).sum::<f64>() / self.total_force
-                }
-                0..3 if self.joined => get(j, k) - get(0, k),
-                _ => get(j, 6 + k),
-            })
-            .collect()
+        Some(March {
+            maps,
+            bases,
+            growths,
+            left: svd.U().to_owned(),
+            singular_values: svd.S().column_vector().iter().copied().collect(),
+            right: svd.V().to_owned(),
+            joined,
+            units: units.clone(),
+        })
     }
 
     /// The tip conditions of a state, in the same units.
     pub fn scaled(&self, conditions: &[f64]) -> Vec<f64> {
-        conditions
-            .iter()
-            .enumerate()
+        let total_force = self.units.total_force();
+        (conditions.iter().enumerate())
             .map(|(i, value)| match (i / 6, i % 6) {
-                (0, 0..3) if self.joined => value / self.total_force,
+                (0, 0..3) if self.joined => value / total_force,
                 (_, 0..3) if self.joined => *value,
                 (j, k) => value / self.units.of(TANGENT * j + 6 + k),
             })
@@ -110,8 +88,7 @@ impl March {
     /// (end of an interval minus beginning of the next, K - 1 of them) and make
     /// the tip's `conditions` vanish. Undetermined directions are left alone.
     pub fn solve(&self, defects: &[Vec<f64>], conditions: &[f64]) -> Vec<Vec<f64>> {
-        let mut offsets: Vec<Col<f64>> = Vec::new();
-        let mut shifts: Vec<Col<f64>> = Vec::new();
+        let (mut offsets, mut shifts) = (Vec::new(), Vec::new());
         let mut carried: Option<Col<f64>> = None;
         for (k, basis) in self.bases.iter().enumerate() {
             let mut b = Col::from_fn(defects[k].len(), |i| defects[k][i]);
@@ -126,7 +103,11 @@ impl March {
         }
         let mut missed = Col::from_fn(conditions.len(), |i| -conditions[i]);
         if let Some(carried) = &carried {
-            for (sum, value) in missed.iter_mut().zip(self.tip(carried.as_ref())) {
+            for (sum, value) in
+                missed
+                    .iter_mut()
+                    .zip(tip(self.joined, &self.units, carried.as_ref()))
+            {
                 *sum -= value;
             }
         }
@@ -170,6 +151,23 @@ impl March {
     }
 }
 
+/// Linearised tip conditions of a perturbation there.
+fn tip(joined: bool, units: &Units, at_tip: ColRef<f64>) -> Vec<f64> {
+    let rods = at_tip.nrows() / TANGENT;
+    let get = |j: usize, k: usize| at_tip[TANGENT * j + k];
+    (0..rods)
+        .flat_map(|j| (0..6).map(move |k| (j, k)))
+        .map(|(j, k)| match k {
+            0..3 if joined && j == 0 => {
+                let force = |j: usize| get(j, 6 + k) * units.of(TANGENT * j + 6);
+                (0..rods).map(force).sum::<f64>() / units.total_force()
+            }
+            0..3 if joined => get(j, k) - get(0, k),
+            _ => get(j, 6 + k),
+        })
+        .collect()
+}
+
 /// x <- R^-1 x with R upper triangular.
 fn back_substitute(r: &Mat<f64>, x: &mut Col<f64>) {
     for i in (0..x.nrows()).rev() {
@@ -200,8 +198,11 @@ mod tests {
         Scenario::from_toml(&text).unwrap()
     }
 
-    fn units(equations: &Equations) -> Units {
-        Units::new(equations, &Trajectory::straight(equations))
+    fn march(joined: bool, maps: Vec<Mat<f64>>) -> Option<March> {
+        let scenario = scenario(joined);
+        let equations = Equations::new(&scenario);
+        let units = Units::new(&equations, &Trajectory::straight(&equations));
+        March::new(&equations, &units, maps)
     }
 
     /// Numbers without any pattern in -1..1.
@@ -229,7 +230,7 @@ mod tests {
     }
 
     /// Rows of the tip's conditions, as the module says they are.
-    fn tip(joined: bool, units: &Units) -> Mat<f64> {
+    fn tip_rows(joined: bool, units: &Units) -> Mat<f64> {
         let mut rows = Mat::zeros(18, 36);
         for (j, k) in (0..3).flat_map(|j| (0..3).map(move |k| (j, k))) {
             let row = 6 * j + k;
@@ -250,68 +251,51 @@ mod tests {
 
     /// The whole system at once: what each interval hands on is what the next
     /// begins with, and the tip's conditions.
-    fn dense(
-        maps: &[Mat<f64>],
-        tip: &Mat<f64>,
-        defects: &[Vec<f64>],
-        conditions: &[f64],
-    ) -> Vec<Vec<f64>> {
-        let size = 18 + 36 * (maps.len() - 1);
-        let mut matrix = Mat::zeros(size, size);
-        let mut right = Mat::zeros(size, 1);
-        let column = |k: usize| if k == 0 { 0 } else { 36 * k - 18 };
+    fn dense(maps: &[Mat<f64>], tip: &Mat<f64>, misses: &[f64]) -> Col<f64> {
+        let mut matrix = Mat::zeros(misses.len(), misses.len());
         for (k, map) in maps.iter().enumerate() {
-            let last = k + 1 == maps.len();
-            let block = if last { tip * map } else { map.clone() };
-            for r in 0..block.nrows() {
-                for c in 0..block.ncols() {
-                    matrix[(36 * k + r, column(k) + c)] = block[(r, c)];
-                }
-                if last {
-                    right[(36 * k + r, 0)] = -conditions[r];
-                } else {
-                    matrix[(36 * k + r, column(k + 1) + r)] = -1.0;
-                    right[(36 * k + r, 0)] = -defects[k][r];
-                }
+            let row = 36 * k;
+            let mut block = map.clone();
+            if k + 1 == maps.len() {
+                block = tip * block;
+            } else {
+                (0..36).for_each(|i| matrix[(row + i, row + 18 + i)] = -1.0);
             }
+            let (rows, columns) = block.shape();
+            let place = matrix.submatrix_mut(row, row.saturating_sub(18), rows, columns);
+            { place }.copy_from(&block);
         }
-        let solution = matrix.full_piv_lu().solve(&right);
-        (0..maps.len())
-            .map(|k| match k {
-                0 => (0..36)
-                    .map(|i| match i % 12 {
-                        0..6 => 0.0,
-                        free => solution[(6 * (i / 12) + free - 6, 0)],
-                    })
-                    .collect(),
-                _ => (0..36).map(|i| solution[(column(k) + i, 0)]).collect(),
-            })
-            .collect()
+        let right = Col::from_fn(misses.len(), |i| -misses[i]);
+        matrix.full_piv_lu().solve(&right)
     }
 
     #[test]
     fn the_condensed_solution_is_that_of_the_whole_system() {
-        for joined in [true, false] {
-            let scenario = scenario(joined);
-            let equations = Equations::new(&scenario);
-            let units = units(&equations);
-            for (intervals, growth) in [(1, 1.0), (2, 1.0), (5, 1e2), (12, 1e3), (12, 1e5)] {
-                let maps = maps(intervals, growth);
-                let mut noise = noise();
-                let mut numbers =
-                    |count: usize| -> Vec<f64> { (0..count).map(|_| noise()).collect() };
-                let defects: Vec<Vec<f64>> = (1..intervals).map(|_| numbers(36)).collect();
-                let conditions = numbers(18);
-                let march = March::new(&equations, &units, maps.clone()).unwrap();
-                let found = march.solve(&defects, &conditions);
-                let wanted = dense(&maps, &tip(joined, &units), &defects, &conditions);
-                let what = format!("joined {joined}, {intervals} intervals, {growth:e}");
-                for (found, wanted) in found.iter().zip(&wanted) {
-                    let largest = wanted.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-                    for (found, wanted) in found.iter().zip(wanted) {
-                        let off = (found - wanted).abs() / largest;
-                        assert!(off < 1e-9, "{what}: {found}, {wanted}");
+        let cases = [(1, 1.0), (2, 1.0), (5, 1e2), (12, 1e3), (12, 1e5)];
+        for (i, (intervals, growth)) in [cases, cases].concat().into_iter().enumerate() {
+            let (joined, maps, mut noise) = (i < 5, maps(intervals, growth), noise());
+            let misses: Vec<f64> = (0..36 * intervals - 18).map(|_| noise()).collect();
+            let (defects, conditions) = misses.split_at(36 * (intervals - 1));
+            let defects: Vec<Vec<f64>> = defects.chunks(36).map(<[f64]>::to_vec).collect();
+            let march = march(joined, maps.clone()).unwrap();
+            let found = march.solve(&defects, conditions);
+            let wanted = dense(&maps, &tip_rows(joined, &march.units), &misses);
+            let mut wanted = wanted.iter().copied();
+            let what = format!("joined {joined}, {intervals} intervals, {growth:e}");
+            for (k, found) in found.iter().enumerate() {
+                let clamped = |i: usize| k == 0 && i % 12 < 6;
+                let mut next = |i| {
+                    if clamped(i) {
+                        0.0
+                    } else {
+                        wanted.next().unwrap()
                     }
+                };
+                let wanted: Vec<f64> = (0..36).map(&mut next).collect();
+                let largest = wanted.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+                for (found, wanted) in found.iter().zip(&wanted) {
+                    let off = (found - wanted).abs() / largest;
+                    assert!(off < 1e-9, "{what}: {found}, {wanted}");
                 }
             }
         }
@@ -323,22 +307,18 @@ mod tests {
         for joined in [true, false] {
             let scenario = scenario(joined);
             let equations = Equations::new(&scenario);
-            let units = units(&equations);
-            let march = March::new(&equations, &units, maps(1, 1.0)).unwrap();
+            let march = march(joined, maps(1, 1.0)).unwrap();
             let mut noise = noise();
             let step: Vec<f64> = (0..36).map(|_| 0.1 * noise()).collect();
-            let mut y = vec![0.0; equations.size()];
-            for j in 0..3 {
-                let base = equations.base(j, glam::DVec3::ZERO, glam::DVec3::ZERO);
-                base.write(&mut y, j);
-            }
-            units.advance(&mut y, &step, 1.0);
+            let mut y = equations.clamped();
+            march.units.advance(&mut y, &step, 1.0);
             let found = march.scaled(&equations.tip_conditions(&y));
             let step = Col::from_fn(36, |i| step[i]);
-            let wanted = tip(joined, &units) * &step;
+            let wanted = tip_rows(joined, &march.units) * &step;
+            let linear = tip(joined, &march.units, step.as_ref());
             for (i, found) in found.iter().enumerate() {
                 assert!((found - wanted[i]).abs() < 1e-14, "condition {i}");
-                assert!((march.tip(step.as_ref())[i] - wanted[i]).abs() < 1e-14);
+                assert!((linear[i] - wanted[i]).abs() < 1e-14);
             }
         }
     }
@@ -347,16 +327,13 @@ mod tests {
     /// It is found, and left alone by the solution.
     #[test]
     fn what_the_tip_does_not_feel_is_found_and_left_alone() {
-        let scenario = scenario(true);
-        let equations = Equations::new(&scenario);
-        let units = units(&equations);
         let mut maps = maps(3, 10.0);
         let begin = Col::from_fn(18, |i| (i as f64).cos());
         let middle = &maps[0] * &begin;
         let last = &maps[1] * &middle;
         let lost = &maps[2] * &last;
         maps[2] -= (1.0 / last.squared_norm_l2()) * &lost * last.transpose();
-        let march = March::new(&equations, &units, maps).unwrap();
+        let march = march(true, maps).unwrap();
         assert!(march.condition() < 1e-13, "{:.1e}", march.condition());
 
         let null = march.null();
@@ -380,10 +357,8 @@ mod tests {
 
     #[test]
     fn what_is_not_finite_is_refused() {
-        let scenario = scenario(true);
-        let equations = Equations::new(&scenario);
         let mut maps = maps(2, 1.0);
         maps[1][(0, 0)] = f64::NAN;
-        assert!(March::new(&equations, &units(&equations), maps).is_none());
+        assert!(march(true, maps).is_none());
     }
 }

@@ -62,21 +62,11 @@ impl<const W: usize> Perturbations<W> {
     /// Carries them through a step.
     pub fn advance(&mut self, equations: &Equations, step: &LinearStep) {
         for i in 0..STAGES {
-            combine(
-                &self.rows,
-                step.width,
-                &A[i][..i],
-                &self.slopes,
-                &mut self.stage,
-            );
-            let derivatives = &step.derivatives[i * equations.rods()..];
-            slopes(
-                equations,
-                &derivatives[self.rods.clone()],
-                self.rods.start,
-                &self.stage,
-                &mut self.slopes[i],
-            );
+            let (rows, stage) = (&self.rows, &mut self.stage);
+            combine(rows, step.width, &A[i][..i], &self.slopes, stage);
+            let derivatives = &step.derivatives[i * equations.rods()..][self.rods.clone()];
+            let (first, stage) = (self.rods.start, &self.stage);
+            slopes(equations, derivatives, first, stage, &mut self.slopes[i]);
         }
         combine(&self.rows, step.width, &B, &self.slopes, &mut self.stage);
         std::mem::swap(&mut self.rows, &mut self.stage);
@@ -116,10 +106,8 @@ fn slopes<const W: usize>(
                 pull(first + j - 1, j.checked_sub(1));
             }
             if first + j + 1 < equations.rods() {
-                pull(
-                    first + j,
-                    Some(j + 1).filter(|next| *next < derivatives.len()),
-                );
+                let next = Some(j + 1).filter(|next| *next < derivatives.len());
+                pull(first + j, next);
             }
             out[6 + k] = force;
         }
@@ -232,9 +220,7 @@ mod tests {
 
     fn end(equations: &Equations, y: Vec<f64>) -> Vec<f64> {
         let mut integrator = Integrator::new(equations, 0.0, y, 1e-13);
-        while integrator.before(END) {
-            integrator.step(END).unwrap();
-        }
+        integrator.run(END, |_| ()).unwrap();
         integrator.y
     }
 
@@ -253,10 +239,10 @@ mod tests {
     fn linear<const W: usize>(equations: &Equations, j: usize) -> Perturbations<W> {
         let mut perturbations = Perturbations::<W>::unit(group(equations, j), j);
         let mut integrator = Integrator::new(equations, 0.0, begin(equations), 1e-12);
-        while integrator.before(END) {
-            integrator.step(END).unwrap();
-            perturbations.advance(equations, &LinearStep::of(equations, &integrator));
-        }
+        let mut advance = |integrator: &Integrator| {
+            perturbations.advance(equations, &LinearStep::of(equations, integrator));
+        };
+        integrator.run(END, &mut advance).unwrap();
         perturbations
     }
 

@@ -1,7 +1,7 @@
 //! A leaf along sigma: where a boundary-value solution starts from, and what
 //! it returns.
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 use super::dop853::{Integrator, Unbounded};
 use super::equations::{Equations, RodState};
@@ -31,10 +31,8 @@ impl Trajectory {
         for i in 1..states.len() {
             let (before, after) = states.split_at_mut(i);
             for j in 0..equations.rods() {
-                let (a, mut b) = (
-                    RodState::read(&before[i - 1], j),
-                    RodState::read(&after[0], j),
-                );
+                let a = RodState::read(&before[i - 1], j);
+                let mut b = RodState::read(&after[0], j);
                 // Of a rotation's two quaternions the one nearer to the last.
                 if a.q.dot(b.q) < 0.0 {
                     b.q = -b.q;
@@ -42,9 +40,7 @@ impl Trajectory {
                 }
             }
         }
-        let slopes = sigma
-            .iter()
-            .zip(&states)
+        let slopes = (sigma.iter().zip(&states))
             .map(|(&sigma, y)| {
                 let mut slopes = vec![0.0; y.len()];
                 equations.slopes(sigma, y, &mut slopes);
@@ -81,18 +77,13 @@ impl Trajectory {
 
     /// The leaf without stress: rods in their rest shapes.
     pub fn unstressed(equations: &Equations, tolerance: f64) -> Result<Self, Unbounded> {
-        let mut y = vec![0.0; equations.size()];
-        for j in 0..equations.rods() {
-            equations.base(j, DVec3::ZERO, DVec3::ZERO).write(&mut y, j);
-        }
-        let mut integrator = Integrator::new(equations, 0.0, y, tolerance);
+        let mut integrator = Integrator::new(equations, 0.0, equations.clamped(), tolerance);
         let (mut sigma, mut states) = (vec![0.0], vec![integrator.y.clone()]);
-        for end in equations.kinks().into_iter().chain([1.0]) {
-            while integrator.before(end) {
-                integrator.step(end)?;
+        for end in equations.stops(0.0, 1.0) {
+            integrator.run(end, |integrator| {
                 sigma.push(integrator.sigma);
                 states.push(integrator.y.clone());
-            }
+            })?;
         }
         Ok(Trajectory::new(equations, sigma, states))
     }
@@ -105,7 +96,6 @@ impl Trajectory {
         tolerance: f64,
     ) -> Result<Self, Unbounded> {
         let mut states: Vec<Vec<f64>> = Vec::new();
-        let kinks = equations.kinks();
         let mut energy = 0.0;
         let slot = equations.size() - 1;
         let mut wanted = stations.iter().copied().peekable();
@@ -114,27 +104,17 @@ impl Trajectory {
             let mut y = begin.clone();
             y[slot] = energy;
             let mut integrator = Integrator::new(equations, from, y, tolerance);
-            let mut stops: Vec<f64> = kinks
-                .iter()
-                .copied()
-                .filter(|s| *s > from && *s < to)
-                .collect();
-            stops.push(to);
+            let mut stops: Vec<f64> = equations.stops(from, to).collect();
             let last = k + 1 == nodes.states.len();
             while let Some(station) = wanted.next_if(|s| *s < to || last) {
                 stops.push(station.clamp(from, to));
-                stops.sort_by(f64::total_cmp);
             }
+            stops.sort_by(f64::total_cmp);
             stops.dedup();
             for stop in stops {
-                while integrator.before(stop) {
-                    integrator.step(stop)?;
-                }
-                let here = stations[states.len().min(stations.len() - 1)];
-                if states.len() < stations.len()
-                    && here.clamp(from, to) == stop
-                    && (here < to || last)
-                {
+                integrator.run(stop, |_| ())?;
+                let here = |s: &f64| s.clamp(from, to) == stop && (*s < to || last);
+                if stations.get(states.len()).is_some_and(here) {
                     states.push(integrator.y.clone());
                 }
             }
@@ -184,13 +164,11 @@ impl Trajectory {
 
     /// This trajectory moved on by `step` times its difference to an earlier one.
     pub fn beyond(&self, equations: &Equations, earlier: &Trajectory, step: f64) -> Self {
-        let states = (self.states())
-            .map(|(sigma, now)| {
-                let before = earlier.at(sigma);
-                let pairs = now.iter().zip(before);
-                pairs
-                    .map(|(now, before)| now + step * (now - before))
-                    .collect()
+        let states = (self.sigma.iter().zip(&self.states))
+            .map(|(&sigma, now)| {
+                let pairs = now.iter().zip(earlier.at(sigma));
+                let moved = pairs.map(|(now, before)| now + step * (now - before));
+                moved.collect()
             })
             .collect();
         Trajectory::new(equations, self.sigma.clone(), states)
@@ -208,11 +186,9 @@ impl Trajectory {
     pub fn turn(&self, equations: &Equations) -> f64 {
         (0..equations.rods())
             .map(|j| {
-                let rotations: Vec<DQuat> = (self.states.iter())
-                    .map(|y| RodState::read(y, j).q)
-                    .collect();
-                let turns = rotations.windows(2).map(|q| q[0].angle_between(q[1]));
-                turns.sum::<f64>()
+                let q = |y: &[f64]| RodState::read(y, j).q;
+                let turns = self.states.windows(2);
+                turns.map(|y| q(&y[0]).angle_between(q(&y[1]))).sum::<f64>()
             })
             .fold(0.0, f64::max)
     }
@@ -221,26 +197,18 @@ impl Trajectory {
     pub fn shape(&self, equations: &Equations) -> Vec<RodShape> {
         (0..equations.rods())
             .map(|j| RodShape {
-                length: equations.rod_length(j) * equations.length,
+                length: equations.lengths[j] * equations.length,
                 nodes: (self.sigma.iter().zip(&self.states))
                     .map(|(&sigma, y)| node(equations, j, sigma, y))
                     .collect(),
             })
             .collect()
     }
-
-    /// The sigmas and the states there.
-    fn states(&self) -> impl Iterator<Item = (f64, &[f64])> {
-        self.sigma
-            .iter()
-            .copied()
-            .zip(self.states.iter().map(Vec::as_slice))
-    }
 }
 
 fn node(equations: &Equations, j: usize, sigma: f64, y: &[f64]) -> NodeState {
     let rod = RodState::read(y, j);
-    let directors: DQuat = rod.q.conjugate();
+    let directors = rod.q.conjugate();
     let (n, m) = (directors * rod.n, directors * rod.m);
     let (v, u) = equations.strains(j, sigma, n, m);
     NodeState {

@@ -42,10 +42,9 @@ fn paper<D: DualNum<Primitive = f64> + Copy>(
         let turn = cross_product(t, director);
         [0, 1, 2].map(|i| director[i] + turn[i])
     });
-    let to_directors = columns;
     let to_lab = [0, 1, 2].map(|i| [0, 1, 2].map(|c| columns[c][i]));
     let (n, m) = (part(2, rod.n), part(3, rod.m));
-    let (n_d, m_d) = (turned(&to_directors, n), turned(&to_directors, m));
+    let (n_d, m_d) = (turned(&columns, n), turned(&columns, m));
     let v = [0, 1, 2].map(|i| n_d[i] * law.compliance[i] + law.rest_strain[i]);
     let u = [0, 1, 2].map(|i| m_d[i] * law.flexibility[i] + law.rest_curvature[i]);
     let tangent = turned(&to_lab, v).map(|x| x * length);
@@ -73,7 +72,7 @@ fn slopes_and_derivatives_are_those_of_the_papers_equations() {
     };
     let mut y = vec![0.0; equations.size()];
     rod.write(&mut y, 0);
-    let (sigma, length) = (0.3, equations.rod_length(0));
+    let (sigma, length) = (0.3, equations.lengths[0]);
     let law = equations.material(0, sigma);
     let load = length * equations.gravity;
     let (value, slope): (SVector<f64, 12>, SMatrix<f64, 12, 12>) = jacobian(
