@@ -200,16 +200,20 @@ impl<'a> Equations<'a> {
             let stiffest = stiffness.max_element();
             stiffness = stiffest * (stiffness / stiffest).powf(self.softened);
         }
-        let (arc, part) = (&self.arcs[j], self.part);
+        let (arc, part) = (self.arcs.get(j), self.part);
         let stretch = rod.rest_stretch.at(sigma);
         // Where it is the scenario's, the law is not to be rounded.
         let (rest_strain, rest_curvature) = match part == 1.0 {
             true => (DVec3::X * stretch, at(&rod.rest_curvature) * self.length),
-            false => (
-                DVec3::X * (part * stretch + (1.0 - part) * arc.stretch(stretch)),
-                at(&rod.rest_curvature) * (part * self.length)
-                    + arc.curvature(self.length * at(&rod.rest_curvature)) * (1.0 - part),
-            ),
+            false => {
+                let own = at(&rod.rest_curvature);
+                let first = arc.map_or(stretch, |arc| arc.stretch);
+                let bend = arc.map_or(self.length * own, |arc| arc.bend * DVec3::Z);
+                (
+                    DVec3::X * (part * stretch + (1.0 - part) * first),
+                    own * (part * self.length) + bend * (1.0 - part),
+                )
+            }
         };
         Material {
             compliance: self.force * at(&rod.force_stiffness).recip(),

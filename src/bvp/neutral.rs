@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::intervals::GROWTH;
-use super::newton::{Newton, Stuck};
+use super::newton::{Newton, Stuck, largest};
 use super::solution::{Neutral, Reason};
 use super::trajectory::{Nodes, Trajectory};
 
@@ -35,13 +35,11 @@ impl Newton<'_, '_> {
         };
         match self.neutral(&STATIONS) {
             Some(neutral) => Reason::Singular(neutral),
-            None => Reason::NoConvergence {
-                correction,
-                growth: self
-                    .growth
-                    .iter()
-                    .fold(0.0, |m, growth| growth.log10().max(m)),
-            },
+            None => {
+                let growths = self.growth.iter().map(|growth| growth.log10());
+                let growth = growths.fold(0.0, f64::max);
+                Reason::NoConvergence { correction, growth }
+            }
         }
     }
 
@@ -53,31 +51,20 @@ impl Newton<'_, '_> {
         if !trusted || march.condition() > NEARLY_SINGULAR {
             return None;
         }
-        let mut nudged = self.nodes.clone();
         let direction = march.null();
-        let largest = direction
-            .iter()
-            .flatten()
-            .fold(0.0_f64, |m, v| m.max(v.abs()));
-        for (y, increment) in nudged.states.iter_mut().zip(&direction) {
-            self.units.advance(y, increment, NUDGE / largest);
-        }
+        let nudged = self.moved(&direction, NUDGE / largest(&direction));
         let sampled =
             |nodes: &Nodes| Trajectory::sampled(self.equations, nodes, stations, NUDGE * NUDGE);
         let (at, beside) = (sampled(&self.nodes).ok()?, sampled(&nudged).ok()?);
         let (at, beside) = (at.shape(self.equations), beside.shape(self.equations));
-        let mut displacement: Vec<Vec<DVec3>> = at
-            .iter()
-            .zip(&beside)
+        let mut displacement: Vec<Vec<DVec3>> = (at.iter().zip(&beside))
             .map(|(at, beside)| {
                 let nodes = at.nodes.iter().zip(&beside.nodes);
                 nodes.map(|(a, b)| b.position - a.position).collect()
             })
             .collect();
-        let largest = displacement
-            .iter()
-            .flatten()
-            .fold(0.0_f64, |m, d| m.max(d.length()));
+        let lengths = displacement.iter().flatten().map(|d| d.length());
+        let largest = lengths.fold(0.0, f64::max);
         for displacement in displacement.iter_mut().flatten() {
             *displacement /= largest;
         }

@@ -237,9 +237,7 @@ impl<'e, 'a> Newton<'e, 'a> {
     fn residuals(&self, nodes: &Nodes, integrated: &[Integrated]) -> Residuals {
         let (last, inner) = integrated.split_last().expect("there is an interval");
         Residuals {
-            defects: inner
-                .iter()
-                .zip(&nodes.states[1..])
+            defects: (inner.iter().zip(&nodes.states[1..]))
                 .map(|(interval, begin)| self.units.difference(&interval.end, begin))
                 .collect(),
             conditions: self.equations.tip_conditions(&last.end),
@@ -251,7 +249,8 @@ impl<'e, 'a> Newton<'e, 'a> {
         march.solve(&residuals.defects, &march.scaled(&residuals.conditions))
     }
 
-    fn moved(&self, step: &[Vec<f64>], factor: f64) -> Nodes {
+    /// The unknowns moved by `factor` times a step.
+    pub fn moved(&self, step: &[Vec<f64>], factor: f64) -> Nodes {
         let mut nodes = self.nodes.clone();
         for (y, increment) in nodes.states.iter_mut().zip(step) {
             self.units.advance(y, increment, factor);
@@ -269,7 +268,7 @@ impl Residuals {
 }
 
 /// The largest number of an increment.
-fn largest(step: &[Vec<f64>]) -> f64 {
+pub fn largest(step: &[Vec<f64>]) -> f64 {
     step.iter()
         .flatten()
         .fold(0.0, |m: f64, value| match value.is_nan() {

@@ -63,7 +63,7 @@ impl<const W: usize> Perturbations<W> {
     pub fn advance(&mut self, equations: &Equations, step: &LinearStep) {
         for i in 0..STAGES {
             let (rows, stage) = (&self.rows, &mut self.stage);
-            combine(rows, step.width, &A[i][..i], &self.slopes, stage);
+            combine(rows, step.width, A[i], &self.slopes, stage);
             let derivatives = &step.derivatives[i * equations.rods()..][self.rods.clone()];
             let (first, stage) = (self.rods.start, &self.stage);
             slopes(equations, derivatives, first, stage, &mut self.slopes[i]);

@@ -158,17 +158,11 @@ impl fmt::Display for Reason {
 /// What the direction means, in words.
 impl fmt::Display for Neutral {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let largest: Vec<DVec3> = self
-            .displacement
-            .iter()
-            .map(|rod| {
-                let longer = |a: DVec3, b: &DVec3| if b.length() > a.length() { *b } else { a };
-                rod.iter().fold(DVec3::ZERO, longer)
-            })
+        let longer = |a: DVec3, b: &DVec3| if b.length() > a.length() { *b } else { a };
+        let largest: Vec<DVec3> = (self.displacement.iter())
+            .map(|rod| rod.iter().fold(DVec3::ZERO, longer))
             .collect();
-        let veins: Vec<String> = largest
-            .iter()
-            .enumerate()
+        let veins: Vec<String> = (largest.iter().enumerate())
             .filter(|(_, moved)| moved.length() > MOVES)
             .map(|(j, _)| (j + 1).to_string())
             .collect();
@@ -178,11 +172,7 @@ impl fmt::Display for Neutral {
             several => format!("veins {}", several.join(", ")),
         };
         let sum: DVec3 = largest.iter().map(|moved| *moved * *moved).sum();
-        let axis = match sum.max_position() {
-            0 => "x",
-            1 => "y",
-            _ => "z",
-        };
+        let axis = ["x", "y", "z"][sum.max_position()];
         write!(
             f,
             "a bifurcation is near, or the leaf can move without resistance; {who} would move, mostly along {axis}"
