@@ -1,7 +1,7 @@
 //! All shapes of a leaf that were found, lowest energy first.
 
-use super::drawing::Drawing;
-use super::page::{new_page, title};
+use super::drawing::{Drawing, NOTE};
+use super::page::new_page;
 use super::small::{SIDE, SmallPanels};
 use super::veins::Veins;
 use crate::study::All;
@@ -12,18 +12,13 @@ const MOST: usize = 24;
 /// Draws the whole page.
 pub fn draw(all: &All) -> Drawing {
     let shown = &all.found[..all.found.len().min(MOST)];
-    let shapes: Vec<Veins> = shown
-        .iter()
-        .map(|found| Veins::of(&found.equilibrium))
-        .collect();
+    let shapes = shown.iter().map(|found| Veins::of(&found.equilibrium));
+    let shapes: Vec<Veins> = shapes.collect();
     let panels = SmallPanels::holding(shapes.iter(), shown.len());
     let name = format!("{}: equilibria, lowest energy first", all.scenario);
-    let mut notes = vec![format!(
-        "{} found from {} starts",
-        all.found.len(),
-        all.starts
-    )];
-    if all.found.len() > MOST {
+    let count = all.found.len();
+    let mut notes = vec![format!("{count} found from {} starts", all.starts)];
+    if count > MOST {
         notes.push(format!("the first {MOST} drawn"));
     }
     let mut drawing = new_page(SIDE, &name, &notes, shapes.first());
@@ -37,9 +32,8 @@ pub fn draw(all: &All) -> Drawing {
         let energy = found.equilibrium.energy.unwrap_or(f64::NAN);
         let text = format!("energy {energy:.7}, {stability}");
         drawing.group("leaf", |page| {
-            let corner = panels.cell(index).corner;
-            title(page, corner, &(index + 1).to_string(), &text);
-            panels.draw(page, index, veins, |_, _, _| ());
+            let number = (index + 1).to_string();
+            panels.draw(page, index, veins, (&number, &text, NOTE), |_, _, _| ());
         });
     }
     drawing

@@ -100,19 +100,13 @@ impl Drawing {
     }
 
     pub fn stroke(&mut self, path: Path, stroke: Stroke) {
-        self.marks.push(Mark::Shape {
-            path,
-            fill: None,
-            stroke: Some(stroke),
-        });
+        let (fill, stroke) = (None, Some(stroke));
+        self.marks.push(Mark::Shape { path, fill, stroke });
     }
 
     pub fn shape(&mut self, path: Path, fill: Color, stroke: Option<Stroke>) {
-        self.marks.push(Mark::Shape {
-            path,
-            fill: Some(fill),
-            stroke,
-        });
+        let fill = Some(fill);
+        self.marks.push(Mark::Shape { path, fill, stroke });
     }
 
     pub fn line(&mut self, from: DVec2, to: DVec2, stroke: Stroke) {
@@ -120,21 +114,21 @@ impl Drawing {
     }
 
     /// Adds a label, if it says anything.
-    fn add(&mut self, label: Label) {
-        if !label.text.is_empty() {
-            self.marks.push(Mark::Label(label));
+    fn add(&mut self, at: DVec2, text: &str, size: f64, anchor: Anchor, color: Color, up: bool) {
+        if !text.is_empty() {
+            self.marks.push(Mark::Label(Label {
+                at,
+                text: text.into(),
+                size,
+                anchor,
+                color,
+                upright: up,
+            }));
         }
     }
 
     pub fn label(&mut self, at: DVec2, text: &str, size: f64, anchor: Anchor, color: Color) {
-        self.add(Label {
-            at,
-            text: text.into(),
-            size,
-            anchor,
-            color,
-            upright: false,
-        });
+        self.add(at, text, size, anchor, color, false);
     }
 
     /// A label whose digits and capitals have their middle at the height of `at`.
@@ -144,14 +138,7 @@ impl Drawing {
     }
 
     pub fn upright_label(&mut self, at: DVec2, text: &str, size: f64, color: Color) {
-        self.add(Label {
-            at,
-            text: text.into(),
-            size,
-            anchor: Anchor::Middle,
-            color,
-            upright: true,
-        });
+        self.add(at, text, size, Anchor::Middle, color, true);
     }
 }
 

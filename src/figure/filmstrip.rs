@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::drawing::{Drawing, NOTE, Stroke, polyline};
 use super::energy::notes;
-use super::page::{new_page, title};
+use super::page::new_page;
 use super::small::{SIDE, SmallPanels};
 use super::veins::{Veins, is_near};
 use crate::report::numbers::short;
@@ -32,13 +32,18 @@ pub fn draw(record: &Record) -> Drawing {
             let time = record.moments.get(still.moment).map_or(0.0, |m| m.time);
             let letter = format!("({})", char::from(b'a' + (index % 26) as u8));
             let when = format!("t = {}", short(time));
-            title(page, panels.cell(index).corner, &letter, &when);
-            panels.draw(page, index, veins, |page, scene, _| {
-                let way: Vec<_> = way.iter().map(|&point| scene.place(point)).collect();
-                if !way.is_empty() {
-                    page.stroke(polyline(&way), Stroke::new(NOTE, 0.8));
-                }
-            });
+            panels.draw(
+                page,
+                index,
+                veins,
+                (&letter, &when, NOTE),
+                |page, scene, _| {
+                    let way: Vec<_> = way.iter().map(|&point| scene.place(point)).collect();
+                    if !way.is_empty() {
+                        page.stroke(polyline(&way), Stroke::new(NOTE, 0.8));
+                    }
+                },
+            );
         });
     }
     drawing

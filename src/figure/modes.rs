@@ -1,9 +1,9 @@
 //! The modes of a leaf at rest: the leaf and, over it, its shape in each mode.
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
-use super::drawing::{Anchor, DOT, Drawing, FRAME, Stroke};
-use super::page::{TEXT_SIZE, new_page, title};
+use super::drawing::{Color, DOT, Drawing, FRAME, NOTE, Stroke};
+use super::page::new_page;
 use super::small::{SIDE, SmallPanels};
 use super::veins::Veins;
 use crate::relax::{Equilibrium, Mode};
@@ -38,33 +38,33 @@ pub fn draw(equilibrium: &Equilibrium) -> Drawing {
     drawing.height = panels.end();
     for (index, (mode, veins)) in drawn.iter().zip(&shapes).enumerate() {
         drawing.group("mode", |page| {
-            let corner = panels.cell(index).corner;
-            caption(page, corner, &(index + 1).to_string(), mode);
-            panels.draw(page, index, veins, |page, scene, width| {
-                for vein in &rest.veins {
-                    let path = vein.path(|point| scene.place(point));
-                    page.stroke(path, Stroke::new(FRAME, 0.6 * width));
-                }
-            });
+            let (number, (text, color)) = ((index + 1).to_string(), caption(mode));
+            panels.draw(
+                page,
+                index,
+                veins,
+                (&number, &text, color),
+                |page, scene, width| {
+                    for vein in &rest.veins {
+                        let path = vein.path(|point| scene.place(point));
+                        page.stroke(path, Stroke::new(FRAME, 0.6 * width));
+                    }
+                },
+            );
         });
     }
     drawing
 }
 
 /// The frequency of a mode; of an unstable one its growth, in red.
-fn caption(page: &mut Drawing, corner: DVec2, number: &str, mode: &Mode) {
+fn caption(mode: &Mode) -> (String, Color) {
     match (mode.is_neutral(), mode.growth()) {
-        (true, _) => title(page, corner, number, "neutral: ω = 0"),
-        (_, None) => {
-            let frequency = mode.frequency().unwrap_or_default();
-            title(page, corner, number, &format!("ω = {}", short(frequency)));
-        }
-        (_, Some(growth)) => {
-            title(page, corner, number, "");
-            let at = corner + DVec2::new(24.0, -8.0);
-            let text = format!("unstable: grows at {}", short(growth));
-            page.label(at, &text, TEXT_SIZE, Anchor::Start, DOT);
-        }
+        (true, _) => ("neutral: ω = 0".into(), NOTE),
+        (_, None) => (
+            format!("ω = {}", short(mode.frequency().unwrap_or_default())),
+            NOTE,
+        ),
+        (_, Some(growth)) => (format!("unstable: grows at {}", short(growth)), DOT),
     }
 }
 
@@ -77,18 +77,12 @@ fn displaced(equilibrium: &Equilibrium, rest: &Veins, mode: &Mode) -> Veins {
         true => (AMPLITUDE * rest.extent() * rest.unit / largest).min(1.0),
         false => 0.0,
     };
-    let curves: Vec<Vec<DVec3>> = equilibrium
-        .shape
-        .curves
-        .iter()
-        .zip(&mode.displacement)
+    let shape = &equilibrium.shape;
+    let moved = shape.curves.iter().zip(&mode.displacement);
+    let curves: Vec<Vec<DVec3>> = moved
         .map(|(curve, by)| curve.iter().zip(by).map(|(x, d)| x + size * d).collect())
         .collect();
-    let joined = if equilibrium.shape.joined {
-        1
-    } else {
-        curves.len()
-    };
+    let joined = if shape.joined { 1 } else { curves.len() };
     let ends = curves.iter().take(joined);
     let tips: Vec<DVec3> = ends.filter_map(|curve| curve.last()).copied().collect();
     Veins::through(&curves, &tips, rest.unit)

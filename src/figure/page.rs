@@ -57,10 +57,15 @@ impl Cell {
 
 /// A panel's title, above its frame.
 pub fn title(page: &mut Drawing, corner: DVec2, letter: &str, text: &str) {
+    title_in(page, corner, letter, text, NOTE);
+}
+
+/// The same with the text in another colour.
+pub fn title_in(page: &mut Drawing, corner: DVec2, letter: &str, text: &str, color: Color) {
     let base = corner - DVec2::new(0.0, 8.0);
     page.label(base, letter, TEXT_SIZE, Anchor::Start, INK);
     let base = base + DVec2::new(24.0, 0.0);
-    page.label(base, text, TEXT_SIZE, Anchor::Start, NOTE);
+    page.label(base, text, TEXT_SIZE, Anchor::Start, color);
 }
 
 const TITLE_BASE: f64 = 38.0;

@@ -17,10 +17,6 @@ const DOTS_PER_METRE: u32 = 7559;
 
 /// Writes the whole file.
 pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
-    encode(&paint(drawing), out)
-}
-
-fn paint(drawing: &Drawing) -> Pixmap {
     let pixels = |length: f64| (length * SCALE).ceil() as u32;
     let mut canvas = Pixmap::new(pixels(drawing.width), pixels(drawing.height))
         .expect("a page has a width and a height");
@@ -41,7 +37,7 @@ fn paint(drawing: &Drawing) -> Pixmap {
             Mark::Label(label) => paint_label(&mut canvas, label, &font),
         }
     }
-    canvas
+    encode(&canvas, out)
 }
 
 fn page_to_pixels() -> Transform {
@@ -124,6 +120,5 @@ fn encode(canvas: &Pixmap, out: &mut dyn Write) -> io::Result<()> {
     }));
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&rgb)?;
-    writer.finish()?;
-    Ok(())
+    Ok(writer.finish()?)
 }

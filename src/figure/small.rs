@@ -3,8 +3,8 @@
 use glam::{DVec2, DVec3};
 
 use super::axis::round_step;
-use super::drawing::Drawing;
-use super::page::{Cell, HEADER, PANEL_TITLE, WIDTH};
+use super::drawing::{Color, Drawing};
+use super::page::{Cell, HEADER, PANEL_TITLE, WIDTH, title_in};
 use super::space::{Camera, Room, Scene, surrounding_box};
 use super::veins::Veins;
 
@@ -53,7 +53,7 @@ impl SmallPanels {
         };
         SmallPanels {
             bounds,
-            step: round_step(GRID / Camera::facing(bounds, any, ROOM).scale()),
+            step: round_step(GRID / Camera::facing(bounds, any, ROOM).scale),
             size,
             top: HEADER,
             count,
@@ -82,16 +82,19 @@ impl SmallPanels {
         (self.top + rows as f64 * row + BOTTOM).ceil()
     }
 
-    /// Draws a leaf into its panel, over what `under` draws there with lines
-    /// of this width. The first panel's axes are named.
+    /// Draws a leaf with its letter and title into its panel, over what `under`
+    /// draws there with lines of this width. The first panel's axes are named.
     pub fn draw(
         &self,
         page: &mut Drawing,
         index: usize,
         veins: &Veins,
+        (letter, text, color): (&str, &str, Color),
         under: impl FnOnce(&mut Drawing, &Scene, f64),
     ) {
-        let scene = Scene::new(self.bounds, self.cell(index), ROOM, Some(self.step));
+        let cell = self.cell(index);
+        title_in(page, cell.corner, letter, text, color);
+        let scene = Scene::new(self.bounds, cell, ROOM, Some(self.step));
         scene.draw_box(page);
         if index == 0 {
             scene.draw_names(page, 9.0);

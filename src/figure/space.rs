@@ -48,7 +48,8 @@ pub struct Camera {
     right: DVec3,
     up: DVec3,
     toward: DVec3,
-    scale: f64,
+    /// Pixels per length.
+    pub scale: f64,
     /// Where the origin is on the page.
     origin: DVec2,
 }
@@ -68,8 +69,8 @@ impl Camera {
         let (first, last) = camera.outline([low, high]);
         let free = cell.size - DVec2::new(room.left + room.right, room.below);
         camera.scale = (free / (last - first)).min_element();
-        let middle =
-            cell.corner + 0.5 * cell.size + 0.5 * DVec2::new(room.left - room.right, -room.below);
+        let shift = DVec2::new(room.left - room.right, -room.below);
+        let middle = cell.corner + 0.5 * cell.size + 0.5 * shift;
         camera.origin = middle - camera.scale * 0.5 * (first + last);
         camera
     }
@@ -77,23 +78,11 @@ impl Camera {
     /// Corners of the rectangle on the page that holds a box.
     pub fn outline(&self, [low, high]: [DVec3; 2]) -> (DVec2, DVec2) {
         let corners = (0..8).map(|corner| {
-            let side = |bit: u32, low: f64, high: f64| if corner & bit == 0 { low } else { high };
-            let corner = DVec3::new(
-                side(1, low.x, high.x),
-                side(2, low.y, high.y),
-                side(4, low.z, high.z),
-            );
-            self.place(corner)
+            let side = |axis: usize| [low, high][corner >> axis & 1][axis];
+            self.place(DVec3::new(side(0), side(1), side(2)))
         });
-        corners.fold(
-            (DVec2::INFINITY, DVec2::NEG_INFINITY),
-            |(first, last), corner| (first.min(corner), last.max(corner)),
-        )
-    }
-
-    /// Pixels per length.
-    pub fn scale(&self) -> f64 {
-        self.scale
+        let none = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        corners.fold(none, |(first, last), at| (first.min(at), last.max(at)))
     }
 
     fn place(&self, point: DVec3) -> DVec2 {
@@ -146,20 +135,17 @@ fn edges(camera: &Camera, low: DVec3, high: DVec3, step: Option<f64>) -> [Edge; 
             round_step(TICK_DISTANCE / seen)
         }),
     };
-    let behind = sides.with_x(0.0).with_z(0.0);
-    let left = DVec3::new(-sides.x, 0.0, 0.0);
-    let up = DVec3::new(0.0, 0.0, sides.z);
-    let right = DVec3::new(sides.x, 0.0, 0.0);
+    let side = |axis: DVec3| sides * axis;
+    let (behind, up, left) = (side(DVec3::Y), side(DVec3::Z), side(DVec3::NEG_X));
+    let walls = [
+        [behind, behind + up],
+        [left, left + up],
+        [behind, behind - left],
+    ];
     [
-        edge("ξ", DVec3::X, low, DVec3::NEG_Y, [behind, behind + up]),
-        edge(
-            "η",
-            DVec3::Y,
-            low.with_x(high.x),
-            DVec3::X,
-            [left, left + up],
-        ),
-        edge("ζ", DVec3::Z, low, -camera.right, [behind, behind + right]),
+        edge("ξ", DVec3::X, low, DVec3::NEG_Y, walls[0]),
+        edge("η", DVec3::Y, low.with_x(high.x), DVec3::X, walls[1]),
+        edge("ζ", DVec3::Z, low, -camera.right, walls[2]),
     ]
 }
 
@@ -258,12 +244,13 @@ impl Scene {
             let shadow = vein.path(|point| self.place(point.with_z(self.low.z)));
             page.stroke(shadow, Stroke::new(SHADOW, width));
         }
-        let mut pieces: Vec<(f64, &Piece, &Vein)> = veins
+        let pieces = veins
             .veins
             .iter()
-            .flat_map(|vein| vein.pieces.iter().map(move |piece| (piece, vein)))
-            .map(|(piece, vein)| (self.camera.toward.dot(piece[0] + piece[3]), piece, vein))
-            .collect();
+            .flat_map(|vein| vein.pieces.iter().map(move |p| (p, vein)));
+        let depth = |piece: &Piece| self.camera.toward.dot(piece[0] + piece[3]);
+        let pieces = pieces.map(|(piece, vein)| (depth(piece), piece, vein));
+        let mut pieces: Vec<(f64, &Piece, &Vein)> = pieces.collect();
         pieces.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (_, piece, vein) in pieces {
             let [start, a, b, end] = piece.map(|point| self.place(point));

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use glam::DVec2;
 
-use super::drawing::{Anchor, Color, DASHES, Drawing, Label, Mark, Path, Step, Stroke};
+use super::drawing::{Anchor, Color, DASHES, Drawing, Label, Mark, Step};
 
 /// Writes the whole file.
 pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
@@ -26,13 +26,27 @@ pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
             Mark::EndGroup => writeln!(out, "</g>")?,
             Mark::Shape { path, fill, stroke } => {
                 write!(out, "<path d=\"")?;
-                write_path(path, out)?;
+                for step in path {
+                    match step {
+                        Step::Move(to) => write!(out, "M{}", point(to))?,
+                        Step::Line(to) => write!(out, "L{}", point(to))?,
+                        Step::Cubic(a, b, to) => {
+                            write!(out, "C{} {} {}", point(a), point(b), point(to))?;
+                        }
+                        Step::Close => write!(out, "Z")?,
+                    }
+                }
                 write!(out, "\"")?;
                 if let Some(fill) = fill {
                     write!(out, " fill=\"{}\"", hex(*fill))?;
                 }
                 if let Some(stroke) = stroke {
-                    write_stroke(stroke, out)?;
+                    let color = hex(stroke.color);
+                    write!(out, " stroke=\"{color}\" stroke-width=\"{}\"", stroke.width)?;
+                    if stroke.dashed {
+                        let [dash, gap] = DASHES;
+                        write!(out, " stroke-dasharray=\"{dash} {gap}\"")?;
+                    }
                 }
                 writeln!(out, "/>")?;
             }
@@ -42,58 +56,19 @@ pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "</svg>")
 }
 
-fn write_path(path: &Path, out: &mut dyn Write) -> io::Result<()> {
-    for step in path {
-        match step {
-            Step::Move(to) => write!(out, "M{}", point(to))?,
-            Step::Line(to) => write!(out, "L{}", point(to))?,
-            Step::Cubic(a, b, to) => write!(out, "C{} {} {}", point(a), point(b), point(to))?,
-            Step::Close => write!(out, "Z")?,
-        }
-    }
-    Ok(())
-}
-
-fn write_stroke(stroke: &Stroke, out: &mut dyn Write) -> io::Result<()> {
-    write!(
-        out,
-        " stroke=\"{}\" stroke-width=\"{}\"",
-        hex(stroke.color),
-        stroke.width
-    )?;
-    if stroke.dashed {
-        let [dash, gap] = DASHES;
-        write!(out, " stroke-dasharray=\"{dash} {gap}\"")?;
-    }
-    Ok(())
-}
-
 fn write_label(label: &Label, out: &mut dyn Write) -> io::Result<()> {
-    let Label {
-        at,
-        text,
-        size,
-        anchor,
-        color,
-        upright,
-    } = label;
-    if *upright {
-        let (x, y) = (number(at.x), number(at.y));
-        write!(out, "<text transform=\"translate({x} {y}) rotate(-90)\"")?;
-    } else {
-        write!(out, "<text x=\"{}\" y=\"{}\"", number(at.x), number(at.y))?;
+    let (x, y) = (number(label.at.x), number(label.at.y));
+    match label.upright {
+        true => write!(out, "<text transform=\"translate({x} {y}) rotate(-90)\"")?,
+        false => write!(out, "<text x=\"{x}\" y=\"{y}\"")?,
     }
-    match anchor {
+    match label.anchor {
         Anchor::Start => (),
         Anchor::Middle => write!(out, " text-anchor=\"middle\"")?,
         Anchor::End => write!(out, " text-anchor=\"end\"")?,
     }
-    writeln!(
-        out,
-        " font-size=\"{size}\" fill=\"{}\">{}</text>",
-        hex(*color),
-        escaped(text)
-    )
+    let (size, color, text) = (label.size, hex(label.color), escaped(&label.text));
+    writeln!(out, " font-size=\"{size}\" fill=\"{color}\">{text}</text>")
 }
 
 fn point(point: &DVec2) -> String {

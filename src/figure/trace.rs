@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 
 use super::axes::Axes;
 use super::axis::Axis;
-use super::drawing::{Anchor, CURVES, Drawing, INK, Stroke};
+use super::drawing::{Anchor, CURVES, Drawing, INK, NOTE, Stroke};
 use super::markers::Marker;
 use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, new_page, title};
 use super::small::SmallPanels;
@@ -49,7 +49,7 @@ pub fn draw(trace: &Trace) -> Drawing {
     let mut drawing = new_page(LEFT, &name, &notes(trace), None);
     drawing.height = panels.end();
     drawing.group("branches", |page| {
-        draw_branches(page, trace, &shown, diagram);
+        draw_branches(page, trace, &shown, diagram)
     });
     if let (Some(law), Some(branch)) = (&trace.law, trace.branches.first()) {
         let cell = Cell::beside_key(below + BETWEEN + PANEL_TITLE, LAW, KEY);
@@ -57,10 +57,8 @@ pub fn draw(trace: &Trace) -> Drawing {
     }
     drawing.group("leaves", |page| {
         for (index, (veins, at)) in shapes.iter().zip(&shown).enumerate() {
-            let corner = panels.cell(index).corner;
-            let text = format!("at {}", what(point(at)));
-            title(page, corner, &(index + 1).to_string(), &text);
-            panels.draw(page, index, veins, |_, _, _| ());
+            let (number, text) = ((index + 1).to_string(), format!("at {}", what(point(at))));
+            panels.draw(page, index, veins, (&number, &text, NOTE), |_, _, _| ());
         }
     });
     drawing
@@ -71,13 +69,12 @@ fn length(curve: &[DVec3]) -> f64 {
 }
 
 fn notes(trace: &Trace) -> Vec<String> {
-    let rods = match trace.rods {
-        1 => "1 vein".into(),
-        rods => format!("{rods} veins"),
-    };
     let points: usize = trace.branches.iter().map(|b| b.points.len()).sum();
     let mut notes = vec![
-        rods,
+        match trace.rods {
+            1 => "1 vein".into(),
+            rods => format!("{rods} veins"),
+        },
         match trace.branches.len() {
             1 => format!("{points} points"),
             branches => format!("{points} points on {branches} branches"),
@@ -104,8 +101,7 @@ fn shown(trace: &Trace) -> Vec<[usize; 2]> {
             wanted.push((0, [b, 0]));
         }
         wanted.push((1 + b.min(1), [b, last]));
-        let critical = branch.critical().map(|(p, _)| (3, [b, p]));
-        wanted.extend(critical);
+        wanted.extend(branch.critical().map(|(p, _)| (3, [b, p])));
     }
     wanted.sort_by_key(|&(rank, _)| rank);
     let mut shown: Vec<[usize; 2]> = Vec::new();
@@ -135,9 +131,8 @@ fn axis(trace: &Trace) -> usize {
     let extent = tips.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
     let (low, high) = extent.unwrap_or_default();
     let way = high - low;
-    (0..3)
-        .max_by(|&a, &b| way[a].total_cmp(&way[b]))
-        .unwrap_or(2)
+    let longest = (0..3).max_by(|&a, &b| way[a].total_cmp(&way[b]));
+    longest.unwrap_or(2)
 }
 
 /// A name with its unit, if that is known.
@@ -162,13 +157,11 @@ fn draw_branches(page: &mut Drawing, trace: &Trace, shown: &[[usize; 2]], cell: 
         force if force.starts_with("load.tip_force") => with_unit(&force, &trace.units.force),
         other => other,
     };
+    let up = with_unit(&up, &trace.units.length);
     let axes = Axes {
         cell,
         across: Axis::holding(&across, all().map(|point| at(point).0)),
-        up: Axis::holding(
-            &with_unit(&up, &trace.units.length),
-            all().map(|point| at(point).1),
-        ),
+        up: Axis::holding(&up, all().map(|point| at(point).1)),
     };
     let what = "equilibria: stable drawn solid, unstable dashed";
     title(page, cell.corner, "(a)", what);
@@ -187,10 +180,8 @@ fn draw_branches(page: &mut Drawing, trace: &Trace, shown: &[[usize; 2]], cell: 
         let of_kind = critical.filter(|(_, point)| (point.kind == PointKind::Fold) == kind);
         axes.markers(page, of_kind.map(|(_, point)| at(point)), marker, INK);
     }
-    let places = shown
-        .iter()
-        .map(|&[b, p]| axes.at(at(&trace.branches[b].points[p])));
-    number(page, places);
+    let shown = shown.iter().map(|&[b, p]| &trace.branches[b].points[p]);
+    number(page, shown.map(|point| axes.at(at(point))));
     draw_key(page, trace, cell);
 }
 
@@ -199,10 +190,9 @@ fn number(page: &mut Drawing, places: impl Iterator<Item = Option<DVec2>>) {
     let mut labels: Vec<(DVec2, String)> = Vec::new();
     for (index, place) in places.enumerate() {
         let Some(place) = place else { continue };
-        let number = (index + 1).to_string();
         match labels.iter_mut().find(|(at, _)| at.distance(place) < CLOSE) {
-            Some((_, text)) => *text += &format!(", {number}"),
-            None => labels.push((place, number)),
+            Some((_, text)) => *text += &format!(", {}", index + 1),
+            None => labels.push((place, (index + 1).to_string())),
         }
     }
     for (place, text) in labels {
@@ -264,24 +254,16 @@ fn draw_law(page: &mut Drawing, trace: &Trace, law: &Law, branch: &TraceBranch, 
         .map(|point| (tip(point, law.axis) - start, point.value))
         .collect();
     let units = &trace.units;
-    let across = with_unit(
-        &format!("displacement along {}", AXES[law.axis]),
-        &units.length,
-    );
+    let across = format!("displacement along {}", AXES[law.axis]);
+    let across = with_unit(&across, &units.length);
+    let up = with_unit("force", &units.force);
     let axes = Axes {
         cell,
         across: Axis::holding(&across, points.iter().map(|p| p.0)),
-        up: Axis::holding(
-            &with_unit("force", &units.force),
-            points.iter().map(|p| p.1),
-        ),
+        up: Axis::holding(&up, points.iter().map(|p| p.1)),
     };
-    title(
-        page,
-        cell.corner,
-        "(b)",
-        "force against displacement of the tip",
-    );
+    let what = "force against displacement of the tip";
+    title(page, cell.corner, "(b)", what);
     axes.draw(page);
     let count = points.len() as f64;
     let x = points.iter().map(|p| p.0).sum::<f64>() / count;
@@ -298,13 +280,8 @@ fn draw_law(page: &mut Drawing, trace: &Trace, law: &Law, branch: &TraceBranch, 
         _ => String::new(),
     };
     let mut key = Key::beside(cell);
-    key.marker(
-        page,
-        "equilibria",
-        "of the first branch",
-        Marker::Dot,
-        CURVES[0],
-    );
+    let which = "of the first branch";
+    key.marker(page, "equilibria", which, Marker::Dot, CURVES[0]);
     let slope = format!("slope {}{unit}", short(law.slope));
     key.line(page, "line of least squares", &slope, line);
     let off = format!("off by {} % at most", short(100.0 * law.deviation));
