@@ -6,10 +6,8 @@ use super::small::{SIDE, SmallPanels};
 use super::veins::Veins;
 use crate::study::All;
 
-/// Shapes drawn.
 const MOST: usize = 24;
 
-/// Draws the whole page.
 pub fn draw(all: &All) -> Drawing {
     let shown = &all.found[..all.found.len().min(MOST)];
     let shapes = shown.iter().map(|found| Veins::of(&found.equilibrium));

@@ -20,7 +20,6 @@ const NAME_BESIDE: f64 = 42.0;
 const AFTER_LABELS: f64 = 13.0;
 const FARTHEST_NAME: f64 = 53.0;
 
-/// A curve with a name.
 pub struct Curve {
     pub name: &'static str,
     pub color: Color,
@@ -28,13 +27,11 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// Its values upwards.
     pub fn values(&self) -> impl Iterator<Item = f64> {
         self.points.iter().map(|point| point.1)
     }
 }
 
-/// A panel between two axes.
 pub struct Axes {
     pub cell: Cell,
     pub across: Axis,

@@ -10,13 +10,10 @@ const AIR: f64 = 0.06;
 const DECADES_OF_AIR: f64 = 0.12;
 /// What is smaller is rounding of rounding.
 const MOST_DECADES: f64 = 18.0;
-
 /// What is larger is a number gone wild.
 const LARGEST: f64 = 1e290;
-
 /// Powers of ten that are written out on a linear axis.
 const PLAIN: Range<f64> = -2.0..4.0;
-
 /// Pixels between ticks at least, and between their labels.
 const LINEAR: [f64; 2] = [62.0, 25.0];
 const LOGARITHMIC: [f64; 2] = [38.0, 22.0];
@@ -24,7 +21,6 @@ const BETWEEN_LABELS: f64 = 4.0;
 /// Pixels of a decade that is divided further.
 const DIVIDED: f64 = 60.0;
 
-/// The direction of an axis on the page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     Across,
@@ -42,7 +38,6 @@ pub enum Ticks {
     At(Vec<f64>),
 }
 
-/// A linear or logarithmic axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
     pub name: String,
@@ -60,7 +55,6 @@ pub struct Axis {
     pub stresses_zero: bool,
 }
 
-/// A tick.
 #[derive(Clone, Debug)]
 pub struct Tick {
     pub value: f64,
@@ -70,7 +64,6 @@ pub struct Tick {
 }
 
 impl Axis {
-    /// A linear axis between two values.
     pub fn linear(name: &str, start: f64, end: f64) -> Self {
         let size = start.abs().max(end.abs());
         let extent = (end - start).abs();
@@ -250,7 +243,6 @@ impl Axis {
     }
 }
 
-/// The least and the greatest value.
 fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let both = values.map(|value| (value, value));
     both.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))

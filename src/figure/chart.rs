@@ -26,11 +26,8 @@ const OTHER_PEERS: [Color; 3] = [
 
 /// The smallest error that is drawn: what is smaller is put there.
 const SMALLEST: f64 = 1e-17;
-
-/// Decades of an axis, at least.
 const FEWEST_DECADES: f64 = 1.0;
 
-/// Draws error against time.
 pub fn draw_chart(chart: &Chart) -> Drawing {
     let rows: Vec<(usize, &Row)> = chart.rows.iter().map(|row| (chart.rods, row)).collect();
     let mut series = contenders(&rows, false);
@@ -68,7 +65,6 @@ pub fn draw_chart(chart: &Chart) -> Drawing {
     page(&title, &notes, &panel)
 }
 
-/// Draws time against the number of veins.
 pub fn draw_scaling(scaling: &Scaling) -> Drawing {
     let rows = scaling.rows.iter().map(|found| (found.rods, &found.row));
     let series = contenders(&rows.collect::<Vec<_>>(), true);

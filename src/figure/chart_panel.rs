@@ -12,11 +12,8 @@ use super::page::{Cell, Key, PANEL_AXIS, TICK_SIZE};
 const FRAME_HEIGHT: f64 = 430.0;
 /// Right of the frame, for the key and the names of lanes.
 const KEY: f64 = 252.0;
-/// Height of a lane of failures.
 const LANE: f64 = 16.0;
-/// Between the lanes and the frame.
 const LANE_GAP: f64 = 7.0;
-
 /// Points on the Pareto front, and the band that joins them.
 const FRONT: Color = Color(247, 205, 92);
 /// What cannot be told from zero.
@@ -29,7 +26,6 @@ pub struct Point {
     pub at: (f64, f64),
     /// From here to there it was spread in repeated measurements.
     pub spread: [(f64, f64); 2],
-    /// Whether it is on the Pareto front.
     pub front: bool,
 }
 
@@ -38,11 +34,9 @@ pub struct Point {
 pub struct Failure {
     /// Where it is on the axis across; `None`: nowhere.
     pub x: Option<f64>,
-    /// How it ended: the name of its lane.
     pub word: String,
 }
 
-/// What is joined by one line.
 pub struct Series {
     pub name: String,
     pub color: Color,
@@ -62,12 +56,10 @@ impl Series {
     }
 }
 
-/// The whole panel.
 pub struct ChartPanel {
     pub series: Vec<Series>,
     pub across: Axis,
     pub up: Axis,
-    /// Values of the axis upwards that cannot be told from zero.
     pub floor: Option<f64>,
 }
 
@@ -95,7 +87,6 @@ impl ChartPanel {
         self.above() + FRAME_HEIGHT + PANEL_AXIS
     }
 
-    /// Draws the panel below `start`.
     pub fn draw(&self, page: &mut Drawing, start: f64) {
         let axes = Axes {
             cell: Cell::beside_key(start + self.above(), FRAME_HEIGHT, KEY),
@@ -121,7 +112,6 @@ impl ChartPanel {
         self.draw_key(page, axes.cell);
     }
 
-    /// Shades what cannot be told from zero.
     fn draw_floor(&self, page: &mut Drawing, cell: Cell) {
         let Some(floor) = self.floor else { return };
         let height = cell.size.y * self.up.part(floor).clamp(0.0, 1.0);

@@ -13,10 +13,8 @@ use super::veins::Veins;
 use crate::report::words::{equilibrium_of_index, headline, verdict};
 use crate::study::{Check, Verdict};
 
-/// Height of a line of text.
 const LINE: f64 = 19.0;
 
-/// Draws the whole page.
 pub fn draw(check: &Check) -> Drawing {
     let mut veins = Veins::of(&check.relaxed);
     if let Some(solution) = check.solution() {

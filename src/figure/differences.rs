@@ -13,16 +13,10 @@ use crate::study::{Check, Quantity};
 const FRAME_HEIGHT: f64 = 216.0;
 /// Right of the frame, for the key.
 const KEY: f64 = 212.0;
-/// The panel with its title and axis.
 pub const HEIGHT: f64 = PANEL_TITLE + FRAME_HEIGHT + PANEL_AXIS;
-
-/// Decades of differences, at least.
 const FEWEST_DECADES: f64 = 3.0;
-
 /// Below, for differences of exactly zero: one lane for each quantity.
 const ZERO_STRIP: f64 = 30.0;
-
-/// Stations are marked if there are no more.
 const MOST_MARKED: usize = 70;
 
 /// A quantity along the veins, and up to which difference of it the solutions
@@ -49,7 +43,6 @@ fn curve(quantity: Quantity, check: &Check, unit: f64, color: Color) -> (Curve, 
     (curve, allowed)
 }
 
-/// Draws the panel below `start`.
 pub fn draw(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
     let quantities = Quantity::ALL.into_iter().zip(CURVES);
     let (curves, allowed): (Vec<Curve>, Vec<Option<f64>>) = quantities
@@ -113,7 +106,6 @@ fn draw_zeros(page: &mut Drawing, curves: &[Curve], above: Cell, stations: Axis)
     }
 }
 
-/// Each curve's name and its largest value.
 fn draw_key(page: &mut Drawing, curves: &[Curve], cell: Cell) {
     let mut key = Key::beside(cell);
     for curve in curves {

@@ -15,7 +15,6 @@ pub struct Drawing {
 pub enum Mark {
     /// Begins a named group: for whoever edits the SVG.
     Group(&'static str),
-    /// Ends the group begun last.
     EndGroup,
     Shape {
         path: Path,
@@ -83,7 +82,6 @@ pub struct Label {
 const HALF_CAPITAL: f64 = 0.36;
 
 impl Drawing {
-    /// An empty page whose height is not known yet.
     pub fn new(width: f64, description: &str) -> Self {
         Drawing {
             width,
@@ -142,7 +140,6 @@ impl Drawing {
     }
 }
 
-/// Straight lines from each point to the next.
 pub fn polyline(points: &[DVec2]) -> Path {
     let mut path: Path = points.iter().map(|&point| Step::Line(point)).collect();
     if let Some(first) = points.first() {
@@ -181,27 +178,19 @@ pub fn circle(center: DVec2, radius: f64) -> Path {
     ]
 }
 
-/// Red, green, blue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Color(pub u8, pub u8, pub u8);
 
 pub const WHITE: Color = Color(255, 255, 255);
-/// Titles and markers.
 pub const INK: Color = Color(32, 32, 36);
-/// Axis labels and notes.
 pub const NOTE: Color = Color(84, 84, 92);
-/// Frames of panels.
 pub const FRAME: Color = Color(120, 120, 128);
-/// Grid lines.
 pub const GRID: Color = Color(226, 227, 232);
 /// The floor of the panel in space.
 pub const FLOOR: Color = Color(247, 247, 249);
 /// Shadows on that floor.
 pub const SHADOW: Color = Color(212, 213, 220);
-
-/// Points of a second solution.
 pub const DOT: Color = Color(213, 60, 30);
-
 /// Colours that must be told apart, also by the colour-blind (after Okabe and Ito).
 pub const BLUE: Color = Color(0, 114, 178);
 pub const SKY: Color = Color(86, 170, 225);
@@ -211,7 +200,6 @@ pub const PURPLE: Color = Color(170, 90, 150);
 pub const ORANGE: Color = Color(230, 159, 0);
 pub const BROWN: Color = Color(120, 80, 45);
 pub const SLATE: Color = Color(60, 60, 66);
-
 /// Of curves in one panel, in this order.
 pub const CURVES: [Color; 8] = [BLUE, GREEN, VERMILION, PURPLE, ORANGE, SKY, BROWN, SLATE];
 

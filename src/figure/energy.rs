@@ -16,7 +16,6 @@ const BOTTOM: f64 = 4.0;
 /// Right of the panels, for the key.
 const KEY: f64 = 200.0;
 
-/// What all pictures say of a simulation.
 pub fn notes(record: &Record) -> Vec<String> {
     let mut notes = vec![
         format!("N = {}", record.rods),
@@ -29,7 +28,6 @@ pub fn notes(record: &Record) -> Vec<String> {
     notes
 }
 
-/// Draws the whole page.
 pub fn draw(record: &Record) -> Drawing {
     let name = format!("{}: energy in time", record.scenario);
     let upper = HEADER + PANEL_TITLE;

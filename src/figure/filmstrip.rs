@@ -13,7 +13,6 @@ use crate::simulate::{Record, Still};
 /// Points of the tip's way that are drawn between two panels at most.
 const MOST_WAY: usize = 400;
 
-/// Draws the whole page.
 pub fn draw(record: &Record) -> Drawing {
     let name = format!("{} in motion", record.scenario);
     let stills = record.stills.iter();

@@ -12,14 +12,12 @@ pub struct Font {
 }
 
 impl Font {
-    /// The embedded font, which a test reads as well.
     pub fn embedded() -> Self {
         Font {
             face: Face::parse(FONT, 0).expect("the embedded font is whole"),
         }
     }
 
-    /// Width of a text of the given size.
     pub fn width(&self, text: &str, size: f64) -> f64 {
         text.chars()
             .map(|c| self.advance(self.glyph(c)))
@@ -87,9 +85,7 @@ impl Font {
 /// page) and moved along the base line.
 struct Outline {
     scale: f64,
-    /// Where the glyph begins.
     start: f64,
-    /// Where the pen is.
     at: DVec2,
     path: Path,
 }

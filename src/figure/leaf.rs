@@ -8,7 +8,6 @@ use crate::relax::Equilibrium;
 use crate::report::numbers::power_of_ten;
 use crate::report::words::{shooting, verdict};
 
-/// Draws the whole page.
 pub fn draw(leaf: &Equilibrium) -> Drawing {
     let veins = Veins::of(leaf);
     let panels = Panels::below(HEADER, &veins);

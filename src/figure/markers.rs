@@ -6,7 +6,6 @@ use glam::{DVec2, DVec3};
 use super::drawing::{Color, DOT, Drawing, INK, Stroke, WHITE, circle, polygon, rectangle};
 use super::veins::Veins;
 
-/// The shape of a marked point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Marker {
     /// A small disc, for points close to each other.

@@ -47,7 +47,6 @@ pub use trace::draw as trace;
 use crate::report::Format;
 use drawing::Drawing;
 
-/// A picture of a result as a file.
 pub struct Picture<R> {
     file: &'static str,
     draw: fn(&R) -> Drawing,

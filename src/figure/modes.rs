@@ -10,13 +10,10 @@ use crate::relax::{Equilibrium, Mode};
 use crate::report::numbers::short;
 use crate::report::words::verdict;
 
-/// Modes that are drawn, at most.
 const MOST: usize = 12;
-
 /// Largest displacement drawn, as a part of the leaf's extent.
 const AMPLITUDE: f64 = 0.2;
 
-/// Draws the whole page.
 pub fn draw(equilibrium: &Equilibrium) -> Drawing {
     let name = format!("{}: modes", equilibrium.scenario);
     let rest = Veins::of(equilibrium);
@@ -68,7 +65,6 @@ fn caption(mode: &Mode) -> (String, Color) {
     }
 }
 
-/// The leaf moved along a mode.
 fn displaced(equilibrium: &Equilibrium, rest: &Veins, mode: &Mode) -> Veins {
     let far = |shape: &[DVec3]| shape.iter().fold(0.0_f64, |m, d| m.max(d.length()));
     let largest = mode.displacement.iter().fold(0.0, |m, d| far(d).max(m));

@@ -17,13 +17,10 @@ pub const HEADER: f64 = 74.0;
 pub const PANEL_TITLE: f64 = 24.0;
 /// Below a panel, for its axis.
 pub const PANEL_AXIS: f64 = 48.0;
-
-/// Font sizes.
 pub const TITLE_SIZE: f64 = 19.0;
 pub const TEXT_SIZE: f64 = 12.0;
 pub const TICK_SIZE: f64 = 10.5;
 
-/// A rectangle on the page.
 #[derive(Clone, Copy)]
 pub struct Cell {
     pub corner: DVec2,
@@ -39,7 +36,6 @@ impl Cell {
         }
     }
 
-    /// The corner opposite to `corner`.
     pub fn end(&self) -> DVec2 {
         self.corner + self.size
     }
@@ -218,7 +214,6 @@ impl KeyRows {
         }
     }
 
-    /// A sample and what it is.
     pub fn entry(
         &mut self,
         page: &mut Drawing,
@@ -235,7 +230,6 @@ impl KeyRows {
         self.at.x += width + BESIDE;
     }
 
-    /// Where the last row ends.
     pub fn end(&self) -> f64 {
         self.at.y + 18.0
     }

@@ -18,17 +18,14 @@ const BOTTOM: f64 = 4.0;
 /// Between the columns, for the right one's axis.
 const COLUMN_GAP: f64 = 74.0;
 const COLUMNS: f64 = WIDTH - LEFT - RIGHT - COLUMN_GAP;
-
 /// Panels do not get smaller than this, however flat the leaf.
 const NARROWEST_COLUMN: f64 = 340.0;
 const LOWEST_TOP: f64 = 270.0;
 const LOWEST_BOTTOM: f64 = 130.0;
 /// Both rows together do not get higher than this, however tall the leaf.
 const HIGHEST_ROWS: f64 = 800.0;
-
 /// Air around the leaf, as a fraction of its largest extent.
 const AIR: f64 = 0.06;
-
 /// Distance between grid lines at least.
 const TICK_DISTANCE: f64 = 36.0;
 
@@ -126,7 +123,6 @@ impl Panels {
         self.rows[1].0 + self.rows[1].1 + PANEL_AXIS + BOTTOM
     }
 
-    /// Draws all four.
     pub fn draw(&self, drawing: &mut Drawing, veins: &Veins) {
         let [left, right] = self.columns;
         let [top, bottom] = self.rows;

@@ -9,13 +9,10 @@ use tiny_skia::{
 use super::drawing::{Anchor, Color, DASHES, Drawing, Label, Mark, Path, Step, Stroke};
 use super::font::Font;
 
-/// Pixels per unit of the page.
 const SCALE: f64 = 2.0;
-
 /// 192 dots per inch, as the file says them: dots per metre.
 const DOTS_PER_METRE: u32 = 7559;
 
-/// Writes the whole file.
 pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
     let pixels = |length: f64| (length * SCALE).ceil() as u32;
     let mut canvas = Pixmap::new(pixels(drawing.width), pixels(drawing.height))

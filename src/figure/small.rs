@@ -15,10 +15,8 @@ const GAP: f64 = 12.0;
 const LOWEST: f64 = 110.0;
 const HIGHEST: f64 = 330.0;
 const BOTTOM: f64 = 10.0;
-
 /// Pixels between grid lines at least.
 const GRID: f64 = 17.0;
-
 /// Veins are thinner in small panels.
 const THINNER: f64 = 0.75;
 
@@ -60,12 +58,10 @@ impl SmallPanels {
         }
     }
 
-    /// Below this.
     pub fn below(self, top: f64) -> Self {
         SmallPanels { top, ..self }
     }
 
-    /// Where a panel is.
     pub fn cell(&self, index: usize) -> Cell {
         let place = DVec2::new((index % COLUMNS) as f64, (index / COLUMNS) as f64);
         let pitch = self.size + DVec2::new(GAP, PANEL_TITLE + GAP);
@@ -75,7 +71,6 @@ impl SmallPanels {
         }
     }
 
-    /// Where the page ends.
     pub fn end(&self) -> f64 {
         let rows = self.count.div_ceil(COLUMNS).max(1);
         let row = PANEL_TITLE + self.size.y + GAP;

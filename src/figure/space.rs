@@ -14,10 +14,8 @@ use super::veins::{Piece, Vein, Veins};
 /// Where the viewer stands: degrees from the xi axis, and above the floor.
 const AZIMUTH: f64 = -55.0;
 const ELEVATION: f64 = 28.0;
-
 /// No side of the box is shorter than this part of its longest.
 const SHORTEST_SIDE: f64 = 0.4;
-
 /// Air around the leaf, as a fraction of its largest extent.
 const AIR: f64 = 0.06;
 
@@ -95,7 +93,6 @@ impl Camera {
 struct Edge {
     name: &'static str,
     direction: DVec3,
-    /// A point of the edge.
     at: DVec3,
     low: f64,
     high: f64,
@@ -103,7 +100,6 @@ struct Edge {
     outward: DVec3,
     /// Where the two walls on which its grid lines run end.
     walls: [DVec3; 2],
-    /// Between ticks.
     step: f64,
 }
 
@@ -149,7 +145,6 @@ fn edges(camera: &Camera, low: DVec3, high: DVec3, step: Option<f64>) -> [Edge; 
     ]
 }
 
-/// A box with a camera that sees it.
 pub struct Scene {
     low: DVec3,
     high: DVec3,
@@ -171,7 +166,6 @@ impl Scene {
         }
     }
 
-    /// Where a point is on the page.
     pub fn place(&self, point: DVec3) -> DVec2 {
         self.camera.place(point)
     }
@@ -210,7 +204,6 @@ impl Scene {
         }
     }
 
-    /// Labels the ticks of all axes.
     pub fn draw_labels(&self, page: &mut Drawing) {
         for edge in &self.edges {
             let out = self.outward(edge);

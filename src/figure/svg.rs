@@ -6,7 +6,6 @@ use glam::DVec2;
 
 use super::drawing::{Anchor, Color, DASHES, Drawing, Label, Mark, Step};
 
-/// Writes the whole file.
 pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
     let Drawing { width, height, .. } = drawing;
     writeln!(

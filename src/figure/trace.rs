@@ -19,17 +19,13 @@ const DIAGRAM: f64 = 380.0;
 const KEY: f64 = 190.0;
 const LAW: f64 = 240.0;
 const BETWEEN: f64 = 26.0;
-
 /// Leaves drawn, and branches named.
 const MOST_LEAVES: usize = 8;
 const MOST_NAMED: usize = 7;
-
 /// Points closer than this on the page have one label.
 const CLOSE: f64 = 14.0;
-
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Draws the whole page.
 pub fn draw(trace: &Trace) -> Drawing {
     let shown = shown(trace);
     let point = |&[b, p]: &[usize; 2]| &trace.branches[b].points[p];
@@ -114,7 +110,6 @@ fn shown(trace: &Trace) -> Vec<[usize; 2]> {
     shown
 }
 
-/// Where a point is, and what its leaf is.
 fn what(point: &TracePoint) -> String {
     let kind = match (point.kind, point.index) {
         (PointKind::Regular, 0) => "stable".into(),
@@ -143,7 +138,6 @@ fn with_unit(name: &str, unit: &Option<String>) -> String {
     }
 }
 
-/// A coordinate of the tip.
 fn tip(point: &TracePoint, axis: usize) -> f64 {
     point.tips.first().map_or(f64::NAN, |tip| tip[axis])
 }

@@ -7,17 +7,13 @@ use crate::relax::{Equilibrium, RodShape};
 
 /// Of a wider leaf, only some veins are drawn: more would not be told apart.
 const MOST_VEINS: usize = 200;
-
 /// Farther away than this many lengths a point is a number gone wild.
 const FARTHEST: f64 = 1e4;
-
 /// How far a drawn curve may be from the computed points, in lengths: a
 /// quarter of a pixel.
 const DRAWN_WITHIN: f64 = 3e-4;
-
 /// No curve is drawn with fewer pieces than this, if it has them.
 const FEWEST_PIECES: usize = 8;
-
 /// Dots of a second solution: on about so many veins at most, about so many in
 /// all, as far apart as this many are on the leaf's extent, and no fewer on a
 /// vein if it has them.
@@ -26,7 +22,6 @@ const MOST_DOTS: usize = 160;
 const DOTS_PER_EXTENT: f64 = 14.0;
 const FEWEST_DOTS: usize = 8;
 
-/// A cubic Bezier curve in space.
 pub type Piece = [DVec3; 4];
 
 pub struct Vein {
@@ -35,7 +30,6 @@ pub struct Vein {
 }
 
 impl Vein {
-    /// The whole vein, placed on the page.
     pub fn path(&self, place: impl Fn(DVec3) -> DVec2) -> Path {
         let start = self.pieces.first().map(|piece| Step::Move(place(piece[0])));
         let pieces = self.pieces.iter();
@@ -44,14 +38,11 @@ impl Vein {
     }
 }
 
-/// What the figure shows.
 pub struct Veins {
     pub veins: Vec<Vein>,
-    /// How many veins the leaf has.
     pub count: usize,
     /// Every so many-th vein is drawn.
     pub every: usize,
-    /// Points of a second solution.
     pub dots: Vec<DVec3>,
     pub tips: Vec<(DVec3, Color)>,
     /// Corners of the box that holds all of it; the clamp is at the origin.
@@ -139,7 +130,6 @@ impl Veins {
         }
     }
 
-    /// What is to be said about lengths and veins.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = vec![format!("L = {}", self.unit)];
         if self.every > 1 {
@@ -167,7 +157,6 @@ impl Veins {
     }
 }
 
-/// Whether a point, in lengths, can be drawn.
 pub fn is_near(point: DVec3) -> bool {
     point.is_finite() && point.abs().max_element() < FARTHEST
 }
@@ -208,7 +197,6 @@ fn largest_miss(pieces: &[Piece], points: &[DVec3], stride: usize) -> f64 {
     points.iter().enumerate().map(miss).fold(0.0, f64::max)
 }
 
-/// The point of a Bezier curve at `t` in [0, 1].
 fn at(piece: &Piece, t: f64) -> DVec3 {
     let [a, b, c, d] = *piece;
     let s = 1.0 - t;

@@ -12,7 +12,6 @@ use super::page::{
 use crate::study::{Confidence, Knob, Map, MapMethod, MapOutcome, MapRow, MapShow};
 use panel::{Panel, Tile, Varied};
 
-/// Width of a sample in the key.
 const SWATCH: f64 = 12.0;
 /// Below each panel, for ticks and, below the last, the name of the axis.
 const TICKS: f64 = 26.0;
@@ -31,7 +30,6 @@ const STRIP_GAP: f64 = 9.0;
 const METHOD: f64 = 130.0;
 const COUNT: f64 = 100.0;
 
-/// Draws the whole page.
 pub fn draw(map: &Map) -> Drawing {
     let name = &map.request.base.scenario().name;
     let title = match map.show {
@@ -139,7 +137,6 @@ fn tiles(map: &Map, method: MapMethod) -> Vec<Option<Tile>> {
     tiles
 }
 
-/// The waves a cell shows.
 fn waves(map: &Map, row: &MapRow) -> Option<f64> {
     row.stable_waves().filter(|_| map.show == MapShow::Waves)
 }

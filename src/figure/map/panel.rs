@@ -15,13 +15,10 @@ const APART: f64 = 5.0;
 /// And no numbers, if smaller than this.
 const NUMBERED: f64 = 13.0;
 const NUMBER_SIZE: f64 = 8.0;
-
-/// A leaf that does not wave.
 const PALE: Color = Color(226, 236, 226);
 /// Waves beyond which colours do not change any more.
 const MOST_WAVES: f64 = 2.5;
 
-/// What a cell shows.
 #[derive(Clone, Copy)]
 pub struct Tile {
     pub outcome: MapOutcome,
@@ -58,7 +55,6 @@ pub fn fill(page: &mut Drawing, cell: Cell, outcome: MapOutcome) {
     }
 }
 
-/// Fills a cell by its number of waves: none is pale.
 pub fn fill_waves(page: &mut Drawing, cell: Cell, waves: f64) {
     let color = match waves {
         0.0 => PALE,
@@ -80,12 +76,10 @@ pub fn mark(page: &mut Drawing, cell: Cell, reference: Confidence) {
     page.shape(circle(at, radius), color, Some(rim));
 }
 
-/// How the longest stable step is drawn.
 pub fn bound_stroke() -> Stroke {
     Stroke::new(Color(170, 0, 60), 2.0)
 }
 
-/// A number that varies from cell to cell.
 pub struct Varied {
     pub axis: Axis,
     /// Where cells end, as parts of the axis: one more than there are cells.
@@ -134,7 +128,6 @@ pub struct Panel<'a> {
 }
 
 impl<'a> Panel<'a> {
-    /// In this cell of the page, with or without labels below.
     pub fn new(cell: Cell, x: &'a Varied, y: Option<&'a Varied>, labelled: bool) -> Self {
         // Panels share the names of their axes.
         let unnamed = |axis: &Axis| Axis {
@@ -164,7 +157,6 @@ impl<'a> Panel<'a> {
         self.axes.draw_frame(page);
     }
 
-    /// Which cell along x and y.
     fn place(&self, i: usize) -> (usize, usize) {
         let along_y = self.y.map_or(1, Varied::cells);
         (i / along_y, i % along_y)
