@@ -36,12 +36,10 @@ pub fn draw_chart(chart: &Chart) -> Drawing {
     let floor = floor.filter(|floor| floor.is_normal() && *floor > 0.0);
     let (across, up) = places(&series);
     let failed = series.iter().flat_map(|series| &series.failures);
-    let across = across
-        .into_iter()
-        .chain(failed.filter_map(|failure| failure.x));
+    let across = across.into_iter();
     let up = up.into_iter().chain(floor);
     let panel = ChartPanel {
-        across: times(across),
+        across: times(across.chain(failed.filter_map(|failure| failure.x))),
         up: Axis::logarithmic("largest true error of positions / L", up, FEWEST_DECADES),
         series,
         floor,
@@ -72,11 +70,11 @@ pub fn draw_scaling(scaling: &Scaling) -> Drawing {
     rods.sort_unstable();
     rods.dedup();
     let rods: Vec<f64> = rods.into_iter().map(|rods| rods as f64).collect();
-    let across = rods.iter().copied();
+    let axis = Axis::logarithmic("number of veins N", rods.iter().copied(), FEWEST_DECADES);
     let panel = ChartPanel {
         across: Axis {
-            ticks: Ticks::At(rods.clone()),
-            ..Axis::logarithmic("number of veins N", across, FEWEST_DECADES)
+            ticks: Ticks::At(rods),
+            ..axis
         },
         up: times(places(&series).1.into_iter()),
         series,
@@ -192,10 +190,10 @@ fn peers(peers: &[Peer]) -> Vec<Series> {
             });
             all.len() - 1
         });
-        match peer.point() {
-            Some((x, y)) => all[place].points.push(Point {
-                at: (x, y.max(SMALLEST)),
-                spread: [peer.seconds.q1, peer.seconds.q3].map(|x| (x, y.max(SMALLEST))),
+        match peer.point().map(|(x, y)| (x, y.max(SMALLEST))) {
+            Some(at) => all[place].points.push(Point {
+                at,
+                spread: [peer.seconds.q1, peer.seconds.q3].map(|x| (x, at.1)),
                 front: peer.pareto,
             }),
             None => all[place].failures.push(Failure {
@@ -245,14 +243,10 @@ mod tests {
     #[test]
     fn a_reference_that_is_not_confirmed_is_called_so() {
         let mut chart = sample::chart();
-        if let Some(reference) = &mut chart.reference {
-            reference.confirmed = false;
-        }
+        chart.reference.as_mut().unwrap().confirmed = false;
         assert!(svg(&chart).contains("NOT confirmed"));
         chart.reference = None;
-        for row in &mut chart.rows {
-            row.true_error = None;
-        }
+        chart.rows.iter_mut().for_each(|row| row.true_error = None);
         assert!(svg(&chart).contains("no reference"));
     }
 
@@ -260,13 +254,8 @@ mod tests {
     fn leaves_are_marked_by_their_veins() {
         let mut scaling = sample::scaling();
         let first = text(&draw_scaling(&scaling));
-        for text in [
-            "to a tolerance of 1e-6",
-            ">5<",
-            ">15<",
-            "number of veins N",
-            "not-run",
-        ] {
+        assert!(first.contains("to a tolerance of 1e-6"));
+        for text in [">5<", ">15<", "number of veins N", "not-run"] {
             assert!(first.contains(text), "{text}");
         }
         scaling.unconfirmed = vec![15];
@@ -291,30 +280,10 @@ mod tests {
             all.map(|peer| (peer.name, peer.color)).collect()
         };
         let alone = of(&chart)[0].clone();
-        chart.peers.insert(
-            0,
-            Peer {
-                name: "another".into(),
-                ..chart.peers[0].clone()
-            },
-        );
+        chart.peers.insert(0, chart.peers[0].clone());
+        chart.peers[0].name = "another".into();
         let both = of(&chart);
         assert_eq!(both[1], alone);
         assert_ne!(both[0].1, alone.1);
-    }
-
-    #[test]
-    fn numbers_gone_wild_are_drawn_without_a_panic() {
-        for wild in [f64::NAN, f64::INFINITY, 1e300, 1e-310, -1.0, 0.0] {
-            let mut chart = sample::chart();
-            chart.rows[0].true_error = Some(wild);
-            if let Some(spread) = &mut chart.rows[1].seconds {
-                spread.median = wild;
-            }
-            if let Some(reference) = &mut chart.reference {
-                reference.known_within = wild;
-            }
-            svg(&chart);
-        }
     }
 }

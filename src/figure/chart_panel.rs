@@ -146,15 +146,18 @@ impl ChartPanel {
         page.beside(beside, &name, TICK_SIZE, Anchor::Start, NOTE);
         let mut from_right = right;
         for series in &self.series {
-            let failures = series.failures.iter();
-            let places = failures.filter(|failure| failure.word == word);
-            let places: Vec<Option<f64>> = places.map(|failure| failure.x).collect();
-            let parts = places.iter().flatten().map(|&x| self.across.part(x));
+            let failures = || {
+                series
+                    .failures
+                    .iter()
+                    .filter(|failure| failure.word == word)
+            };
+            let parts = failures().filter_map(|failure| Some(self.across.part(failure.x?)));
             for part in parts.filter(|part| part.is_finite()) {
                 let x = left + part.clamp(0.0, 1.0) * cell.size.x;
                 Marker::Cross.draw(page, DVec2::new(x, middle), series.color);
             }
-            if places.contains(&None) {
+            if failures().any(|failure| failure.x.is_none()) {
                 from_right -= ROOM;
                 Marker::Cross.draw(page, DVec2::new(from_right, middle), series.color);
             }
@@ -165,8 +168,7 @@ impl ChartPanel {
         let mut key = Key::beside(cell);
         for series in &self.series {
             key.entry(page, &series.name, "", |page, cell| {
-                let [from, to] = cell.midline();
-                page.line(from, to, series.stroke());
+                cell.line(page, series.stroke());
                 series.marker.draw(page, cell.middle(), series.color);
             });
         }
@@ -174,19 +176,13 @@ impl ChartPanel {
         if points().any(|point| point.front) {
             let note = "nothing is both faster and more accurate";
             key.entry(page, "Pareto front", note, |page, cell| {
-                let [from, to] = cell.midline();
-                page.line(from, to, Stroke::new(FRONT, 8.0));
+                cell.line(page, Stroke::new(FRONT, 8.0));
                 halo(page, cell.middle());
             });
         }
         if !self.lanes().is_empty() {
-            key.marker(
-                page,
-                "",
-                "failed or not run: see above",
-                Marker::Cross,
-                NOTE,
-            );
+            let note = "failed or not run: see above";
+            key.marker(page, "", note, (Marker::Cross, NOTE));
         }
         if self.floor.is_some() {
             let note = "below what is known of the reference itself";

@@ -24,10 +24,7 @@ const MOST_MARKED: usize = 70;
 /// scenario's.
 fn curve(quantity: Quantity, check: &Check, unit: f64, color: Color) -> (Curve, Option<f64>) {
     let (name, unit, allowed) = match quantity {
-        Quantity::Position => {
-            let allowed = check.allowed() / unit;
-            ("position, in lengths L", unit, Some(allowed))
-        }
+        Quantity::Position => ("position, in lengths L", unit, Some(check.allowed() / unit)),
         Quantity::Rotation => ("rotation, in radians", 1.0, Some(check.allowed_rotation())),
         Quantity::Force => ("force, in the scenario's unit", 1.0, None),
         Quantity::Moment => ("moment, in the scenario's unit", 1.0, None),
@@ -114,8 +111,7 @@ fn draw_key(page: &mut Drawing, curves: &[Curve], cell: Cell) {
             largest => format!("≤ {}", power_of_ten(largest)),
         };
         key.entry(page, curve.name, &largest, |page, cell| {
-            let [from, to] = cell.midline();
-            page.line(from, to, Stroke::new(curve.color, 1.6));
+            cell.line(page, Stroke::new(curve.color, 1.6));
             Marker::Dot.draw(page, cell.middle(), curve.color);
         });
     }

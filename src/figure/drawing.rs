@@ -33,7 +33,7 @@ pub struct Stroke {
 }
 
 impl Stroke {
-    pub fn new(color: Color, width: f64) -> Self {
+    pub const fn new(color: Color, width: f64) -> Self {
         Stroke {
             color,
             width,

@@ -56,13 +56,8 @@ pub fn draw(record: &Record) -> Drawing {
         let mut key = Key::beside(axes.cell);
         for curve in &curves {
             let last = curve.points.last().map_or(0.0, |point| point.1);
-            let stroke = Stroke::new(curve.color, 1.6);
-            key.line(
-                page,
-                curve.name,
-                &format!("at the end {}", short(last)),
-                stroke,
-            );
+            let note = format!("at the end {}", short(last));
+            key.line(page, curve.name, &note, Stroke::new(curve.color, 1.6));
         }
     });
     let axes = Axes {

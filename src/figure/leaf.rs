@@ -34,30 +34,3 @@ fn notes(equilibrium: &Equilibrium, veins: &Veins) -> Vec<String> {
     notes.extend(veins.notes());
     notes
 }
-
-#[cfg(test)]
-mod tests {
-    use glam::DVec3;
-
-    use super::*;
-    use crate::report::sample;
-
-    #[test]
-    fn shapes_gone_wild_are_drawn_without_a_panic() {
-        for wild in [f64::NAN, f64::INFINITY, 1e300, -1e-300] {
-            let mut leaf = sample::fan(3, 8);
-            for curve in &mut leaf.shape.curves {
-                curve[4].z = wild;
-            }
-            leaf.tips[0].x = wild;
-            draw(&leaf);
-            leaf.shape
-                .curves
-                .iter_mut()
-                .for_each(|curve| curve.fill(DVec3::splat(wild)));
-            draw(&leaf);
-            leaf.shape.curves.clear();
-            draw(&leaf);
-        }
-    }
-}

@@ -82,6 +82,7 @@ mod tests {
     use std::io::Cursor;
 
     use super::*;
+    use crate::relax::Mode;
     use crate::report::sample;
     use crate::simulate::{Record, Stopped};
     use glam::DVec3;
@@ -127,30 +128,96 @@ mod tests {
             time: 10.1,
             percent: 70.0,
         });
-        for svg in motion(&record) {
-            assert!(svg.contains("ended early: diverged"));
-        }
+        let told = |svg: String| svg.contains("ended early: diverged");
+        assert!(motion(&record).into_iter().all(told));
     }
 
     #[test]
     fn numbers_gone_wild_are_drawn_without_a_panic() {
-        for wild in [f64::NAN, f64::INFINITY, 1e308, -1e300, 1e-310, 0.0] {
-            let mut record = sample::record(3, 8);
-            record.stills[3].curves[1][4].z = wild;
-            record.moments[70].energy.kinetic = wild;
-            record.moments[71].tip.x = wild;
-            motion(&record);
-            for moment in &mut record.moments {
-                moment.energy.kinetic = wild;
-                moment.energy.potential = -wild;
-                moment.tip = DVec3::splat(wild);
-            }
-            for still in &mut record.stills {
-                let curves = still.curves.iter_mut();
-                curves.for_each(|curve| curve.fill(DVec3::splat(wild)));
-            }
-            motion(&record);
+        let wild = [
+            f64::NAN,
+            f64::INFINITY,
+            1e308,
+            -1e300,
+            -1e-300,
+            1e-310,
+            -1.0,
+            0.0,
+        ];
+        for wild in wild {
+            draw_wild_leaf(wild);
+            draw_wild_check(wild);
+            draw_wild_chart(wild);
+            draw_wild_motion(wild);
         }
+    }
+
+    fn draw_wild_leaf(wild: f64) {
+        let mut fan = sample::fan(3, 8);
+        let shape = vec![vec![wild * DVec3::Z; 9]; 3];
+        fan.stability.modes = Some(vec![Mode {
+            eigenvalue: wild,
+            error: Some(1e-9),
+            displacement: shape.clone(),
+            rotation: shape,
+        }]);
+        svg::text(&modes(&fan));
+        fan.shape
+            .curves
+            .iter_mut()
+            .for_each(|curve| curve[4].z = wild);
+        fan.tips[0].x = wild;
+        leaf(&fan);
+        fan.shape
+            .curves
+            .iter_mut()
+            .for_each(|curve| curve.fill(DVec3::splat(wild)));
+        leaf(&fan);
+        fan.shape.curves.clear();
+        leaf(&fan);
+    }
+
+    fn draw_wild_check(wild: f64) {
+        let mut found = sample::check(3, 8, 0.0);
+        for difference in &mut found.along {
+            difference.position = wild;
+            difference.moment = wild;
+        }
+        found.along[3].force = wild;
+        if let Some(Ok(solution)) = found.shot.as_mut().map(|shot| shot.found.as_mut()) {
+            solution.rods[1].nodes[4].position = DVec3::splat(wild);
+        }
+        svg::text(&check(&found));
+        let wildest = found.along[0];
+        found.along.fill(wildest);
+        found.tolerance = wild;
+        svg::text(&check(&found));
+    }
+
+    fn draw_wild_chart(wild: f64) {
+        let mut found = sample::chart();
+        found.rows[0].true_error = Some(wild);
+        if let Some(spread) = &mut found.rows[1].seconds {
+            spread.median = wild;
+        }
+        found.reference.as_mut().unwrap().known_within = wild;
+        svg::text(&chart(&found));
+    }
+
+    fn draw_wild_motion(wild: f64) {
+        let mut record = sample::record(3, 8);
+        record.stills[3].curves[1][4].z = wild;
+        record.moments[70].energy.kinetic = wild;
+        record.moments[71].tip.x = wild;
+        motion(&record);
+        for moment in &mut record.moments {
+            moment.energy.kinetic = wild;
+            moment.energy.potential = -wild;
+            moment.tip = DVec3::splat(wild);
+        }
+        let curves = record.stills.iter_mut().flat_map(|still| &mut still.curves);
+        curves.for_each(|curve| curve.fill(DVec3::splat(wild)));
+        motion(&record);
     }
 
     #[test]

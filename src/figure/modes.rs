@@ -90,41 +90,25 @@ mod tests {
     use crate::figure::svg::text;
     use crate::report::sample;
 
-    fn shaking(eigenvalue: f64, size: f64) -> Equilibrium {
-        let mut leaf = sample::fan(3, 8);
-        let shape = vec![vec![size * DVec3::Z; 9]; 3];
-        let mode = Mode {
-            eigenvalue,
-            error: Some(1e-9),
-            displacement: shape.clone(),
-            rotation: shape,
-        };
-        leaf.stability.modes = Some(vec![mode; 14]);
-        leaf.stability.mode_shapes = true;
-        leaf
-    }
-
-    fn svg(leaf: &Equilibrium) -> String {
-        text(&draw(leaf))
-    }
-
     #[test]
     fn frequencies_growth_and_neutral_modes_are_told() {
-        for (eigenvalue, text) in [
+        for (eigenvalue, told) in [
             (4.0, "ω = 2<"),
             (-9.0, "unstable: grows at 3<"),
             (1e-10, "neutral"),
         ] {
-            let svg = svg(&shaking(eigenvalue, 1.0));
-            assert_eq!(svg.matches(text).count(), MOST, "{text}");
+            let mut leaf = sample::fan(3, 8);
+            let shape = vec![vec![DVec3::Z; 9]; 3];
+            let mode = Mode {
+                eigenvalue,
+                error: Some(1e-9),
+                displacement: shape.clone(),
+                rotation: shape,
+            };
+            leaf.stability.modes = Some(vec![mode; 14]);
+            let svg = text(&draw(&leaf));
+            assert_eq!(svg.matches(told).count(), MOST, "{told}");
             assert!(svg.contains("the lowest 12 of 14"));
-        }
-    }
-
-    #[test]
-    fn shapes_gone_wild_are_drawn_without_a_panic() {
-        for wild in [0.0, f64::NAN, f64::INFINITY, 1e300, -1e-300] {
-            svg(&shaking(wild, wild));
         }
     }
 }

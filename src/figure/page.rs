@@ -44,10 +44,16 @@ impl Cell {
         self.corner + 0.5 * self.size
     }
 
-    /// The line from left to right through its middle.
+    /// The ends of the line from left to right through its middle.
     pub fn midline(&self) -> [DVec2; 2] {
         let half = DVec2::new(0.5 * self.size.x, 0.0);
         [self.middle() - half, self.middle() + half]
+    }
+
+    /// Draws that line.
+    pub fn line(&self, page: &mut Drawing, stroke: Stroke) {
+        let [from, to] = self.midline();
+        page.line(from, to, stroke);
     }
 }
 
@@ -178,23 +184,14 @@ impl Key {
 
     /// The same of a line.
     pub fn line(&mut self, page: &mut Drawing, name: &str, note: &str, stroke: Stroke) {
-        self.entry(page, name, note, |page, cell| {
-            let [from, to] = cell.midline();
-            page.line(from, to, stroke);
-        });
+        self.entry(page, name, note, |page, cell| cell.line(page, stroke));
     }
 
     /// The same of marked points.
-    pub fn marker(
-        &mut self,
-        page: &mut Drawing,
-        name: &str,
-        note: &str,
-        marker: Marker,
-        color: Color,
-    ) {
+    pub fn marker(&mut self, page: &mut Drawing, name: &str, note: &str, marker: (Marker, Color)) {
+        let (marker, color) = marker;
         self.entry(page, name, note, |page, cell| {
-            marker.draw(page, cell.middle(), color);
+            marker.draw(page, cell.middle(), color)
         });
     }
 }

@@ -213,10 +213,10 @@ fn draw_key(page: &mut Drawing, trace: &Trace, cell: Cell) {
     let folds = |(_, point): (usize, &TracePoint)| point.kind == PointKind::Fold;
     let critical = || trace.branches.iter().flat_map(TraceBranch::critical);
     if critical().any(|point| !folds(point)) {
-        key.marker(page, "branches cross", "", Marker::Diamond, INK);
+        key.marker(page, "branches cross", "", (Marker::Diamond, INK));
     }
     if critical().any(folds) {
-        key.marker(page, "fold", "", Marker::Ring, INK);
+        key.marker(page, "fold", "", (Marker::Ring, INK));
     }
 }
 
@@ -275,7 +275,7 @@ fn draw_law(page: &mut Drawing, trace: &Trace, law: &Law, branch: &TraceBranch, 
     };
     let mut key = Key::beside(cell);
     let which = "of the first branch";
-    key.marker(page, "equilibria", which, Marker::Dot, CURVES[0]);
+    key.marker(page, "equilibria", which, (Marker::Dot, CURVES[0]));
     let slope = format!("slope {}{unit}", short(law.slope));
     key.line(page, "line of least squares", &slope, line);
     let off = format!("off by {} % at most", short(100.0 * law.deviation));

@@ -60,11 +60,8 @@ impl Veins {
 
     /// Veins through these points, with the longest rod as the unit.
     pub fn through(curves: &[Vec<DVec3>], tips: &[DVec3], longest: f64) -> Self {
-        let unit = if longest.is_finite() && longest > 0.0 {
-            longest
-        } else {
-            1.0
-        };
+        let usable = longest.is_finite() && longest > 0.0;
+        let unit = if usable { longest } else { 1.0 };
         let count = curves.len();
         let every = count.div_ceil(MOST_VEINS).max(1);
         let color = |index: usize| match count {
@@ -73,14 +70,11 @@ impl Veins {
         };
 
         let chosen = |index: usize| index.is_multiple_of(every) || index + 1 == count;
-        let veins: Vec<Vein> = (0..count)
-            .filter(|&index| chosen(index))
-            .map(|index| {
-                let points = drawable(&curves[index], unit);
-                Vein {
-                    pieces: smooth(&points),
-                    color: color(index),
-                }
+        let drawn = (0..count).filter(|&index| chosen(index));
+        let veins: Vec<Vein> = drawn
+            .map(|index| Vein {
+                pieces: smooth(&drawable(&curves[index], unit)),
+                color: color(index),
             })
             .collect();
         let joined = tips.len() == 1;
@@ -90,13 +84,11 @@ impl Veins {
             .filter(|(tip, _)| is_near(*tip))
             .collect();
 
-        let ends = veins
-            .iter()
-            .flat_map(|vein| &vein.pieces)
-            .map(|piece| piece[3]);
-        let (low, high) = ends.fold((DVec3::ZERO, DVec3::ZERO), |(low, high), point| {
-            (low.min(point), high.max(point))
-        });
+        let pieces = veins.iter().flat_map(|vein| &vein.pieces);
+        let (mut low, mut high) = (DVec3::ZERO, DVec3::ZERO);
+        for piece in pieces {
+            (low, high) = (low.min(piece[3]), high.max(piece[3]));
+        }
         Veins {
             veins,
             count,
@@ -163,11 +155,8 @@ pub fn is_near(point: DVec3) -> bool {
 
 /// The points up to the first that cannot be drawn.
 fn drawable(curve: &[DVec3], unit: f64) -> Vec<DVec3> {
-    curve
-        .iter()
-        .map(|&point| point / unit)
-        .take_while(|&point| is_near(point))
-        .collect()
+    let points = curve.iter().map(|&point| point / unit);
+    points.take_while(|&point| is_near(point)).collect()
 }
 
 /// Smooth pieces through the points: through every second, fourth, ... of
@@ -190,9 +179,9 @@ fn smooth(points: &[DVec3]) -> Vec<Piece> {
 
 fn largest_miss(pieces: &[Piece], points: &[DVec3], stride: usize) -> f64 {
     let miss = |(index, &point): (usize, &DVec3)| {
-        let piece = &pieces[(index / stride).min(pieces.len() - 1)];
-        let t = index as f64 / stride as f64 - (index / stride).min(pieces.len() - 1) as f64;
-        at(piece, t).distance(point)
+        let place = (index / stride).min(pieces.len() - 1);
+        let t = index as f64 / stride as f64 - place as f64;
+        at(&pieces[place], t).distance(point)
     };
     points.iter().enumerate().map(miss).fold(0.0, f64::max)
 }
@@ -216,16 +205,11 @@ fn through(points: &[DVec3]) -> Vec<Piece> {
         (i, _) if i == 1 || i + 1 == last => 0.5 * (p[i + 1] - p[i - 1]),
         (i, _) => (8.0 * (p[i + 1] - p[i - 1]) - (p[i + 2] - p[i - 2])) / 12.0,
     };
-    (0..last)
-        .map(|i| {
-            [
-                p[i],
-                p[i] + tangent(i) / 3.0,
-                p[i + 1] - tangent(i + 1) / 3.0,
-                p[i + 1],
-            ]
-        })
-        .collect()
+    let piece = |i: usize| {
+        let (start, end) = (tangent(i) / 3.0, tangent(i + 1) / 3.0);
+        [p[i], p[i] + start, p[i + 1] - end, p[i + 1]]
+    };
+    (0..last).map(piece).collect()
 }
 
 #[cfg(test)]
@@ -238,8 +222,7 @@ mod tests {
     #[test]
     fn a_half_circle_is_drawn_round_with_few_pieces() {
         let points: Vec<DVec3> = (0..=256)
-            .map(|i| PI * f64::from(i) / 256.0)
-            .map(|angle| DVec3::new(angle.cos(), angle.sin(), 0.0) / PI)
+            .map(|i| DVec2::from_angle(PI * f64::from(i) / 256.0).extend(0.0) / PI)
             .collect();
         let pieces = smooth(&points);
         assert!(pieces.len() <= 16, "{}", pieces.len());

@@ -76,9 +76,8 @@ pub fn mark(page: &mut Drawing, cell: Cell, reference: Confidence) {
     page.shape(circle(at, radius), color, Some(rim));
 }
 
-pub fn bound_stroke() -> Stroke {
-    Stroke::new(Color(170, 0, 60), 2.0)
-}
+/// How the longest stable step is drawn.
+pub const BOUND: Stroke = Stroke::new(Color(170, 0, 60), 2.0);
 
 pub struct Varied {
     pub axis: Axis,
@@ -206,15 +205,12 @@ impl<'a> Panel<'a> {
         let inside = |part: &f64| (0.0..=1.0).contains(part);
         for i in 0..request.cells() {
             let (column, row) = self.place(i);
-            if if along_x { column } else { row } > 0 {
-                continue;
-            }
-            let axis = if along_x {
-                &self.axes.across
-            } else {
-                &self.axes.up
+            let (first, axis) = match along_x {
+                true => (column == 0, &self.axes.across),
+                false => (row == 0, &self.axes.up),
             };
-            let part = request.stable_step(i).map(|step| axis.part(step));
+            let step = request.stable_step(i).filter(|_| first);
+            let part = step.map(|step| axis.part(step));
             let Some(part) = part.filter(inside) else {
                 continue;
             };
@@ -224,7 +220,7 @@ impl<'a> Panel<'a> {
                 true => (tile.corner.with_x(place.x), tile.end().with_x(place.x)),
                 false => (tile.corner.with_y(place.y), tile.end().with_y(place.y)),
             };
-            page.line(from, to, bound_stroke());
+            page.line(from, to, BOUND);
         }
     }
 }
