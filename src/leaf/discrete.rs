@@ -112,6 +112,15 @@ impl DiscreteLeaf {
         self.leaf.rods()
     }
 
+    /// Rod and number of every node or segment, of those with the numbers `of` each
+    /// rod.
+    pub fn each<I: Iterator<Item = usize> + Clone>(
+        &self,
+        of: I,
+    ) -> impl Iterator<Item = (usize, usize)> + use<I> {
+        (0..self.rods()).flat_map(move |j| of.clone().map(move |i| (j, i)))
+    }
+
     /// Whether neighbouring rods are coupled.
     pub fn coupled(&self) -> bool {
         let between = self.coupling.iter().take(self.rods() - 1);

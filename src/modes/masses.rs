@@ -6,9 +6,8 @@ use glam::{DMat3, DVec3};
 
 /// Inertia of a node.
 struct Node {
-    rod: usize,
-    /// From 1.
-    node: usize,
+    /// Rod, number from 1.
+    place: (usize, usize),
     unknowns: [usize; 2],
     tensor: DMat3,
     mass: f64,
@@ -28,20 +27,17 @@ impl Masses {
         state: &State,
         pattern: &SparsePattern,
     ) -> Self {
-        let nodes = (0..leaf.rods()).flat_map(|j| (1..=leaf.segments()).map(move |i| (j, i)));
         let node = |(j, i)| {
             let inertia = physics.inertia(leaf, j, i);
             Node {
-                rod: j,
-                node: i,
+                place: (j, i),
                 unknowns: pattern.unknowns(j, i),
                 tensor: inertia.tensor(state.q[state.base(j) + i]),
                 mass: inertia.mass,
             }
         };
-        Masses {
-            nodes: nodes.map(node).collect(),
-        }
+        let nodes = leaf.each(1..=leaf.segments()).map(node).collect();
+        Masses { nodes }
     }
 
     /// M v.
@@ -61,8 +57,8 @@ impl Masses {
     /// Adds `factor` M to the matrix of a system.
     pub fn add(&self, system: &mut System, factor: f64) {
         for node in &self.nodes {
-            let matrix = (node.tensor * factor, node.mass * factor);
-            system.add(node.rod, node.node, matrix, (DVec3::ZERO, DVec3::ZERO));
+            let ((j, i), none) = (node.place, (DVec3::ZERO, DVec3::ZERO));
+            system.add(j, i, (node.tensor * factor, node.mass * factor), none);
         }
     }
 }

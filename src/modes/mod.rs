@@ -18,8 +18,9 @@ mod lanczos;
 mod masses;
 mod quotient;
 
-use crate::leaf::{DiscreteLeaf, Increment, SparseError, SparseFactor, SparsePattern};
-use crate::leaf::{State, System};
+use crate::leaf::{
+    DiscreteLeaf, Increment, SparseError, SparseFactor, SparsePattern, State, System,
+};
 use crate::motion::Physics;
 use lanczos::{Lanczos, Mode};
 use masses::Masses;
@@ -71,12 +72,6 @@ pub enum ModesError {
     Unproved,
 }
 
-/// Eigenvalues not yet found, all below this.
-struct Missing {
-    count: usize,
-    below: f64,
-}
-
 /// A leaf at rest, about to vibrate.
 struct Vibration<'a> {
     leaf: &'a DiscreteLeaf,
@@ -112,16 +107,12 @@ pub fn lowest(
         pattern,
     };
     let found = vibration.lowest(count)?;
-    let mut pairs: Vec<Eigenpair> = found
-        .iter()
-        .map(|vector| {
-            let shape = vibration.shape(vector);
-            Eigenpair {
-                eigenvalue: quotient(&soft, state, &shape),
-                shape,
-            }
-        })
-        .collect();
+    let pair = |vector: &Vec<f64>| {
+        let shape = vibration.shape(vector);
+        let eigenvalue = quotient(&soft, state, &shape);
+        Eigenpair { eigenvalue, shape }
+    };
+    let mut pairs: Vec<Eigenpair> = found.iter().map(pair).collect();
     pairs.sort_by(|a, b| a.eigenvalue.total_cmp(&b.eigenvalue));
     Ok(pairs)
 }
@@ -166,25 +157,24 @@ impl Vibration<'_> {
                 }
                 continue;
             }
-            let missing = self.missing(&found, count, lowest)?;
-            if missing.count == 0 {
+            let (missing, below) = self.missing(&found, count, lowest)?;
+            if missing == 0 {
                 found.truncate(count);
                 return Ok(found.into_iter().map(|found| found.vector).collect());
             }
-            (wanted, limit) = (missing.count.min(count), missing.below);
-            shift = lowest;
+            (wanted, limit, shift) = (missing.min(count), below, lowest);
         }
         Err(ModesError::Unproved)
     }
 
-    /// How many eigenvalues are missing below the `count`-th of those found, to
-    /// which there may be more that are equal.
+    /// How many eigenvalues are missing, and below what value: just below the
+    /// `count`-th of those found, to which there may be more that are equal.
     fn missing(
         &mut self,
         found: &[Mode],
         count: usize,
         lowest: f64,
-    ) -> Result<Missing, ModesError> {
+    ) -> Result<(usize, f64), ModesError> {
         let last = found[count - 1].eigenvalue;
         let rounding = self.leaf.rounding();
         for part in BELOW {
@@ -193,7 +183,7 @@ impl Vibration<'_> {
             let here = found.iter().filter(|f| f.eigenvalue < below).count();
             // Too many: one is equal to the limit but for rounding.
             if let Some(count) = there.checked_sub(here) {
-                return Ok(Missing { count, below });
+                return Ok((count, below));
             }
         }
         Err(ModesError::Unproved)
@@ -243,17 +233,14 @@ impl Vibration<'_> {
         // Multiples of the golden ratio spread evenly: no symmetry, no chance.
         let golden = |k: usize| (k as f64 * 0.618_033_988_749_895).fract() - 0.5;
         let mut load = vec![0.0; self.pattern.size()];
-        let n = self.leaf.segments();
-        for j in 0..self.leaf.rods() {
-            for i in 1..=n {
-                let sigma = self.leaf.grid.sigma()[i];
-                let wave = (7.0 * search as f64 * sigma).sin();
-                for (kind, first) in self.pattern.unknowns(j, i).into_iter().enumerate() {
-                    for c in 0..3 {
-                        let k = 18 * (j + 97 * search) + 3 * kind + c;
-                        load[first + c] +=
-                            golden(k + 1) + sigma * golden(k + 7) + wave * golden(k + 13);
-                    }
+        for (j, i) in self.leaf.each(1..=self.leaf.segments()) {
+            let sigma = self.leaf.grid.sigma()[i];
+            let wave = (7.0 * search as f64 * sigma).sin();
+            for (kind, first) in self.pattern.unknowns(j, i).into_iter().enumerate() {
+                for c in 0..3 {
+                    let k = 18 * (j + 97 * search) + 3 * kind + c;
+                    load[first + c] +=
+                        golden(k + 1) + sigma * golden(k + 7) + wave * golden(k + 13);
                 }
             }
         }
@@ -262,15 +249,12 @@ impl Vibration<'_> {
 
     /// A vector as turns and shifts of all nodes.
     fn shape(&self, vector: &[f64]) -> Vec<Increment> {
-        let n = self.leaf.segments();
-        let mut shape = vec![[0.0; 6]; self.leaf.rods() * (n + 1)];
-        for j in 0..self.leaf.rods() {
-            for i in 1..=n {
-                let [turn, shift] = self.pattern.unknowns(j, i);
-                let node = &mut shape[self.state.base(j) + i];
-                node[..3].copy_from_slice(&vector[turn..turn + 3]);
-                node[3..].copy_from_slice(&vector[shift..shift + 3]);
-            }
+        let mut shape = vec![[0.0; 6]; self.state.x.len()];
+        for (j, i) in self.leaf.each(1..=self.leaf.segments()) {
+            let [turn, shift] = self.pattern.unknowns(j, i);
+            let node = &mut shape[self.state.base(j) + i];
+            node[..3].copy_from_slice(&vector[turn..turn + 3]);
+            node[3..].copy_from_slice(&vector[shift..shift + 3]);
         }
         shape
     }

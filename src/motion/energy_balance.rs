@@ -1,7 +1,7 @@
 //! The energy of a moving leaf, and whether it can be trusted.
 
 use super::method::{Energy, Snapshot, Stopped, Velocity};
-use super::physics::{Inertia, Physics};
+use super::physics::Physics;
 use crate::leaf::{DiscreteLeaf, State};
 use crate::rod::RESOLVED_TURN;
 use glam::DVec3;
@@ -28,34 +28,25 @@ pub fn measure(
     }
     let n = leaf.segments();
     let mut energy = Energy::default();
-    for j in 0..leaf.rods() {
-        for i in 0..=n {
-            let k = state.base(j) + i;
-            let Inertia {
-                mass,
-                transverse,
-                excess,
-            } = physics.inertia(leaf, j, i);
-            let Velocity { angular, linear } = velocity[k];
-            let spin = angular.dot(state.q[k] * DVec3::X);
-            energy.kinetic += 0.5 * mass * linear.length_squared();
-            energy.kinetic += 0.5 * transverse * (angular.length_squared() + excess * spin * spin);
-            let (_, potential) = leaf.load(state, j, i);
-            let stretch = leaf.coupling_energy(state, j, i);
-            energy.coupling += stretch;
-            energy.potential += potential - stretch;
-            if i < n {
-                // By strains: the force may have a part of friction in it.
-                let (section, force) = (leaf.section(j, i), state.n[j * n + i]);
-                let segment = leaf.segment(state, j, i, force);
-                let strain = segment.v(section) - section.rest_strain;
-                energy.elastic += section.bending_energy(&segment);
-                for c in 0..3 {
-                    if section.compliance[c] > 0.0 {
-                        energy.elastic +=
-                            0.5 * section.ds * strain[c] * strain[c] / section.compliance[c];
-                    }
-                }
+    for (j, i) in leaf.each(0..=n) {
+        let (k, inertia) = (state.base(j) + i, physics.inertia(leaf, j, i));
+        let Velocity { angular, linear } = velocity[k];
+        let spin = angular.dot(state.q[k] * DVec3::X);
+        let turning = angular.length_squared() + inertia.excess * spin * spin;
+        energy.kinetic += 0.5 * inertia.mass * linear.length_squared();
+        energy.kinetic += 0.5 * inertia.transverse * turning;
+        let (_, potential) = leaf.load(state, j, i);
+        let stretch = leaf.coupling_energy(state, j, i);
+        energy.coupling += stretch;
+        energy.potential += potential - stretch;
+        if i < n {
+            // By strains: the force may have a part of friction in it.
+            let (section, force) = (leaf.section(j, i), state.n[j * n + i]);
+            let segment = leaf.segment(state, j, i, force);
+            let strain = segment.v(section) - section.rest_strain;
+            energy.elastic += section.bending_energy(&segment);
+            for c in (0..3).filter(|&c| section.compliance[c] > 0.0) {
+                energy.elastic += 0.5 * section.ds * strain[c] * strain[c] / section.compliance[c];
             }
         }
     }
@@ -69,20 +60,28 @@ fn unresolved_energy(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) 
     let loads = physics.loads(time);
     let n = leaf.segments();
     let mut energy = 0.0;
-    for j in 0..leaf.rods() {
-        for i in 0..=n {
-            let Inertia {
-                mass, transverse, ..
-            } = physics.inertia(leaf, j, i);
-            let weight = leaf.grid.weight(i) * leaf.leaf.length(j);
-            energy += (weight * loads.gravity).length_squared() / mass;
-            if i == n {
-                energy += loads.tip_force.length_squared() / mass;
-                energy += loads.tip_moment.length_squared() / transverse;
-            }
+    for (j, i) in leaf.each(0..=n) {
+        let inertia = physics.inertia(leaf, j, i);
+        let weight = leaf.grid.weight(i) * leaf.leaf.length(j);
+        energy += (weight * loads.gravity).length_squared() / inertia.mass;
+        if i == n {
+            energy += loads.tip_force.length_squared() / inertia.mass;
+            energy += loads.tip_moment.length_squared() / inertia.transverse;
         }
     }
     0.5 * h * h * energy
+}
+
+/// Whether a grid can resolve a segment bent by `turn`.
+pub fn resolved(leaf: &DiscreteLeaf, time: f64, turn: f64) -> Result<(), Stopped> {
+    match turn > RESOLVED_TURN {
+        true => Err(Stopped::Unresolved {
+            time,
+            turn,
+            segments: leaf.segments(),
+        }),
+        false => Ok(()),
+    }
 }
 
 /// What was taken out and put in.
@@ -162,42 +161,25 @@ impl EnergyBalance {
                 otherwise,
             });
         }
-        let n = leaf.segments();
-        let turns = (0..leaf.rods()).flat_map(|j| (0..n).map(move |i| (j, i)));
-        let turn = turns
-            .map(|(j, i)| leaf.segment(&now.state, j, i, DVec3::ZERO).turn())
-            .fold(0.0, f64::max);
-        match turn > RESOLVED_TURN {
-            true => Err(Stopped::Unresolved {
-                time,
-                turn,
-                segments: n,
-            }),
-            false => Ok(()),
-        }
+        let turn = |(j, i)| leaf.segment(&now.state, j, i, DVec3::ZERO).turn();
+        let turns = leaf.each(0..leaf.segments()).map(turn);
+        resolved(leaf, time, turns.fold(0.0, f64::max))
     }
 
     /// All its numbers.
     pub fn save(&self) -> [f64; 5] {
-        [
-            self.exchanged.dissipated,
-            self.exchanged.work,
-            self.balance,
-            self.potential,
-            self.largest,
-        ]
+        let Exchange { dissipated, work } = self.exchanged;
+        [dissipated, work, self.balance, self.potential, self.largest]
     }
 
     /// Takes them back.
     pub fn restore(&mut self, next: &mut impl FnMut() -> f64) {
+        let [dissipated, work, balance, potential, largest] = [(); 5].map(|()| next());
         *self = EnergyBalance {
-            exchanged: Exchange {
-                dissipated: next(),
-                work: next(),
-            },
-            balance: next(),
-            potential: next(),
-            largest: next(),
+            exchanged: Exchange { dissipated, work },
+            balance,
+            potential,
+            largest,
         };
     }
 }

@@ -7,8 +7,9 @@
 //! beside it as they can be (P. Underwood, Dynamic relaxation, in: Computational
 //! Methods for Transient Analysis, 1983).
 
-use super::kernel::{GROUP, Node, blocks};
-use super::nodes::Rod;
+use super::kernel::{Node, blocks};
+use super::nodes::{Rod, made_of};
+use super::physics::Physics;
 use crate::leaf::DiscreteLeaf;
 
 /// Part of the squared frequency 4 of a segment that belongs to its rotating
@@ -17,14 +18,12 @@ use crate::leaf::DiscreteLeaf;
 const ROTATING: f64 = 0.5;
 
 /// Puts the masses into the rods; returns that of a joint tip.
-pub fn masses(leaf: &DiscreteLeaf, rods: &mut [Rod]) -> f64 {
-    let n = leaf.segments();
-    let count = rods.len();
+pub fn masses(leaf: &DiscreteLeaf, physics: &Physics, rods: &mut [Rod]) -> f64 {
+    let (n, count) = (leaf.segments(), rods.len());
     let mut tip = 0.0;
     for j in 0..count {
-        let old: Vec<Node> = (0..=n).map(|i| rods[j].node(GROUP + i)).collect();
+        let old: Vec<Node> = (0..=n).map(|i| made_of(leaf, physics, j, i)).collect();
         let mut new = old.clone();
-        let held = old[0].per_inertia == 0.0;
         for i in 0..=n {
             let (mut mass, mut inertia) = (0.0, 0.0);
             let before = i.checked_sub(1).map(|before| &old[before]);
@@ -45,11 +44,12 @@ pub fn masses(leaf: &DiscreteLeaf, rods: &mut [Rod]) -> f64 {
             if i == n {
                 tip += mass;
             }
-            let moves = !(held && i == 0);
-            let tied = node.per_mass == 0.0;
-            node.per_inertia = if moves { 1.0 / inertia } else { 0.0 };
             node.per_spin = 0.0;
-            if !tied {
+            // Zero for a node that is held, and for a joint tip.
+            if node.per_inertia != 0.0 {
+                node.per_inertia = 1.0 / inertia;
+            }
+            if node.per_mass != 0.0 {
                 node.mass = mass;
                 node.per_mass = 1.0 / mass;
             }

@@ -1,8 +1,7 @@
 //! Several numbers at once: what one instruction of the processor works on.
 
-use std::ops::{Add, Deref, Mul, Sub};
-
 use pulp::Simd;
+use std::ops::{Add, Deref, Mul, Sub};
 
 /// The part of an array at a place: index of the first, count.
 #[inline(always)]
@@ -49,16 +48,20 @@ impl<S: Simd> Lanes<S> {
     /// The same number everywhere.
     #[inline(always)]
     pub fn splat(simd: S, value: f64) -> Self {
-        Lanes {
-            simd,
-            v: simd.splat_f64s(value),
-        }
+        let v = simd.splat_f64s(value);
+        Lanes { simd, v }
     }
 
     /// The instructions it works with.
     #[inline(always)]
     pub fn simd(self) -> S {
         self.simd
+    }
+
+    /// Another value for the same instructions.
+    #[inline(always)]
+    fn with(self, v: S::f64s) -> Self {
+        Lanes { v, ..self }
     }
 
     /// Reads `array` from `at` on.
@@ -78,38 +81,26 @@ impl<S: Simd> Lanes<S> {
     /// self * factor + term.
     #[inline(always)]
     pub fn times(self, factor: Self, term: Self) -> Self {
-        Lanes {
-            simd: self.simd,
-            v: self.simd.mul_add_e_f64s(self.v, factor.v, term.v),
-        }
+        self.with(self.simd.mul_add_e_f64s(self.v, factor.v, term.v))
     }
 
     /// term - self * factor.
     #[inline(always)]
     pub fn times_from(self, factor: Self, term: Self) -> Self {
-        Lanes {
-            simd: self.simd,
-            v: self.simd.negate_mul_add_e_f64s(self.v, factor.v, term.v),
-        }
+        self.with(self.simd.negate_mul_add_e_f64s(self.v, factor.v, term.v))
     }
 
     /// 1 / self.
     #[inline(always)]
     pub fn recip(self) -> Self {
         let one = self.simd.splat_f64s(1.0);
-        Lanes {
-            simd: self.simd,
-            v: self.simd.div_f64s(one, self.v),
-        }
+        self.with(self.simd.div_f64s(one, self.v))
     }
 
     /// The larger one.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
-        Lanes {
-            simd: self.simd,
-            v: self.simd.max_f64s(self.v, other.v),
-        }
+        self.with(self.simd.max_f64s(self.v, other.v))
     }
 
     /// The largest of all.
@@ -163,10 +154,7 @@ macro_rules! lanes_operator {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                Lanes {
-                    simd: self.simd,
-                    v: self.simd.$instruction(self.v, other.v),
-                }
+                self.with(self.simd.$instruction(self.v, other.v))
             }
         }
     };
@@ -198,11 +186,11 @@ impl<S: Simd> Vectors<S> {
 
     #[inline(always)]
     pub fn load(simd: S, arrays: &[impl Deref<Target = [f64]>; 3], at: usize) -> Self {
-        Vectors {
-            x: Lanes::load(simd, &arrays[0], at),
-            y: Lanes::load(simd, &arrays[1], at),
-            z: Lanes::load(simd, &arrays[2], at),
-        }
+        Vectors::new(
+            Lanes::load(simd, &arrays[0], at),
+            Lanes::load(simd, &arrays[1], at),
+            Lanes::load(simd, &arrays[2], at),
+        )
     }
 
     #[inline(always)]
@@ -220,40 +208,36 @@ impl<S: Simd> Vectors<S> {
 
     #[inline(always)]
     pub fn cross(self, other: Self) -> Self {
-        Vectors {
-            x: self.z.times_from(other.y, self.y * other.z),
-            y: self.x.times_from(other.z, self.z * other.x),
-            z: self.y.times_from(other.x, self.x * other.y),
-        }
+        Vectors::new(
+            self.z.times_from(other.y, self.y * other.z),
+            self.x.times_from(other.z, self.z * other.x),
+            self.y.times_from(other.x, self.x * other.y),
+        )
     }
 
     #[inline(always)]
     pub fn scale(self, factor: Lanes<S>) -> Self {
-        Vectors {
-            x: self.x * factor,
-            y: self.y * factor,
-            z: self.z * factor,
-        }
+        Vectors::new(self.x * factor, self.y * factor, self.z * factor)
     }
 
     /// term - self * factor.
     #[inline(always)]
     pub fn times_from(self, factor: Lanes<S>, term: Self) -> Self {
-        Vectors {
-            x: self.x.times_from(factor, term.x),
-            y: self.y.times_from(factor, term.y),
-            z: self.z.times_from(factor, term.z),
-        }
+        Vectors::new(
+            self.x.times_from(factor, term.x),
+            self.y.times_from(factor, term.y),
+            self.z.times_from(factor, term.z),
+        )
     }
 
     /// self - a x b.
     #[inline(always)]
     pub fn less_cross(self, a: Self, b: Self) -> Self {
-        Vectors {
-            x: a.y.times_from(b.z, a.z.times(b.y, self.x)),
-            y: a.z.times_from(b.x, a.x.times(b.z, self.y)),
-            z: a.x.times_from(b.y, a.y.times(b.x, self.z)),
-        }
+        Vectors::new(
+            a.y.times_from(b.z, a.z.times(b.y, self.x)),
+            a.z.times_from(b.x, a.x.times(b.z, self.y)),
+            a.x.times_from(b.y, a.y.times(b.x, self.z)),
+        )
     }
 
     /// The vector with these components along `directors`.
@@ -263,24 +247,14 @@ impl<S: Simd> Vectors<S> {
         d1.times(self.x, d2.times(self.y, d3.scale(self.z)))
     }
 
-    /// Component by component.
-    #[inline(always)]
-    pub fn each(self, other: Self) -> Self {
-        Vectors {
-            x: self.x * other.x,
-            y: self.y * other.y,
-            z: self.z * other.z,
-        }
-    }
-
     /// self * factor + term.
     #[inline(always)]
     pub fn times(self, factor: Lanes<S>, term: Self) -> Self {
-        Vectors {
-            x: self.x.times(factor, term.x),
-            y: self.y.times(factor, term.y),
-            z: self.z.times(factor, term.z),
-        }
+        Vectors::new(
+            self.x.times(factor, term.x),
+            self.y.times(factor, term.y),
+            self.z.times(factor, term.z),
+        )
     }
 }
 
@@ -290,11 +264,11 @@ macro_rules! vectors_operator {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                Vectors {
-                    x: self.x.$method(other.x),
-                    y: self.y.$method(other.y),
-                    z: self.z.$method(other.z),
-                }
+                Vectors::new(
+                    self.x.$method(other.x),
+                    self.y.$method(other.y),
+                    self.z.$method(other.z),
+                )
             }
         }
     };
@@ -302,3 +276,5 @@ macro_rules! vectors_operator {
 
 vectors_operator!(Add, add);
 vectors_operator!(Sub, sub);
+// Component by component.
+vectors_operator!(Mul, mul);

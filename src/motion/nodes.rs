@@ -58,28 +58,22 @@ pub fn rod(
     motion.q[3].fill(1.0);
     let mut last = DQuat::IDENTITY;
     for i in 0..=n {
-        let (k, at) = (state.base(j) + i, GROUP + i);
+        let q = state.q[state.base(j) + i];
         // Signs of neighbouring quaternions are aligned once and stay so.
-        let q = if i > 0 && last.dot(state.q[k]) < 0.0 {
-            -state.q[k]
-        } else {
-            state.q[k]
-        };
-        last = q;
-        for (array, value) in motion.q.iter_mut().zip(q.to_array()) {
-            array[at] = value;
+        let flipped = i > 0 && last.dot(q) < 0.0;
+        last = if flipped { -q } else { q };
+        for (array, value) in motion.q.iter_mut().zip(last.to_array()) {
+            array[GROUP + i] = value;
         }
     }
     let made_of: Vec<_> = (0..=n).map(|i| made_of(leaf, physics, j, i)).collect();
     let remembered = if physics.retardation > 0.0 { length } else { 0 };
     let past = || [arrays::<3>(remembered), arrays::<3>(remembered)];
+    let (one, two) = (past(), past());
     let mut rod = Rod {
         motion,
         material: blocks(&made_of, beside.map(|rod| &*rod.material)),
-        past: Past {
-            one: past(),
-            two: past(),
-        },
+        past: Past { one, two },
         totals: StepTotals::default(),
     };
     rod.pad(n);
@@ -87,7 +81,7 @@ pub fn rod(
 }
 
 /// What node `i` of rod `j` is made of, and the segment behind it.
-fn made_of(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> Node {
+pub fn made_of(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> Node {
     let n = leaf.segments();
     let joined = leaf.leaf.joined() && leaf.rods() > 1;
     let mut node = Node {
@@ -106,11 +100,8 @@ fn made_of(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> Node {
     }
     if i < n {
         let section = leaf.section(j, i);
-        // What changes in time is multiplied there.
-        let rest = match physics.rest_changes() {
-            true => 1.0,
-            false => physics.rest(0.0),
-        };
+        // A factor that changes in time is multiplied there.
+        let rest = physics.constant_rest.unwrap_or(1.0);
         node.rest_length = section.rest_strain.x * section.ds;
         for c in 0..3 {
             node.stretch[c] = 1.0 / (section.compliance[c] * section.ds);
@@ -123,7 +114,7 @@ fn made_of(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> Node {
 
 impl Rod {
     /// The block of the node at an index of the arrays, and its place there.
-    fn block(&self, at: usize) -> (&Material, usize) {
+    pub fn block(&self, at: usize) -> (&Material, usize) {
         let i = at - GROUP;
         (&self.material[i / BLOCK], i % BLOCK)
     }
@@ -134,23 +125,14 @@ impl Rod {
         material.weight[i]
     }
 
-    /// What the node at an index of the arrays is made of.
-    pub fn node(&self, at: usize) -> Node {
-        let (material, i) = self.block(at);
-        material.node(i)
-    }
-
     /// Fills the places behind the last node, in its group and next to that, with
     /// its rotation, so that the segments read there, which have no stiffness, are
     /// straight ones.
     pub fn pad(&mut self, segments: usize) {
         let last = GROUP + segments;
-        let end = (last + 1).next_multiple_of(GROUP);
         for q in &mut self.motion.q {
             let value = q[last];
-            for behind in &mut q[last + 1..=end] {
-                *behind = value;
-            }
+            q[last + 1..=(last + 1).next_multiple_of(GROUP)].fill(value);
         }
     }
 
@@ -177,9 +159,8 @@ impl Rod {
 
     /// Rotation of a node.
     pub fn rotation(&self, at: usize) -> DQuat {
-        let [x, y, z, w] = [0, 1, 2, 3].map(|c| self.motion.q[c][at]);
         // They are brought back to unit length now and then only.
-        DQuat::from_xyzw(x, y, z, w).normalize()
+        DQuat::from_array([0, 1, 2, 3].map(|c| self.motion.q[c][at])).normalize()
     }
 
     /// Velocity and angular momentum of a node.
@@ -190,11 +171,9 @@ impl Rod {
     /// Velocities of all nodes.
     pub fn velocities(&self, segments: usize) -> impl Iterator<Item = Velocity> + '_ {
         (GROUP..=GROUP + segments).map(move |at| {
-            let (v, p) = self.moving(at);
-            Velocity {
-                angular: self.spin(at, self.rotation(at), p),
-                linear: v,
-            }
+            let (linear, p) = self.moving(at);
+            let angular = self.spin(at, self.rotation(at), p);
+            Velocity { angular, linear }
         })
     }
 }

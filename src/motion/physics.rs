@@ -48,7 +48,7 @@ pub struct Physics {
     /// The loads, if they do not change.
     constant_loads: Option<Loads>,
     /// The factor of the rest curvatures, if it does not change.
-    constant_rest: Option<f64>,
+    pub constant_rest: Option<f64>,
 }
 
 impl Physics {
@@ -97,10 +97,8 @@ impl Physics {
 
     /// Inertia of node `i` of rod `j`.
     pub fn inertia(&self, leaf: &DiscreteLeaf, j: usize, i: usize) -> Inertia {
-        let (sigma, length) = (
-            leaf.grid.sigma()[i],
-            leaf.grid.weight(i) * leaf.leaf.length(j),
-        );
+        let sigma = leaf.grid.sigma()[i];
+        let length = leaf.grid.weight(i) * leaf.leaf.length(j);
         let rotary = self.density * self.scale.length * self.scale.length;
         Inertia {
             mass: length * self.dynamics.density[j].at(sigma) / self.density,
@@ -131,10 +129,8 @@ impl Physics {
 
     /// The factor of all rest curvatures at a time.
     pub fn rest(&self, time: f64) -> f64 {
-        match self.constant_rest {
-            Some(rest) => rest,
-            None => self.dynamics.rest.at(time * self.time),
-        }
+        let changing = || self.dynamics.rest.at(time * self.time);
+        self.constant_rest.unwrap_or_else(changing)
     }
 
     /// Whether loads change in time.

@@ -18,13 +18,11 @@
 //! whose roots are inside the unit circle while a + 4 b < 4; external damping
 //! leaves that as it is.
 
-use std::array::from_fn;
-
-use nalgebra::SMatrix;
-
 use super::physics::Physics;
 use crate::leaf::{DiscreteLeaf, State};
 use glam::{DMat3, DQuat, DVec3};
+use nalgebra::SMatrix;
+use std::array::from_fn;
 
 /// The longest stable time step, and what limits it.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -69,9 +67,8 @@ const LEAST_HOLD: f64 = 0.01;
 fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f64, &'static str) {
     let (rods, n) = (leaf.rods(), leaf.segments());
     let joined = leaf.leaf.joined() && rods > 1;
-    let all = || (0..rods).flat_map(|j| (0..n).map(move |i| (j, i)));
     let mut held: Vec<Hold> = vec![[DVec3::ZERO; 2]; state.x.len()];
-    for (j, i) in all() {
+    for (j, i) in leaf.each(0..n) {
         let stiffness = stiffness(leaf, state, j, i);
         for end in 0..2 {
             let node = state.base(j) + i + end;
@@ -82,13 +79,12 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
         }
     }
     // All rods hold a joint tip, along directors of their own: as one number.
-    let tips = || (0..rods).map(|j| state.base(j) + n);
-    let tip = tips().map(|node| held[node][0].max_element()).sum::<f64>();
+    let tips = (0..rods).map(|j| held[state.base(j) + n][0].max_element());
+    let tip: f64 = tips.sum();
     let tip_mass = (0..rods).map(|j| physics.inertia(leaf, j, n).mass);
     let tip_mass: f64 = tip_mass.sum();
-
     let (mut largest, mut fastest) = (0.0, None);
-    for (j, i) in all() {
+    for (j, i) in leaf.each(0..n) {
         let stiffness = stiffness(leaf, state, j, i);
         // One over the root of the masses of an end, along the lab axes.
         let root = |end: usize| {
@@ -102,9 +98,8 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
                 true => DVec3::splat(tip_mass * shift.max_element() / tip),
                 false => inertia.mass * shift / held[node][0],
             };
-            let turning = DVec3::new(inertia.polar(), inertia.transverse, inertia.transverse)
-                * turn
-                / held[node][1];
+            let (j1, j2) = (inertia.polar(), inertia.transverse);
+            let turning = DVec3::new(j1, j2, j2) * turn / held[node][1];
             let frame = DMat3::from_quat(state.q[node]);
             [moving, turning].map(|mass| {
                 let root = DMat3::from_diagonal(mass.map(f64::sqrt).recip());

@@ -2,11 +2,10 @@
 
 use super::Explicit;
 use crate::leaf::State;
-use crate::motion::energy_balance::{Exchange, measure};
+use crate::motion::energy_balance::{Exchange, measure, resolved};
 use crate::motion::kernel::{Forces, GROUP};
 use crate::motion::method::{Method, Snapshot, Stopped, Velocity};
 use crate::motion::nodes::vector;
-use crate::rod::RESOLVED_TURN;
 use glam::DVec3;
 
 /// Part of a step that is rounding.
@@ -49,15 +48,10 @@ impl Explicit {
     /// Positions and rotations now.
     pub(super) fn state(&self) -> State {
         let n = self.leaf.segments();
-        let nodes =
-            || (0..self.rods.len()).flat_map(|j| (GROUP..=GROUP + n).map(move |at| (j, at)));
-        State::new(
-            n,
-            nodes()
-                .map(|(j, at)| vector(&self.positions[j].x, at))
-                .collect(),
-            nodes().map(|(j, at)| self.rods[j].rotation(at)).collect(),
-        )
+        let nodes = || self.leaf.each(GROUP..=GROUP + n);
+        let x = nodes().map(|(j, at)| vector(&self.positions[j].x, at));
+        let q = nodes().map(|(j, at)| self.rods[j].rotation(at));
+        State::new(n, x.collect(), q.collect())
     }
 
     fn judge(&mut self) -> Result<(), Stopped> {
@@ -65,15 +59,7 @@ impl Explicit {
         (self.balance).judge(&self.leaf, &self.physics, &now, self.step, OTHERWISE)?;
         self.last_snapshot = Some(now);
         // In the balance rotations are at most pi, as they are in space.
-        let (time, turn) = (self.time, self.largest_turn());
-        match turn > RESOLVED_TURN {
-            true => Err(Stopped::Unresolved {
-                time,
-                turn,
-                segments: self.leaf.segments(),
-            }),
-            false => Ok(()),
-        }
+        resolved(&self.leaf, self.time, self.largest_turn())
     }
 }
 
@@ -126,9 +112,8 @@ impl Method for Explicit {
         exchange += self.kick(0.0, 0.0, false).0;
         let state = self.now();
         let n = self.leaf.segments();
-        let velocity: Vec<Velocity> = (self.rods.iter())
-            .flat_map(|rod| rod.velocities(n))
-            .collect();
+        let velocities = self.rods.iter().flat_map(|rod| rod.velocities(n));
+        let velocity: Vec<Velocity> = velocities.collect();
         for ((rod, x), path) in self.rods.iter_mut().zip(&mut self.positions).zip(path) {
             (*x, rod.motion, rod.past) = path;
         }

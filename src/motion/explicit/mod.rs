@@ -20,20 +20,19 @@ mod advance;
 #[cfg(test)]
 mod tests;
 
-use glam::DVec3;
-use pulp::Arch;
-use rayon::prelude::*;
-
 use super::energy_balance::{EnergyBalance, Exchange};
 use super::fictitious;
 use super::friction::rates;
-use super::kernel::{self, Block, GROUP, Law, Neighbour, Positions, RodLoads, Step};
+use super::kernel::{self, Block, GROUP, Law, Neighbour, Positions, Step};
 use super::method::{Method, Snapshot};
 use super::nodes::{self, Rod, vector};
 use super::physics::Physics;
 use super::stable::StableStep;
 use crate::leaf::{DiscreteLeaf, Loads, State};
 use crate::rod::RESOLVED_TURN;
+use glam::DVec3;
+use pulp::Arch;
+use rayon::prelude::*;
 
 /// Part of the stable time step that is used.
 const SAFETY: f64 = 0.9;
@@ -101,9 +100,8 @@ impl Explicit {
         let count = leaf.rods();
         let joined = leaf.leaf.joined() && count > 1;
         let tip_mass = |j| physics.inertia(&leaf, j, leaf.segments()).mass;
-        let positions: Vec<_> = (0..count)
-            .map(|j| nodes::positions(&leaf, state, j))
-            .collect();
+        let positions = (0..count).map(|j| nodes::positions(&leaf, state, j));
+        let positions: Vec<_> = positions.collect();
         let mut rods: Vec<Rod> = Vec::with_capacity(count);
         for j in 0..count {
             rods.push(nodes::rod(&leaf, &physics, state, j, rods.last()));
@@ -158,7 +156,7 @@ impl Explicit {
     /// fastest motions of all segments become alike. Time steps may be as long
     /// as one then, and the leaf is stopped.
     pub fn use_fictitious_masses(&mut self) {
-        let tip = fictitious::masses(&self.leaf, &mut self.rods);
+        let tip = fictitious::masses(&self.leaf, &self.physics, &mut self.rods);
         self.tip_mass = self.tip_mass.map(|_| tip);
         self.stop();
     }
@@ -293,12 +291,14 @@ impl Explicit {
 
     /// How strains make forces now.
     fn law(&self, remember: bool) -> Law {
+        let changes = self.physics.rest_changes();
         Law {
             damped: self.physics.retardation > 0.0,
-            changes: self.physics.rest_changes(),
-            rest: match self.physics.rest_changes() {
-                true => self.physics.rest(self.stepped),
-                false => 1.0,
+            changes,
+            rest: if changes {
+                self.physics.rest(self.stepped)
+            } else {
+                1.0
             },
             retardation: self.physics.retardation,
             rates: rates(self.widths[0], self.widths[1]),
@@ -309,15 +309,11 @@ impl Explicit {
     /// Moves all nodes but a joint tip; the positions before are left in `next`.
     fn step_rods(&mut self, loads: &Loads, kick: (f64, f64), drift: f64, remember: bool) {
         let (arch, law, segments) = (self.arch, self.law(remember), self.leaf.segments());
-        // The force on a free tip acts in its own rod, a joint one elsewhere.
-        let loads = RodLoads {
-            gravity: loads.gravity.to_array(),
-            tip_force: match self.tip_mass {
-                Some(_) => [0.0; 3],
-                None => loads.tip_force.to_array(),
-            },
-            tip_moment: loads.tip_moment.to_array(),
-        };
+        let mut loads = *loads;
+        if self.tip_mass.is_some() {
+            // The force on a free tip acts in its own rod, on a joint one elsewhere.
+            loads.tip_force = DVec3::ZERO;
+        }
         let normalise = self.steps.is_multiple_of(NORMALISED);
         let (all, leaf) = (&self.positions, &self.leaf);
         let one = |block: &mut Block, j: usize, rod: &mut Rod, next: &mut Positions| {

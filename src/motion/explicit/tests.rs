@@ -90,7 +90,8 @@ fn forces_are_those(discrete: &DiscreteLeaf) {
                 if i == n {
                     tip += force;
                 } else {
-                    let error = (v * (rod.node(GROUP + i).mass / (0.5 * h)) - force).length();
+                    let (material, at) = rod.block(GROUP + i);
+                    let error = (v * (material.mass[at] / (0.5 * h)) - force).length();
                     assert!(error < allowed, "{j} {i}: {error}");
                 }
             }

@@ -1,8 +1,7 @@
 //! What a rod is made of, for the loops over its nodes.
 
-use std::sync::Arc;
-
 use super::BLOCK;
+use std::sync::Arc;
 
 /// A node, and the segment from it to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -71,23 +70,6 @@ impl Material {
             coupled: gather(&|node| node.coupled),
         }
     }
-
-    /// Node `i` of the block.
-    pub fn node(&self, i: usize) -> Node {
-        let each = |arrays: &[[f64; BLOCK]; 3]| arrays.each_ref().map(|array| array[i]);
-        Node {
-            stretch: each(&self.stretch),
-            rest_length: self.rest_length[i],
-            bend: each(&self.bend),
-            rest_turn: each(&self.rest_turn),
-            mass: self.mass[i],
-            per_mass: self.per_mass[i],
-            per_inertia: self.per_inertia[i],
-            per_spin: self.per_spin[i],
-            weight: self.weight[i],
-            coupled: self.coupled[i],
-        }
-    }
 }
 
 /// A rod's nodes in blocks. Blocks that are like the one before, or like the one
@@ -97,12 +79,10 @@ pub fn blocks(nodes: &[Node], beside: Option<&[Arc<Material>]>) -> Vec<Arc<Mater
     let mut blocks: Vec<Arc<Material>> = Vec::with_capacity(nodes.len().div_ceil(BLOCK));
     for nodes in nodes.chunks(BLOCK) {
         let material = Material::new(nodes);
-        let like = [blocks.last(), beside.and_then(|rod| rod.get(blocks.len()))];
-        let same = like
-            .into_iter()
-            .flatten()
-            .find(|other| ***other == material);
-        blocks.push(same.cloned().unwrap_or_else(|| Arc::new(material)));
+        let above = beside.and_then(|rod| rod.get(blocks.len()));
+        let same = [blocks.last(), above].into_iter().flatten();
+        let same = same.cloned().find(|other| **other == material);
+        blocks.push(same.unwrap_or_else(|| Arc::new(material)));
     }
     blocks
 }

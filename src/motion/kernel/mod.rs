@@ -13,14 +13,13 @@ mod material;
 mod nodes;
 mod segments;
 
-use std::sync::Arc;
-
-use pulp::{Arch, Simd};
-
 pub use self::array::Array;
 pub use self::material::{Material, Node, blocks};
 use self::segments::{Nodes, SegmentSums};
 use super::lanes::Lanes;
+use crate::leaf::Loads;
+use pulp::{Arch, Simd};
+use std::sync::Arc;
 
 /// Nodes come in groups of so many; arrays are that much longer at both ends.
 pub const GROUP: usize = 4;
@@ -115,16 +114,6 @@ pub struct Neighbour<'a> {
     pub stiffness: [f64; 3],
 }
 
-/// Loads on a rod.
-#[derive(Clone, Copy, Debug)]
-pub struct RodLoads {
-    /// Force per length.
-    pub gravity: [f64; 3],
-    /// Force and moment on the tip, if that is the rod's own.
-    pub tip_force: [f64; 3],
-    pub tip_moment: [f64; 3],
-}
-
 /// A time step of a rod: a kick by all forces, of length `kick`, velocities
 /// before it times `keep`, and motion free of forces for the time `drift`.
 pub struct Step<'a> {
@@ -138,7 +127,8 @@ pub struct Step<'a> {
     pub material: &'a [Arc<Material>],
     pub past: &'a mut Past,
     pub law: Law,
-    pub loads: RodLoads,
+    /// Without the force on a joint tip.
+    pub loads: Loads,
     pub keep: f64,
     pub kick: f64,
     pub drift: f64,

@@ -59,7 +59,7 @@ impl Step<'_> {
             beside[k] = cut(&neighbours[k].positions.x, place);
             ties[k] = Vectors::splat(simd, neighbours[k].stiffness);
         }
-        let gravity = Vectors::splat(simd, self.loads.gravity);
+        let gravity = Vectors::splat(simd, self.loads.gravity.to_array());
         let (keep, kick) = (Lanes::splat(simd, self.keep), Lanes::splat(simd, self.kick));
         let step = Lanes::splat(simd, self.drift);
         let mut energy = Lanes::splat(simd, 0.0);
@@ -72,7 +72,7 @@ impl Step<'_> {
             let share = Lanes::load(simd, coupled, at);
             for k in 0..K {
                 let gap = Vectors::load(simd, &beside[k], at) - x;
-                force = gap.each(ties[k]).times(share, force);
+                force = (gap * ties[k]).times(share, force);
             }
             let per_mass = Lanes::load(simd, per_mass, at);
             let before = Vectors::load(simd, &v, at);

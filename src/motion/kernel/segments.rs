@@ -21,12 +21,10 @@
 //! written as 1 + B delta. B is a polynomial in delta: a segment costs one
 //! division and no root.
 
-use std::ops::Deref;
-
-use pulp::Simd;
-
 use super::{Array, Block, GROUP, Law, Material, Past};
 use crate::motion::lanes::{Lanes, Vectors, cut, cut_mut, slice};
+use pulp::Simd;
+use std::ops::Deref;
 
 /// (sigma - 1)/delta as a polynomial in delta, sigma being (psi/2)/sin(psi/2):
 /// interpolated at Chebyshev's nodes on 0..2/3, largest error of sigma 1.7e-16.
@@ -165,7 +163,7 @@ fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
         let stiffness = Vectors::load(simd, &stiffness, at);
         // The moment A (2 sigma w - u0) and its part along w, as far as possible
         // before sigma is known: the series takes long.
-        let slope = w.each(stiffness);
+        let slope = w * stiffness;
         let mut at_rest = Vectors::load(simd, &rest_moment, at);
         if CHANGES {
             at_rest = at_rest.scale(rest);
@@ -180,7 +178,7 @@ fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
         }
         if let Some((one, two)) = &mut past {
             let rate = rate((one, two), (w.scale(two_sigma), at), rates, law.remember);
-            let friction = rate.each(stiffness);
+            let friction = rate * stiffness;
             power = power + rate.dot(friction);
             let friction = friction.scale(retardation);
             m = m + friction;
@@ -260,9 +258,9 @@ fn stretch<S: Simd, const DAMPED: bool>(
         if let Some((one, two)) = &mut past {
             let rate = rate((one, two), (v, at), rates, law.remember);
             strain = rate.times(retardation, strain);
-            power = power + rate.dot(rate.each(stiffness));
+            power = power + rate.dot(rate * stiffness);
         }
-        let n = strain.each(stiffness);
+        let n = strain * stiffness;
         let directors = [d1, d2, d3];
         // Along the lab axes from here on: R (v x n) = dx x N.
         let n = n.along(directors);

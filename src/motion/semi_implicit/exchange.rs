@@ -1,26 +1,22 @@
 //! Work and dissipation of a step.
 
-use glam::DVec3;
-
 use super::super::energy_balance::Exchange;
 use super::super::friction::rates;
 use super::SemiImplicit;
 use crate::leaf::{Loads, State};
+use crate::rod::Section;
 use crate::rotation;
+use glam::DVec3;
 
 impl SemiImplicit {
     /// Strains (v, u) of all segments.
     pub(super) fn strains(&self) -> Vec<[DVec3; 2]> {
-        let n = self.leaf.segments();
-        (0..self.leaf.rods())
-            .flat_map(|j| (0..n).map(move |i| (j, i)))
-            .map(|(j, i)| {
-                let segment = self
-                    .leaf
-                    .segment(&self.state, j, i, self.state.n[j * n + i]);
-                [segment.v(self.leaf.section(j, i)), segment.u]
-            })
-            .collect()
+        let (leaf, state, n) = (&self.leaf, &self.state, self.leaf.segments());
+        let strains = |(j, i)| {
+            let segment = leaf.segment(state, j, i, state.n[j * n + i]);
+            [segment.v(leaf.section(j, i)), segment.u]
+        };
+        leaf.each(0..n).map(strains).collect()
     }
 
     /// Makes the attempted step of `h`, and accounts for it.
@@ -35,9 +31,8 @@ impl SemiImplicit {
             let power = self.power_of_friction(h);
             exchange.dissipated += 0.5 * h * (self.friction_power + power);
             self.friction_power = power;
-            let now = self.strains();
-            let last = std::mem::replace(&mut self.past[0], now);
-            self.past[1] = last;
+            self.past.swap(0, 1);
+            self.past[0] = self.strains();
             self.past_step = h;
         }
         self.balance.add(exchange);
@@ -74,16 +69,13 @@ impl SemiImplicit {
 
     /// Energy of bending in a state with the rest curvatures times `rest`.
     fn bending(&self, state: &State, rest: f64) -> f64 {
-        let n = self.leaf.segments();
-        let nodes = (0..self.leaf.rods()).flat_map(|j| (0..n).map(move |i| (j, i)));
-        nodes
-            .zip(&self.sections)
-            .map(|((j, i), own)| {
-                let u = self.leaf.segment(state, j, i, DVec3::ZERO).u;
-                let bent = u - rest * own.rest_curvature;
-                0.5 * own.ds * bent.dot(own.couple_stiffness * bent)
-            })
-            .sum()
+        let segments = self.leaf.each(0..self.leaf.segments());
+        let energy = |((j, i), own): (_, &Section)| {
+            let u = self.leaf.segment(state, j, i, DVec3::ZERO).u;
+            let bent = u - rest * own.rest_curvature;
+            0.5 * own.ds * bent.dot(own.couple_stiffness * bent)
+        };
+        segments.zip(&self.sections).map(energy).sum()
     }
 
     /// Power of internal friction at the end of a step of `h`.

@@ -1,9 +1,8 @@
 //! The start: forces and accelerations of a leaf at rest.
 
-use glam::{DMat3, DVec3};
-
 use super::step::add_inertia;
-use super::{Moving, SemiImplicit};
+use super::{Inertia, Moving, SemiImplicit};
+use glam::{DMat3, DVec3};
 
 /// A first step from rest, of implicit Euler, so short that the leaf hardly
 /// moves: one over the square of its length. It gives the forces in rigid
@@ -34,8 +33,7 @@ impl SemiImplicit {
                 std::mem::swap(&mut self.state.n, &mut self.trial.n);
                 for k in 0..self.state.x.len() {
                     let w = self.increment(k).map(|d| INVERSE_STEP_SQUARED * d);
-                    let v = [DVec3::ZERO; 2];
-                    self.moving[k] = Moving { v, a: w, w };
+                    self.moving[k] = Moving::at_rest(w);
                 }
             }
             false => self.set_accelerations(),
@@ -46,17 +44,15 @@ impl SemiImplicit {
     /// zero. Returns the largest strain of these, as a length.
     fn set_segment_forces(&mut self) -> f64 {
         let (n, mut violation) = (self.leaf.segments(), 0.0_f64);
-        for j in 0..self.leaf.rods() {
-            for i in 0..n {
-                let section = *self.leaf.section(j, i);
-                let idle = self.leaf.segment(&self.state, j, i, DVec3::ZERO);
-                let strain = idle.v(&section) - section.rest_strain;
-                let rigid = section.compliance.cmpeq(DVec3::ZERO);
-                let force = DVec3::select(rigid, DVec3::ZERO, strain / section.compliance);
-                self.state.n[j * n + i] = idle.frame * force;
-                let off = DVec3::select(rigid, section.ds * strain, DVec3::ZERO);
-                violation = violation.max(off.abs().max_element());
-            }
+        for (j, i) in self.leaf.each(0..n) {
+            let section = self.leaf.section(j, i);
+            let idle = self.leaf.segment(&self.state, j, i, DVec3::ZERO);
+            let strain = idle.v(section) - section.rest_strain;
+            let rigid = section.compliance.cmpeq(DVec3::ZERO);
+            let force = DVec3::select(rigid, DVec3::ZERO, strain / section.compliance);
+            self.state.n[j * n + i] = idle.frame * force;
+            let off = DVec3::select(rigid, section.ds * strain, DVec3::ZERO);
+            violation = violation.max(off.abs().max_element());
         }
         violation
     }
@@ -67,27 +63,17 @@ impl SemiImplicit {
         for _ in 0..ITERATIONS {
             self.leaf.assemble(&self.trial, &mut self.system);
             let increments: Vec<_> = (0..self.state.x.len()).map(|k| self.increment(k)).collect();
-            let inertia = &self.inertia;
+            let (inertia, per_mass) = (&self.inertia, INVERSE_STEP_SQUARED);
             let inertial = |k: usize, tensor: &DMat3| {
                 let [turn, shift] = increments[k];
-                (
-                    -INVERSE_STEP_SQUARED * (*tensor * turn),
-                    -INVERSE_STEP_SQUARED * inertia[k].mass * shift,
-                )
+                let moment = -per_mass * (*tensor * turn);
+                (moment, -per_mass * inertia[k].mass * shift)
             };
-            add_inertia(
-                &mut self.system,
-                &self.trial,
-                inertia,
-                INVERSE_STEP_SQUARED,
-                inertial,
-            );
+            add_inertia(&mut self.system, &self.trial, inertia, per_mass, inertial);
             if !self.solve() {
                 return false;
             }
-            self.leaf
-                .advance(&self.trial, &self.system, 1.0, &mut self.next);
-            std::mem::swap(&mut self.trial, &mut self.next);
+            self.advance_trial();
             let (turn, shift) = self.system.largest();
             if turn.max(shift) < LAST {
                 break;
@@ -102,23 +88,16 @@ impl SemiImplicit {
         let n = self.leaf.segments();
         let joined = self.leaf.leaf.joined() && self.leaf.rods() > 1;
         let (mut tip_force, mut tip_mass) = (DVec3::ZERO, 0.0);
-        for j in 0..self.leaf.rods() {
-            for i in 1..=n {
-                let k = self.state.base(j) + i;
-                let (moment, force) = self.system.unbalanced(j, i);
-                let inertia = self.inertia[k];
-                let tensor = inertia.tensor(self.state.q[k]);
-                let w = [tensor.inverse() * moment, force / inertia.mass];
-                if i == n {
-                    tip_force += force;
-                    tip_mass += inertia.mass;
-                }
-                self.moving[k] = Moving {
-                    w,
-                    a: w,
-                    ..Moving::default()
-                };
+        for (j, i) in self.leaf.each(1..=n) {
+            let k = self.state.base(j) + i;
+            let (moment, force) = self.system.unbalanced(j, i);
+            let Inertia { mass, .. } = self.inertia[k];
+            let tensor = self.inertia[k].tensor(self.state.q[k]);
+            if i == n {
+                tip_force += force;
+                tip_mass += mass;
             }
+            self.moving[k] = Moving::at_rest([tensor.inverse() * moment, force / mass]);
         }
         if joined {
             for j in 0..self.leaf.rods() {

@@ -20,14 +20,13 @@ mod exchange;
 mod initial;
 mod step;
 
-use glam::DVec3;
-
 use super::energy_balance::{EnergyBalance, Exchange, measure};
 use super::method::{Method, Snapshot, Stopped, Velocity};
 use super::physics::{Inertia, Physics};
 use crate::leaf::{DiscreteLeaf, SparsePattern, State, System};
 use crate::newton::Definite;
 use crate::rod::Section;
+use glam::{DQuat, DVec3};
 
 /// Spectral radius rho_inf at infinite frequency: what remains in a step of what
 /// it cannot resolve. Smaller values damp more of what it can.
@@ -73,6 +72,14 @@ struct Moving {
     w: [DVec3; 2],
 }
 
+impl Moving {
+    /// With an acceleration, but no velocity.
+    fn at_rest(w: [DVec3; 2]) -> Self {
+        let v = [DVec3::ZERO; 2];
+        Moving { v, a: w, w }
+    }
+}
+
 /// A leaf on the move.
 pub struct SemiImplicit {
     leaf: DiscreteLeaf,
@@ -105,17 +112,14 @@ pub struct SemiImplicit {
 impl SemiImplicit {
     /// A leaf at rest in `state`.
     pub fn new(leaf: DiscreteLeaf, physics: Physics, state: &State, steps: Steps) -> Self {
-        let n = leaf.segments();
-        let nodes = (0..leaf.rods()).flat_map(|j| (0..=n).map(move |i| (j, i)));
-        let inertia = nodes.map(|(j, i)| physics.inertia(&leaf, j, i)).collect();
-        let system = System::new(&leaf);
+        let nodes = leaf.each(0..=leaf.segments());
         let mut motion = SemiImplicit {
-            inertia,
+            inertia: nodes.map(|(j, i)| physics.inertia(&leaf, j, i)).collect(),
             sections: leaf.sections.clone(),
             past: [Vec::new(), Vec::new()],
             past_step: 0.0,
             friction_power: 0.0,
-            system,
+            system: System::new(&leaf),
             solver: Definite::default(),
             state: state.clone(),
             trial: state.clone(),
@@ -202,24 +206,17 @@ impl Method for SemiImplicit {
     }
 
     fn snapshot(&mut self) -> Snapshot {
-        let velocity: Vec<Velocity> = (self.moving.iter())
-            .map(|m| Velocity {
-                angular: m.v[0],
-                linear: m.v[1],
-            })
-            .collect();
+        let velocity = self.moving.iter().map(|m| {
+            let [angular, linear] = m.v;
+            Velocity { angular, linear }
+        });
+        let (time, state, velocity) = (self.time, self.state.clone(), velocity.collect::<Vec<_>>());
         self.leaf.sections.clone_from(&self.sections);
-        let energy = measure(
-            &mut self.leaf,
-            &self.physics,
-            self.time,
-            &self.state,
-            &velocity,
-        );
+        let energy = measure(&mut self.leaf, &self.physics, time, &state, &velocity);
         Snapshot {
-            time: self.time,
+            time,
             energy: self.balance.complete(energy, Exchange::default()),
-            state: self.state.clone(),
+            state,
             velocity,
         }
     }
@@ -237,11 +234,9 @@ impl Method for SemiImplicit {
         numbers.extend(self.state.x.iter().flat_map(|x| x.to_array()));
         numbers.extend(self.state.q.iter().flat_map(|q| q.to_array()));
         numbers.extend(self.state.n.iter().flat_map(|n| n.to_array()));
-        for m in &self.moving {
-            numbers.extend([m.v, m.a, m.w].iter().flatten().flat_map(|v| v.to_array()));
-        }
-        let past = self.past.iter().flatten().flatten();
-        numbers.extend(past.flat_map(|v| v.to_array()));
+        let moving = self.moving.iter().flat_map(|m| [m.v, m.a, m.w]);
+        let past = self.past.iter().flatten().copied();
+        numbers.extend(moving.chain(past).flatten().flat_map(|v| v.to_array()));
         numbers
     }
 
@@ -263,17 +258,11 @@ impl Method for SemiImplicit {
             *x = vector(&mut next);
         }
         for q in &mut self.state.q {
-            *q = glam::DQuat::from_xyzw(next(), next(), next(), next());
+            *q = DQuat::from_xyzw(next(), next(), next(), next());
         }
-        for n in &mut self.state.n {
-            *n = vector(&mut next);
-        }
-        for m in &mut self.moving {
-            for v in [&mut m.v, &mut m.a, &mut m.w].into_iter().flatten() {
-                *v = vector(&mut next);
-            }
-        }
-        for v in self.past.iter_mut().flatten().flatten() {
+        let moving = (self.moving.iter_mut()).flat_map(|m| [&mut m.v, &mut m.a, &mut m.w]);
+        let past = self.past.iter_mut().flatten();
+        for v in self.state.n.iter_mut().chain(moving.chain(past).flatten()) {
             *v = vector(&mut next);
         }
         // The solver in use decides the last digits, too.

@@ -1,13 +1,12 @@
 //! A time step.
 
-use glam::{DMat3, DVec3};
-
 use super::super::friction::rates;
 use super::super::physics::Inertia;
 use super::{ALPHA_F, ALPHA_M, BETA, GAMMA, SemiImplicit, Steps};
 use crate::leaf::{State, System};
 use crate::newton::Work;
 use crate::rotation;
+use glam::{DMat3, DVec3};
 
 /// Newton iterations in a step, and the size of the last (radians, lengths),
 /// as a part of the error allowed and at most; of steps of given length.
@@ -37,6 +36,13 @@ impl SemiImplicit {
         let mut uncounted = Work::default();
         self.solver
             .solve(&mut self.system, 0.0, None, CG_TOLERANCE, &mut uncounted)
+    }
+
+    /// Moves the trial by the increments that were solved for.
+    pub(super) fn advance_trial(&mut self) {
+        let (leaf, next) = (&self.leaf, &mut self.next);
+        leaf.advance(&self.trial, &self.system, 1.0, next);
+        std::mem::swap(&mut self.trial, next);
     }
 
     /// Turn and shift of a node from the state to the trial; none of a base,
@@ -96,9 +102,7 @@ impl SemiImplicit {
             if !size.is_finite() || size > before.max(LARGEST_TURN) {
                 return None;
             }
-            self.leaf
-                .advance(&self.trial, &self.system, 1.0, &mut self.next);
-            std::mem::swap(&mut self.trial, &mut self.next);
+            self.advance_trial();
             if size <= last || (size < 1e-11 && size > 0.3 * before) {
                 self.update_motion(h);
                 return Some(self.local_error(h));
