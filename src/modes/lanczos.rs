@@ -25,12 +25,10 @@ const EXHAUSTED: f64 = 1e-13;
 
 /// An eigenvector of unit mass.
 pub struct Mode {
-    /// Lambda.
     pub eigenvalue: f64,
     pub vector: Vec<f64>,
 }
 
-/// What a run needs.
 pub struct Lanczos<'a> {
     pub masses: &'a Masses,
     /// Sigma.
@@ -53,17 +51,12 @@ impl Lanczos<'_> {
     /// The eigenvalues next above sigma, from the load `start`: `wanted` or
     /// more of them, less if there are no more below `limit` or the run becomes
     /// too long. Then also a value that the wanted ones do not exceed.
-    pub fn run(
-        &mut self,
-        mut start: Vec<f64>,
-        wanted: usize,
-        limit: f64,
-    ) -> (Vec<Mode>, Option<f64>) {
-        (self.solve)(&mut start);
-        let most = (MOST + MOST_A_PAIR * wanted).min(start.len() - self.known.len());
+    pub fn run(&mut self, start: Vec<f64>, wanted: usize, limit: f64) -> (Vec<Mode>, Option<f64>) {
+        let mut next = start;
+        (self.solve)(&mut next);
+        let most = (MOST + MOST_A_PAIR * wanted).min(next.len() - self.known.len());
         let mut basis: Vec<Vec<f64>> = Vec::new();
         let (mut diagonal, mut off): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
-        let mut next = start;
         let mut length = self.orthogonal(&mut next, &basis);
         while basis.len() < most && length > 0.0 {
             next.iter_mut().for_each(|x| *x /= length);

@@ -72,7 +72,6 @@ pub enum ModesError {
     Unproved,
 }
 
-/// A leaf at rest, about to vibrate.
 struct Vibration<'a> {
     leaf: &'a DiscreteLeaf,
     state: &'a State,
@@ -118,7 +117,7 @@ pub fn lowest(
 }
 
 impl Vibration<'_> {
-    /// K - shift M, factorised.
+    /// K - shift M.
     fn factorize(&mut self, shift: f64) -> Result<SparseFactor<'_>, SparseError> {
         self.leaf.assemble(self.state, &mut self.system);
         self.masses.add(&mut self.system, -shift);

@@ -98,7 +98,7 @@ impl std::ops::AddAssign for Exchange {
     }
 }
 
-/// What was taken out and put in, and where it began.
+/// What was exchanged, and where it began.
 #[derive(Clone, Debug, Default)]
 pub struct EnergyBalance {
     exchanged: Exchange,
@@ -109,27 +109,24 @@ pub struct EnergyBalance {
 }
 
 impl EnergyBalance {
-    /// Begins with this.
     pub fn begin(&mut self, start: &Snapshot) {
         self.balance = start.energy.balance();
         self.potential = start.energy.potential;
         self.record(&start.energy);
     }
 
-    /// What has moved until now: energy that is there or was taken out, or that
-    /// loads gave.
+    /// Energy that has moved: what is there or was taken out, or what loads gave.
     fn record(&mut self, energy: &Energy) {
         let there = energy.kinetic + energy.elastic + energy.coupling + energy.dissipated;
         let given = (energy.potential - self.potential - energy.work).abs();
         self.largest = self.largest.max(there).max(given);
     }
 
-    /// Adds what was exchanged in a step.
     pub fn add(&mut self, exchange: Exchange) {
         self.exchanged += exchange;
     }
 
-    /// Adds what was exchanged so far, and `since`.
+    /// The energy now, with what was exchanged so far and `since`.
     pub fn complete(&self, energy: Energy, since: Exchange) -> Energy {
         Energy {
             dissipated: self.exchanged.dissipated + since.dissipated,
@@ -166,13 +163,12 @@ impl EnergyBalance {
         resolved(leaf, time, turns.fold(0.0, f64::max))
     }
 
-    /// All its numbers.
     pub fn save(&self) -> [f64; 5] {
         let Exchange { dissipated, work } = self.exchanged;
         [dissipated, work, self.balance, self.potential, self.largest]
     }
 
-    /// Takes them back.
+    /// Takes back what was saved.
     pub fn restore(&mut self, next: &mut impl FnMut() -> f64) {
         let [dissipated, work, balance, potential, largest] = [(); 5].map(|()| next());
         *self = EnergyBalance {

@@ -38,8 +38,7 @@ mod tests {
     #[test]
     fn straight_lines_where_less_is_known() {
         for before in [0.0, 1e-9, 0.024] {
-            let [now, last, none] = rates(0.1, before);
-            assert_eq!((now, last, none), (10.0, -10.0, 0.0));
+            assert_eq!(rates(0.1, before), [10.0, -10.0, 0.0]);
         }
         assert_eq!(rates(0.0, 0.0), [0.0; 3]);
     }

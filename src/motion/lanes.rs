@@ -40,7 +40,7 @@ pub fn cut_mut(arrays: &mut [impl AsMut<[f64]>; 3], place: (usize, usize)) -> [&
 /// One number for each of several neighbouring nodes.
 #[derive(Clone, Copy)]
 pub struct Lanes<S: Simd> {
-    simd: S,
+    pub simd: S,
     v: S::f64s,
 }
 
@@ -50,12 +50,6 @@ impl<S: Simd> Lanes<S> {
     pub fn splat(simd: S, value: f64) -> Self {
         let v = simd.splat_f64s(value);
         Lanes { simd, v }
-    }
-
-    /// The instructions it works with.
-    #[inline(always)]
-    pub fn simd(self) -> S {
-        self.simd
     }
 
     /// Another value for the same instructions.

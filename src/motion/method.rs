@@ -35,6 +35,18 @@ impl Energy {
     pub fn balance(&self) -> f64 {
         self.kinetic + self.elastic + self.coupling + self.potential + self.dissipated - self.work
     }
+
+    /// All of them changed alike.
+    pub(crate) fn map(self, change: impl Fn(f64) -> f64) -> Self {
+        Energy {
+            kinetic: change(self.kinetic),
+            elastic: change(self.elastic),
+            coupling: change(self.coupling),
+            potential: change(self.potential),
+            dissipated: change(self.dissipated),
+            work: change(self.work),
+        }
+    }
 }
 
 /// A leaf at an instant.

@@ -23,12 +23,10 @@ fn arrays<const K: usize>(length: usize) -> [Array; K] {
     std::array::from_fn(|_| Array::zeros(length))
 }
 
-/// Length of a rod's arrays.
 fn length(segments: usize) -> usize {
     (segments + 1).next_multiple_of(GROUP) + 2 * GROUP
 }
 
-/// Positions of a rod.
 pub fn positions(leaf: &DiscreteLeaf, state: &State, j: usize) -> Positions {
     let n = leaf.segments();
     let mut x = arrays::<3>(length(n));
@@ -113,21 +111,20 @@ pub fn made_of(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> No
 }
 
 impl Rod {
-    /// The block of the node at an index of the arrays, and its place there.
+    /// The block of a node, and its place there, by its index in the arrays.
     pub fn block(&self, at: usize) -> (&Material, usize) {
         let i = at - GROUP;
         (&self.material[i / BLOCK], i % BLOCK)
     }
 
-    /// Length of rod that loads on the node at an index of the arrays come from.
+    /// Length of rod that loads on a node come from.
     pub fn weight(&self, at: usize) -> f64 {
         let (material, i) = self.block(at);
         material.weight[i]
     }
 
-    /// Fills the places behind the last node, in its group and next to that, with
-    /// its rotation, so that the segments read there, which have no stiffness, are
-    /// straight ones.
+    /// Gives the places behind the last node, up to its group's end and the next, its
+    /// rotation: segments read there, without stiffness, are straight.
     pub fn pad(&mut self, segments: usize) {
         let last = GROUP + segments;
         for q in &mut self.motion.q {
@@ -143,7 +140,6 @@ impl Rod {
         q.iter().chain(v).chain(p).chain(past)
     }
 
-    /// The same, to be written.
     pub fn moving_arrays_mut(&mut self) -> impl Iterator<Item = &mut Array> {
         let Motion { q, v, p, .. } = &mut self.motion;
         let past = self.past.one.iter_mut().chain(&mut self.past.two).flatten();
@@ -157,7 +153,6 @@ impl Rod {
         p * material.per_inertia[i] + d1 * (d1.dot(p) * material.per_spin[i])
     }
 
-    /// Rotation of a node.
     pub fn rotation(&self, at: usize) -> DQuat {
         // They are brought back to unit length now and then only.
         DQuat::from_array([0, 1, 2, 3].map(|c| self.motion.q[c][at])).normalize()
@@ -168,7 +163,6 @@ impl Rod {
         (vector(&self.motion.v, at), vector(&self.motion.p, at))
     }
 
-    /// Velocities of all nodes.
     pub fn velocities(&self, segments: usize) -> impl Iterator<Item = Velocity> + '_ {
         (GROUP..=GROUP + segments).map(move |at| {
             let (linear, p) = self.moving(at);
@@ -178,7 +172,6 @@ impl Rod {
     }
 }
 
-/// The vector at an index.
 pub fn vector(arrays: &[Array; 3], at: usize) -> DVec3 {
     DVec3::new(arrays[0][at], arrays[1][at], arrays[2][at])
 }

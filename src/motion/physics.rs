@@ -62,10 +62,8 @@ impl Physics {
     pub fn at_rest(leaf: &Leaf) -> Self {
         let s = leaf.scenario();
         let dynamics = Dynamics::default_for(&s.rods);
-        Physics::of(
-            leaf,
-            dynamics.with_loads(s.gravity, s.tip_force, s.tip_moment),
-        )
+        let loaded = dynamics.with_loads(s.gravity, s.tip_force, s.tip_moment);
+        Physics::of(leaf, loaded)
     }
 
     fn of(leaf: &Leaf, dynamics: Dynamics) -> Self {

@@ -27,27 +27,18 @@ pub struct Frame {
 impl Frame {
     pub(super) fn new(leaf: &Leaf, physics: &Physics, snapshot: &Snapshot, steps: usize) -> Self {
         let (length, time, energy) = (leaf.scale.length, physics.time, leaf.scale.moment());
-        let e = snapshot.energy;
+        let velocity = |v: &Velocity| Velocity {
+            angular: v.angular / time,
+            linear: v.linear * (length / time),
+        };
         Frame {
             time: snapshot.time * time,
             steps,
             rods: leaf.rods(),
             positions: snapshot.state.x.iter().map(|x| *x * length).collect(),
             rotations: snapshot.state.q.clone(),
-            velocities: (snapshot.velocity.iter())
-                .map(|v| Velocity {
-                    angular: v.angular / time,
-                    linear: v.linear * (length / time),
-                })
-                .collect(),
-            energy: Energy {
-                kinetic: e.kinetic * energy,
-                elastic: e.elastic * energy,
-                coupling: e.coupling * energy,
-                potential: e.potential * energy,
-                dissipated: e.dissipated * energy,
-                work: e.work * energy,
-            },
+            velocities: snapshot.velocity.iter().map(velocity).collect(),
+            energy: snapshot.energy.map(|e| e * energy),
         }
     }
 
@@ -59,9 +50,8 @@ impl Frame {
 
     /// The joint tip alone, or one tip per rod.
     pub fn tips(&self, joined: bool) -> Vec<DVec3> {
-        let rods = if joined { 1 } else { self.rods };
-        (0..rods)
-            .map(|rod| self.centerline(rod)[self.positions.len() / self.rods - 1])
-            .collect()
+        let ends = self.positions.chunks(self.positions.len() / self.rods);
+        let tips = ends.map(|rod| rod[rod.len() - 1]);
+        tips.take(if joined { 1 } else { self.rods }).collect()
     }
 }

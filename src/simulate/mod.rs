@@ -98,9 +98,8 @@ impl Simulation {
     /// # Errors
     /// If a request cannot be met.
     pub fn new(scenario: &Scenario, options: &Options) -> Result<Self, Refused> {
-        if let Some(found) = options
-            .step
-            .filter(|step| !(step.is_finite() && *step > 0.0))
+        if let Some(found) = options.step
+            && !(found.is_finite() && found > 0.0)
         {
             return Err(Refused::NotPositive { found });
         }
@@ -150,12 +149,8 @@ impl Simulation {
             }
             Scheme::SemiImplicit => {
                 let steps = step.map_or(Steps::Error(tolerance), Steps::Fixed);
-                Box::new(SemiImplicit::new(
-                    discrete(),
-                    physics.clone(),
-                    &state,
-                    steps,
-                ))
+                let physics = physics.clone();
+                Box::new(SemiImplicit::new(discrete(), physics, &state, steps))
             }
         };
         let (duration, interval) = physics.duration();
@@ -280,12 +275,12 @@ impl Simulation {
     /// Goes back to where [`Simulation::save`] was called; false if the
     /// numbers do not fit.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
-        let Some((made, numbers)) = numbers.split_first() else {
+        let Some((&made, numbers)) = numbers.split_first() else {
             return false;
         };
-        let fits = *made >= 0.0 && *made <= self.outputs as f64 && self.method.restore(numbers);
+        let fits = made >= 0.0 && made <= self.outputs as f64 && self.method.restore(numbers);
         if fits {
-            self.made = *made as usize;
+            self.made = made as usize;
         }
         fits
     }
@@ -306,13 +301,9 @@ fn at_rest(leaf: &Leaf, physics: &Physics, grid: &Grid, tolerance: f64) -> Resul
         });
     }
     let nodes = || found.shape.rods.iter().flat_map(|rod| &rod.nodes);
-    Ok(State::new(
-        grid.segments(),
-        nodes()
-            .map(|node| node.position / leaf.scale.length)
-            .collect(),
-        nodes().map(|node| node.rotation).collect(),
-    ))
+    let x = nodes().map(|node| node.position / leaf.scale.length);
+    let q = nodes().map(|node| node.rotation);
+    Ok(State::new(grid.segments(), x.collect(), q.collect()))
 }
 
 /// The scenario with the loads and the rest shape of time 0.
@@ -323,11 +314,8 @@ fn at_beginning(scenario: &Scenario) -> Scenario {
     scenario.tip_force = dynamics.tip_force.at(0.0);
     scenario.tip_moment = dynamics.tip_moment.at(0.0);
     let factor = dynamics.rest.at(0.0);
-    for curvature in scenario
-        .rods
-        .iter_mut()
-        .flat_map(|rod| &mut rod.rest_curvature)
-    {
+    let rods = scenario.rods.iter_mut();
+    for curvature in rods.flat_map(|rod| &mut rod.rest_curvature) {
         *curvature = curvature.scaled(factor);
     }
     scenario

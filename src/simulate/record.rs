@@ -5,8 +5,7 @@ use crate::motion::{Energy, StableStep};
 use crate::scenario;
 use crate::shape::serialize_tips;
 use glam::DVec3;
-use serde::Serialize;
-use serde::ser::{SerializeMap, Serializer};
+use serde::{Serialize, Serializer, ser::SerializeMap};
 
 /// What is kept of every output, in the units of the scenario.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,18 +25,10 @@ impl Moment {
     /// so that a moment read back is the same.
     pub fn of(frame: &Frame, joined: bool) -> Self {
         let tips = frame.tips(joined);
-        let e = &frame.energy;
         Moment {
             time: frame.time + 0.0,
             steps: frame.steps,
-            energy: Energy {
-                kinetic: e.kinetic + 0.0,
-                elastic: e.elastic + 0.0,
-                coupling: e.coupling + 0.0,
-                potential: e.potential + 0.0,
-                dissipated: e.dissipated + 0.0,
-                work: e.work + 0.0,
-            },
+            energy: frame.energy.map(|e| e + 0.0),
             tip: tips.iter().sum::<DVec3>() / tips.len() as f64 + DVec3::ZERO,
         }
     }

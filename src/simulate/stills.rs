@@ -55,14 +55,13 @@ mod tests {
     use glam::DVec3;
 
     fn moments(count: usize, tip: impl Fn(f64) -> f64) -> Vec<Moment> {
-        (0..count)
-            .map(|i| Moment {
-                time: i as f64,
-                steps: i,
-                energy: Energy::default(),
-                tip: DVec3::new(tip(i as f64), 0.0, 0.0),
-            })
-            .collect()
+        let moment = |i| Moment {
+            time: i as f64,
+            steps: i,
+            energy: Energy::default(),
+            tip: DVec3::X * tip(i as f64),
+        };
+        (0..count).map(moment).collect()
     }
 
     #[test]

@@ -38,14 +38,14 @@ impl Explicit {
         forces.into_iter().map(DVec3::from).collect()
     }
 
-    /// Positions, rotations and segment forces now.
+    /// Positions, rotations and segment forces.
     pub fn now(&mut self) -> State {
         let mut state = self.state();
         state.n = self.forces(false);
         state
     }
 
-    /// Positions and rotations now.
+    /// Positions and rotations.
     pub(super) fn state(&self) -> State {
         let n = self.leaf.segments();
         let nodes = || self.leaf.each(GROUP..=GROUP + n);

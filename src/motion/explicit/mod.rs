@@ -61,7 +61,6 @@ pub struct Explicit {
     block: Block,
     /// Mass of the joint tip, if there is one.
     tip_mass: Option<f64>,
-    /// Time step.
     step: f64,
     /// Time of the last step, and that asked for, less than a step later.
     stepped: f64,
@@ -189,21 +188,19 @@ impl Explicit {
         energy
     }
 
-    /// The largest rotation between the ends of a segment before the last step. That
-    /// of unit quaternions is known up to 2 pi, since their signs are aligned.
+    /// The largest rotation between the ends of a segment before the last step, up to
+    /// 2 pi, since signs of quaternions are aligned.
     fn largest_turn(&self) -> f64 {
         let deltas = self.rods.iter().map(|rod| rod.totals.largest_delta);
         4.0 * (0.5 * deltas.fold(0.0, f64::max).sqrt()).min(1.0).asin()
     }
 
-    /// Whether the leaf before the last step can be trusted: finite numbers, and no
-    /// segment bent by more than its grid can resolve.
+    /// Whether numbers were finite and bending resolved before the last step.
     fn trusted(&self) -> bool {
         let finite = |rod: &Rod| rod.totals.twice_kinetic.is_finite();
         self.largest_turn() <= RESOLVED_TURN && self.rods.iter().all(finite)
     }
 
-    /// Kicks, and drifts for `h`.
     fn kick_and_drift(&mut self, h: f64) -> (Exchange, f64) {
         self.last_snapshot = None;
         let exchange = self.kick(0.5 * h, h, true);
@@ -212,8 +209,7 @@ impl Explicit {
         exchange
     }
 
-    /// By how much time velocities lag behind positions: half a step, but not
-    /// at the start.
+    /// How long velocities lag behind positions: half a step, but not at the start.
     fn behind(&self) -> f64 {
         0.5 * self.widths[0]
     }
@@ -272,7 +268,7 @@ impl Explicit {
         (exchange, energy)
     }
 
-    /// What is between the potentials of two loads, the leaf standing still.
+    /// By how much the potential falls with other loads, the leaf standing still.
     fn potential_of(&self, before: &Loads, after: &Loads) -> f64 {
         let last = GROUP + self.leaf.segments();
         let gravity = after.gravity - before.gravity;
@@ -289,7 +285,6 @@ impl Explicit {
         lower
     }
 
-    /// How strains make forces now.
     fn law(&self, remember: bool) -> Law {
         let changes = self.physics.rest_changes();
         Law {

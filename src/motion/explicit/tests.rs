@@ -2,6 +2,7 @@ use super::*;
 use crate::leaf::{Grid, Leaf};
 use crate::relax::start;
 use crate::scenario::Scenario;
+use std::collections::HashSet;
 
 const LEAF: &str = r#"
     name = "leaf"
@@ -12,24 +13,32 @@ const LEAF: &str = r#"
     load = { gravity = [0.1, -0.3, -1.0], tip_force = [0.3, 0.2, 0.1] }
 "#;
 
+fn discrete(toml: &str, segments: usize) -> DiscreteLeaf {
+    let leaf = Leaf::new(&Scenario::from_toml(toml).unwrap());
+    DiscreteLeaf::new(&leaf, Grid::new(segments, &[]))
+}
+
+fn explicit(leaf: DiscreteLeaf, state: &State) -> Explicit {
+    let physics = Physics::new(&leaf.leaf);
+    Explicit::new(leaf, physics, state, None).unwrap()
+}
+
 /// Within a block, up to its end, and beyond: with one node, and with many.
 const SEGMENTS: [usize; 8] = [1, 2, 3, 4, 127, 128, 129, 150];
 
 /// Curved and twisted, and strained by some percent.
 fn bent(leaf: &DiscreteLeaf) -> State {
     let (mut state, n) = (start(leaf), leaf.segments());
-    for j in 0..state.rods() {
-        for i in 1..=n {
-            let s = i as f64 / n as f64;
-            let tip = if i == n { 0 } else { j };
-            let phase = 5.0 * s + tip as f64;
-            let turn = DVec3::new(phase.sin(), s, phase.cos()) * s;
-            let shift = DVec3::new(phase.cos(), phase.sin(), s) * (0.02 * s * (1.5 - s));
-            // No segment is bent by more than a grid resolves.
-            let turn = turn * (n as f64 / 8.0).min(1.0);
-            let increment = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
-            state.advance(state.base(j) + i, &increment, 1.0);
-        }
+    for (j, i) in leaf.each(1..=n) {
+        let s = i as f64 / n as f64;
+        let tip = if i == n { 0 } else { j };
+        let phase = 5.0 * s + tip as f64;
+        let turn = DVec3::new(phase.sin(), s, phase.cos()) * s;
+        let shift = DVec3::new(phase.cos(), phase.sin(), s) * (0.02 * s * (1.5 - s));
+        // No segment is bent by more than a grid resolves.
+        let turn = turn * (n as f64 / 8.0).min(1.0);
+        let increment = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
+        state.advance(state.base(j) + i, &increment, 1.0);
     }
     state
 }
@@ -37,13 +46,10 @@ fn bent(leaf: &DiscreteLeaf) -> State {
 /// Force and moment on every node by the gradient of the element's energy.
 fn by_element(leaf: &DiscreteLeaf, state: &State) -> Vec<(DVec3, DVec3)> {
     let mut all = vec![(DVec3::ZERO, DVec3::ZERO); state.x.len()];
-    for j in 0..leaf.rods() {
-        for i in 0..=leaf.segments() {
-            let k = state.base(j) + i;
-            all[k].0 += leaf.load(state, j, i).0;
-            if i == leaf.segments() {
-                break;
-            }
+    for (j, i) in leaf.each(0..=leaf.segments()) {
+        let k = state.base(j) + i;
+        all[k].0 += leaf.load(state, j, i).0;
+        if i < leaf.segments() {
             let section = leaf.section(j, i);
             let idle = leaf.segment(state, j, i, DVec3::ZERO);
             let strain = idle.v(section) - section.rest_strain;
@@ -60,22 +66,18 @@ fn by_element(leaf: &DiscreteLeaf, state: &State) -> Vec<(DVec3, DVec3)> {
 /// minimises, whatever instructions the processor has.
 #[test]
 fn forces_are_those_of_the_element() {
-    let scenario = Scenario::from_toml(LEAF).unwrap();
-    let leaf = Leaf::new(&scenario);
     for n in SEGMENTS {
-        let discrete = DiscreteLeaf::new(&leaf, Grid::new(n, &[]));
-        forces_are_those(&discrete);
+        forces_are_those(&discrete(LEAF, n));
     }
 }
 
-fn forces_are_those(discrete: &DiscreteLeaf) {
-    let (leaf, n, state) = (&discrete.leaf, discrete.segments(), bent(discrete));
-    let expected = by_element(discrete, &state);
+fn forces_are_those(leaf: &DiscreteLeaf) {
+    let (n, state) = (leaf.segments(), bent(leaf));
+    let expected = by_element(leaf, &state);
     let largest = expected.iter().map(|(f, m)| f.length().max(m.length()));
     let allowed = 1e-12 * largest.fold(0.0, f64::max);
     for arch in [kernel::arch(), Arch::Scalar] {
-        let physics = Physics::at_rest(leaf);
-        let mut explicit = Explicit::new(discrete.clone(), physics, &state, None).unwrap();
+        let mut explicit = explicit(leaf.clone(), &state);
         explicit.arch = arch;
         explicit.set_damping(0.0);
         let h = 1e-6;
@@ -113,18 +115,12 @@ fn like_blocks_are_shared() {
             line if line.starts_with("rest =") => "rest = { bend_2 = 1.0 }\n".to_string(),
             line => format!("{}\n", line.replace("[1.0, 2.0, 0.5]", "1.0")),
         });
-        let scenario = Scenario::from_toml(&toml.collect::<String>()).unwrap();
-        let leaf = Leaf::new(&scenario);
-        let discrete = DiscreteLeaf::new(&leaf, Grid::new(segments, &[]));
-        let state = start(&discrete);
-        let physics = Physics::new(&leaf);
-        let explicit = Explicit::new(discrete, physics, &state, None).unwrap();
+        let leaf = discrete(&toml.collect::<String>(), segments);
+        let state = start(&leaf);
+        let explicit = explicit(leaf, &state);
         let blocks = explicit.rods.iter().flat_map(|rod| &rod.material);
-        let mut places: Vec<_> = blocks.map(std::sync::Arc::as_ptr).collect();
-        let all = places.len();
-        places.sort();
-        places.dedup();
-        (places.len(), all)
+        let places: Vec<_> = blocks.map(std::sync::Arc::as_ptr).collect();
+        (places.iter().collect::<HashSet<_>>().len(), places.len())
     };
     // The clamped end, the middle and the tip.
     assert_eq!(distinct("rods = 1, length = 1.0", 1000), (3, 8));
@@ -136,12 +132,9 @@ fn like_blocks_are_shared() {
 #[test]
 fn a_constant_factor_of_the_rest_curvature_counts() {
     let after = |toml: &str| {
-        let scenario = Scenario::from_toml(toml).unwrap();
-        let leaf = Leaf::new(&scenario);
-        let discrete = DiscreteLeaf::new(&leaf, Grid::new(20, &[]));
-        let state = bent(&discrete);
-        let physics = Physics::new(&leaf);
-        let mut explicit = Explicit::new(discrete, physics, &state, None).unwrap();
+        let leaf = discrete(toml, 20);
+        let state = bent(&leaf);
+        let mut explicit = explicit(leaf, &state);
         for _ in 0..100 {
             explicit.step(1e-4);
         }

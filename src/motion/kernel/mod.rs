@@ -64,7 +64,6 @@ pub struct Law {
     pub changes: bool,
     /// Factor of the rest curvature if that changes, or one.
     pub rest: f64,
-    /// Retardation time.
     pub retardation: f64,
     /// Weights of the present and the past strains in their rate.
     pub rates: [f64; 3],
@@ -87,7 +86,6 @@ pub struct Block {
 }
 
 impl Block {
-    /// With no forces.
     pub fn new() -> Self {
         let zeros = [[0.0; GROUP + BLOCK]; 3];
         Block {
@@ -146,17 +144,15 @@ pub struct StepTotals {
     pub twice_kinetic: f64,
     /// Power of internal friction, over the retardation time.
     pub friction: f64,
-    /// Elastic energy taken by a rise of the factor of the rest curvature,
-    /// over that rise.
+    /// Elastic energy taken by a rise of the factor of the rest curvature, over that.
     pub rest: f64,
     /// Largest (2 sin(psi/4))^2 of a segment bent by psi, before the step.
     pub largest_delta: f64,
-    /// Force of the last segment.
+    /// Of the last segment.
     pub last_force: [f64; 3],
 }
 
 impl Step<'_> {
-    /// Makes the step.
     pub fn make(self, arch: Arch) -> StepTotals {
         match (self.law.damped, self.law.changes) {
             (true, true) => arch.dispatch(Dispatched::<true, true>(self)),
@@ -167,8 +163,7 @@ impl Step<'_> {
     }
 }
 
-/// The instructions to work with: the widest there are, if a group of nodes is a
-/// whole number of them.
+/// The widest instructions there are, if a group of nodes is a whole number of them.
 pub fn arch() -> Arch {
     struct Width;
     impl pulp::WithSimd for Width {
@@ -178,14 +173,11 @@ pub fn arch() -> Arch {
         }
     }
     let arch = Arch::new();
-    match GROUP.is_multiple_of(arch.dispatch(Width)) {
-        true => arch,
-        false => Arch::Scalar,
-    }
+    let fits = GROUP.is_multiple_of(arch.dispatch(Width));
+    if fits { arch } else { Arch::Scalar }
 }
 
-/// The number of nodes from `start` on in the block that begins there, whole
-/// groups of a rod of so many `segments`.
+/// Nodes of the block that begins at node `start` of a rod, in whole groups.
 fn length(segments: usize, start: usize) -> usize {
     ((segments + 1).next_multiple_of(GROUP) - start).min(BLOCK)
 }
@@ -239,16 +231,14 @@ impl<const DAMPED: bool, const CHANGES: bool> pulp::WithSimd for Dispatched<'_, 
     }
 }
 
-/// The forces of a rod's segments, and nothing else.
+/// The forces of a rod's segments alone, put into `forces`.
 pub struct Forces<'a> {
     pub segments: usize,
     pub positions: &'a Positions,
     pub motion: &'a Motion,
-    /// Block by block.
     pub material: &'a [Arc<Material>],
     pub past: &'a mut Past,
     pub law: Law,
-    /// Where they go, segment by segment.
     pub forces: &'a mut Vec<[f64; 3]>,
 }
 

@@ -17,9 +17,8 @@ const SINC: [f64; 3] = [1.0, -1.0 / 6.0, 1.0 / 120.0];
 impl Step<'_> {
     /// Moves the nodes of `place` (index of the first, count) with the forces in
     /// the block; returns eight times their kinetic energy in the middle of the
-    /// kick. Positions move on, and every node turns as a body free of moments
-    /// with one axis of symmetry does: about its angular momentum, and about its
-    /// own axis.
+    /// kick. Every node turns as a body free of moments with one axis of symmetry
+    /// does: about its angular momentum, and about its own axis.
     #[inline(always)]
     pub fn kick_and_drift<S: Simd>(&mut self, simd: S, place: (usize, usize)) -> Lanes<S> {
         // In two loops, as of forces.

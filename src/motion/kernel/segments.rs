@@ -52,7 +52,7 @@ fn rate<S: Simd>(
     rates: [Lanes<S>; 3],
     remember: bool,
 ) -> Vectors<S> {
-    let simd = now.x.simd();
+    let simd = now.x.simd;
     let last = Vectors::load(simd, one, at);
     let before = Vectors::load(simd, two, at);
     if remember {
@@ -62,7 +62,7 @@ fn rate<S: Simd>(
     before.times(rates[2], last.times(rates[1], now.scale(rates[0])))
 }
 
-/// Nodes of a rod, and what is known there.
+/// Nodes of a rod.
 #[derive(Clone, Copy)]
 pub struct Nodes<'a> {
     /// Index of the first, count.
@@ -73,20 +73,17 @@ pub struct Nodes<'a> {
     pub law: &'a Law,
 }
 
-/// What the loops over segments sum up over a rod.
+/// What the loops over segments sum up over a rod: see [`super::StepTotals`].
 #[derive(Clone, Copy)]
 pub struct SegmentSums<S: Simd> {
-    /// Power of internal friction over the retardation time, if `DAMPED`.
+    /// If `DAMPED`.
     pub friction: Lanes<S>,
-    /// Elastic energy taken by a rise of the factor of the rest curvature, over
-    /// that rise, if `CHANGES`.
+    /// If `CHANGES`.
     pub rest: Lanes<S>,
-    /// Largest delta.
     pub largest_delta: Lanes<S>,
 }
 
 impl<S: Simd> SegmentSums<S> {
-    /// All zero.
     #[inline(always)]
     pub fn zero(simd: S) -> Self {
         let zero = Lanes::splat(simd, 0.0);

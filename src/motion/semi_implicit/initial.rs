@@ -82,7 +82,6 @@ impl SemiImplicit {
         self.trial.x.iter().all(|x| x.is_finite())
     }
 
-    /// Accelerations of a leaf at rest.
     fn set_accelerations(&mut self) {
         self.leaf.assemble(&self.state, &mut self.system);
         let n = self.leaf.segments();

@@ -44,8 +44,7 @@ const NO_TIME: f64 = 1e-9;
 /// Bounds of the change of the step.
 const GROWTH: (f64, f64) = (0.2, 2.0);
 
-/// What may help if energy grows, besides a shorter step, and if steps become too
-/// short.
+/// What may help if energy grows, besides a shorter step, and if steps are too short.
 const OTHERWISE: &str = "dynamics.start = \"at-rest\"";
 const TOO_SHORT: &str = "use more segments a rod, or slower changes of the loads";
 const TOO_SHORT_AT_THE_START: &str = "the arcs it is released from strain rods that are rigid: \
@@ -61,10 +60,10 @@ pub enum Steps {
     Error(f64),
 }
 
-/// Motion of a node.
+/// Motion of a node: pairs of an angular and a linear vector.
 #[derive(Clone, Copy, Debug, Default)]
 struct Moving {
-    /// Velocity: angular, linear.
+    /// Velocity.
     v: [DVec3; 2],
     /// Auxiliary acceleration.
     a: [DVec3; 2],
@@ -104,7 +103,6 @@ pub struct SemiImplicit {
     step: f64,
     time: f64,
     count: usize,
-    /// Factorisations so far.
     pub factorizations: usize,
     balance: EnergyBalance,
 }
@@ -189,13 +187,14 @@ impl Method for SemiImplicit {
                 self.step = longest.min(GROWTH.1 * self.step);
             }
             if self.step < SHORTEST_STEP {
-                return Err(Stopped::StepTooShort {
-                    time: self.time,
-                    advice: match self.time > 0.0 {
-                        true => TOO_SHORT,
-                        false => TOO_SHORT_AT_THE_START,
-                    },
-                });
+                let time = self.time;
+                let started = time > 0.0;
+                let advice = if started {
+                    TOO_SHORT
+                } else {
+                    TOO_SHORT_AT_THE_START
+                };
+                return Err(Stopped::StepTooShort { time, advice });
             }
             if error.is_some() && last {
                 self.time = until;
@@ -267,10 +266,8 @@ impl Method for SemiImplicit {
         }
         // The solver in use decides the last digits, too.
         self.leaf.assemble(&self.state, &mut self.system);
-        self.solver.direct = match direct {
-            true => SparsePattern::new(&self.system).ok(),
-            false => None,
-        };
+        let pattern = direct.then(|| SparsePattern::new(&self.system).ok());
+        self.solver.direct = pattern.flatten();
         true
     }
 }

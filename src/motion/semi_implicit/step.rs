@@ -112,7 +112,6 @@ impl SemiImplicit {
         None
     }
 
-    /// Local error of a step, and whether it turned too far.
     fn local_error(&self, h: f64) -> f64 {
         let mut error: f64 = 0.0;
         for (next, now) in self.next_moving.iter().zip(&self.moving) {
@@ -123,8 +122,7 @@ impl SemiImplicit {
         error * ERROR.abs() * h * h
     }
 
-    /// Where the leaf would be at the end of a step if its acceleration did
-    /// not change.
+    /// The trial if accelerations did not change in the step.
     fn predict(&mut self, h: f64) {
         self.trial.clone_from(&self.state);
         for (k, m) in self.moving.iter().enumerate() {
