@@ -103,6 +103,7 @@ pub struct SemiImplicit {
     step: f64,
     time: f64,
     count: usize,
+    /// Factorisations so far.
     pub factorizations: usize,
     balance: EnergyBalance,
 }
