@@ -47,11 +47,8 @@ pub struct Difference {
 impl Difference {
     /// Between two shapes at the same stations.
     pub fn between(a: &[RodShape], b: &[RodShape]) -> Self {
-        let pairs = a
-            .iter()
-            .zip(b)
-            .flat_map(|(a, b)| a.nodes.iter().zip(&b.nodes));
-        pairs
+        let rods = a.iter().zip(b);
+        rods.flat_map(|(a, b)| a.nodes.iter().zip(&b.nodes))
             .map(|(a, b)| Difference::of(a, b))
             .fold(Difference::default(), Difference::max)
     }

@@ -30,7 +30,8 @@
 use std::f64::consts::PI;
 
 use glam::{DQuat, DVec2, DVec3};
-use serde::ser::{Serialize, SerializeStruct, Serializer};
+use serde::Serialize;
+use serde::ser::{SerializeStruct, Serializer};
 
 use crate::rotation;
 use crate::scenario::Scenario;
@@ -53,8 +54,10 @@ const STRAIGHT: f64 = 1e-10;
 /// A mean twist below this, in radians, has no hand.
 const LEAST_TWIST: f64 = 1e-3;
 
-/// Which way the sections turn from base to tip, on average.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Which way the sections turn from base to tip, on average; in lower case in
+/// `summary.json`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Hand {
     /// As a right-handed screw: the mean twist is positive.
     Right,
@@ -62,17 +65,6 @@ pub enum Hand {
     Left,
     /// Not at all, or as much to the right as to the left.
     None,
-}
-
-impl Hand {
-    /// The word used in `summary.json`.
-    pub fn word(self) -> &'static str {
-        match self {
-            Hand::Right => "right",
-            Hand::Left => "left",
-            Hand::None => "none",
-        }
-    }
 }
 
 /// What one vein does.
@@ -116,15 +108,15 @@ impl Vein {
 
 impl Serialize for Vein {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut object = serializer.serialize_struct("Vein", 7)?;
-        object.serialize_field("waves", &self.waves())?;
-        object.serialize_field("amplitude", &self.amplitude)?;
-        object.serialize_field("wavelength", &self.wavelength)?;
-        object.serialize_field("twist", &self.twist)?;
-        object.serialize_field("tension", &self.tension)?;
-        object.serialize_field("load_number", &self.load_number)?;
-        object.serialize_field("predicted_waves", &self.predicted_waves())?;
-        object.end()
+        serializer.collect_map([
+            ("waves", Some(self.waves())),
+            ("amplitude", Some(self.amplitude)),
+            ("wavelength", self.wavelength),
+            ("twist", Some(self.twist)),
+            ("tension", Some(self.tension)),
+            ("load_number", Some(self.load_number)),
+            ("predicted_waves", Some(self.predicted_waves())),
+        ])
     }
 }
 
@@ -140,19 +132,20 @@ struct Margin<'a>(&'a Vein);
 
 impl Serialize for Margin<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut object = serializer.serialize_struct("Margin", 4)?;
-        object.serialize_field("waves", &self.0.waves())?;
-        object.serialize_field("amplitude", &self.0.amplitude)?;
-        object.serialize_field("wavelength", &self.0.wavelength)?;
-        object.serialize_field("predicted_waves", &self.0.predicted_waves())?;
-        object.end()
+        let Margin(vein) = self;
+        serializer.collect_map([
+            ("waves", Some(vein.waves())),
+            ("amplitude", Some(vein.amplitude)),
+            ("wavelength", vein.wavelength),
+            ("predicted_waves", Some(vein.predicted_waves())),
+        ])
     }
 }
 
 impl Serialize for Undulation {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut object = serializer.serialize_struct("Undulation", 4)?;
-        object.serialize_field("handedness", self.hand().word())?;
+        object.serialize_field("handedness", &self.hand())?;
         object.serialize_field("twist", &self.twist())?;
         object.serialize_field("margins", &self.margin().map(Margin))?;
         object.serialize_field("veins", &self.veins)?;
@@ -246,18 +239,14 @@ impl Undulation {
 /// Trapezoidal mean over the length.
 fn mean(stations: &[f64], values: impl Iterator<Item = f64>) -> f64 {
     let values: Vec<f64> = values.collect();
-    let pairs = stations.windows(2).zip(values.windows(2));
-    pairs
-        .map(|(s, v)| 0.5 * (s[1] - s[0]) * (v[0] + v[1]))
-        .sum()
+    let mean = |(s, v): (&[f64], &[f64])| 0.5 * (s[1] - s[0]) * (v[0] + v[1]);
+    stations.windows(2).zip(values.windows(2)).map(mean).sum()
 }
 
 /// The integral of u1: the twists of all segments.
 fn twist(line: &Centerline) -> f64 {
-    let pairs = line.windows(2);
-    pairs
-        .map(|pair| rotation::log(pair[0].1.conjugate() * pair[1].1).x)
-        .sum()
+    let turn = |pair: &[(DVec3, DQuat)]| rotation::log(pair[0].1.conjugate() * pair[1].1).x;
+    line.windows(2).map(turn).sum()
 }
 
 /// A half-wave between two inflections.
@@ -329,12 +318,8 @@ impl Curve {
     fn inflections(&self) -> Vec<f64> {
         let mut found = Vec::new();
         let mut last: Option<(usize, f64)> = None;
-        for (i, &turn) in self
-            .turns
-            .iter()
-            .enumerate()
-            .filter(|(_, turn)| turn.abs() > STRAIGHT)
-        {
+        let turns = self.turns.iter().enumerate();
+        for (i, &turn) in turns.filter(|(_, turn)| turn.abs() > STRAIGHT) {
             if let Some((k, before)) = last.filter(|(_, before)| before * turn < 0.0) {
                 let part = before / (before - turn);
                 found.push((k + 1) as f64 + part * (i - k) as f64);
@@ -391,10 +376,10 @@ fn half_waves(lines: &[Centerline], j: usize, least: f64) -> Vec<HalfWave> {
 }
 
 fn amplitude(waves: &[HalfWave]) -> f64 {
-    let pairs = waves.windows(2);
-    pairs
-        .map(|pair| 0.5 * (pair[0].height + pair[1].height))
-        .fold(0.0, f64::max)
+    let halves = waves
+        .windows(2)
+        .map(|pair| 0.5 * (pair[0].height + pair[1].height));
+    halves.fold(0.0, f64::max)
 }
 
 fn wavelength(waves: &[HalfWave]) -> Option<f64> {

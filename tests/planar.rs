@@ -233,8 +233,8 @@ fn other_leaves_are_solved_in_space() {
     for entry in [
         "load.gravity=[0, 0, 1e-9]",
         "load.tip_force=[0, 0, 1e-9]",
-        "rest.bend_2=1e-9",
-        "rest.twist=1e-9",
+        "rest.bend_2=[0, 1e-9, 0]",
+        "rest.twist=[0, 0, 1e-9]",
     ] {
         let leaf = fig05(&format!("leaf.rods=3; {entry}"));
         assert!(!rest(&leaf, false, Some(8)).model.planar, "{entry}");

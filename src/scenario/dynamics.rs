@@ -115,11 +115,9 @@ impl Dynamics {
         let time = time(scale, &density);
         let duration = DURATION * time;
         let radius = Profile::Constant(RADIUS * scale.length);
-        let inertia = density
-            .iter()
-            .map(|density| round_inertia(density, &radius));
+        let inertia = |density| round_inertia(density, &radius);
         Dynamics {
-            rotary_inertia: inertia.collect(),
+            rotary_inertia: density.iter().map(inertia).collect(),
             polar_excess: 0.0,
             external_damping: 2.0 * LOWEST_FREQUENCY * mean_of(&density) / time,
             density,
@@ -138,12 +136,10 @@ impl Dynamics {
 
 /// Mean over the rods, mid-rod; exact where all are equal.
 fn mean_of(profiles: &[Profile]) -> f64 {
-    profiles
-        .iter()
-        .zip(1..)
-        .fold(0.0, |mean, (profile, count)| {
-            mean + (profile.at(0.5) - mean) / f64::from(count)
-        })
+    let counted = profiles.iter().zip(1..);
+    counted.fold(0.0, |mean, (profile, count)| {
+        mean + (profile.at(0.5) - mean) / f64::from(count)
+    })
 }
 
 /// The unit of time sqrt(rho L^4/A); in this order nothing overflows.
@@ -171,36 +167,25 @@ pub(super) fn round_inertia(density: &Profile, radius: &Profile) -> Profile {
 mod tests {
     use super::*;
 
-    fn rods(lengths: &[f64], bending: f64) -> Vec<Rod> {
-        let constant = |values: [f64; 3]| values.map(Profile::Constant);
-        lengths
-            .iter()
-            .map(|&length| Rod {
-                length,
-                angle: 0.0,
-                couple_stiffness: constant([0.1, bending, bending]),
-                force_stiffness: constant([f64::INFINITY; 3]),
-                rest_curvature: constant([0.0; 3]),
-                rest_stretch: Profile::Constant(1.0),
-            })
-            .collect()
-    }
-
     #[test]
     fn times_are_in_the_natural_unit_by_default() {
         for (length, bending) in [(1.0, 1.0), (0.03, 7.1), (1e50, 1e-50), (1e-50, 1e50)] {
-            let rods = rods(&[length, 0.5 * length, 0.1 * length], bending);
+            let rods = [1.0, 0.5, 0.1].map(|part| Rod {
+                length: part * length,
+                angle: 0.0,
+                couple_stiffness: [0.1, bending, bending].map(Profile::Constant),
+                force_stiffness: [f64::INFINITY; 3].map(Profile::Constant),
+                rest_curvature: [0.0; 3].map(Profile::Constant),
+                rest_stretch: Profile::Constant(1.0),
+            });
             let dynamics = Dynamics::default_for(&rods);
-            assert_eq!(dynamics.duration, 10.0);
-            assert_eq!(dynamics.output_interval, 0.1);
+            assert_eq!((dynamics.duration, dynamics.output_interval), (10.0, 0.1));
             let density = dynamics.mean_density();
             let close = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-12;
             assert!(close(density, bending / length.powi(4)));
             assert!(close(dynamics.external_damping, 2.0 * 3.516 * density));
-            assert!(close(
-                dynamics.rotary_inertia[2].at(0.5),
-                0.01 * density * length * length
-            ));
+            let inertia = dynamics.rotary_inertia[2].at(0.5);
+            assert!(close(inertia, 0.01 * density * length * length));
         }
     }
 

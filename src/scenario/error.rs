@@ -37,11 +37,10 @@ pub enum Place {
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Place::File { file, line: None } => write!(f, "{file}"),
-            Place::File {
-                file,
-                line: Some(line),
-            } => write!(f, "{file}:{line}"),
+            Place::File { file, line } => {
+                f.write_str(file)?;
+                line.map_or(Ok(()), |line| write!(f, ":{line}"))
+            }
             Place::Set { given } => write!(f, "--set {given}"),
         }
     }
@@ -49,10 +48,8 @@ impl fmt::Display for Place {
 
 /// The line of `text` that holds byte `at`, counted from 1.
 pub(super) fn line_of(text: &[u8], at: usize) -> usize {
-    1 + text[..at.min(text.len())]
-        .iter()
-        .filter(|byte| **byte == b'\n')
-        .count()
+    let before = text[..at.min(text.len())].iter();
+    1 + before.filter(|byte| **byte == b'\n').count()
 }
 
 /// The offending line with a caret below, to be put after a message; empty
@@ -72,10 +69,7 @@ pub(super) fn snippet(text: &str, span: std::ops::Range<usize>) -> String {
     let number = line_of(text.as_bytes(), at).to_string();
     let gap = " ".repeat(number.len());
     // Tabs stay tabs, so that the caret stands below its character.
-    let indent: String = text[start..at]
-        .chars()
-        .map(|c| if c == '\t' { '\t' } else { ' ' })
-        .collect();
+    let indent = text[start..at].replace(|c| c != '\t', " ");
     let width = text
         .get(span.start..span.end.max(span.start))
         .map_or(1, |s| s.trim_end().chars().count());

@@ -21,9 +21,8 @@ impl Profile {
         match self {
             Profile::Constant(value) => *value,
             Profile::Linear { at, value } => {
-                let right = at
-                    .partition_point(|&knot| knot < sigma)
-                    .clamp(1, at.len() - 1);
+                let right = at.partition_point(|&knot| knot < sigma);
+                let right = right.clamp(1, at.len() - 1);
                 let t = (sigma - at[right - 1]) / (at[right] - at[right - 1]);
                 if t >= 1.0 {
                     // Next to a large value the sum below would lose a small one.
@@ -40,12 +39,9 @@ impl Profile {
             Profile::Constant(value) => value * sigma,
             Profile::Linear { at, .. } => {
                 let inside = at.iter().copied().filter(|&knot| knot < sigma);
-                let mut knots: Vec<f64> = inside.collect();
-                knots.push(sigma);
-                knots
-                    .windows(2)
-                    .map(|w| (w[1] - w[0]) * self.at(0.5 * (w[0] + w[1])))
-                    .sum()
+                let knots: Vec<f64> = inside.chain([sigma]).collect();
+                let part = |w: &[f64]| (w[1] - w[0]) * self.at(0.5 * (w[0] + w[1]));
+                knots.windows(2).map(part).sum()
             }
         }
     }
@@ -91,58 +87,35 @@ impl Profile {
 mod tests {
     use super::*;
 
-    fn tent() -> Profile {
+    fn linear<const N: usize>(at: [f64; N], value: [f64; N]) -> Profile {
         Profile::Linear {
-            at: vec![0.0, 0.25, 1.0],
-            value: vec![1.0, 3.0, -6.0],
+            at: at.to_vec(),
+            value: value.to_vec(),
         }
     }
 
     #[test]
     fn a_constant_is_the_same_everywhere() {
         let rigid = Profile::Constant(f64::INFINITY);
-        assert_eq!(rigid.at(0.0), f64::INFINITY);
-        assert_eq!(rigid.at(1.0), f64::INFINITY);
+        assert_eq!([0.0, 1.0].map(|sigma| rigid.at(sigma)), [f64::INFINITY; 2]);
         assert!(rigid.kinks().is_empty());
-        assert_eq!(Profile::Constant(-2.0).integral(0.25), -0.5);
-        assert_eq!(Profile::Constant(-2.0).max_abs(), 2.0);
-        assert_eq!(Profile::Constant(-2.0).min(), -2.0);
+        let negative = Profile::Constant(-2.0);
+        let found = (negative.integral(0.25), negative.max_abs(), negative.min());
+        assert_eq!(found, (-0.5, 2.0, -2.0));
     }
 
+    /// Beyond the ends, where a rounding error may lead, the end values hold.
     #[test]
     fn linear_between_knots_and_exact_at_them() {
-        let tent = tent();
-        let values = [
-            (0.0, 1.0),
-            (0.125, 2.0),
-            (0.25, 3.0),
-            (0.5, 0.0),
-            (1.0, -6.0),
-        ];
-        for (sigma, value) in values {
-            assert_eq!(tent.at(sigma), value, "at {sigma}");
-        }
-        for (sigma, integral) in [(0.0, 0.0), (0.125, 0.1875), (0.25, 0.5), (1.0, -0.625)] {
-            assert_eq!(tent.integral(sigma), integral, "to {sigma}");
-        }
+        let tent = linear([0.0, 0.25, 1.0], [1.0, 3.0, -6.0]);
+        let at = [-1e-17, 0.0, 0.125, 0.25, 0.5, 1.0, 1.0 + 1e-15];
+        let values = [1.0, 1.0, 2.0, 3.0, 0.0, -6.0, -6.0];
+        assert_eq!(at.map(|sigma| tent.at(sigma)), values);
+        let integrals = [0.0, 0.125, 0.25, 1.0].map(|sigma| tent.integral(sigma));
+        assert_eq!(integrals, [0.0, 0.1875, 0.5, -0.625]);
         assert_eq!(tent.kinks(), [0.25]);
-        assert_eq!(tent.max_abs(), 6.0);
-        assert_eq!(tent.min(), -6.0);
-    }
-
-    #[test]
-    fn a_small_value_at_a_knot_is_not_lost() {
-        let steep = Profile::Linear {
-            at: vec![0.0, 0.5, 1.0],
-            value: vec![1e9, 1e-9, 1e9],
-        };
-        assert_eq!(steep.at(0.5), 1e-9);
-    }
-
-    #[test]
-    fn beyond_the_ends_the_end_values_hold() {
-        // A fraction may come out a rounding error outside [0, 1].
-        assert_eq!(tent().at(-1e-17), 1.0);
-        assert_eq!(tent().at(1.0 + 1e-15), -6.0);
+        assert_eq!((tent.max_abs(), tent.min()), (6.0, -6.0));
+        // A small value at a knot is not lost beside large ones.
+        assert_eq!(linear([0.0, 0.5, 1.0], [1e9, 1e-9, 1e9]).at(0.5), 1e-9);
     }
 }

@@ -66,49 +66,32 @@ fn between(from: f64, to: f64, fraction: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn factor() -> Schedule<f64> {
-        Schedule {
-            at: vec![-1.0, 0.5, 0.7],
-            value: vec![1.0, 4.0, 0.1],
-        }
-    }
-
-    #[test]
-    fn a_constant_is_the_same_at_all_times() {
-        let gravity = Schedule::constant([0.0, 0.0, -0.3]);
-        assert!(gravity.is_constant());
-        for time in [f64::NEG_INFINITY, -1.0, 0.0, 1e300, f64::INFINITY] {
-            assert_eq!(gravity.at(time), [0.0, 0.0, -0.3], "at {time}");
-        }
-    }
-
     #[test]
     fn linear_between_times_exact_at_them_and_constant_outside() {
-        for (time, value) in [
-            (-1e9, 1.0),
-            (-1.0, 1.0),
-            (0.0, 3.0),
-            (0.5, 4.0),
-            (0.7, 0.1),
-            (1e9, 0.1),
-        ] {
-            assert_eq!(factor().at(time), value, "at {time}");
-        }
+        let factor = Schedule {
+            at: vec![-1.0, 0.5, 0.7],
+            value: vec![1.0, 4.0, 0.1],
+        };
+        let values = [-1e9, -1.0, 0.0, 0.5, 0.7, 1e9].map(|time| factor.at(time));
+        assert_eq!(values, [1.0, 1.0, 3.0, 4.0, 0.1, 0.1]);
         let force = Schedule {
             at: vec![0.0, 2.0],
             value: vec![[0.0, 1.0, 0.0], [4.0, 1.0, -2.0]],
         };
         assert_eq!(force.at(0.5), [1.0, 1.0, -0.5]);
+        assert!(!factor.is_constant());
     }
 
     #[test]
     fn equal_values_are_constant_however_many() {
-        assert!(!factor().is_constant());
         let still = Schedule {
             at: vec![0.0, 1.0],
             value: vec![0.3, 0.3],
         };
-        assert!(still.is_constant());
-        assert_eq!(still.at(0.7), 0.3);
+        for still in [still, Schedule::constant(0.3)] {
+            assert!(still.is_constant());
+            let times = [f64::NEG_INFINITY, -1.0, 0.0, 0.7, 1e300, f64::INFINITY];
+            assert_eq!(times.map(|time| still.at(time)), [0.3; 6]);
+        }
     }
 }

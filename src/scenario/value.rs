@@ -41,19 +41,15 @@ impl<'e> Item<'e> {
 
     /// A whole number from 1 to `most`.
     pub(super) fn whole(&self, most: usize) -> Result<usize> {
-        let whole = match self.value() {
-            DeValue::Integer(integer) => {
-                usize::from_str_radix(integer.as_str(), integer.radix()).ok()
-            }
-            _ => None,
-        };
-        whole
-            .filter(|whole| (1..=most).contains(whole))
-            .ok_or_else(|| {
-                self.refuse(format_args!(
-                    "must be a whole number from 1 to {most}, without a decimal point"
-                ))
-            })
+        if let DeValue::Integer(integer) = self.value()
+            && let Ok(whole) = usize::from_str_radix(integer.as_str(), integer.radix())
+            && (1..=most).contains(&whole)
+        {
+            return Ok(whole);
+        }
+        Err(self.refuse(format_args!(
+            "must be a whole number from 1 to {most}, without a decimal point"
+        )))
     }
 
     /// A number in the range of its key.
@@ -73,14 +69,9 @@ impl<'e> Item<'e> {
         // 1e999 parses to infinity, which nobody wrote.
         let says_infinite =
             matches!(self.value(), DeValue::Float(float) if float.as_str().contains("inf"));
-        let value: f64 = match value {
-            Some(value) if says_infinite || !f64::is_infinite(value) => value,
-            _ => {
-                return Err(
-                    self.refuse("is not a number a computer can hold (the largest is 1.8e308)")
-                );
-            }
-        };
+        let value = value.filter(|value| says_infinite || !f64::is_infinite(*value));
+        let too_large = "is not a number a computer can hold (the largest is 1.8e308)";
+        let value = value.ok_or_else(|| self.refuse(too_large))?;
         let positive = matches!(range, Range::Positive | Range::PositiveOrInfinite);
         let problem = match value {
             _ if value.is_nan() || value == f64::NEG_INFINITY => "must be a finite number",
@@ -119,9 +110,7 @@ impl<'e> Item<'e> {
         };
         let because = format!("one per {each} ({counted})");
         let needed = match self.key().form() {
-            Form::Quantity(_) => {
-                format!("a number, a list of {count} (one per rod), or {PROFILE}")
-            }
+            Form::Quantity(_) => format!("a number, a list of {count} (one per rod), or {PROFILE}"),
             _ => format!("a number or a list of {count} (one per {each})"),
         };
         let list = self.list_of(count, &because, &needed)?;
@@ -153,12 +142,11 @@ impl<'e> Item<'e> {
             range => range,
         };
         let values = self.list_of(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
-        Ok(Profile::Linear {
-            at: at.to_vec(),
-            value: values
-                .map(|item| item.number_in(range))
-                .collect::<Result<_>>()?,
-        })
+        let value = values
+            .map(|item| item.number_in(range))
+            .collect::<Result<_>>()?;
+        let at = at.to_vec();
+        Ok(Profile::Linear { at, value })
     }
 
     /// A load in time.

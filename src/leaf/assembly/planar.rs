@@ -144,15 +144,3 @@ fn couple(block: &mut Block<PLANAR>, k: &PlanarBlocks) {
         [-xt.y, -xx.x_axis.y, -xx.y_axis.y],
     ];
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn turns_add() {
-        let q = turned(turned(DQuat::IDENTITY, 2.5), 1.5);
-        let wanted = DQuat::from_rotation_z(4.0);
-        assert!((q.dot(wanted).abs() - 1.0).abs() < 1e-15);
-    }
-}

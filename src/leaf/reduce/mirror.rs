@@ -75,12 +75,8 @@ pub fn whole_of(half: &Leaf, state: &State) -> State {
             true => DQuat::from_xyzw(-q.x, q.y, -q.z, q.w),
             false => q,
         }));
-        let own_forces = &state.n[own * n..(own + 1) * n];
-        forces.extend(
-            own_forces
-                .iter()
-                .map(|&f| reflect(f / half.share(own), image)),
-        );
+        let own_forces = state.n[own * n..(own + 1) * n].iter();
+        forces.extend(own_forces.map(|&f| reflect(f / half.share(own), image)));
     }
     let mut whole = State::new(n, x, q);
     whole.n = forces;
@@ -89,50 +85,4 @@ pub fn whole_of(half: &Leaf, state: &State) -> State {
 
 fn reflect(v: DVec3, image: bool) -> DVec3 {
     if image { DVec3::new(v.x, -v.y, v.z) } else { v }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const LEAF: &str = r#"
-        name = "leaf"
-        leaf = { rods = 5, length = [0.9, 1.0, 1.1, 1.0, 0.9], fan = "symmetric" }
-        stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 100.0, shear_3 = 100.0 }
-        rest = { twist = [0.1, 0.2, 0.0, -0.2, -0.1], bend_2 = 0.3 }
-        coupling = { y = [1.0, 2.0, 2.0, 1.0] }
-        load = { gravity = [0.1, 0.0, -1.0] }
-    "#;
-
-    fn half(entry: &str) -> bool {
-        let scenario = Scenario::from_toml_with(LEAF, "leaf", &[entry.into()]).unwrap();
-        Leaf::new(&scenario)
-            .reduced()
-            .is_some_and(|leaf| leaf.mirrored)
-    }
-
-    #[test]
-    fn mirrored_leaves_are_known() {
-        for entry in [
-            "name='same'",
-            "rest.stretch=[1.2, 1.1, 1.0, 1.1, 1.2]",
-            "rest.bend_3=[1.0, 0.0, 0.0, 0.0, -1.0]",
-        ] {
-            assert!(half(entry), "{entry}");
-        }
-        for entry in [
-            "leaf.fan='paper'",
-            "leaf.length=[0.9, 1.0, 1.1, 1.0, 0.8]",
-            "stiffness.axial=[1, 2, 3, 2, 2]",
-            "rest.twist=0.1",
-            "rest.stretch=[1.2, 1.1, 1.0, 1.1, 1.0]",
-            "rest.bend_3=[1.0, 0.0, 0.0, 0.0, 1.0]",
-            "rest.bend_3=[1.0, 0.0, 0.5, 0.0, -1.0]",
-            "coupling.z=[1.0, 2.0, 2.0, 3.0]",
-            "load.gravity=[0.0, 1e-9, -1.0]",
-            "load.tip_force=[0.0, 1.0, 0.0]",
-        ] {
-            assert!(!half(entry), "{entry}");
-        }
-    }
 }
