@@ -61,17 +61,6 @@ pub struct Eigenpair {
     pub shape: Vec<Increment>,
 }
 
-/// The modes could not be found.
-#[derive(Clone, Copy, Debug, thiserror::Error)]
-pub enum ModesError {
-    /// The matrix does not fit into memory.
-    #[error(transparent)]
-    Memory(#[from] SparseError),
-    /// The eigenvalues found are not as many as there are.
-    #[error("the lowest eigenvalues could not be told apart")]
-    Unproved,
-}
-
 struct Vibration<'a> {
     leaf: &'a DiscreteLeaf,
     state: &'a State,
@@ -81,23 +70,21 @@ struct Vibration<'a> {
 }
 
 /// The lowest `count` eigenvalues, ascending, all if there are fewer, with
-/// their modes, which are orthonormal with the masses.
-///
-/// # Errors
-/// If memory is short, or the list cannot be proved to be complete.
+/// their modes, which are orthonormal with the masses. `None` if memory is short, or
+/// the list cannot be proved to be complete.
 pub fn lowest(
     leaf: &DiscreteLeaf,
     physics: &Physics,
     state: &State,
     count: usize,
-) -> Result<Vec<Eigenpair>, ModesError> {
+) -> Option<Vec<Eigenpair>> {
     let mut soft = leaf.clone();
     let tension = state.n.iter().fold(0.0_f64, |m, n| m.max(n.length()));
     for section in &mut soft.sections {
         *section = section.condense(STIFFEST.max(STIFFER * tension));
     }
     let system = System::new(&soft);
-    let pattern = SparsePattern::new(&system)?;
+    let pattern = SparsePattern::new(&system).ok()?;
     let mut vibration = Vibration {
         masses: Masses::new(&soft, physics, state, &pattern),
         leaf: &soft,
@@ -113,42 +100,41 @@ pub fn lowest(
     };
     let mut pairs: Vec<Eigenpair> = found.iter().map(pair).collect();
     pairs.sort_by(|a, b| a.eigenvalue.total_cmp(&b.eigenvalue));
-    Ok(pairs)
+    Some(pairs)
 }
 
 impl Vibration<'_> {
     /// K - shift M.
-    fn factorize(&mut self, shift: f64) -> Result<SparseFactor<'_>, SparseError> {
+    fn factorize(&mut self, shift: f64) -> Option<SparseFactor<'_>> {
         self.leaf.assemble(self.state, &mut self.system);
         self.masses.add(&mut self.system, -shift);
-        self.pattern.factorize(&self.system, 0.0)
+        self.pattern.factorize(&self.system, 0.0).ok()
     }
 
     /// A shift below all eigenvalues, no farther than it must be.
-    fn below_all(&mut self) -> Result<f64, ModesError> {
+    fn below_all(&mut self) -> Option<f64> {
         let mut shift = -self.leaf.neutral_shift();
         while self.factorize(shift)?.negative() > 0 {
             shift = (NEXT_SHIFT * shift).min(-FIRST_SHIFT);
             if !shift.is_finite() {
-                return Err(ModesError::Unproved);
+                return None;
             }
         }
-        Ok(shift)
+        Some(shift)
     }
 
     /// Eigenvectors of unit mass, eigenvalues ascending.
-    fn lowest(&mut self, count: usize) -> Result<Vec<Vec<f64>>, ModesError> {
-        let size = self.pattern.size();
-        let count = count.min(size);
+    fn lowest(&mut self, count: usize) -> Option<Vec<Vec<f64>>> {
+        let count = count.min(self.pattern.size());
         if count == 0 {
-            return Ok(Vec::new());
+            return Some(Vec::new());
         }
         let lowest = self.below_all()?;
         let (mut shift, mut limit) = (lowest, f64::INFINITY);
         let mut found: Vec<Mode> = Vec::new();
         let mut wanted = count;
         for search in 0..SEARCHES + count {
-            let bound = self.search(shift, (wanted, limit), search, &mut found)?;
+            let bound = (self.search(shift, (wanted, limit), search, &mut found)).ok()?;
             if found.len() < count {
                 wanted = count - found.len();
                 if let Some(bound) = bound {
@@ -159,21 +145,16 @@ impl Vibration<'_> {
             let (missing, below) = self.missing(&found, count, lowest)?;
             if missing == 0 {
                 found.truncate(count);
-                return Ok(found.into_iter().map(|found| found.vector).collect());
+                return Some(found.into_iter().map(|found| found.vector).collect());
             }
             (wanted, limit, shift) = (missing.min(count), below, lowest);
         }
-        Err(ModesError::Unproved)
+        None
     }
 
     /// How many eigenvalues are missing, and below what value: just below the
     /// `count`-th of those found, to which there may be more that are equal.
-    fn missing(
-        &mut self,
-        found: &[Mode],
-        count: usize,
-        lowest: f64,
-    ) -> Result<(usize, f64), ModesError> {
+    fn missing(&mut self, found: &[Mode], count: usize, lowest: f64) -> Option<(usize, f64)> {
         let last = found[count - 1].eigenvalue;
         let rounding = self.leaf.rounding();
         for part in BELOW {
@@ -182,24 +163,24 @@ impl Vibration<'_> {
             let here = found.iter().filter(|f| f.eigenvalue < below).count();
             // Too many: one is equal to the limit but for rounding.
             if let Some(count) = there.checked_sub(here) {
-                return Ok((count, below));
+                return Some((count, below));
             }
         }
-        Err(ModesError::Unproved)
+        None
     }
 
     /// A shift closer to the next eigenvalues, where many are close together:
     /// somewhat below `bound`, but above no more than those found.
-    fn closer(&mut self, shift: f64, bound: f64, found: &[Mode]) -> Result<f64, ModesError> {
+    fn closer(&mut self, shift: f64, bound: f64, found: &[Mode]) -> Option<f64> {
         let mut part = FIRST_PART;
         while part < 1.0 {
             let closer = bound - part * (bound - shift);
             if self.factorize(closer)?.negative() <= found.len() {
-                return Ok(closer);
+                return Some(closer);
             }
             part *= NEXT_PART;
         }
-        Ok(shift)
+        Some(shift)
     }
 
     /// Adds to the eigenvalues found `wanted` more of those next above the
@@ -210,7 +191,7 @@ impl Vibration<'_> {
         (wanted, limit): (usize, f64),
         search: usize,
         found: &mut Vec<Mode>,
-    ) -> Result<Option<f64>, ModesError> {
+    ) -> Result<Option<f64>, SparseError> {
         let start = self.start(search);
         self.leaf.assemble(self.state, &mut self.system);
         self.masses.add(&mut self.system, -shift);

@@ -53,7 +53,7 @@ pub fn lowest(run: &Run) -> Option<Vec<Mode>> {
     let levels = levels(run)?;
     let finest = levels.last()?;
     let physics = Physics::new(run.leaf);
-    let on = |level: &Level| modes::lowest(&level.leaf, &physics, &level.state, options.modes).ok();
+    let on = |level: &Level| modes::lowest(&level.leaf, &physics, &level.state, options.modes);
     // The finest first: what is too large for it need not be begun.
     let pairs = on(finest)?;
     let first = levels.len().saturating_sub(GRIDS);
