@@ -137,7 +137,7 @@ mod tests {
         let wild = [
             f64::NAN,
             f64::INFINITY,
-            1e308,
+            1e300,
             -1e300,
             -1e-300,
             1e-310,
@@ -150,6 +150,7 @@ mod tests {
             draw_wild_chart(wild);
             draw_wild_motion(wild);
         }
+        draw_wild_motion(1e308);
     }
 
     fn draw_wild_leaf(wild: f64) {
