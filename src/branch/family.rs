@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use std::sync::Arc;
+
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, Scale, State};
 use crate::scenario::Scenario;
 
@@ -86,7 +88,7 @@ impl<'a> Family<'a> {
         act: impl FnOnce(&DiscreteLeaf) -> R,
     ) -> Result<R, OutOfRange> {
         let scenario = self.scenario(fraction)?;
-        let leaf = Leaf::in_units(&scenario, self.scale);
+        let leaf = Leaf::in_units(Arc::new(scenario), self.scale);
         let mut discrete = DiscreteLeaf::new(&leaf, grid.clone());
         for section in &mut discrete.sections {
             section.condensing = match self.softening {

@@ -45,12 +45,12 @@ pub struct Loads {
 impl Leaf {
     /// Scales a checked scenario.
     pub fn new(scenario: &Scenario) -> Self {
-        Leaf::in_units(scenario, scenario.scale())
+        Leaf::in_units(Arc::new(scenario.clone()), scenario.scale())
     }
 
     /// The same in given units, in which leaves that differ in length or
     /// stiffness can be compared.
-    pub fn in_units(scenario: &Scenario, scale: Scale) -> Self {
+    pub fn in_units(scenario: Arc<Scenario>, scale: Scale) -> Self {
         let rods = scenario.rods.iter();
         let profiles = rods.flat_map(|rod| {
             let triples = [
@@ -74,7 +74,6 @@ impl Leaf {
         let softest = couple.fold(f64::INFINITY, |m, profile| m.min(profile.at(0.5)));
         let vector = |a: [f64; 3], unit: f64| DVec3::from_array(a) / unit;
         Leaf {
-            scenario: Arc::new(scenario.clone()),
             mirrored: false,
             planar: false,
             scale,
@@ -85,6 +84,7 @@ impl Leaf {
             },
             kinks,
             softest: softest / scale.stiffness,
+            scenario,
         }
     }
 

@@ -80,8 +80,8 @@ pub fn blocks(nodes: &[Node], beside: Option<&[Arc<Material>]>) -> Vec<Arc<Mater
     for nodes in nodes.chunks(BLOCK) {
         let material = Material::new(nodes);
         let above = beside.and_then(|rod| rod.get(blocks.len()));
-        let same = [blocks.last(), above].into_iter().flatten();
-        let same = same.cloned().find(|other| **other == material);
+        let near = [blocks.last(), above].into_iter().flatten();
+        let same = { near }.find(|other| ***other == material).cloned();
         blocks.push(same.unwrap_or_else(|| Arc::new(material)));
     }
     blocks
