@@ -53,11 +53,7 @@ fn a_leaf_comes_to_rest_and_is_written_down() {
     assert_eq!(csv.lines().count(), 1 + 5 * stations);
     let tip = csv.lines().nth(stations).unwrap().split(',').skip(3);
     let tip: Vec<f64> = tip.take(3).map(|cell| cell.parse().unwrap()).collect();
-    assert_eq!(
-        summary["tip"],
-        serde_json::json!(tip),
-        "every digit is kept"
-    );
+    assert_eq!(summary["tip"], serde_json::json!(tip));
 }
 
 #[test]

@@ -3,8 +3,9 @@
 //! scenario's.
 
 use super::equations::Equations;
-use super::newton::{Newton, Work};
+use super::newton::Newton;
 use super::solution::Reason;
+use super::solution::Work;
 use super::trajectory::Trajectory;
 
 /// Accuracy of the solutions on the way.

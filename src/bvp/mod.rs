@@ -52,6 +52,5 @@ mod state;
 mod tableau;
 mod trajectory;
 
-pub use newton::Work;
-pub use solution::{Failure, Neutral, Options, Precision, Reason, Solution, Start};
+pub use solution::{Failure, Neutral, Options, Precision, Reason, Solution, Start, Work};
 pub use solve::solve;

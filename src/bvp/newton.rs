@@ -10,9 +10,8 @@ use super::dop853::Unbounded;
 use super::equations::{Equations, RodState};
 use super::intervals::{Integrated, Units, choose, integrate, sensitivities};
 use super::march::March;
-use super::solution::Reason;
+use super::solution::{Reason, Work};
 use super::trajectory::{Nodes, Trajectory};
-use serde::Serialize;
 
 /// Iterations before a solution is given up.
 const MAX_ITERATIONS: usize = 60;
@@ -33,29 +32,6 @@ const KEEP: f64 = 0.1;
 /// Corrections may stop shrinking at this multiple of the integration's
 /// tolerance, which is where its step control makes noise.
 const NOISE: f64 = 1e3;
-
-/// Work done by the shooting, counted so that tests can pin it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Work {
-    /// Corrections made.
-    pub iterations: usize,
-    /// Linearisations: sensitivities of all intervals, and their factorisation.
-    pub linearizations: usize,
-    /// Steps of the integrator.
-    pub steps: usize,
-    /// Evaluations of the slopes of the whole leaf.
-    pub slopes: usize,
-}
-
-impl Work {
-    /// Adds what another run did.
-    pub fn add(&mut self, other: Work) {
-        self.iterations += other.iterations;
-        self.linearizations += other.linearizations;
-        self.steps += other.steps;
-        self.slopes += other.slopes;
-    }
-}
 
 /// Why Newton's method did not converge.
 pub enum Stuck {

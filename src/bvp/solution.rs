@@ -3,11 +3,34 @@
 use std::fmt;
 
 use glam::DVec3;
+use serde::Serialize;
 
 use super::dop853::Unbounded;
-use super::newton::Work;
 use crate::limit::Limit;
 use crate::shape::{Difference, RodShape};
+
+/// Work done by the shooting, counted so that tests can pin it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Work {
+    /// Corrections made.
+    pub iterations: usize,
+    /// Linearisations: sensitivities of all intervals, and their factorisation.
+    pub linearizations: usize,
+    /// Steps of the integrator.
+    pub steps: usize,
+    /// Evaluations of the slopes of the whole leaf.
+    pub slopes: usize,
+}
+
+impl Work {
+    /// Adds what another run did.
+    pub fn add(&mut self, other: Work) {
+        self.iterations += other.iterations;
+        self.linearizations += other.linearizations;
+        self.steps += other.steps;
+        self.slopes += other.slopes;
+    }
+}
 
 /// Displacements below this part of the largest are not worth telling.
 const MOVES: f64 = 0.2;

@@ -2,8 +2,8 @@
 
 use super::continuation::{Interrupted, from_arcs};
 use super::equations::Equations;
-use super::newton::{Newton, Work};
-use super::solution::{Failure, Options, Precision, Reason, Solution, Start};
+use super::newton::Newton;
+use super::solution::{Failure, Options, Precision, Reason, Solution, Start, Work};
 use super::trajectory::Trajectory;
 use crate::scenario::{Scenario, longest};
 use crate::shape::Difference;
