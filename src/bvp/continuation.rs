@@ -4,8 +4,8 @@
 
 use super::equations::Equations;
 use super::newton::Newton;
-use super::solution::Reason;
-use super::solution::Work;
+use super::solution::{Reason, Work};
+
 use super::trajectory::Trajectory;
 
 /// Accuracy of the solutions on the way.
