@@ -9,6 +9,7 @@ use toml::de::DeValue;
 use super::dynamics::{OUTPUTS, round_inertia};
 use super::error::ScenarioError;
 use super::key::Key;
+use super::material::Sections;
 use super::raw::{Item, Raw};
 use super::{Dynamics, Profile, Rod, Scenario, Start, Units, limits};
 
@@ -33,7 +34,8 @@ pub(super) fn check(raw: &Raw) -> Result<Scenario> {
         force: raw.given(Key::UnitForce).map(unit).transpose()?,
     };
     let rods = raw.item(Key::Rods)?.whole(MOST_RODS)?;
-    let rods = veins(raw, rods)?;
+    let sections = Sections::read(raw, rods)?;
+    let rods = veins(raw, rods, sections.as_ref())?;
     let joined = raw.item(Key::Joined)?.switch()?;
     let coupling = coupling(raw, rods.len() - 1)?;
     let gravity = raw.item(Key::Gravity)?.vector()?;
@@ -42,7 +44,8 @@ pub(super) fn check(raw: &Raw) -> Result<Scenario> {
     let tip_moment = item.vector()?;
     on_one_rod(item, rods.len(), &[tip_moment])?;
     let tolerance = tolerance(raw.item(Key::Tolerance)?)?;
-    let dynamics = dynamics(raw, &rods, [gravity, tip_force, tip_moment])?;
+    let loads = [gravity, tip_force, tip_moment];
+    let dynamics = dynamics(raw, &rods, sections.as_ref(), loads)?;
     let scenario = Scenario {
         name,
         units,
@@ -83,7 +86,7 @@ fn unit(item: Item) -> Result<String> {
     Ok(unit.trim().to_string())
 }
 
-fn veins(raw: &Raw, rods: usize) -> Result<Vec<Rod>> {
+fn veins(raw: &Raw, rods: usize, sections: Option<&Sections>) -> Result<Vec<Rod>> {
     let length = raw.item(Key::Length)?.one_each(rods)?;
     let angle = angles(raw.item(Key::Fan)?, rods)?;
     let quantity = |key| raw.item(key)?.quantity(rods);
@@ -91,8 +94,10 @@ fn veins(raw: &Raw, rods: usize) -> Result<Vec<Rod>> {
         Ok([quantity(first)?, quantity(second)?, quantity(third)?])
     };
     let stretch = quantity(Key::RestStretch)?;
-    let couple = triple(limits::COUPLE)?;
-    let force = triple(limits::FORCE)?;
+    let (couple, force) = match sections {
+        Some(sections) => (sections.couple(), sections.force()),
+        None => (triple(limits::COUPLE)?, triple(limits::FORCE)?),
+    };
     let rest = triple(limits::REST)?;
     let of = |all: &[Vec<Profile>; 3], rod: usize| all.each_ref().map(|one| one[rod].clone());
     Ok((0..rods)
@@ -167,10 +172,24 @@ fn tolerance(item: Item) -> Result<f64> {
 }
 
 /// The table `[dynamics]`, for rods under the loads `[gravity, tip_force, tip_moment]`.
-fn dynamics(raw: &Raw, rods: &[Rod], loads: [[f64; 3]; 3]) -> Result<Dynamics> {
+fn dynamics(
+    raw: &Raw,
+    rods: &[Rod],
+    sections: Option<&Sections>,
+    loads: [[f64; 3]; 3],
+) -> Result<Dynamics> {
     let [gravity, tip_force, tip_moment] = loads;
-    let preset = match raw.given(Key::Density) {
-        Some(density) => Dynamics::of_density(rods, density.quantity(rods.len())?),
+    let of_sections = sections.and_then(Sections::density);
+    let density = match raw.given(Key::Density) {
+        Some(item) => {
+            let why = "section.mass_density is given, too: leave one of them out";
+            item.ensure(of_sections.is_none(), why)?;
+            Some(item.quantity(rods.len())?)
+        }
+        None => of_sections,
+    };
+    let preset = match density {
+        Some(density) => Dynamics::of_density(rods, density),
         None => Dynamics::default_for(rods),
     }
     .with_loads(gravity, tip_force, tip_moment);
@@ -181,6 +200,7 @@ fn dynamics(raw: &Raw, rods: &[Rod], loads: [[f64; 3]; 3]) -> Result<Dynamics> {
     };
     let duration = number(Key::Duration, preset.duration)?;
     let section = rotary_inertia(raw, &preset.density)?;
+    let section = section.or_else(|| sections.and_then(Sections::rotary_inertia));
     let external_damping = number(Key::ExternalDamping, preset.external_damping)?;
     let internal_damping = raw.item(Key::InternalDamping)?.number()?;
     let output_interval = match raw.given(Key::OutputInterval) {

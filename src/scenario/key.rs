@@ -124,6 +124,20 @@ keys! {
     Shear2 "stiffness.shear_2": Quantity(PositiveOrInfinite), [0, 1, 0], Refused("100.0");
     /// H3, against shear along d3; `inf`: unshearable.
     Shear3 "stiffness.shear_3": Quantity(PositiveOrInfinite), [0, 1, 0], Refused("100.0");
+    /// form of the rods' section, from which their stiffnesses follow.
+    SectionShape "section.shape": Text, [0, 0, 0], Refused("\"circle\"");
+    /// diameter of a circle.
+    Diameter "section.diameter": Quantity(Positive), [1, 0, 0], Refused("0.1");
+    /// width of an ellipse or a rectangle, along d2.
+    Width "section.width": Quantity(Positive), [1, 0, 0], Refused("0.4");
+    /// thickness of an ellipse or a rectangle, along d3.
+    Thickness "section.thickness": Quantity(Positive), [1, 0, 0], Refused("0.1");
+    /// E, Young's modulus.
+    Young "section.young": Quantity(Positive), [-2, 1, 0], Refused("0.3");
+    /// nu, Poisson's ratio.
+    Poisson "section.poisson": Quantity(Finite), [0, 0, 0], Means("0.3");
+    /// mass per volume.
+    MassDensity "section.mass_density": Quantity(Positive), [-4, 1, 2], Follows;
     /// u0_1, twist at rest; positive turns d2 towards d3 on the way to the tip.
     RestTwist "rest.twist": Quantity(Finite), [-1, 0, 0], Means("0.0");
     /// u0_2, curvature at rest about d2; positive bends the rod down, towards -d3.
@@ -264,7 +278,7 @@ mod tests {
             assert_eq!(Key::from_path(key.path()), Some(key));
             assert_eq!(key.row().key, key);
         }
-        assert_eq!(Key::tables().len(), 8);
+        assert_eq!(Key::tables().len(), 9);
     }
 
     #[test]

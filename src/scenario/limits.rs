@@ -4,9 +4,10 @@
 
 use super::error::ScenarioError;
 use super::key::{Form, Key};
+use super::material;
 use super::raw::{Item, Raw};
 use super::scale::longest;
-use super::{Rod, Scale, Scenario};
+use super::{Profile, Rod, Scale, Scenario};
 
 type Result = std::result::Result<(), ScenarioError>;
 
@@ -147,6 +148,7 @@ pub(super) fn check(raw: &Raw, scenario: &Scenario) -> Result {
     }
     coupling(raw, scenario)?;
     dynamics(raw, scenario)?;
+    masses(raw, scenario)?;
     in_time(raw, scenario)
 }
 
@@ -196,6 +198,15 @@ fn rods(raw: &Raw, rods: &[Rod]) -> Result {
         for (key, stiffness) in FORCE.into_iter().zip(&rod.force_stiffness) {
             check(key, index, &FORCE_STIFFNESS, natural(key, stiffness.min()))?;
         }
+        // Stiffnesses that are not given follow from the size of a section.
+        if let Some(item) = material::size(raw) {
+            let couple = rod.couple_stiffness.iter().map(Profile::min);
+            let least = couple.fold(f64::INFINITY, f64::min);
+            STIFFNESSES.check(item.entry(index), stiffest / least)?;
+            for (key, stiffness) in FORCE.into_iter().zip(&rod.force_stiffness) {
+                FORCE_STIFFNESS.check(item.entry(index), natural(key, stiffness.min()))?;
+            }
+        }
         for (key, curvature) in REST.into_iter().zip(&rod.rest_curvature) {
             check(key, index, &REST_ANGLE, natural(key, curvature.max_abs()))?;
         }
@@ -235,6 +246,32 @@ fn dynamics(raw: &Raw, scenario: &Scenario) -> Result {
             continue;
         };
         for (index, profile) in item.quantity(scenario.rods.len())?.iter().enumerate() {
+            for value in [profile.min(), profile.max_abs()] {
+                limit.check(item.entry(index), value * natural)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Masses that follow from sections.
+fn masses(raw: &Raw, scenario: &Scenario) -> Result {
+    let (Some(size), Some(density)) = (material::size(raw), raw.given(Key::MassDensity)) else {
+        return Ok(());
+    };
+    let (scale, time) = (scenario.scale(), scenario.time());
+    let dynamics = &scenario.dynamics;
+    for (item, key, limit, profiles) in [
+        (density, Key::Density, &DYNAMICS[0].1, &dynamics.density),
+        (
+            size,
+            Key::RotaryInertia,
+            &DYNAMICS[1].1,
+            &dynamics.rotary_inertia,
+        ),
+    ] {
+        let natural = per(key, scale, time);
+        for (index, profile) in profiles.iter().enumerate() {
             for value in [profile.min(), profile.max_abs()] {
                 limit.check(item.entry(index), value * natural)?;
             }

@@ -8,11 +8,13 @@ mod dynamics;
 mod error;
 mod key;
 mod limits;
+mod material;
 mod profile;
 mod raw;
 mod read;
 mod scale;
 mod schedule;
+mod section;
 mod value;
 
 pub use dynamics::{Dynamics, Start};
@@ -24,6 +26,7 @@ pub(crate) use read::text;
 pub use scale::Scale;
 pub(crate) use scale::longest;
 pub use schedule::Schedule;
+pub use section::{Property, Section};
 
 /// A checked scenario. All quantities are in the units the file was written
 /// in, which only have to be consistent with each other.

@@ -1,7 +1,11 @@
 //! A quantity along a rod.
 
-/// A quantity along a rod: constant, or linear between knots given at
-/// fractions sigma = s/L of the rod's length.
+use std::sync::Arc;
+
+use super::section::{Property, Section};
+
+/// A quantity along a rod: constant, linear between knots given at fractions
+/// sigma = s/L of the rod's length, or what follows from its section.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Profile {
     /// The same value everywhere; may be infinite where the quantity allows it.
@@ -13,7 +17,25 @@ pub enum Profile {
         /// Values at the knots, all finite.
         value: Vec<f64>,
     },
+    /// A property of the rod's section, where the section changes along it.
+    Section {
+        /// The section.
+        section: Arc<Section>,
+        /// The property.
+        property: Property,
+        /// Times which it is taken.
+        factor: f64,
+    },
 }
+
+/// Abscissae and weights of the Gauss-Legendre rule of five points on (0, 1).
+const GAUSS: [(f64, f64); 5] = [
+    (0.046_910_077_030_668_004, 0.118_463_442_528_094_54),
+    (0.230_765_344_947_158_45, 0.239_314_335_249_683_23),
+    (0.5, 0.284_444_444_444_444_44),
+    (0.769_234_655_052_841_6, 0.239_314_335_249_683_23),
+    (0.953_089_922_969_332, 0.118_463_442_528_094_54),
+];
 
 impl Profile {
     /// The value at the fraction `sigma` in [0, 1].
@@ -30,6 +52,11 @@ impl Profile {
                 }
                 value[right - 1] + t.max(0.0) * (value[right] - value[right - 1])
             }
+            Profile::Section {
+                section,
+                property,
+                factor,
+            } => factor * section.at(*property, sigma),
         }
     }
 
@@ -43,6 +70,19 @@ impl Profile {
                 let part = |w: &[f64]| (w[1] - w[0]) * self.at(0.5 * (w[0] + w[1]));
                 knots.windows(2).map(part).sum()
             }
+            Profile::Section { section, .. } => {
+                let inside = section.kinks().iter().copied();
+                let inside = inside.filter(|&knot| knot < sigma);
+                let knots: Vec<f64> = [0.0].into_iter().chain(inside).chain([sigma]).collect();
+                let part = |w: &[f64]| -> f64 {
+                    let width = w[1] - w[0];
+                    let points = GAUSS.iter();
+                    points
+                        .map(|(x, weight)| width * weight * self.at(w[0] + x * width))
+                        .sum()
+                };
+                knots.windows(2).map(part).sum()
+            }
         }
     }
 
@@ -51,17 +91,18 @@ impl Profile {
         match self {
             Profile::Constant(_) => &[],
             Profile::Linear { at, .. } => &at[1..at.len() - 1],
+            Profile::Section { section, .. } => section.kinks(),
         }
     }
 
     /// The largest absolute value along the rod.
     pub fn max_abs(&self) -> f64 {
-        self.values().iter().fold(0.0, |m, v| m.max(v.abs()))
+        self.values().fold(0.0, |m, v| m.max(v.abs()))
     }
 
     /// The smallest value along the rod.
     pub fn min(&self) -> f64 {
-        self.values().iter().fold(f64::INFINITY, |m, v| m.min(*v))
+        self.values().fold(f64::INFINITY, f64::min)
     }
 
     /// The same profile times a factor.
@@ -72,13 +113,28 @@ impl Profile {
                 at: at.clone(),
                 value: value.iter().map(|v| factor * v).collect(),
             },
+            Profile::Section {
+                section,
+                property,
+                factor: own,
+            } => Profile::Section {
+                section: section.clone(),
+                property: *property,
+                factor: factor * own,
+            },
         }
     }
 
-    fn values(&self) -> &[f64] {
+    /// Its values where they may be extreme.
+    fn values(&self) -> Box<dyn Iterator<Item = f64> + '_> {
         match self {
-            Profile::Constant(value) => std::slice::from_ref(value),
-            Profile::Linear { value, .. } => value,
+            Profile::Constant(value) => Box::new(std::iter::once(*value)),
+            Profile::Linear { value, .. } => Box::new(value.iter().copied()),
+            Profile::Section {
+                section,
+                property,
+                factor,
+            } => Box::new(section.samples(*property).map(move |value| factor * value)),
         }
     }
 }

@@ -11,7 +11,7 @@ type Result<T> = std::result::Result<T, ScenarioError>;
 
 /// Lengths and stiffnesses lie between these: fourth powers of lengths and
 /// quotients of stiffnesses must not overflow.
-const MAGNITUDES: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
+pub(super) const MAGNITUDES: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
 
 const INFINITE: &str = "must be a finite number; inf (rigid) is allowed for stiffness.axial, \
      shear_2 and shear_3 only, not in a profile";

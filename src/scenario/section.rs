@@ -1,0 +1,269 @@
+//! Stiffnesses and masses of a rod from its material and the size of its section.
+//!
+//! With the area S, the second moments I2 and I3 about d2 and d3 and the shear
+//! modulus G = E/(2 (1 + nu)):
+//!
+//! | | |
+//! | --- | --- |
+//! | torsion | A1 = G J |
+//! | bending | A2 = E I2, A3 = E I3 |
+//! | axial | H1 = E S |
+//! | shear | H2 = k2 G S, H3 = k3 G S |
+//! | density, rotary inertia | rho S, rho (I2 + I3)/2 |
+//!
+//! The torsion constants J are those of Saint-Venant (S. P. Timoshenko and J. N.
+//! Goodier, Theory of Elasticity, 3rd ed., arts. 107 to 109), the shear factors k
+//! those of G. R. Cowper, J. Appl. Mech. 33 (1966), 335.
+
+use std::f64::consts::PI;
+
+use super::Profile;
+
+/// Points between two knots at which extremes are looked for.
+const SAMPLES: usize = 16;
+
+/// The outline of a section.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Outline {
+    /// A circle, or an ellipse, of which the width is along d2 and the thickness
+    /// along d3.
+    Ellipse,
+    /// A rectangle with the same sides.
+    Rectangle,
+}
+
+/// What follows from a section.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Property {
+    /// A1, A2 and A3, by index.
+    Couple(usize),
+    /// H1, H2 and H3, by index.
+    Force(usize),
+    /// Mass per length.
+    Density,
+    /// Moment of inertia per length: the mean of those about d2 and about d3, so
+    /// that twice it is that about d1.
+    RotaryInertia,
+}
+
+/// The section of a rod and its material, along the rod.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Section {
+    outline: Outline,
+    width: Profile,
+    thickness: Profile,
+    young: Profile,
+    poisson: Profile,
+    /// Mass per volume; zero where it is not given.
+    mass_density: Profile,
+    /// Fractions inside (0, 1) where the slope of one of them may jump.
+    kinks: Vec<f64>,
+}
+
+impl Section {
+    pub(super) fn new(
+        outline: Outline,
+        [width, thickness]: [Profile; 2],
+        [young, poisson, mass_density]: [Profile; 3],
+    ) -> Section {
+        let profiles = [&width, &thickness, &young, &poisson, &mass_density];
+        let mut kinks: Vec<f64> = profiles
+            .into_iter()
+            .flat_map(Profile::kinks)
+            .copied()
+            .collect();
+        kinks.sort_by(f64::total_cmp);
+        kinks.dedup();
+        Section {
+            outline,
+            width,
+            thickness,
+            young,
+            poisson,
+            mass_density,
+            kinks,
+        }
+    }
+
+    /// Whether it is the same along the whole rod.
+    pub(super) fn is_constant(&self) -> bool {
+        [
+            &self.width,
+            &self.thickness,
+            &self.young,
+            &self.poisson,
+            &self.mass_density,
+        ]
+        .into_iter()
+        .all(|profile| matches!(profile, Profile::Constant(_)))
+    }
+
+    /// Fractions inside (0, 1) where the slope of a property may jump.
+    pub fn kinks(&self) -> &[f64] {
+        &self.kinks
+    }
+
+    /// A property at a fraction of the length.
+    pub fn at(&self, property: Property, sigma: f64) -> f64 {
+        let (w, t) = (self.width.at(sigma), self.thickness.at(sigma));
+        let (young, poisson) = (self.young.at(sigma), self.poisson.at(sigma));
+        let shear = young / (2.0 * (1.0 + poisson));
+        let (area, second) = match self.outline {
+            Outline::Ellipse => (PI / 4.0 * w * t, PI / 64.0),
+            Outline::Rectangle => (w * t, 1.0 / 12.0),
+        };
+        let second = [second * w * t * t * t, second * t * w * w * w];
+        match property {
+            Property::Couple(0) => shear * self.outline.torsion(w, t),
+            Property::Couple(axis) => young * second[axis - 1],
+            Property::Force(0) => young * area,
+            Property::Force(1) => self.outline.shear_factor(w, t, poisson) * shear * area,
+            Property::Force(_) => self.outline.shear_factor(t, w, poisson) * shear * area,
+            Property::Density => self.mass_density.at(sigma) * area,
+            Property::RotaryInertia => 0.5 * self.mass_density.at(sigma) * (second[0] + second[1]),
+        }
+    }
+
+    /// Values at the knots and between them.
+    pub(super) fn samples(&self, property: Property) -> impl Iterator<Item = f64> {
+        let edges = [&[0.0], self.kinks(), &[1.0]].concat();
+        (0..edges.len() - 1).flat_map(move |panel| {
+            let (from, to) = (edges[panel], edges[panel + 1]);
+            (0..=SAMPLES).map(move |k| {
+                let part = k as f64 / SAMPLES as f64;
+                self.at(property, from + part * (to - from))
+            })
+        })
+    }
+}
+
+impl Outline {
+    /// The torsion constant J. Of a rectangle with the long side a and the short
+    /// side b: a b^3 (1/3 - 64/pi^5 b/a sum over odd n of tanh(n pi a/(2 b))/n^5).
+    fn torsion(self, width: f64, thickness: f64) -> f64 {
+        match self {
+            Outline::Ellipse => {
+                let (a, b) = (width / 2.0, thickness / 2.0);
+                // In this order equal sides give the circle's to the last bit but one.
+                PI * a * b * (a * b) * ((a * b) / (a * a + b * b))
+            }
+            Outline::Rectangle => {
+                let (long, short) = (width.max(thickness), width.min(thickness));
+                let term = |n: f64| (n * PI * long / (2.0 * short)).tanh() / n.powi(5);
+                // From n = 17 on every tanh is 1: the rest of the sum is known
+                // (zeta(5) times 31/32, less the terms before).
+                let all = 31.0 / 32.0 * 1.036_927_755_143_37;
+                let odd = (0..8).map(|k| (2 * k + 1) as f64);
+                let short_of_one: f64 = odd.map(|n| n.powi(-5) - term(n)).sum();
+                let sum = all - short_of_one;
+                long * short.powi(3) * (1.0 / 3.0 - 64.0 / PI.powi(5) * short / long * sum)
+            }
+        }
+    }
+
+    /// Cowper's factor for a shear force along the side `along`.
+    fn shear_factor(self, along: f64, across: f64, nu: f64) -> f64 {
+        match self {
+            Outline::Rectangle => 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu),
+            Outline::Ellipse => {
+                let (a, b) = (along * along, across * across);
+                12.0 * (1.0 + nu) * a * (3.0 * a + b)
+                    / ((40.0 + 37.0 * nu) * a * a + (16.0 + 10.0 * nu) * a * b + nu * b * b)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn section(outline: Outline, width: f64, thickness: f64, poisson: f64) -> Section {
+        let constant = Profile::Constant;
+        let material = [constant(2.0), constant(poisson), constant(3.0)];
+        Section::new(outline, [constant(width), constant(thickness)], material)
+    }
+
+    #[track_caller]
+    fn close(found: f64, wanted: f64, relative: f64) {
+        assert!((found / wanted - 1.0).abs() < relative, "{found} {wanted}");
+    }
+
+    /// Table 6 of Timoshenko and Goodier, art. 109, beyond its digits by summing the
+    /// series term by term, and the thin strip.
+    #[test]
+    fn torsion_of_rectangles() {
+        for (sides, constant) in [
+            (1.0, 0.140_577_014_955),
+            (2.0, 0.228_681_655_7),
+            (10.0, 0.312_332_5),
+        ] {
+            close(
+                Outline::Rectangle.torsion(sides, 1.0),
+                constant * sides,
+                3e-5,
+            );
+            close(
+                Outline::Rectangle.torsion(1.0, sides),
+                constant * sides,
+                3e-5,
+            );
+        }
+        let direct = |long: f64| {
+            let odd = (0..20_000).map(|k| (2 * k + 1) as f64);
+            let sum: f64 = odd.map(|n| (n * PI * long / 2.0).tanh() / n.powi(5)).sum();
+            long * (1.0 / 3.0 - 64.0 / PI.powi(5) / long * sum)
+        };
+        for long in [1.0, 1.3, 4.0, 50.0] {
+            close(Outline::Rectangle.torsion(long, 1.0), direct(long), 1e-13);
+        }
+        close(Outline::Rectangle.torsion(1e4, 1.0), 1e4 / 3.0, 1e-4);
+    }
+
+    /// A round section of diameter d: J = pi d^4/32, I = pi d^4/64, Cowper's factor
+    /// 6 (1 + nu)/(7 + 6 nu).
+    #[test]
+    fn an_ellipse_with_equal_axes_is_a_circle() {
+        let nu = 0.37;
+        let circle = section(Outline::Ellipse, 0.2, 0.2, nu);
+        let (shear, area) = (2.0 / (2.0 * (1.0 + nu)), PI * 0.01);
+        let i = PI * 0.2_f64.powi(4) / 64.0;
+        let factor = 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu);
+        for (property, value) in [
+            (Property::Couple(0), shear * 2.0 * i),
+            (Property::Couple(1), 2.0 * i),
+            (Property::Couple(2), 2.0 * i),
+            (Property::Force(0), 2.0 * area),
+            (Property::Force(1), factor * shear * area),
+            (Property::Force(2), factor * shear * area),
+            (Property::Density, 3.0 * area),
+            (Property::RotaryInertia, 3.0 * i),
+        ] {
+            close(circle.at(property, 0.5), value, 1e-14);
+        }
+    }
+
+    /// The stiff direction of a flat section is sideways: A3 about d3, H2 along d2.
+    #[test]
+    fn a_flat_section_is_soft_up_and_down() {
+        let flat = section(Outline::Rectangle, 0.4, 0.1, 0.3);
+        close(
+            flat.at(Property::Couple(1), 0.0),
+            2.0 * 0.4 * 1e-3 / 12.0,
+            1e-14,
+        );
+        close(
+            flat.at(Property::Couple(2), 0.0),
+            2.0 * 0.1 * 0.064 / 12.0,
+            1e-14,
+        );
+        let ellipse = section(Outline::Ellipse, 0.4, 0.1, 0.3);
+        assert!(ellipse.at(Property::Force(1), 0.0) > ellipse.at(Property::Force(2), 0.0));
+        let second = PI / 64.0 * 0.4 * 0.1 * (0.16 + 0.01);
+        close(
+            ellipse.at(Property::RotaryInertia, 0.0),
+            1.5 * second,
+            1e-14,
+        );
+    }
+}
