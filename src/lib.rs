@@ -198,6 +198,7 @@ pub mod cli;
 mod figure;
 #[cfg(feature = "cli")]
 pub mod files;
+mod lanes;
 mod leaf;
 mod limit;
 mod modes;

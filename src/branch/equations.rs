@@ -87,7 +87,7 @@ impl<'a> Equations<'a> {
     pub fn new(family: &'a Family<'a>, grid: Grid) -> Result<Self, OutOfRange> {
         let system = family.with(0.0, &grid, System::new)?;
         let one = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
-        let ones = vec![vec![one; grid.segments()]; system.rods.len()];
+        let ones = vec![vec![one; grid.segments()]; system.rods()];
         Ok(Equations {
             family,
             softened: None,
@@ -117,7 +117,7 @@ impl<'a> Equations<'a> {
     }
 
     pub(super) fn rods(&self) -> usize {
-        self.system.rods.len()
+        self.system.rods()
     }
 
     /// Product of two directions.

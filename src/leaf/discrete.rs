@@ -174,10 +174,16 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Mass of node `i` of rod `j` at unit density: rotary, translational.
-    pub(super) fn mass(&self, j: usize, i: usize) -> [f64; 2] {
-        let mass = self.weights[i] * self.leaf.length(j) * self.leaf.share(j);
+    /// Mass of the nodes of rod `j` at unit density, over their weights: rotary,
+    /// translational.
+    pub(super) fn mass_per_weight(&self, j: usize) -> [f64; 2] {
+        let mass = self.leaf.length(j) * self.leaf.share(j);
         [RADIUS_OF_GYRATION * RADIUS_OF_GYRATION * mass, mass]
+    }
+
+    /// Trapezoidal weight of node `i` as a fraction of the length.
+    pub(super) fn weight(&self, i: usize) -> f64 {
+        self.weights[i]
     }
 
     /// Segment `i` of rod `j` in `state`, carrying the force `n`.

@@ -1,6 +1,7 @@
 //! The whole matrix of the leaf as one sparse symmetric indefinite
 //! factorisation: for the Morse index, and for Newton's method at a saddle.
 
+use super::chain::place;
 use super::state::{Field, Increment};
 use super::system::System;
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -58,7 +59,7 @@ impl SparsePattern {
 
     /// The same with so many dense rows and columns at the end.
     pub fn bordered(system: &System, rows: usize) -> Result<Self, SparseError> {
-        let (rods, n) = (system.rods.len(), system.segments);
+        let (rods, n) = (system.rods(), system.segments);
         let mut nodes = Vec::with_capacity(rods * n);
         dissect((0, rods), (0, n), &mut nodes);
         let mut first = vec![0; rods * n];
@@ -221,22 +222,19 @@ impl SparseFactor<'_> {
     pub fn solve(&mut self, system: &mut System, inertia: Option<(&[Vec<Increment>], f64)>) {
         let unknowns = &self.pattern.unknowns;
         let mut b = vec![0.0; self.pattern.size];
-        for (j, rod) in system.rods.iter().enumerate() {
-            for (i, mut rhs) in rod.rhs.iter().copied().enumerate() {
+        for (j, rod) in system.rhs().iter().enumerate() {
+            for (i, mut rhs) in rod.iter().copied().enumerate() {
                 if let Some((velocity, per_step)) = inertia {
+                    let mass = system.mass(j, i);
                     for c in 0..6 {
-                        rhs[c] += rod.mass[i][c / 3] * velocity[j][i][c] * per_step;
+                        rhs[c] += mass[c / 3] * velocity[j][i][c] * per_step;
                     }
                 }
                 unknowns.gather(j, i, &rhs, &mut b);
             }
         }
         self.solve_vector(&mut b);
-        for (j, rod) in system.rods.iter_mut().enumerate() {
-            for (i, solution) in rod.solution.iter_mut().enumerate() {
-                *solution = unknowns.scatter(j, i, &b);
-            }
-        }
+        system.set_solution(&self.increments(&b));
     }
 
     /// Solves the bordered system for forces `rhs`, and `below` in the rows of
@@ -251,12 +249,18 @@ impl SparseFactor<'_> {
         }
         b[self.pattern.border..].copy_from_slice(below);
         self.solve_vector(&mut b);
-        let n = self.pattern.unknowns.segments;
-        let nodes = |j: usize| (0..n).map(|i| unknowns.scatter(j, i, &b)).collect();
         Bordered {
-            increments: (0..rhs.len()).map(nodes).collect(),
+            increments: self.increments(&b),
             multipliers: b[self.pattern.border..].to_vec(),
         }
+    }
+
+    /// The increments of all nodes.
+    fn increments(&self, all: &[f64]) -> Field {
+        let unknowns = &self.pattern.unknowns;
+        let rods = unknowns.first.chunks_exact(unknowns.segments).enumerate();
+        let nodes = |j: usize| (0..unknowns.segments).map(move |i| unknowns.scatter(j, i, all));
+        rods.map(|(j, _)| nodes(j).collect()).collect()
     }
 }
 
@@ -332,30 +336,27 @@ fn triangle(
             Side::Upper => Triplet::new(low, high, value),
         });
     };
-    for (j, rod) in system.rods.iter().enumerate() {
+    for j in 0..system.rods() {
         let at = |i: usize, c: usize| unknowns.at(j, i, c);
-        let chain = rod.matrix.spatial();
-        for (i, block) in chain.diagonal.iter().enumerate() {
+        let (group, lane) = place(j);
+        let chain = system.groups[group].matrix.spatial();
+        for i in 0..n {
+            let (own, next) = chain.blocks(i, lane);
+            let mass = system.mass(j, i);
             for r in 0..6 {
-                add(at(i, r), at(i, r), shift * rod.mass[i][r / 3]);
+                add(at(i, r), at(i, r), shift * mass[r / 3]);
                 for c in r..6 {
-                    add(at(i, r), at(i, c), block[r][c]);
+                    add(at(i, r), at(i, c), own[r][c]);
+                }
+                for c in 0..if i + 1 < n { 6 } else { 0 } {
+                    add(at(i, r), at(i + 1, c), next[r][c]);
                 }
             }
-        }
-        for (i, block) in chain.off.iter().enumerate() {
-            for r in 0..6 {
-                for c in 0..6 {
-                    add(at(i, r), at(i + 1, c), block[r][c]);
-                }
-            }
-        }
-        if let Some(springs) = system.springs.get(j) {
-            for (i, spring) in springs.iter().enumerate() {
-                if unknowns.tip.is_none() || i + 1 < n {
-                    for c in 0..3 {
-                        add(at(i, 3 + c), unknowns.at(j + 1, i, 3 + c), -spring[c]);
-                    }
+            if let Some(spring) = system.spring(j, i)
+                && (unknowns.tip.is_none() || i + 1 < n)
+            {
+                for c in 0..3 {
+                    add(at(i, 3 + c), unknowns.at(j + 1, i, 3 + c), -spring[c]);
                 }
             }
         }

@@ -5,7 +5,6 @@ mod explicit;
 mod fictitious;
 mod friction;
 mod kernel;
-mod lanes;
 mod method;
 mod nodes;
 mod physics;

@@ -1,8 +1,8 @@
 //! Components of increments that the plane of a mirrored half leaf holds.
 
-use crate::leaf::chain::{Chain, first};
+use crate::lanes::Four;
+use crate::leaf::chain::{Chain, Increments, first, place};
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::state::Increment;
 use glam::DVec3;
 
 /// Components of a node's increment (turn, shift) that are zero for a node in
@@ -22,14 +22,15 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Sets the held components of rod `j` to zero in a right-hand side.
-    pub(super) fn clear_held_components(&self, j: usize, rhs: &mut [Increment]) {
+    /// Sets the held components of rod `j` to zero in the right-hand side of its
+    /// group.
+    pub(super) fn clear_held_components(&self, j: usize, rhs: &mut [Increments]) {
         if !self.leaf.mirrored {
             return;
         }
         for (i, rhs) in rhs.iter_mut().enumerate() {
             for &c in self.held_components(j, i + 1) {
-                rhs[c] = 0.0;
+                rhs[c].0[place(j).1] = 0.0;
             }
         }
     }
@@ -40,31 +41,26 @@ impl DiscreteLeaf {
         &self,
         j: usize,
         chain: &mut Chain<B>,
-        rhs: &mut [Increment],
+        rhs: &mut [Increments],
     ) {
         if !self.leaf.mirrored {
             return;
         }
         self.clear_held_components(j, rhs);
+        let set = |four: &mut Four, value: f64| four.0[place(j).1] = value;
         for i in 0..self.segments() {
             for &held in self.held_components(j, i + 1) {
                 let Some(c) = held.checked_sub(first(B)) else {
                     continue;
                 };
-                let block = &mut chain.diagonal[i];
                 for k in 0..B {
-                    block[c][k] = 0.0;
-                    block[k][c] = 0.0;
-                }
-                block[c][c] = 1.0;
-                if i > 0 {
-                    for row in &mut chain.off[i - 1] {
-                        row[c] = 0.0;
+                    set(chain.diagonal(i, c.min(k), c.max(k)), 0.0);
+                    set(chain.off(i, c, k), 0.0);
+                    if i > 0 {
+                        set(chain.off(i - 1, k, c), 0.0);
                     }
                 }
-                if let Some(off) = chain.off.get_mut(i) {
-                    off[c] = [0.0; B];
-                }
+                set(chain.diagonal(i, c, c), 1.0);
             }
         }
     }

@@ -4,10 +4,10 @@ mod held;
 mod planar;
 mod spatial;
 
-use super::chain::RodMatrix;
+use super::chain::{Block, Chain, GroupMatrix, Increments, place, set_lane};
 use super::discrete::DiscreteLeaf;
-use super::state::State;
-use super::system::{Sums, System, each_rod};
+use super::state::{Increment, State};
+use super::system::{Sums, System, each_group, rods_of};
 use glam::DVec3;
 
 impl DiscreteLeaf {
@@ -15,25 +15,30 @@ impl DiscreteLeaf {
     /// `system`.
     pub fn assemble(&self, state: &State, system: &mut System) -> Sums {
         system.moment = self.tip_moment();
-        each_rod(system.parallel, &mut system.rods, |j, rod| {
-            let rhs = &mut rod.rhs;
-            rod.sums = match &mut rod.matrix {
-                RodMatrix::Spatial(chain, _) => {
-                    let sums = self.assemble_spatial(j, state, chain, rhs);
-                    self.hold_components(j, chain, rhs);
-                    sums
-                }
-                RodMatrix::Planar(chain, _) => {
-                    let sums = self.assemble_planar(j, state, chain, rhs);
-                    self.hold_components(j, chain, rhs);
-                    sums
-                }
-            };
+        each_group(system.parallel, &mut system.groups, |g, group| {
+            let rhs = &mut group.rhs;
+            group.sums = Sums::default();
+            for j in rods_of(g, self.rods()) {
+                let sums = match &mut group.matrix {
+                    GroupMatrix::Spatial(chain) => {
+                        let sums = self.assemble_spatial(j, state, chain, rhs);
+                        self.hold_components(j, chain, rhs);
+                        sums
+                    }
+                    GroupMatrix::Planar(chain) => {
+                        let sums = self.assemble_planar(j, state, chain, rhs);
+                        self.hold_components(j, chain, rhs);
+                        sums
+                    }
+                };
+                group.sums.energy += sums.energy;
+                group.sums.turn = group.sums.turn.max(sums.turn);
+            }
         });
         let mut total = Sums::default();
-        for rod in &system.rods {
-            total.energy += rod.sums.energy;
-            total.turn = total.turn.max(rod.sums.turn);
+        for group in &system.groups {
+            total.energy += group.sums.energy;
+            total.turn = total.turn.max(group.sums.turn);
         }
         total
     }
@@ -41,13 +46,16 @@ impl DiscreteLeaf {
     /// Writes the right-hand side of the change, to first order, if the rods
     /// had no compliance in the components `dropped` (ones and zeros).
     pub fn assemble_stiffening(&self, state: &State, dropped: DVec3, system: &mut System) {
-        for (j, rod) in system.rods.iter_mut().enumerate() {
-            rod.rhs.fill([0.0; 6]);
+        let mut all = vec![vec![[0.0; 6]; self.segments()]; self.rods()];
+        for (j, rhs) in all.iter_mut().enumerate() {
             match self.leaf.planar {
-                false => self.stiffen_spatial(j, state, dropped, &mut rod.rhs),
-                true => self.stiffen_planar(j, state, dropped, &mut rod.rhs),
+                false => self.stiffen_spatial(j, state, dropped, rhs),
+                true => self.stiffen_planar(j, state, dropped, rhs),
             }
-            self.clear_held_components(j, &mut rod.rhs);
+        }
+        system.set_rhs(&all);
+        for j in 0..self.rods() {
+            self.clear_held_components(j, &mut system.groups[place(j).0].rhs);
         }
     }
 
@@ -111,5 +119,38 @@ impl DiscreteLeaf {
             }
         }
         energy
+    }
+}
+
+/// The equations of a node while its segments are assembled.
+struct Node<const B: usize> {
+    block: Block<B>,
+    next: Block<B>,
+    rhs: Increment,
+}
+
+impl<const B: usize> Default for Node<B> {
+    fn default() -> Self {
+        Node {
+            block: [[0.0; B]; B],
+            next: [[0.0; B]; B],
+            rhs: [0.0; 6],
+        }
+    }
+}
+
+impl<const B: usize> Node<B> {
+    /// Writes them for node `i` (from 0) of rod `j`.
+    fn put(&self, i: usize, j: usize, chain: &mut Chain<B>, rhs: &mut [Increments]) {
+        let lane = place(j).1;
+        for r in 0..B {
+            for c in 0..B {
+                chain.off(i, r, c).0[lane] = self.next[r][c];
+                if r <= c {
+                    chain.diagonal(i, r, c).0[lane] = self.block[r][c];
+                }
+            }
+        }
+        set_lane(&mut rhs[i], lane, &self.rhs);
     }
 }

@@ -1,6 +1,7 @@
 //! The equations of a leaf in its plane z = 0, three unknowns a node.
 
-use crate::leaf::chain::{Block, Chain, PLANAR};
+use super::Node;
+use crate::leaf::chain::{Block, Chain, Increments, PLANAR};
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{Increment, State, shift};
 use crate::leaf::system::{Sums, System};
@@ -21,9 +22,10 @@ impl DiscreteLeaf {
         j: usize,
         state: &State,
         chain: &mut Chain<PLANAR>,
-        rhs: &mut [Increment],
+        rhs: &mut [Increments],
     ) -> Sums {
         let mut sums = Sums::default();
+        let mut own = Node::<PLANAR>::default();
         for i in 0..self.segments() {
             let section = self.section(j, i);
             let segment = self.planar_segment(state, j, i);
@@ -32,17 +34,19 @@ impl DiscreteLeaf {
             let gradient = segment.condensed_gradient(section);
             let blocks = segment.hessian(section);
             if i > 0 {
-                add_left(&mut chain.diagonal[i - 1], &blocks);
-                couple(&mut chain.off[i - 1], &blocks);
-                pull_left(&mut rhs[i - 1], &gradient);
+                add_left(&mut own.block, &blocks);
+                couple(&mut own.next, &blocks);
+                pull_left(&mut own.rhs, &gradient);
+                own.put(i - 1, j, chain, rhs);
             }
-            set_right(&mut chain.diagonal[i], &blocks);
-            self.add_coupling_stiffness(j, i + 1, &mut chain.diagonal[i]);
+            set_right(&mut own.block, &blocks);
+            self.add_coupling_stiffness(j, i + 1, &mut own.block);
             let (load, potential) = self.load(state, j, i + 1);
             sums.energy += potential;
-            rhs[i] = [0.0, 0.0, 0.0, load.x, load.y, 0.0];
-            pull_right(&mut rhs[i], &gradient);
+            own.rhs = [0.0, 0.0, 0.0, load.x, load.y, 0.0];
+            pull_right(&mut own.rhs, &gradient);
         }
+        own.put(self.segments() - 1, j, chain, rhs);
         sums
     }
 
@@ -73,10 +77,10 @@ impl DiscreteLeaf {
         next: &mut State,
     ) {
         let n = self.segments();
-        for (j, rod) in solution.rods.iter().enumerate() {
+        for (j, rod) in solution.solution().iter().enumerate() {
             let base = state.base(j);
             let (mut turn, mut dx) = (0.0, DVec2::ZERO);
-            for (i, increment) in rod.solution.iter().enumerate() {
+            for (i, increment) in rod.iter().enumerate() {
                 let (after, dx_after) = (increment[2], shift(increment).truncate());
                 let force = self.planar_segment(state, j, i).force_increment(
                     self.section(j, i),

@@ -1,6 +1,7 @@
 //! The equations of a leaf in space, six unknowns a node.
 
-use crate::leaf::chain::{Block, Chain, SPATIAL};
+use super::Node;
+use crate::leaf::chain::{Block, Chain, Increments, SPATIAL};
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{Increment, State, shift, turn};
 use crate::leaf::system::{Sums, System};
@@ -14,10 +15,11 @@ impl DiscreteLeaf {
         j: usize,
         state: &State,
         chain: &mut Chain<SPATIAL>,
-        rhs: &mut [Increment],
+        rhs: &mut [Increments],
     ) -> Sums {
         let n = self.segments();
         let mut sums = Sums::default();
+        let mut own = Node::<SPATIAL>::default();
         for i in 0..n {
             let force = state.n[j * n + i];
             let section = self.section(j, i);
@@ -27,18 +29,20 @@ impl DiscreteLeaf {
             let (g_x, g_a, g_b) = segment.condensed_gradient(section);
             let blocks = segment.hessian(section);
             if i > 0 {
-                add_left(&mut chain.diagonal[i - 1], &blocks);
-                couple(&mut chain.off[i - 1], &blocks);
-                add(&mut rhs[i - 1], -g_a, g_x);
+                add_left(&mut own.block, &blocks);
+                couple(&mut own.next, &blocks);
+                add(&mut own.rhs, -g_a, g_x);
+                own.put(i - 1, j, chain, rhs);
             }
-            set_right(&mut chain.diagonal[i], &blocks);
-            self.add_coupling_stiffness(j, i + 1, &mut chain.diagonal[i]);
+            set_right(&mut own.block, &blocks);
+            self.add_coupling_stiffness(j, i + 1, &mut own.block);
             let (load, potential) = self.load(state, j, i + 1);
             sums.energy += potential;
-            rhs[i] = [0.0; 6];
-            add(&mut rhs[i], -g_b, load - g_x);
+            own.rhs = [0.0; 6];
+            add(&mut own.rhs, -g_b, load - g_x);
         }
-        add(&mut rhs[n - 1], self.tip_moment(), DVec3::ZERO);
+        add(&mut own.rhs, self.tip_moment(), DVec3::ZERO);
+        own.put(n - 1, j, chain, rhs);
         sums
     }
 
@@ -70,11 +74,11 @@ impl DiscreteLeaf {
         next: &mut State,
     ) {
         let n = self.segments();
-        for (j, rod) in solution.rods.iter().enumerate() {
+        for (j, rod) in solution.solution().iter().enumerate() {
             let base = state.base(j);
             let (mut a, mut dx0) = (DVec3::ZERO, DVec3::ZERO);
             for i in 0..n {
-                let increment = &rod.solution[i];
+                let increment = &rod[i];
                 let (b, dx1) = (turn(increment), shift(increment));
                 let force = state.n[j * n + i];
                 let segment = self.segment(state, j, i, force);

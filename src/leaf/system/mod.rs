@@ -5,18 +5,22 @@
 //! factorised in linear time, and conjugate gradients preconditioned by it
 //! take care of E, which is weak beside a rod's own stiffness ([`solve`]).
 
+mod kernels;
 mod solve;
 
 pub use solve::Solved;
 
-use super::chain::{RodMatrix, TipFactor};
+use super::chain::{GroupMatrix, Increments, Masses, TipFactor, of_lane, place, set_lane};
 use super::discrete::DiscreteLeaf;
 use super::state::{Field, Increment, shift, turn};
+use crate::lanes::{Four, GROUP, arch};
 use glam::{DMat3, DVec3};
+use pulp::Arch;
 use rayon::prelude::*;
+use std::ops::Range;
 
-/// From this many nodes on, rods are shared out among threads. Measured: below
-/// it waking the threads costs more than they bring.
+/// From this many nodes on, groups of rods are shared out among threads.
+/// Measured: below it waking the threads costs more than they bring.
 const PARALLEL_NODES: usize = 8192;
 
 /// What an assembly sums up over all rods.
@@ -28,52 +32,71 @@ pub struct Sums {
     pub turn: f64,
 }
 
-/// All that belongs to one rod.
+/// All that belongs to a group of rods, one rod in each lane. In a lane without a
+/// rod all increments and forces are zero.
 #[derive(Clone, Debug)]
-pub(crate) struct RodSystem {
-    pub matrix: RodMatrix,
-    /// Nodal masses: rotary, translational.
-    pub mass: Vec<[f64; 2]>,
-    /// Right-hand side; with a joint tip, the last displacement slot holds
-    /// the rod's share of the tip's.
-    pub rhs: Vec<Increment>,
+pub(crate) struct Group {
+    pub matrix: GroupMatrix,
+    /// One in lanes with a rod, zero in others.
+    pub active: Four,
+    /// Right-hand side; with a joint tip, the last displacement slots hold
+    /// the rods' shares of the tip's.
+    pub rhs: Vec<Increments>,
     /// Solution, nodes 1 to n, complete.
-    pub solution: Vec<Increment>,
+    pub solution: Vec<Increments>,
     pub sums: Sums,
-    residual: Vec<Increment>,
-    z: Vec<Increment>,
-    b_p: Vec<Increment>,
-    e_p: Vec<Increment>,
+    /// Nodal masses per weight: rotary, translational.
+    masses: [Four; 2],
+    /// E: coupling per weight with the rods before, with those behind.
+    coupling: [[Four; 3]; 2],
+    residual: Vec<Increments>,
+    z: Vec<Increments>,
+    b_p: Vec<Increments>,
     partial: f64,
 }
 
 /// The linear system of a leaf, with room for all of its solution.
 #[derive(Clone, Debug)]
 pub struct System {
-    pub(crate) rods: Vec<RodSystem>,
-    p: Vec<Vec<Increment>>,
+    pub(crate) groups: Vec<Group>,
+    rods: usize,
+    p: Vec<Vec<Increments>>,
     pub(super) joined: bool,
     coupled: bool,
     pub(super) parallel: bool,
     pub(super) segments: usize,
+    /// Weights of the nodes 1 to n in the masses.
+    weights: Vec<f64>,
+    /// Those in E: none at a joint tip.
+    coupling_weights: Vec<f64>,
+    arch: Arch,
     tip: Option<TipFactor>,
-    /// E: coupling of gap g at nodes 1..n, none where the leaf has none.
-    pub(super) springs: Vec<Vec<DVec3>>,
+    /// Coupling of every gap per weight, none where the leaf has none.
+    gaps: Vec<DVec3>,
     /// Spatial dead moment on the tip of a single rod, as of the last assembly.
     pub(super) moment: DVec3,
 }
 
-/// Runs `f` over the rods, on all threads if `parallel`. Each rod works on its
-/// own data only and sums are taken in the order of the rods afterwards, so
+/// Runs `f` over the groups, on all threads if `parallel`. Each group works on its
+/// own data only and sums are taken in the order of the groups afterwards, so
 /// that the result does not depend on the number of threads.
-pub(super) fn each_rod<T: Send>(parallel: bool, rods: &mut [T], f: impl Fn(usize, &mut T) + Sync) {
+pub(super) fn each_group<T: Send>(
+    parallel: bool,
+    groups: &mut [T],
+    f: impl Fn(usize, &mut T) + Sync,
+) {
     if parallel {
-        let rods = rods.par_iter_mut().enumerate();
-        rods.for_each(|(j, rod)| f(j, rod));
+        let groups = groups.par_iter_mut().enumerate();
+        groups.for_each(|(g, group)| f(g, group));
     } else {
-        let rods = rods.iter_mut().enumerate();
-        rods.for_each(|(j, rod)| f(j, rod));
+        let groups = groups.iter_mut().enumerate();
+        groups.for_each(|(g, group)| f(g, group));
     }
+}
+
+/// The numbers of the rods of a group.
+pub(super) fn rods_of(group: usize, rods: usize) -> Range<usize> {
+    GROUP * group..rods.min(GROUP * (group + 1))
 }
 
 impl System {
@@ -82,72 +105,88 @@ impl System {
         let (rods, n) = (leaf.rods(), leaf.segments());
         // The tip of a single rod is its own.
         let joined = leaf.leaf.joined() && rods > 1;
-        let zeros = || vec![[0.0; 6]; n];
         let coupled = leaf.coupled();
-        let springs = |g: usize| {
+        let gap = |g: usize| {
             // A node in the plane of the mirror does not answer a pull across it.
             let answer = match leaf.leaf.in_plane(g) {
                 true => DVec3::new(1.0, 0.0, 1.0),
                 false => DVec3::ONE,
             };
-            (1..=n).map(|i| answer * leaf.spring(g - 1, i)).collect()
+            answer * leaf.coupling(g - 1)
         };
+        let gaps: Vec<DVec3> = match coupled {
+            true => (1..rods).map(gap).collect(),
+            false => Vec::new(),
+        };
+        let weights: Vec<f64> = (1..=n).map(|i| leaf.weight(i)).collect();
+        let mut coupling_weights = weights.clone();
+        if joined {
+            coupling_weights[n - 1] = 0.0;
+        }
+        let count = rods.div_ceil(GROUP);
         System {
-            rods: (0..rods)
-                .map(|j| RodSystem {
-                    matrix: RodMatrix::new(n, joined, leaf.leaf.planar),
-                    mass: (1..=n).map(|i| leaf.mass(j, i)).collect(),
-                    rhs: zeros(),
-                    solution: zeros(),
-                    sums: Sums::default(),
-                    residual: zeros(),
-                    z: zeros(),
-                    b_p: zeros(),
-                    e_p: zeros(),
-                    partial: 0.0,
-                })
-                .collect(),
-            p: vec![zeros(); rods],
+            groups: (0..count).map(|g| Group::new(leaf, g, &gaps)).collect(),
+            rods,
+            p: vec![vec![Increments::default(); n]; count],
             joined,
             coupled,
-            parallel: rods * n >= PARALLEL_NODES && rods > 1 && rayon::current_num_threads() > 1,
+            parallel: rods * n >= PARALLEL_NODES && count > 1 && rayon::current_num_threads() > 1,
             segments: n,
+            weights,
+            coupling_weights,
+            arch: arch(),
             tip: None,
-            springs: match coupled {
-                true => (1..rods).map(springs).collect(),
-                false => Vec::new(),
-            },
+            gaps,
             moment: DVec3::ZERO,
         }
     }
 
+    /// Number of rods.
+    pub fn rods(&self) -> usize {
+        self.rods
+    }
+
     /// Whether its nodes move in space, not only in a plane.
     pub fn spatial(&self) -> bool {
-        matches!(self.rods[0].matrix, RodMatrix::Spatial(..))
+        matches!(self.groups[0].matrix, GroupMatrix::Spatial(_))
+    }
+
+    /// Coupling of gap `g` at node `i` (from 0), if there is one.
+    pub(super) fn spring(&self, g: usize, i: usize) -> Option<DVec3> {
+        Some(*self.gaps.get(g)? * self.coupling_weights[i])
+    }
+
+    /// Nodal mass of node `i` (from 0) of rod `j`: rotary, translational.
+    pub(super) fn mass(&self, j: usize, i: usize) -> [f64; 2] {
+        let (group, lane) = place(j);
+        let masses = &self.groups[group].masses;
+        masses.map(|mass| mass.0[lane] * self.weights[i])
     }
 
     /// Adds to the equations of node `i` (from 1) of rod `j`: to the matrix a
     /// rotary and a translational part on its diagonal, to the right-hand side
     /// a moment and a force. What inertia adds in a time step.
     pub fn add(&mut self, j: usize, i: usize, matrix: (DMat3, f64), rhs: (DVec3, DVec3)) {
-        let rod = &mut self.rods[j];
-        let block = &mut rod.matrix.spatial_mut().diagonal[i - 1];
-        let increment = &mut rod.rhs[i - 1];
+        let (group, lane) = place(j);
+        let group = &mut self.groups[group];
+        let chain = group.matrix.spatial_mut();
+        let increment = &mut group.rhs[i - 1];
         for c in 0..3 {
-            for r in 0..3 {
-                block[r][c] += matrix.0.col(c)[r];
+            for r in 0..=c {
+                chain.diagonal(i - 1, r, c).0[lane] += matrix.0.col(c)[r];
             }
-            block[3 + c][3 + c] += matrix.1;
-            increment[c] += rhs.0[c];
-            increment[3 + c] += rhs.1[c];
+            chain.diagonal(i - 1, 3 + c, 3 + c).0[lane] += matrix.1;
+            increment[c].0[lane] += rhs.0[c];
+            increment[3 + c].0[lane] += rhs.1[c];
         }
     }
 
     /// The right-hand side of node `i` (from 1) of rod `j`: moment and force
     /// on it, or on the joint tip the rod's share of it.
     pub fn unbalanced(&self, j: usize, i: usize) -> (DVec3, DVec3) {
-        let rhs = &self.rods[j].rhs[i - 1];
-        (turn(rhs), shift(rhs))
+        let (group, lane) = place(j);
+        let rhs = of_lane(&self.groups[group].rhs[i - 1], lane);
+        (turn(&rhs), shift(&rhs))
     }
 
     /// Makes the last solution the right-hand side, times the mass matrix and
@@ -155,13 +194,11 @@ impl System {
     pub fn iterate_mode(&mut self) {
         let (turn, shift) = self.largest();
         let scale = 1.0 / turn.max(shift);
-        for rod in &mut self.rods {
-            for ((rhs, solution), m) in rod.rhs.iter_mut().zip(&rod.solution).zip(&rod.mass) {
-                for c in 0..6 {
-                    rhs[c] = m[c / 3] * solution[c] * scale;
-                }
-            }
+        let mut rhs = self.momentum(&self.solution());
+        for value in rhs.iter_mut().flatten().flatten() {
+            *value *= scale;
         }
+        self.set_rhs(&rhs);
     }
 
     /// A right-hand side without any symmetry, the same on all grids, to begin
@@ -170,26 +207,27 @@ impl System {
         // Multiples of the golden ratio spread evenly: no symmetry, no chance.
         let golden = |k: usize| (k as f64 * 0.618_033_988_749_895).fract() - 0.5;
         let segments = self.segments as f64;
-        for (j, rod) in self.rods.iter_mut().enumerate() {
-            for (i, (rhs, m)) in rod.rhs.iter_mut().zip(&rod.mass).enumerate() {
-                for c in 0..6 {
-                    let along = (i + 1) as f64 / segments;
-                    rhs[c] = m[c / 3] * (golden(12 * j + c + 1) + along * golden(12 * j + c + 7));
-                }
-            }
-        }
+        let node = |j: usize, i: usize| {
+            let along = (i + 1) as f64 / segments;
+            std::array::from_fn(|c| golden(12 * j + c + 1) + along * golden(12 * j + c + 7))
+        };
+        let rod = |j: usize| (0..self.segments).map(|i| node(j, i)).collect();
+        let seed: Field = (0..self.rods).map(rod).collect();
+        self.set_rhs(&self.momentum(&seed));
     }
 
     /// Whether K + shift M is positive definite already without the coupling,
     /// which can only add to it: then no eigenvalue is negative. Overwrites
     /// the matrix.
     pub fn stable_without_coupling(&mut self, shift: f64) -> bool {
-        for (j, rod) in self.rods.iter_mut().enumerate() {
-            for gap in [j.wrapping_sub(1), j] {
-                let springs = self.springs.get(gap).into_iter().flatten();
-                for (block, spring) in rod.matrix.spatial_mut().diagonal.iter_mut().zip(springs) {
-                    for c in 0..3 {
-                        block[3 + c][3 + c] -= spring[c];
+        for group in &mut self.groups {
+            let chain = group.matrix.spatial_mut();
+            for (i, weight) in self.coupling_weights.iter().enumerate() {
+                for c in 0..3 {
+                    let block = chain.diagonal(i, 3 + c, 3 + c);
+                    for (lane, value) in block.0.iter_mut().enumerate() {
+                        let [before, behind] = group.coupling.map(|side| side[c].0[lane]);
+                        *value -= (before + behind) * weight;
                     }
                 }
             }
@@ -199,64 +237,119 @@ impl System {
 
     /// The right-hand side as of the last assembly.
     pub fn rhs(&self) -> Field {
-        self.rods.iter().map(|rod| rod.rhs.clone()).collect()
+        self.gather(|group| &group.rhs)
     }
 
     /// Puts another right-hand side in its place.
     pub fn set_rhs(&mut self, rhs: &Field) {
-        for (rod, rhs) in self.rods.iter_mut().zip(rhs) {
-            rod.rhs.copy_from_slice(rhs);
-        }
+        self.scatter(rhs, |group| &mut group.rhs);
     }
 
     /// The last solution.
     pub fn solution(&self) -> Field {
-        self.rods.iter().map(|rod| rod.solution.clone()).collect()
+        self.gather(|group| &group.solution)
     }
 
     /// Puts other increments in its place.
     pub fn set_solution(&mut self, increments: &Field) {
-        for (rod, increments) in self.rods.iter_mut().zip(increments) {
-            rod.solution.copy_from_slice(increments);
+        self.scatter(increments, |group| &mut group.solution);
+    }
+
+    fn gather(&self, of: impl Fn(&Group) -> &Vec<Increments>) -> Field {
+        let rod = |j: usize| {
+            let (group, lane) = place(j);
+            let nodes = of(&self.groups[group]).iter();
+            nodes.map(|node| of_lane(node, lane)).collect()
+        };
+        (0..self.rods).map(rod).collect()
+    }
+
+    fn scatter(&mut self, field: &Field, of: impl Fn(&mut Group) -> &mut Vec<Increments>) {
+        for (j, rod) in field.iter().enumerate() {
+            let (group, lane) = place(j);
+            for (node, of_rod) in of(&mut self.groups[group]).iter_mut().zip(rod) {
+                set_lane(node, lane, of_rod);
+            }
         }
     }
 
     /// The mass matrix times increments.
     pub fn momentum(&self, increments: &Field) -> Field {
-        let of = |(v, m): (&Increment, &[f64; 2])| std::array::from_fn(|c| m[c / 3] * v[c]);
-        let rods = self.rods.iter().zip(increments);
-        rods.map(|(rod, v)| v.iter().zip(&rod.mass).map(of).collect())
+        let node = |j: usize, (i, v): (usize, &Increment)| {
+            let mass = self.mass(j, i);
+            std::array::from_fn(|c| mass[c / 3] * v[c])
+        };
+        let rods = increments.iter().enumerate();
+        rods.map(|(j, rod)| rod.iter().enumerate().map(|of| node(j, of)).collect())
             .collect()
     }
 
     /// Largest rotation and largest displacement of the last solution.
     pub fn largest(&self) -> (f64, f64) {
-        let (mut turn, mut shift) = (0.0_f64, 0.0_f64);
-        for increment in self.rods.iter().flat_map(|rod| &rod.solution) {
-            for c in 0..3 {
-                turn = turn.max(increment[c].abs());
-                shift = shift.max(increment[3 + c].abs());
+        let mut largest = [Four::default(); 2];
+        for increment in self.groups.iter().flat_map(|group| &group.solution) {
+            for c in 0..6 {
+                for (most, value) in largest[c / 3].0.iter_mut().zip(&increment[c].0) {
+                    *most = most.max(value.abs());
+                }
             }
         }
+        let [turn, shift] = largest.map(|four| four.0.into_iter().fold(0.0, f64::max));
         (turn, shift)
     }
 
     /// Kinetic energy at unit density of the given nodal velocities.
     pub fn kinetic_energy(&self, velocity: &[Vec<Increment>]) -> f64 {
-        let of = |(v, m): (&Increment, &[f64; 2])| {
-            0.5 * (m[0] * dot(&v[..3], &v[..3]) + m[1] * dot(&v[3..], &v[3..]))
+        let node = |j: usize, (i, v): (usize, &Increment)| {
+            let mass = self.mass(j, i);
+            0.5 * (mass[0] * dot(&v[..3], &v[..3]) + mass[1] * dot(&v[3..], &v[3..]))
         };
-        let rods = self.rods.iter().zip(velocity);
-        rods.map(|(rod, v)| v.iter().zip(&rod.mass).map(of).sum::<f64>())
+        let rods = velocity.iter().enumerate();
+        rods.map(|(j, rod)| rod.iter().enumerate().map(|of| node(j, of)).sum::<f64>())
             .sum()
     }
 
     /// Writes the velocity that covers `part` of the last solution in `dt`.
     pub fn velocity(&self, part: f64, dt: f64, velocity: &mut [Vec<Increment>]) {
-        for (rod, velocity) in self.rods.iter().zip(velocity) {
-            for (v, d) in velocity.iter_mut().zip(&rod.solution) {
-                *v = d.map(|d| part * d / dt);
+        for (j, rod) in velocity.iter_mut().enumerate() {
+            let (group, lane) = place(j);
+            for (v, d) in rod.iter_mut().zip(&self.groups[group].solution) {
+                *v = of_lane(d, lane).map(|d| part * d / dt);
             }
+        }
+    }
+}
+
+impl Group {
+    /// Room for the equations of a group of the rods of `leaf`.
+    fn new(leaf: &DiscreteLeaf, group: usize, gaps: &[DVec3]) -> Self {
+        let n = leaf.segments();
+        let zeros = vec![Increments::default(); n];
+        let (mut active, mut masses) = (Four::default(), [Four::default(); 2]);
+        let mut coupling = [[Four::default(); 3]; 2];
+        for (lane, j) in rods_of(group, leaf.rods()).enumerate() {
+            active.0[lane] = 1.0;
+            for (four, mass) in masses.iter_mut().zip(leaf.mass_per_weight(j)) {
+                four.0[lane] = mass;
+            }
+            for (side, gap) in [j.wrapping_sub(1), j].into_iter().enumerate() {
+                for c in 0..3 {
+                    coupling[side][c].0[lane] = gaps.get(gap).map_or(0.0, |gap| gap[c]);
+                }
+            }
+        }
+        Group {
+            matrix: GroupMatrix::new(n, leaf.leaf.joined() && leaf.rods() > 1, leaf.leaf.planar),
+            active,
+            rhs: zeros.clone(),
+            solution: zeros.clone(),
+            sums: Sums::default(),
+            masses,
+            coupling,
+            residual: zeros.clone(),
+            z: zeros.clone(),
+            b_p: zeros,
+            partial: 0.0,
         }
     }
 }

@@ -3,10 +3,13 @@
 //! B p follows p by the recursion of the method itself, so that an iteration
 //! costs one solve with B and one product with the sparse E.
 
-use super::{System, dot, each_rod};
-use crate::leaf::chain::TipFactor;
+use super::kernels::{Advance, Coupled, Direction, Product};
+use super::{Group, Masses, System, dot, each_group, rods_of};
+use crate::lanes::{Four, run};
+use crate::leaf::chain::{Increments, TipFactor};
 use crate::leaf::state::Increment;
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// Iterations after which the rod-wise preconditioner is held to have failed.
 const MAX_ITERATIONS: usize = 200;
@@ -31,35 +34,38 @@ impl System {
     /// Factorises the matrix of a single rod whatever the signs of its pivots;
     /// false only if one of them is zero.
     pub fn factorize_indefinite(&mut self) -> bool {
-        debug_assert_eq!(self.rods.len(), 1);
+        debug_assert_eq!(self.rods, 1);
         self.factorize_signed(0.0, true)
     }
 
     fn factorize_signed(&mut self, shift: f64, any_sign: bool) -> bool {
-        each_rod(self.parallel, &mut self.rods, |_, rod| {
-            let tip = rod.matrix.factorize(shift, &rod.mass, any_sign);
-            rod.partial = if tip.is_some() { 1.0 } else { -1.0 };
-            if let (Some(tip), Some(last)) = (tip, rod.z.last_mut()) {
-                // Carried to the sum below without allocating.
-                *last = [
-                    tip[0][0], tip[0][1], tip[0][2], tip[1][1], tip[1][2], tip[2][2],
-                ];
-            }
+        let (arch, weights) = (self.arch, &self.weights);
+        each_group(self.parallel, &mut self.groups, |_, group| {
+            let masses = Masses {
+                shift,
+                per_weight: group.masses,
+                weights,
+            };
+            let definite = group.matrix.factorize(arch, &masses, any_sign);
+            group.partial = if definite { 1.0 } else { -1.0 };
         });
-        if self.rods.iter().any(|rod| rod.partial < 0.0) {
+        if self.groups.iter().any(|group| group.partial < 0.0) {
             return false;
         }
         if !self.joined {
             return true;
         }
-        let mut sum = [0.0; 6];
-        for rod in &self.rods {
-            for (sum, value) in sum.iter_mut().zip(&rod.z[self.segments - 1]) {
-                *sum += value;
+        let mut sum = [[0.0; 3]; 3];
+        for (g, group) in self.groups.iter().enumerate() {
+            for lane in 0..rods_of(g, self.rods).len() {
+                for (sum, row) in sum.iter_mut().zip(group.matrix.tip(lane)) {
+                    for c in 0..3 {
+                        sum[c] += row[c];
+                    }
+                }
             }
         }
-        let [a, b, c, d, e, f] = sum;
-        self.tip = TipFactor::new([[a, b, c], [b, d, e], [c, e, f]]);
+        self.tip = TipFactor::new(sum);
         self.tip.is_some()
     }
 
@@ -67,12 +73,11 @@ impl System {
     /// plus `inertia` (mass times velocity over time step), to the relative
     /// accuracy `tolerance` in the energy norm.
     pub fn solve(&mut self, inertia: Option<(&[Vec<Increment>], f64)>, tolerance: f64) -> Solved {
-        let (last, joined) = (self.segments - 1, self.joined);
         let mut tip_residual = self.load_residual(inertia);
+        let (mut tip_z, mut rz) = self.precondition(tip_residual);
         if !self.coupled {
-            self.precondition(tip_residual);
-            for rod in &mut self.rods {
-                rod.solution.copy_from_slice(&rod.z);
+            for group in &mut self.groups {
+                group.solution.copy_from_slice(&group.z);
             }
             if self.moment != DVec3::ZERO {
                 self.correct_for_moment();
@@ -80,16 +85,14 @@ impl System {
             return Solved::Yes(1);
         }
 
-        let mut tip_z = self.precondition(tip_residual);
         let mut tip_p = tip_z;
         let mut tip_b_p = tip_residual;
         let mut tip_solution = [0.0; 3];
-        for (rod, p) in self.rods.iter_mut().zip(&mut self.p) {
-            rod.solution.fill([0.0; 6]);
-            p.copy_from_slice(&rod.z);
-            rod.b_p.copy_from_slice(&rod.residual);
+        for (group, p) in self.groups.iter_mut().zip(&mut self.p) {
+            group.solution.fill(Increments::default());
+            p.copy_from_slice(&group.z);
+            group.b_p.copy_from_slice(&group.residual);
         }
-        let mut rz = self.residual_dot_z(&tip_residual, &tip_z);
         let target = tolerance * tolerance * rz;
         let mut iterations = 1;
         loop {
@@ -102,29 +105,13 @@ impl System {
                 };
             }
             let alpha = rz / p_k_p;
-            let p = &self.p;
-            each_rod(self.parallel, &mut self.rods, |j, rod| {
-                for i in 0..rod.solution.len() {
-                    for c in 0..6 {
-                        rod.solution[i][c] += alpha * p[j][i][c];
-                        rod.residual[i][c] -= alpha * (rod.b_p[i][c] + rod.e_p[i][c]);
-                    }
-                }
-            });
+            self.advance(alpha);
             for c in 0..3 {
                 tip_solution[c] += alpha * tip_p[c];
                 tip_residual[c] -= alpha * tip_b_p[c];
             }
-            if joined {
-                // No coupling acts on the joint tip: B p alone stands there.
-                for rod in &mut self.rods {
-                    for c in 3..6 {
-                        rod.residual[last][c] = 0.0;
-                    }
-                }
-            }
-            tip_z = self.precondition(tip_residual);
-            let rz_next = self.residual_dot_z(&tip_residual, &tip_z);
+            let rz_next;
+            (tip_z, rz_next) = self.precondition(tip_residual);
             if rz_next <= target {
                 break;
             }
@@ -138,18 +125,12 @@ impl System {
                 tip_p[c] = tip_z[c] + beta * tip_p[c];
                 tip_b_p[c] = tip_residual[c] + beta * tip_b_p[c];
             }
-            for (rod, p) in self.rods.iter_mut().zip(&mut self.p) {
-                for i in 0..p.len() {
-                    for c in 0..6 {
-                        p[i][c] = rod.z[i][c] + beta * p[i][c];
-                        rod.b_p[i][c] = rod.residual[i][c] + beta * rod.b_p[i][c];
-                    }
-                }
-            }
+            self.turn_direction(beta);
         }
-        if joined {
-            for rod in &mut self.rods {
-                rod.solution[last][3..].copy_from_slice(&tip_solution);
+        if self.joined {
+            for group in &mut self.groups {
+                let last = group.solution.last_mut().expect("a rod has a segment");
+                set_tip(last, tip_solution, &group.active);
             }
         }
         Solved::Yes(iterations)
@@ -158,23 +139,29 @@ impl System {
     /// Makes the right-hand side plus `inertia` the residual; returns that of a
     /// joint tip.
     fn load_residual(&mut self, inertia: Option<(&[Vec<Increment>], f64)>) -> [f64; 3] {
-        let last = self.segments - 1;
-        each_rod(self.parallel, &mut self.rods, |j, rod| {
-            rod.residual.copy_from_slice(&rod.rhs);
-            if let Some((velocity, per_step)) = inertia {
-                for ((r, v), m) in rod.residual.iter_mut().zip(&velocity[j]).zip(&rod.mass) {
-                    for c in 0..6 {
-                        r[c] += m[c / 3] * v[c] * per_step;
+        let (rods, weights, joined) = (self.rods, &self.weights, self.joined);
+        each_group(self.parallel, &mut self.groups, |g, group| {
+            group.residual.copy_from_slice(&group.rhs);
+            let Some((velocity, per_step)) = inertia else {
+                return;
+            };
+            for (lane, j) in rods_of(g, rods).enumerate() {
+                let [rotary, mass] = group.masses.map(|mass| mass.0[lane] * per_step);
+                for ((r, v), weight) in group.residual.iter_mut().zip(&velocity[j]).zip(weights) {
+                    for c in 0..3 {
+                        r[c].0[lane] += rotary * weight * v[c];
+                        r[3 + c].0[lane] += mass * weight * v[3 + c];
                     }
                 }
             }
         });
         let mut tip_residual = [0.0; 3];
-        if self.joined {
-            for rod in &mut self.rods {
+        if joined {
+            for group in &mut self.groups {
+                let last = group.residual.last_mut().expect("a rod has a segment");
                 for c in 0..3 {
-                    tip_residual[c] += rod.residual[last][3 + c];
-                    rod.residual[last][3 + c] = 0.0;
+                    tip_residual[c] += last[3 + c].sum();
+                    last[3 + c] = Four::default();
                 }
             }
         }
@@ -182,70 +169,84 @@ impl System {
     }
 
     /// z = B^-1 residual, complete with the tip's displacement in every rod's
-    /// last slot; returns that displacement.
-    fn precondition(&mut self, tip_residual: [f64; 3]) -> [f64; 3] {
-        let last = self.segments - 1;
-        each_rod(self.parallel, &mut self.rods, |_, rod| {
-            rod.z.copy_from_slice(&rod.residual);
-            rod.matrix.forward(&mut rod.z);
+    /// last slot; returns that displacement and residual . z over all unknowns.
+    fn precondition(&mut self, tip_residual: [f64; 3]) -> ([f64; 3], f64) {
+        let (last, arch) = (self.segments - 1, self.arch);
+        each_group(self.parallel, &mut self.groups, |_, group| {
+            group.matrix.forward(arch, &group.residual, &mut group.z);
         });
-        let mut tip = [0.0; 3];
+        let mut tip = None;
         if let Some(factor) = self.tip.as_ref().filter(|_| self.joined) {
             let mut b = tip_residual;
-            for rod in &self.rods {
+            for group in &self.groups {
                 for c in 0..3 {
-                    b[c] += rod.z[last][3 + c];
+                    b[c] += group.z[last][3 + c].sum();
                 }
             }
-            tip = factor.solve(b);
+            tip = Some(factor.solve(b));
         }
-        let joined = self.joined;
-        each_rod(self.parallel, &mut self.rods, |_, rod| {
-            if joined {
-                rod.z[last][3..].copy_from_slice(&tip);
+        each_group(self.parallel, &mut self.groups, |_, group| {
+            if let Some(tip) = tip {
+                set_tip(&mut group.z[last], tip, &group.active);
             }
-            rod.matrix.backward(&mut rod.z);
+            // A joint tip's slots hold no residual, only its displacement.
+            group.partial = (group.matrix).backward(arch, &group.residual, &mut group.z);
         });
-        tip
+        let tip = tip.unwrap_or_default();
+        let product = self.groups.iter().map(|group| group.partial).sum::<f64>();
+        (tip, product + dot(&tip_residual, &tip))
     }
 
-    /// residual . z over all unknowns.
-    fn residual_dot_z(&mut self, tip_residual: &[f64; 3], tip_z: &[f64; 3]) -> f64 {
-        each_rod(self.parallel, &mut self.rods, |_, rod| {
-            rod.partial = rod
-                .residual
-                .iter()
-                .zip(&rod.z)
-                .map(|(a, b)| dot(a, b))
-                .sum();
-        });
-        // A joint tip's slots hold no residual, only its displacement.
-        self.rods.iter().map(|rod| rod.partial).sum::<f64>() + dot(tip_residual, tip_z)
-    }
-
-    /// e_p = E p for every rod; returns p . (B + E) p without the tip's part.
+    /// p . (B + E) p without the tip's part.
     fn multiply(&mut self) -> f64 {
-        let (p, springs, joined, last) = (&self.p, &self.springs, self.joined, self.segments - 1);
-        each_rod(self.parallel, &mut self.rods, |j, rod| {
-            let mut partial = 0.0;
-            for i in 0..rod.e_p.len() {
-                let mut e_p = [0.0; 6];
-                for (gap, neighbour) in [(j.wrapping_sub(1), j.wrapping_sub(1)), (j, j + 1)] {
-                    if gap < springs.len() {
-                        for c in 0..3 {
-                            e_p[3 + c] -= springs[gap][i][c] * p[neighbour][i][3 + c];
-                        }
-                    }
-                }
-                rod.e_p[i] = e_p;
-                let count = if joined && i == last { 3 } else { 6 };
-                for c in 0..count {
-                    partial += p[j][i][c] * (rod.b_p[i][c] + e_p[c]);
-                }
-            }
-            rod.partial = partial;
+        let (p, weights, arch) = (&self.p, &self.coupling_weights, self.arch);
+        each_group(self.parallel, &mut self.groups, |g, group| {
+            let mut kernel = Product {
+                group,
+                coupled: Coupled {
+                    p,
+                    group: g,
+                    weights,
+                },
+                product: Four::default(),
+            };
+            run(arch, &mut kernel);
+            group.partial = kernel.product.sum();
         });
-        self.rods.iter().map(|rod| rod.partial).sum()
+        self.groups.iter().map(|group| group.partial).sum()
+    }
+
+    /// Goes `alpha` times p; the residual goes with it. Of a joint tip's slots
+    /// that of the residual stays zero: no coupling acts there.
+    fn advance(&mut self, alpha: f64) {
+        let (p, weights, arch) = (&self.p, &self.coupling_weights, self.arch);
+        each_group(self.parallel, &mut self.groups, |g, group| {
+            let coupled = Coupled {
+                p,
+                group: g,
+                weights,
+            };
+            run(
+                arch,
+                &mut Advance {
+                    group,
+                    coupled,
+                    alpha,
+                },
+            );
+        });
+    }
+
+    /// The next direction: z plus `beta` times the last.
+    fn turn_direction(&mut self, beta: f64) {
+        let arch = self.arch;
+        let turn = |(group, p): (&mut _, &mut Vec<Increments>)| {
+            run(arch, &mut Direction { group, p, beta });
+        };
+        match self.parallel {
+            true => (self.groups.par_iter_mut()).zip(&mut self.p).for_each(turn),
+            false => self.groups.iter_mut().zip(&mut self.p).for_each(turn),
+        }
     }
 
     /// A dead moment M is not conservative in three dimensions: the derivative
@@ -253,36 +254,41 @@ impl System {
     /// skew. It has rank two at one node and is brought in by the formula of
     /// Sherman, Morrison and Woodbury.
     fn correct_for_moment(&mut self) {
-        use nalgebra::Matrix3;
-        let last = self.segments - 1;
-        let rod = &mut self.rods[0];
+        use nalgebra::{Matrix3, Vector3};
+        let (last, arch) = (self.segments - 1, self.arch);
+        let group = &mut self.groups[0];
         let m = 0.5 * self.moment;
         let skew = Matrix3::new(0.0, m.z, -m.y, -m.z, 0.0, m.x, m.y, -m.x, 0.0);
-        // Columns of B^-1 that belong to the tip's rotation, one at a time.
-        let mut columns = Matrix3::zeros();
-        for c in 0..3 {
-            rod.z.fill([0.0; 6]);
-            rod.z[last][c] = 1.0;
-            rod.matrix.forward(&mut rod.z);
-            rod.matrix.backward(&mut rod.z);
-            for r in 0..3 {
-                columns[(r, c)] = rod.z[last][r];
+        // z = B^-1 times a moment on the tip; returns the tip's rotation.
+        let solve = |group: &mut Group, moment: [f64; 3]| {
+            group.residual.fill(Increments::default());
+            for c in 0..3 {
+                group.residual[last][c].0[0] = moment[c];
             }
-        }
-        let turn = nalgebra::Vector3::from_column_slice(&rod.solution[last][..3]);
-        let small = Matrix3::identity() + skew * columns;
+            group.matrix.forward(arch, &group.residual, &mut group.z);
+            (group.matrix).backward(arch, &group.residual, &mut group.z);
+            Vector3::from_fn(|c, _| group.z[last][c].0[0])
+        };
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let columns = axes.map(|axis| solve(group, axis));
+        let small = Matrix3::identity() + skew * Matrix3::from_columns(&columns);
         let Some(inverse) = small.try_inverse() else {
             return;
         };
-        let moment = inverse * (skew * turn);
-        rod.z.fill([0.0; 6]);
-        rod.z[last][..3].copy_from_slice(moment.as_slice());
-        rod.matrix.forward(&mut rod.z);
-        rod.matrix.backward(&mut rod.z);
-        for (solution, z) in rod.solution.iter_mut().zip(&rod.z) {
+        let turn = Vector3::from_fn(|c, _| group.solution[last][c].0[0]);
+        let moment: Vector3<f64> = inverse * (skew * turn);
+        solve(group, moment.into());
+        for (solution, z) in group.solution.iter_mut().zip(&group.z) {
             for c in 0..6 {
-                solution[c] -= z[c];
+                solution[c].0[0] -= z[c].0[0];
             }
         }
+    }
+}
+
+/// Writes the displacement of a joint tip.
+fn set_tip(last: &mut Increments, tip: [f64; 3], active: &Four) {
+    for c in 0..3 {
+        last[3 + c] = Four(active.0.map(|active| active * tip[c]));
     }
 }

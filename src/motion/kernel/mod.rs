@@ -16,20 +16,18 @@ mod segments;
 pub use self::array::Array;
 pub use self::material::{Material, Node, blocks};
 use self::segments::{Nodes, SegmentSums};
-use super::lanes::Lanes;
+use crate::lanes::Lanes;
+pub use crate::lanes::{GROUP, arch};
 use crate::leaf::Loads;
 use pulp::{Arch, Simd};
 use std::sync::Arc;
-
-/// Nodes come in groups of so many; arrays are that much longer at both ends.
-pub const GROUP: usize = 4;
 
 /// Nodes of a block. Measured: with half as many, steps take 1.06 times as long,
 /// for the beginnings and ends of the loops; twice as many gain nothing.
 pub const BLOCK: usize = 32 * GROUP;
 
-/// Positions of a rod's nodes, one array per component. Node i stands at
-/// GROUP + i; what is before and after is never used, only read.
+/// Positions of a rod's nodes, one array per component. Nodes come in groups, and
+/// arrays are a group longer at both ends: node i stands at GROUP + i; what is before and after is never used, only read.
 #[derive(Clone, Debug)]
 pub struct Positions {
     pub x: [Array; 3],
@@ -161,20 +159,6 @@ impl Step<'_> {
             (false, false) => arch.dispatch(Dispatched::<false, false>(self)),
         }
     }
-}
-
-/// The widest instructions there are, if a group of nodes is a whole number of them.
-pub fn arch() -> Arch {
-    struct Width;
-    impl pulp::WithSimd for Width {
-        type Output = usize;
-        fn with_simd<S: Simd>(self, _: S) -> usize {
-            S::F64_LANES
-        }
-    }
-    let arch = Arch::new();
-    let fits = GROUP.is_multiple_of(arch.dispatch(Width));
-    if fits { arch } else { Arch::Scalar }
 }
 
 /// Nodes of the block that begins at node `start` of a rod, in whole groups.

@@ -4,7 +4,7 @@ use pulp::Simd;
 
 use super::segments::quaternion;
 use super::{BLOCK, GROUP, Motion, Neighbour, Step};
-use crate::motion::lanes::{Lanes, Vectors, cut, cut_mut, slice, slice_mut};
+use crate::lanes::{Lanes, Vectors, cut, cut_mut, slice, slice_mut};
 
 /// cos and sin(a)/a as series in a^2, for angles of a step (halved). Truncated,
 /// they turn a node by a little too much: by 2e-10 of the angle at a = 0.1,

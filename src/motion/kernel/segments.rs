@@ -22,7 +22,7 @@
 //! division and no root.
 
 use super::{Array, Block, GROUP, Law, Material, Past};
-use crate::motion::lanes::{Lanes, Vectors, cut, cut_mut, slice};
+use crate::lanes::{Lanes, Vectors, cut, cut_mut, slice};
 use pulp::Simd;
 use std::ops::Deref;
 

@@ -1,7 +1,64 @@
 //! Several numbers at once: what one instruction of the processor works on.
 
-use pulp::Simd;
+use pulp::{Arch, Simd};
 use std::ops::{Add, Deref, Mul, Sub};
+
+/// So many numbers make a group: a whole number of the widest instructions used.
+pub const GROUP: usize = 4;
+
+/// The numbers of a group.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C, align(32))]
+pub struct Four(pub [f64; GROUP]);
+
+impl Four {
+    /// The same number everywhere.
+    pub fn splat(value: f64) -> Self {
+        Four([value; GROUP])
+    }
+
+    /// Sum of all.
+    pub fn sum(&self) -> f64 {
+        self.0.iter().sum()
+    }
+}
+
+/// The widest instructions there are, if a group is a whole number of them.
+pub fn arch() -> Arch {
+    struct Width;
+    impl pulp::WithSimd for Width {
+        type Output = usize;
+        fn with_simd<S: Simd>(self, _: S) -> usize {
+            S::F64_LANES
+        }
+    }
+    let arch = Arch::new();
+    let fits = GROUP.is_multiple_of(arch.dispatch(Width));
+    if fits { arch } else { Arch::Scalar }
+}
+
+/// A loop over groups.
+pub trait Kernel {
+    /// Works on the lanes from `part` on, as many as an instruction has.
+    fn run<S: Simd>(&mut self, simd: S, part: usize);
+}
+
+/// Runs a loop with the instructions of `arch`.
+pub fn run(arch: Arch, kernel: &mut impl Kernel) {
+    struct Parts<'a, K>(&'a mut K);
+    impl<K: Kernel> pulp::WithSimd for Parts<'_, K> {
+        type Output = ();
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) {
+            let mut part = 0;
+            while part < GROUP {
+                self.0.run(simd, part);
+                part += S::F64_LANES;
+            }
+        }
+    }
+    arch.dispatch(Parts(kernel));
+}
 
 /// The part of an array at a place: index of the first, count.
 #[inline(always)]
@@ -37,7 +94,7 @@ pub fn cut_mut(arrays: &mut [impl AsMut<[f64]>; 3], place: (usize, usize)) -> [&
     ]
 }
 
-/// One number for each of several neighbouring nodes.
+/// One number for each of several neighbouring nodes, or rods.
 #[derive(Clone, Copy)]
 pub struct Lanes<S: Simd> {
     pub simd: S,
@@ -72,6 +129,26 @@ impl<S: Simd> Lanes<S> {
         lanes[0] = self.v;
     }
 
+    /// Reads a group from the lane `part` on.
+    #[inline(always)]
+    pub fn of(simd: S, group: &Four, part: usize) -> Self {
+        Lanes::load(simd, &group.0, part)
+    }
+
+    /// Writes a group from the lane `part` on.
+    #[inline(always)]
+    pub fn put(self, group: &mut Four, part: usize) {
+        self.store(&mut group.0, part);
+    }
+
+    /// This where `test` is positive, `otherwise` elsewhere and where it is no number.
+    #[inline(always)]
+    pub fn where_positive(self, test: Self, otherwise: Self) -> Self {
+        let zero = self.simd.splat_f64s(0.0);
+        let positive = self.simd.less_than_f64s(zero, test.v);
+        self.with(self.simd.select_f64s(positive, self.v, otherwise.v))
+    }
+
     /// self * factor + term.
     #[inline(always)]
     pub fn times(self, factor: Self, term: Self) -> Self {
@@ -101,6 +178,12 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     pub fn largest(self) -> f64 {
         self.simd.reduce_max_f64s(self.v)
+    }
+
+    /// The smallest of all.
+    #[inline(always)]
+    pub fn smallest(self) -> f64 {
+        self.simd.reduce_min_f64s(self.v)
     }
 
     /// Sum of all.
@@ -158,7 +241,7 @@ lanes_operator!(Add, add, add_f64s);
 lanes_operator!(Sub, sub, sub_f64s);
 lanes_operator!(Mul, mul, mul_f64s);
 
-/// A vector for each of several neighbouring nodes.
+/// A vector for each of several neighbouring nodes, or rods.
 #[derive(Clone, Copy)]
 pub struct Vectors<S: Simd> {
     pub x: Lanes<S>,

@@ -1,0 +1,126 @@
+//! The vectors of the conjugate gradients.
+
+use super::Group;
+use crate::lanes::{Four, GROUP, Kernel, Lanes};
+use crate::leaf::chain::Increments;
+use pulp::Simd;
+
+/// What E p needs.
+#[derive(Clone, Copy)]
+pub struct Coupled<'a> {
+    /// The p of all groups, and which is this one.
+    pub p: &'a [Vec<Increments>],
+    pub group: usize,
+    pub weights: &'a [f64],
+}
+
+impl Coupled<'_> {
+    /// The part of E p at node `i` that belongs to component `c` of the shift.
+    #[inline(always)]
+    fn pull<S: Simd>(
+        self,
+        simd: S,
+        (i, c): (usize, usize),
+        coupling: &[[Four; 3]; 2],
+        part: usize,
+    ) -> Lanes<S> {
+        let at = |group: usize, lane: usize| match self.p.get(group) {
+            Some(p) => p[i][3 + c].0[lane],
+            None => 0.0,
+        };
+        let own = self.p[self.group][i][3 + c].0;
+        let first = at(self.group.wrapping_sub(1), GROUP - 1);
+        let last = at(self.group + 1, 0);
+        let before = Four([first, own[0], own[1], own[2]]);
+        let behind = Four([own[1], own[2], own[3], last]);
+        let pull = Lanes::of(simd, &coupling[0][c], part) * Lanes::of(simd, &before, part);
+        let behind = Lanes::of(simd, &behind, part);
+        let pull = behind.times(Lanes::of(simd, &coupling[1][c], part), pull);
+        Lanes::splat(simd, -self.weights[i]) * pull
+    }
+}
+
+/// p . (B + E) p.
+pub struct Product<'a> {
+    pub group: &'a Group,
+    pub coupled: Coupled<'a>,
+    pub product: Four,
+}
+
+impl Kernel for Product<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        let mut sum = Lanes::splat(simd, 0.0);
+        let p = &self.coupled.p[self.coupled.group];
+        for (i, (b_p, p)) in self.group.b_p.iter().zip(p).enumerate() {
+            for c in 0..6 {
+                let mut k_p = Lanes::of(simd, &b_p[c], part);
+                if c >= 3 {
+                    let coupling = &self.group.coupling;
+                    k_p = k_p + self.coupled.pull(simd, (i, c - 3), coupling, part);
+                }
+                sum = k_p.times(Lanes::of(simd, &p[c], part), sum);
+            }
+        }
+        sum.put(&mut self.product, part);
+    }
+}
+
+/// solution += alpha p, residual -= alpha (B + E) p.
+pub struct Advance<'a> {
+    pub group: &'a mut Group,
+    pub coupled: Coupled<'a>,
+    pub alpha: f64,
+}
+
+impl Kernel for Advance<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        let alpha = Lanes::splat(simd, self.alpha);
+        let p = &self.coupled.p[self.coupled.group];
+        for i in 0..p.len() {
+            for c in 0..6 {
+                let mut k_p = Lanes::of(simd, &self.group.b_p[i][c], part);
+                if c >= 3 {
+                    let coupling = &self.group.coupling;
+                    k_p = k_p + self.coupled.pull(simd, (i, c - 3), coupling, part);
+                }
+                let solution = &mut self.group.solution[i][c];
+                let residual = &mut self.group.residual[i][c];
+                let p = Lanes::of(simd, &p[i][c], part);
+                p.times(alpha, Lanes::of(simd, solution, part))
+                    .put(solution, part);
+                k_p.times_from(alpha, Lanes::of(simd, residual, part))
+                    .put(residual, part);
+            }
+        }
+    }
+}
+
+/// p = z + beta p, B p = residual + beta B p.
+pub struct Direction<'a> {
+    pub group: &'a mut Group,
+    pub p: &'a mut [Increments],
+    pub beta: f64,
+}
+
+impl Kernel for Direction<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        let beta = Lanes::splat(simd, self.beta);
+        let Group {
+            z, residual, b_p, ..
+        } = &mut *self.group;
+        for i in 0..z.len() {
+            for c in 0..6 {
+                for (old, new) in [
+                    (&mut self.p[i][c], &z[i][c]),
+                    (&mut b_p[i][c], &residual[i][c]),
+                ] {
+                    let new = Lanes::of(simd, new, part);
+                    Lanes::of(simd, old, part).times(beta, new).put(old, part);
+                }
+            }
+        }
+    }
+}
