@@ -80,6 +80,29 @@ impl Difference {
     }
 }
 
+/// Stations that cut the length in so many equal parts.
+pub fn equally_spaced(parts: usize) -> Vec<f64> {
+    (0..=parts).map(|i| i as f64 / parts as f64).collect()
+}
+
+/// Where the polynomial through `count` values at neighbouring `nodes` takes its
+/// values from for `at`: the first of them, and their weights.
+pub fn weights(nodes: &[f64], at: f64, count: usize) -> (usize, Vec<f64>) {
+    let count = count.min(nodes.len());
+    let right = nodes.partition_point(|node| *node < at);
+    let first = right
+        .saturating_sub(count.div_ceil(2))
+        .min(nodes.len() - count);
+    let near = &nodes[first..first + count];
+    let weight = |i: usize| -> f64 {
+        let others = (0..count).filter(|&j| j != i);
+        others
+            .map(|j| (at - near[j]) / (near[i] - near[j]))
+            .product()
+    };
+    (first, (0..count).map(weight).collect())
+}
+
 /// Serializes tips as the key `tip`, which is null if there are several, and
 /// then `tips`.
 ///

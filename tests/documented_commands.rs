@@ -97,7 +97,8 @@ fn of_scripts() -> HashSet<String> {
 /// What a shell is given to run a command with the program that was built.
 fn with_program(command: &str) -> Option<String> {
     let command = command.replace("cargo run --release -- ", "leafdyn ");
-    command.starts_with("leafdyn ").then_some(command)
+    let piped = command.starts_with("cat ") && command.contains(" | leafdyn ");
+    (piped || command.starts_with("leafdyn ")).then_some(command)
 }
 
 /// A folder with the scenarios that come with the program and those of a page.

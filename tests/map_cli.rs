@@ -112,6 +112,26 @@ fn one_and_two_threads_give_the_same_rows() {
     assert_eq!(one, two);
 }
 
+/// Rows without a word on which map they are of.
+#[test]
+fn a_table_without_its_summary_is_refused() {
+    let place = Workplace::new();
+    run(&place, "", "2");
+    fs::remove_file(place.path("out/map.json")).unwrap();
+    let before = place.read("out/map.csv");
+    let again = small("--out out");
+    let refused = place.run(&again).ends(2);
+    contains(
+        &refused.err,
+        &[
+            "out/map.csv is of another map",
+            "name another folder with --out DIR",
+        ],
+    );
+    assert_eq!(place.read("out/map.csv"), before);
+    assert_eq!(place.names("out"), ["map.csv", "map.png", "map.svg"]);
+}
+
 #[test]
 fn a_run_goes_on_where_one_was_stopped() {
     let place = Workplace::new();

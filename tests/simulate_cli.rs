@@ -15,7 +15,7 @@ const FILES: [&str; 7] = [
     "filmstrip.png",
     "filmstrip.svg",
     "motion.csv",
-    "summary.json",
+    "motion.json",
 ];
 
 const MOTION: &str = "time,rod,sigma,x,y,z,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz";
@@ -113,7 +113,7 @@ fn the_report_says_what_was_done() {
         "  balance  ",
         "  tip      (",
         " ns a step and segment\n",
-        "  written  out/small: summary.json, energy.svg, energy.png, filmstrip.svg, \
+        "  written  out/small: motion.json, energy.svg, energy.png, filmstrip.svg, \
          filmstrip.png, motion.csv, energy.csv\n",
     ]);
     assert_eq!(place.names("out/small"), FILES);
@@ -126,7 +126,7 @@ fn the_report_says_what_was_done() {
 fn tables_and_summary_tell_the_same() {
     let place = Workplace::new();
     let summary = simulate(&place, "leaf.toml --set dynamics.duration=0.5 --segments 8");
-    assert_eq!(place.json("out/small/summary.json"), summary);
+    assert_eq!(place.json("out/small/motion.json"), summary);
 
     let motion = place.numbers("out/small/motion.csv", MOTION);
     assert_eq!(motion.len(), 101 * 5 * 9);
@@ -280,7 +280,7 @@ fn long_motions_are_arrays() {
     let summary = every("0.005");
     assert_eq!(summary["frames"], 2401);
     let mut names = FILES;
-    names[5] = "motion.npy";
+    (names[5], names[6]) = ("motion.json", "motion.npy");
     let left = place.names("out/small");
     assert_eq!(left, names, "no table of an earlier run");
     let (shape, numbers) = npy(&place);

@@ -10,9 +10,10 @@ use std::process::{Child, Command};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use leafdyn::files::Recording;
+use leafdyn::files::{Document, Recording, Selection};
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Options, Scheme, Simulation};
+use serde_json::{Value, json};
 use workplace::{Run, Workplace, contains, interrupt, leaf};
 
 /// So many outputs are waited for before a run is stopped.
@@ -84,7 +85,8 @@ fn stop(place: &Workplace, child: Child, after: usize) -> Run {
 fn stopped(place: &Workplace, arguments: &str) {
     let child = place.start(&format!("simulate {arguments} --out out"));
     let Run { out, err, .. } = stop(place, child, OUTPUTS);
-    assert_eq!(out, "");
+    let refused = json!({ "error": "stopped by Ctrl-C", "exit_status": 130 });
+    assert_eq!(serde_json::from_str::<Value>(&out).unwrap(), refused);
     assert!(err.starts_with("stopped at t = "), "{err}");
     assert!(err.ends_with("; go on with --resume\n"), "{err}");
 }
@@ -119,7 +121,7 @@ fn same_files(place: &Workplace) {
     assert_eq!(names.len(), 7);
     for name in names {
         let [a, b] = ["whole", "out"].map(|folder| match name.as_str() {
-            "summary.json" => without_wall_seconds(&place.read(&format!("{folder}/{name}"))),
+            "motion.json" => without_wall_seconds(&place.read(&format!("{folder}/{name}"))),
             _ => fs::read(place.path(folder).join(&name)).unwrap(),
         });
         assert!(a == b, "{name} differs");
@@ -172,10 +174,11 @@ gravity = { at = [0.0, 1.0], value = [[0, 0, -1], [0, 1, -1]] }
             let run = |folder: &str, resume: bool, outputs: Option<usize>| {
                 let folder = place.path(folder);
                 let mut simulation = Simulation::new(&scenario, &options).unwrap();
-                let mut recording = match resume {
-                    true => Recording::resume(&folder, &mut simulation).unwrap(),
-                    false => Recording::begin(&folder, &mut simulation).unwrap(),
+                let recording = match resume {
+                    true => Recording::resume(&folder, &mut simulation, &Selection::default()),
+                    false => Recording::begin(&folder, &mut simulation, &Selection::default()),
                 };
+                let mut recording = recording.unwrap();
                 while !simulation.done() && Some(simulation.frames().1) != outputs {
                     let frame = simulation.next_frame().unwrap();
                     recording.add(&simulation, &frame).unwrap();
@@ -186,7 +189,9 @@ gravity = { at = [0.0, 1.0], value = [[0, 0, -1], [0, 1, -1]] }
                     return;
                 }
                 let record = recording.record(&simulation, None).unwrap();
-                recording.finish(&record).unwrap();
+                recording
+                    .finish(&Document::new(&record, &scenario, None))
+                    .unwrap();
                 let kept = recording.checkpointer().write();
                 assert!(kept.is_none(), "nothing is left to keep");
             };

@@ -9,12 +9,11 @@ use crate::files;
 use crate::relax::{self, Method};
 use crate::report::words::contender;
 use crate::scenario::Scenario;
-use crate::study::{self, ChartOptions, Contender, Turn};
+use crate::study::{self, Chart as Charted, ChartOptions, Contender, Turn};
 
 use crate::report;
 
-use super::progress::ProgressLine;
-use super::request::Request;
+use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status};
 
 /// Measure every method over its own accuracy, and chart time against true error.
@@ -59,13 +58,22 @@ fn contender_parser() -> impl TypedValueParser<Value = Contender> {
 
 impl Chart {
     pub fn run(self) -> Result<Status, Refusal> {
-        let (scenario, folder) = self.request.open()?;
+        let how = How {
+            varies: false,
+            stations: false,
+            side_by_side: false,
+        };
+        self.request.each::<Charted>(how, |job| self.one(job))
+    }
+
+    fn one(&self, job: &Job) -> Result<Done, Refusal> {
+        let scenario = &job.scenario;
         if self.request.tolerance.is_some() && self.rods.is_empty() {
             return Err(
                 "--tolerance: a chart runs over all tolerances; it is that of --rods".into(),
             );
         }
-        let leaves = self.leaves()?;
+        let leaves = self.leaves(job)?;
         let mut options = ChartOptions {
             seconds: self.seconds,
             ..ChartOptions::default()
@@ -77,7 +85,7 @@ impl Chart {
         for file in &self.peers {
             options.peers.extend(files::read_peers(file)?);
         }
-        let mut line = ProgressLine::new(&scenario.name);
+        let mut line = job.progress();
         let mut progress = |turn: &Turn| {
             line.say(|elapsed| {
                 format!(
@@ -94,32 +102,34 @@ impl Chart {
         // What is asked of the second is looked at before the first is made.
         let tolerance = self.request.tolerance.unwrap_or(scenario.tolerance);
         relax::check_tolerance(tolerance)?;
-        let mut chart = study::chart(&scenario, &options, &mut progress)?;
+        let mut chart = study::chart(scenario, &options, &mut progress)?;
         if !leaves.is_empty() {
             chart.scaling = Some(study::scaling(&leaves, tolerance, &options, &mut progress)?);
         }
         drop(line);
         for remark in &chart.remarks {
-            self.request.remark(&chart.scenario, Some(remark));
+            job.remark(Some(remark));
         }
-        let scaled = match &chart.scaling {
-            Some(scaling) => files::write_all(&folder, scaling).map(drop),
-            None => Ok(()),
-        };
         let scaling = chart.scaling.iter();
         let mut confirmed = scaling.map(|scaling| scaling.unconfirmed.is_empty());
         let success = chart.confirmed() && confirmed.all(|confirmed| confirmed);
-        let status = self.request.deliver(&chart, &folder, success, |folder| {
-            report::chart_report(&chart, folder.filter(|_| scaled.is_ok()))
-        })?;
-        scaled?;
-        Ok(status)
+        let mut files = Vec::new();
+        let written = job.write(&chart).and_then(|written| {
+            files.extend(written);
+            if let Some(scaling) = &chart.scaling {
+                files.extend(job.write(scaling)?);
+            }
+            Ok(None)
+        });
+        job.done(&chart, success, written, |_| {
+            report::chart_report(&chart, files)
+        })
     }
 
     /// The leaves of `--rods`.
-    fn leaves(&self) -> Result<Vec<Scenario>, Refusal> {
+    fn leaves(&self, job: &Job) -> Result<Vec<Scenario>, Refusal> {
         let rods = self.rods.iter();
-        rods.map(|rods| self.request.with(&format!("leaf.rods={rods}")))
+        rods.map(|rods| job.with(&format!("leaf.rods={rods}")))
             .collect()
     }
 }

@@ -2,12 +2,11 @@
 
 use clap::Args;
 
-use crate::study::{self, CheckOptions, Verdict};
+use crate::study::{self, Check as Checked, CheckOptions, Verdict};
 
 use crate::report;
 
-use super::progress::ProgressLine;
-use super::request::Request;
+use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status};
 
 /// Relax a leaf, solve its boundary-value problem by shooting from there, and compare.
@@ -30,21 +29,29 @@ pub struct Check {
 
 impl Check {
     pub fn run(self) -> Result<Status, Refusal> {
-        let (scenario, folder) = self.request.open()?;
+        let how = How {
+            varies: false,
+            stations: true,
+            side_by_side: false,
+        };
+        self.request.each::<Checked>(how, |job| self.one(job))
+    }
+
+    fn one(&self, job: &Job) -> Result<Done, Refusal> {
         let options = CheckOptions {
             tolerance: self.request.tolerance,
             keep_unstable: self.keep_unstable,
             intervals: self.intervals,
         };
-        let mut line = ProgressLine::new(&scenario.name);
-        let check = study::check(&scenario, &options, &mut |progress| line.update(progress))?;
+        let mut line = job.progress();
+        let check = study::check(&job.scenario, &options, &mut |progress| {
+            line.update(progress)
+        })?;
         drop(line);
         if let Verdict::NotCompared(reason) = &check.verdict {
-            self.request.remark(&scenario.name, Some(reason));
+            job.remark(Some(reason));
         }
         let success = matches!(check.verdict, Verdict::Agree);
-        self.request.deliver(&check, &folder, success, |folder| {
-            report::check_report(&check, folder)
-        })
+        job.deliver(&check, success, |files| report::check_report(&check, files))
     }
 }

@@ -8,7 +8,7 @@ use std::time::Instant;
 use clap::{Args, ValueHint};
 
 use crate::files;
-use crate::files::Journal;
+use crate::files::{Journal, Kind};
 use crate::report::FileError;
 use crate::study::{
     self, CELL_SECONDS, Map as Cells, MapMethod, MapRequest, MapRow, MapShow, Vary,
@@ -16,9 +16,8 @@ use crate::study::{
 
 use crate::report;
 
-use super::progress::ProgressLine;
-use super::request::Request;
-use super::{Refusal, Status, show};
+use super::request::{Done, How, Job, Request};
+use super::{Refusal, Status};
 
 /// Solve a leaf by several methods over one or two varying numbers, and map where each method fails.
 ///
@@ -88,47 +87,54 @@ const WHOLE: Shard = Shard { part: 1, of: 1 };
 
 impl Map {
     pub fn run(self) -> Result<Status, Refusal> {
-        let (base, folder) = self.request.open_base()?;
+        let how = How {
+            varies: true,
+            stations: false,
+            side_by_side: false,
+        };
+        self.request.each::<Cells>(how, |job| self.one(job))
+    }
+
+    fn one(&self, job: &Job) -> Result<Done, Refusal> {
+        let folder = &job.folder;
         let request = MapRequest::new(
-            base,
+            job.base()?,
             self.vary.clone(),
             self.methods.clone(),
             self.request.tolerance,
             self.cell_seconds,
         )?;
-        files::belongs(&folder, &request)?;
+        files::belongs(folder, &request)?;
         let clock = Instant::now();
-        let known = self.known(&folder, &request)?;
-        files::claim(&folder, &Cells::new(request.clone(), known.clone()))?;
+        let known = self.known(folder, &request)?;
+        // Rows are found again by the request beside them.
+        let kept = job.selection.kinds.contains(&Kind::Csv);
+        if kept {
+            let map = Cells::new(request.clone(), known.clone());
+            files::claim(folder, &job.document(&map))?;
+        }
         let computed = match self.draw.is_empty() {
-            true => self.solve(&folder, &request, &known)?,
+            true => self.solve(job, kept, &request, &known)?,
             false => Vec::new(),
         };
-        let before = known.len();
-        let count = computed.len();
-        let mut map = Cells::new(request, [known, computed].concat());
-        map.show = self.show;
         let told = report::MapTold {
-            known: before,
-            computed: count,
+            known: known.len(),
+            computed: computed.len(),
             seconds: clock.elapsed().as_secs_f64(),
         };
-        match self.shard {
-            Some(shard) => {
-                let name = shard.file_name();
-                files::write_rows(&folder, &name, &map.request, &map.rows)?;
-                let report =
-                    report::map_report(&map, told, &folder.join(name).display().to_string());
-                show(report.as_bytes())?;
-            }
-            None => {
-                return self.request.deliver(&map, &folder, true, |folder| {
-                    let files = folder.map(|folder| report::table::written(&map, folder));
-                    report::map_report(&map, told, &files.unwrap_or_default())
-                });
-            }
+        let mut map = Cells::new(request, [known, computed].concat());
+        map.show = self.show;
+        let report = |files| report::map_report(&map, told, files);
+        let Some(shard) = self.shard else {
+            return job.deliver(&map, true, report);
+        };
+        let mut written = None;
+        if kept {
+            let name = shard.file_name();
+            files::write_rows(folder, &name, &map.request, &map.rows)?;
+            written = Some(folder.join(name).display().to_string());
         }
-        Ok(Status::Success)
+        job.done(&map, true, Ok(written), report)
     }
 
     /// The rows that need not be computed: a shard's own, or of a whole map
@@ -155,7 +161,8 @@ impl Map {
     /// Solves what is not known; rows are in the file as soon as they are found.
     fn solve(
         &self,
-        folder: &Path,
+        job: &Job,
+        kept: bool,
         request: &MapRequest,
         known: &[MapRow],
     ) -> Result<Vec<MapRow>, Refusal> {
@@ -179,12 +186,17 @@ impl Map {
             return Ok(Vec::new());
         }
         let name = self.shard.map_or("map.csv".into(), Shard::file_name);
-        let mut journal = Journal::open(folder, &name, request, known)?;
-        let mut line = ProgressLine::new(&request.base.scenario().name);
+        let mut journal = match kept {
+            true => Some(Journal::open(&job.folder, &name, request, known)?),
+            false => None,
+        };
+        let mut line = job.progress();
         let (mut rows, mut finished) = (Vec::new(), 0);
         let mut failed: Option<FileError> = None;
         study::map(request, &todo, &mut |new| {
-            failed = journal.append(request, &new).err();
+            failed = journal
+                .as_mut()
+                .and_then(|it| it.append(request, &new).err());
             rows.extend(new);
             finished += 1;
             let cells = todo.len();

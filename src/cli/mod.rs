@@ -9,16 +9,19 @@ mod request;
 mod simulate;
 mod trace;
 
+use std::env;
 use std::error::Error;
 use std::io::{self, IsTerminal, Write};
 use std::process::{self, ExitCode};
-use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use clap::{Parser, Subcommand};
 
 use crate::files;
 use crate::files::Checkpointer;
-use crate::report::FileError;
+use crate::report::{FileError, Refused, json};
+use crate::scenario::printable;
 
 /// How a leaf of coupled elastic veins comes to rest, with an error bar and a statement of stability, and how it moves.
 #[derive(Debug, Parser)]
@@ -76,22 +79,59 @@ fn as_typed(refusal: Refusal) -> Refusal {
 
 /// The program: does what the process was asked for, and returns its exit status.
 pub fn main() -> ExitCode {
-    let command_line = Cli::parse();
+    // Also of a request that cannot be understood.
+    let json = env::args_os().any(|argument| argument == "--json");
+    JSON.store(json, Ordering::Relaxed);
+    let command_line = match Cli::try_parse() {
+        Ok(command_line) => command_line,
+        Err(error) if error.use_stderr() => {
+            let message = error.render().to_string();
+            return fail(
+                message.trim_start_matches("error: ").trim_end(),
+                Status::Refused,
+                json,
+            )
+            .into();
+        }
+        // Help, or the version.
+        Err(told) => told.exit(),
+    };
     let interrupted = stop_at_once_on_interrupt();
     match interrupted.and_then(|()| command_line.run()) {
         Ok(status) => status.into(),
-        Err(refusal) => {
-            note(&format!("error: {refusal}"));
-            Status::Refused.into()
-        }
+        Err(refusal) => fail(&refusal.to_string(), Status::Refused, json).into(),
+    }
+}
+
+/// Whether standard output is for JSON.
+static JSON: AtomicBool = AtomicBool::new(false);
+
+/// Says why something was not done: to people, and as JSON if that is still to come.
+fn fail(error: &str, status: Status, json: bool) -> Status {
+    note(&format!("error: {error}"));
+    if json {
+        show_refused(error, status as i32);
+    }
+    status
+}
+
+fn show_refused(error: &str, exit_status: i32) {
+    let mut bytes = Vec::new();
+    let refused = Refused {
+        exit_status,
+        ..Refused::new(error)
+    };
+    if json::write(&refused, &mut bytes).is_ok() {
+        // There is nobody left to tell.
+        let _ = show(&bytes);
     }
 }
 
 /// Why something was not done: a message that says what to change.
-type Refusal = Box<dyn Error>;
+type Refusal = Box<dyn Error + Send + Sync>;
 
 /// What the process tells its caller.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Status {
     /// At rest within the tolerance; of a check: both methods agree; of a
     /// simulation: followed to its end; of a chart: its reference is confirmed.
@@ -124,13 +164,15 @@ impl From<Status> for ExitCode {
 }
 
 /// What writes a checkpoint of a simulation when the process is stopped, if there is one.
-static CHECKPOINTER: OnceLock<Checkpointer> = OnceLock::new();
+static CHECKPOINTER: Mutex<Option<Checkpointer>> = Mutex::new(None);
 
 /// Lets Ctrl-C end the process at once, with no file half written, and a
 /// simulation kept.
 fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     ctrlc::set_handler(|| {
-        let kept = CHECKPOINTER.get().and_then(Checkpointer::write_and_stop);
+        let kept = checkpointer()
+            .as_ref()
+            .and_then(Checkpointer::write_and_stop);
         files::abandon_unfinished();
         if io::stderr().is_terminal() {
             // The progress line may be there.
@@ -140,6 +182,9 @@ fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
             Some(Status::Refused) => Status::Refused as i32,
             _ => INTERRUPTED,
         };
+        if JSON.load(Ordering::Relaxed) {
+            show_refused("stopped by Ctrl-C", status);
+        }
         process::exit(status);
     })?;
     Ok(())
@@ -147,8 +192,12 @@ fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
 
 /// Lets Ctrl-C write a checkpoint, from now on.
 fn checkpoint_on_interrupt(checkpointer: Checkpointer) {
-    // A process has one simulation.
-    let _ = CHECKPOINTER.set(checkpointer);
+    *self::checkpointer() = Some(checkpointer);
+}
+
+fn checkpointer() -> MutexGuard<'static, Option<Checkpointer>> {
+    // It is replaced as a whole: whatever its last user did, it is sound.
+    CHECKPOINTER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Says where a simulation that was kept can go on, or why it cannot.
@@ -168,7 +217,12 @@ fn show_checkpoint(kept: &Result<f64, FileError>) -> Status {
 
 /// A line on standard error; if nobody can read it, nothing is lost.
 fn note(line: &str) {
-    let _ = writeln!(io::stderr(), "{line}");
+    let _ = writeln!(io::stderr(), "{}", printable(line));
+}
+
+/// A report on standard output.
+fn show_report(report: &str) -> Result<(), Refusal> {
+    show(printable(report).as_bytes())
 }
 
 /// Writes to standard output. A reader that has seen enough (`| head`) is no error.

@@ -32,6 +32,16 @@ impl ProgressLine {
         }
     }
 
+    /// One that is never shown.
+    pub fn hidden() -> Self {
+        ProgressLine {
+            scenario: String::new(),
+            start: Instant::now(),
+            terminal: false,
+            bar: None,
+        }
+    }
+
     /// How far a relaxation has come.
     pub fn update(&mut self, progress: &Progress) {
         self.say(|elapsed| {

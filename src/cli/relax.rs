@@ -1,17 +1,13 @@
 //! `leafdyn relax`: a leaf comes to rest.
 
-use std::path::Path;
-
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::relax::{self, Equilibrium, Method, Options, SemiImplicit};
 use crate::report;
-use crate::scenario::Scenario;
-use crate::study;
+use crate::study::{self, All};
 
-use super::progress::ProgressLine;
-use super::request::Request;
+use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status};
 
 /// Eigenvalues that are told unasked.
@@ -70,18 +66,25 @@ fn method_parser() -> impl TypedValueParser<Value = Method> {
 
 impl Relax {
     pub fn run(self) -> Result<Status, Refusal> {
-        let (scenario, folder) = self.request.open()?;
-        if self.all {
-            return self.all(&scenario, &folder);
+        let how = How {
+            varies: false,
+            stations: true,
+            side_by_side: true,
+        };
+        match self.all {
+            true => self.request.each::<All>(how, |job| self.all(job)),
+            false => (self.request).each::<Equilibrium>(how, |job| self.one(job)),
         }
-        let equilibrium = self.solve(&scenario)?;
-        let (name, remark) = (&equilibrium.scenario, equilibrium.remark.as_ref());
-        self.request.remark(name, remark);
+    }
+
+    fn one(&self, job: &Job) -> Result<Done, Refusal> {
+        let equilibrium = self.solve(job)?;
+        let equilibrium = equilibrium.at_stations(&job.scenario, job.selection.stations);
+        job.remark(equilibrium.remark.as_ref());
         let success = equilibrium.outcome.is_success();
-        self.request
-            .deliver(&equilibrium, &folder, success, |folder| {
-                report::relax_report(&equilibrium, folder)
-            })
+        job.deliver(&equilibrium, success, |files| {
+            report::relax_report(&equilibrium, files)
+        })
     }
 
     /// The method with its own options; refused where they do not fit each other.
@@ -118,7 +121,7 @@ impl Relax {
         })
     }
 
-    fn solve(&self, scenario: &Scenario) -> Result<Equilibrium, Refusal> {
+    fn solve(&self, job: &Job) -> Result<Equilibrium, Refusal> {
         let options = Options {
             method: self.method()?,
             tolerance: self.request.tolerance,
@@ -126,19 +129,19 @@ impl Relax {
             mode_shapes: self.modes.is_some_and(|count| count > 0),
             ..Options::default()
         };
-        let mut line = ProgressLine::new(&scenario.name);
-        Ok(relax::relax(scenario, &options, &mut |progress| {
+        let mut line = job.progress();
+        Ok(relax::relax(&job.scenario, &options, &mut |progress| {
             line.update(progress)
         })?)
     }
 
-    fn all(&self, scenario: &Scenario, folder: &Path) -> Result<Status, Refusal> {
+    fn all(&self, job: &Job) -> Result<Done, Refusal> {
         let Method::SemiImplicit(how) = self.method()? else {
             return Err("--all: only with the method semi-implicit".into());
         };
-        let mut line = ProgressLine::new(&scenario.name);
-        let all = study::all(
-            scenario,
+        let mut line = job.progress();
+        let mut all = study::all(
+            &job.scenario,
             how,
             self.request.tolerance,
             &mut |starts, found| {
@@ -149,9 +152,11 @@ impl Relax {
             },
         )?;
         drop(line);
+        for found in &mut all.found {
+            let leaf = found.equilibrium.clone();
+            found.equilibrium = leaf.at_stations(&job.scenario, job.selection.stations);
+        }
         let success = !all.found.is_empty();
-        self.request.deliver(&all, folder, success, |folder| {
-            report::all_report(&all, folder)
-        })
+        job.deliver(&all, success, |files| report::all_report(&all, files))
     }
 }

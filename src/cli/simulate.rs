@@ -1,6 +1,5 @@
 //! `leafdyn simulate`: a leaf moves.
 
-use std::path::Path;
 use std::time::Instant;
 
 use clap::Args;
@@ -8,10 +7,10 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::files::Recording;
 use crate::report::{self, FileError, numbers::brief};
-use crate::simulate::{Options, Scheme, Simulation, Stopped};
+use crate::simulate::{Options, Record, Scheme, Simulation, Stopped};
 
 use super::progress::ProgressLine;
-use super::request::Request;
+use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status, checkpoint_on_interrupt, show_checkpoint};
 
 /// Follow a leaf as it moves: its shape, velocities and energies in time.
@@ -51,25 +50,31 @@ fn method_parser() -> impl TypedValueParser<Value = Scheme> {
 
 impl Simulate {
     pub fn run(self) -> Result<Status, Refusal> {
-        let (scenario, folder) = self.request.open()?;
+        let how = How {
+            varies: false,
+            stations: true,
+            side_by_side: false,
+        };
+        self.request.each::<Record>(how, |job| self.one(job))
+    }
+
+    fn one(&self, job: &Job) -> Result<Done, Refusal> {
         let options = Options {
             scheme: self.method,
             segments: self.segments,
             step: self.step,
             tolerance: self.request.tolerance,
         };
-        let mut simulation = Simulation::new(&scenario, &options)?;
+        let mut simulation = Simulation::new(&job.scenario, &options)?;
+        let (folder, selection) = (&job.folder, &job.selection);
         let mut recording = match self.resume {
-            true => Recording::resume(&folder, &mut simulation)?,
-            false => Recording::begin(&folder, &mut simulation)?,
+            true => Recording::resume(folder, &mut simulation, selection)?,
+            false => Recording::begin(folder, &mut simulation, selection)?,
         };
         checkpoint_on_interrupt(recording.checkpointer());
-        let ended = self.follow(&mut simulation, &mut recording, &folder);
-        if ended.is_err()
-            && let Some(kept) = recording.checkpointer().write()
-        {
-            // What was found so far need not be lost with the files.
-            show_checkpoint(&kept);
+        let ended = self.follow(&mut simulation, &mut recording, job);
+        if ended.is_err() {
+            keep(&recording);
         }
         ended
     }
@@ -78,18 +83,30 @@ impl Simulate {
         &self,
         simulation: &mut Simulation,
         recording: &mut Recording,
-        folder: &Path,
-    ) -> Result<Status, Refusal> {
-        let stopped = record(simulation, recording)?;
+        job: &Job,
+    ) -> Result<Done, Refusal> {
+        let stopped = record(simulation, recording, job.progress())?;
         let record = recording.record(simulation, stopped)?;
-        self.request.remark(&record.scenario, stopped);
-        let written = recording.finish(&record);
-        self.request.show(&record, || {
-            let files = written.as_ref().ok().map(|files| (folder, &files[..]));
+        job.remark(stopped);
+        let written = recording.finish(&job.document(&record));
+        let written = match written {
+            Ok(files) => Ok(job.named(&files)),
+            Err(error) => {
+                // What was found so far need not be lost with the files.
+                keep(recording);
+                Err(error.into())
+            }
+        };
+        job.done(&record, stopped.is_none(), written, |files| {
             report::simulate_report(&record, files)
-        })?;
-        written?;
-        Ok(Status::of(stopped.is_none()))
+        })
+    }
+}
+
+/// Leaves a checkpoint, if that is possible.
+fn keep(recording: &Recording) {
+    if let Some(kept) = recording.checkpointer().write() {
+        show_checkpoint(&kept);
     }
 }
 
@@ -97,10 +114,9 @@ impl Simulate {
 fn record(
     simulation: &mut Simulation,
     recording: &mut Recording,
+    mut line: ProgressLine,
 ) -> Result<Option<Stopped>, FileError> {
-    let scenario = simulation.leaf().scenario();
-    let duration = scenario.dynamics.duration;
-    let mut line = ProgressLine::new(&scenario.name);
+    let duration = simulation.leaf().scenario().dynamics.duration;
     let (clock, begin) = (Instant::now(), simulation.time());
     while !simulation.done() {
         let frame = match simulation.next_frame() {

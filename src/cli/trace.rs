@@ -2,12 +2,11 @@
 
 use clap::Args;
 
-use crate::study::{self, MOST_POINTS, TraceError, TraceRequest, Vary};
+use crate::study::{self, MOST_POINTS, Trace as Traced, TraceError, TraceRequest, Vary};
 
 use crate::report;
 
-use super::progress::ProgressLine;
-use super::request::Request;
+use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status};
 
 /// Follow an equilibrium through one number of the scenario: through folds, with the Morse index along the way.
@@ -47,11 +46,18 @@ pub struct Trace {
 
 impl Trace {
     pub fn run(self) -> Result<Status, Refusal> {
-        let (base, folder) = self.request.open_base()?;
-        let name = base.scenario().name.clone();
+        let how = How {
+            varies: true,
+            stations: false,
+            side_by_side: false,
+        };
+        self.request.each::<Traced>(how, |job| self.one(job))
+    }
+
+    fn one(&self, job: &Job) -> Result<Done, Refusal> {
         let request = TraceRequest {
-            base,
-            vary: self.vary,
+            base: job.base()?,
+            vary: self.vary.clone(),
             switch: self.switch,
             keep_unstable: self.keep_unstable,
             segments: self.segments,
@@ -59,7 +65,7 @@ impl Trace {
             most_points: self.points,
             cross_section: self.cross_section,
         };
-        let mut line = ProgressLine::new(&name);
+        let mut line = job.progress();
         let trace = study::trace(&request, &mut |branch, points, value| {
             line.say(|elapsed| {
                 format!(
@@ -72,11 +78,10 @@ impl Trace {
         })
         .map_err(name_option)?;
         drop(line);
-        self.request.remark(&name, trace.remark.as_ref());
-        self.request
-            .deliver(&trace, &folder, trace.complete, |folder| {
-                report::trace_report(&trace, folder)
-            })
+        job.remark(trace.remark.as_ref());
+        job.deliver(&trace, trace.complete, |files| {
+            report::trace_report(&trace, files)
+        })
     }
 }
 

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::files::atomic;
-use crate::report::{FileError, Format, Json, lines, table};
+use crate::files::{atomic, write_table};
+use crate::report::{Document, FileError, json, lines, table};
 use crate::study::{Map, MapRequest, MapRow};
 
 /// What says which map the rows beside it are of.
@@ -51,13 +51,13 @@ pub fn belongs(folder: &Path, request: &MapRequest) -> Result<bool, FileError> {
 ///
 /// # Errors
 /// If the folder has another map, or cannot be written to.
-pub fn claim(folder: &Path, map: &Map) -> Result<(), FileError> {
-    if belongs(folder, &map.request)? {
+pub fn claim(folder: &Path, map: &Document<Map>) -> Result<(), FileError> {
+    if belongs(folder, &map.result.request)? {
         return Ok(());
     }
     let file = folder.join(JSON);
     atomic::make_folder(folder)?;
-    atomic::write_file(&file, |out| Json(JSON).write(map, out))
+    atomic::write_file(&file, |out| json::write(map, out))
         .map_err(|reason| FileError::write(&file, reason))
 }
 
@@ -120,8 +120,7 @@ pub fn write_rows(
     request: &MapRequest,
     rows: &[MapRow],
 ) -> Result<(), FileError> {
-    atomic::make_folder(folder)?;
     let file = folder.join(name);
-    atomic::write_file(&file, |out| out.write_all(&table(request, rows)?))
-        .map_err(|reason| FileError::write(&file, reason))
+    let table = table(request, rows).map_err(|reason| FileError::write(&file, reason))?;
+    write_table(folder, name, &table).map(drop)
 }

@@ -3,27 +3,33 @@
 mod atomic;
 mod checksum;
 mod journal;
+mod owner;
 mod peers;
 mod recording;
 
 use std::fs;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
 
 pub use atomic::{abandon_unfinished, check_writable};
 pub use journal::{Journal, belongs, claim, write_rows};
+pub use owner::{check_owner, source};
 pub use peers::read_peers;
 pub use recording::{Checkpointer, Recording};
 
 use crate::figure::{self, Picture};
 use crate::relax::Equilibrium;
 use crate::report::table::Table;
-use crate::report::{self, FileError, Format, Json, Written};
+use crate::report::{self, FileError, Format, Written, json};
+pub use crate::report::{Document, Kind};
 use crate::simulate::Record;
 use crate::study::{All, Chart, Check, Map, Scaling, Trace};
 
 impl Written for Equilibrium {
+    const JSON: Option<&'static str> = Some("summary.json");
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Json("summary.json"),
         &Table("centerlines.csv", report::centerlines),
         &Picture::svg("figure.svg", figure::leaf),
         &Picture::png("figure.png", figure::leaf),
@@ -42,16 +48,16 @@ impl Written for Equilibrium {
 }
 
 impl Written for Check {
+    const JSON: Option<&'static str> = Some("check.json");
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Json("check.json"),
         &Picture::svg("check.svg", figure::check),
         &Picture::png("check.png", figure::check),
     ];
 }
 
 impl Written for Map {
+    const JSON: Option<&'static str> = Some("map.json");
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Json("map.json"),
         &Table("map.csv", report::map_table),
         &Picture::svg("map.svg", figure::map),
         &Picture::png("map.png", figure::map),
@@ -59,16 +65,16 @@ impl Written for Map {
 }
 
 impl Written for All {
+    const JSON: Option<&'static str> = Some("equilibria.json");
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Json("equilibria.json"),
         &Picture::svg("equilibria.svg", figure::all),
         &Picture::png("equilibria.png", figure::all),
     ];
 }
 
 impl Written for Trace {
+    const JSON: Option<&'static str> = Some("trace.json");
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Json("trace.json"),
         &Table("trace.csv", report::trace_table),
         &Picture::svg("trace.svg", figure::trace),
         &Picture::png("trace.png", figure::trace),
@@ -76,8 +82,9 @@ impl Written for Trace {
 }
 
 impl Written for Record {
+    const JSON: Option<&'static str> = Some("motion.json");
+    const GROWING: &'static [Kind] = &[Kind::Csv];
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Json("summary.json"),
         &Picture::svg("energy.svg", figure::energy),
         &Picture::png("energy.png", figure::energy),
         &Picture::svg("filmstrip.svg", figure::filmstrip),
@@ -86,8 +93,8 @@ impl Written for Record {
 }
 
 impl Written for Chart {
+    const JSON: Option<&'static str> = Some("chart.json");
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Json("chart.json"),
         &Table("chart.csv", report::chart_table),
         &Picture::svg("chart.svg", figure::chart),
         &Picture::png("chart.png", figure::chart),
@@ -96,6 +103,7 @@ impl Written for Chart {
 
 /// Its numbers are also in the JSON of its chart.
 impl Written for Scaling {
+    const JSON: Option<&'static str> = None;
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
         &Table("chart_rods.csv", report::scaling_table),
         &Picture::svg("chart_rods.svg", figure::scaling),
@@ -103,21 +111,78 @@ impl Written for Scaling {
     ];
 }
 
-/// Writes every format of a result into `folder`, which is made if it is not
-/// there, and returns the paths written.
-pub fn write_all<R: Written>(folder: &Path, result: &R) -> Result<Vec<PathBuf>, FileError> {
-    atomic::make_folder(folder)?;
-    let write_one = |format: &&'static dyn Format<R>| {
-        let file = folder.join(format.file_name());
-        atomic::write_file(&file, |out| format.write(result, out))
-            .map(|()| file.clone())
-            .map_err(|reason| FileError::write(&file, reason))
-    };
-    let more = if result.has_more() { R::MORE } else { &[] };
-    let written = R::FORMATS.iter().chain(more).map(write_one).collect();
-    for format in R::MORE.iter().skip(more.len()) {
-        // Of another result. That there is none is the rule.
-        let _ = fs::remove_file(folder.join(format.file_name()));
+/// What is written of a result.
+#[derive(Clone, Debug)]
+pub struct Selection {
+    /// Kinds of files.
+    pub kinds: Vec<Kind>,
+    /// So many parts of equal length lie between the stations of every vein; left
+    /// out: as the grid has them.
+    pub stations: Option<usize>,
+}
+
+impl Default for Selection {
+    fn default() -> Self {
+        Selection {
+            kinds: Kind::USUAL.to_vec(),
+            stations: None,
+        }
     }
-    written
+}
+
+/// Writes a result into `folder`, which is made if it is not there, as files of
+/// these kinds, and returns their paths. Files of other kinds stay as they are.
+///
+/// # Errors
+/// If one cannot be written.
+pub fn write_all<R: Written>(
+    folder: &Path,
+    document: &Document<R>,
+    kinds: &[Kind],
+) -> Result<Vec<PathBuf>, FileError> {
+    if kinds.is_empty() {
+        return Ok(Vec::new());
+    }
+    atomic::make_folder(folder)?;
+    let write = |name: &str, fill: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
+        let file = folder.join(name);
+        match atomic::write_file(&file, fill) {
+            Ok(()) => Ok(file),
+            Err(reason) => Err(FileError::write(&file, reason)),
+        }
+    };
+    let result = document.result;
+    let formats = result.formats(kinds);
+    let (json, others) = rayon::join(
+        || {
+            let name = R::JSON.filter(|_| kinds.contains(&Kind::Json))?;
+            Some(write(name, &|out| json::write(document, out)))
+        },
+        || -> Vec<_> {
+            let formats = formats.par_iter();
+            formats
+                .map(|format| write(format.file_name(), &|out| format.write(result, out)))
+                .collect()
+        },
+    );
+    if !result.has_more() {
+        for format in R::MORE {
+            // Of another result. That there is none is the rule.
+            let _ = fs::remove_file(folder.join(format.file_name()));
+        }
+    }
+    json.into_iter().chain(others).collect()
+}
+
+/// Writes a table whole into `folder`, which is made if it is not there.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write_table(folder: &Path, name: &str, rows: &[u8]) -> Result<PathBuf, FileError> {
+    atomic::make_folder(folder)?;
+    let file = folder.join(name);
+    match atomic::write_file(&file, |out| out.write_all(rows)) {
+        Ok(()) => Ok(file),
+        Err(reason) => Err(FileError::write(&file, reason)),
+    }
 }

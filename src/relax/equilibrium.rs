@@ -215,6 +215,9 @@ pub struct Shape {
     /// Centerlines on the finest grid, one per rod, for drawing.
     #[serde(skip)]
     pub curves: Vec<Vec<DVec3>>,
+    /// Fractions of the length at which these are given.
+    #[serde(skip)]
+    pub curve_stations: Vec<f64>,
 }
 
 impl Shape {

@@ -20,6 +20,7 @@ mod shape;
 mod solve;
 mod stability;
 pub(crate) mod start;
+mod stations;
 
 pub use crate::limit::Limit;
 pub use crate::newton::Work;

@@ -74,6 +74,7 @@ pub fn equilibrium(
             curves: (lines.iter())
                 .map(|line| line.iter().map(|(x, _)| *x).collect())
                 .collect(),
+            curve_stations: finest.leaf.grid.sigma().to_vec(),
         },
     }
 }

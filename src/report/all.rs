@@ -1,15 +1,13 @@
 //! The equilibria of a leaf as people read them.
 
-use std::path::Path;
-
 use crate::report::numbers::power_of_ten;
 use crate::study::{All, Found};
 
 use super::numbers::{seconds, veins};
-use super::table::{lay_out, written};
+use super::table::lay_out;
 
 /// The equilibria, lowest energy first.
-pub fn report(all: &All, folder: Option<&Path>) -> String {
+pub fn report(all: &All, files: Option<String>) -> String {
     let mut lines: Vec<(&str, String)> = Vec::new();
     for (number, found) in all.found.iter().enumerate() {
         let name = if number == 0 { "found" } else { "" };
@@ -30,7 +28,7 @@ pub fn report(all: &All, folder: Option<&Path>) -> String {
             seconds(all.wall_seconds)
         ),
     ));
-    lines.extend(folder.map(|folder| ("written", written(all, folder))));
+    lines.extend(files.map(|files| ("written", files)));
     lines.push((
         "remark",
         "there may be more: no number of starts proves that these are all".into(),

@@ -3,7 +3,13 @@
 
 use std::io::{self, Write};
 
+use glam::DVec3;
+
 use crate::relax::{Equilibrium, NodeState};
+use crate::shape::weights;
+
+/// Nodes of a cubic between those of the finest grid.
+const CUBIC: usize = 4;
 
 /// Names of the columns. Rods are numbered from 1; strains and stress
 /// resultants are components along the directors.
@@ -49,16 +55,19 @@ pub fn modes_table(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result
         .has_headers(false)
         .from_writer(out);
     table.write_record(MODES_HEADER)?;
-    let stations = &equilibrium.shape.stations;
+    let shape = &equilibrium.shape;
+    let place = |&at: &f64| (at, weights(&shape.curve_stations, at, CUBIC));
+    let places: Vec<_> = shape.stations.iter().map(place).collect();
     for (index, mode) in equilibrium.stability.modes.iter().flatten().enumerate() {
         let of_mode = (index + 1, mode.eigenvalue, mode.error, mode.frequency());
         let rods = mode.displacement.iter().zip(&mode.rotation);
         for (rod, (displacement, rotation)) in rods.enumerate() {
-            // Stations are every so many-th node.
-            let stride = (displacement.len() - 1) / (stations.len() - 1).max(1);
-            for (station, &sigma) in stations.iter().enumerate() {
-                let node = station * stride;
-                let [d, r] = [displacement[node], rotation[node]];
+            for (sigma, (first, weights)) in &places {
+                let at = |nodes: &[DVec3]| -> DVec3 {
+                    let near = weights.iter().zip(&nodes[*first..]);
+                    near.map(|(weight, node)| *weight * *node).sum()
+                };
+                let [d, r] = [at(displacement), at(rotation)];
                 let shape = [d.x, d.y, d.z, r.x, r.y, r.z].map(|value| value + 0.0);
                 table.serialize((of_mode, rod + 1, sigma, shape))?;
             }

@@ -1,17 +1,15 @@
 //! The summary of a chart that people read.
 
-use std::path::Path;
-
 use crate::report::numbers::power_of_ten;
 use crate::report::words::contender;
 use crate::study::{Chart, Decade, Peer, Reference, Row, Scaling};
 
 use super::numbers::{seconds, veins_of};
-use super::table::{lay_out, under, written};
+use super::table::{lay_out, under};
 
 /// What errors are measured against, the Pareto front, the fastest way to every
 /// accuracy, and peers.
-pub fn report(chart: &Chart, folder: Option<&Path>) -> String {
+pub fn report(chart: &Chart, files: Vec<String>) -> String {
     let mut lines = under("errors", reference(chart.reference.as_ref()));
     lines.push(("measured", measured(chart)));
     lines.extend(under("front", front(chart)));
@@ -27,12 +25,7 @@ pub fn report(chart: &Chart, folder: Option<&Path>) -> String {
             .iter()
             .map(|remark| ("remark", remark.clone())),
     );
-    if let Some(folder) = folder {
-        lines.push(("written", written(chart, folder)));
-        if let Some(scaling) = &chart.scaling {
-            lines.push(("", written(scaling, folder)));
-        }
-    }
+    lines.extend(under("written", files));
     let veins = veins_of(chart.rods, chart.joined);
     let heading = format!("{}: {veins}, speed against accuracy", chart.scenario);
     lay_out(&heading, &lines)
@@ -240,12 +233,12 @@ mod tests {
         for row in chart.rows.iter_mut().take(2) {
             row.ending = Ending::OtherEquilibrium;
         }
-        let said = report(&chart, None);
+        let said = report(&chart, Vec::new());
         assert!(said.contains("that is NOT CONFIRMED"), "{said}");
         let failed = "semi-implicit, extrapolated, tolerance=1e-2,1e-6, other-equilibrium\n";
         assert!(said.contains(failed), "{said}");
         chart.reference = None;
-        let said = report(&chart, None);
+        let said = report(&chart, Vec::new());
         assert!(
             said.contains("  errors   not known: no equilibrium was found"),
             "{said}"

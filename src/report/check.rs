@@ -1,7 +1,5 @@
 //! The summary of a check that people read.
 
-use std::path::Path;
-
 use glam::DVec3;
 
 use crate::bvp::Solution;
@@ -11,11 +9,11 @@ use super::numbers::{
     bound, decimals, eigenvalues, grids, point, power_of_ten, seconds, significant, veins,
 };
 use super::relax::found;
-use super::table::{Lines, lay_out, under, written};
+use super::table::{Lines, lay_out, under};
 use super::words::{equilibrium_of_index, headline, shooting};
 
 /// The verdict, what both methods found, and how far they are apart.
-pub fn report(check: &Check, folder: Option<&Path>) -> String {
+pub fn report(check: &Check, files: Option<String>) -> String {
     let relaxed = &check.relaxed;
     let mut lines = vec![("verdict", judgement(check))];
     lines.extend(both(check));
@@ -28,7 +26,7 @@ pub fn report(check: &Check, folder: Option<&Path>) -> String {
     if let (Some(remark), true) = (&relaxed.remark, check.shot.is_some()) {
         lines.push(("remark", remark.clone()));
     }
-    lines.extend(folder.map(|folder| ("written", written(check, folder))));
+    lines.extend(files.map(|files| ("written", files)));
     let veins = veins(relaxed);
     let heading = format!("{}: {veins}, relaxed and by shooting", relaxed.scenario);
     lay_out(&heading, &lines)

@@ -19,7 +19,7 @@ pub struct Told {
 }
 
 /// What varies, what was done, and how often each method had each outcome.
-pub fn report(map: &Map, told: Told, files: &str) -> String {
+pub fn report(map: &Map, told: Told, files: Option<String>) -> String {
     let request = &map.request;
     let mut lines: Vec<(&str, String)> = Vec::new();
     for axis in &request.axes {
@@ -46,9 +46,7 @@ pub fn report(map: &Map, told: Told, files: &str) -> String {
         ),
     ));
     lines.extend(under("found", counts(map)));
-    if !files.is_empty() {
-        lines.push(("written", files.into()));
-    }
+    lines.extend(files.map(|files| ("written", files)));
     lay_out(
         &format!("{}: where methods fail", request.base.scenario().name),
         &lines,

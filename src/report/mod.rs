@@ -21,13 +21,16 @@ pub mod words;
 
 use std::io::{self, Write};
 
+use serde::Serialize;
+
+use crate::scenario::{Scenario, printable};
+
 pub use all::report as all_report;
 pub use centerlines::{centerlines, modes_table};
 pub use chart::report as chart_report;
 pub use chart_table::{chart_table, scaling_table};
 pub use check::report as check_report;
 pub use error::FileError;
-pub use json::Json;
 pub use map::{Told as MapTold, report as map_report};
 pub use map_table::{lines, map_table, read_rows, table};
 pub use relax::report as relax_report;
@@ -36,7 +39,7 @@ pub use trace::report as trace_report;
 pub use trace_table::trace_table;
 
 /// One way to write a result down.
-pub trait Format<R> {
+pub trait Format<R>: Sync {
     /// Name of the file, the same from release to release.
     fn file_name(&self) -> &'static str;
 
@@ -45,10 +48,15 @@ pub trait Format<R> {
 }
 
 /// A result that is written to a folder.
-pub trait Written: Sized + 'static {
-    /// Every format, in the order in which the files are written; first the
-    /// JSON that is also shown on request.
+pub trait Written: Serialize + Sync + Sized + 'static {
+    /// Name of its JSON file, which is also shown on request.
+    const JSON: Option<&'static str>;
+
+    /// Every other format, in the order in which files are named.
     const FORMATS: &'static [&'static dyn Format<Self>];
+
+    /// Kinds of files that are written on the way to the result.
+    const GROWING: &'static [Kind] = &[];
 
     /// Formats of what not every result has, written after the others. If this
     /// one has not, what an earlier run has left of them is removed.
@@ -59,10 +67,112 @@ pub trait Written: Sized + 'static {
         false
     }
 
-    /// Names of the files written.
-    fn file_names(&self) -> Vec<&'static str> {
+    /// All kinds of its files.
+    fn kinds() -> Vec<Kind> {
+        let formats = Self::FORMATS
+            .iter()
+            .map(|format| Kind::of(format.file_name()));
+        let json = Self::JSON.map(Kind::of).into_iter();
+        json.chain(formats)
+            .chain(Self::GROWING.iter().copied())
+            .collect()
+    }
+
+    /// Its formats of these kinds.
+    fn formats(&self, kinds: &[Kind]) -> Vec<&'static dyn Format<Self>> {
         let more = if self.has_more() { Self::MORE } else { &[] };
-        let formats = Self::FORMATS.iter().chain(more);
-        formats.map(|format| format.file_name()).collect()
+        let formats = Self::FORMATS.iter().chain(more).copied();
+        let wanted = |format: &&dyn Format<Self>| kinds.contains(&Kind::of(format.file_name()));
+        formats.filter(wanted).collect()
+    }
+}
+
+/// A kind of files: what `--write` lists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The result itself.
+    Json,
+    /// Tables; large ones as arrays of NumPy.
+    Csv,
+    /// Figures as text.
+    Svg,
+    /// Figures as pixels.
+    Png,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Kind; 4] = [Kind::Json, Kind::Csv, Kind::Svg, Kind::Png];
+
+    /// Those that are written unasked.
+    pub const USUAL: [Kind; 4] = [Kind::Json, Kind::Csv, Kind::Svg, Kind::Png];
+
+    /// Its word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Kind::Json => "json",
+            Kind::Csv => "csv",
+            Kind::Svg => "svg",
+            Kind::Png => "png",
+        }
+    }
+
+    /// That of a file, by the end of its name.
+    pub fn of(file: &str) -> Kind {
+        let end = file.rsplit('.').next();
+        let named = Kind::ALL.into_iter().find(|kind| Some(kind.word()) == end);
+        named.unwrap_or(Kind::Csv)
+    }
+}
+
+/// A result with what it was made from, as it stands in JSON: what the file of a
+/// verb holds and `--json` prints.
+#[derive(Serialize)]
+pub struct Document<'a, R> {
+    /// Of the program.
+    version: &'static str,
+    /// The way from the folder of the files to that of the scenario, if it is
+    /// known: by this a folder knows whose results it holds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    source: Option<&'a str>,
+    /// The result.
+    #[serde(flatten)]
+    pub result: &'a R,
+    /// The scenario, every entry in place that was left out or overridden.
+    input: &'a Scenario,
+    /// Why its files could not be written, and the exit status then.
+    #[serde(flatten)]
+    pub refused: Option<Refused>,
+}
+
+/// What `--json` prints of a refusal.
+#[derive(Clone, Debug, Serialize)]
+pub struct Refused {
+    /// Why, and what to change.
+    pub error: String,
+    /// 2, or 130 after Ctrl-C.
+    pub exit_status: i32,
+}
+
+impl Refused {
+    /// Of a request, or of a file that could not be written.
+    pub fn new(error: &str) -> Self {
+        Refused {
+            error: printable(error).into(),
+            exit_status: 2,
+        }
+    }
+}
+
+impl<'a, R> Document<'a, R> {
+    /// Of a scenario, whose file is there.
+    pub fn new(result: &'a R, input: &'a Scenario, source: Option<&'a str>) -> Self {
+        Document {
+            result,
+            version: env!("CARGO_PKG_VERSION"),
+            source,
+            input,
+            refused: None,
+        }
     }
 }

@@ -1,20 +1,18 @@
 //! The summary of a relaxation that people read.
 
-use std::path::Path;
-
 use crate::relax::{Equilibrium, Mode, Outcome};
 use crate::report::words::{shooting, verdict};
 
 use super::numbers::{
     bound, brief, decimals, eigenvalues, grids, point, seconds, significant, veins,
 };
-use super::table::{lay_out, written};
+use super::table::lay_out;
 
 /// Modes whose numbers are told.
 const MODES_TOLD: usize = 6;
 
 /// What was solved, what was found, how well, and where the files are.
-pub fn report(equilibrium: &Equilibrium, folder: Option<&Path>) -> String {
+pub fn report(equilibrium: &Equilibrium, files: Option<String>) -> String {
     let mut lines = vec![("found", found(equilibrium))];
     if let Some(saddle) = &equilibrium.stability.saddle {
         lines.push((
@@ -42,7 +40,7 @@ pub fn report(equilibrium: &Equilibrium, folder: Option<&Path>) -> String {
         lines.push(("model", equilibrium.model.description.clone()));
     }
     lines.push(("work", work(equilibrium)));
-    lines.extend(folder.map(|folder| ("written", written(equilibrium, folder))));
+    lines.extend(files.map(|files| ("written", files)));
     lines.extend((equilibrium.remark.iter()).map(|remark| ("remark", remark.clone())));
     let heading = format!(
         "{}: {}, method {}",

@@ -1,18 +1,16 @@
 //! The summary of a simulation that people read.
 
-use std::path::{Path, PathBuf};
-
 use crate::report::numbers::power_of_ten;
 use crate::simulate::Record;
 
 use super::numbers::{brief, point, seconds, significant, veins_of};
-use super::table::{Lines, lay_out, named};
+use super::table::{Lines, lay_out};
 
 /// Decimals of a position, relative to the longest rod.
 const DECIMALS: f64 = 7.0;
 
 /// How far the leaf came, with what steps, and where its energy went.
-pub fn report(record: &Record, files: Option<(&Path, &[PathBuf])>) -> String {
+pub fn report(record: &Record, files: Option<String>) -> String {
     let mut lines = vec![
         ("moved", moved(record)),
         ("grid", format!("{} segments a vein", record.segments)),
@@ -21,10 +19,7 @@ pub fn report(record: &Record, files: Option<(&Path, &[PathBuf])>) -> String {
     lines.extend(energy(record));
     lines.extend(tip(record));
     lines.push(("speed", speed(record)));
-    if let Some((folder, files)) = files {
-        let names = files.iter().filter_map(|file| file.file_name()?.to_str());
-        lines.push(("written", named(folder, names)));
-    }
+    lines.extend(files.map(|files| ("written", files)));
     if let Some(stopped) = record.stopped {
         lines.push(("remark", stopped.to_string()));
     }

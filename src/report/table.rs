@@ -1,12 +1,14 @@
 //! How results are laid out: named lines for the console, rows for CSV.
 
-use std::fmt::Write as _;
+use std::collections::HashMap;
+use std::fmt::{self, Write as _};
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
-use super::{Format, Written};
+use super::Format;
 
 /// Lines of a report, each with its name; one without a name continues the one
 /// above.
@@ -28,14 +30,10 @@ pub fn lay_out(heading: &str, lines: &[(&str, String)]) -> String {
     text
 }
 
-/// The files of a result in their folder.
-pub fn written<R: Written>(result: &R, folder: &Path) -> String {
-    named(folder, result.file_names().into_iter())
-}
-
 /// Files in a folder.
-pub fn named<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> String {
-    let names: Vec<&str> = names.collect();
+pub fn named(folder: &Path, files: &[PathBuf]) -> String {
+    let names = files.iter().filter_map(|file| file.file_name());
+    let names: Vec<_> = names.map(|name| name.to_string_lossy()).collect();
     format!("{}: {}", folder.display(), names.join(", "))
 }
 
@@ -86,6 +84,129 @@ fn write_rows<R: Serialize>(
         table.serialize(row)?;
     }
     table.flush()
+}
+
+/// Results in one table: of each the file it is of, the exit status and its JSON,
+/// from which every number and word is taken. Columns are named by their keys, of
+/// objects within by both (`work_steps`); lists are left out, but for tips.
+///
+/// # Errors
+/// If the JSON is none.
+pub fn rows_of_json(results: &[(String, i32, Vec<u8>)]) -> io::Result<Vec<u8>> {
+    let mut columns: Vec<String> = Vec::new();
+    let mut rows: Vec<HashMap<String, String>> = Vec::new();
+    for (file, status, json) in results {
+        let Flat(mut cells) = serde_json::from_slice(json)?;
+        let head = [("file", file.clone()), ("exit_status", status.to_string())];
+        cells.retain(|(name, _)| name != "exit_status");
+        cells.splice(0..0, head.map(|(name, cell)| (name.to_string(), cell)));
+        let mut after = 0;
+        for (name, _) in &cells {
+            after = 1 + match columns.iter().position(|column| column == name) {
+                Some(known) => known,
+                None => {
+                    columns.insert(after, name.clone());
+                    after
+                }
+            };
+        }
+        rows.push(cells.into_iter().collect());
+    }
+    columns.retain(|column| column != "error");
+    columns.push("error".into());
+    let mut table = csv::Writer::from_writer(Vec::new());
+    table.write_record(&columns)?;
+    for row in &rows {
+        table.write_record(
+            columns
+                .iter()
+                .map(|column| row.get(column).map_or("", String::as_str)),
+        )?;
+    }
+    table.into_inner().map_err(|error| error.into_error())
+}
+
+/// What a JSON value says in cells, each with its name; a number or a word has none.
+struct Flat(Vec<(String, String)>);
+
+impl<'de> Deserialize<'de> for Flat {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Cells;
+
+        impl Cells {
+            fn one<E>(cell: impl ToString) -> Result<Flat, E> {
+                Ok(Flat(vec![(String::new(), cell.to_string())]))
+            }
+        }
+
+        impl<'de> Visitor<'de> for Cells {
+            type Value = Flat;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("JSON")
+            }
+
+            fn visit_bool<E>(self, value: bool) -> Result<Flat, E> {
+                Cells::one(value)
+            }
+
+            fn visit_i64<E>(self, value: i64) -> Result<Flat, E> {
+                Cells::one(value)
+            }
+
+            fn visit_u64<E>(self, value: u64) -> Result<Flat, E> {
+                Cells::one(value)
+            }
+
+            fn visit_f64<E>(self, value: f64) -> Result<Flat, E> {
+                Cells::one(format_args!("{value:?}"))
+            }
+
+            fn visit_str<E>(self, value: &str) -> Result<Flat, E> {
+                Cells::one(value)
+            }
+
+            fn visit_unit<E>(self) -> Result<Flat, E> {
+                Cells::one("")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Flat, A::Error> {
+                while list.next_element::<IgnoredAny>()?.is_some() {}
+                Ok(Flat(Vec::new()))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut object: A) -> Result<Flat, A::Error> {
+                let mut cells = Vec::new();
+                while let Some(key) = object.next_key::<String>()? {
+                    match key.as_str() {
+                        "version" | "source" | "input" => {
+                            object.next_value::<IgnoredAny>()?;
+                        }
+                        "tip" | "tip_force_sum" => {
+                            let tip = object.next_value::<Option<[f64; 3]>>()?;
+                            for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+                                let cell =
+                                    tip.map_or(String::new(), |tip| format!("{:?}", tip[axis]));
+                                cells.push((format!("{key}_{name}"), cell));
+                            }
+                        }
+                        _ => {
+                            let Flat(inner) = object.next_value()?;
+                            cells.extend(inner.into_iter().map(
+                                |(name, cell)| match name.as_str() {
+                                    "" => (key.clone(), cell),
+                                    name => (format!("{key}_{name}"), cell),
+                                },
+                            ));
+                        }
+                    }
+                }
+                Ok(Flat(cells))
+            }
+        }
+
+        deserializer.deserialize_any(Cells)
+    }
 }
 
 /// The header of a table of such rows, which may have none yet.

@@ -1,15 +1,13 @@
 //! The summary of a trace that people read.
 
-use std::path::Path;
-
 use crate::study::{Law, PointKind, Trace, TraceBranch, TracePoint};
 
 use super::numbers::{power_of_ten, seconds, veins_of};
-use super::table::{lay_out, under, written};
+use super::table::{lay_out, under};
 use super::words::branch_end;
 
 /// The branches, their ends, and where the index changes.
-pub fn report(trace: &Trace, folder: Option<&Path>) -> String {
+pub fn report(trace: &Trace, files: Option<String>) -> String {
     let [from, to] = trace.range.map(|value| trace.keys.text(value));
     let mut lines = vec![("vary", format!("{} from {from} to {to}", trace.keys))];
     let branches = trace.branches.iter().enumerate();
@@ -33,7 +31,7 @@ pub fn report(trace: &Trace, folder: Option<&Path>) -> String {
             seconds(trace.wall_seconds)
         ),
     ));
-    lines.extend(folder.map(|folder| ("written", written(trace, folder))));
+    lines.extend(files.map(|files| ("written", files)));
     lines.extend((trace.remark.iter()).map(|remark| ("remark", remark.clone())));
     let veins = veins_of(trace.rods, trace.joined);
     lay_out(&format!("{}: {veins}, followed", trace.scenario), &lines)

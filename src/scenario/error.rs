@@ -1,5 +1,6 @@
 //! Why a scenario is refused: one message for a person, and where it points.
 
+use std::borrow::Cow;
 use std::fmt;
 
 use super::key::Key;
@@ -7,7 +8,7 @@ use super::key::Key;
 /// Why a scenario was refused. Its text is the whole message: where, which
 /// key, what was found, and what to change.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{place}: {problem}")]
+#[error("{}", printable(&format!("{place}: {problem}")))]
 pub struct ScenarioError {
     /// Where.
     pub place: Place,
@@ -15,6 +16,18 @@ pub struct ScenarioError {
     pub key: Option<Key>,
     /// The rest of the message.
     pub problem: String,
+}
+
+impl ScenarioError {
+    /// The same of a file that is no TOML itself: its lines are others.
+    pub(super) fn without_line(mut self) -> Self {
+        if let Place::File { line, .. } = &mut self.place {
+            *line = None;
+        }
+        let end = self.problem.find('\n').unwrap_or(self.problem.len());
+        self.problem.truncate(end);
+        self
+    }
 }
 
 /// Where a value was written, or is missing.
@@ -44,6 +57,27 @@ impl fmt::Display for Place {
             Place::Set { given } => write!(f, "--set {given}"),
         }
     }
+}
+
+/// A message with what a terminal would obey instead of showing it, control
+/// characters but line ends and tabs, and marks of the direction of writing, as
+/// escapes.
+pub(crate) fn printable(message: &str) -> Cow<'_, str> {
+    let obeyed = |c: char| {
+        c.is_control() && !matches!(c, '\n' | '\t')
+            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    if !message.contains(obeyed) {
+        return message.into();
+    }
+    let mut shown = String::new();
+    for c in message.chars() {
+        match obeyed(c) {
+            true => shown.extend(c.escape_default()),
+            false => shown.push(c),
+        }
+    }
+    shown.into()
 }
 
 /// The line of `text` that holds byte `at`, counted from 1.

@@ -3,6 +3,7 @@
 //! A new key is a row here, a field of the checked scenario, and the line in
 //! `check` that reads the one into the other.
 
+use super::error::shorten;
 use Form::*;
 use LeftOut::*;
 use Range::*;
@@ -266,6 +267,29 @@ pub(crate) fn nearest(path: &str) -> Option<&'static str> {
     let near = candidates.map(|candidate| (strsim::levenshtein(&path, candidate), candidate));
     let (edits, candidate) = near.min()?;
     (edits <= most).then_some(candidate)
+}
+
+/// What is wrong with a path that is no key's, and what was probably meant.
+pub(super) fn unknown(path: &str) -> String {
+    let found = shorten(path);
+    match nearest(path) {
+        Some(meant) if meant != path => {
+            return format!("unknown key {found} (did you mean {meant}?)");
+        }
+        _ => (),
+    }
+    let table = path.split('.').next().unwrap_or("");
+    let tables = Key::tables();
+    match tables.iter().find(|known| **known == table) {
+        Some(table) => {
+            let allowed = Key::allowed_in(table).join(", ");
+            format!("unknown key {found}: [{table}] has {allowed}")
+        }
+        None => {
+            let tables = tables.join(", ");
+            format!("unknown key {found}: keys are name and those of {tables}, as in leaf.rods")
+        }
+    }
 }
 
 #[cfg(test)]

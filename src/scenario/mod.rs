@@ -6,9 +6,11 @@
 mod check;
 mod dynamics;
 mod error;
+mod form;
 mod key;
 mod limits;
 mod material;
+mod part;
 mod profile;
 mod raw;
 mod read;
@@ -18,11 +20,13 @@ mod section;
 mod value;
 
 pub use dynamics::{Dynamics, Start};
+pub(crate) use error::printable;
 pub use error::{Place, ScenarioError};
+pub(crate) use key::Form;
 pub use key::Key;
-pub(crate) use key::{Form, LeftOut, nearest};
+pub use part::Part;
 pub use profile::Profile;
-pub(crate) use read::text;
+pub(crate) use read::{MOST_BYTES, text, utf8};
 pub use scale::Scale;
 pub(crate) use scale::longest;
 pub use schedule::Schedule;

@@ -8,6 +8,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::{Place, ScenarioError, line_of, shorten, snippet};
 use super::key::{Form, Key, LeftOut, nearest};
+use super::part::Override;
 
 /// All entries of a scenario, those of `--set` in place of the file's.
 pub(super) struct Raw<'a> {
@@ -100,11 +101,11 @@ impl<'a> Source<'a> {
 }
 
 impl<'a> Raw<'a> {
-    /// Reads `text`, then lays the `KEY=VALUE` of `overrides` over it.
+    /// Reads `text`, then lays `overrides` over it.
     pub(super) fn parse(
         text: &'a str,
         file: &'a str,
-        overrides: &'a [String],
+        overrides: &'a [Override],
     ) -> Result<Raw<'a>, ScenarioError> {
         let mut raw = Raw {
             file,
@@ -164,26 +165,18 @@ impl<'a> Raw<'a> {
         Ok(())
     }
 
-    /// Takes one `KEY=VALUE`. The value is TOML; what cannot be is taken as text.
-    fn set(&mut self, given: &'a str) -> Result<(), ScenarioError> {
-        let (path, text) = given.split_once('=').unwrap_or((given, ""));
-        let (path, text) = (path.trim(), text.trim());
-        let origin = Origin::Set(given);
+    /// Takes one override. The value is TOML; what cannot be is taken as text.
+    fn set(&mut self, given: &'a Override) -> Result<(), ScenarioError> {
+        let text = given.value.as_str();
+        let origin = Origin::Set(&given.given);
         let source = Source { text, origin };
-        if !given.contains('=') {
-            let problem = "must be KEY=VALUE, e.g. --set load.gravity=[0,0,-0.5]";
-            return Err(source.refuse(0, problem.into()));
-        }
-        let Some(key) = Key::from_path(path) else {
-            return Err(source.unknown_key(path, 0..0, Key::all().map(Key::path).collect()));
-        };
         let value = match DeValue::parse(text) {
             Err(_) if !text.is_empty() && !text.starts_with(['[', '{', '"', '\'']) => {
                 Spanned::new(0..text.len(), DeValue::String(text.into()))
             }
             parsed => source.parse(parsed)?,
         };
-        self.entries[key as usize] = Some(Entry { value, source });
+        self.entries[given.key as usize] = Some(Entry { value, source });
         Ok(())
     }
 

@@ -5,14 +5,17 @@ use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 use super::error::{Place, ScenarioError, line_of};
+use super::form::from_json;
+use super::part::resolve;
 use super::raw::Raw;
 use super::{Scenario, check};
 
 /// Most bytes of a file; 100,000 rods with every quantity listed stay below.
-const MOST_BYTES: u64 = 64 << 20;
+pub(crate) const MOST_BYTES: u64 = 64 << 20;
 
 impl Scenario {
-    /// Reads and checks the TOML in `text`.
+    /// Reads and checks the TOML in `text`, or the JSON of a [`Scenario`] or of a
+    /// result with its `input`.
     ///
     /// ```
     /// let scenario = leafdyn::scenario::Scenario::from_toml(
@@ -32,13 +35,22 @@ impl Scenario {
 
     /// As [`Scenario::from_toml`], with the entries `overrides` replaced
     /// (`KEY=VALUE`, such as `load.gravity=[0,0,-0.5]`; the value is TOML, and
-    /// what is no TOML is taken as text). Messages call the text `file`.
+    /// what is no TOML is taken as text), or parts of them: one entry of a list
+    /// (`load.gravity[2]=-1`, `stiffness.bending_2.value[0]=2`), or every number of
+    /// a key multiplied (`scale:load.gravity=2`). Messages call the text `file`.
     pub fn from_toml_with(
         text: &str,
         file: &str,
         overrides: &[String],
     ) -> Result<Scenario, ScenarioError> {
-        check::check(&Raw::parse(text, file, overrides)?)
+        let toml = from_json(text, file).transpose()?;
+        let read = toml.as_deref().unwrap_or(text);
+        let overrides = resolve(read, overrides)?;
+        let checked = Raw::parse(read, file, &overrides).and_then(|raw| check::check(&raw));
+        checked.map_err(|error| match toml {
+            Some(_) => error.without_line(),
+            None => error,
+        })
     }
 
     /// Reads and checks the file at `path`.
@@ -54,28 +66,25 @@ impl Scenario {
 
 /// The text of a scenario's file.
 pub(crate) fn text(path: &Path) -> Result<String, ScenarioError> {
-    let refuse = |line, problem| {
-        let file = path.display().to_string();
-        let place = Place::File { file, line };
-        ScenarioError {
-            place,
-            key: None,
-            problem,
-        }
-    };
+    let file = path.display().to_string();
     let mut bytes = Vec::new();
     // Opening a folder succeeds on some systems, and reading it fails.
     File::open(path)
         .and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|reason| match reason.kind() {
             ErrorKind::IsADirectory => {
-                refuse(None, "is a folder: give the TOML file itself".into())
+                refused(&file, None, "is a folder: give the TOML file itself".into())
             }
-            _ => refuse(None, format!("cannot be read: {reason}")),
+            _ => refused(&file, None, format!("cannot be read: {reason}")),
         })?;
+    utf8(bytes, &file)
+}
+
+/// The text of a scenario's `file`, of whose bytes these are the first.
+pub(crate) fn utf8(bytes: Vec<u8>, file: &str) -> Result<String, ScenarioError> {
     if bytes.len() as u64 > MOST_BYTES {
         let problem = format!("is larger than {MOST_BYTES} bytes: this is no scenario");
-        return Err(refuse(None, problem));
+        return Err(refused(file, None, problem));
     }
     String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
@@ -83,6 +92,15 @@ pub(crate) fn text(path: &Path) -> Result<String, ScenarioError> {
         let byte = bytes[offset];
         let problem =
             format!("is not text in UTF-8: byte {offset} is 0x{byte:02x}: save the file as UTF-8");
-        refuse(Some(line_of(bytes, offset)), problem)
+        refused(file, Some(line_of(bytes, offset)), problem)
     })
+}
+
+fn refused(file: &str, line: Option<usize>, problem: String) -> ScenarioError {
+    let file = file.to_string();
+    ScenarioError {
+        place: Place::File { file, line },
+        key: None,
+        problem,
+    }
 }

@@ -49,13 +49,13 @@ pub enum Property {
 /// The section of a rod and its material, along the rod.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
-    outline: Outline,
-    width: Profile,
-    thickness: Profile,
-    young: Profile,
-    poisson: Profile,
+    pub(super) outline: Outline,
+    pub(super) width: Profile,
+    pub(super) thickness: Profile,
+    pub(super) young: Profile,
+    pub(super) poisson: Profile,
     /// Mass per volume; zero where it is not given.
-    mass_density: Profile,
+    pub(super) mass_density: Profile,
     /// Fractions inside (0, 1) where the slope of one of them may jump.
     kinks: Vec<f64>,
 }

@@ -2,7 +2,11 @@
 
 use crate::leaf::Leaf;
 use crate::motion::{Energy, Physics, Snapshot, Velocity};
+use crate::shape::weights;
 use glam::{DQuat, DVec3};
+
+/// Nodes that a cubic goes through.
+const CUBIC: usize = 4;
 
 /// A leaf at an instant, in the units of its scenario. Nodes are numbered rod
 /// by rod, base to tip.
@@ -40,6 +44,37 @@ impl Frame {
             velocities: snapshot.velocity.iter().map(velocity).collect(),
             energy: snapshot.energy.map(|e| e * energy),
         }
+    }
+
+    /// The same with nodes at the fractions `to` of the length, by cubics through
+    /// those at the fractions `from`.
+    pub fn at(&self, from: &[f64], to: &[f64]) -> Frame {
+        let weights: Vec<_> = to.iter().map(|&at| weights(from, at, CUBIC)).collect();
+        let mut there = Frame {
+            positions: Vec::new(),
+            rotations: Vec::new(),
+            velocities: Vec::new(),
+            ..self.clone()
+        };
+        for base in (0..self.rods).map(|rod| rod * from.len()) {
+            for (first, weights) in &weights {
+                let near = || (base + first..).zip(weights.iter().copied());
+                let sum = |of: &dyn Fn(usize) -> DVec3| near().map(|(i, w)| w * of(i)).sum();
+                // A rotation's two quaternions must not be mixed up.
+                let side = self.rotations[base + first];
+                let rotation = near().fold(DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), |sum, (i, w)| {
+                    let q = self.rotations[i];
+                    sum + q * w.copysign(w * q.dot(side))
+                });
+                there.positions.push(sum(&|i| self.positions[i]));
+                there.rotations.push(rotation.normalize());
+                there.velocities.push(Velocity {
+                    linear: sum(&|i| self.velocities[i].linear),
+                    angular: sum(&|i| self.velocities[i].angular),
+                });
+            }
+        }
+        there
     }
 
     /// Nodes of a rod: positions from base to tip.

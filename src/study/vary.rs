@@ -1,8 +1,9 @@
 //! Numbers of a scenario that vary: `KEY=FROM..TO[:COUNT][log]`.
 //!
 //! A key is any number of the scenario by its path as in `--set`, one entry of
-//! a list by an index that counts from 0 (`load.gravity[2]`), or a setting of a
-//! method (`method.step`). Several keys joined by `+` take the same value. The
+//! a list by an index that counts from 0 (`load.gravity[2]`), all numbers of a key
+//! multiplied (`scale:stiffness.bending_2`), or a setting of a method
+//! (`method.step`). Several keys joined by `+` take the same value. The
 //! values go into a scenario through the same text as `--set`, so that every
 //! limit of the format holds for them ([`Base::at`]).
 //!
@@ -30,7 +31,7 @@ pub use base::{Base, Varied};
 use std::fmt;
 use std::str::FromStr;
 
-use crate::scenario::{Form, Key, ScenarioError, nearest};
+use crate::scenario::{Form, Part, ScenarioError};
 
 /// Values where no count is given.
 const COUNT: usize = 11;
@@ -94,12 +95,7 @@ impl Knobs {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
     /// Of the scenario.
-    Entry {
-        /// The key.
-        key: Key,
-        /// One entry of its list, counted from 0.
-        index: Option<usize>,
-    },
+    Entry(Part),
     /// Of a method.
     Knob(Knob),
 }
@@ -107,8 +103,15 @@ pub enum Target {
 impl Target {
     fn is_whole(self) -> bool {
         match self {
-            Target::Entry { key, .. } => key.form() == Form::Whole,
+            Target::Entry(part) => part.key.form() == Form::Whole,
             Target::Knob(knob) => knob == Knob::Segments,
+        }
+    }
+
+    fn text(self, value: f64) -> String {
+        match self.is_whole() {
+            true => format!("{value:.0}"),
+            false => format!("{value:?}"),
         }
     }
 }
@@ -122,49 +125,20 @@ impl FromStr for Target {
             return Ok(Target::Knob(knob));
         }
         let refuse = |why: String| VaryError::Key(format!("{text}: {why}"));
-        let (path, index) = match text.strip_suffix(']').and_then(|rest| rest.split_once('[')) {
-            Some((path, index)) => {
-                let index = index.trim().parse();
-                let index = index.map_err(|_| {
-                    refuse("an index is a whole number from 0, as in load.gravity[2]".into())
-                })?;
-                (path.trim(), Some(index))
-            }
-            None => (text, None),
-        };
-        let Some(key) = Key::from_path(path) else {
-            return Err(refuse(match nearest(path) {
-                Some(meant) => format!("unknown key; did you mean {meant}?"),
-                None => {
-                    let numbers = Key::all().filter(|key| key.form().is_numeric());
-                    let paths = numbers.map(Key::path).chain(Knob::ALL.map(Knob::path));
-                    format!("unknown key: {}", paths.collect::<Vec<_>>().join(", "))
-                }
-            }));
-        };
-        match (key.form(), index) {
-            (form, _) if !form.is_numeric() => {
-                Err(refuse("takes no number that could vary".into()))
-            }
-            (Form::Whole | Form::Number(_), Some(_)) => {
-                Err(refuse("is one number: leave the index out".into()))
-            }
-            (Form::Vector, Some(3..)) => Err(refuse("x, y, z have the indices 0, 1, 2".into())),
-            (Form::Vector | Form::Fan, None) => {
-                Err(refuse(format!("is a list: give an index, as in {path}[0]")))
-            }
-            _ => Ok(Target::Entry { key, index }),
+        if text.starts_with("method.") {
+            let all = Knob::ALL.map(Knob::path).join(" and ");
+            return Err(refuse(format!("unknown key: methods have {all}")));
         }
+        let part = Part::parse(text).map_err(refuse)?;
+        part.is_number().map_err(refuse)?;
+        Ok(Target::Entry(part))
     }
 }
 
 impl fmt::Display for Target {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Target::Entry { key, index } => {
-                f.write_str(key.path())?;
-                index.map_or(Ok(()), |index| write!(f, "[{index}]"))
-            }
+            Target::Entry(part) => part.fmt(f),
             Target::Knob(knob) => f.write_str(knob.path()),
         }
     }

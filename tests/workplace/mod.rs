@@ -103,14 +103,21 @@ impl Workplace {
         command.spawn().unwrap()
     }
 
-    /// A run that is refused: status 2, the message, nothing printed, and
-    /// nothing written.
+    /// A run that is refused: status 2, the message, nothing printed but JSON that
+    /// says the same, and nothing written.
     #[track_caller]
     pub fn refuses(&self, arguments: &str, message: &str) {
         let before = self.names(".");
         let run = self.run(arguments);
         assert_eq!(run.status, Some(2), "{arguments}: {}", run.err);
-        assert_eq!(run.out, "", "{arguments}");
+        match arguments.contains("--json") {
+            true => {
+                let refused = run.json();
+                assert_eq!(refused["exit_status"], 2, "{arguments}");
+                assert!(refused["error"].as_str().unwrap().contains(message));
+            }
+            false => assert_eq!(run.out, "", "{arguments}"),
+        }
         assert!(run.err.contains(message), "{message} in {}", run.err);
         assert_eq!(self.names("."), before, "{arguments}");
     }

@@ -44,10 +44,12 @@ pub struct Identity {
     segments: usize,
     step: Option<String>,
     tolerance: String,
+    /// Of `--stations`.
+    stations: Option<usize>,
 }
 
 impl Identity {
-    pub fn of(simulation: &Simulation) -> Self {
+    pub fn of(simulation: &Simulation, stations: Option<usize>) -> Self {
         let scenario = simulation.leaf().scenario();
         Identity {
             version: env!("CARGO_PKG_VERSION").into(),
@@ -58,11 +60,12 @@ impl Identity {
             segments: simulation.segments(),
             step: simulation.longest_step().map(digits),
             tolerance: digits(simulation.tolerance()),
+            stations,
         }
     }
 
     /// What tells runs apart, with numbers as people read them.
-    fn described(&self) -> [(&'static str, String); 7] {
+    fn described(&self) -> [(&'static str, String); 8] {
         let number = |digits: &str| number(digits).map_or("?".into(), |number| number.to_string());
         let step = self.step.as_deref();
         [
@@ -76,6 +79,10 @@ impl Identity {
                 step.map_or("left to the tolerance".into(), number),
             ),
             ("tolerance", number(&self.tolerance)),
+            (
+                "stations",
+                (self.stations).map_or("of the grid".into(), |count| count.to_string()),
+            ),
         ]
     }
 
@@ -203,7 +210,7 @@ mod tests {
     use crate::report::sample;
 
     fn identity() -> Identity {
-        Identity::of(&sample::swing(1, 4).0)
+        Identity::of(&sample::swing(1, 4).0, None)
     }
 
     fn written() -> (tempfile::TempDir, Checkpoint) {

@@ -20,10 +20,11 @@ use glam::DVec3;
 
 pub use checkpointer::Checkpointer;
 
-use super::{atomic, write_all};
-use crate::report::FileError;
+use super::{Selection, atomic, write_all};
 use crate::report::table::header;
+use crate::report::{Document, FileError, Kind};
 use crate::scenario;
+use crate::shape::equally_spaced;
 use crate::simulate::{Frame, Moment, Record, Simulation, Still, Stopped, stills};
 use checkpoint::{Checkpoint, Identity, damaged};
 use checkpointer::Latest;
@@ -36,7 +37,7 @@ const STILLS: usize = 8;
 /// The files of a simulation that is under way.
 ///
 /// ```
-/// use leafdyn::files::Recording;
+/// use leafdyn::files::{Document, Recording, Selection};
 /// use leafdyn::scenario::Scenario;
 /// use leafdyn::simulate::{Options, Simulation};
 ///
@@ -50,13 +51,13 @@ const STILLS: usize = 8;
 /// # let folder = folder.path();
 /// let scenario = Scenario::from_toml(cantilever)?;
 /// let mut simulation = Simulation::new(&scenario, &Options::default())?;
-/// let mut recording = Recording::begin(folder, &mut simulation)?;
+/// let mut recording = Recording::begin(folder, &mut simulation, &Selection::default())?;
 /// while !simulation.done() {
 ///     let frame = simulation.next_frame()?;
 ///     recording.add(&simulation, &frame)?;
 /// }
 /// let record = recording.record(&simulation, None)?;
-/// let files = recording.finish(&record)?;
+/// let files = recording.finish(&Document::new(&record, &scenario, None))?;
 /// assert_eq!(files.len(), 7);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -67,8 +68,11 @@ pub struct Recording {
     size: Size,
     stations: Vec<f64>,
     joined: bool,
-    motion: GrowingFile,
-    energy: GrowingFile,
+    /// `motion` and `energy`, where they are wanted or figures are made of them.
+    growing: Option<[GrowingFile; 2]>,
+    selection: Selection,
+    /// Positions at the last output.
+    last: Vec<DVec3>,
     moments: Vec<Moment>,
     /// Time on the clock in processes before this one.
     wall: Duration,
@@ -77,18 +81,26 @@ pub struct Recording {
 
 impl Recording {
     /// Begins the files of a simulation in `folder`, which is made if it is
-    /// not there, with the leaf as it is now.
+    /// not there, with the leaf as it is now. Without tables and figures nothing
+    /// is written on the way, and there is nothing to resume.
     ///
     /// # Errors
     /// If they cannot be written.
-    pub fn begin(folder: &Path, simulation: &mut Simulation) -> Result<Self, FileError> {
-        atomic::make_folder(folder)?;
-        let (form, size) = form(simulation);
-        let start = form.start(size, outputs(simulation));
-        let motion = GrowingFile::begin(folder.join(form.file_name()), &start)?;
-        let start = header(energy::Row::default());
-        let energy = GrowingFile::begin(folder.join(energy::FILE_NAME), &start)?;
-        let mut recording = Recording::with(folder, simulation, motion, energy);
+    pub fn begin(
+        folder: &Path,
+        simulation: &mut Simulation,
+        selection: &Selection,
+    ) -> Result<Self, FileError> {
+        let mut recording = Recording::with(folder, simulation, selection);
+        if selection.kinds.iter().any(|kind| *kind != Kind::Json) {
+            atomic::make_folder(folder)?;
+            let form = recording.form;
+            let start = form.start(recording.size, outputs(simulation));
+            let motion = GrowingFile::begin(folder.join(form.file_name()), &start)?;
+            let start = header(energy::Row::default());
+            let energy = GrowingFile::begin(folder.join(energy::FILE_NAME), &start)?;
+            recording.growing = Some([motion, energy]);
+        }
         let frame = simulation.frame();
         recording.add(simulation, &frame)?;
         Ok(recording)
@@ -100,8 +112,13 @@ impl Recording {
     /// # Errors
     /// If there is no checkpoint, or it does not fit. Nothing that was kept is
     /// lost then.
-    pub fn resume(folder: &Path, simulation: &mut Simulation) -> Result<Self, FileError> {
-        let found = Checkpoint::read(folder, &Identity::of(simulation))?;
+    pub fn resume(
+        folder: &Path,
+        simulation: &mut Simulation,
+        selection: &Selection,
+    ) -> Result<Self, FileError> {
+        let mut recording = Recording::with(folder, simulation, selection);
+        let found = Checkpoint::read(folder, &recording.run)?;
         let state = found.state().filter(|state| simulation.restore(state));
         state.ok_or_else(|| {
             damaged(
@@ -109,11 +126,11 @@ impl Recording {
                 "it does not fit the leaf",
             )
         })?;
-        let (form, _) = form(simulation);
-        let motion = GrowingFile::resume(folder.join(form.file_name()), &found.motion)?;
+        let motion = folder.join(recording.form.file_name());
+        let motion = GrowingFile::resume(motion, &found.motion)?;
         let energy = GrowingFile::resume(folder.join(energy::FILE_NAME), &found.energy)?;
-        let mut recording = Recording::with(folder, simulation, motion, energy);
-        let moments = recording.energy.read(energy::read).ok();
+        let moments = energy.read(energy::read).ok();
+        recording.growing = Some([motion, energy]);
         recording.moments = moments
             .filter(|moments| moments.len() == simulation.frames().1 + 1)
             .ok_or_else(|| damaged(&folder.join(energy::FILE_NAME), "outputs are missing"))?;
@@ -122,22 +139,25 @@ impl Recording {
         Ok(recording)
     }
 
-    fn with(
-        folder: &Path,
-        simulation: &Simulation,
-        motion: GrowingFile,
-        energy: GrowingFile,
-    ) -> Self {
-        let (form, size) = form(simulation);
+    fn with(folder: &Path, simulation: &Simulation, selection: &Selection) -> Self {
+        let stations = match selection.stations {
+            Some(count) => equally_spaced(count),
+            None => simulation.stations().to_vec(),
+        };
+        let size = Size {
+            rods: simulation.leaf().rods(),
+            nodes: stations.len(),
+        };
         Recording {
             folder: folder.into(),
-            run: Identity::of(simulation),
-            form,
+            run: Identity::of(simulation, selection.stations),
+            form: Form::of(size, outputs(simulation)),
             size,
-            stations: simulation.stations().into(),
+            stations,
             joined: simulation.leaf().joined(),
-            motion,
-            energy,
+            growing: None,
+            selection: selection.clone(),
+            last: Vec::new(),
             moments: Vec::new(),
             wall: Duration::ZERO,
             checkpointer: Checkpointer::default(),
@@ -154,23 +174,35 @@ impl Recording {
     /// # Errors
     /// If it cannot be written.
     pub fn add(&mut self, simulation: &Simulation, frame: &Frame) -> Result<(), FileError> {
-        let moment = Moment::of(frame, self.joined);
+        self.moments.push(Moment::of(frame, self.joined));
+        let Some([motion, energy]) = &mut self.growing else {
+            self.last = frame.positions.clone();
+            return Ok(());
+        };
         let (form, stations) = (self.form, &self.stations);
-        self.motion.append(|out| form.write(frame, stations, out))?;
-        self.energy.append(|out| energy::write(&moment, out))?;
-        self.moments.push(moment);
+        let there = match self.selection.stations {
+            Some(_) => &frame.at(simulation.stations(), stations),
+            None => frame,
+        };
+        motion.append(|out| form.write(there, stations, out))?;
+        if let Some(moment) = self.moments.last() {
+            energy.append(|out| energy::write(moment, out))?;
+        }
         self.update_checkpointer(simulation);
         Ok(())
     }
 
     fn update_checkpointer(&self, simulation: &Simulation) {
+        let Some(files) = &self.growing else {
+            return;
+        };
         let wall = (self.wall + simulation.wall_time()).as_nanos();
         let wall = wall.min(u128::from(u64::MAX)) as u64;
-        let extents = [self.motion.extent(), self.energy.extent()];
+        let extents = files.each_ref().map(GrowingFile::extent);
         let time = simulation.time();
         *self.checkpointer.latest() = Some(Latest {
             folder: self.folder.clone(),
-            files: [self.motion.unfinished(), self.energy.unfinished()],
+            files: files.each_ref().map(GrowingFile::unfinished),
             checkpoint: Checkpoint::new(self.run.clone(), extents, time, wall),
             state: simulation.save(),
         });
@@ -187,16 +219,24 @@ impl Recording {
         stopped: Option<Stopped>,
     ) -> Result<Record, FileError> {
         let longest = scenario::longest(&simulation.leaf().scenario().rods);
-        let chosen = stills(&self.moments, STILLS, longest);
         let (form, size) = (self.form, self.size);
-        let shapes = self
-            .motion
-            .read(|file| form.positions(size, &chosen, file))?;
+        let (chosen, shapes, nodes) = match &self.growing {
+            Some([motion, _]) => {
+                let chosen = stills(&self.moments, STILLS, longest);
+                let shapes = motion.read(|file| form.positions(size, &chosen, file))?;
+                (chosen, shapes, size.nodes)
+            }
+            None => {
+                let nodes = self.last.len() / size.rods;
+                let last = self.moments.len().saturating_sub(1);
+                (vec![last], mem::take(&mut self.last), nodes)
+            }
+        };
         let still = |(moment, shape): (usize, &[DVec3])| Still {
             moment,
-            curves: shape.chunks(size.nodes).map(<[DVec3]>::to_vec).collect(),
+            curves: shape.chunks(nodes).map(<[DVec3]>::to_vec).collect(),
         };
-        let stills = chosen.into_iter().zip(shapes.chunks(size.rows()));
+        let stills = chosen.into_iter().zip(shapes.chunks(nodes * size.rods));
         let moments = mem::take(&mut self.moments);
         let mut record = Record::new(simulation, stopped, moments, stills.map(still).collect());
         record.wall_seconds += self.wall.as_secs_f64();
@@ -208,25 +248,34 @@ impl Recording {
     ///
     /// # Errors
     /// If a file cannot be written; a checkpoint can then still be.
-    pub fn finish(&mut self, record: &Record) -> Result<Vec<PathBuf>, FileError> {
-        let mut files = write_all(&self.folder, record)?;
+    pub fn finish(&mut self, record: &Document<Record>) -> Result<Vec<PathBuf>, FileError> {
+        let kinds = &self.selection.kinds;
+        let mut files = write_all(&self.folder, record, kinds)?;
+        let Some([motion, energy]) = &mut self.growing else {
+            return Ok(files);
+        };
         // From here on there is nothing left to go on from.
         let mut latest = self.checkpointer.latest();
-        let start = self.form.start(self.size, record.moments.len());
-        self.motion.replace_start(&start)?;
-        files.push(self.motion.finish()?);
-        files.push(self.energy.finish()?);
+        if kinds.contains(&Kind::Csv) {
+            let outputs = record.result.moments.len();
+            motion.replace_start(&self.form.start(self.size, outputs))?;
+            files.push(motion.finish()?);
+            files.push(energy.finish()?);
+        }
         latest.take();
         drop(latest);
         let file = |name: &str| self.folder.join(name);
         let other = file(self.form.other().file_name());
-        for left in [
+        let mut left = vec![
             file(checkpoint::FILE_NAME),
             kept_path(&file(self.form.file_name())),
             kept_path(&other),
             kept_path(&file(energy::FILE_NAME)),
-            other,
-        ] {
+        ];
+        if kinds.contains(&Kind::Csv) {
+            left.push(other);
+        }
+        for left in left {
             // What is not there need not be removed.
             let _ = fs::remove_file(left);
         }
@@ -237,12 +286,4 @@ impl Recording {
 /// Outputs of a simulation, the first and the last included.
 fn outputs(simulation: &Simulation) -> usize {
     simulation.frames().0 + 1
-}
-
-fn form(simulation: &Simulation) -> (Form, Size) {
-    let size = Size {
-        rods: simulation.leaf().rods(),
-        nodes: simulation.stations().len(),
-    };
-    (Form::of(size, outputs(simulation)), size)
 }

@@ -135,6 +135,7 @@ pub fn shoot(
         work: work.into(),
         wall_seconds: clock.elapsed().as_secs_f64(),
         shape: Shape {
+            curve_stations: stations.clone(),
             stations,
             joined: scenario.joined,
             curves: rods.iter().map(curve).collect(),

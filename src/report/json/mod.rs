@@ -5,21 +5,6 @@ use std::io::{self, Write};
 use serde::Serialize;
 use serde_json::ser::Formatter;
 
-use super::Format;
-
-/// A result as it serializes, in a file of this name: also what `--json` prints.
-pub struct Json(pub &'static str);
-
-impl<R: Serialize> Format<R> for Json {
-    fn file_name(&self) -> &'static str {
-        self.0
-    }
-
-    fn write(&self, result: &R, out: &mut dyn Write) -> io::Result<()> {
-        write(result, out)
-    }
-}
-
 /// Writes the whole file. Numbers that are not finite are null.
 pub fn write(object: &impl Serialize, out: &mut dyn Write) -> io::Result<()> {
     let mut serializer = serde_json::Serializer::with_formatter(&mut *out, Layout::default());

@@ -74,7 +74,7 @@ impl TraceRequest {
         for target in keys.targets() {
             let why = match target {
                 Target::Knob(_) => "is a setting of a method, not of the leaf",
-                Target::Entry { key, .. } => match key {
+                Target::Entry(part) => match part.key {
                     Key::TipMoment => NO_MOMENT,
                     Key::Tolerance => "changes no leaf",
                     key if key.path().starts_with("dynamics.") => {

@@ -15,7 +15,7 @@ use crate::branch::{
 };
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::relax::{Equilibrium, Options, SemiImplicit, node_state, project, relax};
-use crate::scenario::{Key, Scenario};
+use crate::scenario::{Key, Part, Scenario};
 use crate::shape::RodShape;
 use crate::study::Target;
 use crate::undulation::Undulation;
@@ -106,10 +106,12 @@ pub fn trace(
 /// tip that varies.
 fn law(request: &TraceRequest, branch: &TraceBranch) -> Option<Law> {
     let [
-        Target::Entry {
+        Target::Entry(Part {
             key: Key::TipForce,
-            index: Some(axis),
-        },
+            indices: [Some(axis), None],
+            scale: false,
+            ..
+        }),
     ] = request.vary.keys.targets()
     else {
         return None;

@@ -1,12 +1,9 @@
 //! The scenario into which varying numbers are put.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
-use toml::Value;
-
 use super::{Keys, Knob, Knobs, Target, VaryError};
-use crate::scenario::{self, Form, Key, LeftOut, Scenario};
+use crate::scenario::{self, Scenario};
 
 /// A scenario as text, with some entries replaced: what numbers are put into.
 #[derive(Clone, Debug)]
@@ -15,8 +12,6 @@ pub struct Base {
     file: String,
     overrides: Vec<String>,
     knobs: Knobs,
-    /// The same, parsed: a list can only change as a whole.
-    entries: BTreeMap<&'static str, Value>,
     scenario: Scenario,
 }
 
@@ -57,7 +52,6 @@ impl Base {
         }
         let scenario = Scenario::from_toml_with(&text, &file, &of_scenario)?;
         Ok(Base {
-            entries: entries(&text, &of_scenario),
             text,
             file,
             overrides: of_scenario,
@@ -92,70 +86,21 @@ impl Base {
     /// If it is refused, or has no such entry.
     pub fn at(&self, values: &[(&Keys, f64)]) -> Result<Varied, VaryError> {
         let mut knobs = self.knobs;
-        let mut changed: BTreeMap<&'static str, Value> = BTreeMap::new();
+        let mut overrides = self.overrides.clone();
         for (keys, value) in values {
             for &target in keys.targets() {
                 match target {
                     Target::Knob(knob) => knobs.set(knob, *value)?,
-                    Target::Entry { key, index } => {
-                        let entry = self.entry(&changed, key, index, *value)?;
-                        changed.insert(key.path(), entry);
+                    Target::Entry(part) => {
+                        overrides.push(format!("{part}={}", target.text(*value)));
                     }
                 }
             }
         }
-        let changes = changed
-            .iter()
-            .map(|(path, value)| format!("{path}={value}"));
-        let overrides: Vec<String> = self.overrides.iter().cloned().chain(changes).collect();
         Ok(Varied {
             scenario: Scenario::from_toml_with(&self.text, &self.file, &overrides)?,
             knobs,
         })
-    }
-
-    /// The whole value of a key of which one number is new.
-    fn entry(
-        &self,
-        changed: &BTreeMap<&'static str, Value>,
-        key: Key,
-        index: Option<usize>,
-        value: f64,
-    ) -> Result<Value, VaryError> {
-        if key.form() == Form::Whole {
-            return Ok(Value::Integer(value as i64));
-        }
-        let Some(index) = index else {
-            return Ok(Value::Float(value));
-        };
-        let now = |key: Key| changed.get(key.path()).or(self.entries.get(key.path()));
-        let refuse = |why: String| {
-            let index = Some(index);
-            let key = Target::Entry { key, index };
-            Err(VaryError::Key(format!("{key}: {why}")))
-        };
-        let rods = match now(Key::Rods) {
-            Some(Value::Integer(rods)) => *rods as usize,
-            _ => self.scenario.rods.len(),
-        };
-        let count = match key.form() {
-            Form::PerGap(_) => rods.saturating_sub(1),
-            _ => rods,
-        };
-        let mut list = match now(key) {
-            Some(Value::Array(list)) => list.clone(),
-            Some(number @ (Value::Float(_) | Value::Integer(_))) => vec![number.clone(); count],
-            Some(_) => return refuse("is no list in the scenario".into()),
-            None => return refuse("is not in the scenario: write its list first".into()),
-        };
-        let entries = list.len();
-        let Some(entry) = list.get_mut(index) else {
-            return refuse(format!(
-                "there are {entries} entries, and indices count from 0"
-            ));
-        };
-        *entry = Value::Float(value);
-        Ok(Value::Array(list))
     }
 }
 
@@ -168,42 +113,4 @@ fn setting(path: &str, value: &str) -> Result<(Knob, f64), VaryError> {
     let number = value.parse();
     let number = number.map_err(|_| VaryError::knob(knob, format_args!("{value}"), "a number"))?;
     Ok((knob, number))
-}
-
-/// Every entry of an accepted scenario by its path, those left out included
-/// where they have a value all the same.
-fn entries(text: &str, overrides: &[String]) -> BTreeMap<&'static str, Value> {
-    let table = |text: &str| text.parse::<toml::Table>().unwrap_or_default();
-    // What is no TOML is a text.
-    let value = |text: &str| {
-        let value = table(&format!("it = {text}")).remove("it");
-        value.unwrap_or_else(|| Value::String(text.trim().into()))
-    };
-    let document = table(text);
-    let mut entries = BTreeMap::new();
-    for key in Key::all() {
-        let written = match key.path().split_once('.') {
-            Some((table, name)) => document.get(table).and_then(|table| table.get(name)),
-            None => document.get(key.path()),
-        };
-        let left_out = match key.left_out() {
-            LeftOut::Means(text) => Some(value(text)),
-            _ => None,
-        };
-        entries.extend(
-            written
-                .cloned()
-                .or(left_out)
-                .map(|value| (key.path(), value)),
-        );
-    }
-    for given in overrides {
-        let Some((path, text)) = given.split_once('=') else {
-            continue;
-        };
-        if let Some(key) = Key::from_path(path.trim()) {
-            entries.insert(key.path(), value(text));
-        }
-    }
-    entries
 }

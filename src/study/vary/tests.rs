@@ -79,6 +79,9 @@ fn slips_are_explained() {
         ("leaf.fan=1..2", "give an index"),
         ("leaf.joined=0..1", "no number"),
         ("dynamics.gravity=0..1", "no number"),
+        ("dynamics.gravity.value=0..1", "give an index"),
+        ("stiffness.torsion.value=0..1", "give an index"),
+        ("scale:leaf.rods=1..2", "no numbers"),
         ("name=0..1", "no number"),
         ("=0..1", "unknown key"),
         ("stiffness.axial+=0..1", "unknown key"),
@@ -145,6 +148,27 @@ fn a_whole_key_changes_for_all_rods_and_keys_can_change_together() {
 }
 
 #[test]
+fn knots_vary_and_all_numbers_of_a_key_together() {
+    let base = base(&[]).unwrap();
+    let varied = at(
+        &base,
+        &[
+            ("stiffness.bending_3.value[1]", 2.0),
+            ("scale:stiffness.bending_2", 10.0),
+        ],
+    );
+    let rods = varied.unwrap().scenario.rods;
+    assert_eq!(rods[2].couple_stiffness[2].at(0.5), 1.5);
+    let bending = |rod: usize| rods[rod].couple_stiffness[1].at(0.5);
+    assert_eq!([0, 1, 2].map(bending), [10.0, 20.0, 30.0]);
+    let keys = vary("scale:stiffness.bending_3+load.gravity[2]=1..2").keys;
+    assert_eq!(
+        keys.to_string(),
+        "scale:stiffness.bending_3+load.gravity[2]"
+    );
+}
+
+#[test]
 fn settings_of_methods_are_not_the_scenarios() {
     let set = base(&["method.segments=16", "load.gravity=[0,0,-2]"]).unwrap();
     assert_eq!(set.knobs().segments, Some(16));
@@ -180,7 +204,7 @@ fn refusals_name_key_and_reason() {
         (("stiffness.bending_2[3]", 1.0), "3 entries"),
         (("stiffness.bending_3[0]", 1.0), "no list"),
         (("coupling.z[2]", 1.0), "2 entries"),
-        (("dynamics.density[0]", 1.0), "write its list first"),
+        (("dynamics.density[0]", 1.0), "write it first"),
         (("leaf.rods", 4.0), "leaf.fan"),
         (("method.step", 0.0), "greater than 0"),
     ] {

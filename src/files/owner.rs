@@ -1,0 +1,102 @@
+//! Whose results a folder holds: the JSON files in it name the scenario's file.
+
+use std::ffi::OsStr;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Component, Path, PathBuf, absolute};
+
+use crate::relax::Equilibrium;
+use crate::report::{FileError, Written};
+use crate::simulate::Record;
+use crate::study::{All, Chart, Check, Map, Trace};
+
+/// The JSON files of all verbs.
+const FILES: [Option<&str>; 7] = [
+    Equilibrium::JSON,
+    All::JSON,
+    Check::JSON,
+    Record::JSON,
+    Trace::JSON,
+    Map::JSON,
+    Chart::JSON,
+];
+
+/// How a result in `folder` names the file of its scenario: the way there from
+/// the folder, so that both can move together.
+pub fn source(folder: &Path, file: &Path) -> String {
+    let [Ok(folder), Ok(file)] = [folder, file].map(|path| absolute(path).map(without_dots)) else {
+        return file.display().to_string();
+    };
+    let [from, to] = [&folder, &file].map(|path| path.components().collect::<Vec<_>>());
+    let shared = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
+    let up = from[shared..].iter().map(|_| OsStr::new(".."));
+    let way: PathBuf = up
+        .chain(to[shared..].iter().map(|c| c.as_os_str()))
+        .collect();
+    way.display().to_string()
+}
+
+/// The path without `..`.
+fn without_dots(path: PathBuf) -> PathBuf {
+    let mut plain = PathBuf::new();
+    for component in path.components() {
+        match component {
+            Component::ParentDir => _ = plain.pop(),
+            other => plain.push(other),
+        }
+    }
+    plain
+}
+
+/// Refuses a folder that holds results of a scenario in another file.
+///
+/// # Errors
+/// If it does.
+pub fn check_owner(folder: &Path, source: &str) -> Result<(), FileError> {
+    for name in FILES.into_iter().flatten() {
+        let file = folder.join(name);
+        let Some(other) = source_in(&file).filter(|other| other != source) else {
+            continue;
+        };
+        let other = folder.join(other);
+        let other = without_dots(absolute(&other).unwrap_or(other));
+        return Err(FileError::unfit(
+            &file,
+            &format!(
+                "is of another scenario, in {}: name a folder with --out DIR, or give this scenario another name",
+                other.display()
+            ),
+        ));
+    }
+    Ok(())
+}
+
+/// The source that a JSON file names, if there is one that does.
+fn source_in(file: &Path) -> Option<String> {
+    // It is one of the first lines; others are as long as the leaf is large.
+    let lines = BufReader::new(File::open(file).ok()?.take(1 << 12)).lines();
+    let mut lines = lines.map_while(Result::ok);
+    let line = lines.find_map(|line| Some(line.strip_prefix("  \"source\": ")?.to_string()))?;
+    serde_json::from_str(line.trim_end_matches(',')).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_way_to_a_scenario_starts_at_the_folder() {
+        for (folder, file, way) in [
+            ("/a/out/b", "/a/b.toml", "../../b.toml"),
+            ("/a/out", "/a/out/c/d.json", "c/d.json"),
+            ("/a/x/../out", "/a/./b.toml", "../b.toml"),
+            ("/", "/b.toml", "b.toml"),
+        ] {
+            assert_eq!(source(Path::new(folder), Path::new(file)), way);
+        }
+        assert_eq!(
+            source(Path::new("out"), Path::new("s/a.toml")),
+            "../s/a.toml"
+        );
+    }
+}

@@ -1,0 +1,289 @@
+//! A leaf at rest at other stations than it was found at.
+
+use crate::leaf::Leaf;
+use crate::relax::equilibrium::{Equilibrium, Outcome, Shape};
+use crate::scenario::{Profile, Rod, Scenario};
+use crate::shape::{NodeState, RodShape, equally_spaced, weights};
+use glam::{DQuat, DVec3};
+
+/// Parts that the stations of a result cut a vein into, at least.
+const PARTS: usize = 16;
+
+/// Most nodes that a polynomial goes through whose slopes there are known.
+const HERMITE: usize = 4;
+
+/// Most nodes of one whose slopes are not known.
+const LAGRANGE: usize = 6;
+
+impl Equilibrium {
+    /// The same at stations that cut every vein into so many equal parts; `None`:
+    /// at the nodes of the finest grid, and as many between them as make at least
+    /// 17 stations.
+    ///
+    /// Between the stations where it was found, a vein is the polynomial that has
+    /// its positions and tangents there, and rotations and moments with the slopes
+    /// that the equations give; never across a knot of a profile. What this may be
+    /// wrong by is added to the error estimate.
+    #[must_use]
+    pub fn at_stations(mut self, scenario: &Scenario, parts: Option<usize>) -> Self {
+        let to = match parts {
+            Some(parts) => equally_spaced(parts),
+            None => finest(&self.shape),
+        };
+        let at_rest = !matches!(
+            self.outcome,
+            Outcome::NotAtRest | Outcome::Singular | Outcome::Diverged
+        );
+        let places: Vec<_> = {
+            let leaf = Leaf::new(scenario);
+            let places = to
+                .iter()
+                .map(|&at| Place::new(&self.shape, leaf.kinks(), at));
+            places.collect()
+        };
+        let mut differences = [0.0_f64; 2];
+        let rods = self.shape.rods.iter().enumerate().map(|(j, rod)| {
+            let known = Known::new(rod);
+            let nodes = places.iter().map(|place| {
+                if let Some(node) = place.node {
+                    return rod.nodes[node];
+                }
+                if at_rest {
+                    let [best, second, third] = [0, 1, 2].map(|fewer| {
+                        let nodes = place.hermite(fewer);
+                        sum(&nodes, &known.positions, &known.tangents)
+                    });
+                    differences[0] = differences[0].max((best - second).length());
+                    differences[1] = differences[1].max((second - third).length());
+                }
+                let mut node = known.at(place, at_rest);
+                strains(&scenario.rods[j], place.at, &mut node);
+                node
+            });
+            RodShape {
+                length: rod.length,
+                nodes: nodes.collect(),
+            }
+        });
+        self.shape.rods = rods.collect();
+        self.shape.stations = to;
+        if let Some(error) = &mut self.accuracy.error_estimate {
+            let [best, second] = differences;
+            *error += if second > best {
+                best * (best / second)
+            } else {
+                best
+            };
+        }
+        self
+    }
+}
+
+/// Nodes of the finest grid, with every segment halved until there are enough.
+fn finest(shape: &Shape) -> Vec<f64> {
+    let mut stations = shape.curve_stations.clone();
+    while (2..=PARTS).contains(&stations.len()) {
+        let middles = stations
+            .windows(2)
+            .flat_map(|w| [0.5 * (w[0] + w[1]), w[1]]);
+        stations = stations[..1].iter().copied().chain(middles).collect();
+    }
+    stations
+}
+
+/// A place along the veins, and the stations around it.
+struct Place {
+    /// The station that it is.
+    node: Option<usize>,
+    at: f64,
+    /// Stations between the same knots, and the first of them.
+    near: Vec<f64>,
+    first: usize,
+}
+
+/// Weights of a value and of its slope at a station.
+type Weights = Vec<(usize, f64, f64)>;
+
+impl Place {
+    fn new(shape: &Shape, kinks: &[f64], at: f64) -> Self {
+        let known = &shape.stations;
+        let node = known
+            .iter()
+            .position(|station| (station - at).abs() < 1e-14);
+        let right = kinks.partition_point(|kink| *kink <= at);
+        let left = right.checked_sub(1).map_or(0.0, |left| kinks[left]);
+        let right = kinks.get(right).copied().unwrap_or(1.0);
+        let first = known.partition_point(|station| *station < left - 1e-14);
+        let last = known.partition_point(|station| *station <= right + 1e-14);
+        let near = known[first..last].to_vec();
+        Place {
+            node,
+            at,
+            near,
+            first,
+        }
+    }
+
+    /// With the nearest stations, so many fewer than can be.
+    fn hermite(&self, fewer: usize) -> Weights {
+        let count = HERMITE.min(self.near.len()).saturating_sub(fewer).max(1);
+        let (first, lagrange) = weights(&self.near, self.at, count);
+        let near = &self.near[first..first + count];
+        let each = lagrange.iter().enumerate().map(|(i, weight)| {
+            let others = (0..count).filter(|&j| j != i);
+            let slope: f64 = others.map(|j| 1.0 / (near[i] - near[j])).sum();
+            let (away, squared) = (self.at - near[i], weight * weight);
+            let value = squared * (1.0 - 2.0 * slope * away);
+            (self.first + first + i, value, squared * away)
+        });
+        each.collect()
+    }
+
+    fn lagrange(&self) -> Weights {
+        let (first, weights) = weights(&self.near, self.at, LAGRANGE);
+        let each = (self.first + first..).zip(weights);
+        each.map(|(i, weight)| (i, weight, 0.0)).collect()
+    }
+}
+
+/// What is known of a vein at its stations, along the lab axes, with slopes by the
+/// fraction of the length.
+struct Known {
+    positions: Vec<DVec3>,
+    tangents: Vec<DVec3>,
+    rotations: Vec<[f64; 4]>,
+    turns: Vec<[f64; 4]>,
+    forces: Vec<DVec3>,
+    moments: Vec<DVec3>,
+    torques: Vec<DVec3>,
+}
+
+impl Known {
+    fn new(rod: &RodShape) -> Self {
+        let each = |of: &dyn Fn(&NodeState) -> DVec3| rod.nodes.iter().map(of).collect::<Vec<_>>();
+        let tangent = |node: &NodeState| node.rotation * node.v * rod.length;
+        let mut rotations: Vec<DQuat> = Vec::new();
+        for node in &rod.nodes {
+            // Of a continuous sign.
+            let before = rotations.last().copied().unwrap_or(node.rotation);
+            let same = before.dot(node.rotation) >= 0.0;
+            rotations.push(if same { node.rotation } else { -node.rotation });
+        }
+        let turn = |(q, node): (&DQuat, &NodeState)| {
+            let u = node.u * (0.5 * rod.length);
+            (*q * DQuat::from_xyzw(u.x, u.y, u.z, 0.0)).to_array()
+        };
+        Known {
+            positions: each(&|node| node.position),
+            tangents: each(&tangent),
+            turns: rotations.iter().zip(&rod.nodes).map(turn).collect(),
+            rotations: rotations.iter().map(|q| q.to_array()).collect(),
+            forces: each(&|node| node.rotation * node.n),
+            moments: each(&|node| node.rotation * node.m),
+            // m' = -r' x n.
+            torques: each(&|node| (node.rotation * node.n).cross(tangent(node))),
+        }
+    }
+
+    /// The state at a place, without its strains. Without equilibrium slopes are
+    /// not what the equations say.
+    fn at(&self, place: &Place, at_rest: bool) -> NodeState {
+        let lagrange = place.lagrange();
+        let hermite = match at_rest {
+            true => &place.hermite(0),
+            false => &lagrange,
+        };
+        let mut q = [0.0; 4];
+        for &(i, value, slope) in hermite {
+            for (k, q) in q.iter_mut().enumerate() {
+                *q += value * self.rotations[i][k] + slope * self.turns[i][k];
+            }
+        }
+        let rotation = DQuat::from_array(q).normalize();
+        let to_directors = rotation.conjugate();
+        NodeState {
+            position: sum(hermite, &self.positions, &self.tangents),
+            rotation,
+            v: DVec3::X,
+            u: DVec3::ZERO,
+            n: to_directors * sum(&lagrange, &self.forces, &self.forces),
+            m: to_directors * sum(hermite, &self.moments, &self.torques),
+        }
+    }
+}
+
+fn sum(weights: &Weights, values: &[DVec3], slopes: &[DVec3]) -> DVec3 {
+    let terms = weights.iter();
+    terms
+        .map(|&(i, value, slope)| value * values[i] + slope * slopes[i])
+        .sum()
+}
+
+/// Sets the strains that the constitutive law gives.
+fn strains(rod: &Rod, at: f64, node: &mut NodeState) {
+    let triple = |of: &[Profile; 3]| DVec3::from_array(of.each_ref().map(|it| it.at(at)));
+    node.v = rod.rest_stretch.at(at) * DVec3::X + node.n / triple(&rod.force_stiffness);
+    node.u = triple(&rod.rest_curvature) + node.m / triple(&rod.couple_stiffness);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tapering vein with a knot, against itself solved on a grid that has the
+    /// stations.
+    #[test]
+    fn stations_between_are_as_accurate_as_those_that_were_solved_for() {
+        let scenario = Scenario::from_toml(
+            r#"
+            name = "taper"
+            leaf = { rods = 3, length = [1.0, 1.1, 0.9], fan = "paper" }
+            stiffness = { torsion = 0.5, bending_2 = { at = [0.0, 0.3, 1.0], value = [1.0, 1.0, 0.4] }, bending_3 = 1.0, axial = 100.0, shear_2 = 50.0, shear_3 = inf }
+            rest = { bend_2 = 0.7, twist = -0.4, stretch = 1.05 }
+            coupling = { y = 1.0, z = 2.0 }
+            load = { gravity = [0.1, 0.2, -2.0] }
+            "#,
+        )
+        .unwrap();
+        let sharp = scenario.relaxation().tolerance(1e-10).run().unwrap();
+        for tolerance in [1e-3, 1e-6, 1e-8] {
+            let found = scenario.relaxation().tolerance(tolerance).run().unwrap();
+            let there = found.clone().at_stations(&scenario, None);
+            let (known, finest) = (found.shape.stations.len(), found.shape.curves[0].len());
+            assert!(there.shape.stations.len() >= finest.max(PARTS + 1) && known < finest);
+            let sharp = sharp.clone().at_stations(&scenario, Some(40));
+            let there = found.at_stations(&scenario, Some(40));
+            assert_eq!(there.shape.stations, equally_spaced(40));
+            let error = there.accuracy.error_estimate.unwrap();
+            for (one, other) in there.shape.rods.iter().zip(&sharp.shape.rods) {
+                for (node, exact) in one.nodes.iter().zip(&other.nodes) {
+                    let away = (node.position - exact.position).length();
+                    assert!(away <= error, "{tolerance}: {away} > {error}");
+                    assert!((node.m - exact.m).length() < 1e2 * error);
+                    assert!((node.n - exact.n).length() < 1e3 * error);
+                    assert!((node.u - exact.u).length() < 1e3 * error);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn stations_that_were_found_stay_as_they_are() {
+        let scenario = Scenario::from_toml(include_str!("../../scenarios/paper/fig04.toml"));
+        let scenario = scenario.unwrap();
+        let found = scenario.relax().unwrap();
+        let there = found.clone().at_stations(&scenario, None);
+        for (i, station) in found.shape.stations.iter().enumerate() {
+            let k = there
+                .shape
+                .stations
+                .iter()
+                .position(|s| s == station)
+                .unwrap();
+            for (one, other) in found.shape.rods.iter().zip(&there.shape.rods) {
+                assert_eq!(one.nodes[i], other.nodes[k]);
+            }
+        }
+        assert_eq!(there.shape.stations.len(), there.shape.curves[0].len());
+    }
+}

@@ -1,0 +1,453 @@
+//! Parts of a scenario's entries: `load.gravity[2]`, `stiffness.bending_2.value[1]`,
+//! or all numbers of one together, `scale:stiffness.bending_2`.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use toml::Value;
+
+use super::error::{Place, ScenarioError, shorten};
+use super::key::{Form, Key, LeftOut, unknown};
+
+/// Lists that a table can have.
+const LISTS: [&str; 3] = ["at", "value", "factor"];
+
+/// What is set: an entry of a scenario, one of its lists, one entry of that, or
+/// all numbers of one of these, which are multiplied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// The key.
+    pub key: Key,
+    /// Which list of a profile or schedule.
+    pub(crate) list: Option<&'static str>,
+    /// Which entry of the list, and which of that, counted from 0.
+    pub(crate) indices: [Option<usize>; 2],
+    /// Whether its numbers are multiplied, and not replaced.
+    pub(crate) scale: bool,
+}
+
+impl Part {
+    /// Reads it; otherwise why it is none.
+    pub(crate) fn parse(text: &str) -> Result<Part, String> {
+        let (scale, rest) = match text.trim().strip_prefix("scale:") {
+            Some(rest) => (true, rest.trim()),
+            None => (false, text.trim()),
+        };
+        let (path, brackets) = rest.split_at(rest.find('[').unwrap_or(rest.len()));
+        let path = path.trim();
+        let (key, list) = match Key::from_path(path) {
+            Some(key) => (key, None),
+            None => {
+                let list = path.rsplit_once('.').and_then(|(path, name)| {
+                    let list = LISTS.into_iter().find(|list| *list == name)?;
+                    Some((Key::from_path(path)?, Some(list)))
+                });
+                list.ok_or_else(|| unknown(path))?
+            }
+        };
+        let mut indices = [None; 2];
+        let wrong = || "an index is a whole number from 0, as in load.gravity[2]".to_string();
+        for (place, index) in brackets.split_terminator(']').enumerate() {
+            let index = index.trim().strip_prefix('[').ok_or_else(wrong)?.trim();
+            let index = index.parse().map_err(|_| wrong())?;
+            *indices.get_mut(place).ok_or_else(wrong)? = Some(index);
+        }
+        if !brackets.is_empty() && !brackets.ends_with(']') {
+            return Err(wrong());
+        }
+        let part = Part {
+            key,
+            list,
+            indices,
+            scale,
+        };
+        part.check()?;
+        Ok(part)
+    }
+
+    /// Refuses what no entry of this form has.
+    fn check(&self) -> Result<(), String> {
+        let (form, path, index) = (self.key.form(), self.key.path(), self.indices[0]);
+        let single = matches!(form, Form::Text | Form::Switch | Form::Whole);
+        match form {
+            _ if single && self.scale => Err("has no numbers that could be scaled".into()),
+            Form::Whole | Form::Number(_) if index.is_some() => {
+                Err("is one number: leave the index out".into())
+            }
+            Form::Text | Form::Switch if index.is_some() => Err("has no entries".into()),
+            Form::Vector if index > Some(2) => Err("x, y, z have the indices 0, 1, 2".into()),
+            Form::Quantity(_) | Form::VectorInTime | Form::FactorInTime => Ok(()),
+            _ if self.list.is_some() => Err(format!("{path} has no lists within")),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether it is one number, or one for all rods, that can take any value.
+    pub(crate) fn is_number(&self) -> Result<(), String> {
+        let path = self.key.path();
+        let within = self
+            .list
+            .map_or(path.to_string(), |list| format!("{path}.{list}"));
+        let list = || Err(format!("is a list: give an index, as in {within}[0]"));
+        match self.key.form() {
+            _ if self.scale => Ok(()),
+            Form::Text | Form::Switch => Err("takes no number that could vary".into()),
+            Form::VectorInTime | Form::FactorInTime if self.list.is_none() => Err(format!(
+                "takes no number that could vary; its entries do: {path}.at[0]"
+            )),
+            Form::Vector | Form::Fan if self.indices[0].is_none() => list(),
+            _ if self.list.is_some() && self.indices[0].is_none() => list(),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether it is the whole of its key.
+    fn is_whole(&self) -> bool {
+        self.list.is_none() && self.indices[0].is_none() && !self.scale
+    }
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let scale = if self.scale { "scale:" } else { "" };
+        write!(f, "{scale}{}", self.key.path())?;
+        self.list.map_or(Ok(()), |list| write!(f, ".{list}"))?;
+        let mut indices = self.indices.iter().flatten();
+        indices.try_for_each(|index| write!(f, "[{index}]"))
+    }
+}
+
+/// An override with the whole value of its key.
+pub(super) struct Override {
+    /// As it was given.
+    pub given: String,
+    pub key: Key,
+    pub value: String,
+}
+
+/// Overrides of whole entries, from those of parts of entries of the scenario in
+/// `text`, which may have errors that are found elsewhere.
+pub(super) fn resolve(text: &str, overrides: &[String]) -> Result<Vec<Override>, ScenarioError> {
+    let mut resolved: Vec<Override> = Vec::new();
+    for given in overrides {
+        let refuse = |problem: String| {
+            let given = shorten(given);
+            ScenarioError {
+                place: Place::Set { given },
+                key: None,
+                problem,
+            }
+        };
+        let Some((path, value)) = given.split_once('=') else {
+            let problem = "must be KEY=VALUE, e.g. --set load.gravity=[0,0,-0.5]";
+            return Err(refuse(problem.into()));
+        };
+        let part = Part::parse(path).map_err(refuse)?;
+        let whole = match part.is_whole() {
+            true => value.trim().to_string(),
+            false => {
+                let about = |why: String| ScenarioError {
+                    key: Some(part.key),
+                    ..refuse(format!("{part}: {why}"))
+                };
+                let entries = Entries::new(text, &resolved);
+                entries.changed(part, value).map_err(about)?.to_string()
+            }
+        };
+        resolved.push(Override {
+            given: given.clone(),
+            key: part.key,
+            value: whole,
+        });
+    }
+    Ok(resolved)
+}
+
+/// Every entry by its key, as far as it can be read, those left out included
+/// where they have a value all the same.
+struct Entries(BTreeMap<&'static str, Value>);
+
+impl Entries {
+    fn new(text: &str, overrides: &[Override]) -> Self {
+        let document = text.parse::<toml::Table>().unwrap_or_default();
+        let mut entries = BTreeMap::new();
+        for key in Key::all() {
+            let written = match key.parts() {
+                ("", name) => document.get(name),
+                (table, name) => document.get(table).and_then(|table| table.get(name)),
+            };
+            let left_out = || match key.left_out() {
+                LeftOut::Means(text) => value_of(text),
+                _ => None,
+            };
+            entries.extend(
+                written
+                    .cloned()
+                    .or_else(left_out)
+                    .map(|value| (key.path(), value)),
+            );
+        }
+        for given in overrides {
+            entries.extend(value_of(&given.value).map(|value| (given.key.path(), value)));
+        }
+        Entries(entries)
+    }
+
+    /// The whole value of a key of which a part is new.
+    fn changed(&self, part: Part, given: &str) -> Result<Value, String> {
+        let given = given.trim();
+        let new = value_of(given).ok_or(format!("{} is no value", shorten(given)))?;
+        let whole = self.0.get(part.key.path());
+        let mut whole = whole
+            .cloned()
+            .ok_or("is not in the scenario: write it first")?;
+        let mut place = &mut whole;
+        if let Some(list) = part.list {
+            let found = place.get_mut(list);
+            place = found.ok_or(format!("the scenario has no {list} there: write it first"))?;
+        } else if part.indices[0].is_some() {
+            self.spread(part, place)?;
+        }
+        for index in part.indices.into_iter().flatten() {
+            let entries = place.as_array_mut().ok_or("is no list in the scenario")?;
+            let count = entries.len();
+            let entry = entries.get_mut(index);
+            place = entry
+                .ok_or_else(|| format!("there are {count} entries, and indices count from 0"))?;
+        }
+        match part.scale {
+            true => {
+                let factor = number(&new).filter(|factor| factor.is_finite());
+                multiply(place, factor.ok_or("the factor must be a finite number")?)?;
+            }
+            false => *place = new,
+        }
+        Ok(whole)
+    }
+
+    /// Turns a number for all rods, or gaps, into a list.
+    fn spread(&self, part: Part, place: &mut Value) -> Result<(), String> {
+        if number(place).is_some() {
+            let rods = self.0.get(Key::Rods.path()).and_then(Value::as_integer);
+            let rods = rods.and_then(|rods| usize::try_from(rods).ok());
+            let rods = rods.filter(|rods| *rods <= MOST_RODS);
+            let rods = rods.ok_or("leaf.rods must say of how many")?;
+            let count = match part.key.form() {
+                Form::PerGap(_) => rods.saturating_sub(1),
+                _ => rods,
+            };
+            *place = Value::Array(vec![place.clone(); count]);
+        }
+        Ok(())
+    }
+}
+
+/// Most entries that a number is spread to; a scenario with more is refused.
+const MOST_RODS: usize = 100_000;
+
+/// What a text means as TOML.
+fn value_of(text: &str) -> Option<Value> {
+    let table = format!("it = {text}").parse::<toml::Table>();
+    match table {
+        Ok(mut table) => table.remove("it").filter(|_| table.is_empty()),
+        // What is no TOML is a text.
+        Err(_) => (!text.starts_with(['[', '{', '"', '\''])).then(|| Value::String(text.into())),
+    }
+}
+
+fn number(value: &Value) -> Option<f64> {
+    match value {
+        Value::Float(float) => Some(*float),
+        Value::Integer(integer) => Some(*integer as f64),
+        _ => None,
+    }
+}
+
+/// Multiplies every number; knots and times stay where they are.
+fn multiply(value: &mut Value, factor: f64) -> Result<(), String> {
+    if let Some(number) = number(value) {
+        *value = Value::Float(number * factor);
+        return Ok(());
+    }
+    match value {
+        Value::Array(list) => list
+            .iter_mut()
+            .try_for_each(|entry| multiply(entry, factor)),
+        Value::Table(table) => {
+            let lists = table.iter_mut().filter(|(name, _)| *name != "at");
+            lists
+                .map(|(_, list)| list)
+                .try_for_each(|list| multiply(list, factor))
+        }
+        other => Err(format!(
+            "{} is no number to be scaled: write numbers first",
+            shorten(&other.to_string())
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::Scenario;
+
+    const TEXT: &str = r#"
+        name = "three"
+        leaf = { rods = 3, length = 1, fan = "paper" }
+        coupling = { y = 1, z = [0.5, 2] }
+        load = { gravity = [0, 0.5, -1] }
+        dynamics = { gravity = { at = [0, 1], value = [[0, 0, -1], [0, 0, -2]] }, rest = { at = [0], factor = [2] } }
+
+        [stiffness]
+        torsion = 1.0
+        bending_2 = { at = [0.0, 0.5, 1.0], value = [1, 0.5, 0.25] }
+        bending_3 = { at = [0.0, 1.0], value = [[1, 2], [3, 4], [5, 6]] }
+        axial = inf
+        shear_2 = [inf, 100, 1e3]
+        shear_3 = 100
+    "#;
+
+    fn with(overrides: &[&str]) -> Result<Scenario, ScenarioError> {
+        let overrides: Vec<String> = overrides.iter().map(|given| given.to_string()).collect();
+        Scenario::from_toml_with(TEXT, "three.toml", &overrides)
+    }
+
+    /// A part against the whole value that it makes.
+    #[test]
+    fn parts_and_scales_are_whole_values() {
+        for (parts, whole) in [
+            (
+                &["stiffness.torsion[1]=2.5"][..],
+                "stiffness.torsion=[1.0, 2.5, 1.0]",
+            ),
+            (&["coupling.y[0]=3"], "coupling.y=[3, 1]"),
+            (
+                &["coupling.z[1] = 0.25", "coupling.z[0]=1"],
+                "coupling.z=[1, 0.25]",
+            ),
+            (&["load.gravity[2]=-7"], "load.gravity=[0, 0.5, -7]"),
+            (
+                &["stiffness.bending_2.value[1]=2.0"],
+                "stiffness.bending_2={ at = [0.0, 0.5, 1.0], value = [1, 2.0, 0.25] }",
+            ),
+            (
+                &["stiffness.bending_2.at[1]=0.25"],
+                "stiffness.bending_2={ at = [0.0, 0.25, 1.0], value = [1, 0.5, 0.25] }",
+            ),
+            (
+                &["stiffness.bending_3.value[2][0]=9"],
+                "stiffness.bending_3={ at = [0, 1], value = [[1, 2], [3, 4], [9, 6]] }",
+            ),
+            (
+                &["stiffness.bending_3.value[2]=[7, 8]"],
+                "stiffness.bending_3={ at = [0, 1], value = [[1, 2], [3, 4], [7, 8]] }",
+            ),
+            (
+                &["dynamics.gravity.value[1][2]=-3"],
+                "dynamics.gravity={ at = [0, 1], value = [[0, 0, -1], [0, 0, -3]] }",
+            ),
+            (
+                &["scale:stiffness.bending_2=0.5"],
+                "stiffness.bending_2={ at = [0.0, 0.5, 1.0], value = [0.5, 0.25, 0.125] }",
+            ),
+            (
+                &["scale:stiffness.bending_3.value[0]=2"],
+                "stiffness.bending_3={ at = [0, 1], value = [[2, 4], [3, 4], [5, 6]] }",
+            ),
+            (
+                &["scale:stiffness.shear_2=2"],
+                "stiffness.shear_2=[inf, 200, 2e3]",
+            ),
+            (&["scale:stiffness.axial=2"], "stiffness.axial=inf"),
+            (&["scale:leaf.length=1.5"], "leaf.length=1.5"),
+            (&["scale:load.gravity=2"], "load.gravity=[0, 1, -2]"),
+            (&["scale:load.gravity[2]=3"], "load.gravity=[0, 0.5, -3]"),
+            (
+                &["scale:dynamics.rest=0.5"],
+                "dynamics.rest={ at = [0], factor = [1] }",
+            ),
+            (
+                &[
+                    "leaf.rods=2",
+                    "coupling.z=1",
+                    "stiffness.bending_3=1",
+                    "stiffness.shear_2[1]=7",
+                ],
+                "",
+            ),
+            (&["scale:rest.twist=3"], "rest.twist=0.0"),
+        ] {
+            match whole {
+                "" => assert!(
+                    with(parts)
+                        .unwrap_err()
+                        .to_string()
+                        .contains("has 3 entries")
+                ),
+                whole => assert_eq!(with(parts).unwrap(), with(&[whole]).unwrap(), "{parts:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn slips_are_explained() {
+        for (given, part) in [
+            (
+                "stiffness.torsion[3]=1",
+                "--set stiffness.torsion[3]=1: stiffness.torsion[3]: there are 3 entries",
+            ),
+            ("stiffness.bending_2[0]=1", "is no list in the scenario"),
+            ("stiffness.torsion.value[0]=1", "has no value there"),
+            ("load.gravity[3]=1", "x, y, z have the indices 0, 1, 2"),
+            ("load.gravity[z]=1", "an index is a whole number from 0"),
+            ("load.gravity[1=1", "an index is a whole number from 0"),
+            ("load.gravity[1]x=1", "an index is a whole number from 0"),
+            ("load.gravity[1][1]=1", "is no list in the scenario"),
+            (
+                "load.gravity[1][1][1]=1",
+                "an index is a whole number from 0",
+            ),
+            ("leaf.rods[0]=1", "leave the index out"),
+            ("scale:leaf.rods=2", "no numbers that could be scaled"),
+            ("scale:leaf.fan=2", "\"paper\" is no number to be scaled"),
+            (
+                "scale:stiffness.torsion=x",
+                "the factor must be a finite number",
+            ),
+            (
+                "scale:stiffness.torsion=inf",
+                "the factor must be a finite number",
+            ),
+            (
+                "scale:dynamics.density=2",
+                "is not in the scenario: write it first",
+            ),
+            (
+                "scale:stiffness.torsion=-1",
+                "stiffness.torsion = -1.0: must be greater than 0",
+            ),
+            (
+                "stiffness.torsion[1]=-1",
+                "--set stiffness.torsion[1]=-1: stiffness.torsion, entry 2 = -1: must be greater than 0",
+            ),
+            (
+                "stiffness.bending2[1]=1",
+                "unknown key stiffness.bending2 (did you mean stiffness.bending_2?)",
+            ),
+            ("scale:torsion=1", "did you mean stiffness.torsion?"),
+            (
+                "stiffness.gold=1",
+                "unknown key stiffness.gold: [stiffness] has torsion, bending_2",
+            ),
+            (
+                "monsoon=1",
+                "unknown key monsoon: keys are name and those of units, leaf,",
+            ),
+            ("load.gravity[2]", "must be KEY=VALUE"),
+        ] {
+            let message = with(&[given]).unwrap_err().to_string();
+            assert!(message.contains(part), "{given}: {message}");
+            assert!(message.len() < 300, "{message}");
+        }
+    }
+}
