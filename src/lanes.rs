@@ -1,7 +1,8 @@
 //! Several numbers at once: what one instruction of the processor works on.
 
-use pulp::{Arch, Simd};
-use std::ops::{Add, Deref, Mul, Sub};
+use glam::DVec3;
+use pulp::{Arch, Scalar, Simd};
+use std::ops::{Add, Deref, Div, Mul, Neg, Sub};
 
 /// So many numbers make a group: a whole number of the widest instructions used.
 pub const GROUP: usize = 4;
@@ -95,9 +96,9 @@ pub fn cut_mut(arrays: &mut [impl AsMut<[f64]>; 3], place: (usize, usize)) -> [&
 }
 
 /// One number for each of several neighbouring nodes, or rods.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Lanes<S: Simd> {
-    pub simd: S,
+    pub(crate) simd: S,
     v: S::f64s,
 }
 
@@ -180,6 +181,23 @@ impl<S: Simd> Lanes<S> {
         self.simd.reduce_max_f64s(self.v)
     }
 
+    /// Square root.
+    #[inline(always)]
+    pub fn sqrt(self) -> Self {
+        self.with(self.simd.sqrt_f64s(self.v))
+    }
+
+    /// What `f` makes of every number.
+    #[inline(always)]
+    pub fn each(self, f: impl Fn(f64) -> f64) -> Self {
+        let mut numbers = Four::default();
+        self.store(&mut numbers.0[..S::F64_LANES], 0);
+        for number in &mut numbers.0[..S::F64_LANES] {
+            *number = f(*number);
+        }
+        Lanes::of(self.simd, &numbers, 0)
+    }
+
     /// The smallest of all.
     #[inline(always)]
     pub fn smallest(self) -> f64 {
@@ -240,27 +258,57 @@ macro_rules! lanes_operator {
 lanes_operator!(Add, add, add_f64s);
 lanes_operator!(Sub, sub, sub_f64s);
 lanes_operator!(Mul, mul, mul_f64s);
+lanes_operator!(Div, div, div_f64s);
+
+impl<S: Simd> Neg for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        self.with(self.simd.neg_f64s(self.v))
+    }
+}
+
+/// A single number.
+impl From<f64> for Lanes<Scalar> {
+    #[inline(always)]
+    fn from(value: f64) -> Self {
+        Lanes::splat(Scalar, value)
+    }
+}
+
+impl From<Lanes<Scalar>> for f64 {
+    #[inline(always)]
+    fn from(single: Lanes<Scalar>) -> Self {
+        single.v
+    }
+}
 
 /// A vector for each of several neighbouring nodes, or rods.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Vectors<S: Simd> {
+    /// Along the first axis.
     pub x: Lanes<S>,
+    /// Along the second axis.
     pub y: Lanes<S>,
+    /// Along the third axis.
     pub z: Lanes<S>,
 }
 
 impl<S: Simd> Vectors<S> {
+    /// From its components.
     #[inline(always)]
     pub fn new(x: Lanes<S>, y: Lanes<S>, z: Lanes<S>) -> Self {
         Vectors { x, y, z }
     }
 
+    /// The same vector everywhere.
     #[inline(always)]
     pub fn splat(simd: S, v: [f64; 3]) -> Self {
         let [x, y, z] = v.map(|v| Lanes::splat(simd, v));
         Vectors { x, y, z }
     }
 
+    /// Reads three arrays from `at` on.
     #[inline(always)]
     pub fn load(simd: S, arrays: &[impl Deref<Target = [f64]>; 3], at: usize) -> Self {
         Vectors::new(
@@ -270,6 +318,7 @@ impl<S: Simd> Vectors<S> {
         )
     }
 
+    /// Writes three arrays from `at` on.
     #[inline(always)]
     pub fn store(self, arrays: &mut [&mut [f64]; 3], at: usize) {
         self.x.store(arrays[0], at);
@@ -277,12 +326,14 @@ impl<S: Simd> Vectors<S> {
         self.z.store(arrays[2], at);
     }
 
+    /// Scalar product.
     #[inline(always)]
     pub fn dot(self, other: Self) -> Lanes<S> {
         let zz = self.z * other.z;
         self.x.times(other.x, self.y.times(other.y, zz))
     }
 
+    /// Vector product.
     #[inline(always)]
     pub fn cross(self, other: Self) -> Self {
         Vectors::new(
@@ -292,6 +343,7 @@ impl<S: Simd> Vectors<S> {
         )
     }
 
+    /// self * factor.
     #[inline(always)]
     pub fn scale(self, factor: Lanes<S>) -> Self {
         Vectors::new(self.x * factor, self.y * factor, self.z * factor)
@@ -322,6 +374,36 @@ impl<S: Simd> Vectors<S> {
     pub fn along(self, directors: [Self; 3]) -> Self {
         let [d1, d2, d3] = directors;
         d1.times(self.x, d2.times(self.y, d3.scale(self.z)))
+    }
+
+    /// Its components.
+    #[inline(always)]
+    pub fn array(self) -> [Lanes<S>; 3] {
+        [self.x, self.y, self.z]
+    }
+
+    /// Component by component.
+    #[inline(always)]
+    pub fn over(self, other: Self) -> Self {
+        Vectors::new(self.x / other.x, self.y / other.y, self.z / other.z)
+    }
+
+    /// The components along `directors`.
+    #[inline(always)]
+    pub fn onto(self, directors: [Self; 3]) -> Self {
+        let [d1, d2, d3] = directors;
+        Vectors::new(d1.dot(self), d2.dot(self), d3.dot(self))
+    }
+
+    /// One vector in every lane, from the lane `part` on.
+    #[inline(always)]
+    pub fn gather(simd: S, vectors: [DVec3; GROUP], part: usize) -> Self {
+        let [a, b, c, d] = vectors;
+        Vectors::new(
+            Lanes::of(simd, &Four([a.x, b.x, c.x, d.x]), part),
+            Lanes::of(simd, &Four([a.y, b.y, c.y, d.y]), part),
+            Lanes::of(simd, &Four([a.z, b.z, c.z, d.z]), part),
+        )
     }
 
     /// self * factor + term.
@@ -355,3 +437,26 @@ vectors_operator!(Add, add);
 vectors_operator!(Sub, sub);
 // Component by component.
 vectors_operator!(Mul, mul);
+
+impl<S: Simd> Neg for Vectors<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Vectors::new(-self.x, -self.y, -self.z)
+    }
+}
+
+/// A single vector.
+impl From<DVec3> for Vectors<Scalar> {
+    #[inline(always)]
+    fn from(v: DVec3) -> Self {
+        Vectors::splat(Scalar, v.to_array())
+    }
+}
+
+impl From<Vectors<Scalar>> for DVec3 {
+    #[inline(always)]
+    fn from(single: Vectors<Scalar>) -> Self {
+        DVec3::new(single.x.v, single.y.v, single.z.v)
+    }
+}

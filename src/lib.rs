@@ -228,6 +228,9 @@ pub mod internals {
             Failure, Neutral, Options, Precision, Reason, Solution, Start, Work, solve,
         };
     }
+    pub mod lanes {
+        pub use crate::lanes::{Lanes, Vectors};
+    }
     pub mod leaf {
         pub use crate::leaf::{
             DiscreteLeaf, Grid, Leaf, Scale, Solved, SparsePattern, State, System, shift, turn,
@@ -242,7 +245,9 @@ pub mod internals {
         };
     }
     pub mod rod {
-        pub use crate::rod::{Ends, PlanarSegment, Section, Segment};
+        pub use crate::rod::{
+            Element, Ends, Nodes, PlanarElement, Section, Sections, Segment, SpatialElement,
+        };
     }
     pub mod rotation {
         pub use crate::rotation::{exp, log, outer};

@@ -6,13 +6,17 @@ mod common;
 
 use common::random::{cases, leaves};
 use common::{keeping, on, parse, relaxed, rest, same, scenario};
-use glam::{DMat3, DVec2, DVec3};
-use leafdyn::internals::rod::{Ends, PlanarSegment, Section, Segment};
+use glam::{DVec2, DVec3};
+use leafdyn::internals::lanes::Lanes;
+use leafdyn::internals::rod::{
+    Element, Ends, Nodes, PlanarElement, Section, Sections, SpatialElement,
+};
 use leafdyn::internals::rotation;
 use leafdyn::relax::{Options, Outcome, SemiImplicit, Work};
 use leafdyn::scenario::{Profile, Scenario};
 use leafdyn::shape::Difference;
 use proptest::prelude::*;
+use pulp::Scalar;
 
 fn fig05(entries: &str) -> Scenario {
     scenario("paper/fig05", entries)
@@ -76,37 +80,45 @@ proptest! {
         let dx = DVec2::from_array(dx).extend(0.0);
         let n = DVec2::from_array(n).extend(0.0);
         let ends = Ends { x: [DVec3::ZERO, dx], q: [q0, if flip { -q1 } else { q1 }] };
-        let full = Segment::new(&section, &ends, n);
-        let planar = PlanarSegment::new(&section, ends.x, ends.q, n);
+        let (sections, nodes) = (Sections::from(&section), Nodes::from(&ends));
+        let full = SpatialElement::new(&sections, &nodes, n.into());
+        let planar = PlanarElement::new(&sections, &nodes, n.into());
         // Rounding, of numbers of the size of the largest entry.
-        let (stiff, force) = (full.hessian(&section), full.condensed_gradient(&section));
-        let entries = |k: &DMat3| k.to_cols_array().iter().fold(0.0_f64, |m, k| m.max(k.abs()));
-        let largest = 1.0 + entries(&stiff.xx).max(entries(&stiff.xa)).max(entries(&stiff.aa));
-        let equal = |a: f64, b: f64| (a - b).abs() < 1e-13 * largest;
+        let (ours, theirs) = (planar.hessian(&sections), full.hessian(&sections));
+        let entries = theirs.across.iter().flatten().map(|&k| f64::from(k).abs());
+        let largest = entries.fold(1.0, f64::max);
+        let equal = |a: Lanes<Scalar>, b: Lanes<Scalar>| {
+            (f64::from(a) - f64::from(b)).abs() < 1e-13 * largest
+        };
 
-        let energies = (section.planar_strain_energy(&planar), section.strain_energy(&full));
-        prop_assert!((energies.0 - energies.1).abs() < 1e-12 * (1.0 + energies.1));
-        prop_assert!(equal(planar.turn(), full.turn()));
-        let stiffening = planar.stiffening_gradient(&section, DVec3::X);
-        for (ours, (g_x, g_a, g_b)) in [
-            (planar.condensed_gradient(&section), force),
-            (stiffening, full.stiffening_gradient(&section, DVec3::X)),
+        let energies = [planar.strain_energy(&sections), full.strain_energy(&sections)];
+        let energies = energies.map(f64::from);
+        prop_assert!((energies[0] - energies[1]).abs() < 1e-12 * (1.0 + energies[1]));
+        prop_assert!(equal(planar.squared_turn(), full.squared_turn()));
+        let dropped = DVec3::X.into();
+        for (ours, theirs) in [
+            (planar.condensed_gradient(&sections), full.condensed_gradient(&sections)),
+            (
+                planar.stiffening_gradient(&sections, dropped),
+                full.stiffening_gradient(&sections, dropped),
+            ),
         ] {
-            prop_assert!(equal(ours.x.x, g_x.x) && equal(ours.x.y, g_x.y));
-            prop_assert!(equal(ours.turn[0], g_a.z) && equal(ours.turn[1], g_b.z));
+            for node in 0..2 {
+                // Of turn and shift: about z, along x and y.
+                prop_assert!((0..3).all(|k| equal(ours[node][k], theirs[node][2 + k])));
+            }
         }
-        let ours = planar.hessian(&section);
-        for (column, theirs) in [(ours.xx.x_axis, stiff.xx.x_axis), (ours.xx.y_axis, stiff.xx.y_axis)] {
-            prop_assert!(equal(column.x, theirs.x) && equal(column.y, theirs.y));
+        for r in 0..3 {
+            for c in 0..3 {
+                prop_assert!(equal(ours.across[r][c], theirs.across[2 + r][2 + c]));
+                for node in (0..2).filter(|_| r <= c) {
+                    prop_assert!(equal(ours.own[node][r][c], theirs.own[node][2 + r][2 + c]));
+                }
+            }
         }
-        for theirs in [stiff.xa.z_axis, stiff.xb.z_axis] {
-            prop_assert!(equal(ours.xt.x, theirs.x) && equal(ours.xt.y, theirs.y));
-        }
-        prop_assert!(equal(ours.same, stiff.aa.z_axis.z) && equal(ours.same, stiff.bb.z_axis.z));
-        prop_assert!(equal(ours.across, stiff.ab.z_axis.z));
-        let (step, a, b) = (DVec2::new(0.3, -0.2), 0.7, -0.4);
-        let ours = planar.force_increment(&section, step, 0.5 * (a + b));
-        let theirs = full.force_increment(&section, step.extend(0.0), a * DVec3::Z, b * DVec3::Z);
+        let (step, turns) = (DVec3::new(0.3, -0.2, 0.0), [0.7, -0.4].map(|a| (a * DVec3::Z).into()));
+        let ours = planar.force_increment(&sections, step.into(), turns);
+        let theirs = full.force_increment(&sections, step.into(), turns);
         prop_assert!(equal(ours.x, theirs.x) && equal(ours.y, theirs.y));
     }
 }

@@ -1,11 +1,13 @@
 //! The discretised leaf: its segments, loads and coupling.
 
-use super::chain::{Block, turns};
 use super::dimensionless::{Leaf, Loads};
 use super::grid::Grid;
+use super::loads::{RodLoad, RodLoads};
 use super::state::State;
+use crate::lanes::{GROUP, Vectors};
 use crate::rod::{Ends, Section, Segment};
 use glam::DVec3;
+use pulp::Scalar;
 
 /// Radius of gyration of a vein with the tissue it carries, in units of the
 /// leaf's length: its rotary inertia per unit length and mass is the square.
@@ -135,34 +137,7 @@ impl DiscreteLeaf {
     /// Coupling of gap `g` at node `i`, force per displacement; none at a
     /// joint tip, which all rods share.
     pub(crate) fn spring(&self, g: usize, i: usize) -> DVec3 {
-        if self.leaf.joined() && i == self.segments() {
-            DVec3::ZERO
-        } else {
-            self.coupling[g] * self.weights[i]
-        }
-    }
-
-    /// Adds the stiffness of the coupling of node `i` of rod `j` to its block.
-    #[inline]
-    pub(super) fn add_coupling_stiffness<const B: usize>(
-        &self,
-        j: usize,
-        i: usize,
-        block: &mut Block<B>,
-    ) {
-        let turns = turns(B);
-        for g in [j.wrapping_sub(1), j] {
-            if g < self.rods() - 1 {
-                let spring = self.spring(g, i);
-                for c in 0..B - turns {
-                    block[turns + c][turns + c] += spring[c];
-                }
-            }
-        }
-        if self.leaf.beside_image(j) {
-            let across = turns + 1;
-            block[across][across] += 2.0 * self.spring(j, i).y;
-        }
+        self.coupling[g] * self.coupling_weight(i)
     }
 
     /// Dead moment on the tip of a single rod.
@@ -202,39 +177,52 @@ impl DiscreteLeaf {
         &self.sections[j * self.segments() + i]
     }
 
-    /// Dead load and coupling on node `i` of rod `j`, and its share of the
-    /// potential energy (a gap's belongs to its lower rod). The tip force acts
-    /// on every free tip, and once on a joint one, through the first rod.
-    #[inline]
-    pub fn load(&self, state: &State, j: usize, i: usize) -> (DVec3, f64) {
-        let k = state.base(j) + i;
-        let x = state.x[k];
+    /// Weight of the coupling of node `i`: none at a joint tip, which all rods share.
+    pub(super) fn coupling_weight(&self, i: usize) -> f64 {
+        match self.leaf.joined() && i == self.segments() {
+            true => 0.0,
+            false => self.weights[i],
+        }
+    }
+
+    /// What acts on rod `j`, per weight. The tip force acts on every free tip, and
+    /// once on a joint one, through the first rod.
+    pub(super) fn rod_load(&self, j: usize) -> RodLoad {
+        let (joined, mirrored) = (self.leaf.joined(), self.leaf.mirrored);
         let share = self.leaf.share(j);
-        let weight = self.load_factor * self.weights[i] * self.leaf.length(j) * share;
-        let mut force = self.loads.gravity * weight;
-        if i == self.segments() && (j == 0 || !self.leaf.joined()) {
-            let share = match self.leaf.joined() && self.leaf.mirrored {
-                true => 0.5,
-                false => share,
-            };
-            force += share * self.load_factor * self.loads.tip_force;
+        let tip_share = match joined {
+            true if j > 0 => 0.0,
+            true if mirrored => 0.5,
+            _ => share,
+        };
+        let gap = |present: bool, g: usize| match present {
+            true => self.coupling[g],
+            false => DVec3::ZERO,
+        };
+        RodLoad {
+            dead: self.loads.gravity * (self.load_factor * self.leaf.length(j) * share),
+            tip: tip_share * self.load_factor * self.loads.tip_force,
+            before: gap(j > 0, j.wrapping_sub(1)),
+            behind: gap(j + 1 < self.rods(), j),
+            image: 2.0 * DVec3::Y * gap(self.leaf.beside_image(j), j),
         }
-        let mut energy = -force.dot(x);
-        if self.leaf.beside_image(j) {
-            let pull = -2.0 * self.spring(j, i).y * x.y;
-            force.y += pull;
-            energy -= 0.5 * pull * x.y;
-        }
-        if j > 0 {
-            force += self.spring(j - 1, i) * (state.x[k - self.segments() - 1] - x);
-        }
-        if j + 1 < self.rods() {
-            let stretch = state.x[k + self.segments() + 1] - x;
-            let pull = self.spring(j, i) * stretch;
-            force += pull;
-            energy += 0.5 * pull.dot(stretch);
-        }
-        (force, energy)
+    }
+
+    /// Dead load and coupling on node `i` of rod `j`, and its share of the
+    /// potential energy (a gap's belongs to its lower rod).
+    pub fn load(&self, state: &State, j: usize, i: usize) -> (DVec3, f64) {
+        let (k, nodes) = (state.base(j) + i, self.segments() + 1);
+        let x = |present: bool, k: usize| state.x[if present { k } else { state.base(j) + i }];
+        let (first, last) = (j == 0, j + 1 == self.rods());
+        let x = [
+            x(!first, k.wrapping_sub(nodes)),
+            state.x[k],
+            x(!last, k + nodes),
+        ];
+        let load = RodLoads::gather(Scalar, [self.rod_load(j); GROUP], 0);
+        let weights = [self.weights[i], self.coupling_weight(i)];
+        let (force, energy) = load.at(x.map(Vectors::from), weights, i == self.segments());
+        (force.into(), energy.into())
     }
 
     /// Potential energy of the dead loads in a state.

@@ -6,6 +6,7 @@ mod chain;
 mod dimensionless;
 mod discrete;
 mod grid;
+mod loads;
 mod reduce;
 mod sparse;
 mod state;

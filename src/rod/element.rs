@@ -22,247 +22,394 @@
 //! and Newton's method converges as fast for any stiffness in stretch and shear:
 //! a rigid rod is c = 0.
 
-use crate::rotation::{self, Relative, cross_matrix, outer};
-use glam::{DMat3, DQuat, DVec3};
+use super::section::Sections;
+use crate::lanes::{Lanes, Vectors};
+use crate::rotation::{Quaternions, Relative};
+use pulp::Simd;
 
-/// What a segment is made of, taken at its midpoint.
-#[derive(Clone, Copy, Debug)]
-pub struct Section {
-    /// Reference length of the segment.
-    pub ds: f64,
-    /// Couple stiffness A: torsion, bending about d2, about d3.
-    pub couple_stiffness: DVec3,
-    /// Rest curvature u0.
-    pub rest_curvature: DVec3,
-    /// Rest strain v0; (1, 0, 0) has neither grown nor been sheared.
-    pub rest_strain: DVec3,
-    /// Compliance 1/H: axial, shear along d2, along d3; zero if rigid.
-    pub compliance: DVec3,
-    /// Stiffness by which the force is condensed out: H, or a large one in its
-    /// place if H is larger still (see [`Section::condense`]).
-    pub condensing: DVec3,
+/// The two nodes of several segments.
+#[derive(Clone, Copy)]
+pub struct Nodes<S: Simd> {
+    /// Positions.
+    pub x: [Vectors<S>; 2],
+    /// Rotations.
+    pub q: [Quaternions<S>; 2],
 }
 
-/// The two nodes of a segment.
-#[derive(Clone, Copy, Debug)]
-pub struct Ends {
-    /// Positions of the nodes.
-    pub x: [DVec3; 2],
-    /// Rotations of the nodes.
-    pub q: [DQuat; 2],
-}
+/// Several segments between nodes of B unknowns: turns, then shifts.
+pub trait Element<S: Simd, const B: usize>: Sized {
+    /// The segments between `nodes` that carry the spatial forces `n`.
+    fn new(sections: &Sections<S>, nodes: &Nodes<S>, n: Vectors<S>) -> Self;
 
-/// A segment in a given state.
-#[derive(Clone, Copy, Debug)]
-pub struct Segment {
-    /// Midpoint directors as columns.
-    pub frame: DMat3,
-    /// Curvature u.
-    pub u: DVec3,
-    /// Stress couple m = A (u - u0).
-    pub m: DVec3,
-    /// Director components nu of the force the segment carries.
-    pub nu: DVec3,
-    /// The strain that goes with that force, v0 + c nu.
-    pub w: DVec3,
-    /// R^T (x1 - x0) - ds w: by how much the constitutive law is not yet met.
-    pub gap: DVec3,
-    relative: Relative,
-}
-
-/// Second derivatives with respect to (x1 - x0) and the spatial rotation
-/// increments a, b of the two nodes, the force being condensed out.
-#[derive(Clone, Copy, Debug)]
-pub struct Blocks {
-    /// d2/dx dx
-    pub xx: DMat3,
-    /// d2/dx da
-    pub xa: DMat3,
-    /// d2/dx db
-    pub xb: DMat3,
-    /// d2/da da
-    pub aa: DMat3,
-    /// d2/da db
-    pub ab: DMat3,
-    /// d2/db db
-    pub bb: DMat3,
-}
-
-impl Section {
-    /// Sets the stiffness that condenses the force out to at most `largest`.
-    /// Beyond it the matrix is that of a softer rod while the residual stays
-    /// exact: a proximal step in the force, which changes no solution, costs
-    /// a contraction of the order of 1/`largest` an iteration, and keeps the
-    /// pivots within what double precision holds.
-    pub fn condense(mut self, largest: f64) -> Self {
-        self.condensing = self.compliance.recip().min(DVec3::splat(largest));
-        self
-    }
+    /// Squared rotation between the two ends.
+    fn squared_turn(&self) -> Lanes<S>;
 
     /// Elastic energy of the strains, ds/2 sum_k (H_k (v_k - v0_k)^2 +
     /// A_k (u_k - u0_k)^2). Infinite for a strained rigid rod.
-    #[inline]
-    pub fn strain_energy(&self, segment: &Segment) -> f64 {
-        let gamma = segment.v(self) - self.rest_strain;
-        0.5 * self.ds * (gamma * gamma / self.compliance).element_sum()
-            + self.bending_energy(segment)
+    fn strain_energy(&self, sections: &Sections<S>) -> Lanes<S>;
+
+    /// First derivatives of Pi with respect to the unknowns of both nodes, with
+    /// the force condensed out: the right-hand side that belongs to
+    /// [`Element::hessian`].
+    fn condensed_gradient(&self, sections: &Sections<S>) -> [[Lanes<S>; B]; 2];
+
+    /// What the condensed gradient gains, to first order, if the compliance of
+    /// the components in `dropped` (ones and zeros) is taken away.
+    fn stiffening_gradient(
+        &self,
+        sections: &Sections<S>,
+        dropped: Vectors<S>,
+    ) -> [[Lanes<S>; B]; 2];
+
+    /// Second derivatives, the force condensed out.
+    fn hessian(&self, sections: &Sections<S>) -> Hessian<S, B>;
+
+    /// The change of the spatial force that goes with the nodal increments
+    /// `dx` = dx1 - dx0 and the spatial rotations `turns` of both nodes.
+    fn force_increment(
+        &self,
+        sections: &Sections<S>,
+        dx: Vectors<S>,
+        turns: [Vectors<S>; 2],
+    ) -> Vectors<S>;
+}
+
+/// Second derivatives with respect to the unknowns of the two nodes.
+pub struct Hessian<S: Simd, const B: usize> {
+    /// The nodes' own blocks, upper triangles.
+    pub own: [[[Lanes<S>; B]; B]; 2],
+    /// The block between the first and the second.
+    pub across: [[Lanes<S>; B]; B],
+}
+
+/// Several segments in space: see [`Segment`](super::Segment).
+#[derive(Clone, Copy)]
+pub struct SpatialElement<S: Simd> {
+    pub(super) frame: [Vectors<S>; 3],
+    pub(super) u: Vectors<S>,
+    pub(super) m: Vectors<S>,
+    pub(super) nu: Vectors<S>,
+    pub(super) w: Vectors<S>,
+    pub(super) gap: Vectors<S>,
+    pub(super) relative: Relative<S>,
+}
+
+/// A matrix, rows first.
+pub type Rows<S> = [Vectors<S>; 3];
+
+/// First derivatives: with respect to x1 (that to x0 is its negative), and to
+/// the rotations of the two nodes.
+pub type First<S> = [Vectors<S>; 3];
+
+/// Second derivatives with respect to (x1 - x0) and the spatial rotation
+/// increments a, b of the two nodes.
+pub struct Second<S: Simd> {
+    pub xx: Rows<S>,
+    pub xa: Rows<S>,
+    pub xb: Rows<S>,
+    pub aa: Rows<S>,
+    pub ab: Rows<S>,
+    pub bb: Rows<S>,
+}
+
+impl<S: Simd> SpatialElement<S> {
+    /// First derivatives of Pi, the force held.
+    #[inline(always)]
+    pub fn gradient(&self, sections: &Sections<S>) -> First<S> {
+        self.pull_back(self.nu, self.nu.cross(self.w).scale(sections.ds), self.m)
     }
 
-    /// ds/2 sum_k A_k (u_k - u0_k)^2.
-    #[inline]
-    pub fn bending_energy(&self, segment: &Segment) -> f64 {
-        0.5 * self.ds * segment.m.dot(segment.u - self.rest_curvature)
+    /// With the force condensed out.
+    #[inline(always)]
+    pub fn condensed(&self, sections: &Sections<S>) -> First<S> {
+        let correction = sections.condensing * self.gap;
+        let g_mu = self.nu.cross(self.w).scale(sections.ds);
+        let g_mu = g_mu - self.law_rate_transposed(sections, correction);
+        let nu = correction.times(sections.per_ds, self.nu);
+        self.pull_back(nu, g_mu, self.m)
     }
 
-    /// Elastic energy by the force carried, which equals the strain energy where
-    /// the constitutive law is met: bending plus ds/2 sum_k c_k nu_k^2.
-    #[inline]
-    pub fn elastic_energy(&self, segment: &Segment) -> f64 {
-        self.bending_energy(segment)
-            + 0.5 * self.ds * (self.compliance * segment.nu * segment.nu).element_sum()
+    /// See [`Element::stiffening_gradient`].
+    #[inline(always)]
+    pub fn stiffening(&self, sections: &Sections<S>, dropped: Vectors<S>) -> First<S> {
+        let gap = (dropped * sections.compliance * self.nu).scale(sections.ds);
+        let correction = sections.condensing * gap;
+        let g_mu = -self.nu.cross(gap) - self.law_rate_transposed(sections, correction);
+        let none = Vectors::splat(sections.ds.simd, [0.0; 3]);
+        self.pull_back(correction.scale(sections.per_ds), g_mu, none)
+    }
+
+    /// From the derivatives with respect to R^T dx and to the turn mu of the
+    /// midpoint to nodal derivatives, adding the bending moment `m`.
+    #[inline(always)]
+    fn pull_back(&self, nu: Vectors<S>, g_mu: Vectors<S>, m: Vectors<S>) -> First<S> {
+        let g_mu = g_mu.scale(Lanes::splat(nu.x.simd, 0.5));
+        let g_delta = self.relative.tau.cross(g_mu) + self.relative.derivative(m);
+        [
+            nu.along(self.frame),
+            (g_mu - g_delta).along(self.frame),
+            (g_mu + g_delta).along(self.frame),
+        ]
+    }
+
+    /// D^T a, with d(R w) = R D mu at constant spatial force, D being
+    /// diag(c) \[nu\] - \[w\].
+    #[inline(always)]
+    fn law_rate_transposed(&self, sections: &Sections<S>, a: Vectors<S>) -> Vectors<S> {
+        self.w.cross(a) - self.nu.cross(sections.compliance * a)
+    }
+
+    /// Columns of diag(k) D with the stiffness k that condenses the force out, and
+    /// the second derivatives with respect to the turn of the midpoint,
+    /// ds (D^T diag(k) D + w.nu - (w nu^T + nu w^T)/2 + \[nu\] diag(c) \[nu\]).
+    #[inline(always)]
+    fn midpoint(&self, sections: &Sections<S>) -> [Rows<S>; 2] {
+        let (nu, w, c, k) = (self.nu, self.w, sections.compliance, sections.condensing);
+        let zero = Lanes::splat(k.x.simd, 0.0);
+        let half = Lanes::splat(k.x.simd, 0.5);
+        let (d01, d02) = (nu.z.times_from(c.x, w.z), nu.y.times(c.x, -w.y));
+        let (d10, d12) = (nu.z.times(c.y, -w.z), nu.x.times_from(c.y, w.x));
+        let (d20, d21) = (nu.y.times_from(c.z, w.y), nu.x.times(c.z, -w.x));
+        let (k01, k02, k10) = (k.x * d01, k.x * d02, k.y * d10);
+        let (k12, k20, k21) = (k.y * d12, k.z * d20, k.z * d21);
+        let (w_nu, squares) = (w.dot(nu), nu * nu);
+        let xx = d10.times(k10, d20 * k20) - w.x * nu.x;
+        let yy = d01.times(k01, d21 * k21) - w.y * nu.y;
+        let zz = d02.times(k02, d12 * k12) - w.z * nu.z;
+        let xx = w_nu + xx - c.y.times(squares.z, c.z * squares.y);
+        let yy = w_nu + yy - c.x.times(squares.z, c.z * squares.x);
+        let zz = w_nu + zz - c.x.times(squares.y, c.y * squares.x);
+        let xy = c.z.times(nu.x * nu.y, d20 * k21) - half * w.x.times(nu.y, w.y * nu.x);
+        let xz = c.y.times(nu.x * nu.z, d10 * k12) - half * w.x.times(nu.z, w.z * nu.x);
+        let yz = c.x.times(nu.y * nu.z, d01 * k02) - half * w.y.times(nu.z, w.z * nu.y);
+        [
+            [
+                Vectors::new(zero, k10, k20),
+                Vectors::new(k01, zero, k21),
+                Vectors::new(k02, k12, zero),
+            ],
+            [
+                Vectors::new(xx, xy, xz).scale(sections.ds),
+                Vectors::new(xy, yy, yz).scale(sections.ds),
+                Vectors::new(xz, yz, zz).scale(sections.ds),
+            ],
+        ]
+    }
+
+    /// F K F^T from the columns of K, F having the directors as columns.
+    #[inline(always)]
+    fn to_lab(&self, [a, b, c]: Rows<S>) -> Rows<S> {
+        let (a, b, c) = (
+            a.along(self.frame),
+            b.along(self.frame),
+            c.along(self.frame),
+        );
+        [
+            Vectors::new(a.x, b.x, c.x).along(self.frame),
+            Vectors::new(a.y, b.y, c.y).along(self.frame),
+            Vectors::new(a.z, b.z, c.z).along(self.frame),
+        ]
+    }
+
+    /// The same of a diagonal matrix K.
+    #[inline(always)]
+    fn diagonal_to_lab(&self, k: Vectors<S>) -> Rows<S> {
+        let [d1, d2, d3] = self.frame;
+        let (a, b, c) = (d1.scale(k.x), d2.scale(k.y), d3.scale(k.z));
+        [
+            Vectors::new(a.x, b.x, c.x).along(self.frame),
+            Vectors::new(a.y, b.y, c.y).along(self.frame),
+            Vectors::new(a.z, b.z, c.z).along(self.frame),
+        ]
+    }
+
+    /// Second derivatives, the force condensed out, in terms of
+    /// eta = (a + b)/2 and delta = b - a (see [`Relative`] for the expansions),
+    /// then of the two nodes.
+    #[inline(always)]
+    pub fn second(&self, sections: &Sections<S>) -> Second<S> {
+        let simd = sections.ds.simd;
+        let number = |value: f64| Lanes::splat(simd, value);
+        let (half, quarter, eighth) = (number(0.5), number(0.25), number(0.125));
+        let [stiff, midpoint] = self.midpoint(sections);
+        let (stiff, p) = (self.to_lab(stiff), self.to_lab(midpoint));
+        let xx = self.diagonal_to_lab(sections.condensing.scale(sections.per_ds));
+        let lab = |v: Vectors<S>| v.along(self.frame);
+        let tau = lab(self.relative.tau);
+        let g = lab(self.nu.cross(self.w).scale(sections.ds));
+        let moment = lab(self.relative.derivative(self.m)).scale(half);
+        let y = tau.cross(g).scale(eighth);
+        let bending = sections.couple_stiffness.scale(sections.per_ds);
+        let (diagonal, multiple, v) = self.relative.second_derivatives(bending, self.m);
+        let (diagonal, v, w) = (self.diagonal_to_lab(diagonal), lab(v), lab(self.relative.w));
+
+        // P [tau], and [tau] P [tau].
+        let q = [p[0].cross(tau), p[1].cross(tau), p[2].cross(tau)];
+        let q_tau = [
+            q[1].times_from(tau.z, q[2].scale(tau.y)),
+            q[2].times_from(tau.x, q[0].scale(tau.z)),
+            q[0].times_from(tau.y, q[1].scale(tau.x)),
+        ];
+        let none = Vectors::splat(simd, [0.0; 3]);
+        let unit = |r: usize, value: Lanes<S>| {
+            let mut row = none;
+            *[&mut row.x, &mut row.y, &mut row.z][r] = value;
+            row
+        };
+        let across = [
+            Vectors::new(none.x, -moment.z, moment.y),
+            Vectors::new(moment.z, none.x, -moment.x),
+            Vectors::new(-moment.y, moment.x, none.x),
+        ];
+        let tau_g = tau.dot(g) * quarter;
+        let (g, v_rows) = (g.scale(quarter).array(), v.array());
+        let (tau_rows, w_rows, y_rows) = (tau.array(), w.array(), y.array());
+        let [mut eta_delta, mut xa, mut xb, mut aa, mut ab, mut bb] = [[none; 3]; 6];
+        for r in 0..3 {
+            let row = q[r].times_from(half, across[r]);
+            eta_delta[r] = tau.times(g[r], row) - unit(r, tau_g);
+        }
+        let delta_eta = transposed(eta_delta);
+        for r in 0..3 {
+            let row = q_tau[r].times_from(quarter, diagonal[r] + unit(r, multiple));
+            let row = tau.times(y_rows[r], y.times(tau_rows[r], row));
+            let delta_delta = w.times(v_rows[r], v.times(w_rows[r], row));
+            let eta_eta = p[r].scale(quarter);
+            let symmetric = (eta_delta[r] + delta_eta[r]).scale(half);
+            let skew = (eta_delta[r] - delta_eta[r]).scale(half);
+            aa[r] = eta_eta - symmetric + delta_delta;
+            bb[r] = eta_eta + symmetric + delta_delta;
+            ab[r] = eta_eta + skew - delta_delta;
+            let (eta, delta) = (stiff[r].scale(half), stiff[r].cross(tau).scale(half));
+            xa[r] = -(eta + delta);
+            xb[r] = delta - eta;
+        }
+        Second {
+            xx,
+            xa,
+            xb,
+            aa,
+            ab,
+            bb,
+        }
     }
 }
 
-impl Segment {
-    /// The segment between `ends` that carries the spatial force `n`.
-    #[inline]
-    pub fn new(section: &Section, ends: &Ends, n: DVec3) -> Self {
-        let relative = Relative::of(ends.q[0].conjugate() * ends.q[1]);
-        let frame = DMat3::from_quat(rotation::midpoint(ends.q[0], ends.q[1]));
-        let to_directors = frame.transpose();
-        let u = relative.psi / section.ds;
-        let nu = to_directors * n;
-        let w = section.rest_strain + section.compliance * nu;
-        Segment {
+/// The transposed matrix.
+#[inline(always)]
+fn transposed<S: Simd>([a, b, c]: Rows<S>) -> Rows<S> {
+    [
+        Vectors::new(a.x, b.x, c.x),
+        Vectors::new(a.y, b.y, c.y),
+        Vectors::new(a.z, b.z, c.z),
+    ]
+}
+
+impl<S: Simd> Element<S, 6> for SpatialElement<S> {
+    #[inline(always)]
+    fn new(sections: &Sections<S>, nodes: &Nodes<S>, n: Vectors<S>) -> Self {
+        let (relative, frame) = Relative::between(nodes.q);
+        let u = relative.psi.scale(sections.per_ds);
+        let nu = n.onto(frame);
+        let w = nu * sections.compliance + sections.rest_strain;
+        let dx = (nodes.x[1] - nodes.x[0]).onto(frame);
+        SpatialElement {
             frame,
             u,
-            m: section.couple_stiffness * (u - section.rest_curvature),
+            m: sections.couple_stiffness * (u - sections.rest_curvature),
             nu,
             w,
-            gap: to_directors * (ends.x[1] - ends.x[0]) - section.ds * w,
+            gap: w.times_from(sections.ds, dx),
             relative,
         }
     }
 
-    /// Strain v = R^T (x1 - x0)/ds.
-    pub fn v(&self, section: &Section) -> DVec3 {
-        self.gap / section.ds + self.w
+    #[inline(always)]
+    fn squared_turn(&self) -> Lanes<S> {
+        self.relative.psi.dot(self.relative.psi)
     }
 
-    /// Rotation between the two ends, in radians.
-    #[inline]
-    pub fn turn(&self) -> f64 {
-        self.relative.psi.length()
+    #[inline(always)]
+    fn strain_energy(&self, sections: &Sections<S>) -> Lanes<S> {
+        let strain = self.w - sections.rest_strain;
+        let gamma = self.gap.times(sections.per_ds, strain);
+        let stretch = (gamma * gamma).over(sections.compliance);
+        let bending = self.m.dot(self.u - sections.rest_curvature);
+        let half = Lanes::splat(bending.simd, 0.5);
+        half * sections.ds * (stretch.x + stretch.y + stretch.z + bending)
     }
 
-    /// First derivatives of Pi, the force held: with respect to x1 (that to x0
-    /// is its negative) and to the rotations of the two nodes.
-    #[inline]
-    pub fn gradient(&self, section: &Section) -> (DVec3, DVec3, DVec3) {
-        self.pull_back(self.nu, section.ds * self.nu.cross(self.w))
+    #[inline(always)]
+    fn condensed_gradient(&self, sections: &Sections<S>) -> [[Lanes<S>; 6]; 2] {
+        on_nodes(self.condensed(sections))
     }
 
-    /// As [`Segment::gradient`], with the force condensed out: the right-hand
-    /// side that belongs to [`Segment::hessian`].
-    #[inline]
-    pub fn condensed_gradient(&self, section: &Section) -> (DVec3, DVec3, DVec3) {
-        let correction = section.condensing * self.gap;
-        let g_mu =
-            section.ds * self.nu.cross(self.w) - self.law_rate(section).transpose() * correction;
-        self.pull_back(self.nu + correction / section.ds, g_mu)
+    #[inline(always)]
+    fn stiffening_gradient(
+        &self,
+        sections: &Sections<S>,
+        dropped: Vectors<S>,
+    ) -> [[Lanes<S>; 6]; 2] {
+        on_nodes(self.stiffening(sections, dropped))
     }
 
-    /// What the condensed gradient gains, to first order, if the compliance of
-    /// the components in `dropped` (ones and zeros) is taken away.
-    pub fn stiffening_gradient(&self, section: &Section, dropped: DVec3) -> (DVec3, DVec3, DVec3) {
-        let gap = section.ds * dropped * section.compliance * self.nu;
-        let correction = section.condensing * gap;
-        let g_mu = -self.nu.cross(gap) - self.law_rate(section).transpose() * correction;
-        let g_delta = 0.5 * self.relative.tau.cross(g_mu);
-        (
-            self.frame * (correction / section.ds),
-            self.frame * (0.5 * g_mu - g_delta),
-            self.frame * (0.5 * g_mu + g_delta),
-        )
-    }
-
-    /// From the derivatives with respect to R^T dx and to the turn mu of the
-    /// midpoint to nodal derivatives, adding the bending moment.
-    #[inline]
-    fn pull_back(&self, nu: DVec3, g_mu: DVec3) -> (DVec3, DVec3, DVec3) {
-        let g_delta = 0.5 * self.relative.tau.cross(g_mu) + self.relative.derivative(self.m);
-        (
-            self.frame * nu,
-            self.frame * (0.5 * g_mu - g_delta),
-            self.frame * (0.5 * g_mu + g_delta),
-        )
-    }
-
-    /// D with d(R w) = R D mu at constant spatial force.
-    #[inline]
-    fn law_rate(&self, section: &Section) -> DMat3 {
-        DMat3::from_diagonal(section.compliance) * cross_matrix(self.nu) - cross_matrix(self.w)
-    }
-
-    /// Second derivatives, the force condensed out. Derived in the midpoint
-    /// frame in terms of eta = (a + b)/2 and delta = b - a (see
-    /// [`Relative`] for the expansions), then turned to the lab frame.
-    #[inline]
-    pub fn hessian(&self, section: &Section) -> Blocks {
-        let ds = section.ds;
-        let (nu, w) = (self.nu, self.w);
-        let stiffness = section.condensing;
-        let d = self.law_rate(section);
-        let stiff_d = DMat3::from_diagonal(stiffness) * d;
-        let cross_nu = cross_matrix(nu);
-
-        // Turning of the midpoint.
-        let w_nu = outer(w, nu);
-        let geometric = DMat3::from_diagonal(DVec3::splat(w.dot(nu)))
-            - 0.5 * (w_nu + w_nu.transpose())
-            + cross_nu * DMat3::from_diagonal(section.compliance) * cross_nu;
-        let p = ds * (d.transpose() * stiff_d + geometric);
-
-        let g = ds * nu.cross(w);
-        let tau = self.relative.tau;
-        let cross_tau = cross_matrix(tau);
-        let p_tau = p * cross_tau;
-        let tau_y = outer(tau, tau.cross(g));
-        let eta_delta = -0.5 * p_tau
-            + 0.25 * (cross_tau * cross_matrix(g))
-            + 0.5 * cross_matrix(self.relative.derivative(self.m));
-        let delta_delta = -0.25 * (cross_tau * p_tau)
-            + 0.125 * (tau_y + tau_y.transpose())
-            + self.relative.congruence(section.couple_stiffness / ds)
-            + self.relative.hessian(self.m);
-        let half_xi_eta = -0.5 * stiff_d;
-        let xi_delta = 0.5 * (stiff_d * cross_tau);
-
-        // From eta, delta to the two nodes, from directors to the lab.
-        let frame = self.frame;
-        let to_directors = frame.transpose();
-        let lab = |k: DMat3| frame * k * to_directors;
-        let (quarter, transposed) = (0.25 * p, eta_delta.transpose());
-        let mixed = 0.5 * (eta_delta + transposed);
-        Blocks {
-            xx: lab(DMat3::from_diagonal(stiffness / ds)),
-            xa: lab(half_xi_eta - xi_delta),
-            xb: lab(half_xi_eta + xi_delta),
-            aa: lab(quarter - mixed + delta_delta),
-            ab: lab(quarter + 0.5 * (eta_delta - transposed) - delta_delta),
-            bb: lab(quarter + mixed + delta_delta),
+    #[inline(always)]
+    fn hessian(&self, sections: &Sections<S>) -> Hessian<S, 6> {
+        let Second {
+            xx,
+            xa,
+            xb,
+            aa,
+            ab,
+            bb,
+        } = self.second(sections);
+        let none = [[sections.ds; 6]; 6];
+        let (mut left, mut right, mut across) = (none, none, none);
+        let (ax, bx) = (transposed(xa), transposed(xb));
+        for r in 0..3 {
+            let (xx, xb, aa, ab) = (xx[r].array(), xb[r].array(), aa[r].array(), ab[r].array());
+            let (ax, bx, bb) = (ax[r].array(), bx[r].array(), bb[r].array());
+            for c in 0..3 {
+                left[r][c] = aa[c];
+                left[r][3 + c] = -ax[c];
+                left[3 + r][3 + c] = xx[c];
+                right[r][c] = bb[c];
+                right[r][3 + c] = bx[c];
+                right[3 + r][3 + c] = xx[c];
+                across[r][c] = ab[c];
+                across[r][3 + c] = ax[c];
+                across[3 + r][c] = -xb[c];
+                across[3 + r][3 + c] = -xx[c];
+            }
+        }
+        Hessian {
+            own: [left, right],
+            across,
         }
     }
 
-    /// The change of the spatial force that goes with the nodal increments
-    /// `dx` = dx1 - dx0 and spatial rotations `a`, `b`.
-    #[inline]
-    pub fn force_increment(&self, section: &Section, dx: DVec3, a: DVec3, b: DVec3) -> DVec3 {
-        let to_directors = self.frame.transpose();
-        let (alpha, beta) = (to_directors * a, to_directors * b);
-        let mu = 0.5 * (alpha + beta) + 0.5 * (beta - alpha).cross(self.relative.tau);
-        let d_mu = section.compliance * self.nu.cross(mu) - self.w.cross(mu);
-        let gap = to_directors * dx - section.ds * d_mu + self.gap;
-        self.frame * (section.condensing * gap / section.ds)
+    #[inline(always)]
+    fn force_increment(
+        &self,
+        sections: &Sections<S>,
+        dx: Vectors<S>,
+        turns: [Vectors<S>; 2],
+    ) -> Vectors<S> {
+        let half = Lanes::splat(dx.x.simd, 0.5);
+        let [alpha, beta] = [turns[0].onto(self.frame), turns[1].onto(self.frame)];
+        let mu = (alpha + beta + (beta - alpha).cross(self.relative.tau)).scale(half);
+        let d_mu = sections.compliance * self.nu.cross(mu) - self.w.cross(mu);
+        let gap = d_mu.times_from(sections.ds, dx.onto(self.frame) + self.gap);
+        let change = sections.condensing * gap.scale(sections.per_ds);
+        change.along(self.frame)
     }
+}
+
+/// As derivatives with respect to the unknowns of the two nodes.
+#[inline(always)]
+fn on_nodes<S: Simd>([x, a, b]: First<S>) -> [[Lanes<S>; 6]; 2] {
+    [
+        [a.x, a.y, a.z, -x.x, -x.y, -x.z],
+        [b.x, b.y, b.z, x.x, x.y, x.z],
+    ]
 }

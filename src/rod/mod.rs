@@ -1,10 +1,14 @@
-//! One segment of a rod: its section, its strains, its energy and derivatives.
+//! Segments of rods: their sections, strains, energy and derivatives.
 
 mod element;
 mod planar;
+mod section;
+mod segment;
 
-pub use element::{Blocks, Ends, Section, Segment};
-pub use planar::{PlanarBlocks, PlanarGradient, PlanarSegment};
+pub use element::{Element, Nodes, SpatialElement};
+pub use planar::PlanarElement;
+pub use section::{Section, Sections};
+pub use segment::{Ends, Segment};
 
 /// A segment that is bent by more than this (radians) is not resolved by its grid.
 pub const RESOLVED_TURN: f64 = 1.6;

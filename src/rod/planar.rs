@@ -1,4 +1,4 @@
-//! The midpoint element of a segment that stays in the plane z = 0.
+//! The midpoint element of segments that stay in the plane z = 0.
 //!
 //! Rotations about one axis commute: they are angles theta, whose geodesic
 //! midpoint is their mean. With psi = theta1 - theta0, d1 the direction of
@@ -10,148 +10,197 @@
 //! what [`Segment`](super::Segment) is if nothing leaves the plane. The turns
 //! of both nodes act alike on all but the bending: by their mean.
 
-use super::Section;
+use super::element::{Element, Hessian, Nodes};
+use super::section::Sections;
+use crate::lanes::{Lanes, Vectors};
 use crate::rotation;
-use glam::{DMat2, DQuat, DVec2, DVec3};
+use pulp::Simd;
 
-/// A segment in the plane in a given state.
-#[derive(Clone, Copy, Debug)]
-pub struct PlanarSegment {
+/// A vector in the plane for each of several segments.
+type Pair<S> = [Lanes<S>; 2];
+
+/// Several segments in the plane.
+#[derive(Clone, Copy)]
+pub struct PlanarElement<S: Simd> {
     /// Midpoint director d1.
-    d1: DVec2,
+    d1: Pair<S>,
     /// Angle psi between the two ends.
-    psi: f64,
+    psi: Lanes<S>,
     /// Stress couple about d3.
-    m: f64,
+    m: Lanes<S>,
     /// Director components of the force the segment carries.
-    nu: DVec2,
+    nu: Pair<S>,
     /// The strain that goes with that force, v0 + c nu.
-    w: DVec2,
+    w: Pair<S>,
     /// R^T (x1 - x0) - ds w.
-    gap: DVec2,
+    gap: Pair<S>,
     /// D with d(R w) = R D dtheta at constant spatial force, theta the mean angle.
-    law_rate: DVec2,
+    law_rate: Pair<S>,
 }
 
-/// First derivatives: with respect to x1 (that to x0 is its negative), and to
-/// the angles of the two nodes.
-#[derive(Clone, Copy, Debug)]
-pub struct PlanarGradient {
-    /// d/dx
-    pub x: DVec2,
-    /// d/da, d/db
-    pub turn: [f64; 2],
+#[inline(always)]
+fn dot<S: Simd>(a: Pair<S>, b: Pair<S>) -> Lanes<S> {
+    a[0].times(b[0], a[1] * b[1])
 }
 
-/// Second derivatives with respect to (x1 - x0) and the angles a, b of the two
-/// nodes, the force being condensed out.
-#[derive(Clone, Copy, Debug)]
-pub struct PlanarBlocks {
-    /// d2/dx dx
-    pub xx: DMat2,
-    /// d2/dx da and d2/dx db
-    pub xt: DVec2,
-    /// d2/da da and d2/db db
-    pub same: f64,
-    /// d2/da db
-    pub across: f64,
+/// a_1 b_2 - a_2 b_1.
+#[inline(always)]
+fn perp_dot<S: Simd>(a: Pair<S>, b: Pair<S>) -> Lanes<S> {
+    a[1].times_from(b[0], a[0] * b[1])
 }
 
-impl Section {
-    /// [`Section::strain_energy`] of a segment in the plane.
-    #[inline]
-    pub fn planar_strain_energy(&self, segment: &PlanarSegment) -> f64 {
-        let gamma = segment.gap / self.ds + segment.w - self.rest_strain.truncate();
-        let bending = segment.m * (segment.psi / self.ds - self.rest_curvature.z);
-        0.5 * self.ds * ((gamma * gamma / self.compliance.truncate()).element_sum() + bending)
+impl<S: Simd> PlanarElement<S> {
+    /// R v.
+    #[inline(always)]
+    fn to_lab(&self, v: Pair<S>) -> Pair<S> {
+        let [x, y] = self.d1;
+        [y.times_from(v[1], x * v[0]), y.times(v[0], x * v[1])]
+    }
+
+    /// First derivatives from those with respect to R^T dx and the two angles.
+    #[inline(always)]
+    fn pull_back(&self, nu: Pair<S>, turns: Pair<S>) -> [[Lanes<S>; 3]; 2] {
+        let [x, y] = self.to_lab(nu);
+        [[turns[0], -x, -y], [turns[1], x, y]]
     }
 }
 
-impl PlanarSegment {
-    /// The segment between two nodes at `x`, turned by `q` about z, that
-    /// carries the spatial force `n`; of all of them what lies in the plane.
-    #[inline]
-    pub fn new(section: &Section, x: [DVec3; 2], q: [DQuat; 2], n: DVec3) -> Self {
-        let [a, b] = q.map(|q| DVec2::new(q.w, q.z));
-        let sign = if a.dot(b) < 0.0 { -1.0 } else { 1.0 };
-        let (cos, sin) = (sign * a.dot(b), sign * a.perp_dot(b));
-        let psi = 2.0 * rotation::half_over_sin(sin * sin, cos) * sin;
+impl<S: Simd> Element<S, 3> for PlanarElement<S> {
+    #[inline(always)]
+    fn new(sections: &Sections<S>, nodes: &Nodes<S>, n: Vectors<S>) -> Self {
+        let simd = sections.ds.simd;
+        let one = Lanes::splat(simd, 1.0);
+        let [a, b] = [nodes.q[0], nodes.q[1]];
+        let (a, b) = ([a.1, a.0.z], [b.1, b.0.z]);
+        let cos = dot(a, b) + Lanes::splat(simd, f64::MIN_POSITIVE);
+        let sign = one.where_positive(cos, -one);
+        let b = [b[0] * sign, b[1] * sign];
+        let d = [b[0] - a[0], b[1] - a[1]];
+        let delta = dot(d, d);
+        let [sigma, ..] = rotation::series(delta);
+        let psi = (sigma + sigma) * perp_dot(a, b);
         // Half angles add, and twice their mean is the mean angle.
-        let sum = a + sign * b;
-        let d1 = sum.rotate(sum) / sum.length_squared();
-        let compliance = section.compliance.truncate();
-        let nu = to_directors(d1, n.truncate());
-        let w = section.rest_strain.truncate() + compliance * nu;
-        PlanarSegment {
+        let s = [a[0] + b[0], a[1] + b[1]];
+        let inverse = (Lanes::splat(simd, 4.0) - delta).recip();
+        let d1 = [
+            s[1].times_from(s[1], s[0] * s[0]) * inverse,
+            (s[0] + s[0]) * s[1] * inverse,
+        ];
+        let onto = |v: Pair<S>| [dot(d1, v), perp_dot(d1, v)];
+        let (c, rest) = (sections.compliance, sections.rest_strain);
+        let nu = onto([n.x, n.y]);
+        let w = [c.x.times(nu[0], rest.x), c.y.times(nu[1], rest.y)];
+        let dx = nodes.x[1] - nodes.x[0];
+        let dx = onto([dx.x, dx.y]);
+        let u = psi * sections.per_ds;
+        PlanarElement {
             d1,
             psi,
-            m: section.couple_stiffness.z * (psi / section.ds - section.rest_curvature.z),
+            m: sections.couple_stiffness.z * (u - sections.rest_curvature.z),
             nu,
             w,
-            gap: to_directors(d1, (x[1] - x[0]).truncate()) - section.ds * w,
-            law_rate: w.perp() - compliance * nu.perp(),
+            gap: [
+                w[0].times_from(sections.ds, dx[0]),
+                w[1].times_from(sections.ds, dx[1]),
+            ],
+            law_rate: [c.x.times(nu[1], -w[1]), c.y.times_from(nu[0], w[0])],
         }
     }
 
-    /// Rotation between the two ends, in radians.
-    #[inline]
-    pub fn turn(&self) -> f64 {
-        self.psi.abs()
+    #[inline(always)]
+    fn squared_turn(&self) -> Lanes<S> {
+        self.psi * self.psi
     }
 
-    /// See [`Segment::condensed_gradient`](super::Segment::condensed_gradient).
-    #[inline]
-    pub fn condensed_gradient(&self, section: &Section) -> PlanarGradient {
-        let correction = section.condensing.truncate() * self.gap;
-        let mean = section.ds * self.nu.perp_dot(self.w) - self.law_rate.dot(correction);
-        PlanarGradient {
-            x: self.d1.rotate(self.nu + correction / section.ds),
-            turn: [0.5 * mean - self.m, 0.5 * mean + self.m],
+    #[inline(always)]
+    fn strain_energy(&self, sections: &Sections<S>) -> Lanes<S> {
+        let (c, rest) = (sections.compliance, sections.rest_strain);
+        let gamma = [
+            self.gap[0].times(sections.per_ds, self.w[0] - rest.x),
+            self.gap[1].times(sections.per_ds, self.w[1] - rest.y),
+        ];
+        let stretch = gamma[0] * gamma[0] / c.x + gamma[1] * gamma[1] / c.y;
+        let bending = self.psi * sections.per_ds - sections.rest_curvature.z;
+        let half = Lanes::splat(bending.simd, 0.5);
+        half * sections.ds * self.m.times(bending, stretch)
+    }
+
+    #[inline(always)]
+    fn condensed_gradient(&self, sections: &Sections<S>) -> [[Lanes<S>; 3]; 2] {
+        let k = sections.condensing;
+        let correction = [k.x * self.gap[0], k.y * self.gap[1]];
+        let mean = sections.ds * perp_dot(self.nu, self.w) - dot(self.law_rate, correction);
+        let mean = mean * Lanes::splat(mean.simd, 0.5);
+        let nu = [
+            correction[0].times(sections.per_ds, self.nu[0]),
+            correction[1].times(sections.per_ds, self.nu[1]),
+        ];
+        self.pull_back(nu, [mean - self.m, mean + self.m])
+    }
+
+    #[inline(always)]
+    fn stiffening_gradient(
+        &self,
+        sections: &Sections<S>,
+        dropped: Vectors<S>,
+    ) -> [[Lanes<S>; 3]; 2] {
+        let gap = (dropped * sections.compliance).scale(sections.ds);
+        let gap = [gap.x * self.nu[0], gap.y * self.nu[1]];
+        let k = sections.condensing;
+        let correction = [k.x * gap[0], k.y * gap[1]];
+        let mean = -perp_dot(self.nu, gap) - dot(self.law_rate, correction);
+        let mean = mean * Lanes::splat(mean.simd, 0.5);
+        let nu = [
+            correction[0] * sections.per_ds,
+            correction[1] * sections.per_ds,
+        ];
+        self.pull_back(nu, [mean, mean])
+    }
+
+    #[inline(always)]
+    fn hessian(&self, sections: &Sections<S>) -> Hessian<S, 3> {
+        let (c, k, [x, y]) = (sections.compliance, sections.condensing, self.d1);
+        let number = |value: f64| Lanes::splat(c.x.simd, value);
+        let nu = self.nu;
+        let geometric = dot(self.w, nu) - c.x.times(nu[1] * nu[1], c.y * nu[0] * nu[0]);
+        let stiff_rate = [k.x * self.law_rate[0], k.y * self.law_rate[1]];
+        let mean = sections.ds * (dot(self.law_rate, stiff_rate) + geometric);
+        let mean = mean * number(0.25);
+        let bending = sections.couple_stiffness.z * sections.per_ds;
+        let half = number(-0.5);
+        let [tx, ty] = self.to_lab([stiff_rate[0] * half, stiff_rate[1] * half]);
+        let (k1, k2) = (k.x * sections.per_ds, k.y * sections.per_ds);
+        let (xx, xy) = (x.times(x * k1, y * y * k2), x * y * (k1 - k2));
+        let yy = y.times(y * k1, x * x * k2);
+        let (same, across) = (mean + bending, mean - bending);
+        Hessian {
+            own: [
+                [[same, -tx, -ty], [-tx, xx, xy], [-ty, xy, yy]],
+                [[same, tx, ty], [tx, xx, xy], [ty, xy, yy]],
+            ],
+            across: [[across, tx, ty], [-tx, -xx, -xy], [-ty, -xy, -yy]],
         }
     }
 
-    /// See [`Segment::stiffening_gradient`](super::Segment::stiffening_gradient).
-    #[inline]
-    pub fn stiffening_gradient(&self, section: &Section, dropped: DVec3) -> PlanarGradient {
-        let gap = section.ds * (dropped * section.compliance).truncate() * self.nu;
-        let correction = section.condensing.truncate() * gap;
-        let mean = -self.nu.perp_dot(gap) - self.law_rate.dot(correction);
-        PlanarGradient {
-            x: self.d1.rotate(correction / section.ds),
-            turn: [0.5 * mean; 2],
-        }
+    #[inline(always)]
+    fn force_increment(
+        &self,
+        sections: &Sections<S>,
+        dx: Vectors<S>,
+        turns: [Vectors<S>; 2],
+    ) -> Vectors<S> {
+        let number = |value: f64| Lanes::splat(dx.x.simd, value);
+        let turn = (turns[0].z + turns[1].z) * number(0.5) * sections.ds;
+        let (dx, k) = ([dx.x, dx.y], sections.condensing);
+        let gap = [
+            turn.times_from(self.law_rate[0], dot(self.d1, dx) + self.gap[0]),
+            turn.times_from(self.law_rate[1], perp_dot(self.d1, dx) + self.gap[1]),
+        ];
+        let nu = [
+            k.x * gap[0] * sections.per_ds,
+            k.y * gap[1] * sections.per_ds,
+        ];
+        let [x, y] = self.to_lab(nu);
+        Vectors::new(x, y, number(0.0))
     }
-
-    /// Second derivatives, the force condensed out.
-    #[inline]
-    pub fn hessian(&self, section: &Section) -> PlanarBlocks {
-        let (ds, stiffness) = (section.ds, section.condensing.truncate());
-        let across = self.nu.perp();
-        let geometric = self.w.dot(self.nu) - (section.compliance.truncate() * across).dot(across);
-        let stiff_rate = stiffness * self.law_rate;
-        let mean = 0.25 * ds * (self.law_rate.dot(stiff_rate) + geometric);
-        let bending = section.couple_stiffness.z / ds;
-        let frame = DMat2::from_cols(self.d1, self.d1.perp());
-        PlanarBlocks {
-            xx: frame * DMat2::from_diagonal(stiffness / ds) * frame.transpose(),
-            xt: self.d1.rotate(-0.5 * stiff_rate),
-            same: mean + bending,
-            across: mean - bending,
-        }
-    }
-
-    /// The change of the spatial force that goes with the increment `dx` of
-    /// x1 - x0 and the mean `turn` of the two nodes.
-    #[inline]
-    pub fn force_increment(&self, section: &Section, dx: DVec2, turn: f64) -> DVec2 {
-        let gap = to_directors(self.d1, dx) - section.ds * turn * self.law_rate + self.gap;
-        self.d1
-            .rotate(section.condensing.truncate() * gap / section.ds)
-    }
-}
-
-/// R^T v.
-#[inline]
-fn to_directors(d1: DVec2, v: DVec2) -> DVec2 {
-    DVec2::new(d1.dot(v), d1.perp_dot(v))
 }

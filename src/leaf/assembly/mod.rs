@@ -1,40 +1,39 @@
 //! A discretised leaf's unbalanced forces, its matrix, its energy.
 
 mod held;
-mod planar;
-mod spatial;
+mod kernels;
 
-use super::chain::{Block, Chain, GroupMatrix, Increments, place, set_lane};
+use self::kernels::{Advance, Assemble, Rods, Stiffen};
+use super::chain::{GroupMatrix, place};
 use super::discrete::DiscreteLeaf;
-use super::state::{Increment, State};
+use super::state::State;
 use super::system::{Sums, System, each_group, rods_of};
+use crate::lanes::{GROUP, run};
 use glam::DVec3;
+use rayon::prelude::*;
 
 impl DiscreteLeaf {
     /// Assembles matrix and right-hand side of Newton's equations into
     /// `system`.
     pub fn assemble(&self, state: &State, system: &mut System) -> Sums {
         system.moment = self.tip_moment();
+        let (arch, moment) = (system.arch, system.moment);
         each_group(system.parallel, &mut system.groups, |g, group| {
-            let rhs = &mut group.rhs;
-            group.sums = Sums::default();
+            let rods = Rods::new(self, state, g);
+            run(arch, &mut Assemble { rods, group });
             for j in rods_of(g, self.rods()) {
-                let sums = match &mut group.matrix {
-                    GroupMatrix::Spatial(chain) => {
-                        let sums = self.assemble_spatial(j, state, chain, rhs);
-                        self.hold_components(j, chain, rhs);
-                        sums
-                    }
-                    GroupMatrix::Planar(chain) => {
-                        let sums = self.assemble_planar(j, state, chain, rhs);
-                        self.hold_components(j, chain, rhs);
-                        sums
-                    }
-                };
-                group.sums.energy += sums.energy;
-                group.sums.turn = group.sums.turn.max(sums.turn);
+                match &mut group.matrix {
+                    GroupMatrix::Spatial(chain) => self.hold_components(j, chain, &mut group.rhs),
+                    GroupMatrix::Planar(chain) => self.hold_components(j, chain, &mut group.rhs),
+                }
             }
         });
+        if moment != DVec3::ZERO {
+            let last = &mut system.groups[0].rhs[self.segments() - 1];
+            for c in 0..3 {
+                last[c].0[0] += moment[c];
+            }
+        }
         let mut total = Sums::default();
         for group in &system.groups {
             total.energy += group.sums.energy;
@@ -46,14 +45,16 @@ impl DiscreteLeaf {
     /// Writes the right-hand side of the change, to first order, if the rods
     /// had no compliance in the components `dropped` (ones and zeros).
     pub fn assemble_stiffening(&self, state: &State, dropped: DVec3, system: &mut System) {
-        let mut all = vec![vec![[0.0; 6]; self.segments()]; self.rods()];
-        for (j, rhs) in all.iter_mut().enumerate() {
-            match self.leaf.planar {
-                false => self.stiffen_spatial(j, state, dropped, rhs),
-                true => self.stiffen_planar(j, state, dropped, rhs),
-            }
-        }
-        system.set_rhs(&all);
+        let arch = system.arch;
+        each_group(system.parallel, &mut system.groups, |g, group| {
+            let rods = Rods::new(self, state, g);
+            let mut kernel = Stiffen {
+                rods,
+                dropped,
+                group,
+            };
+            run(arch, &mut kernel);
+        });
         for j in 0..self.rods() {
             self.clear_held_components(j, &mut system.groups[place(j).0].rhs);
         }
@@ -63,9 +64,32 @@ impl DiscreteLeaf {
     /// rod, nodes 1 to n), written over `next`.
     pub fn advance(&self, state: &State, solution: &System, step: f64, next: &mut State) {
         next.clone_from(state);
-        match self.leaf.planar {
-            false => self.advance_spatial(state, solution, step, next),
-            true => self.advance_planar(state, solution, step, next),
+        let (n, arch) = (self.segments(), solution.arch);
+        let (nodes, forces) = (GROUP * (n + 1), GROUP * n);
+        let advance = |(g, ((x, q), n)): (usize, ((&mut [_], &mut [_]), &mut [_]))| {
+            let rods = Rods::new(self, state, g);
+            let solution = &solution.groups[g].solution;
+            let mut kernel = Advance {
+                rods,
+                solution,
+                step,
+                x,
+                q,
+                n,
+            };
+            run(arch, &mut kernel);
+        };
+        match solution.parallel {
+            true => (next.x.par_chunks_mut(nodes))
+                .zip(next.q.par_chunks_mut(nodes))
+                .zip(next.n.par_chunks_mut(forces))
+                .enumerate()
+                .for_each(advance),
+            false => (next.x.chunks_mut(nodes))
+                .zip(next.q.chunks_mut(nodes))
+                .zip(next.n.chunks_mut(forces))
+                .enumerate()
+                .for_each(advance),
         }
     }
 
@@ -119,38 +143,5 @@ impl DiscreteLeaf {
             }
         }
         energy
-    }
-}
-
-/// The equations of a node while its segments are assembled.
-struct Node<const B: usize> {
-    block: Block<B>,
-    next: Block<B>,
-    rhs: Increment,
-}
-
-impl<const B: usize> Default for Node<B> {
-    fn default() -> Self {
-        Node {
-            block: [[0.0; B]; B],
-            next: [[0.0; B]; B],
-            rhs: [0.0; 6],
-        }
-    }
-}
-
-impl<const B: usize> Node<B> {
-    /// Writes them for node `i` (from 0) of rod `j`.
-    fn put(&self, i: usize, j: usize, chain: &mut Chain<B>, rhs: &mut [Increments]) {
-        let lane = place(j).1;
-        for r in 0..B {
-            for c in 0..B {
-                chain.off(i, r, c).0[lane] = self.next[r][c];
-                if r <= c {
-                    chain.diagonal(i, r, c).0[lane] = self.block[r][c];
-                }
-            }
-        }
-        set_lane(&mut rhs[i], lane, &self.rhs);
     }
 }

@@ -11,8 +11,8 @@ mod kernels;
 
 use self::kernels::{Backward, Factorize, Forward};
 use super::state::Increment;
-use crate::lanes::{Four, GROUP, run};
-use pulp::Arch;
+use crate::lanes::{Four, GROUP, Lanes, run};
+use pulp::{Arch, Simd};
 
 /// Increments of a node, or the forces dual to them, of all rods of a group.
 pub type Increments = [Four; 6];
@@ -110,6 +110,35 @@ impl<const B: usize> Chain<B> {
             }
         }
         chain
+    }
+
+    /// Writes the upper triangle of the block of node `i` (from 0), and the block
+    /// between it and the next if there is one; identities in lanes without a rod.
+    #[inline(always)]
+    pub fn put<S: Simd>(
+        &mut self,
+        i: usize,
+        own: &[[Lanes<S>; B]; B],
+        next: Option<&[[Lanes<S>; B]; B]>,
+        (active, part): (Lanes<S>, usize),
+    ) {
+        let node = &mut self.matrix[i * entries(B)..][..entries(B)];
+        let zero = Lanes::splat(active.simd, 0.0);
+        let one = Lanes::splat(active.simd, 1.0);
+        for r in 0..B {
+            let own_r = own[r][r].where_positive(active, one);
+            own_r.put(&mut node[upper(B, r, r)], part);
+            for c in r + 1..B {
+                let own = own[r][c].where_positive(active, zero);
+                own.put(&mut node[upper(B, r, c)], part);
+            }
+            if let Some(next) = next {
+                for c in 0..B {
+                    let next = next[r][c].where_positive(active, zero);
+                    next.put(&mut node[off(B, r, c)], part);
+                }
+            }
+        }
     }
 
     /// Entry (r, c) of the block of node `i` (from 0), r <= c.

@@ -69,7 +69,7 @@ pub struct System {
     weights: Vec<f64>,
     /// Those in E: none at a joint tip.
     coupling_weights: Vec<f64>,
-    arch: Arch,
+    pub(super) arch: Arch,
     tip: Option<TipFactor>,
     /// Coupling of every gap per weight, none where the leaf has none.
     gaps: Vec<DVec3>,
@@ -118,11 +118,6 @@ impl System {
             true => (1..rods).map(gap).collect(),
             false => Vec::new(),
         };
-        let weights: Vec<f64> = (1..=n).map(|i| leaf.weight(i)).collect();
-        let mut coupling_weights = weights.clone();
-        if joined {
-            coupling_weights[n - 1] = 0.0;
-        }
         let count = rods.div_ceil(GROUP);
         System {
             groups: (0..count).map(|g| Group::new(leaf, g, &gaps)).collect(),
@@ -132,8 +127,8 @@ impl System {
             coupled,
             parallel: rods * n >= PARALLEL_NODES && count > 1 && rayon::current_num_threads() > 1,
             segments: n,
-            weights,
-            coupling_weights,
+            weights: (1..=n).map(|i| leaf.weight(i)).collect(),
+            coupling_weights: (1..=n).map(|i| leaf.coupling_weight(i)).collect(),
             arch: arch(),
             tip: None,
             gaps,

@@ -18,31 +18,14 @@
 //!
 //! S = sigma + c w w^T is the derivative of the rotation vector. As it leaves
 //! what lies along w as it is, c = (1 - sigma)/|w|^2 = -4 B/|s|^2 if sigma is
-//! written as 1 + B delta. B is a polynomial in delta: a segment costs one
+//! written as 1 + B delta. B is a polynomial in delta ([`B`]): a segment costs one
 //! division and no root.
 
 use super::{Array, Block, GROUP, Law, Material, Past};
 use crate::lanes::{Lanes, Vectors, cut, cut_mut, slice};
+use crate::rotation::{B, directors};
 use pulp::Simd;
 use std::ops::Deref;
-
-/// (sigma - 1)/delta as a polynomial in delta, sigma being (psi/2)/sin(psi/2):
-/// interpolated at Chebyshev's nodes on 0..2/3, largest error of sigma 1.7e-16.
-/// Up to there, a segment bent by 1.68, a little more than what counts as
-/// resolved.
-const B: [f64; 11] = [
-    0.16666666666666688,
-    0.03333333333325741,
-    0.007142857147397268,
-    0.0015873014817296078,
-    0.00036075161528440684,
-    8.324142592010429e-05,
-    1.9462028784123005e-05,
-    4.469961631947446e-06,
-    1.2554386436622931e-06,
-    7.904972852467008e-08,
-    1.5773720034975787e-07,
-];
 
 /// The rate of a strain, from the last two.
 #[inline(always)]
@@ -221,7 +204,6 @@ fn stretch<S: Simd, const DAMPED: bool>(
     let mut past = DAMPED.then(|| (cut_mut(past_one, place), cut_mut(past_two, place)));
     let rates = law.rates.map(|rate| Lanes::splat(simd, rate));
     let retardation = Lanes::splat(simd, law.retardation);
-    let one = Lanes::splat(simd, 1.0);
     let mut power = sums.friction;
     let mut at = 0;
     while at + S::F64_LANES <= count {
@@ -229,27 +211,10 @@ fn stretch<S: Simd, const DAMPED: bool>(
         let (b, bw) = quaternion(simd, &q1, at);
         // Midpoint frame: the rotation matrix of s without its length.
         let (s, sw) = (a + b, aw + bw);
-        let r = s.scale(Lanes::load(simd, twice_inverse, at));
-        let (xy, xz, yz) = (s.x * r.y, s.x * r.z, s.y * r.z);
-        let (not_x, not_z) = (s.x.times_from(r.x, one), s.z.times_from(r.z, one));
-        let d1 = Vectors::new(
-            s.y.times_from(r.y, not_z),
-            sw.times(r.z, xy),
-            sw.times_from(r.y, xz),
-        );
-        let d2 = Vectors::new(
-            sw.times_from(r.z, xy),
-            s.x.times_from(r.x, not_z),
-            sw.times(r.x, yz),
-        );
-        let d3 = Vectors::new(
-            sw.times(r.y, xz),
-            sw.times_from(r.x, yz),
-            s.y.times_from(r.y, not_x),
-        );
+        let directors = directors((s, sw), Lanes::load(simd, twice_inverse, at));
         let dx = Vectors::load(simd, &x1, at) - Vectors::load(simd, &x0, at);
         let length = Lanes::load(simd, rest_length, at);
-        let v = Vectors::new(d1.dot(dx), d2.dot(dx), d3.dot(dx));
+        let v = dx.onto(directors);
         let mut strain = Vectors::new(v.x - length, v.y, v.z);
         let stiffness = Vectors::load(simd, &stiffness, at);
         if let Some((one, two)) = &mut past {
@@ -258,7 +223,6 @@ fn stretch<S: Simd, const DAMPED: bool>(
             power = power + rate.dot(rate * stiffness);
         }
         let n = strain * stiffness;
-        let directors = [d1, d2, d3];
         // Along the lab axes from here on: R (v x n) = dx x N.
         let n = n.along(directors);
         n.store(&mut force, at);

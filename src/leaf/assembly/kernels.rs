@@ -1,0 +1,304 @@
+//! The loops over the segments of a group of rods.
+
+use crate::lanes::{Four, GROUP, Kernel, Lanes, Vectors};
+use crate::leaf::chain::{Chain, GroupMatrix, Increments, first, turns};
+use crate::leaf::discrete::DiscreteLeaf;
+use crate::leaf::loads::{RodLoad, RodLoads};
+use crate::leaf::state::State;
+use crate::leaf::system::{Group, Sums, rods_of};
+use crate::rod::{Element, Nodes, PlanarElement, Section, Sections, SpatialElement};
+use crate::rotation::{Quaternions, exp_each, multiply_each};
+use glam::{DQuat, DVec3};
+use pulp::Simd;
+
+/// The rods of a group in a state; lanes without a rod repeat the last.
+pub struct Rods<'a> {
+    leaf: &'a DiscreteLeaf,
+    group: usize,
+    sections: [&'a [Section]; GROUP],
+    x: [&'a [DVec3]; GROUP],
+    q: [&'a [DQuat]; GROUP],
+    n: [&'a [DVec3]; GROUP],
+    /// Positions of the rods before and behind, or their own where there is none.
+    beside: [[&'a [DVec3]; GROUP]; 2],
+    loads: [RodLoad; GROUP],
+}
+
+impl<'a> Rods<'a> {
+    pub fn new(leaf: &'a DiscreteLeaf, state: &'a State, group: usize) -> Self {
+        let (n, last) = (leaf.segments(), leaf.rods() - 1);
+        let rods: [usize; GROUP] = std::array::from_fn(|lane| (GROUP * group + lane).min(last));
+        let x = |j: usize| &state.x[state.base(j)..][..=n];
+        Rods {
+            leaf,
+            group,
+            sections: rods.map(|j| &leaf.sections[j * n..][..n]),
+            x: rods.map(x),
+            q: rods.map(|j| &state.q[state.base(j)..][..=n]),
+            n: rods.map(|j| &state.n[j * n..][..n]),
+            beside: [
+                rods.map(|j| x(j.saturating_sub(1))),
+                rods.map(|j| x((j + 1).min(last))),
+            ],
+            loads: rods.map(|j| leaf.rod_load(j)),
+        }
+    }
+
+    #[inline(always)]
+    fn x<S: Simd>(&self, simd: S, i: usize, part: usize) -> Vectors<S> {
+        let [a, b, c, d] = self.x;
+        Vectors::gather(simd, [a[i], b[i], c[i], d[i]], part)
+    }
+
+    #[inline(always)]
+    fn q<S: Simd>(&self, simd: S, i: usize, part: usize) -> Quaternions<S> {
+        let [a, b, c, d] = self.q;
+        let (a, b, c, d) = (a[i], b[i], c[i], d[i]);
+        let vector = |q: DQuat| DVec3::new(q.x, q.y, q.z);
+        let v = Vectors::gather(simd, [vector(a), vector(b), vector(c), vector(d)], part);
+        (v, Lanes::of(simd, &Four([a.w, b.w, c.w, d.w]), part))
+    }
+
+    #[inline(always)]
+    fn n<S: Simd>(&self, simd: S, i: usize, part: usize) -> Vectors<S> {
+        let [a, b, c, d] = self.n;
+        Vectors::gather(simd, [a[i], b[i], c[i], d[i]], part)
+    }
+
+    #[inline(always)]
+    fn sections<S: Simd>(&self, simd: S, i: usize, part: usize) -> Sections<S> {
+        let [a, b, c, d] = self.sections;
+        Sections::gather(simd, [&a[i], &b[i], &c[i], &d[i]], part)
+    }
+
+    #[inline(always)]
+    fn beside<S: Simd>(&self, simd: S, side: usize, i: usize, part: usize) -> Vectors<S> {
+        let [a, b, c, d] = self.beside[side];
+        Vectors::gather(simd, [a[i], b[i], c[i], d[i]], part)
+    }
+
+    /// Segment `i` of every rod, and its sections.
+    #[inline(always)]
+    fn element<S: Simd, E: Element<S, B>, const B: usize>(
+        &self,
+        simd: S,
+        i: usize,
+        part: usize,
+    ) -> (E, Sections<S>) {
+        let nodes = Nodes {
+            x: [self.x(simd, i, part), self.x(simd, i + 1, part)],
+            q: [self.q(simd, i, part), self.q(simd, i + 1, part)],
+        };
+        let sections = self.sections(simd, i, part);
+        (E::new(&sections, &nodes, self.n(simd, i, part)), sections)
+    }
+}
+
+/// Matrix, right-hand side and energy.
+pub struct Assemble<'a> {
+    pub rods: Rods<'a>,
+    pub group: &'a mut Group,
+}
+
+impl Kernel for Assemble<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        let Group {
+            matrix,
+            rhs,
+            active,
+            sums,
+            ..
+        } = &mut *self.group;
+        let active = Lanes::of(simd, active, part);
+        let of_lanes = match matrix {
+            GroupMatrix::Spatial(chain) => {
+                assemble::<S, SpatialElement<S>, _>(&self.rods, chain, rhs, (active, part))
+            }
+            GroupMatrix::Planar(chain) => {
+                assemble::<S, PlanarElement<S>, _>(&self.rods, chain, rhs, (active, part))
+            }
+        };
+        if part == 0 {
+            *sums = Sums::default();
+        }
+        sums.energy += of_lanes.energy;
+        sums.turn = sums.turn.max(of_lanes.turn);
+    }
+}
+
+#[inline(always)]
+fn assemble<S: Simd, E: Element<S, B>, const B: usize>(
+    rods: &Rods,
+    chain: &mut Chain<B>,
+    rhs: &mut [Increments],
+    (active, part): (Lanes<S>, usize),
+) -> Sums {
+    let simd = active.simd;
+    let zero = Lanes::splat(simd, 0.0);
+    let loads = RodLoads::gather(simd, rods.loads, part);
+    let stiffness = loads.stiffness().array();
+    let (mut energy, mut squared_turn) = (zero, zero);
+    let (mut own, mut force) = ([[zero; B]; B], [zero; B]);
+    let n = rhs.len();
+    for i in 0..n {
+        let (element, sections): (E, _) = rods.element(simd, i, part);
+        energy = energy + element.strain_energy(&sections);
+        squared_turn = squared_turn.max(element.squared_turn());
+        let gradient = element.condensed_gradient(&sections);
+        let hessian = element.hessian(&sections);
+        if i > 0 {
+            for r in 0..B {
+                for c in r..B {
+                    own[r][c] = own[r][c] + hessian.own[0][r][c];
+                }
+                let force = active * (force[r] - gradient[0][r]);
+                force.put(&mut rhs[i - 1][first(B) + r], part);
+            }
+            chain.put(i - 1, &own, Some(&hessian.across), (active, part));
+        }
+        own = hessian.own[1];
+        let tip = i + 1 == n;
+        let weights = [rods.leaf.weight(i + 1), rods.leaf.coupling_weight(i + 1)];
+        let x = [
+            rods.beside(simd, 0, i + 1, part),
+            rods.x(simd, i + 1, part),
+            rods.beside(simd, 1, i + 1, part),
+        ];
+        let (load, potential) = loads.at(x, weights, tip);
+        energy = energy + potential;
+        let load = load.array();
+        let coupling_weight = Lanes::splat(simd, weights[1]);
+        for r in 0..B {
+            force[r] = -gradient[1][r];
+            if r >= turns(B) {
+                let c = r - turns(B);
+                force[r] = force[r] + load[c];
+                own[r][r] = stiffness[c].times(coupling_weight, own[r][r]);
+            }
+        }
+    }
+    for r in 0..B {
+        (active * force[r]).put(&mut rhs[n - 1][first(B) + r], part);
+    }
+    chain.put(n - 1, &own, None, (active, part));
+    Sums {
+        energy: energy.where_positive(active, zero).sum(),
+        turn: squared_turn.largest().sqrt(),
+    }
+}
+
+/// The right-hand side of [`DiscreteLeaf::assemble_stiffening`].
+pub struct Stiffen<'a> {
+    pub rods: Rods<'a>,
+    pub dropped: DVec3,
+    pub group: &'a mut Group,
+}
+
+impl Kernel for Stiffen<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        let Group { rhs, active, .. } = &mut *self.group;
+        let active = Lanes::of(simd, active, part);
+        let (rods, dropped) = (&self.rods, Vectors::splat(simd, self.dropped.to_array()));
+        match rods.leaf.leaf.planar() {
+            false => stiffen::<S, SpatialElement<S>, 6>(rods, dropped, rhs, (active, part)),
+            true => stiffen::<S, PlanarElement<S>, 3>(rods, dropped, rhs, (active, part)),
+        }
+    }
+}
+
+#[inline(always)]
+fn stiffen<S: Simd, E: Element<S, B>, const B: usize>(
+    rods: &Rods,
+    dropped: Vectors<S>,
+    rhs: &mut [Increments],
+    (active, part): (Lanes<S>, usize),
+) {
+    let simd = active.simd;
+    let mut force = [Lanes::splat(simd, 0.0); B];
+    let n = rhs.len();
+    for i in 0..=n {
+        let gradient = match i < n {
+            true => {
+                let (element, sections): (E, _) = rods.element(simd, i, part);
+                element.stiffening_gradient(&sections, dropped)
+            }
+            false => [[Lanes::splat(simd, 0.0); B]; 2],
+        };
+        for r in 0..B {
+            if i > 0 {
+                let force = active * (force[r] - gradient[0][r]);
+                force.put(&mut rhs[i - 1][first(B) + r], part);
+            }
+            force[r] = -gradient[1][r];
+        }
+    }
+}
+
+/// The next state of a group, without the bases, which stay.
+pub struct Advance<'a> {
+    pub rods: Rods<'a>,
+    pub solution: &'a [Increments],
+    pub step: f64,
+    pub x: &'a mut [DVec3],
+    pub q: &'a mut [DQuat],
+    pub n: &'a mut [DVec3],
+}
+
+impl Kernel for Advance<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        match self.rods.leaf.leaf.planar() {
+            false => self.advance::<S, SpatialElement<S>, 6>(simd, part),
+            true => self.advance::<S, PlanarElement<S>, 3>(simd, part),
+        }
+    }
+}
+
+impl Advance<'_> {
+    #[inline(always)]
+    fn advance<S: Simd, E: Element<S, B>, const B: usize>(&mut self, simd: S, part: usize) {
+        let step = Lanes::splat(simd, self.step);
+        let lanes = rods_of(self.rods.group, self.rods.leaf.rods()).len();
+        let lanes = part..lanes.min(part + S::F64_LANES);
+        let none = Vectors::splat(simd, [0.0; 3]);
+        let (mut turn, mut shift) = (none, none);
+        let segments = self.solution.len();
+        for (i, increment) in self.solution.iter().enumerate() {
+            let of = |c: usize| {
+                let [x, y, z] = [&increment[c], &increment[c + 1], &increment[c + 2]];
+                Vectors::new(
+                    Lanes::of(simd, x, part),
+                    Lanes::of(simd, y, part),
+                    Lanes::of(simd, z, part),
+                )
+            };
+            let (turn_after, shift_after) = (of(0), of(3));
+            let rods = &self.rods;
+            let (element, sections): (E, _) = rods.element(simd, i, part);
+            let turns = [turn, turn_after];
+            let change = element.force_increment(&sections, shift_after - shift, turns);
+            let n = change.times(step, rods.n(simd, i, part));
+            let x = shift_after.times(step, rods.x(simd, i + 1, part));
+            let turned = exp_each(turn_after.scale(step));
+            let (q, qw) = multiply_each(turned, rods.q(simd, i + 1, part));
+            let mut numbers = [Four::default(); 10];
+            let [n, x, q] = [n, x, q].map(Vectors::array);
+            for c in 0..3 {
+                n[c].put(&mut numbers[c], part);
+                x[c].put(&mut numbers[3 + c], part);
+                q[c].put(&mut numbers[6 + c], part);
+            }
+            qw.put(&mut numbers[9], part);
+            for lane in lanes.clone() {
+                let [n1, n2, n3, x1, x2, x3, q1, q2, q3, qw] = numbers.map(|four| four.0[lane]);
+                let node = lane * (segments + 1) + i + 1;
+                self.n[lane * segments + i] = DVec3::new(n1, n2, n3);
+                self.x[node] = DVec3::new(x1, x2, x3);
+                self.q[node] = DQuat::from_xyzw(q1, q2, q3, qw);
+            }
+            (turn, shift) = (turn_after, shift_after);
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! One segment, as numbers.
+
+use super::element::{Element, Nodes, SpatialElement};
+use super::section::Section;
+use crate::lanes::Vectors;
+use crate::rotation::{self, Relative};
+use glam::{DMat3, DQuat, DVec3};
+use pulp::Scalar;
+
+/// The two nodes of a segment.
+#[derive(Clone, Copy, Debug)]
+pub struct Ends {
+    /// Positions of the nodes.
+    pub x: [DVec3; 2],
+    /// Rotations of the nodes.
+    pub q: [DQuat; 2],
+}
+
+impl From<&Ends> for Nodes<Scalar> {
+    fn from(ends: &Ends) -> Self {
+        Nodes {
+            x: ends.x.map(Vectors::from),
+            q: ends.q.map(rotation::from_quaternion),
+        }
+    }
+}
+
+/// A segment in a given state.
+#[derive(Clone, Copy, Debug)]
+pub struct Segment {
+    /// Midpoint directors as columns.
+    pub frame: DMat3,
+    /// Curvature u.
+    pub u: DVec3,
+    /// Stress couple m = A (u - u0).
+    pub m: DVec3,
+    /// Director components nu of the force the segment carries.
+    pub nu: DVec3,
+    /// The strain that goes with that force, v0 + c nu.
+    pub w: DVec3,
+    /// R^T (x1 - x0) - ds w: by how much the constitutive law is not yet met.
+    pub gap: DVec3,
+    relative: Relative<Scalar>,
+}
+
+/// Second derivatives with respect to (x1 - x0) and the spatial rotation
+/// increments a, b of the two nodes, the force being condensed out.
+#[derive(Clone, Copy, Debug)]
+pub struct Blocks {
+    /// d2/dx dx
+    pub xx: DMat3,
+    /// d2/dx da
+    pub xa: DMat3,
+    /// d2/dx db
+    pub xb: DMat3,
+    /// d2/da da
+    pub aa: DMat3,
+    /// d2/da db
+    pub ab: DMat3,
+    /// d2/db db
+    pub bb: DMat3,
+}
+
+impl Section {
+    /// ds/2 sum_k A_k (u_k - u0_k)^2.
+    #[inline]
+    pub fn bending_energy(&self, segment: &Segment) -> f64 {
+        0.5 * self.ds * segment.m.dot(segment.u - self.rest_curvature)
+    }
+
+    /// Elastic energy by the force carried, which equals the strain energy where
+    /// the constitutive law is met: bending plus ds/2 sum_k c_k nu_k^2.
+    #[inline]
+    pub fn elastic_energy(&self, segment: &Segment) -> f64 {
+        self.bending_energy(segment)
+            + 0.5 * self.ds * (self.compliance * segment.nu * segment.nu).element_sum()
+    }
+}
+
+impl Segment {
+    /// The segment between `ends` that carries the spatial force `n`.
+    pub fn new(section: &Section, ends: &Ends, n: DVec3) -> Self {
+        let element = SpatialElement::new(&section.into(), &ends.into(), n.into());
+        let [d1, d2, d3] = element.frame.map(DVec3::from);
+        Segment {
+            frame: DMat3::from_cols(d1, d2, d3),
+            u: element.u.into(),
+            m: element.m.into(),
+            nu: element.nu.into(),
+            w: element.w.into(),
+            gap: element.gap.into(),
+            relative: element.relative,
+        }
+    }
+
+    fn element(&self) -> SpatialElement<Scalar> {
+        let DMat3 {
+            x_axis,
+            y_axis,
+            z_axis,
+        } = self.frame;
+        SpatialElement {
+            frame: [x_axis, y_axis, z_axis].map(Vectors::from),
+            u: self.u.into(),
+            m: self.m.into(),
+            nu: self.nu.into(),
+            w: self.w.into(),
+            gap: self.gap.into(),
+            relative: self.relative,
+        }
+    }
+
+    /// Strain v = R^T (x1 - x0)/ds.
+    pub fn v(&self, section: &Section) -> DVec3 {
+        self.gap / section.ds + self.w
+    }
+
+    /// Rotation between the two ends, in radians.
+    pub fn turn(&self) -> f64 {
+        DVec3::from(self.relative.psi).length()
+    }
+
+    /// First derivatives of Pi, the force held: with respect to x1 (that to x0
+    /// is its negative) and to the rotations of the two nodes.
+    pub fn gradient(&self, section: &Section) -> (DVec3, DVec3, DVec3) {
+        self.element()
+            .gradient(&section.into())
+            .map(DVec3::from)
+            .into()
+    }
+
+    /// As [`Segment::gradient`], with the force condensed out: the right-hand
+    /// side that belongs to [`Segment::hessian`].
+    pub fn condensed_gradient(&self, section: &Section) -> (DVec3, DVec3, DVec3) {
+        let gradient = self.element().condensed(&section.into());
+        gradient.map(DVec3::from).into()
+    }
+
+    /// Second derivatives, the force condensed out.
+    pub fn hessian(&self, section: &Section) -> Blocks {
+        let second = self.element().second(&section.into());
+        let matrix = |rows: [Vectors<Scalar>; 3]| {
+            let [a, b, c] = rows.map(DVec3::from);
+            DMat3::from_cols(a, b, c).transpose()
+        };
+        Blocks {
+            xx: matrix(second.xx),
+            xa: matrix(second.xa),
+            xb: matrix(second.xb),
+            aa: matrix(second.aa),
+            ab: matrix(second.ab),
+            bb: matrix(second.bb),
+        }
+    }
+
+    /// The change of the spatial force that goes with the nodal increments
+    /// `dx` = dx1 - dx0 and spatial rotations `a`, `b`.
+    pub fn force_increment(&self, section: &Section, dx: DVec3, a: DVec3, b: DVec3) -> DVec3 {
+        let (element, turns) = (self.element(), [a.into(), b.into()]);
+        let change = element.force_increment(&section.into(), dx.into(), turns);
+        change.into()
+    }
+}
