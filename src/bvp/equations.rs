@@ -35,6 +35,8 @@ pub struct Equations<'a> {
     gravity: DVec3,
     tip_force: DVec3,
     tip_moment: DVec3,
+    /// Where the tips of the rods are held, and in which rotation.
+    held: Vec<(DVec3, DQuat)>,
     /// The smallest couple stiffness along each rod.
     pub softest: Vec<f64>,
     /// Rate per sigma at which the coupling makes perturbations of each rod grow.
@@ -50,6 +52,26 @@ pub struct Equations<'a> {
     pub softened: f64,
     /// When to give up solving them.
     pub limit: Limit,
+}
+
+/// What the tips are bound to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tip {
+    /// Nothing.
+    Free,
+    /// Each other.
+    Joint,
+    /// A point that is given.
+    Pinned,
+    /// A point, and directions there.
+    Clamped,
+}
+
+/// The rotation vector from `b` to `a`, to first order.
+pub fn difference(a: DQuat, b: DQuat) -> DVec3 {
+    let turn = a * b.conjugate();
+    let sign = if turn.w < 0.0 { -2.0 } else { 2.0 };
+    sign * DVec3::new(turn.x, turn.y, turn.z)
 }
 
 /// Derivatives of one rod's slopes by its own state, in blocks of three.
@@ -123,6 +145,14 @@ impl<'a> Equations<'a> {
             gravity: DVec3::from_array(scenario.gravity) * (length / force),
             tip_force: DVec3::from_array(scenario.tip_force) / force,
             tip_moment: DVec3::from_array(scenario.tip_moment) / (force * length),
+            held: (0..rods.len())
+                .filter_map(|j| {
+                    let held = scenario.held_tip.as_ref()?;
+                    let clamp = held.clamps.as_ref().map(|clamps| clamps[j].rotation());
+                    let position = DVec3::from_array(held.position) / length;
+                    Some((position, clamp.unwrap_or_default()))
+                })
+                .collect(),
             softest,
             arcs: arcs::arcs(scenario, &lengths),
             kinks: kinks(scenario),
@@ -288,31 +318,41 @@ impl<'a> Equations<'a> {
 
     /// What the state at the tip misses of conditions (b), (d) and (e): six
     /// numbers per rod. Joint tips: the distance of tip j from tip 0, for rod 0
-    /// the force; free tips: the force. Then the moment.
+    /// the force; free tips: the force; tips that are held: the distance from
+    /// their holder. Then the moment, or of a clamped tip the rotation.
     pub fn tip_conditions(&self, y: &[f64]) -> Vec<f64> {
         let rods: Vec<RodState> = (0..self.rods()).map(|j| RodState::read(y, j)).collect();
         let force: DVec3 = rods.iter().map(|rod| rod.n).sum();
         (rods.iter().enumerate())
             .flat_map(|(j, rod)| {
-                let first = match (self.scenario.joined, j) {
-                    (true, 0) => force - self.part * self.tip_force,
-                    (true, _) => rod.r - rods[0].r,
-                    (false, _) => rod.n - self.part * self.tip_force,
+                let first = match (self.tip(), j) {
+                    (Tip::Joint, 0) => force - self.part * self.tip_force,
+                    (Tip::Joint, _) => rod.r - rods[0].r,
+                    (Tip::Free, _) => rod.n - self.part * self.tip_force,
+                    (Tip::Pinned | Tip::Clamped, _) => rod.r - self.held[j].0,
                 };
-                let moment = rod.m - self.part * self.tip_moment;
-                [first.to_array(), moment.to_array()].concat()
+                let second = match self.tip() {
+                    Tip::Clamped => difference(rod.q, self.held[j].1),
+                    _ => rod.m - self.part * self.tip_moment,
+                };
+                [first.to_array(), second.to_array()].concat()
             })
             .collect()
     }
 
-    /// Whether the tips share one point.
-    pub fn joined(&self) -> bool {
-        self.scenario.joined
+    /// What the tips are bound to.
+    pub fn tip(&self) -> Tip {
+        match &self.scenario.held_tip {
+            Some(held) if held.clamps.is_some() => Tip::Clamped,
+            Some(_) => Tip::Pinned,
+            None if self.scenario.joined => Tip::Joint,
+            None => Tip::Free,
+        }
     }
 
     /// Potential of the dead tip force in the state at the tip.
     pub fn tip_potential(&self, y: &[f64]) -> f64 {
-        let tips = if self.joined() { 1 } else { self.rods() };
+        let tips = if self.scenario.joined { 1 } else { self.rods() };
         let work: f64 = (0..tips)
             .map(|j| self.tip_force.dot(RodState::read(y, j).r))
             .sum();

@@ -7,7 +7,7 @@ use faer::Mat;
 use glam::DVec3;
 
 use super::dop853::{Integrator, Unbounded};
-use super::equations::{Equations, RodState, TANGENT};
+use super::equations::{Equations, RodState, TANGENT, difference};
 use super::propagate::{LinearStep, Perturbations, group};
 use super::trajectory::{Nodes, Trajectory};
 
@@ -68,11 +68,9 @@ impl Units {
         (0..self.force.len())
             .flat_map(|j| {
                 let (a, b) = (RodState::read(a, j), RodState::read(b, j));
-                let turn = a.q * b.q.conjugate();
-                let sign = if turn.w < 0.0 { -2.0 } else { 2.0 };
                 [
                     a.r - b.r,
-                    sign * DVec3::new(turn.x, turn.y, turn.z),
+                    difference(a.q, b.q),
                     (a.n - b.n) / self.force[j],
                     (a.m - b.m) / self.moment[j],
                 ]

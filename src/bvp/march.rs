@@ -8,7 +8,7 @@
 
 use faer::{Col, ColRef, Mat};
 
-use super::equations::{Equations, TANGENT};
+use super::equations::{Equations, TANGENT, Tip};
 use super::intervals::Units;
 
 /// Directions of the tip's conditions whose singular value is below this part
@@ -27,7 +27,7 @@ pub struct March {
     left: Mat<f64>,
     singular_values: Vec<f64>,
     right: Mat<f64>,
-    joined: bool,
+    tip: Tip,
     units: Units,
 }
 
@@ -43,15 +43,15 @@ impl March {
             bases.push(basis);
             growths.push(qr.thin_R().to_owned());
         }
-        let joined = equations.joined();
+        let tip = equations.tip();
         let columns: Vec<Vec<f64>> = (reached.col_iter())
-            .map(|column| tip(joined, units, column))
+            .map(|column| at_tip(tip, units, column))
             .collect();
-        let tip = Mat::from_fn(columns.len(), columns.len(), |i, c| columns[c][i]);
-        if !tip.is_all_finite() {
+        let conditions = Mat::from_fn(columns.len(), columns.len(), |i, c| columns[c][i]);
+        if !conditions.is_all_finite() {
             return None;
         }
-        let svd = tip.svd().ok()?;
+        let svd = conditions.svd().ok()?;
         Some(March {
             maps,
             bases,
@@ -59,7 +59,7 @@ impl March {
             left: svd.U().to_owned(),
             singular_values: svd.S().column_vector().iter().copied().collect(),
             right: svd.V().to_owned(),
-            joined,
+            tip,
             units: units.clone(),
         })
     }
@@ -68,10 +68,10 @@ impl March {
     pub fn scaled(&self, conditions: &[f64]) -> Vec<f64> {
         let total_force = self.units.total_force();
         (conditions.iter().enumerate())
-            .map(|(i, value)| match (i / 6, i % 6) {
-                (0, 0..3) if self.joined => value / total_force,
-                (_, 0..3) if self.joined => *value,
-                (j, k) => value / self.units.of(TANGENT * j + 6 + k),
+            .map(|(i, value)| match (self.tip, i / 6, i % 6) {
+                (Tip::Joint, 0, 0..3) => value / total_force,
+                (Tip::Joint | Tip::Pinned, _, 0..3) | (Tip::Clamped, ..) => *value,
+                (_, j, k) => value / self.units.of(TANGENT * j + 6 + k),
             })
             .collect()
     }
@@ -106,7 +106,7 @@ impl March {
             for (sum, value) in
                 missed
                     .iter_mut()
-                    .zip(tip(self.joined, &self.units, carried.as_ref()))
+                    .zip(at_tip(self.tip, &self.units, carried.as_ref()))
             {
                 *sum -= value;
             }
@@ -152,17 +152,18 @@ impl March {
 }
 
 /// Linearised tip conditions of a perturbation there.
-fn tip(joined: bool, units: &Units, at_tip: ColRef<f64>) -> Vec<f64> {
-    let rods = at_tip.nrows() / TANGENT;
-    let get = |j: usize, k: usize| at_tip[TANGENT * j + k];
+fn at_tip(tip: Tip, units: &Units, perturbation: ColRef<f64>) -> Vec<f64> {
+    let rods = perturbation.nrows() / TANGENT;
+    let get = |j: usize, k: usize| perturbation[TANGENT * j + k];
     (0..rods)
         .flat_map(|j| (0..6).map(move |k| (j, k)))
-        .map(|(j, k)| match k {
-            0..3 if joined && j == 0 => {
+        .map(|(j, k)| match (tip, k) {
+            (Tip::Joint, 0..3) if j == 0 => {
                 let force = |j: usize| get(j, 6 + k) * units.of(TANGENT * j + 6);
                 (0..rods).map(force).sum::<f64>() / units.total_force()
             }
-            0..3 if joined => get(j, k) - get(0, k),
+            (Tip::Joint, 0..3) => get(j, k) - get(0, k),
+            (Tip::Pinned, 0..3) | (Tip::Clamped, _) => get(j, k),
             _ => get(j, 6 + k),
         })
         .collect()
@@ -315,7 +316,7 @@ mod tests {
             let found = march.scaled(&equations.tip_conditions(&y));
             let step = Col::from_fn(36, |i| step[i]);
             let wanted = tip_rows(joined, &march.units) * &step;
-            let linear = tip(joined, &march.units, step.as_ref());
+            let linear = at_tip(equations.tip(), &march.units, step.as_ref());
             for (i, found) in found.iter().enumerate() {
                 assert!((found - wanted[i]).abs() < 1e-14, "condition {i}");
                 assert!((linear[i] - wanted[i]).abs() < 1e-14);

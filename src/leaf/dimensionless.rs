@@ -2,7 +2,7 @@
 
 use crate::rod::Section;
 use crate::rotation;
-use crate::scenario::{Dynamics, Profile, Rod, Scale, Scenario};
+use crate::scenario::{Clamp, Dynamics, Profile, Rod, Scale, Scenario};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -26,9 +26,27 @@ pub struct Leaf {
     pub scale: Scale,
     /// The loads at rest.
     pub loads: Loads,
+    /// The tip, if it is held.
+    pub held: Option<Held>,
     kinks: Vec<f64>,
     /// The smallest couple stiffness, mid-rod.
     softest: f64,
+}
+
+/// A tip that is held.
+#[derive(Clone, Debug)]
+pub struct Held {
+    /// Where.
+    pub position: DVec3,
+    /// If the directions are held, too, one a rod.
+    pub clamps: Option<Vec<Clamp>>,
+}
+
+impl Held {
+    /// The rotation in which the tip of rod `j` is held.
+    pub fn rotation(&self, j: usize) -> Option<DQuat> {
+        Some(self.clamps.as_ref()?[j].rotation())
+    }
 }
 
 /// Dead loads.
@@ -82,6 +100,10 @@ impl Leaf {
                 tip_force: vector(scenario.tip_force, scale.force()),
                 tip_moment: vector(scenario.tip_moment, scale.moment()),
             },
+            held: scenario.held_tip.as_ref().map(|held| Held {
+                position: vector(held.position, scale.length),
+                clamps: held.clamps.clone(),
+            }),
             kinks,
             softest: softest / scale.stiffness,
             scenario,

@@ -156,9 +156,42 @@ impl DiscreteLeaf {
         [RADIUS_OF_GYRATION * RADIUS_OF_GYRATION * mass, mass]
     }
 
-    /// Trapezoidal weight of node `i` as a fraction of the length.
-    pub(super) fn weight(&self, i: usize) -> f64 {
-        self.weights[i]
+    /// Puts the tips where they are held, if they are.
+    pub fn hold_tips(&self, state: &mut State) {
+        let Some(held) = &self.leaf.held else {
+            return;
+        };
+        for j in 0..self.rods() {
+            let tip = state.base(j) + self.segments();
+            state.x[tip] = held.position;
+            if let Some(rotation) = held.rotation(j) {
+                state.q[tip] = rotation;
+            }
+        }
+    }
+
+    /// The force that the holder of a held tip feels, and the moments of the rods
+    /// on a clamp.
+    pub fn reaction(&self, state: &State) -> (DVec3, Vec<DVec3>) {
+        let n = self.segments();
+        let mut force = DVec3::ZERO;
+        let mut moments = Vec::with_capacity(self.rods());
+        for j in 0..self.rods() {
+            let segment = self.segment(state, j, n - 1, state.n[j * n + n - 1]);
+            let (g_x, _, g_b) = segment.gradient(self.section(j, n - 1));
+            force += self.load(state, j, n).0 - g_x;
+            moments.push(-g_b);
+        }
+        (force, moments)
+    }
+
+    /// Weight of node `i` in the masses: none where a tip is held, which has no part
+    /// in any motion.
+    pub(super) fn moving_weight(&self, i: usize) -> f64 {
+        match self.leaf.held {
+            Some(_) if i == self.segments() => 0.0,
+            _ => self.weights[i],
+        }
     }
 
     /// Segment `i` of rod `j` in `state`, carrying the force `n`.

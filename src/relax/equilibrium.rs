@@ -201,6 +201,20 @@ pub struct Stability {
     pub saddle: Option<Saddle>,
 }
 
+/// What the holder of a held tip feels.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Reaction {
+    /// The force.
+    #[serde(rename = "tip_reaction")]
+    pub force: DVec3,
+    /// Of a clamp, the moments of the rods, about the tip.
+    #[serde(
+        rename = "tip_reaction_moments",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub moments: Option<Vec<DVec3>>,
+}
+
 /// The shape of a leaf.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Shape {
@@ -253,6 +267,9 @@ pub struct Equilibrium {
     pub tips: Vec<DVec3>,
     /// Sum over the rods of the force each passes to its tip.
     pub tip_force_sum: DVec3,
+    /// What the holder of the tip feels, if it is held.
+    #[serde(flatten)]
+    pub reaction: Option<Reaction>,
     /// Whether it is stable.
     #[serde(flatten)]
     pub stability: Stability,

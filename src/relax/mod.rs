@@ -3,6 +3,7 @@
 
 mod equilibrium;
 mod grids;
+mod grip;
 pub(crate) mod index;
 mod method;
 mod methods;
@@ -26,7 +27,9 @@ pub use crate::limit::Limit;
 pub use crate::newton::Work;
 pub use crate::shape::{NodeState, RodShape};
 pub(crate) use equilibrium::serialize_index;
-pub use equilibrium::{Accuracy, Equilibrium, Mode, Model, Outcome, Saddle, Shape, Stability};
+pub use equilibrium::{
+    Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Saddle, Shape, Stability,
+};
 pub(crate) use index::{index_near, project};
 pub use method::{Method, SemiImplicit, UnknownMethod};
 pub(crate) use methods::shooting::{START as SHOOTING_START, check_intervals};

@@ -103,6 +103,14 @@ pub enum RelaxError {
         "method = explicit: under load.tip_moment, which has no potential, motion need not come to rest; use semi-implicit, or shooting"
     )]
     Follows,
+    /// Shooting from arcs knows no way to where a tip is held.
+    #[error(
+        "method = {found}: a tip that is held (tip.held) is led there by the relaxation; use shooting-from-rest"
+    )]
+    HeldTip {
+        /// The method asked for.
+        found: &'static str,
+    },
     /// Too many modes.
     #[error("modes = {found}: allowed are 0 to {MOST_MODES}")]
     Modes {

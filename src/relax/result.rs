@@ -2,7 +2,9 @@
 
 use crate::leaf::DiscreteLeaf;
 use crate::newton::Stop;
-use crate::relax::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability};
+use crate::relax::equilibrium::{
+    Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
+};
 use crate::relax::method::Method;
 use crate::relax::prolong::lagrange;
 use crate::relax::richardson::Richardson;
@@ -45,6 +47,7 @@ pub fn equilibrium(
         energy: Some(energies.column(columns)[0] * scale.moment()),
         tips: tips.map(|node| node.position).collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
+        reaction: reaction(&series, columns),
         stability: Stability {
             negative_eigenvalues: run.index,
             modes: None,
@@ -77,6 +80,33 @@ pub fn equilibrium(
             curve_stations: finest.leaf.grid.sigma().to_vec(),
         },
     }
+}
+
+/// What the holder of a held tip feels, with `columns` extrapolations.
+fn reaction(levels: &[&Level], columns: usize) -> Option<Reaction> {
+    let leaf = &levels[0].leaf.leaf;
+    let held = leaf.held.as_ref()?;
+    let mut table = Richardson::default();
+    for level in levels {
+        let (force, moments) = level.leaf.reaction(&level.state);
+        let all = [force].into_iter().chain(moments);
+        table.push(
+            level.leaf.segments(),
+            all.flat_map(|it| it.to_array()).collect(),
+        );
+    }
+    let values = table.column(columns);
+    let mut vectors = values
+        .as_chunks::<3>()
+        .0
+        .iter()
+        .map(|&it| DVec3::from_array(it));
+    let force = vectors.next()? * leaf.scale.force();
+    let moments = vectors.map(|moment| moment * leaf.scale.moment()).collect();
+    Some(Reaction {
+        force,
+        moments: held.clamps.is_some().then_some(moments),
+    })
 }
 
 /// All nodes of a level, in units of the scenario.

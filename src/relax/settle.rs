@@ -66,7 +66,8 @@ impl Run<'_, '_> {
     pub fn settle(&mut self, grid: Grid, guess: InitialGuess) -> Settled {
         self.last = None;
         let mut leaf = DiscreteLeaf::new(self.leaf, grid);
-        let near_rest = matches!(guess, InitialGuess::Coarser(_) | InitialGuess::Finer(_));
+        let mut near_rest = matches!(guess, InitialGuess::Coarser(_) | InitialGuess::Finer(_));
+        let grip = leaf.leaf.held.is_some() && matches!(guess, InitialGuess::Start);
         let cg_tolerance = match guess {
             InitialGuess::Start | InitialGuess::Pushed(_) => FAR_FROM_REST,
             InitialGuess::Coarser(_) => 1e-4,
@@ -80,15 +81,24 @@ impl Run<'_, '_> {
             | InitialGuess::Finer(state)
             | InitialGuess::Pushed(state) => state,
         };
+        let mut moved = false;
+        if grip {
+            let led = self.lead_grips(&leaf, state);
+            (state, near_rest, moved) = (led.state, led.at_rest, led.moved);
+        }
         let explicit = matches!(self.options.method, Method::Explicit { .. });
         let follows = leaf.tip_moment() != DVec3::ZERO;
         if !explicit && !follows && !self.keeps_unstable() {
-            return self.settle_in_a_valley(leaf, state, near_rest, cg_tolerance);
+            let settled = self.settle_in_a_valley(leaf, state, near_rest, cg_tolerance);
+            return Settled {
+                moved: moved || settled.moved,
+                ..settled
+            };
         }
         let accuracy = self.accuracy(&leaf);
         let mut system = System::new(&leaf);
         let progress = &mut step_reporter(&mut *self.progress, leaf.segments());
-        let (work, mut moved) = (&mut self.work, false);
+        let work = &mut self.work;
         let rest = if explicit {
             let mut request = explicit::Request {
                 accuracy,
@@ -99,7 +109,7 @@ impl Run<'_, '_> {
                 limit: &self.options.limit,
             };
             let rest = explicit::settle(&leaf, &mut state, &mut system, &mut request);
-            moved = request.moved;
+            moved |= request.moved;
             self.remaining = self.remaining.max(rest.unwrap_or(0.0));
             rest
         } else {

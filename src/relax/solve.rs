@@ -39,6 +39,10 @@ pub fn relax(
     };
     shooting::check_intervals(intervals)?;
     if !matches!(options.method, Method::ShootingFromRest { .. }) {
+        if scenario.held_tip.is_some() {
+            let found = options.method.word();
+            return Err(RelaxError::HeldTip { found });
+        }
         let arcs = Start::Arcs;
         return Ok(shooting::shoot(
             scenario, options, intervals, tolerance, arcs,

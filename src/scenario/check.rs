@@ -11,7 +11,7 @@ use super::error::ScenarioError;
 use super::key::Key;
 use super::material::Sections;
 use super::raw::{Item, Raw};
-use super::{Dynamics, Profile, Rod, Scenario, Start, Units, limits};
+use super::{Dynamics, Profile, Rod, Scenario, Start, Units, limits, tip};
 
 type Result<T> = std::result::Result<T, ScenarioError>;
 
@@ -43,6 +43,7 @@ pub(super) fn check(raw: &Raw) -> Result<Scenario> {
     let item = raw.item(Key::TipMoment)?;
     let tip_moment = item.vector()?;
     on_one_rod(item, rods.len(), &[tip_moment])?;
+    let held_tip = tip::held(raw, &rods, joined)?;
     let tolerance = tolerance(raw.item(Key::Tolerance)?)?;
     let loads = [gravity, tip_force, tip_moment];
     let dynamics = dynamics(raw, &rods, sections.as_ref(), loads)?;
@@ -55,6 +56,7 @@ pub(super) fn check(raw: &Raw) -> Result<Scenario> {
         gravity,
         tip_force,
         tip_moment,
+        held_tip,
         tolerance,
         dynamics,
     };

@@ -159,6 +159,14 @@ keys! {
     TipForce "load.tip_force": Vector, [0, 1, 0], Means("[0.0, 0.0, 0.0]");
     /// dead moment on the tip, one rod only.
     TipMoment "load.tip_moment": Vector, [1, 1, 0], Means("[0.0, 0.0, 0.0]");
+    /// how the tips are held.
+    TipHeld "tip.held": Text, [0, 0, 0], Means("\"free\"");
+    /// where the joint tip, or the only rod's, is held.
+    TipPosition "tip.position": Vector, [1, 0, 0], Follows;
+    /// of a clamped tip, the angles of the rods there, in radians.
+    TipAngles "tip.angles": PerRod(Finite), [0, 0, 0], Means("0.0");
+    /// of a clamped tip, the turn of the sections about d1, in radians.
+    TipTwist "tip.twist": PerRod(Finite), [0, 0, 0], Means("0.0");
     /// wanted accuracy, relative to the longest rod.
     Tolerance "solve.tolerance": Number(Finite), [0, 0, 0], Means("1e-6");
     /// rho, mass per length of rod.

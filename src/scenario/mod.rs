@@ -17,6 +17,7 @@ mod read;
 mod scale;
 mod schedule;
 mod section;
+mod tip;
 mod value;
 
 pub use dynamics::{Dynamics, Start};
@@ -31,6 +32,7 @@ pub use scale::Scale;
 pub(crate) use scale::longest;
 pub use schedule::Schedule;
 pub use section::{Property, Section};
+pub use tip::{Clamp, HeldTip};
 
 /// A checked scenario. All quantities are in the units the file was written
 /// in, which only have to be consistent with each other.
@@ -54,6 +56,8 @@ pub struct Scenario {
     pub tip_force: [f64; 3],
     /// Dead moment about the lab axes on the tip of a single rod.
     pub tip_moment: [f64; 3],
+    /// The tip, if it is held.
+    pub held_tip: Option<HeldTip>,
     /// Wanted accuracy of the centerlines, relative to the largest rod length.
     pub tolerance: f64,
     /// How the leaf moves; what is at rest does not depend on it.

@@ -1,4 +1,5 @@
-//! Components of increments that the plane of a mirrored half leaf holds.
+//! Components of increments that are held: by the plane of a mirrored half leaf,
+//! at a tip that is pinned or clamped.
 
 use crate::lanes::Four;
 use crate::leaf::chain::{Chain, Increments, first, place};
@@ -13,7 +14,12 @@ impl DiscreteLeaf {
     /// The components that are zero in the increments of node `i` (from 1) of
     /// rod `j`.
     pub(super) fn held_components(&self, j: usize, i: usize) -> &'static [usize] {
-        if self.leaf.in_plane(j) {
+        if let Some(held) = self.leaf.held.as_ref().filter(|_| i == self.segments()) {
+            match held.clamps {
+                Some(_) => &[0, 1, 2, 3, 4, 5],
+                None => &[3, 4, 5],
+            }
+        } else if self.leaf.in_plane(j) {
             &ACROSS_THE_PLANE
         } else if self.leaf.mirrored && self.leaf.joined() && i == self.segments() {
             &ACROSS_THE_PLANE[2..]
@@ -22,13 +28,19 @@ impl DiscreteLeaf {
         }
     }
 
+    /// The number (from 0) of the first node that may be held.
+    fn first_held(&self) -> usize {
+        match (self.leaf.mirrored, &self.leaf.held) {
+            (true, _) => 0,
+            (false, Some(_)) => self.segments() - 1,
+            (false, None) => self.segments(),
+        }
+    }
+
     /// Sets the held components of rod `j` to zero in the right-hand side of its
     /// group.
     pub(super) fn clear_held_components(&self, j: usize, rhs: &mut [Increments]) {
-        if !self.leaf.mirrored {
-            return;
-        }
-        for (i, rhs) in rhs.iter_mut().enumerate() {
+        for (i, rhs) in rhs.iter_mut().enumerate().skip(self.first_held()) {
             for &c in self.held_components(j, i + 1) {
                 rhs[c].0[place(j).1] = 0.0;
             }
@@ -43,12 +55,9 @@ impl DiscreteLeaf {
         chain: &mut Chain<B>,
         rhs: &mut [Increments],
     ) {
-        if !self.leaf.mirrored {
-            return;
-        }
         self.clear_held_components(j, rhs);
         let set = |four: &mut Four, value: f64| four.0[place(j).1] = value;
-        for i in 0..self.segments() {
+        for i in self.first_held()..self.segments() {
             for &held in self.held_components(j, i + 1) {
                 let Some(c) = held.checked_sub(first(B)) else {
                     continue;

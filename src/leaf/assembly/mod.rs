@@ -114,20 +114,19 @@ impl DiscreteLeaf {
             }
             moment += self.tip_moment();
             let (unbalanced_force, unbalanced_moment) = self.unbalanced_residual(j, force, moment);
+            // What a tip that is held does not balance, its holder does.
+            match &self.leaf.held {
+                Some(held) if held.clamps.is_some() => continue,
+                Some(_) => {}
+                None if self.leaf.joined() => tip += force,
+                None => largest = largest.max(unbalanced_force),
+            }
             largest = largest.max(unbalanced_moment);
-            tip += force;
-            if !self.leaf.joined() {
-                largest = largest.max(unbalanced_force);
-            }
         }
-        if self.leaf.joined() {
-            if self.leaf.mirrored {
-                tip.y = 0.0;
-            }
-            largest.max(tip.abs().max_element())
-        } else {
-            largest
+        if self.leaf.mirrored {
+            tip.y = 0.0;
         }
+        largest.max(tip.abs().max_element())
     }
 
     /// Potential energy of a state: elastic, of the coupling, and of the loads.

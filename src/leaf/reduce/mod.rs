@@ -13,6 +13,9 @@ impl Leaf {
     /// any: half of it if it is its own mirror image, that in its plane if
     /// nothing acts out of it.
     pub fn reduced(&self) -> Option<Leaf> {
+        if self.held.is_some() {
+            return None;
+        }
         let mut reduced = self.clone();
         reduced.mirrored = mirror::is_mirrored(self.scenario());
         reduced.planar = planar::is_planar(self.scenario());

@@ -103,8 +103,8 @@ impl System {
     /// Room for the equations of `leaf`.
     pub fn new(leaf: &DiscreteLeaf) -> Self {
         let (rods, n) = (leaf.rods(), leaf.segments());
-        // The tip of a single rod is its own.
-        let joined = leaf.leaf.joined() && rods > 1;
+        // The tip of a single rod is its own, and one that is held is nobody's.
+        let joined = leaf.leaf.joined() && rods > 1 && leaf.leaf.held.is_none();
         let coupled = leaf.coupled();
         let gap = |g: usize| {
             // A node in the plane of the mirror does not answer a pull across it.
@@ -127,7 +127,7 @@ impl System {
             coupled,
             parallel: rods * n >= PARALLEL_NODES && count > 1 && rayon::current_num_threads() > 1,
             segments: n,
-            weights: (1..=n).map(|i| leaf.weight(i)).collect(),
+            weights: (1..=n).map(|i| leaf.moving_weight(i)).collect(),
             coupling_weights: (1..=n).map(|i| leaf.coupling_weight(i)).collect(),
             arch: arch(),
             tip: None,

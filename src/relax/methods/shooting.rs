@@ -3,13 +3,16 @@
 use crate::bvp::{self, Reason, Solution, Start};
 use crate::leaf::{Grid, Leaf};
 use crate::newton::Work;
-use crate::relax::equilibrium::{Accuracy, Equilibrium, Model, Outcome, Shape, Stability};
+use crate::relax::equilibrium::{
+    Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
+};
 use crate::relax::index::index_near;
 use crate::relax::options::{MAX_INTERVALS, Options, RelaxError};
 use crate::relax::segments::coarsest;
 use crate::scenario::{Scenario, longest};
 use crate::shape::RodShape;
 use crate::undulation::Undulation;
+use glam::DVec3;
 use std::time::Instant;
 
 /// Segments between stations, at least.
@@ -124,6 +127,15 @@ pub fn shoot(
         energy,
         tips: tips.iter().take(listed).map(|node| node.position).collect(),
         tip_force_sum: tips.iter().map(|node| node.rotation * node.n).sum(),
+        reaction: scenario.held_tip.as_ref().map(|held| Reaction {
+            force: DVec3::from_array(scenario.tip_force)
+                - tips
+                    .iter()
+                    .map(|node| node.rotation * node.n)
+                    .sum::<DVec3>(),
+            moments: (held.clamps.is_some())
+                .then(|| tips.iter().map(|node| -(node.rotation * node.m)).collect()),
+        }),
         stability: Stability {
             negative_eigenvalues: index,
             mode_shapes: options.mode_shapes,

@@ -1,0 +1,122 @@
+//! How the tips are held: the table `[tip]`.
+
+use std::f64::consts::PI;
+
+use glam::DQuat;
+
+use super::error::ScenarioError;
+use super::key::Key;
+use super::raw::Raw;
+use super::{Rod, longest};
+
+/// Farther from the base than this, in lengths of the longest rod with its
+/// growth, no rod is meant to reach.
+const FARTHEST: f64 = 10.0;
+
+/// Largest angle and twist, in turns.
+const MOST_TURNS: f64 = 100.0;
+
+/// A tip that is held: of a joined leaf, or of a single rod.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeldTip {
+    /// Where.
+    pub position: [f64; 3],
+    /// If the directions are held, too, one a rod; `None`: pinned.
+    pub clamps: Option<Vec<Clamp>>,
+}
+
+/// The direction in which the tip of a rod is held.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clamp {
+    /// Angle of d1 in the e1-e2 plane, radians.
+    pub angle: f64,
+    /// By how much the section is then turned about d1, radians.
+    pub twist: f64,
+}
+
+impl Clamp {
+    /// The rotation of the tip.
+    pub fn rotation(self) -> DQuat {
+        DQuat::from_rotation_z(self.angle) * DQuat::from_rotation_x(self.twist)
+    }
+}
+
+/// Reads `[tip]` of a leaf of these rods; `None` if the tips are free.
+pub(super) fn held(
+    raw: &Raw,
+    rods: &[Rod],
+    joined: bool,
+) -> Result<Option<HeldTip>, ScenarioError> {
+    let item = raw.item(Key::TipHeld)?;
+    let word = item.text()?;
+    let clamped = word == "clamped";
+    item.ensure(
+        clamped || ["free", "pinned"].contains(&word),
+        "must be \"free\", \"pinned\" (the position is given) or \"clamped\" (the directions, too)",
+    )?;
+    let of_clamps = [Key::TipAngles, Key::TipTwist].map(|key| raw.given(key));
+    if let Some(unused) = of_clamps.into_iter().flatten().find(|_| !clamped) {
+        return Err(unused.refuse("belongs to a clamped tip: add tip.held = \"clamped\""));
+    }
+    let position = raw.given(Key::TipPosition);
+    if word == "free" {
+        return match position {
+            Some(position) => Err(position
+                .refuse("belongs to a tip that is held: add tip.held = \"pinned\" or \"clamped\"")),
+            None => Ok(None),
+        };
+    }
+    let Some(at) = position else {
+        return Err(item.refuse("needs tip.position = [x, y, z], where the tip is held"));
+    };
+    item.ensure(
+        joined || rods.len() == 1,
+        "needs leaf.joined = true: one point is held, which all tips share",
+    )?;
+    let position = at.vector()?;
+    let [x, y, z] = position;
+    let distance = x.hypot(y).hypot(z);
+    let reach = |rod: &Rod| rod.length * rod.rest_stretch.integral(1.0);
+    let most = FARTHEST * rods.iter().map(reach).fold(longest(rods), f64::max);
+    at.ensure(
+        distance <= most,
+        format_args!(
+            "is {distance:e} away from the base, more than {FARTHEST} times the longest rod"
+        ),
+    )?;
+    for (index, rod) in rods.iter().enumerate() {
+        at.ensure(
+            !rod.force_stiffness[0].min().is_infinite() || distance < reach(rod),
+            format_args!(
+                "is {distance:e} away from the base, but rod {} is inextensible and {:e} long",
+                index + 1,
+                reach(rod)
+            ),
+        )?;
+    }
+    if let Some(moment) = raw.given(Key::TipMoment) {
+        moment.ensure(
+            moment.vector()? == [0.0; 3],
+            "needs a free tip: leave out tip.held, or the moment",
+        )?;
+    }
+    let each = |key| {
+        let item = raw.item(key)?;
+        let angles = item.one_each(rods.len())?;
+        item.ensure(
+            angles
+                .iter()
+                .all(|angle| angle.abs() <= 2.0 * PI * MOST_TURNS),
+            format_args!("must be at most {MOST_TURNS} turns, in radians"),
+        )?;
+        Ok(angles)
+    };
+    let clamps = match clamped {
+        true => {
+            let pairs = each(Key::TipAngles)?.into_iter().zip(each(Key::TipTwist)?);
+            Some(pairs.map(|(angle, twist)| Clamp { angle, twist }).collect())
+        }
+        false => None,
+    };
+    Ok(Some(HeldTip { position, clamps }))
+}
