@@ -100,8 +100,10 @@ impl<'a> Family<'a> {
     }
 }
 
-/// Puts the bases of all rods where the leaf clamps them.
+/// Puts the bases of all rods where the leaf clamps them, and tips where they are
+/// held.
 pub fn clamp(leaf: &DiscreteLeaf, state: &mut State) {
+    leaf.hold_tips(state);
     for j in 0..leaf.rods() {
         let base = state.base(j);
         state.q[base] = leaf.leaf.base(j);

@@ -156,6 +156,15 @@ impl DiscreteLeaf {
         [RADIUS_OF_GYRATION * RADIUS_OF_GYRATION * mass, mass]
     }
 
+    /// Whether node `i` of the rods turns, and is displaced: a tip that is held is
+    /// not.
+    pub fn moves(&self, i: usize) -> [bool; 2] {
+        match &self.leaf.held {
+            Some(held) if i == self.segments() => [held.clamps.is_none(), false],
+            _ => [true, true],
+        }
+    }
+
     /// Puts the tips where they are held, if they are.
     pub fn hold_tips(&self, state: &mut State) {
         let Some(held) = &self.leaf.held else {
@@ -183,6 +192,11 @@ impl DiscreteLeaf {
             moments.push(-g_b);
         }
         (force, moments)
+    }
+
+    /// Trapezoidal weight of node `i` as a fraction of the length.
+    pub(super) fn weight(&self, i: usize) -> f64 {
+        self.weights[i]
     }
 
     /// Weight of node `i` in the masses: none where a tip is held, which has no part

@@ -29,11 +29,14 @@ impl Masses {
     ) -> Self {
         let node = |(j, i)| {
             let inertia = physics.inertia(leaf, j, i);
+            let tensor = inertia.tensor(state.q[state.base(j) + i]);
+            // What does not move has no part in any motion.
+            let [turns, shifts] = leaf.moves(i);
             Node {
                 place: (j, i),
                 unknowns: pattern.unknowns(j, i),
-                tensor: inertia.tensor(state.q[state.base(j) + i]),
-                mass: inertia.mass,
+                tensor: if turns { tensor } else { DMat3::ZERO },
+                mass: if shifts { inertia.mass } else { 0.0 },
             }
         };
         let nodes = leaf.each(1..=leaf.segments()).map(node).collect();
