@@ -156,6 +156,12 @@ impl DiscreteLeaf {
         [RADIUS_OF_GYRATION * RADIUS_OF_GYRATION * mass, mass]
     }
 
+    /// Whether all tips are one point that moves.
+    pub fn tips_move_together(&self) -> bool {
+        // The tip of a single rod is its own, and one that is held does not move.
+        self.leaf.joined() && self.rods() > 1 && self.leaf.held.is_none()
+    }
+
     /// Whether node `i` of the rods turns, and is displaced: a tip that is held is
     /// not.
     pub fn moves(&self, i: usize) -> [bool; 2] {

@@ -81,16 +81,19 @@ pub fn rod(
 /// What node `i` of rod `j` is made of, and the segment behind it.
 pub fn made_of(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> Node {
     let n = leaf.segments();
-    let joined = leaf.leaf.joined() && leaf.rods() > 1;
+    let joined = leaf.tips_move_together();
     let mut node = Node {
         weight: leaf.grid.weight(i) * leaf.leaf.length(j),
         ..Node::default()
     };
     if i > 0 || !physics.clamped() {
         let inertia = physics.inertia(leaf, j, i);
-        node.per_inertia = 1.0 / inertia.transverse;
-        node.per_spin = 1.0 / inertia.polar() - 1.0 / inertia.transverse;
-        if i < n || !joined {
+        let [turns, shifts] = leaf.moves(i);
+        if turns {
+            node.per_inertia = 1.0 / inertia.transverse;
+            node.per_spin = 1.0 / inertia.polar() - 1.0 / inertia.transverse;
+        }
+        if shifts && (i < n || !joined) {
             node.mass = inertia.mass;
             node.per_mass = 1.0 / inertia.mass;
             node.coupled = leaf.grid.weight(i);

@@ -100,6 +100,8 @@ pub(super) fn held(
             "needs a free tip: leave out tip.held, or the moment",
         )?;
     }
+    let base = raw.item(Key::Clamped)?;
+    base.ensure(base.switch()?, "a tip that is held (tip.held) needs a base that is clamped")?;
     let each = |key| {
         let item = raw.item(key)?;
         let angles = item.one_each(rods.len())?;

@@ -103,8 +103,7 @@ impl System {
     /// Room for the equations of `leaf`.
     pub fn new(leaf: &DiscreteLeaf) -> Self {
         let (rods, n) = (leaf.rods(), leaf.segments());
-        // The tip of a single rod is its own, and one that is held is nobody's.
-        let joined = leaf.leaf.joined() && rods > 1 && leaf.leaf.held.is_none();
+        let joined = leaf.tips_move_together();
         let coupled = leaf.coupled();
         let gap = |g: usize| {
             // A node in the plane of the mirror does not answer a pull across it.

@@ -97,7 +97,7 @@ impl Explicit {
             return Err(Rigid);
         }
         let count = leaf.rods();
-        let joined = leaf.leaf.joined() && count > 1;
+        let joined = leaf.tips_move_together();
         let tip_mass = |j| physics.inertia(&leaf, j, leaf.segments()).mass;
         let positions = (0..count).map(|j| nodes::positions(&leaf, state, j));
         let positions: Vec<_> = positions.collect();

@@ -85,7 +85,7 @@ impl SemiImplicit {
     fn set_accelerations(&mut self) {
         self.leaf.assemble(&self.state, &mut self.system);
         let n = self.leaf.segments();
-        let joined = self.leaf.leaf.joined() && self.leaf.rods() > 1;
+        let joined = self.leaf.tips_move_together();
         let (mut tip_force, mut tip_mass) = (DVec3::ZERO, 0.0);
         for (j, i) in self.leaf.each(1..=n) {
             let k = self.state.base(j) + i;

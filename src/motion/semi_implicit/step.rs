@@ -45,14 +45,19 @@ impl SemiImplicit {
         std::mem::swap(&mut self.trial, next);
     }
 
-    /// Turn and shift of a node from the state to the trial; none of a base,
-    /// which is held and not even rounding may move.
+    /// Turn and shift of a node from the state to the trial; none of a base or a tip
+    /// that is held, which not even rounding may move.
     pub(super) fn increment(&self, k: usize) -> [DVec3; 2] {
-        if k.is_multiple_of(self.leaf.segments() + 1) {
-            return [DVec3::ZERO; 2];
-        }
-        let turn = rotation::log(self.trial.q[k] * self.state.q[k].conjugate());
-        [turn, self.trial.x[k] - self.state.x[k]]
+        let [turns, shifts] = match k % (self.leaf.segments() + 1) {
+            0 => [false; 2],
+            i => self.leaf.moves(i),
+        };
+        let turn = || rotation::log(self.trial.q[k] * self.state.q[k].conjugate());
+        let shift = || self.trial.x[k] - self.state.x[k];
+        [
+            if turns { turn() } else { DVec3::ZERO },
+            if shifts { shift() } else { DVec3::ZERO },
+        ]
     }
 
     /// Motion at the end of a step of h that leads from the state to the trial.
