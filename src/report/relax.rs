@@ -33,6 +33,10 @@ pub fn report(equilibrium: &Equilibrium, files: Option<String>) -> String {
         }
         lines.push(("energy", significant(energy)));
     }
+    if let Some(reaction) = &equilibrium.reaction {
+        let force = reaction.force.to_array().map(significant).join(", ");
+        lines.push(("reaction", format!("({force}) on the holder of the tip")));
+    }
     lines.extend(waves(equilibrium).map(|waves| ("waves", waves)));
     lines.push(("error", error(equilibrium)));
     lines.extend(modes(equilibrium).map(|modes| ("modes", modes)));

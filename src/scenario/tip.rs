@@ -101,7 +101,10 @@ pub(super) fn held(
         )?;
     }
     let base = raw.item(Key::Clamped)?;
-    base.ensure(base.switch()?, "a tip that is held (tip.held) needs a base that is clamped")?;
+    base.ensure(
+        base.switch()?,
+        "a tip that is held (tip.held) needs a base that is clamped",
+    )?;
     let each = |key| {
         let item = raw.item(key)?;
         let angles = item.one_each(rods.len())?;

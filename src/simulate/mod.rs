@@ -112,7 +112,9 @@ impl Simulation {
         let grid = Grid::new(segments, leaf.kinks());
         let physics = Physics::new(&leaf);
         let state = match scenario.dynamics.start {
-            Start::Released if leaf.held.is_none() => start(&DiscreteLeaf::new(&leaf, grid.clone())),
+            Start::Released if leaf.held.is_none() => {
+                start(&DiscreteLeaf::new(&leaf, grid.clone()))
+            }
             // Tips that are held are led to their holders, the leaf at rest.
             Start::Released | Start::AtRest => at_rest(&leaf, &physics, &grid, tolerance)?,
         };

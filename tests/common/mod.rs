@@ -307,6 +307,7 @@ pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -
         gravity,
         tip_force: [0.0; 3],
         tip_moment: [0.0; 3],
+        held_tip: None,
         tolerance: 1e-6,
     }
 }

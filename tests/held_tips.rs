@@ -1,0 +1,264 @@
+//! Tips that are held: pinned or clamped at a given place, as by the jaws of a
+//! testing machine.
+
+mod common;
+
+use std::f64::consts::{PI, TAU};
+
+use common::branch::{changes_at, follow};
+use common::random::{drawn, leaves};
+use common::{
+    ROD, TIGHT, agree, close, entries, relaxed, scale, set_stiffness, settle, settled, shot_near,
+    to,
+};
+use glam::DVec3;
+use leafdyn::relax::{Method, Options};
+use leafdyn::scenario::{Clamp, HeldTip, Scenario};
+use leafdyn::simulate::{self, Frame, Scheme, Simulation};
+
+/// The text of a rod whose tip is held where it is at rest.
+fn held(how: &str) -> String {
+    format!("{ROD}\ntip = {{ held = \"{how}\", position = [1.0, 0.0, 0.0] }}")
+}
+
+fn held_rod(how: &str, overrides: &str) -> Scenario {
+    Scenario::from_toml_with(&held(how), "held", &entries(overrides)).unwrap()
+}
+
+/// Euler's loads P_E of the clamped-clamped and the clamped-pinned column, as the
+/// grip's travel P/EA at which a rod that is shortened buckles: P (1 - P/EA) = P_E.
+#[test]
+fn columns_buckle_at_eulers_loads() {
+    for (how, load) in [
+        ("clamped", 39.47841760435743),
+        ("pinned", 20.19072855642663),
+    ] {
+        let stiff = format!("{}; stiffness.bending_2=3.0", set_stiffness(1e3, f64::INFINITY));
+        let load = 500.0 * (1.0 - (1.0_f64 - 4e-3 * load).sqrt());
+        let buckled = 1.0 - load / 1e3;
+        let to = 1.0 - 1.4 * load / 1e3;
+        let found = follow(
+            &held(how),
+            &stiff,
+            &format!("tip.position[0]=1.0..{to}"),
+            false,
+        );
+        let critical = [(buckled, 1)];
+        changes_at(how, &found, &critical, 1e-10);
+        // Just before, the holder bears it.
+        let before = format!("{stiff}; tip.position=[{}, 0, 0]", buckled + 1e-9);
+        let leaf = settle(&held_rod(how, &before), TIGHT);
+        let force = leaf.reaction.unwrap().force;
+        assert!((force - DVec3::X * load).length() < 1e-5, "{force}");
+    }
+}
+
+/// An isotropic rod between clamps, neither pulled nor pushed, becomes unstable
+/// when the moment M that twists it has tan(M L/2B) = M L/2B.
+#[test]
+fn a_twisted_rod_becomes_unstable_in_two_directions() {
+    let torsion = 0.8;
+    let stiff = format!("{}; stiffness.torsion={torsion}", set_stiffness(1e8, f64::INFINITY));
+    let found = follow(&held("clamped"), &stiff, "tip.twist=0..14", false);
+    let twist = 8.986818915818128 / torsion;
+    changes_at("twist", &found, &[(twist, 2)], 1e-8);
+    // More than a turn counts, and the clamp feels the moment.
+    let leaf = settle(
+        &held_rod("clamped", &format!("{stiff}; tip.twist=11")),
+        1e-9,
+    );
+    let moments = leaf.reaction.unwrap().moments.unwrap();
+    assert!((moments[0] + DVec3::X * (11.0 * torsion)).length() < 1e-6);
+}
+
+/// Frequencies beta^2 of beams that are clamped at the base, with the first roots
+/// beta of cos b cosh b = 1 and of tan b = tanh b.
+#[test]
+fn held_beams_vibrate_at_their_frequencies() {
+    for (how, beta) in [
+        ("clamped", 4.730040744862704_f64),
+        ("pinned", 3.926602312047919),
+    ] {
+        let stiff = format!(
+            "{}; dynamics.density=1; dynamics.rotary_inertia=1e-9; stiffness.bending_3=2.0",
+            set_stiffness(1e7, f64::INFINITY)
+        );
+        let mut options = to(1e-9);
+        (options.modes, options.mode_shapes) = (2, true);
+        let leaf = relaxed(&held_rod(how, &stiff), &options);
+        let modes = leaf.stability.modes.unwrap();
+        let beta = beta * beta;
+        for (mode, exact) in modes.iter().zip([beta, 2.0_f64.sqrt() * beta]) {
+            close(how, mode.frequency().unwrap() / exact, 1.0, 1e-6);
+        }
+    }
+}
+
+/// A chain hangs in a catenary; a rod that hardly resists bending nearly does,
+/// but for the layers at its ends, as thin as the root of its stiffness over the
+/// tension: its lowest point is off in proportion to the stiffness.
+#[test]
+fn a_soft_cable_hangs_in_a_catenary() {
+    // Of length L = 1.2 between points 1 apart: 2 a sinh(1/(2a)) = L.
+    let (mut low, mut high) = (0.1_f64, 10.0_f64);
+    for _ in 0..200 {
+        let a = 0.5 * (low + high);
+        match 2.0 * a * (0.5 / a).sinh() > 1.2 {
+            true => low = a,
+            false => high = a,
+        }
+    }
+    let sag = low * ((0.5 / low).cosh() - 1.0);
+    let off = [4e-4, 1e-4, 2.5e-5].map(|stiffness: f64| {
+        let soft = format!(
+            "leaf.length=1.2; load.gravity=[0, 0, -1]; stiffness.torsion={stiffness}; \
+             stiffness.bending_2={stiffness}; stiffness.bending_3={stiffness}; {}",
+            set_stiffness(1e4, 1e4)
+        );
+        let rod = held_rod("clamped", &soft);
+        let leaf = settle(&rod, 1e-7);
+        let lowest = leaf.shape.curves[0].iter().map(|x| -x.z);
+        (lowest.fold(0.0, f64::max) - sag).abs()
+    });
+    println!("{off:?}");
+    for pair in off.windows(2) {
+        assert!(pair[1] < 0.62 * pair[0], "{off:?}");
+    }
+    assert!(off[2] < 0.01, "{off:?}");
+}
+
+/// A rod bent into a ring closes on itself: it carries the moment 2 pi, and the
+/// energy 2 pi^2.
+#[test]
+fn a_ring_closes_on_itself() {
+    let ring = format!("stiffness.torsion=2.0; tip.position=[0, 0, 0]; tip.angles={TAU}");
+    let leaf = settle(&held_rod("clamped", &ring), 1e-9);
+    close("energy", leaf.energy.unwrap(), 2.0 * PI * PI, 1e-7);
+    let reaction = leaf.reaction.unwrap();
+    let moment = reaction.moments.unwrap()[0];
+    assert!((moment + DVec3::Z * TAU).length() < 1e-6, "{moment}");
+    assert!(reaction.force.length() < 1e-6);
+}
+
+/// Random leaves whose joint tip is held somewhere around where it would rest.
+fn held_leaves(count: usize) -> Vec<Scenario> {
+    let mut drawn = drawn(leaves(), 2 * count);
+    drawn.retain(|leaf| leaf.joined);
+    drawn.truncate(count);
+    for (case, leaf) in drawn.iter_mut().enumerate() {
+        let golden = |k: usize| ((case * 7 + k) as f64 * 0.618_033_988_749_895).fract() - 0.5;
+        let clamp = |j: usize| Clamp {
+            angle: golden(j + 4),
+            twist: 2.0 * golden(j + 9),
+        };
+        leaf.held_tip = Some(HeldTip {
+            position: [0.7 + 0.2 * golden(1), 0.4 * golden(2), 0.4 * golden(3)],
+            clamps: (case % 2 == 0).then(|| (0..leaf.rods.len()).map(clamp).collect()),
+        });
+    }
+    drawn
+}
+
+#[test]
+fn relaxation_and_shooting_find_the_same_held_leaf() {
+    for (case, scenario) in held_leaves(30).iter().enumerate() {
+        let what = format!("leaf {case}, {} veins", scenario.rods.len());
+        let leaf = settle(scenario, TIGHT);
+        let shot = shot_near(scenario, &leaf);
+        agree(&what, scenario, &leaf, &shot, 1e-9);
+        let held = scenario.held_tip.as_ref().unwrap();
+        let position = DVec3::from_array(held.position);
+        for (j, rod) in leaf.shape.rods.iter().enumerate() {
+            let tip = rod.nodes.last().unwrap();
+            assert!((tip.position - position).length() < 1e-14, "{what}");
+            if let Some(clamps) = &held.clamps {
+                assert!(tip.rotation.angle_between(clamps[j].rotation()) < 1e-7);
+            }
+        }
+        // What the holder feels is what the rods bear, and the load on the tip.
+        let borne: DVec3 = (shot.rods.iter().filter_map(|rod| rod.nodes.last()))
+            .map(|tip| tip.rotation * tip.n)
+            .sum();
+        let felt = leaf.reaction.unwrap().force;
+        let off = felt - (DVec3::from_array(scenario.tip_force) - borne);
+        let unit = scale(scenario).force();
+        assert!(off.length() / unit < 1e-6, "{what}: {off}");
+    }
+}
+
+/// A held leaf comes to rest by its motion, explicit or not, where the relaxation
+/// says; until it is pushed it rests there, and its tip never moves.
+#[test]
+fn held_leaves_move_between_their_holders() {
+    for how in ["clamped", "pinned"] {
+        let loads = "stiffness.bending_2=2.0; tip.position=[0.9, 0, 0.1]; load.gravity=[0, 0, -20]";
+        let pushed = "dynamics.duration=12; dynamics.output_interval=0.5; \
+             dynamics.gravity={at=[2.0, 2.5, 3.0], value=[[0, 0, -20], [0, 60, -20], [0, 0, -20]]}";
+        let scenario = held_rod(how, &format!("{loads}; {pushed}"));
+        let [explicit, semi_implicit] = [Scheme::Explicit, Scheme::SemiImplicit].map(|scheme| {
+            let options = simulate::Options {
+                scheme: Some(scheme),
+                ..simulate::Options::default()
+            };
+            let mut simulation = Simulation::new(&scenario, &options).unwrap();
+            let first = simulation.frame();
+            let mut frames = vec![first];
+            while !simulation.done() {
+                frames.push(simulation.next_frame().unwrap());
+            }
+            frames
+        });
+        let apart = |a: &Frame, b: &Frame| {
+            let pairs = a.positions.iter().zip(&b.positions);
+            pairs.fold(0.0_f64, |most, (a, b)| most.max(a.distance(*b)))
+        };
+        for frames in [&explicit, &semi_implicit] {
+            for frame in frames {
+                let tip = frame.positions.last().unwrap();
+                assert!((*tip - DVec3::new(0.9, 0.0, 0.1)).length() < 1e-14);
+            }
+            assert!(apart(&frames[0], &frames[1]) < 1e-6);
+            assert!(apart(&frames[0], &frames[5]) > 1e-2);
+            assert!(apart(&frames[0], frames.last().unwrap()) < 1e-4);
+        }
+        for (a, b) in explicit.iter().zip(&semi_implicit) {
+            assert!(apart(a, b) < 1e-3, "{how}, t = {}: {}", a.time, apart(a, b));
+        }
+        let [a, b] = [Method::Explicit { segments: None }, Method::default()].map(|method| {
+            let options = Options { method, ..to(1e-7) };
+            settled(&held_rod(how, loads), &options)
+        });
+        close("energy", a.energy.unwrap(), b.energy.unwrap(), 1e-7);
+    }
+}
+
+#[test]
+fn what_cannot_be_held_is_refused() {
+    for (entry, problem) in [
+        ("tip.held='loose'", "must be \"free\", \"pinned\""),
+        ("tip.held='free'", "belongs to a tip that is held"),
+        (
+            "tip.held='pinned'; tip.twist=1.0",
+            "belongs to a clamped tip",
+        ),
+        (
+            "leaf.rods=3; leaf.fan='paper'; leaf.joined=false",
+            "needs leaf.joined = true",
+        ),
+        ("tip.position=[30, 0, 0]", "more than 10 times"),
+        (
+            "stiffness.axial=inf; tip.position=[1.5, 0, 0]",
+            "inextensible",
+        ),
+        ("load.tip_moment=[0, 0, 1]", "needs a free tip"),
+        ("tip.twist=1e4", "at most 100 turns"),
+        ("dynamics.clamped=false", "needs a base that is clamped"),
+    ] {
+        let refused = Scenario::from_toml_with(&held("clamped"), "held", &entries(entry));
+        let message = refused.unwrap_err().to_string();
+        assert!(message.contains(problem), "{message}");
+    }
+    let alone = ROD.to_string() + "tip = { held = \"pinned\" }";
+    let message = Scenario::from_toml(&alone).unwrap_err().to_string();
+    assert!(message.contains("needs tip.position"), "{message}");
+}
