@@ -108,6 +108,17 @@ impl Scenario {
             Key::Gravity => list(self.gravity),
             Key::TipForce => list(self.tip_force),
             Key::TipMoment => list(self.tip_moment),
+            Key::TipHeld | Key::TipPosition | Key::TipAngles | Key::TipTwist => {
+                let held = self.held_tip.as_ref()?;
+                let clamps = held.clamps.as_deref();
+                match key {
+                    Key::TipHeld if clamps.is_some() => return text("clamped"),
+                    Key::TipHeld => return text("pinned"),
+                    Key::TipPosition => list(held.position),
+                    Key::TipAngles => each(clamps?.iter().map(|clamp| clamp.angle)),
+                    _ => each(clamps?.iter().map(|clamp| clamp.twist)),
+                }
+            }
             Key::Tolerance => Written::Number(self.tolerance),
             Key::Density => quantity(dynamics.density.iter()),
             // Left out it is not the same about d1.
@@ -296,6 +307,7 @@ mod tests {
         let paper = include_str!("../../scenarios/paper/fig04.toml");
         let swing = include_str!("../../scenarios/motion/swing.toml");
         let buckled = include_str!("../../scenarios/classic/elastica_buckled.toml");
+        let held = include_str!("../../scenarios/classic/twisted_strip.toml");
         let (head, tail) = FULL.split_at(FULL.find("stiffness").unwrap());
         let tail = &tail[tail.find("rest").unwrap()..];
         let section = "section = { shape = 'circle', diameter = { at = [0, 0.4, 1], value = [[0.2, 0.1, 0.05], [0.2, 0.2, 0.1], [0.2, 0.1, 0.1]] }, young = [1e3, 2e3, 3e3], mass_density = 2 }";
@@ -303,7 +315,7 @@ mod tests {
         let tail = [&tail[..mass.start], &tail[mass.end..]].concat();
         let tapering = format!("{head}{section}\n{tail}");
         let even = tapering.replace("{ at = [0, 0.4, 1], value = [[0.2, 0.1, 0.05], [0.2, 0.2, 0.1], [0.2, 0.1, 0.1]] }", "0.3");
-        for text in [FULL, paper, swing, buckled, &tapering, &even] {
+        for text in [FULL, paper, swing, buckled, held, &tapering, &even] {
             let scenario = Scenario::from_toml(text).unwrap();
             let json = serde_json::to_string(&scenario).unwrap();
             let again = Scenario::from_toml(&json);
