@@ -54,11 +54,6 @@ pub(crate) enum LeftOut {
 }
 
 impl Form {
-    /// Whether it is a number, or has entries that are numbers.
-    pub(crate) fn is_numeric(self) -> bool {
-        !matches!(self, Text | Switch | VectorInTime | FactorInTime)
-    }
-
     /// What its numbers may be.
     pub(super) fn range(self) -> Range {
         match self {
