@@ -10,6 +10,8 @@ use super::drawing::{Anchor, Color, DASHES, Drawing, Label, Mark, Path, Step, St
 use super::font::Font;
 
 const SCALE: f64 = 2.0;
+/// Bytes of a chunk of the file.
+const CHUNK: usize = 1 << 16;
 /// 192 dots per inch, as the file says them: dots per metre.
 const DOTS_PER_METRE: u32 = 7559;
 
@@ -98,11 +100,6 @@ fn paint_label(canvas: &mut Pixmap, label: &Label, font: &Font) {
 }
 
 fn encode(canvas: &Pixmap, out: &mut dyn Write) -> io::Result<()> {
-    // The page is opaque: its transparency need not be stored.
-    let mut rgb = vec![0; 3 * canvas.pixels().len()];
-    for (to, from) in rgb.chunks_exact_mut(3).zip(canvas.data().chunks_exact(4)) {
-        to.copy_from_slice(&from[..3]);
-    }
     let mut encoder = png::Encoder::new(out, canvas.width(), canvas.height());
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
@@ -115,7 +112,15 @@ fn encode(canvas: &Pixmap, out: &mut dyn Write) -> io::Result<()> {
         yppu: DOTS_PER_METRE,
         unit: png::Unit::Meter,
     }));
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(&rgb)?;
-    Ok(writer.finish()?)
+    // Row by row: buffers of the whole page cost more than what is done with them.
+    let mut rows = encoder.write_header()?.into_stream_writer_with_size(CHUNK)?;
+    let mut rgb = vec![0; 3 * canvas.width() as usize];
+    for row in canvas.data().chunks_exact(4 * canvas.width() as usize) {
+        // The page is opaque: its transparency need not be stored.
+        for (to, from) in rgb.chunks_exact_mut(3).zip(row.chunks_exact(4)) {
+            to.copy_from_slice(&from[..3]);
+        }
+        rows.write_all(&rgb)?;
+    }
+    Ok(rows.finish()?)
 }

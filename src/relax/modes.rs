@@ -53,16 +53,20 @@ pub fn lowest(run: &Run) -> Option<Vec<Mode>> {
     let levels = levels(run)?;
     let finest = levels.last()?;
     let physics = Physics::new(run.leaf);
-    let on = |level: &Level| modes::lowest(&level.leaf, &physics, &level.state, options.modes);
-    // The finest first: what is too large for it need not be begun.
-    let pairs = on(finest)?;
-    let first = levels.len().saturating_sub(GRIDS);
+    let count = options.modes;
+    let on = |level: &Level| modes::lowest(&level.leaf, &physics, &level.state, count);
+    let coarser = &levels[levels.len().saturating_sub(GRIDS)..levels.len() - 1];
+    let (pairs, coarser) = rayon::join(
+        || on(finest),
+        || coarser.iter().map(on).collect::<Vec<_>>(),
+    );
+    let pairs = pairs?;
     let mut series = Series {
         grids: Vec::new(),
         count: pairs.len(),
     };
-    for level in &levels[first..levels.len() - 1] {
-        match on(level) {
+    for pairs in coarser {
+        match pairs {
             Some(pairs) => series.push(&pairs),
             // Grids must follow each other.
             None => series.grids.clear(),
