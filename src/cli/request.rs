@@ -17,7 +17,7 @@ use crate::scenario::Scenario;
 use crate::study::Base;
 
 use super::progress::ProgressLine;
-use super::{Refusal, Status, fail, note, show, show_report};
+use super::{Refusal, Status, as_typed, fail, note, show, show_report};
 
 /// What every verb is asked.
 #[derive(Debug, Args)]
@@ -147,9 +147,8 @@ impl Request {
         let line = std::sync::Mutex::new(&mut line);
         let finished = AtomicUsize::new(0);
         let solve = |job: Result<Job, Refusal>| {
-            let done = job
-                .and_then(|job| run(&job))
-                .map_err(|refusal| refusal.to_string());
+            let done = job.and_then(|job| run(&job));
+            let done = done.map_err(|refusal| as_typed(refusal).to_string());
             let count = 1 + finished.fetch_add(1, Ordering::Relaxed);
             if let (true, Ok(mut line)) = (how.side_by_side, line.lock()) {
                 let all = self.scenarios.len();
