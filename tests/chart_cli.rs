@@ -405,6 +405,23 @@ fn cost_is_charted_against_the_number_of_veins() {
     assert_eq!(chart["scaling"]["runs"].as_array().unwrap().len(), 6);
 }
 
+/// Two joined veins buckle in one way; a single one may do so in any direction, so
+/// that shooting cannot confirm it.
+#[test]
+fn a_leaf_of_rods_alone_that_is_not_confirmed_is_a_failure() {
+    let chart = |rods: &str| {
+        let arguments = "chart leaf.toml --seconds 0.1 --methods semi-implicit-grid --json --write none \
+                         --set leaf.rods=2 --set leaf.fan=symmetric --set load.gravity=[0,0,0] \
+                         --set load.tip_force=[-12,0,0]";
+        Workplace::new().run(&format!("{arguments} --rods {rods}"))
+    };
+    for (rods, status, unconfirmed) in [("1", 1, json!([1])), ("2", 0, json!([]))] {
+        let chart = chart(rods).ends(status).json();
+        assert_eq!(chart["reference"]["confirmed"], true);
+        assert_eq!(chart["scaling"]["unconfirmed"], unconfirmed);
+    }
+}
+
 #[test]
 fn bad_requests_are_refused_before_anything_is_written() {
     all_refused(
