@@ -125,7 +125,13 @@ fn control_characters_are_escaped() {
     for arguments in [
         ["relax", "leaf.toml", "--method", &name].map(String::from),
         ["map", "leaf.toml", "--vary", &format!("{name}=1..2")].map(String::from),
-        ["trace", "leaf.toml", "--vary", &format!("rest.twist={name}")].map(String::from),
+        [
+            "trace",
+            "leaf.toml",
+            "--vary",
+            &format!("rest.twist={name}"),
+        ]
+        .map(String::from),
         ["relax", "leaf.toml", "--write", &name].map(String::from),
         ["relax", "leaf.toml", &format!("--{name}"), "1"].map(String::from),
     ] {
@@ -146,7 +152,10 @@ fn control_characters_are_escaped() {
     }
     fs::write(place.path(&file), workplace::leaf("small", 2)).unwrap();
     let out = format!("o{esc}");
-    let report = place.command("relax").args([file.as_str(), "--out", out.as_str()]).output();
+    let report = place
+        .command("relax")
+        .args([file.as_str(), "--out", out.as_str()])
+        .output();
     contains(
         &shown(Run::from(report.unwrap())),
         &["o\\u{1b}[31m: summary.json"],

@@ -113,7 +113,9 @@ fn encode(canvas: &Pixmap, out: &mut dyn Write) -> io::Result<()> {
         unit: png::Unit::Meter,
     }));
     // Row by row: buffers of the whole page cost more than what is done with them.
-    let mut rows = encoder.write_header()?.into_stream_writer_with_size(CHUNK)?;
+    let mut rows = encoder
+        .write_header()?
+        .into_stream_writer_with_size(CHUNK)?;
     let mut rgb = vec![0; 3 * canvas.width() as usize];
     for row in canvas.data().chunks_exact(4 * canvas.width() as usize) {
         // The page is opaque: its transparency need not be stored.

@@ -56,10 +56,8 @@ pub fn lowest(run: &Run) -> Option<Vec<Mode>> {
     let count = options.modes;
     let on = |level: &Level| modes::lowest(&level.leaf, &physics, &level.state, count);
     let coarser = &levels[levels.len().saturating_sub(GRIDS)..levels.len() - 1];
-    let (pairs, coarser) = rayon::join(
-        || on(finest),
-        || coarser.iter().map(on).collect::<Vec<_>>(),
-    );
+    let (pairs, coarser) =
+        rayon::join(|| on(finest), || coarser.iter().map(on).collect::<Vec<_>>());
     let pairs = pairs?;
     let mut series = Series {
         grids: Vec::new(),

@@ -82,7 +82,12 @@ impl Scenario {
             | Key::Young
             | Key::Poisson
             | Key::MassDensity => self.of_section(key)?,
-            Key::Torsion | Key::Bending2 | Key::Bending3 | Key::Axial | Key::Shear2 | Key::Shear3
+            Key::Torsion
+            | Key::Bending2
+            | Key::Bending3
+            | Key::Axial
+            | Key::Shear2
+            | Key::Shear3
                 if self.section(0).is_some() =>
             {
                 return None;
@@ -314,7 +319,10 @@ mod tests {
         let mass = tail.find("density").unwrap()..tail.find("internal").unwrap();
         let tail = [&tail[..mass.start], &tail[mass.end..]].concat();
         let tapering = format!("{head}{section}\n{tail}");
-        let even = tapering.replace("{ at = [0, 0.4, 1], value = [[0.2, 0.1, 0.05], [0.2, 0.2, 0.1], [0.2, 0.1, 0.1]] }", "0.3");
+        let even = tapering.replace(
+            "{ at = [0, 0.4, 1], value = [[0.2, 0.1, 0.05], [0.2, 0.2, 0.1], [0.2, 0.1, 0.1]] }",
+            "0.3",
+        );
         for text in [FULL, paper, swing, buckled, held, &tapering, &even] {
             let scenario = Scenario::from_toml(text).unwrap();
             let json = serde_json::to_string(&scenario).unwrap();
