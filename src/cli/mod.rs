@@ -2,6 +2,7 @@
 
 mod chart;
 mod check;
+mod job;
 mod map;
 mod progress;
 mod relax;
