@@ -21,13 +21,16 @@ mod tip;
 mod value;
 
 pub use dynamics::{Dynamics, Start};
+#[cfg(feature = "cli")]
 pub(crate) use error::printable;
 pub use error::{Place, ScenarioError};
 pub(crate) use key::Form;
 pub use key::Key;
 pub use part::Part;
 pub use profile::Profile;
-pub(crate) use read::{MOST_BYTES, text, utf8};
+pub(crate) use read::text;
+#[cfg(feature = "cli")]
+pub(crate) use read::{MOST_BYTES, utf8};
 pub use scale::Scale;
 pub(crate) use scale::longest;
 pub use schedule::Schedule;
