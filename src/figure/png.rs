@@ -113,9 +113,8 @@ fn encode(canvas: &Pixmap, out: &mut dyn Write) -> io::Result<()> {
         unit: png::Unit::Meter,
     }));
     // Row by row: buffers of the whole page cost more than what is done with them.
-    let mut rows = encoder
-        .write_header()?
-        .into_stream_writer_with_size(CHUNK)?;
+    let mut writer = encoder.write_header()?;
+    let mut rows = writer.stream_writer_with_size(CHUNK)?;
     let mut rgb = vec![0; 3 * canvas.width() as usize];
     for row in canvas.data().chunks_exact(4 * canvas.width() as usize) {
         // The page is opaque: its transparency need not be stored.
@@ -124,5 +123,6 @@ fn encode(canvas: &Pixmap, out: &mut dyn Write) -> io::Result<()> {
         }
         rows.write_all(&rgb)?;
     }
-    Ok(rows.finish()?)
+    rows.finish()?;
+    Ok(writer.finish()?)
 }
