@@ -201,6 +201,7 @@ pub mod files;
 mod lanes;
 mod leaf;
 mod limit;
+pub mod memory;
 mod modes;
 mod motion;
 mod newton;

@@ -12,6 +12,7 @@ use super::intervals::{Integrated, Units, choose, integrate, sensitivities};
 use super::march::March;
 use super::solution::{Reason, Work};
 use super::trajectory::{Nodes, Trajectory};
+use crate::memory::Request;
 
 /// Iterations before a solution is given up.
 const MAX_ITERATIONS: usize = 60;
@@ -71,13 +72,14 @@ struct Residuals {
 
 impl<'e, 'a> Newton<'e, 'a> {
     /// Sets up the unknowns from a trajectory, over so many intervals; `None`:
-    /// as many as the growth of perturbations needs, if that is possible.
+    /// as many as the growth of perturbations needs, if that is possible and
+    /// memory allows it.
     pub fn near(
         equations: &'e Equations<'a>,
         near: &Trajectory,
         intervals: Option<usize>,
         work: &'e mut Work,
-    ) -> Result<Self, Unbounded> {
+    ) -> Result<Self, Reason> {
         let mut nodes = match intervals {
             Some(count) => {
                 let sigma: Vec<f64> = (0..=count).map(|k| k as f64 / count as f64).collect();
@@ -86,6 +88,8 @@ impl<'e, 'a> Newton<'e, 'a> {
             }
             None => choose(equations, near)?,
         };
+        let (rods, intervals) = (equations.rods(), nodes.states.len());
+        Request::Shooting { rods, intervals }.weigh()?;
         let first = &mut nodes.states[0];
         for j in 0..equations.rods() {
             let rod = RodState::read(first, j);

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::dop853::Unbounded;
 use crate::limit::Limit;
+use crate::memory::TooMuch;
 use crate::shape::{Difference, RodShape};
 
 /// Work done by the shooting, counted so that tests can pin it.
@@ -146,6 +147,14 @@ pub enum Reason {
     },
     /// The equations are singular.
     Singular(Neutral),
+    /// So many intervals as are needed take too much memory.
+    TooMuch(TooMuch),
+}
+
+impl From<TooMuch> for Reason {
+    fn from(too_much: TooMuch) -> Self {
+        Reason::TooMuch(too_much)
+    }
 }
 
 impl From<Unbounded> for Reason {
@@ -174,6 +183,7 @@ impl fmt::Display for Reason {
                 "the equations are singular (ratio of singular values {:.1e}): {neutral}",
                 neutral.ratio
             ),
+            Reason::TooMuch(too_much) => too_much.fmt(f),
         }
     }
 }

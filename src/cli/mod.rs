@@ -70,6 +70,9 @@ fn as_typed(refusal: Refusal) -> Refusal {
         "step",
     ];
     let text = refusal.to_string();
+    if let Some(text) = text.strip_suffix("raise the limit on memory") {
+        return format!("{text}raise the limit with --memory").into();
+    }
     match text.split_once(' ') {
         Some((option, rest)) if OPTIONS.contains(&option) => {
             format!("--{option} {}", rest.trim_start_matches("= ")).into()

@@ -10,6 +10,7 @@ use clap::{Args, ValueHint};
 use rayon::prelude::*;
 
 use crate::files::{self, Kind, Selection};
+use crate::memory;
 use crate::report::table::{named, rows_of_json};
 use crate::report::{Refused, Written, json};
 use crate::scenario::Scenario;
@@ -45,6 +46,10 @@ pub struct Request {
     /// Write K + 1 equally spaced stations of every vein [default: those of the finest grid, at least 17]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=MOST_STATIONS))]
     stations: Option<u32>,
+
+    /// Most memory that the request may take, as in 2GB; what would take more is refused before it starts [default: half of what the machine has]
+    #[arg(long, value_name = "SIZE", value_parser = memory::parse)]
+    memory: Option<u64>,
 
     /// Print the result as JSON on standard output and nothing else there
     #[arg(long)]
@@ -96,6 +101,7 @@ impl Request {
         how: How,
         run: impl Fn(&Job) -> Result<Done, Refusal> + Sync,
     ) -> Result<Status, Refusal> {
+        self.memory.into_iter().for_each(memory::allow);
         let selection = self.selection::<R>(how)?;
         let job = |file: &Path| self.open(file, how, &selection);
         if let [file] = self.scenarios.as_slice() {

@@ -11,7 +11,10 @@ use crate::simulate::{Options, Record, Scheme, Simulation, Stopped};
 
 use super::progress::ProgressLine;
 use super::request::{Done, How, Job, Request};
-use super::{Refusal, Status, checkpoint_on_interrupt, show_checkpoint};
+use super::{Refusal, Status, checkpoint_on_interrupt, note, show_checkpoint};
+
+/// Seconds from which on it is told before a simulation begins how long it takes.
+const WORTH_TELLING: f64 = 60.0;
 
 /// Follow a leaf as it moves: its shape, velocities and energies in time.
 ///
@@ -71,6 +74,12 @@ impl Simulate {
             true => Recording::resume(folder, &mut simulation, selection)?,
             false => Recording::begin(folder, &mut simulation, selection)?,
         };
+        if let Some((steps, seconds)) = simulation.expected()
+            && seconds > WORTH_TELLING
+        {
+            let (time, steps) = (duration(seconds), brief(steps));
+            note(&format!("{}: {steps} steps to make, some {time}", job.scenario.name));
+        }
         checkpoint_on_interrupt(recording.checkpointer());
         let ended = self.follow(&mut simulation, &mut recording, job);
         if ended.is_err() {
@@ -134,19 +143,24 @@ fn record(
 
 /// How far a simulation has come, at so many units of time per second.
 fn progress(time: f64, duration: f64, speed: f64) -> String {
-    let left = ((duration - time) / speed).ceil();
-    let left = match left as u64 {
-        _ if !left.is_finite() => "?".into(),
-        seconds @ 0..120 => format!("{seconds} s"),
-        seconds @ 120..7200 => format!("{} min", seconds.div_ceil(60)),
-        seconds => format!("{} h", seconds.div_ceil(3600)),
-    };
+    let left = self::duration((duration - time) / speed);
     format!(
         "t = {} of {}, {} a second, {left} left",
         brief(time),
         brief(duration),
         brief(speed)
     )
+}
+
+/// A time for people.
+fn duration(seconds: f64) -> String {
+    let seconds = seconds.ceil();
+    match seconds as u64 {
+        _ if !seconds.is_finite() => "?".into(),
+        seconds @ 0..120 => format!("{seconds} s"),
+        seconds @ 120..7200 => format!("{} min", seconds.div_ceil(60)),
+        seconds => format!("{} h", seconds.div_ceil(3600)),
+    }
 }
 
 #[cfg(test)]

@@ -65,6 +65,7 @@ pub struct Tick {
 
 impl Axis {
     pub fn linear(name: &str, start: f64, end: f64) -> Self {
+        let [start, end] = [start, end].map(|value| value.clamp(-LARGEST, LARGEST));
         let size = start.abs().max(end.abs());
         let extent = (end - start).abs();
         // An extent that is rounding is none.
@@ -197,7 +198,9 @@ impl Axis {
             part: self.part(value),
             text,
         };
-        ticks.into_iter().map(tick).collect()
+        // Beyond the largest number there is no power of ten.
+        let ticks = ticks.into_iter().map(tick);
+        ticks.filter(|tick| tick.part.is_finite()).collect()
     }
 
     /// Every so many-th power of ten or, where there are few, 1, 2 and 5 times these.
@@ -338,6 +341,21 @@ mod tests {
         }
         let axis = Axis::logarithmic("", [1e-300, 1e-3].into_iter(), 3.0);
         assert!(axis.part(1e-300) < 0.0, "rounding of rounding is left out");
+    }
+
+    #[test]
+    fn ticks_of_the_largest_numbers_are_on_the_axis() {
+        for values in [vec![1e308], vec![1e308, 1e-300], vec![-1.7e308, 1.7e308]] {
+            for axis in [
+                Axis::logarithmic("t", values.iter().copied(), 3.0),
+                Axis::holding("t", values.iter().copied()),
+                Axis::linear("t", values[0], *values.last().unwrap()),
+            ] {
+                for tick in axis.ticks(300.0, Up) {
+                    assert!((0.0..=1.0).contains(&tick.part), "{tick:?} of {axis:?}");
+                }
+            }
+        }
     }
 
     #[test]

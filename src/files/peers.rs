@@ -1,5 +1,6 @@
 //! Tables of measurements of other programs, as `benches/peers` writes them.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -14,6 +15,15 @@ const COLUMNS: [&str; 7] = [
 
 /// Most bytes of a table.
 const MOST_BYTES: u64 = 16 << 20;
+
+/// Most rows: a chart of more says nothing.
+const MOST_ROWS: usize = 10_000;
+
+/// Most programs in one chart, each a marker and a line of the key.
+const MOST_PROGRAMS: usize = 100;
+
+/// Most characters of a cell.
+const MOST_CHARACTERS: usize = 200;
 
 /// Reads a table.
 ///
@@ -55,7 +65,8 @@ fn parse(bytes: &[u8]) -> Result<Vec<PeerRow>, (u64, String)> {
             }
         };
     }
-    let mut rows = Vec::new();
+    let mut rows: Vec<PeerRow> = Vec::new();
+    let mut programs = BTreeSet::new();
     for record in table.records() {
         let record = record.map_err(|error| {
             let line = error.position().map_or(0, csv::Position::line);
@@ -70,7 +81,23 @@ fn parse(bytes: &[u8]) -> Result<Vec<PeerRow>, (u64, String)> {
             ));
         }
         let cell = columns.map(|column| record[column].trim());
-        rows.push(row(cell).map_err(|problem| (line, problem))?);
+        if rows.len() == MOST_ROWS {
+            return Err((line, format!("more than {MOST_ROWS} rows: take fewer")));
+        }
+        for (name, cell) in COLUMNS.into_iter().zip(cell) {
+            if cell.chars().count() > MOST_CHARACTERS {
+                let what = format!("{name}: more than {MOST_CHARACTERS} characters");
+                return Err((line, what));
+            }
+        }
+        let row = row(cell).map_err(|problem| (line, problem))?;
+        let (_, settings) = row.knob.split_once(' ').unwrap_or_default();
+        programs.insert(format!("{} {settings}", row.program));
+        if programs.len() > MOST_PROGRAMS {
+            let what = "programs, each with its settings: take fewer";
+            return Err((line, format!("more than {MOST_PROGRAMS} {what}")));
+        }
+        rows.push(row);
     }
     Ok(rows)
 }
@@ -165,6 +192,15 @@ mod tests {
         ] {
             refused(format!("{HEADER}{good}{bad}\n{good}").as_bytes(), 3, part);
         }
+        let row = |program: &str| format!("{program},s,5,k,0.1,1e-3,converged\n");
+        let long = HEADER.to_string() + &row("p") + &row(&"x".repeat(1_000_000));
+        refused(long.as_bytes(), 3, "program: more than 200 characters");
+        let many: String = (0..60_000).map(|i| row(&format!("p{i}"))).collect();
+        refused((HEADER.to_string() + &many).as_bytes(), 102, "more than 100 programs");
+        let settings: String = (0..101).map(|i| format!("p,s,5,k s{i},1,,c\n")).collect();
+        refused((HEADER.to_string() + &settings).as_bytes(), 102, "more than 100 programs");
+        let rows = HEADER.to_string() + &row("p").repeat(10_001);
+        refused(rows.as_bytes(), 10_002, "more than 10000 rows");
         refused(b"", 1, "must name the columns program,");
         refused(b"program,scenario\n", 1, "must name the columns");
         refused(format!("program,{HEADER}").as_bytes(), 1, "each once");

@@ -39,6 +39,25 @@ impl Grid {
         grid
     }
 
+    /// The grid whose nodes are `stations`: of so many segments, or of a half, a
+    /// quarter ... of these, refined. Between kinks that is not the same.
+    pub fn through(stations: &[f64], kinks: &[f64]) -> Self {
+        let segments = stations.len() - 1;
+        let grid = Grid::new(segments, kinks);
+        let apart = |grid: &Grid| {
+            let pairs = grid.sigma.iter().zip(stations);
+            grid.segments() != segments || pairs.into_iter().any(|(a, b)| (a - b).abs() > 1e-9)
+        };
+        let mut nested = grid.clone();
+        let mut halvings = 0;
+        while apart(&nested) && segments.is_multiple_of(2 << halvings) {
+            halvings += 1;
+            nested = Grid::new(segments >> halvings, kinks);
+            nested = (0..halvings).fold(nested, |grid, _| grid.refined());
+        }
+        if apart(&nested) { grid } else { nested }
+    }
+
     /// The same grid with every segment halved.
     pub fn refined(&self) -> Self {
         self.cut(|a, b, _| [a, 0.5 * (a + b)])
@@ -104,6 +123,9 @@ mod tests {
             );
             let sum: f64 = (0..=segments).map(|i| grid.weight(i)).sum();
             assert!((sum - 1.0).abs() < 1e-15);
+        }
+        for grid in [Grid::new(32, &[0.3404]), Grid::new(8, &[0.3404]).refined().refined()] {
+            assert_eq!(Grid::through(grid.sigma(), &[0.3404]), grid);
         }
         // However many kinks there are, every panel has a segment.
         assert_eq!(Grid::new(1, &[0.25, 0.5]).segments(), 3);

@@ -1,6 +1,7 @@
 //! Nested grids: as fine as the tolerance needs, with an error estimate.
 
 use crate::leaf::Grid;
+use crate::memory::Request;
 use crate::newton::Stop;
 use crate::relax::method::Method;
 use crate::relax::options::MAX_NODES;
@@ -37,11 +38,12 @@ impl Run<'_, '_> {
             }
             let level = self.levels.last().expect("the leaf has settled");
             let finer = level.leaf.grid.refined();
-            let nodes = self.leaf.rods() * finer.segments();
+            let (rods, segments) = (self.leaf.rods(), finer.segments());
             if self.segments().is_some()
-                || finer.segments() > FINEST
-                || nodes > MAX_NODES
-                || self.beyond_rounding(finer.segments())
+                || segments > FINEST
+                || rods * segments > MAX_NODES
+                || (Request::Grid { rods, segments }).weigh().is_err()
+                || self.beyond_rounding(segments)
             {
                 self.judge_stability()?;
                 return Ok(false);

@@ -1,6 +1,7 @@
 //! What is asked of a relaxation, and what cannot be asked.
 
 use crate::limit::Limit;
+use crate::memory::TooMuch;
 use crate::relax::method::Method;
 
 /// What is asked of a relaxation.
@@ -92,6 +93,9 @@ pub enum RelaxError {
         /// Their product.
         nodes: usize,
     },
+    /// Too much memory.
+    #[error(transparent)]
+    Memory(TooMuch),
     /// The explicit method has no stable time step for rigid rods.
     #[error(
         "method = explicit: a stiffness is inf, and no time step is short enough for rigid rods; give a number, or use semi-implicit"

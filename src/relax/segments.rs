@@ -1,6 +1,7 @@
 //! Segments of the coarsest grid, as wanted or as needed.
 
 use crate::leaf::Leaf;
+use crate::memory::Request;
 use crate::relax::method::Method;
 use crate::relax::options::{MAX_NODES, RelaxError};
 use crate::relax::run::COARSEST;
@@ -60,6 +61,7 @@ pub fn check_segments(
             nodes,
         });
     }
+    (Request::Grid { rods, segments }.weigh()).map_err(RelaxError::Memory)?;
     Ok(segments)
 }
 

@@ -37,7 +37,7 @@ pub fn relax(
         Method::SingleShooting => Some(1),
         Method::Shooting { intervals } | Method::ShootingFromRest { intervals } => intervals,
     };
-    shooting::check_intervals(intervals)?;
+    shooting::check_intervals(scenario.rods.len(), intervals)?;
     if !matches!(options.method, Method::ShootingFromRest { .. }) {
         if scenario.held_tip.is_some() {
             let found = options.method.word();

@@ -17,7 +17,7 @@ type Result<T> = std::result::Result<T, ScenarioError>;
 
 /// Most rods: a leaf of 100,000 rods and eight segments already has five
 /// million unknowns.
-const MOST_RODS: usize = 100_000;
+pub const MOST_RODS: usize = 100_000;
 /// Longest name: a folder of it, and files in that, must be allowed everywhere.
 const LONGEST_NAME: usize = 100;
 /// Longest name of a unit: it stands beside axes.

@@ -9,6 +9,7 @@ use super::form::from_json;
 use super::part::resolve;
 use super::raw::Raw;
 use super::{Scenario, check};
+use crate::memory::Request;
 
 /// Most bytes of a file; 100,000 rods with every quantity listed stay below.
 pub(crate) const MOST_BYTES: u64 = 64 << 20;
@@ -86,6 +87,8 @@ pub(crate) fn utf8(bytes: Vec<u8>, file: &str) -> Result<String, ScenarioError> 
         let problem = format!("is larger than {MOST_BYTES} bytes: this is no scenario");
         return Err(refused(file, None, problem));
     }
+    let weight = Request::Scenario { bytes: bytes.len() };
+    (weight.weigh()).map_err(|why| refuse(None, why.to_string()))?;
     String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
         let bytes = error.as_bytes();

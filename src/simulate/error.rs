@@ -2,6 +2,10 @@
 
 use crate::relax;
 
+/// Longest time that a simulation may be expected to take, in seconds.
+pub const MOST_SECONDS: f64 = 3.0 * DAY;
+const DAY: f64 = 86_400.0;
+
 /// What cannot be simulated. Times are in the scenario's unit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Refused {
@@ -38,6 +42,20 @@ pub enum Refused {
         stable: f64,
         /// What limits it.
         limit: &'static str,
+    },
+    /// The time step is too short for the duration.
+    #[error(
+        "the time step of {step:.3e} makes {steps:.1e} steps, which take some {} days, and at most {} are allowed: \
+         use the semi-implicit method, softer rods, fewer segments, or a shorter duration",
+        (.seconds / DAY).ceil(), MOST_SECONDS / DAY
+    )]
+    TooLong {
+        /// The step.
+        step: f64,
+        /// Steps to the end.
+        steps: f64,
+        /// About how long they take.
+        seconds: f64,
     },
     /// The grid or the tolerance is impossible.
     #[error(transparent)]

@@ -26,7 +26,7 @@ mod record;
 mod stills;
 
 pub use crate::motion::Stopped;
-pub use error::Refused;
+pub use error::{MOST_SECONDS, Refused};
 pub use frame::Frame;
 pub use record::{Moment, Record, Still};
 pub use stills::stills;
@@ -40,6 +40,10 @@ use crate::scenario::{Scenario, Start};
 
 /// Default of segments a rod, if its rest shape does not need more.
 const SEGMENTS: usize = 16;
+
+/// Seconds that one step of one segment takes.
+const EXPLICIT_SECONDS: f64 = 2e-8;
+const SEMI_IMPLICIT_SECONDS: f64 = 2e-6;
 
 /// Which method moves the leaf.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -157,7 +161,7 @@ impl Simulation {
             }
         };
         let (duration, interval) = physics.duration();
-        Ok(Simulation {
+        let simulation = Simulation {
             leaf,
             scheme,
             stable,
@@ -171,7 +175,28 @@ impl Simulation {
             tolerance,
             grid,
             physics,
-        })
+        };
+        match simulation.expected() {
+            Some((steps, seconds)) if seconds > MOST_SECONDS => Err(Refused::TooLong {
+                step: simulation.step.unwrap_or_default(),
+                steps,
+                seconds,
+            }),
+            _ => Ok(simulation),
+        }
+    }
+
+    /// Steps from here to the end, and about how many seconds they take on one core
+    /// of a machine of 2020; `None` where the error of the steps decides.
+    pub fn expected(&self) -> Option<(f64, f64)> {
+        let (duration, _) = self.physics.duration();
+        let steps = ((duration * self.physics.time - self.time()) / self.step?).max(0.0);
+        let each = match self.scheme {
+            Scheme::Explicit => EXPLICIT_SECONDS,
+            Scheme::SemiImplicit => SEMI_IMPLICIT_SECONDS,
+        };
+        let nodes = self.leaf.rods() * self.grid.segments();
+        Some((steps, steps * nodes as f64 * each))
     }
 
     /// The leaf that moves.
@@ -276,12 +301,15 @@ impl Simulation {
     }
 
     /// Goes back to where [`Simulation::save`] was called; false if the
-    /// numbers do not fit.
+    /// numbers do not fit, or one of them is not finite.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let Some((&made, numbers)) = numbers.split_first() else {
             return false;
         };
-        let fits = made >= 0.0 && made <= self.outputs as f64 && self.method.restore(numbers);
+        let finite = || numbers.iter().all(|number| number.is_finite());
+        let fits = (0.0..=self.outputs as f64).contains(&made)
+            && finite()
+            && self.method.restore(numbers);
         if fits {
             self.made = made as usize;
         }

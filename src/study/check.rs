@@ -6,11 +6,11 @@ pub use shot::Shot;
 
 use serde::Serialize;
 
-use super::judge::{fine_grid, timed};
+use super::judge::{fine_grid, index_at, same_places, timed, with_those_of};
 use super::words::words;
 use crate::bvp::{self, Solution, Start};
 use crate::relax::{
-    self, Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit, index_near,
+    self, Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit,
 };
 use crate::scenario::Scenario;
 use crate::shape::Difference;
@@ -185,7 +185,7 @@ impl Check {
     /// Where a quantity differs most.
     pub fn farthest(&self, quantity: Quantity) -> Option<Place> {
         let solution = self.solution()?;
-        let stride = (solution.stations.len() - 1) / (self.stations.len() - 1);
+        let places = same_places(&self.stations, &solution.stations);
         let rods = self
             .relaxed
             .shape
@@ -194,9 +194,9 @@ impl Check {
             .zip(&solution.rods)
             .enumerate();
         let found = rods.flat_map(|(rod, (a, b))| {
-            let nodes = a.nodes.iter().zip(b.nodes.iter().step_by(stride));
-            nodes.zip(&self.stations).map(move |((a, b), &sigma)| {
-                let difference = quantity.of(&Difference::of(a, b));
+            let nodes = a.nodes.iter().zip(&places).zip(&self.stations);
+            nodes.map(move |((a, &place), &sigma)| {
+                let difference = quantity.of(&Difference::of(a, &b.nodes[place]));
                 (difference, Place { rod, sigma })
             })
         });
@@ -225,7 +225,7 @@ pub fn check(
     options: &CheckOptions,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Check, RelaxError> {
-    relax::check_intervals(options.intervals)?;
+    relax::check_intervals(scenario.rods.len(), options.intervals)?;
     let asked = Options {
         tolerance: options.tolerance,
         method: SemiImplicit {
@@ -249,9 +249,10 @@ fn shoot(scenario: &Scenario, relaxed: &Equilibrium, intervals: Option<usize>) -
         rods: &relaxed.shape.rods,
     };
     let precision = bvp::Precision::Error(relaxed.accuracy.tolerance);
+    let stations = with_those_of(grid.sigma(), &relaxed.shape.stations);
     let options = bvp::Options {
         intervals,
-        ..bvp::Options::new(start, grid.sigma(), precision)
+        ..bvp::Options::new(start, &stations, precision)
     };
     let (found, wall_seconds) = timed(|| bvp::solve(scenario, &options));
     let rods = found.as_ref().map_or(&[][..], |solution| &solution.rods);
@@ -261,7 +262,7 @@ fn shoot(scenario: &Scenario, relaxed: &Equilibrium, intervals: Option<usize>) -
             .map(|node| node.position)
             .collect(),
         negative_eigenvalues: match &found {
-            Ok(solution) => index_near(scenario, grid, &solution.rods),
+            Ok(solution) => index_at(scenario, grid, &solution.stations, &solution.rods),
             Err(_) => None,
         },
         found,
@@ -270,15 +271,16 @@ fn shoot(scenario: &Scenario, relaxed: &Equilibrium, intervals: Option<usize>) -
 }
 
 /// Largest differences over all rods at each station of the relaxed leaf, which
-/// are among those of the solution.
+/// are among those of the solution: paired by place, as panels between knots
+/// may be cut otherwise on another grid of as many segments.
 fn differences(relaxed: &Equilibrium, solution: &Solution) -> Vec<Difference> {
     let leaf = &relaxed.shape;
-    let stride = (solution.stations.len() - 1) / (leaf.stations.len() - 1);
     let rods = || leaf.rods.iter().zip(&solution.rods);
-    (0..leaf.stations.len())
-        .map(|i| {
+    let places = same_places(&leaf.stations, &solution.stations);
+    (places.into_iter().enumerate())
+        .map(|(i, place)| {
             rods()
-                .map(|(a, b)| Difference::of(&a.nodes[i], &b.nodes[stride * i]))
+                .map(|(a, b)| Difference::of(&a.nodes[i], &b.nodes[place]))
                 .fold(Difference::default(), Difference::max)
         })
         .collect()

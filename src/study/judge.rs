@@ -217,6 +217,28 @@ pub fn common(a: &[f64], b: &[f64]) -> Vec<(usize, usize)> {
     common
 }
 
+/// For every one of some stations the place of the nearest in an ascending list.
+pub fn same_places(stations: &[f64], list: &[f64]) -> Vec<usize> {
+    let nearest = |&station: &f64| {
+        let behind = list.partition_point(|&other| other < station);
+        let before = behind.saturating_sub(1);
+        match list.get(behind) {
+            Some(other) if other - station < station - list[before] || behind == 0 => behind,
+            _ => before,
+        }
+    };
+    stations.iter().map(nearest).collect()
+}
+
+/// The nodes of a grid, and those of `others` that are not among them.
+pub fn with_those_of(grid: &[f64], others: &[f64]) -> Vec<f64> {
+    let shared: Vec<usize> = common(others, grid).into_iter().map(|(i, _)| i).collect();
+    let own = (0..others.len()).filter(|i| shared.binary_search(i).is_err());
+    let mut all: Vec<f64> = grid.iter().copied().chain(own.map(|i| others[i])).collect();
+    all.sort_by(f64::total_cmp);
+    all
+}
+
 /// All stations in one ascending list.
 pub fn union(mut stations: Vec<f64>) -> Vec<f64> {
     stations.sort_by(f64::total_cmp);
@@ -279,5 +301,9 @@ mod tests {
         let stations = union(vec![0.0, 0.5, 1.0, 0.0, 0.3, 0.5 + 1e-16, 1.0]);
         assert_eq!(stations, [0.0, 0.3, 0.5, 1.0]);
         assert_eq!(common(&stations, &[0.0, 0.5, 0.7]), [(0, 0), (2, 1)]);
+        let others = [0.0, 0.2, 0.5 + 1e-16, 1.0];
+        let all = with_those_of(&stations, &others);
+        assert_eq!(all, [0.0, 0.2, 0.3, 0.5, 1.0]);
+        assert_eq!(same_places(&others, &all), [0, 1, 3, 4]);
     }
 }

@@ -29,6 +29,7 @@ mod base;
 pub use base::{Base, Varied};
 
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use crate::scenario::{Form, Part, ScenarioError};
@@ -38,6 +39,10 @@ const COUNT: usize = 11;
 
 /// Most values along one axis.
 const MOST: usize = 10_000;
+
+/// The largest size of a value, and the smallest that is not zero: what is between
+/// two of them, their product and their quotient are numbers.
+const SIZES: RangeInclusive<f64> = 1e-100..=1e100;
 
 /// Decimal digits that values between the ends keep: 0.001, not
 /// 0.0010000000000000002.
@@ -228,8 +233,10 @@ impl FromStr for Vary {
         let (from, to) = (range.split_once("..")).ok_or_else(|| refuse("has no .."))?;
         let number = |text: &str| {
             let value = text.trim().parse().ok();
-            let finite = value.filter(|value: &f64| value.is_finite());
-            finite.ok_or_else(|| refuse("FROM and TO must be numbers"))
+            let allowed = |value: &f64| *value == 0.0 || SIZES.contains(&value.abs());
+            value.filter(allowed).ok_or_else(|| {
+                refuse("FROM and TO must be numbers, zero or of a size from 1e-100 to 1e100")
+            })
         };
         let (from, to) = (number(from)?, number(to)?);
         if log && from * to <= 0.0 {

@@ -123,7 +123,7 @@ impl Recording {
         state.ok_or_else(|| {
             damaged(
                 &folder.join(checkpoint::FILE_NAME),
-                "it does not fit the leaf",
+                "it does not fit the leaf, or a number of it is not finite",
             )
         })?;
         let motion = folder.join(recording.form.file_name());

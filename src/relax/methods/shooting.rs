@@ -2,6 +2,7 @@
 
 use crate::bvp::{self, Reason, Solution, Start};
 use crate::leaf::{Grid, Leaf};
+use crate::memory::Request;
 use crate::newton::Work;
 use crate::relax::equilibrium::{
     Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
@@ -29,14 +30,14 @@ fn station_grid(scenario: &Scenario) -> Grid {
     Grid::new(segments, leaf.kinks())
 }
 
-/// Refuses a number of intervals that cannot be.
-pub fn check_intervals(intervals: Option<usize>) -> Result<(), RelaxError> {
-    match intervals {
-        Some(found) if !(1..=MAX_INTERVALS).contains(&found) => {
-            Err(RelaxError::Intervals { found })
-        }
-        _ => Ok(()),
+/// Refuses a number of intervals that cannot be, or that so many `rods` cannot be
+/// shot over; left out: one, as the fewest that will be chosen.
+pub fn check_intervals(rods: usize, intervals: Option<usize>) -> Result<(), RelaxError> {
+    if let Some(found) = intervals.filter(|found| !(1..=MAX_INTERVALS).contains(found)) {
+        return Err(RelaxError::Intervals { found });
     }
+    let intervals = intervals.unwrap_or(1);
+    (Request::Shooting { rods, intervals }.weigh()).map_err(RelaxError::Memory)
 }
 
 /// Solves the boundary-value problem from a leaf that is roughly at `rest`; where

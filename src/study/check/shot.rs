@@ -84,6 +84,7 @@ impl Serialize for Shot {
                 Reason::Singular(neutral) => ("singular", Some(neutral), *work),
                 Reason::NoConvergence { .. } => ("no-convergence", None, *work),
                 Reason::Unbounded { .. } => ("unbounded", None, *work),
+                Reason::TooMuch(_) => ("too-much-memory", None, *work),
             },
         };
         Keys {

@@ -19,6 +19,10 @@ use super::row::{Confidence, Found, MapMethod, MapOutcome, MapRow};
 const SHARPER: f64 = 1e-2;
 const SHARPEST: f64 = 1e-12;
 
+/// Seconds that a node takes on any machine, at the very least: a grid is made and
+/// started on before anybody looks at the clock.
+const LEAST_SECONDS: f64 = 1e-6;
+
 /// What a cell's leaf is solved with.
 pub struct Cell<'a> {
     scenario: &'a Scenario,
@@ -107,6 +111,15 @@ impl<'a> Cell<'a> {
         if let (MapMethod::ToRest(Method::SemiImplicit(_)), None) = (method, segments) {
             return self.relaxed.clone();
         }
+        let nodes = segments.map_or(0, |segments| segments.saturating_mul(scenario.rods.len()));
+        let on_grid = match method {
+            MapMethod::ExplicitMotion => true,
+            MapMethod::ToRest(method) => !method.is_shooting(),
+        };
+        if on_grid && nodes as f64 * LEAST_SECONDS > self.limit.as_secs_f64() {
+            let why = format!("{nodes} nodes take longer than {} s", self.limit.as_secs_f64());
+            return (Err((MapOutcome::OutOfTime, why)), 0.0);
+        }
         within(self.limit, |limit| match method {
             MapMethod::ExplicitMotion => motion::answer(scenario, self.knobs, tolerance, limit),
             MapMethod::ToRest(method) => match method {
@@ -140,6 +153,7 @@ impl<'a> Cell<'a> {
         let solution = solved.map_err(|failure| {
             let outcome = match failure.reason {
                 Reason::Unbounded { .. } => MapOutcome::Diverged,
+                Reason::TooMuch(_) => MapOutcome::Refused,
                 _ => MapOutcome::NotConverged,
             };
             let way = match failure.part {

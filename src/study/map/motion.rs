@@ -16,6 +16,9 @@ use crate::study::vary::{Knobs, Varied};
 /// Segments a rod where none are asked for: as in a simulation.
 const SEGMENTS: usize = 16;
 
+/// Stations of a grid at which answers are compared.
+const MOST_STATIONS: usize = 4096;
+
 /// Steps between looks at the clock.
 const LOOK: f64 = 1000.0;
 
@@ -137,8 +140,14 @@ fn shape(leaf: &DiscreteLeaf, state: &State) -> Vec<RodShape> {
 
 /// Stations that a reference should have beside its own.
 pub fn stations(scenario: &Scenario, knobs: Knobs) -> Vec<f64> {
-    match knobs.segments {
-        Some(segments) => fine_grid(scenario, segments).sigma().to_vec(),
-        None => vec![0.0, 1.0],
+    let leaf = Leaf::new(scenario);
+    match relax::check_segments(&leaf, knobs.segments, SEGMENTS) {
+        Ok(segments) if knobs.segments.is_some() => {
+            let grid = fine_grid(scenario, segments);
+            let every = grid.segments().div_ceil(MOST_STATIONS);
+            let tip = [1.0].into_iter();
+            grid.sigma().iter().copied().step_by(every).chain(tip).collect()
+        }
+        _ => vec![0.0, 1.0],
     }
 }

@@ -7,6 +7,7 @@ use serde::{Serialize, Serializer};
 use super::cell::{Cell, one_line};
 use super::motion;
 use super::row::{MapMethod, MapRow};
+use crate::memory::Request;
 use crate::relax::check_tolerance;
 use crate::study::vary::{Base, Keys, Knob, Vary, VaryError};
 
@@ -89,6 +90,11 @@ impl MapRequest {
         if methods.is_empty() {
             return refuse("no methods: name one at least".into());
         }
+        let weight = Request::Map {
+            cells: found,
+            methods: methods.len(),
+        };
+        (weight.weigh()).map_err(|why| MapRefused(why.to_string()))?;
         let request = MapRequest {
             base,
             axes,

@@ -14,7 +14,8 @@ use crate::branch::{
     switch, walk,
 };
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
-use crate::relax::{Equilibrium, Options, SemiImplicit, node_state, project, relax};
+use crate::memory::Request;
+use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, node_state, project, relax};
 use crate::scenario::{Key, Part, Scenario};
 use crate::shape::RodShape;
 use crate::study::Target;
@@ -135,13 +136,18 @@ fn initial_state(
     first: &Equilibrium,
     segments: Option<usize>,
 ) -> Result<(Grid, State), TraceError> {
-    let coarse = Grid::new(first.shape.stations.len() - 1, leaf.kinks());
+    let coarse = Grid::through(&first.shape.stations, leaf.kinks());
     let discrete = DiscreteLeaf::new(leaf, coarse);
     let mut grid = discrete.grid.clone();
     let mut state = project(leaf, &discrete, &first.shape.rods);
     let wanted = match segments {
         None => 2 * grid.segments(),
-        Some(wanted) => crate::relax::check_segments(leaf, Some(wanted), wanted)?,
+        Some(wanted) => {
+            let segments = crate::relax::check_segments(leaf, Some(wanted), wanted)?;
+            let rods = leaf.rods();
+            (Request::Branches { rods, segments }.weigh()).map_err(RelaxError::Memory)?;
+            segments
+        }
     };
     while grid.segments() < wanted
         || segments.is_none() && index_differs(family, &grid, &state, first)

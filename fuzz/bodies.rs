@@ -1,0 +1,149 @@
+//! What is done with an input, whatever it is: by the fuzz targets beside this
+//! file, and by `tests/hostile_mutations.rs`. None may panic or run on.
+#![allow(dead_code)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+use std::time::Duration;
+
+use leafdyn::files::{Recording, read_peers};
+use leafdyn::scenario::Scenario;
+use leafdyn::simulate::{Options, Simulation};
+use leafdyn::study::{Base, Vary};
+use tempfile::TempDir;
+
+/// A leaf with something of everything.
+pub const LEAF: &str = r#"
+name = "small"
+leaf = { rods = 2, length = 1.0, fan = "paper", joined = true }
+stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = [1.0, 2.0], axial = 100.0, shear_2 = 100.0, shear_3 = inf }
+coupling = { x = 0.0, y = 1.0, z = [1.0] }
+load = { gravity = [0.0, 0.0, -1.0] }
+solve = { tolerance = 1e-6 }
+[rest]
+twist = 0.1
+bend_2 = { at = [0.0, 0.3, 1.0], value = [0.0, 1.0, 2.0] }
+stretch = [1.0, 1.1]
+[dynamics]
+density = { at = [0.0, 1.0], value = [2.0, 1.0] }
+duration = 0.02
+output_interval = 0.01
+gravity = { at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -2.0]] }
+"#;
+
+/// More rods than this take their time.
+const RODS: usize = 8;
+
+/// A scenario is refused in a few words, or comes to rest or does not, and moves.
+pub fn scenario(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else {
+        return;
+    };
+    match Scenario::from_toml(text) {
+        Ok(scenario) if scenario.rods.len() <= RODS => run(&scenario),
+        Ok(_) => {}
+        Err(error) => assert!(error.to_string().len() < 2_000 + 4 * text.len(), "{error}"),
+    }
+}
+
+fn run(scenario: &Scenario) {
+    let limit = Duration::from_secs(2);
+    if let Ok(leaf) = scenario.relaxation().time_limit(limit).run() {
+        let nodes = leaf.shape.rods.iter().flat_map(|rod| &rod.nodes);
+        for node in nodes.filter(|_| leaf.outcome.is_success()) {
+            assert!(node.position.is_finite() && node.rotation.is_finite());
+            assert!(node.n.is_finite() && node.m.is_finite());
+        }
+    }
+    let options = Options {
+        segments: Some(8),
+        ..Options::default()
+    };
+    let Ok(mut simulation) = Simulation::new(scenario, &options) else {
+        return;
+    };
+    let short = |(_, seconds)| seconds < 0.05;
+    if simulation.expected().is_some_and(short) && simulation.frames().0 < 100 {
+        while !simulation.done() && simulation.next_frame().is_ok() {}
+    }
+}
+
+/// An entry as behind `--set`, and numbers as behind `--vary`.
+pub fn typed(data: &[u8]) {
+    static BASE: LazyLock<Base> =
+        LazyLock::new(|| Base::of_text(LEAF.into(), "leaf".into(), &[]).unwrap());
+    let Ok(text) = std::str::from_utf8(data) else {
+        return;
+    };
+    if let Err(refused) = Base::of_text(LEAF.into(), "leaf".into(), &[text.into()]) {
+        assert!(refused.to_string().len() < 4_000 + 4 * text.len());
+    }
+    let Ok(vary) = text.parse::<Vary>() else {
+        return;
+    };
+    assert!(vary.values.iter().all(|value| value.is_finite()));
+    let ends = [vary.values[0], vary.values[vary.values.len() - 1]];
+    for value in ends.into_iter().filter(|value| value.abs() < 1e3) {
+        let _ = BASE.at(&[(&vary.keys, value)]);
+    }
+}
+
+/// A table of measurements of other programs.
+pub fn peers(data: &[u8]) {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("peers.csv");
+    fs::write(&file, data).unwrap();
+    match read_peers(&file) {
+        Ok(rows) => assert!(rows.iter().all(|row| row.seconds > 0.0)),
+        Err(error) => assert!(error.to_string().len() < 1_000 + 4 * data.len()),
+    }
+}
+
+/// A simulation of [`LEAF`], stopped after one output.
+pub fn stopped() -> (TempDir, Scenario) {
+    let scenario = Scenario::from_toml(&LEAF.replace("inf", "100.0")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let mut simulation = Simulation::new(&scenario, &Options::default()).unwrap();
+    let mut recording = Recording::begin(folder.path(), &mut simulation).unwrap();
+    let frame = simulation.next_frame().unwrap();
+    recording.add(&simulation, &frame).unwrap();
+    recording.checkpointer().write().unwrap().unwrap();
+    drop(recording);
+    (folder, scenario)
+}
+
+/// What the files in a folder hold.
+pub fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    let read = |file: PathBuf| (file.clone(), fs::read(file).unwrap());
+    files.into_iter().map(read).collect()
+}
+
+/// `checkpoint.json` of a simulation that was stopped.
+pub fn checkpoint(data: &[u8]) {
+    resumed("checkpoint.json", data);
+}
+
+/// A simulation goes on where nothing that counts has changed; if not it is
+/// refused, and every file is as it was.
+pub fn resumed(name: &str, data: &[u8]) {
+    static STOPPED: LazyLock<(TempDir, Scenario)> = LazyLock::new(stopped);
+    let (whole, scenario) = &*STOPPED;
+    let folder = tempfile::tempdir().unwrap();
+    for (file, bytes) in contents(whole.path()) {
+        fs::write(folder.path().join(file.file_name().unwrap()), bytes).unwrap();
+    }
+    fs::write(folder.path().join(name), data).unwrap();
+    let before = contents(folder.path());
+    let mut simulation = Simulation::new(scenario, &Options::default()).unwrap();
+    match Recording::resume(folder.path(), &mut simulation) {
+        Ok(_) => assert_eq!(simulation.frames().1, 1),
+        Err(error) => {
+            assert!(error.to_string().len() < 2_000, "{error}");
+            assert_eq!(contents(folder.path()), before);
+        }
+    }
+}

@@ -1,0 +1,258 @@
+//! How much memory a request would take, and how much it may.
+//!
+//! Requests are weighed before they start: what is refused in a sentence would
+//! otherwise end the process without one. The weights are what whole runs of the
+//! program were seen to take at most, files and figures included.
+
+use std::fmt;
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Bytes allowed; 0: not yet looked up.
+static ALLOWED: AtomicU64 = AtomicU64::new(0);
+
+/// Allows the requests of this process so many bytes each, in place of half of
+/// what the machine has.
+pub fn allow(bytes: u64) {
+    ALLOWED.store(bytes.max(1), Ordering::Relaxed);
+}
+
+/// Bytes that one request may take: as many as [`allow`] said, or half of what the
+/// machine has, or the group of processes that this one belongs to. Where that is
+/// not known there is no limit.
+pub fn allowed() -> u64 {
+    match ALLOWED.load(Ordering::Relaxed) {
+        0 => {
+            let group = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
+            let bytes = [of_machine(), of_group(Path::new("/sys/fs/cgroup"), &group)];
+            let bytes = bytes.into_iter().flatten().min();
+            allow(bytes.map_or(u64::MAX, |bytes| bytes / 2));
+            ALLOWED.load(Ordering::Relaxed)
+        }
+        bytes => bytes,
+    }
+}
+
+/// Memory of the machine.
+fn of_machine() -> Option<u64> {
+    let text = fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
+    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    kilobytes.checked_mul(1024)
+}
+
+/// The least limit of the group of processes `/proc/self/cgroup` names, and of
+/// those it is part of.
+fn of_group(root: &Path, named: &str) -> Option<u64> {
+    let bytes = |file: &Path| fs::read_to_string(file).ok()?.trim().parse::<u64>().ok();
+    let limits = named.lines().flat_map(|line| {
+        let mut parts = line.splitn(3, ':').skip(1);
+        let controllers = parts.next().unwrap_or_default();
+        let path = parts.next().unwrap_or_default().trim_start_matches('/');
+        let (root, file) = match controllers {
+            "" => (root.to_path_buf(), "memory.max"),
+            _ => (root.join("memory"), "memory.limit_in_bytes"),
+        };
+        let of_memory = controllers.is_empty() || controllers.split(',').any(|c| c == "memory");
+        let folder = root.join(path);
+        let folders: Vec<_> = folder.ancestors().map(|folder| folder.join(file)).collect();
+        let inside = move |file: &std::path::PathBuf| of_memory && file.starts_with(&root);
+        folders.into_iter().filter(inside)
+    });
+    limits.filter_map(|file| bytes(&file)).min()
+}
+
+/// What takes memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// A leaf on a grid.
+    Grid {
+        /// Rods.
+        rods: usize,
+        /// Segments a rod.
+        segments: usize,
+    },
+    /// Branches of equilibria on a grid, which is refined twice.
+    Branches {
+        /// Rods.
+        rods: usize,
+        /// Segments a rod.
+        segments: usize,
+    },
+    /// The matrices of shooting.
+    Shooting {
+        /// Rods.
+        rods: usize,
+        /// Intervals.
+        intervals: usize,
+    },
+    /// The rows of a map.
+    Map {
+        /// Cells.
+        cells: usize,
+        /// Methods in each.
+        methods: usize,
+    },
+    /// A scenario as text.
+    Scenario {
+        /// Its length.
+        bytes: usize,
+    },
+}
+
+impl Request {
+    /// About as many bytes as it takes at most.
+    pub fn bytes(self) -> u64 {
+        let product = |factors: [usize; 3], each: u64| {
+            let factors = factors.into_iter().map(|factor| factor as u64);
+            factors.fold(each, u64::saturating_mul)
+        };
+        match self {
+            // 1750 seen for one rod of many segments, 2700 for many rods of few.
+            Request::Grid { rods, segments } => {
+                product([rods, segments.saturating_add(1), 1], 2_700)
+            }
+            Request::Branches { rods, segments } => product([rods, segments, 1], 27_000),
+            // Five matrices of (12 N)^2 numbers an interval seen.
+            Request::Shooting { rods, intervals } => {
+                product([rods, rods, intervals.saturating_add(1)], 5 * 144 * 8)
+            }
+            Request::Map { cells, methods } => product([cells, methods, 1], 1_000),
+            // 72 seen.
+            Request::Scenario { bytes } => product([bytes, 1, 1], 75),
+        }
+    }
+
+    /// Refuses what would take more than is [`allowed`].
+    ///
+    /// # Errors
+    /// If it would.
+    pub fn weigh(self) -> Result<(), TooMuch> {
+        let (needed, allowed) = (self.bytes(), allowed());
+        match needed > allowed {
+            true => Err(TooMuch {
+                request: self,
+                allowed,
+            }),
+            false => Ok(()),
+        }
+    }
+}
+
+/// A request that would take more memory than it may.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{request} would take about {} of memory, and {} are allowed: {}, or raise the limit on memory",
+    size(.request.bytes()), size(*.allowed), .request.instead()
+)]
+pub struct TooMuch {
+    /// What was asked.
+    pub request: Request,
+    /// Bytes it may take.
+    pub allowed: u64,
+}
+
+impl Request {
+    fn instead(self) -> &'static str {
+        match self {
+            Request::Grid { .. } | Request::Branches { .. } => "use fewer rods or segments",
+            Request::Shooting { .. } => {
+                "use fewer rods or intervals, or the method semi-implicit, which has no such matrices"
+            }
+            Request::Map { .. } => "lower the counts of the axes",
+            Request::Scenario { .. } => "write fewer entries",
+        }
+    }
+}
+
+impl fmt::Display for Request {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Request::Grid { rods, segments } => write!(f, "{rods} rods of {segments} segments"),
+            Request::Branches { rods, segments } => {
+                write!(f, "branches of {rods} rods of {segments} segments")
+            }
+            Request::Shooting { rods, intervals } => {
+                write!(f, "shooting with {rods} rods, intervals: {intervals},")
+            }
+            Request::Map { cells, methods } => write!(f, "{cells} cells by {methods} methods"),
+            Request::Scenario { bytes } => write!(f, "a scenario of {bytes} bytes"),
+        }
+    }
+}
+
+const UNITS: [(&str, f64); 4] = [("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)];
+
+/// Bytes for people.
+fn size(bytes: u64) -> String {
+    let bytes = bytes as f64;
+    let unit = UNITS.into_iter().find(|(_, unit)| bytes >= *unit);
+    unit.map_or(format!("{bytes} bytes"), |(name, unit)| {
+        format!("{:.1} {name}", bytes / unit)
+    })
+}
+
+/// Bytes as people write them: `2GB`, `500 MB`, `1e9`.
+///
+/// # Errors
+/// If it is no size, or none at all.
+pub fn parse(text: &str) -> Result<u64, String> {
+    let text = text.trim();
+    let unit = UNITS.into_iter().find_map(|(name, unit)| {
+        let number = text.len().checked_sub(name.len()).filter(|&at| text.is_char_boundary(at))?;
+        let (number, end) = text.split_at(number);
+        end.eq_ignore_ascii_case(name).then_some((number, unit))
+    });
+    let (number, unit) = unit.unwrap_or((text, 1.0));
+    let bytes = number.trim().parse::<f64>().map(|number| number * unit);
+    match bytes {
+        Ok(bytes) if (1.0..1e18).contains(&bytes) => Ok(bytes as u64),
+        _ => Err("must be a size, as in 500MB or 2GB".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_read_and_written() {
+        for (text, bytes) in [("2GB", 2_000_000_000), ("1.5 mb", 1_500_000), ("1e9", 1_000_000_000)] {
+            assert_eq!(parse(text), Ok(bytes));
+        }
+        for text in ["", "GB", "-1GB", "0", "many", "nan", "inf", "1e300", "ä", "äB"] {
+            assert!(parse(text).is_err(), "{text}");
+        }
+        assert_eq!(size(5_700_000_000), "5.7 GB");
+        assert_eq!(size(12), "12 bytes");
+        let endless = Request::Grid { rods: usize::MAX, segments: usize::MAX };
+        assert_eq!(endless.bytes(), u64::MAX);
+    }
+
+    #[test]
+    fn the_least_limit_of_a_group_and_those_around_it_holds() {
+        let root = tempfile::tempdir().unwrap();
+        let at = |path: &str, limit: &str| {
+            let folder = root.path().join(path);
+            fs::create_dir_all(&folder).unwrap();
+            let name = if path.starts_with("memory") { "memory.limit_in_bytes" } else { "memory.max" };
+            fs::write(folder.join(name), limit).unwrap();
+        };
+        at("a", "4000\n");
+        at("a/b", "max\n");
+        at("memory/c", "3000\n");
+        let limit = |named: &str| of_group(root.path(), named);
+        assert_eq!(limit("0::/a/b\n"), Some(4000));
+        assert_eq!(limit("0::/\n"), None);
+        assert_eq!(limit("5:cpu:/a\n4:memory:/c\n0::/a\n"), Some(3000));
+        assert_eq!(limit("nonsense"), None);
+    }
+
+    #[test]
+    fn half_of_the_machine_is_allowed() {
+        if let Some(all) = of_machine() {
+            assert!(all > 1 << 20 && allowed() <= all / 2);
+        }
+    }
+}

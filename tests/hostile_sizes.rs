@@ -1,0 +1,153 @@
+//! Requests that would take all memory, or days, are refused before they start;
+//! numbers of any size break nothing; what is late says so.
+
+mod workplace;
+
+use std::fs;
+use std::time::Instant;
+
+use leafdyn::scenario::Scenario;
+use leafdyn::simulate::{Options, Scheme, Simulation};
+use serde_json::Value;
+use workplace::{Workplace, leaf};
+
+#[test]
+fn what_takes_more_memory_than_is_allowed_is_refused() {
+    workplace::all_refused(
+        "relax leaf.toml",
+        "
+        --segments 100000 --memory 100MB => 5 rods of 100000 segments would take about 1.4 GB of memory, and 100.0 MB are allowed: use fewer rods or segments, or raise the limit with --memory
+        --segments 1000 --memory 1e6 => and 1.0 MB are allowed
+        --method shooting --memory 1MB => use fewer rods or intervals
+        --method shooting --intervals 4000 --memory 1GB => shooting with 5 rods, intervals: 4000, would
+        --method shooting --set leaf.rods=100000 => shooting with 100000 rods
+        --method single-shooting --set leaf.rods=100000 => shooting with 100000 rods
+        --memory 10kB => a scenario of 
+        --memory lots => must be a size, as in 500MB or 2GB
+        --memory -1GB => must be a size
+        ",
+    );
+    workplace::all_refused(
+        "",
+        "
+        check leaf.toml --intervals 4000 --memory 1GB => shooting with 5 rods
+        check leaf.toml --set leaf.rods=100000 => shooting with 100000 rods
+        simulate leaf.toml --segments 100000 --memory 1GB => 5 rods of 100000 segments
+        trace leaf.toml --segments 10000 --vary load.gravity[2]=-1..0 --memory 1GB => branches of 5 rods of 10000 segments
+        map leaf.toml --vary load.gravity[2]=-1..0:1000 --vary load.gravity[0]=0..1:1000 --memory 1GB => lower the counts of the axes
+        ",
+    );
+}
+
+#[test]
+fn as_much_as_is_allowed_is_used_and_no_more() {
+    let place = Workplace::new();
+    place.run("relax leaf.toml --segments 100 --memory 10MB").ok();
+    // Refinement ends where memory does, and says so by its outcome.
+    let run = place.run("relax leaf.toml --tolerance 1e-11 --memory 1.5MB --json");
+    let summary = run.ends(1).json();
+    assert_eq!(summary["outcome"], "tolerance-not-reached");
+    let grids = summary["segments"].as_array().unwrap();
+    assert!(grids.iter().all(|n| n.as_u64().unwrap() <= 128), "{grids:?}");
+}
+
+#[test]
+fn a_large_scenario_is_weighed_before_it_is_parsed() {
+    let place = Workplace::new();
+    let comments = "# nothing but words, again and again\n".repeat(100_000);
+    fs::write(place.path("large.toml"), leaf("large", 2) + &comments).unwrap();
+    place.refuses("relax large.toml --memory 100MB", "would take about 277.5 MB");
+    place.run("relax large.toml --memory 1GB").ok();
+}
+
+/// Numbers of rods that no scenario has, and sizes beyond all powers of ten.
+#[test]
+fn maps_over_numbers_of_any_size_are_drawn_or_refused() {
+    for rods in ["-5..3:2", "1..1e9:2", "0..5:2", "-9e18..9e18:2"] {
+        let place = Workplace::new();
+        let vary = format!("--vary leaf.rods={rods} --vary coupling.y[0]=0..1:2");
+        let run = place.run(&format!("map leaf.toml {vary} --methods semi-implicit"));
+        run.ok().says(&["refused"]);
+        place.picture("out/small/map");
+    }
+    workplace::all_refused(
+        "map leaf.toml",
+        "
+        --vary stiffness.bending_2=1e308..1e308:3 => of a size from 1e-100 to 1e100
+        --vary load.gravity[2]=1e307..1.7e308:3 => of a size from
+        --vary load.gravity[2]=-1.7e308..1.7e308:3 => of a size from
+        --vary load.gravity[2]=1e-300..1:3log => of a size from
+        ",
+    );
+    let place = Workplace::new();
+    for (vary, rows) in [("1e99..1e100:3", 3), ("-1e100..1e100:2", 2), ("1e-100..1e100:3log", 3)] {
+        let folder = format!("out/{rows}{}", vary.len());
+        let asked = format!("map leaf.toml --vary load.gravity[2]={vary} --out {folder}");
+        place.run(&format!("{asked} --methods semi-implicit")).ok();
+        assert!(!place.picture(&format!("{folder}/map")).contains("inf"), "{vary}");
+    }
+}
+
+#[test]
+fn a_cell_keeps_its_time_whatever_its_grid() {
+    let clock = Instant::now();
+    let place = Workplace::new();
+    let one = "map leaf.toml --set leaf.rods=1 --set coupling.y=0 --set coupling.z=0";
+    let run = place.run(&format!("{one} --vary method.segments=8..1e6:2log --cell-seconds 0.5"));
+    run.ok().says(&["out-of-time"]);
+    let fixed = "--set method.segments=4000000 --vary load.gravity[2]=-1..0:2 --cell-seconds 1";
+    place.run(&format!("{one} {fixed} --out out/fixed")).ok().says(&["out-of-time"]);
+    let seconds = clock.elapsed().as_secs();
+    assert!(seconds < 60, "{seconds} s");
+}
+
+#[test]
+fn a_simulation_of_weeks_is_refused_before_it_starts() {
+    let place = Workplace::new();
+    for method in ["explicit", "semi-implicit"] {
+        let asked = format!("simulate leaf.toml --method {method} --step 1e-12");
+        place.refuses(&asked, "the time step of 1.000e-12 makes 1.0e13 steps, which take some");
+    }
+    let stiff = "--set stiffness.torsion=1e12 --set dynamics.section_radius=1e-6";
+    place.refuses(&format!("simulate leaf.toml {stiff}"), "at most 3 are allowed");
+}
+
+/// A vein with a kink whose shooting takes several intervals: its grid is that of
+/// 32 segments refined, and cut otherwise than one of 256 would be.
+#[test]
+fn stations_of_a_profile_with_knots_are_compared_by_place() {
+    let place = Workplace::new();
+    let text = leaf("knots", 1)
+        .replace("bending_2 = 1.0", "bending_2 = { at = [0.0, 0.3404, 1.0], value = [1.0, 2.0, 0.2] }")
+        .replace("gravity = [0.0, 0.0, -1.0]", "gravity = [0.0, 0.0, -3000.0]");
+    fs::write(place.path("knots.toml"), text).unwrap();
+    let check = place.run("check knots.toml --json").ok().json();
+    assert_eq!(check["verdict"], "agree");
+    assert_eq!(check["within_estimates"], true);
+    let list = |key: &str| check[key].as_array().map(Vec::len);
+    assert_eq!(list("stations"), list("differences"));
+    let trace = place.run("trace knots.toml --vary load.gravity[2]=-3000..-2900:2 --json");
+    assert_eq!(trace.json()["complete"], Value::Bool(true), "{}", trace.err);
+}
+
+#[test]
+fn a_checkpoint_with_a_number_that_is_not_finite_is_refused() {
+    let scenario = Scenario::from_toml(&leaf("small", 2)).unwrap();
+    for scheme in [Scheme::Explicit, Scheme::SemiImplicit] {
+        let options = Options {
+            scheme: Some(scheme),
+            ..Options::default()
+        };
+        let mut simulation = Simulation::new(&scenario, &options).unwrap();
+        simulation.next_frame().unwrap();
+        let state = simulation.save();
+        assert!(simulation.restore(&state), "{scheme:?}");
+        for at in (0..state.len()).step_by(7) {
+            for wild in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                let mut changed = state.clone();
+                changed[at] = wild;
+                assert!(!simulation.restore(&changed), "{scheme:?}: {wild} at {at}");
+            }
+        }
+    }
+}
