@@ -37,7 +37,9 @@ pub fn allowed() -> u64 {
 /// Memory of the machine.
 fn of_machine() -> Option<u64> {
     let text = fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
+    let line = text
+        .lines()
+        .find_map(|line| line.strip_prefix("MemTotal:"))?;
     let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     kilobytes.checked_mul(1024)
 }
@@ -200,7 +202,10 @@ fn size(bytes: u64) -> String {
 pub fn parse(text: &str) -> Result<u64, String> {
     let text = text.trim();
     let unit = UNITS.into_iter().find_map(|(name, unit)| {
-        let number = text.len().checked_sub(name.len()).filter(|&at| text.is_char_boundary(at))?;
+        let number = text
+            .len()
+            .checked_sub(name.len())
+            .filter(|&at| text.is_char_boundary(at))?;
         let (number, end) = text.split_at(number);
         end.eq_ignore_ascii_case(name).then_some((number, unit))
     });
@@ -218,15 +223,24 @@ mod tests {
 
     #[test]
     fn sizes_are_read_and_written() {
-        for (text, bytes) in [("2GB", 2_000_000_000), ("1.5 mb", 1_500_000), ("1e9", 1_000_000_000)] {
+        for (text, bytes) in [
+            ("2GB", 2_000_000_000),
+            ("1.5 mb", 1_500_000),
+            ("1e9", 1_000_000_000),
+        ] {
             assert_eq!(parse(text), Ok(bytes));
         }
-        for text in ["", "GB", "-1GB", "0", "many", "nan", "inf", "1e300", "ä", "äB"] {
+        for text in [
+            "", "GB", "-1GB", "0", "many", "nan", "inf", "1e300", "ä", "äB",
+        ] {
             assert!(parse(text).is_err(), "{text}");
         }
         assert_eq!(size(5_700_000_000), "5.7 GB");
         assert_eq!(size(12), "12 bytes");
-        let endless = Request::Grid { rods: usize::MAX, segments: usize::MAX };
+        let endless = Request::Grid {
+            rods: usize::MAX,
+            segments: usize::MAX,
+        };
         assert_eq!(endless.bytes(), u64::MAX);
     }
 
@@ -236,7 +250,11 @@ mod tests {
         let at = |path: &str, limit: &str| {
             let folder = root.path().join(path);
             fs::create_dir_all(&folder).unwrap();
-            let name = if path.starts_with("memory") { "memory.limit_in_bytes" } else { "memory.max" };
+            let name = if path.starts_with("memory") {
+                "memory.limit_in_bytes"
+            } else {
+                "memory.max"
+            };
             fs::write(folder.join(name), limit).unwrap();
         };
         at("a", "4000\n");

@@ -78,7 +78,10 @@ impl Simulate {
             && seconds > WORTH_TELLING
         {
             let (time, steps) = (duration(seconds), brief(steps));
-            note(&format!("{}: {steps} steps to make, some {time}", job.scenario.name));
+            note(&format!(
+                "{}: {steps} steps to make, some {time}",
+                job.scenario.name
+            ));
         }
         checkpoint_on_interrupt(recording.checkpointer());
         let ended = self.follow(&mut simulation, &mut recording, job);

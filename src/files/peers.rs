@@ -196,9 +196,17 @@ mod tests {
         let long = HEADER.to_string() + &row("p") + &row(&"x".repeat(1_000_000));
         refused(long.as_bytes(), 3, "program: more than 200 characters");
         let many: String = (0..60_000).map(|i| row(&format!("p{i}"))).collect();
-        refused((HEADER.to_string() + &many).as_bytes(), 102, "more than 100 programs");
+        refused(
+            (HEADER.to_string() + &many).as_bytes(),
+            102,
+            "more than 100 programs",
+        );
         let settings: String = (0..101).map(|i| format!("p,s,5,k s{i},1,,c\n")).collect();
-        refused((HEADER.to_string() + &settings).as_bytes(), 102, "more than 100 programs");
+        refused(
+            (HEADER.to_string() + &settings).as_bytes(),
+            102,
+            "more than 100 programs",
+        );
         let rows = HEADER.to_string() + &row("p").repeat(10_001);
         refused(rows.as_bytes(), 10_002, "more than 10000 rows");
         refused(b"", 1, "must name the columns program,");

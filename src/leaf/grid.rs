@@ -124,7 +124,10 @@ mod tests {
             let sum: f64 = (0..=segments).map(|i| grid.weight(i)).sum();
             assert!((sum - 1.0).abs() < 1e-15);
         }
-        for grid in [Grid::new(32, &[0.3404]), Grid::new(8, &[0.3404]).refined().refined()] {
+        for grid in [
+            Grid::new(32, &[0.3404]),
+            Grid::new(8, &[0.3404]).refined().refined(),
+        ] {
             assert_eq!(Grid::through(grid.sigma(), &[0.3404]), grid);
         }
         // However many kinks there are, every panel has a segment.

@@ -307,9 +307,8 @@ impl Simulation {
             return false;
         };
         let finite = || numbers.iter().all(|number| number.is_finite());
-        let fits = (0.0..=self.outputs as f64).contains(&made)
-            && finite()
-            && self.method.restore(numbers);
+        let fits =
+            (0.0..=self.outputs as f64).contains(&made) && finite() && self.method.restore(numbers);
         if fits {
             self.made = made as usize;
         }

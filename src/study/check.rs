@@ -9,9 +9,7 @@ use serde::Serialize;
 use super::judge::{fine_grid, index_at, same_places, timed, with_those_of};
 use super::words::words;
 use crate::bvp::{self, Solution, Start};
-use crate::relax::{
-    self, Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit,
-};
+use crate::relax::{self, Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit};
 use crate::scenario::Scenario;
 use crate::shape::Difference;
 use shot::relaxation;

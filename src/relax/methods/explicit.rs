@@ -41,6 +41,9 @@ const STEPS_PER_LOOK: usize = 200;
 /// Steps of the motion into the valley between looks at the clock.
 const STEPS_PER_PIECE: f64 = 2000.0;
 
+/// And nodes times steps: a tenth of a second.
+const NODES_PER_PIECE: f64 = 5e6;
+
 /// Accuracy that rounding allows.
 const LEAST_ACCURACY: f64 = 1e-10;
 
@@ -117,7 +120,7 @@ fn find_valley(
 ) -> Result<(), Stop> {
     let (mut fastest, mut convex) = (0.0_f64, 0);
     while motion.time() < LONGEST_MOTION {
-        look_ahead(motion, request.limit)?;
+        look_ahead(motion, leaf.rods() * leaf.segments(), request.limit)?;
         let now = motion.snapshot();
         fastest = fastest.max(now.energy.kinetic);
         let slow = now.energy.kinetic <= SLOW * fastest;
@@ -138,10 +141,11 @@ fn find_valley(
 
 /// Moves on to the next look. On fine grids of stiff rods that takes long: with
 /// a limit it is made in pieces.
-fn look_ahead(motion: &mut Explicit, limit: &Limit) -> Result<(), Stop> {
+fn look_ahead(motion: &mut Explicit, nodes: usize, limit: &Limit) -> Result<(), Stop> {
     let begin = motion.time();
+    let steps = STEPS_PER_PIECE.min((NODES_PER_PIECE / nodes as f64).max(1.0));
     let pieces = match limit.is_none() {
-        false => (LOOK / (STEPS_PER_PIECE * motion.longest_step())).ceil(),
+        false => (LOOK / (steps * motion.longest_step())).ceil(),
         true => 1.0,
     };
     for piece in 1..=pieces as usize {
@@ -167,12 +171,16 @@ fn descend(
     request: &mut Request,
 ) -> Result<f64, Stop> {
     let accuracy = request.accuracy.max(LEAST_ACCURACY);
+    let large = (leaf.rods() * leaf.segments()) as f64 > NODES_PER_PIECE / STEPS_PER_PIECE;
     motion.use_fictitious_masses();
     let mut balanced = FIRST_BALANCE * accuracy;
     let (mut since, mut before) = (0, 0.0);
     let (mut best, mut looks_since_best) = (f64::INFINITY, 0);
     loop {
         for _ in 0..STEPS_PER_LOOK {
+            if large && request.limit.reached() {
+                return Err(Stop::StepLimit);
+            }
             let rate = 3.0 / (STEP * (since + 2) as f64);
             motion.set_damping(rate);
             let moving = motion.step(STEP);

@@ -117,7 +117,10 @@ impl<'a> Cell<'a> {
             MapMethod::ToRest(method) => !method.is_shooting(),
         };
         if on_grid && nodes as f64 * LEAST_SECONDS > self.limit.as_secs_f64() {
-            let why = format!("{nodes} nodes take longer than {} s", self.limit.as_secs_f64());
+            let why = format!(
+                "{nodes} nodes take longer than {} s",
+                self.limit.as_secs_f64()
+            );
             return (Err((MapOutcome::OutOfTime, why)), 0.0);
         }
         within(self.limit, |limit| match method {

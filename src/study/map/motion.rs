@@ -146,7 +146,12 @@ pub fn stations(scenario: &Scenario, knobs: Knobs) -> Vec<f64> {
             let grid = fine_grid(scenario, segments);
             let every = grid.segments().div_ceil(MOST_STATIONS);
             let tip = [1.0].into_iter();
-            grid.sigma().iter().copied().step_by(every).chain(tip).collect()
+            grid.sigma()
+                .iter()
+                .copied()
+                .step_by(every)
+                .chain(tip)
+                .collect()
         }
         _ => vec![0.0, 1.0],
     }
