@@ -3,7 +3,9 @@
 
 mod common;
 
-use common::random::{drawn, leaves};
+use std::time::Duration;
+
+use common::random::{drawn, leaves, uneven_leaves};
 use common::{distance, files, kept, paper_leaf, read, relaxed, scenario, to};
 use leafdyn::scenario::Scenario;
 
@@ -144,4 +146,42 @@ fn of_a_saddle_that_is_kept() {
         let what = format!("{k}, {tolerance:e}: {error:e}, {estimate:e}");
         assert!(error <= estimate + uncertain, "{what}");
     }
+}
+
+/// Leaves at the edge of what could be one, of which some do not come to rest: in
+/// those that do, soft directions beside stiff ones leave more than the energy of an
+/// error shows. `LEAFDYN_LEAVES` is how many are tried.
+#[test]
+fn of_leaves_of_uneven_stiffness() {
+    let count = std::env::var("LEAFDYN_LEAVES").ok();
+    let count = count.and_then(|count| count.parse().ok()).unwrap_or(40);
+    let limit = Duration::from_secs(2);
+    let (mut judged, mut wrong) = (0, Vec::new());
+    for (case, leaf) in drawn(uneven_leaves(), count).iter().enumerate() {
+        let to = |tolerance| {
+            leaf.relaxation()
+                .tolerance(tolerance)
+                .time_limit(limit)
+                .run()
+        };
+        let [found, truth] = [1e-6, 1e-10].map(|tolerance| to(tolerance).unwrap());
+        if !(found.outcome.is_success() && truth.outcome.is_success()) {
+            continue;
+        }
+        let [estimate, uncertain] =
+            [&found, &truth].map(|leaf| leaf.accuracy.error_estimate.unwrap());
+        let error = distance(&found, &truth);
+        // Where there are several equilibria, each is one.
+        if error < 0.01 {
+            judged += 1;
+            let grids = &found.accuracy.segments;
+            let what = format!("{case}: error {error:.1e}, estimate {estimate:.1e}, {grids:?}");
+            wrong.extend((error > estimate + uncertain).then_some(what));
+        }
+    }
+    println!("{} of {judged} estimates too low", wrong.len());
+    assert!(
+        2 * judged > count && wrong.is_empty(),
+        "{judged}: {wrong:#?}"
+    );
 }

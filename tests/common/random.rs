@@ -195,3 +195,64 @@ prop_compose! {
         leaf
     }
 }
+
+/// Constant or, as often, with a kink or two and up to twenty times as large in one
+/// place as in another.
+fn uneven_profile(value: impl Strategy<Value = f64>) -> impl Strategy<Value = Profile> {
+    let knots = (0.05..0.5, 0.55..0.95, prop::array::uniform4(-0.7..0.5));
+    (value, knots, prop::bool::weighted(0.3)).prop_map(|(value, (first, second, tens), on)| {
+        let at = |k: usize| value * 10f64.powf(tens[k]);
+        match on && value.is_finite() {
+            false => Profile::Constant(value),
+            true => linear(&[0.0, first, second, 1.0], &[0, 1, 2, 3].map(at)),
+        }
+    })
+}
+
+prop_compose! {
+    fn uneven_rods(count: usize)(
+        couple in prop::collection::vec(
+            prop::array::uniform3(uneven_profile(log_uniform(-1.5..1.5))), count),
+        force in prop::collection::vec(
+            prop::array::uniform3(prop_oneof![
+                4 => uneven_profile(log_uniform(1.5..5.0)),
+                1 => Just(Profile::Constant(f64::INFINITY)),
+            ]), count),
+        curved in log_uniform(-1.0..1.3),
+        rest in prop::collection::vec(prop::array::uniform3(uneven_profile(-1.0..1.0)), count),
+        lengths in prop::collection::vec(0.58..1.73, count),
+        angles in prop::collection::vec(-1.5..1.5, count),
+    ) -> Scenario {
+        let mut leaf = paper_leaf(count, [1.0; 3], [1.0; 3], 0.0);
+        for (j, rod) in leaf.rods.iter_mut().enumerate() {
+            rod.length = lengths[j];
+            rod.angle = angles[j];
+            rod.couple_stiffness = couple[j].clone();
+            rod.force_stiffness = force[j].clone();
+            rod.rest_curvature = rest[j].each_ref().map(|profile| profile.scaled(curved));
+        }
+        leaf
+    }
+}
+
+prop_compose! {
+    /// One to eight veins at the edge of what could be a leaf: stiffness over three
+    /// decades, lengths over a factor of three, curved by up to 20/L at rest, loads up
+    /// to 1e4 of the softest vein.
+    pub fn uneven_leaves()(count in 1..9_usize)(
+        leaf in uneven_rods(count),
+        load in log_uniform(-2.5..2.5),
+        coupling in log_uniform(-1.0..3.0),
+        parts in prop::collection::vec(prop::array::uniform3(0.0..1.0), count - 1),
+        gravity in prop::array::uniform3(-1.0..1.0),
+        tip_force in prop::array::uniform3(-1.0..1.0),
+        joined in prop::bool::weighted(0.75),
+    ) -> Scenario {
+        let mut leaf: Scenario = leaf;
+        leaf.joined = joined;
+        leaf.gravity = gravity.map(|g| load * g);
+        leaf.tip_force = tip_force.map(|f| load * leaf.rods.len() as f64 * f);
+        leaf.coupling = parts.iter().map(|gap| gap.map(|part: f64| coupling * part)).collect();
+        leaf
+    }
+}
