@@ -49,11 +49,10 @@ impl Equations<'_> {
         let mut previous = f64::INFINITY;
         let mut finished = false;
         for _ in 0..=ITERATIONS {
-            let family = match (finished, self.softened) {
-                (true, Some(softened)) => softened,
-                _ => *self.family,
+            let linear = match finished {
+                true => self.linearise_softened(&mut state, fraction)?,
+                false => self.linearise(&mut state, fraction)?,
             };
-            let linear = self.linearise_in(family, &mut state, fraction)?;
             let mut solve = self.factor_bordered(&border)?;
             let none = vec![0.0; p];
             let forces = solve(&linear.forces, &none);
@@ -112,7 +111,7 @@ impl Equations<'_> {
     pub fn soft_modes(&mut self, point: &Point, count: usize) -> Result<Vec<Field>, Stuck> {
         let mut state = point.state.clone();
         self.linearise(&mut state, point.fraction)?;
-        let count = count.min(6 * self.rods() * self.grid.segments() / 2).max(1);
+        let count = count.min(6 * self.rods() * self.grid().segments() / 2).max(1);
         let mut pattern = self.pattern.take();
         let mut factor = factorized(&mut pattern, &self.system, SHIFT)?;
         let mut modes: Vec<Field> = (0..count).map(|k| seed(&mut self.system, k)).collect();

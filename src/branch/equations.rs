@@ -1,6 +1,6 @@
 //! The equations of a branch on one grid, linearised and solved.
 
-use super::family::{Family, OutOfRange, clamp};
+use super::family::{Family, Leaves, OutOfRange, clamp};
 use super::field::{dot, is_finite, largest, plus, times};
 use super::{Point, Tangent};
 use crate::leaf::{Field, Grid, Solved, SparseFactor, SparsePattern, State, System};
@@ -52,13 +52,11 @@ pub enum Stuck {
 /// The equations of a family of leaves on a grid, with the memory to solve them.
 pub struct Equations<'a> {
     /// The leaves.
-    pub family: &'a Family<'a>,
+    pub leaves: Leaves<'a>,
     /// The same with softened matrices, where these decide what is critical.
     /// Newton's method needs the true ones: near singular points of the softened it
     /// would not converge.
-    pub softened: Option<Family<'a>>,
-    /// The grid.
-    pub grid: Grid,
+    pub softened: Option<Leaves<'a>>,
     /// The mass of the leaf but for its base.
     mass: f64,
     pub(super) system: System,
@@ -85,14 +83,19 @@ pub(super) struct Linear {
 impl<'a> Equations<'a> {
     /// Room for the equations of `family` on `grid`.
     pub fn new(family: &'a Family<'a>, grid: Grid) -> Result<Self, OutOfRange> {
-        let system = family.with(0.0, &grid, System::new)?;
+        Equations::of(Leaves::new(family, grid))
+    }
+
+    fn of(mut leaves: Leaves<'a>) -> Result<Self, OutOfRange> {
+        // Veins may be coupled at one end of the range only.
+        let coupled = leaves.at(0.0)?.coupled();
+        let system = System::new(leaves.at(if coupled { 0.0 } else { 1.0 })?);
         let one = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
-        let ones = vec![vec![one; grid.segments()]; system.rods()];
+        let ones = vec![vec![one; leaves.grid.segments()]; system.rods()];
         Ok(Equations {
-            family,
+            leaves,
             softened: None,
             mass: dot(&system.momentum(&ones), &ones),
-            grid,
             system,
             pattern: None,
             bordered: None,
@@ -103,7 +106,12 @@ impl<'a> Equations<'a> {
 
     /// The same on the grid with all segments halved.
     pub fn refined(&self) -> Result<Self, OutOfRange> {
-        Equations::new(self.family, self.grid.refined())
+        Equations::of(self.leaves.refined())
+    }
+
+    /// The grid.
+    pub fn grid(&self) -> &Grid {
+        &self.leaves.grid
     }
 
     /// Product of two increments over the masses, per unit of the leaf's mass.
@@ -143,58 +151,25 @@ impl<'a> Equations<'a> {
         step: f64,
     ) -> Result<State, OutOfRange> {
         self.system.set_solution(increments);
-        let system = &self.system;
-        self.family.with(fraction, &self.grid, |leaf| {
-            let mut next = state.clone();
-            leaf.advance(state, system, step, &mut next);
-            next
-        })
+        let leaf = self.leaves.at(fraction)?;
+        let mut next = state.clone();
+        leaf.advance(state, &self.system, step, &mut next);
+        Ok(next)
     }
 
     /// The forces, their rates, and the matrix (left in the system).
     pub(super) fn linearise(&mut self, state: &mut State, fraction: f64) -> Result<Linear, Stuck> {
-        self.linearise_in(*self.family, state, fraction)
+        linearise(&mut self.leaves, &mut self.system, state, fraction)
     }
 
-    pub(super) fn linearise_in(
+    /// The same with the softened matrix, if there is one.
+    pub(super) fn linearise_softened(
         &mut self,
-        family: Family,
         state: &mut State,
         fraction: f64,
     ) -> Result<Linear, Stuck> {
-        let (grid, system) = (&self.grid, &mut self.system);
-        let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
-            // At an end of the range there may be nothing beyond.
-            let mut at = |step: f64| {
-                family.with(fraction + step, grid, |leaf| {
-                    let mut moved = state.clone();
-                    clamp(leaf, &mut moved);
-                    leaf.assemble(&moved, system);
-                    (step, system.rhs())
-                })
-            };
-            at(step).or_else(|_| at(0.0))
-        });
-        let ((after, forces_after), (before, forces_before)) = (after?, before?);
-        let rate = plus(&forces_after, -1.0, &forces_before);
-        let rate = times(&rate, 1.0 / (after - before));
-        let (turn, shift, noise) = family.with(fraction, grid, |leaf| {
-            clamp(leaf, state);
-            let turn = leaf.assemble(state, system).turn;
-            let sections = leaf.sections.iter();
-            let stiffest = sections.fold(1.0, |m: f64, s| m.max(s.condensing.max_element()));
-            let noise = ROUNDING * f64::EPSILON * stiffest;
-            (turn, leaf.neutral_shift(), noise)
-        })?;
-        if !turn.is_finite() || turn > RESOLVED_TURN {
-            return Err(Stuck::Unresolved);
-        }
-        Ok(Linear {
-            forces: system.rhs(),
-            rate,
-            shift,
-            noise,
-        })
+        let leaves = self.softened.as_mut().unwrap_or(&mut self.leaves);
+        linearise(leaves, &mut self.system, state, fraction)
     }
 
     /// Solves for the forces and their rate with K + shift M: rod by rod if that
@@ -250,8 +225,7 @@ impl<'a> Equations<'a> {
             state = self.moved(&state, fraction, &increments, 1.0)?;
             fraction += step;
             if at_rest(size, previous) {
-                let (family, grid) = (self.family, &self.grid);
-                family.with(fraction, grid, |leaf| clamp(leaf, &mut state))?;
+                clamp(self.leaves.at(fraction)?, &mut state);
                 let mut tangent = self.normalised(Tangent {
                     increments: rate,
                     fraction: 1.0,
@@ -279,22 +253,57 @@ impl<'a> Equations<'a> {
 
     /// Morse index of a state at rest, neutral modes not counting.
     fn index(&mut self, state: &State, fraction: f64) -> Result<usize, Stuck> {
-        let (family, grid, system) = (self.family, &self.grid, &mut self.system);
+        let leaf = self.leaves.at(fraction)?;
+        let system = &mut self.system;
         self.factorizations += 1;
-        let assemble = |system: &mut System| {
-            family.with(fraction, grid, |leaf| {
-                leaf.assemble(state, system);
-                leaf.neutral_shift()
-            })
-        };
-        let shift = assemble(system)?;
+        let shift = leaf.neutral_shift();
+        system.set_coupling(leaf);
+        leaf.assemble(state, system);
         if system.stable_without_coupling(shift) {
             return Ok(0);
         }
-        assemble(system)?;
+        leaf.assemble(state, system);
         self.factorizations += 1;
         Ok(factorized(&mut self.pattern, system, shift)?.negative())
     }
+}
+
+/// The forces on a state, their rates, and the matrix (left in the system).
+fn linearise(
+    leaves: &mut Leaves,
+    system: &mut System,
+    state: &mut State,
+    fraction: f64,
+) -> Result<Linear, Stuck> {
+    let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
+        // At an end of the range there may be nothing beyond.
+        let mut at = |step: f64| {
+            let leaf = leaves.at(fraction + step)?;
+            let mut moved = state.clone();
+            clamp(leaf, &mut moved);
+            leaf.assemble(&moved, system);
+            Ok((step, system.rhs()))
+        };
+        at(step).or_else(|_: OutOfRange| at(0.0))
+    });
+    let ((after, forces_after), (before, forces_before)) = (after?, before?);
+    let rate = plus(&forces_after, -1.0, &forces_before);
+    let rate = times(&rate, 1.0 / (after - before));
+    let leaf = leaves.at(fraction)?;
+    clamp(leaf, state);
+    system.set_coupling(leaf);
+    let turn = leaf.assemble(state, system).turn;
+    if !turn.is_finite() || turn > RESOLVED_TURN {
+        return Err(Stuck::Unresolved);
+    }
+    let sections = leaf.sections.iter();
+    let stiffest = sections.fold(1.0, |m: f64, s| m.max(s.condensing.max_element()));
+    Ok(Linear {
+        forces: system.rhs(),
+        rate,
+        shift: leaf.neutral_shift(),
+        noise: ROUNDING * f64::EPSILON * stiffest,
+    })
 }
 
 /// A direct factorisation of the assembled matrix K + `shift` M.

@@ -1,8 +1,9 @@
 //! Leaves that differ in one parameter.
 
-use glam::DVec3;
-
+use std::collections::VecDeque;
 use std::sync::Arc;
+
+use glam::DVec3;
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, Scale, State};
 use crate::scenario::Scenario;
@@ -12,7 +13,7 @@ use crate::scenario::Scenario;
 const STIFFEST: f64 = 1e5;
 
 /// A leaf for every value of a parameter.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Family<'a> {
     make: &'a (dyn Fn(f64) -> Result<Scenario, String> + Sync),
     /// Values of the parameter at the fractions 0 and 1.
@@ -20,7 +21,8 @@ pub struct Family<'a> {
     to: f64,
     /// Whether equal steps of the fraction are equal quotients of the value.
     log: bool,
-    scale: Scale,
+    /// The leaves there.
+    ends: [Leaf; 2],
     softening: Option<f64>,
 }
 
@@ -37,14 +39,15 @@ impl<'a> Family<'a> {
         (from, to): (f64, f64),
         log: bool,
     ) -> Result<Self, OutOfRange> {
-        let first = make(from).map_err(OutOfRange)?;
-        make(to).map_err(OutOfRange)?;
+        let [first, last] = [from, to].map(|value| make(value).map_err(OutOfRange));
+        let first = Leaf::new(&first?);
+        let last = Leaf::in_units(Arc::new(last?), first.scale);
         Ok(Family {
             make,
             from,
             to,
             log,
-            scale: Leaf::new(&first).scale,
+            ends: [first, last],
             softening: None,
         })
     }
@@ -57,13 +60,13 @@ impl<'a> Family<'a> {
     pub fn softened(&self, softening: f64) -> Self {
         Family {
             softening: Some(softening),
-            ..*self
+            ..self.clone()
         }
     }
 
     /// The units of all its leaves.
     pub fn scale(&self) -> Scale {
-        self.scale
+        self.ends[0].scale
     }
 
     /// The parameter at a fraction of its range.
@@ -80,6 +83,27 @@ impl<'a> Family<'a> {
         (self.make)(self.value(fraction)).map_err(OutOfRange)
     }
 
+    /// The leaf there.
+    fn leaf(&self, fraction: f64) -> Result<Leaf, OutOfRange> {
+        Ok(match fraction {
+            0.0 => self.ends[0].clone(),
+            1.0 => self.ends[1].clone(),
+            _ => Leaf::in_units(Arc::new(self.scenario(fraction)?), self.scale()),
+        })
+    }
+
+    /// One of its leaves on a grid.
+    fn discretised(&self, leaf: &Leaf, grid: &Grid) -> DiscreteLeaf {
+        let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
+        for section in &mut discrete.sections {
+            section.condensing = match self.softening {
+                Some(softening) => (section.compliance + DVec3::splat(softening)).recip(),
+                None => section.condensing.min(DVec3::splat(STIFFEST)),
+            };
+        }
+        discrete
+    }
+
     /// Does something with the leaf there, on a grid.
     pub fn with<R>(
         &self,
@@ -87,16 +111,52 @@ impl<'a> Family<'a> {
         grid: &Grid,
         act: impl FnOnce(&DiscreteLeaf) -> R,
     ) -> Result<R, OutOfRange> {
-        let scenario = self.scenario(fraction)?;
-        let leaf = Leaf::in_units(Arc::new(scenario), self.scale);
-        let mut discrete = DiscreteLeaf::new(&leaf, grid.clone());
-        for section in &mut discrete.sections {
-            section.condensing = match self.softening {
-                Some(softening) => (section.compliance + DVec3::splat(softening)).recip(),
-                None => section.condensing.min(DVec3::splat(STIFFEST)),
-            };
+        Ok(act(&self.discretised(&self.leaf(fraction)?, grid)))
+    }
+}
+
+/// Leaves of a family on one grid. The last few are kept: an iteration comes
+/// back to them, and to make a scenario costs more than to assemble a small leaf.
+pub struct Leaves<'a> {
+    pub family: &'a Family<'a>,
+    pub grid: Grid,
+    kept: VecDeque<(f64, DiscreteLeaf)>,
+}
+
+/// Leaves that are kept: of a difference over the parameter, and one more.
+const KEPT: usize = 4;
+
+impl<'a> Leaves<'a> {
+    pub fn new(family: &'a Family<'a>, grid: Grid) -> Self {
+        Leaves {
+            family,
+            grid,
+            kept: VecDeque::new(),
         }
-        Ok(act(&discrete))
+    }
+
+    /// The same on the grid with all segments halved.
+    pub fn refined(&self) -> Self {
+        let grid = self.grid.refined();
+        let kept = self.kept.iter();
+        let finer = |leaf: &DiscreteLeaf| self.family.discretised(&leaf.leaf, &grid);
+        Leaves {
+            kept: kept.map(|(at, leaf)| (*at, finer(leaf))).collect(),
+            family: self.family,
+            grid,
+        }
+    }
+
+    /// The leaf at a fraction of the range.
+    pub fn at(&mut self, fraction: f64) -> Result<&DiscreteLeaf, OutOfRange> {
+        let known = self.kept.iter().position(|(at, _)| *at == fraction);
+        let leaf = match known.and_then(|index| self.kept.remove(index)) {
+            Some((_, leaf)) => leaf,
+            None => (self.family).discretised(&self.family.leaf(fraction)?, &self.grid),
+        };
+        self.kept.truncate(KEPT - 1);
+        self.kept.push_front((fraction, leaf));
+        Ok(&self.kept[0].1)
     }
 }
 

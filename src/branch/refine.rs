@@ -2,7 +2,7 @@
 
 use super::critical::Critical;
 use super::equations::{Equations, Stuck};
-use super::family::Family;
+use super::family::{Family, Leaves};
 use super::field::prolong as prolong_field;
 use super::{Point, Tangent};
 use crate::leaf::{Grid, State};
@@ -61,7 +61,7 @@ pub fn refine(
         if error <= accuracy {
             break;
         }
-        let before = &equations.grid;
+        let before = equations.grid();
         let finer = family.with(fraction, before, |leaf| prolong(leaf, &state))?;
         tangent = Tangent {
             increments: prolong_field(&tangent.increments),
@@ -82,7 +82,7 @@ pub fn refine(
             break;
         };
         (state, fraction) = (found.state, found.fraction);
-        reached.clone_from(&equations.grid);
+        reached.clone_from(equations.grid());
         table.push(&equations, &state, fraction)?;
         error = table.tips.best().map_or(f64::INFINITY, |best| best.error);
     }
@@ -97,7 +97,7 @@ pub fn refine_critical(family: &Family, grid: &Grid, found: &Critical) -> Result
     let mut reached = grid.clone();
     for level in 0..CRITICAL_GRIDS {
         if level > 0 {
-            let before = &equations.grid;
+            let before = equations.grid();
             let on_finer = |leaf: &_| prolong(leaf, &critical.state);
             let state = family.with(critical.fraction, before, on_finer)?;
             equations = equations.refined()?;
@@ -115,9 +115,9 @@ pub fn refine_critical(family: &Family, grid: &Grid, found: &Critical) -> Result
                 break;
             };
             critical = found;
-            reached.clone_from(&equations.grid);
+            reached.clone_from(equations.grid());
         }
-        let (rigid, rounding) = family.with(critical.fraction, &equations.grid, |leaf| {
+        let (rigid, rounding) = family.with(critical.fraction, equations.grid(), |leaf| {
             let rigid = leaf.stiffest() * NEARLY_RIGID < 1.0;
             let limit = if rigid {
                 1.0 / SOFTENING
@@ -133,7 +133,7 @@ pub fn refine_critical(family: &Family, grid: &Grid, found: &Critical) -> Result
         table.rounding = table.rounding.max(rounding);
         let fraction = match rigid {
             false => critical.fraction,
-            true => unsoftened(family, &equations.grid, &critical)?,
+            true => unsoftened(family, equations.grid(), &critical)?,
         };
         table.push(&equations, &critical.state, fraction)?;
         // A finer grid would only add rounding.
@@ -150,8 +150,9 @@ fn unsoftened(family: &Family, grid: &Grid, critical: &Critical) -> Result<f64, 
     let mut fractions = [0.0; 4];
     let mut near = critical.clone();
     for (k, fraction) in fractions.iter_mut().enumerate().rev() {
+        let soft = family.softened(SOFTENING * (k + 1) as f64);
         let mut equations = Equations::new(family, grid.clone())?;
-        equations.softened = Some(family.softened(SOFTENING * (k + 1) as f64));
+        equations.softened = Some(Leaves::new(&soft, grid.clone()));
         near = near.again(&mut equations)?;
         *fraction = near.fraction;
     }
@@ -172,8 +173,8 @@ struct Table {
 
 impl Table {
     fn push(&mut self, equations: &Equations, state: &State, fraction: f64) -> Result<(), Stuck> {
-        let family = equations.family;
-        let energy = family.with(fraction, &equations.grid, |leaf| leaf.energy(state))?;
+        let family = equations.leaves.family;
+        let energy = family.with(fraction, equations.grid(), |leaf| leaf.energy(state))?;
         let tips = (0..state.rods()).flat_map(|j| state.tip(j).to_array());
         let segments = state.segments();
         self.tips.push(segments, tips.collect());

@@ -105,16 +105,8 @@ impl System {
         let (rods, n) = (leaf.rods(), leaf.segments());
         let joined = leaf.tips_move_together();
         let coupled = leaf.coupled();
-        let gap = |g: usize| {
-            // A node in the plane of the mirror does not answer a pull across it.
-            let answer = match leaf.leaf.in_plane(g) {
-                true => DVec3::new(1.0, 0.0, 1.0),
-                false => DVec3::ONE,
-            };
-            answer * leaf.coupling(g - 1)
-        };
-        let gaps: Vec<DVec3> = match coupled {
-            true => (1..rods).map(gap).collect(),
+        let gaps = match coupled {
+            true => gaps(leaf).collect(),
             false => Vec::new(),
         };
         let count = rods.div_ceil(GROUP);
@@ -132,6 +124,18 @@ impl System {
             tip: None,
             gaps,
             moment: DVec3::ZERO,
+        }
+    }
+
+    /// Takes the coupling between rods, if it has any, from a leaf of which all else but
+    /// what is assembled is as it was for [`System::new`].
+    pub fn set_coupling(&mut self, leaf: &DiscreteLeaf) {
+        if self.coupled {
+            self.gaps.clear();
+            self.gaps.extend(gaps(leaf));
+            for (g, group) in self.groups.iter_mut().enumerate() {
+                group.coupling = coupling(rods_of(g, self.rods), &self.gaps);
+            }
         }
     }
 
@@ -314,22 +318,42 @@ impl System {
     }
 }
 
+/// Coupling of every gap per weight.
+fn gaps(leaf: &DiscreteLeaf) -> impl Iterator<Item = DVec3> {
+    let gap = move |g: usize| {
+        // A node in the plane of the mirror does not answer a pull across it.
+        let answer = match leaf.leaf.in_plane(g) {
+            true => DVec3::new(1.0, 0.0, 1.0),
+            false => DVec3::ONE,
+        };
+        answer * leaf.coupling(g - 1)
+    };
+    (1..leaf.rods()).map(gap)
+}
+
+/// Coupling of the rods of a group with those before and those behind.
+fn coupling(rods: Range<usize>, gaps: &[DVec3]) -> [[Four; 3]; 2] {
+    let mut coupling = [[Four::default(); 3]; 2];
+    for (lane, j) in rods.enumerate() {
+        for (side, gap) in [j.wrapping_sub(1), j].into_iter().enumerate() {
+            for c in 0..3 {
+                coupling[side][c].0[lane] = gaps.get(gap).map_or(0.0, |gap| gap[c]);
+            }
+        }
+    }
+    coupling
+}
+
 impl Group {
     /// Room for the equations of a group of the rods of `leaf`.
     fn new(leaf: &DiscreteLeaf, group: usize, gaps: &[DVec3]) -> Self {
         let n = leaf.segments();
         let zeros = vec![Increments::default(); n];
         let (mut active, mut masses) = (Four::default(), [Four::default(); 2]);
-        let mut coupling = [[Four::default(); 3]; 2];
         for (lane, j) in rods_of(group, leaf.rods()).enumerate() {
             active.0[lane] = 1.0;
             for (four, mass) in masses.iter_mut().zip(leaf.mass_per_weight(j)) {
                 four.0[lane] = mass;
-            }
-            for (side, gap) in [j.wrapping_sub(1), j].into_iter().enumerate() {
-                for c in 0..3 {
-                    coupling[side][c].0[lane] = gaps.get(gap).map_or(0.0, |gap| gap[c]);
-                }
             }
         }
         Group {
@@ -339,7 +363,7 @@ impl Group {
             solution: zeros.clone(),
             sums: Sums::default(),
             masses,
-            coupling,
+            coupling: coupling(rods_of(group, leaf.rods()), gaps),
             residual: zeros.clone(),
             z: zeros.clone(),
             b_p: zeros,
