@@ -222,7 +222,9 @@ pub mod undulation;
 #[doc(hidden)]
 pub mod internals {
     pub mod branch {
-        pub use crate::branch::{Equations, Family, Kind, Point, Walk, walk};
+        pub use crate::branch::{
+            End, Equations, Family, Followed, Grids, Kind, Point, Refined, Walk, begin, walk,
+        };
     }
     pub mod bvp {
         pub use crate::bvp::{
@@ -254,7 +256,7 @@ pub mod internals {
         pub use crate::rotation::{exp, log, outer};
     }
     pub mod relax {
-        pub use crate::relax::index::project;
+        pub use crate::relax::index::{index_near, project};
         pub use crate::relax::start::start;
     }
 }

@@ -163,3 +163,50 @@ fn a_vein_that_grows_is_followed() {
         assert!((a - b).abs() < 2e-6, "{a} {b}");
     }
 }
+
+/// On the grid that is enough at its start, this branch would go over to one that only
+/// that grid has.
+#[test]
+fn a_branch_that_needs_finer_grids_gets_them() {
+    let place = Workplace::new();
+    let leaf = "scenarios/paper/fig10.toml --set leaf.rods=5 --keep-unstable --tolerance 1e-4";
+    let run = place.run(&format!(
+        "trace {leaf} --vary load.gravity[2]=0..-0.5 --json"
+    ));
+    let trace = run.ends(0).json();
+    let branch = &trace["branches"][0];
+    assert_eq!(
+        [&branch["end"], &trace["complete"]],
+        [&Value::from("returned"), &true.into()]
+    );
+    for row in place.table("out/fig10/trace.csv", COLUMNS) {
+        let error: f64 = row[8]
+            .parse()
+            .unwrap_or_else(|_| panic!("no bound: {row:?}"));
+        assert!(error <= 1e-4, "{row:?}");
+    }
+    let critical = branch["critical"].as_array().unwrap();
+    assert_eq!((critical.len(), &critical[0]["kind"]), (1, &"fold".into()));
+    assert!(
+        critical[0]["value_error"].as_f64().unwrap() < 1e-6,
+        "{critical:?}"
+    );
+    let index = |point: &str| branch[point]["negative_eigenvalues"].as_u64().unwrap();
+    assert_eq!(index("first"), index("last") + 1);
+}
+
+/// Also of veins that are coupled at one end of the range only.
+#[test]
+fn coupling_may_vary() {
+    let place = Workplace::new();
+    let vary = "--set coupling.y=0 --vary coupling.z=0..40 --tolerance 1e-8 --json --out t";
+    let trace = place.run(&format!("trace leaf.toml {vary}")).ends(0).json();
+    let branch = &trace["branches"][0];
+    assert!(branch["points"].as_u64().unwrap() < 40, "{branch}");
+    let set = "--set coupling.y=0 --set coupling.z=40 --tolerance 1e-9 --json --out r";
+    let leaf = place.run(&format!("relax leaf.toml {set}")).json();
+    let tips = [&branch["last"]["tip"], &leaf["tip"]].map(floats);
+    for (a, b) in tips[0].iter().zip(&tips[1]) {
+        assert!((a - b).abs() < 2e-8, "{a} {b}");
+    }
+}

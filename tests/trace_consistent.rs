@@ -56,7 +56,7 @@ fn random_branches() {
             longest: 0.02,
             most: 120,
         };
-        let branch = walk(&mut equations, first, &how, &mut |_| {});
+        let branch = walk(&mut equations, first, &how, &mut |_, _| {});
         points += branch.points.len();
         missed += branch.missed.len();
 

@@ -24,6 +24,10 @@ const NEUTRAL: f64 = 1e-6;
 /// Zeros within this part of a step are one.
 const SAME: f64 = 1e-6;
 
+/// The search arrives where the step did to within this part of the step, if both
+/// are on the same branch.
+const ARRIVES: f64 = 0.05;
+
 /// What a critical point is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -53,8 +57,8 @@ pub struct Critical {
     pub slope: f64,
 }
 
-/// The critical points between two points of a branch, the second of them
-/// found by a step of the given length from the first.
+/// The critical points between two points of a branch, the second of them so
+/// far from the first along its tangent.
 pub fn locate(
     equations: &mut Equations,
     a: &Point,
@@ -69,6 +73,9 @@ pub fn locate(
         held: &held,
     };
     let ends = [search.at(0.0)?, search.at(step)?];
+    if ends[1].deflated.state.shift_to(&b.state) > ARRIVES * step {
+        return Err(Stuck::NotConverged);
+    }
     let mut found: Vec<(f64, Critical)> = Vec::new();
     for which in 0..ends[0].eigenvalues.len() {
         let values = [0, 1].map(|k| ends[k].eigenvalues[which]);

@@ -111,7 +111,9 @@ impl Equations<'_> {
     pub fn soft_modes(&mut self, point: &Point, count: usize) -> Result<Vec<Field>, Stuck> {
         let mut state = point.state.clone();
         self.linearise(&mut state, point.fraction)?;
-        let count = count.min(6 * self.rods() * self.grid().segments() / 2).max(1);
+        let count = count
+            .min(6 * self.rods() * self.grid().segments() / 2)
+            .max(1);
         let mut pattern = self.pattern.take();
         let mut factor = factorized(&mut pattern, &self.system, SHIFT)?;
         let mut modes: Vec<Field> = (0..count).map(|k| seed(&mut self.system, k)).collect();

@@ -69,6 +69,11 @@ impl<'a> Family<'a> {
         self.ends[0].scale
     }
 
+    /// The leaf at the fraction 0.
+    pub fn first(&self) -> &Leaf {
+        &self.ends[0]
+    }
+
     /// The parameter at a fraction of its range.
     pub fn value(&self, fraction: f64) -> f64 {
         match fraction {

@@ -1,7 +1,8 @@
 //! Sums over the increments of a leaf.
 
-use crate::leaf::{Field, Increment};
+use crate::leaf::{Field, Increment, State};
 use crate::relax::prolong::lagrange;
+use crate::rotation;
 
 /// The work of forces on increments.
 pub fn dot(forces: &Field, increments: &Field) -> f64 {
@@ -47,6 +48,16 @@ pub fn combined(parts: &[f64], fields: &[Field]) -> Field {
 pub fn largest(a: &Field) -> f64 {
     let all = a.iter().flatten().flatten();
     all.fold(0.0, |m, v| m.max(v.abs()))
+}
+
+/// The increments that lead from a state to another on the same grid.
+pub fn between(a: &State, b: &State) -> Field {
+    let node = |k: usize| {
+        let (turn, shift) = (rotation::log(b.q[k] * a.q[k].conjugate()), b.x[k] - a.x[k]);
+        [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z]
+    };
+    let rod = |j: usize| (1..=a.segments()).map(move |i| a.base(j) + i);
+    (0..a.rods()).map(|j| rod(j).map(node).collect()).collect()
 }
 
 /// Whether all components are finite.

@@ -18,24 +18,33 @@
 //! which is regular (Govaerts, Numerical Methods for Bifurcations of Dynamical
 //! Equilibria, 2000). An eigenvalue of H is zero where one of K is, and smooth,
 //! so that a secant method finds its zero to rounding.
+//!
+//! All that holds on one grid. A point counts once finer grids have it too: the
+//! same branch, going the same way with the same index, its tips known to the
+//! accuracy asked for. Where they have not, the branch goes on over a finer grid
+//! from the last point that counts.
 
+mod begin;
 mod critical;
 mod deflation;
 mod equations;
 mod family;
 mod field;
+mod follow;
 mod refine;
 mod switch;
 mod walk;
 
-pub use critical::{Critical, Kind};
+pub use begin::begin;
+pub use critical::Kind;
 pub use equations::{Equations, Stuck};
 pub use family::Family;
-pub use refine::{Refined, refine, refine_critical};
+pub use follow::{Followed, Grids};
+pub use refine::{Doubt, Refined};
 pub use switch::switch;
-pub use walk::{Branch, End, Walk, walk};
+pub use walk::{End, Walk, walk};
 
-pub(crate) use crate::relax::prolong::prolong as prolonged;
+use crate::relax::prolong::prolong as prolonged;
 
 use crate::leaf::{Field, State};
 

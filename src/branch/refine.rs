@@ -1,17 +1,28 @@
-//! Points of a branch on finer and finer grids, extrapolated.
+//! Points of a branch on finer and finer grids: extrapolated, and thereby verified.
 
 use super::critical::Critical;
-use super::equations::{Equations, Stuck};
-use super::family::{Family, Leaves};
+use super::equations::{Equations, Stuck, reversed};
+use super::family::{Family, Leaves, OutOfRange};
 use super::field::prolong as prolong_field;
 use super::{Point, Tangent};
-use crate::leaf::{Grid, State};
+use crate::leaf::{DiscreteLeaf, Grid, State};
+use crate::relax::node_state;
 use crate::relax::prolong::prolong;
 use crate::relax::richardson::Richardson;
+use crate::shape::RodShape;
 
-/// Grids of a regular point at most, and of a critical one.
+/// Grids of a point at most, those of a critical point unless its tips need more,
+/// and segments of the finest.
 const GRIDS: usize = 6;
 const CRITICAL_GRIDS: usize = 4;
+const FINEST: usize = 4096;
+
+/// From grid to grid a point moves by less and less, if by more than this (lengths).
+const STILL: f64 = 1e-4;
+
+/// Tangents on two grids that differ by more than this (cosine) are those of two
+/// branches.
+const SAME_WAY: f64 = 0.85;
 
 /// A critical parameter within this part of its range is exact.
 const EXACT: f64 = 1e-12;
@@ -31,75 +42,177 @@ const NEARLY_RIGID: f64 = 1.01e5;
 pub struct Refined {
     /// The parameter, as a fraction of its range.
     pub fraction: f64,
-    /// In the family's units, as the tips of all rods.
+    /// Energy, in the family's units.
     pub energy: f64,
+    /// Tips of all rods, likewise.
     pub tips: Vec<[f64; 3]>,
-    /// Bound on the error of the tips; `None` on one grid.
-    pub error: Option<f64>,
+    /// Bound on the error of the tips.
+    pub error: f64,
     /// Bound on the error of the parameter, as a fraction of its range.
-    pub fraction_error: Option<f64>,
-    /// The state on the finest grid, and that grid.
+    pub fraction_error: f64,
+    /// The state on the finest grid.
     pub state: State,
+    /// That grid.
     pub grid: Grid,
 }
 
-/// A regular point to the given accuracy of its tips, on as many grids as it takes.
+impl Refined {
+    /// Its leaf on the finest grid, in the scenario's units.
+    ///
+    /// # Errors
+    /// If the extrapolated parameter is one that no leaf can have.
+    pub fn shapes(&self, family: &Family) -> Result<Vec<RodShape>, OutOfRange> {
+        let scale = family.scale();
+        let node = |leaf: &DiscreteLeaf, j: usize, i: usize| {
+            let mut node = node_state(leaf, &self.state, j, i);
+            node.position *= scale.length;
+            node.u /= scale.length;
+            node.n *= scale.force();
+            node.m *= scale.moment();
+            node
+        };
+        let rod = |leaf: &DiscreteLeaf, j: usize| RodShape {
+            length: leaf.leaf.length(j) * scale.length,
+            nodes: (0..=leaf.segments()).map(|i| node(leaf, j, i)).collect(),
+        };
+        family.with(self.fraction, &self.grid, |leaf| {
+            (0..leaf.rods()).map(|j| rod(leaf, j)).collect()
+        })
+    }
+}
+
+/// Why a point is not verified.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Doubt {
+    /// Finer grids have no solution near it.
+    #[error("finer grids have no solution there")]
+    Unsolved,
+    /// They have one of another branch: far away, or going another way.
+    #[error("finer grids have another branch there")]
+    OtherBranch,
+    /// They have one with another index.
+    #[error("finer grids have another index there")]
+    OtherIndex,
+    /// The index changes, and no singular matrix explains it.
+    #[error("the index changes there without a singular matrix")]
+    Unexplained,
+    /// The error of the tips stays above the accuracy.
+    #[error("the tolerance is not reached there on any grid")]
+    Inaccurate,
+}
+
+impl From<Stuck> for Doubt {
+    fn from(_: Stuck) -> Self {
+        Doubt::Unsolved
+    }
+}
+
+impl From<OutOfRange> for Doubt {
+    fn from(_: OutOfRange) -> Self {
+        Doubt::Unsolved
+    }
+}
+
+/// A point on the next finer grid.
+pub(super) struct Finer<'a> {
+    pub equations: Equations<'a>,
+    pub point: Point,
+    /// By how much it moved.
+    pub moved: f64,
+}
+
+/// A point on the grid with all segments halved.
+pub(super) fn on_finer<'a>(
+    equations: &mut Equations<'a>,
+    point: &Point,
+) -> Result<Finer<'a>, Stuck> {
+    let guess = prolong(equations.leaves.at(point.fraction)?, &point.state);
+    let increments = prolong_field(&point.tangent.increments);
+    let mut equations = equations.refined()?;
+    let tangent = equations.normalised(Tangent {
+        increments,
+        ..point.tangent
+    });
+    // Next to a crossing the same plane may hold another branch, too; the
+    // same way of the leaf does not.
+    let inside = point.fraction != 0.0 && point.fraction != 1.0;
+    let normal = (inside && tangent.fraction.abs() < ALONG).then(|| {
+        equations.normalised(Tangent {
+            increments: tangent.increments.clone(),
+            fraction: 0.0,
+        })
+    });
+    let (mut found, _) = equations.correct(&guess, point.fraction, normal.as_ref())?;
+    if equations.along(&found.tangent, &tangent) < 0.0 {
+        found.tangent = reversed(found.tangent);
+    }
+    Ok(Finer {
+        moved: guess.shift_to(&found.state),
+        point: found,
+        equations,
+    })
+}
+
+/// A regular point to the given accuracy of its tips, on as many grids as it takes;
+/// on all of them it must be the same.
 pub fn refine(
     family: &Family,
     grid: &Grid,
     point: &Point,
     accuracy: f64,
-) -> Result<Refined, Stuck> {
+) -> Result<Refined, Doubt> {
     let mut table = Table::default();
     let mut equations = Equations::new(family, grid.clone())?;
-    table.push(&equations, &point.state, point.fraction)?;
-    let (mut state, mut fraction) = (point.state.clone(), point.fraction);
-    let mut tangent = point.tangent.clone();
-    let mut error = f64::INFINITY;
-    let mut reached = grid.clone();
+    table.push(&mut equations, &point.state, point.fraction)?;
+    let mut now = point.clone();
+    let mut moved = f64::INFINITY;
     for _ in 1..GRIDS {
-        if error <= accuracy {
+        if 2 * equations.grid().segments() > FINEST {
             break;
         }
-        let before = equations.grid();
-        let finer = family.with(fraction, before, |leaf| prolong(leaf, &state))?;
-        tangent = Tangent {
-            increments: prolong_field(&tangent.increments),
-            ..tangent
+        let finer = on_finer(&mut equations, &now)?;
+        equations = finer.equations;
+        // In the same plane on all grids, for the sake of the series.
+        let tangent = Tangent {
+            increments: prolong_field(&now.tangent.increments),
+            ..now.tangent
         };
-        equations = equations.refined()?;
-        // Next to a crossing the same plane may hold another branch, too; the
-        // same way of the leaf does not.
-        let along = equations.normalised(tangent.clone()).fraction.abs();
-        let inside = fraction != 0.0 && fraction != 1.0;
-        let normal = (inside && along < ALONG).then(|| {
-            equations.normalised(Tangent {
-                increments: tangent.increments.clone(),
-                fraction: 0.0,
-            })
-        });
-        let Ok((found, _)) = equations.correct(&finer, fraction, normal.as_ref()) else {
-            break;
+        let same = equations.normalised(tangent.clone());
+        let same = equations.along(&finer.point.tangent, &same);
+        if same < SAME_WAY || finer.moved > moved.max(STILL) {
+            return Err(Doubt::OtherBranch);
+        }
+        if finer.point.index != point.index {
+            return Err(Doubt::OtherIndex);
+        }
+        moved = finer.moved;
+        now = Point {
+            tangent,
+            ..finer.point
         };
-        (state, fraction) = (found.state, found.fraction);
-        reached.clone_from(equations.grid());
-        table.push(&equations, &state, fraction)?;
-        error = table.tips.best().map_or(f64::INFINITY, |best| best.error);
+        table.push(&mut equations, &now.state, now.fraction)?;
+        if table.error() <= accuracy {
+            return Ok(table.refined(now.state, equations.grid().clone()));
+        }
     }
-    Ok(table.refined(state, reached))
+    Err(Doubt::Inaccurate)
 }
 
-/// A critical point, on four grids.
-pub fn refine_critical(family: &Family, grid: &Grid, found: &Critical) -> Result<Refined, Stuck> {
+/// A critical point on four grids, or more if its tips need them to be as accurate.
+pub fn refine_critical(
+    family: &Family,
+    grid: &Grid,
+    found: &Critical,
+    accuracy: f64,
+) -> Result<Refined, Doubt> {
     let mut table = Table::default();
     let mut equations = Equations::new(family, grid.clone())?;
     let mut critical = found.clone();
-    let mut reached = grid.clone();
-    for level in 0..CRITICAL_GRIDS {
+    let mut moved = f64::INFINITY;
+    for level in 0..GRIDS {
         if level > 0 {
-            let before = equations.grid();
-            let on_finer = |leaf: &_| prolong(leaf, &critical.state);
-            let state = family.with(critical.fraction, before, on_finer)?;
+            let leaf = equations.leaves.at(critical.fraction)?;
+            let state = prolong(leaf, &critical.state);
             equations = equations.refined()?;
             let tangent = equations.normalised(Tangent {
                 increments: prolong_field(&critical.tangent.increments),
@@ -111,37 +224,42 @@ pub fn refine_critical(family: &Family, grid: &Grid, found: &Critical) -> Result
                 held: critical.held.iter().map(prolong_field).collect(),
                 ..critical.clone()
             };
-            let Ok(found) = finer.again(&mut equations) else {
-                break;
-            };
-            critical = found;
-            reached.clone_from(equations.grid());
+            critical = finer.again(&mut equations)?;
+            let way = finer.state.shift_to(&critical.state);
+            if way > moved.max(STILL) {
+                return Err(Doubt::OtherBranch);
+            }
+            moved = way;
         }
-        let (rigid, rounding) = family.with(critical.fraction, equations.grid(), |leaf| {
-            let rigid = leaf.stiffest() * NEARLY_RIGID < 1.0;
-            let limit = if rigid {
-                1.0 / SOFTENING
-            } else {
-                f64::INFINITY
-            };
-            let condensing = leaf.sections.iter().map(|it| it.condensing.max_element());
-            let stiffest = condensing.fold(0.0_f64, |most, it| most.max(it.min(limit)));
-            let segments = leaf.segments() as f64;
-            let rounding = f64::EPSILON * stiffest * segments * segments / critical.steepness();
-            (rigid, rounding)
-        })?;
+        let leaf = equations.leaves.at(critical.fraction)?;
+        let rigid = leaf.stiffest() * NEARLY_RIGID < 1.0;
+        let limit = if rigid {
+            1.0 / SOFTENING
+        } else {
+            f64::INFINITY
+        };
+        let condensing = leaf.sections.iter().map(|it| it.condensing.max_element());
+        let stiffest = condensing.fold(0.0_f64, |most, it| most.max(it.min(limit)));
+        let segments = leaf.segments() as f64;
+        let rounding = f64::EPSILON * stiffest * segments * segments / critical.steepness();
         table.rounding = table.rounding.max(rounding);
         let fraction = match rigid {
             false => critical.fraction,
             true => unsoftened(family, equations.grid(), &critical)?,
         };
-        table.push(&equations, &critical.state, fraction)?;
+        table.push(&mut equations, &critical.state, fraction)?;
         // A finer grid would only add rounding.
-        if (table.fraction.best()).is_some_and(|best| best.error < table.rounding.max(EXACT)) {
+        let exact =
+            (table.fraction.best()).is_some_and(|best| best.error < table.rounding.max(EXACT));
+        let enough = exact || level + 1 >= CRITICAL_GRIDS;
+        if enough && table.error() <= accuracy {
+            return Ok(table.refined(critical.state, equations.grid().clone()));
+        }
+        if 2 * equations.grid().segments() > FINEST {
             break;
         }
     }
-    Ok(table.refined(critical.state, reached))
+    Err(Doubt::Inaccurate)
 }
 
 /// The parameter of a critical point of a nearly rigid leaf: by softened
@@ -172,9 +290,13 @@ struct Table {
 }
 
 impl Table {
-    fn push(&mut self, equations: &Equations, state: &State, fraction: f64) -> Result<(), Stuck> {
-        let family = equations.leaves.family;
-        let energy = family.with(fraction, equations.grid(), |leaf| leaf.energy(state))?;
+    fn push(
+        &mut self,
+        equations: &mut Equations,
+        state: &State,
+        fraction: f64,
+    ) -> Result<(), Stuck> {
+        let energy = equations.leaves.at(fraction)?.energy(state);
         let tips = (0..state.rods()).flat_map(|j| state.tip(j).to_array());
         let segments = state.segments();
         self.tips.push(segments, tips.collect());
@@ -183,18 +305,24 @@ impl Table {
         Ok(())
     }
 
+    /// Estimate of the error of the tips.
+    fn error(&self) -> f64 {
+        self.tips.best().map_or(f64::INFINITY, |best| best.error)
+    }
+
     fn refined(&self, state: State, grid: Grid) -> Refined {
-        let best = self.tips.best();
-        let columns = best.as_ref().map_or(0, |best| best.columns);
-        let tips = self.tips.column(columns);
-        let own = self.fraction.best();
-        let own_columns = own.as_ref().map_or(0, |best| best.columns);
+        let columns = |table: &Richardson| table.best().map_or(0, |best| best.columns);
+        let own = self
+            .fraction
+            .best()
+            .map_or(f64::INFINITY, |best| best.error);
+        let tips = self.tips.column(columns(&self.tips));
         Refined {
-            fraction: self.fraction.column(own_columns)[0],
-            energy: self.energy.column(columns)[0],
+            fraction: self.fraction.column(columns(&self.fraction))[0],
+            energy: self.energy.column(columns(&self.tips))[0],
             tips: tips.chunks(3).map(|tip| [tip[0], tip[1], tip[2]]).collect(),
-            error: best.map(|best| best.error),
-            fraction_error: own.map(|best| best.error + self.rounding),
+            error: self.error(),
+            fraction_error: own + self.rounding,
             state,
             grid,
         }

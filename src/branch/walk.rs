@@ -1,7 +1,9 @@
-//! Following a branch.
+//! Following a branch on one grid.
 
-use super::critical::{Critical, locate};
+use super::critical::{Critical, Kind, locate};
 use super::equations::{Equations, Stuck, reversed};
+use super::field::{add, between, plus};
+use super::refine::{Doubt, on_finer};
 use super::{Point, Tangent};
 
 /// First step as a part of the longest, and the shortest.
@@ -21,6 +23,10 @@ const BENT: f64 = 0.85;
 /// Newton may move a predicted point by this part of the step.
 const DRIFT: f64 = 0.5;
 
+/// A step goes along the mean of the tangents at its ends but for a part of third
+/// order. One with more than this part of it across them leads to another branch.
+const ACROSS: f64 = 0.1;
+
 /// More eigenvalues than this do not change their sign in one step, if it can
 /// be shortened to this part of the longest.
 const MOST_CHANGES: usize = 2;
@@ -30,10 +36,14 @@ const SHORT_ENOUGH: f64 = 0.02;
 /// are shorter than this part of the longest.
 const UNEXPLAINED: f64 = 1e-3;
 
-/// A branch that comes back to its first point to within this part of a step is
-/// closed; looked for after so many points.
-const CLOSED: f64 = 0.75;
+/// A branch that comes to within this part of a step of its first point is
+/// tried for being closed, after so many points: by so many steps into the plane
+/// through that point which is normal to the branch. There the two must be the
+/// same within `SAME` (radians, lengths, fractions).
+const CLOSED: f64 = 1.0;
 const CLOSED_AFTER: usize = 8;
+const CLOSING: usize = 5;
+const SAME: f64 = 1e-7;
 
 /// How to follow a branch.
 #[derive(Clone, Copy, Debug)]
@@ -58,9 +68,11 @@ pub enum End {
     MostPoints,
     /// No step however short could be made.
     Stuck(Stuck),
+    /// What comes next is another thing on every grid up to the finest.
+    Unverified(Doubt),
 }
 
-/// A branch on one grid.
+/// A branch on one grid, or on finer and finer ones.
 #[derive(Clone, Debug)]
 pub struct Branch {
     /// Its points, in order.
@@ -69,84 +81,168 @@ pub struct Branch {
     pub critical: Vec<(usize, Critical)>,
     /// Changes of the index that could not be located: after which point.
     pub missed: Vec<usize>,
-    /// How it ended.
-    pub end: End,
+    /// How it ended, if it has.
+    pub end: Option<End>,
+    /// The first point on the present grid, if it is known there.
+    first: Option<Point>,
+    /// Length of the next step, and of those that were made.
+    step: f64,
+    steps: Vec<f64>,
 }
 
-/// Follows a branch from its first point in the direction of its tangent, as
-/// long as the parameter is within its range. `progress` is called with each point.
+/// Follows a branch on one grid from its first point in the direction of its
+/// tangent, as long as the parameter is within its range. `progress` is told of
+/// each point: how many there are, and the parameter.
 pub fn walk(
     equations: &mut Equations,
     first: Point,
     how: &Walk,
-    progress: &mut dyn FnMut(&Point),
+    progress: &mut dyn FnMut(usize, f64),
 ) -> Branch {
-    let mut branch = Branch {
-        points: vec![first.clone()],
-        critical: Vec::new(),
-        missed: Vec::new(),
-        end: End::MostPoints,
-    };
-    let mut now = first.clone();
-    let mut step = FIRST * how.longest;
-    progress(&now);
-    while branch.points.len() < how.most {
-        let found = advance(equations, &now, step).and_then(|found| {
-            match how.accepts(equations, &now, &found, step) {
+    let mut branch = Branch::new(first, how);
+    branch.go_on(equations, how, how.most, progress);
+    branch
+}
+
+impl Branch {
+    /// A branch of which the first point is known.
+    pub fn new(first: Point, how: &Walk) -> Self {
+        Branch {
+            points: vec![first.clone()],
+            critical: Vec::new(),
+            missed: Vec::new(),
+            end: None,
+            first: Some(first),
+            step: FIRST * how.longest,
+            steps: Vec::new(),
+        }
+    }
+
+    /// Goes on until there are so many points, or it ends.
+    pub fn go_on(
+        &mut self,
+        equations: &mut Equations,
+        how: &Walk,
+        until: usize,
+        progress: &mut dyn FnMut(usize, f64),
+    ) {
+        while self.end.is_none() && self.points.len() < until.min(how.most) {
+            if let Err(stuck) = self.try_step(equations, how) {
+                self.end = Some(End::Stuck(stuck));
+            }
+            let now = &self.points[self.points.len() - 1];
+            progress(self.points.len(), now.fraction);
+        }
+        if self.end.is_none() && self.points.len() >= how.most {
+            self.end = Some(End::MostPoints);
+        }
+    }
+
+    /// Forgets all behind the given point, and the end; the next step from it will be
+    /// as long as the last one from it, or to it.
+    pub fn go_back(&mut self, to: usize) {
+        let made = self.steps.get(to).or(self.steps.last());
+        self.step = *made.unwrap_or(&self.step);
+        self.points.truncate(to + 1);
+        self.steps.truncate(to);
+        self.critical.retain(|(after, _)| *after < to);
+        self.missed.retain(|after| *after < to);
+        self.end = None;
+    }
+
+    /// Makes the next step so much shorter.
+    pub fn shorten(&mut self, part: f64) {
+        self.step *= part;
+    }
+
+    /// Leaves out a point between two others.
+    pub fn leave_out(&mut self, number: usize) {
+        self.points.remove(number);
+        self.steps[number - 1] += self.steps.remove(number);
+        let after = self.critical.iter_mut().map(|(after, _)| after);
+        for after in after.chain(&mut self.missed) {
+            *after -= usize::from(*after >= number);
+        }
+    }
+
+    /// Whether there is a critical point right before or behind a point.
+    pub fn is_near_critical(&self, number: usize) -> bool {
+        let mut critical = self.critical.iter();
+        critical.any(|(after, _)| *after == number || after + 1 == number)
+    }
+
+    /// Takes its last point to the grid with all segments halved.
+    pub fn refine(&mut self, equations: &mut Equations) -> Result<(), Stuck> {
+        let last = self.points.len() - 1;
+        let finer = on_finer(equations, &self.points[last])?.point;
+        let first = self.first.take();
+        self.first = match last {
+            0 => Some(finer.clone()),
+            _ => first.and_then(|first| Some(on_finer(equations, &first).ok()?.point)),
+        };
+        self.points[last] = finer;
+        Ok(())
+    }
+
+    /// Makes a step from the last point, or shortens the next try. Fails where that is
+    /// too short.
+    fn try_step(&mut self, equations: &mut Equations, how: &Walk) -> Result<(), Stuck> {
+        let now = &self.points[self.points.len() - 1];
+        let step = self.step;
+        let found = advance(equations, now, step).and_then(|found| {
+            match how.accepts(equations, now, &found, step) {
                 true => Ok(found),
                 false => Err(Stuck::NotConverged),
             }
         });
         let mut next = match found {
             Ok(found) => found,
-            Err(reason) => {
-                step *= 0.5;
-                if step < SHORTEST * how.longest {
-                    branch.end = End::Stuck(reason);
-                    return branch;
-                }
-                continue;
+            Err(_) if 0.5 * step >= SHORTEST * how.longest => {
+                self.step = 0.5 * step;
+                return Ok(());
             }
+            Err(stuck) => return Err(stuck),
         };
-        let turned = equations.along(&now.tangent, &next.point.tangent);
-        let edge = match arrive_at_edge(equations, &now, &mut next, step) {
-            Ok(edge) => edge,
-            Err(stuck) => {
-                branch.end = End::Stuck(stuck);
-                return branch;
-            }
-        };
-        if next.point.index != now.index {
-            let after = branch.points.len() - 1;
-            let found = locate(equations, &now, &next.point, next.step).unwrap_or_default();
+        let turn = equations.along(&now.tangent, &next.point.tangent);
+        let mut end = arrive_at_edge(equations, now, &mut next, step)?;
+        if let Some(first) = &self.first
+            && end.is_none()
+            && self.points.len() > CLOSED_AFTER
+            && distance(first, &next.point) < CLOSED * step
+            && let Some(point) = closing(equations, first, &next.point, step)
+        {
+            next.point = point;
+            end = Some(End::Closed);
+        }
+        let turned = now.tangent.fraction * next.point.tangent.fraction < 0.0;
+        if next.point.index != now.index || turned {
+            let after = self.points.len() - 1;
+            let way = equations.along(&chord(now, &next.point), &now.tangent);
+            let found = locate(equations, now, &next.point, way).unwrap_or_default();
             let changes: usize = found.iter().map(|critical| critical.modes.len()).sum();
-            if changes != next.point.index.abs_diff(now.index) {
+            let folds = found.iter().filter(|critical| critical.kind == Kind::Fold);
+            let explained = changes == next.point.index.abs_diff(now.index)
+                && (folds.count() % 2 == 1) == turned;
+            if !explained {
                 // A change that nothing in between explains: this is another
                 // branch, passing nearby.
                 if next.step > UNEXPLAINED * how.longest {
-                    step = 0.5 * next.step;
-                    continue;
+                    self.step = 0.5 * next.step;
+                    return Ok(());
                 }
-                branch.missed.push(after);
+                self.missed.push(after);
             }
             let all = found.into_iter();
-            branch.critical.extend(all.map(|point| (after, point)));
+            self.critical.extend(all.map(|point| (after, point)));
         }
-        let closed = edge.is_none()
-            && branch.points.len() > CLOSED_AFTER
-            && distance(&first, &next.point) < CLOSED * step;
-        now = next.point;
-        progress(&now);
-        branch.points.push(now.clone());
-        if let Some(end) = edge.or(closed.then_some(End::Closed)) {
-            branch.end = end;
-            return branch;
+        self.steps.push(next.step);
+        self.points.push(next.point);
+        self.end = end;
+        if next.iterations <= FEW && turn > STRAIGHT {
+            self.step = (GROWTH * step).min(how.longest);
         }
-        if next.iterations <= FEW && turned > STRAIGHT {
-            step = (GROWTH * step).min(how.longest);
-        }
+        Ok(())
     }
-    branch
 }
 
 /// A point found by a step.
@@ -166,7 +262,31 @@ impl Walk {
         equations.along(&now.tangent, &found.point.tangent) > BENT
             && found.drift < DRIFT * step
             && (changes <= MOST_CHANGES || step < SHORT_ENOUGH * self.longest)
+            && across(equations, now, &found.point) < ACROSS
     }
+}
+
+/// The straight way from a point to another.
+fn chord(a: &Point, b: &Point) -> Tangent {
+    Tangent {
+        increments: between(&a.state, &b.state),
+        fraction: b.fraction - a.fraction,
+    }
+}
+
+/// The part of the way from a point to another that lies across the mean of their
+/// tangents.
+fn across(equations: &Equations, a: &Point, b: &Point) -> f64 {
+    let mean = equations.normalised(Tangent {
+        increments: plus(&a.tangent.increments, 1.0, &b.tangent.increments),
+        fraction: a.tangent.fraction + b.tangent.fraction,
+    });
+    let mut way = chord(a, b);
+    let length = equations.along(&way, &way).sqrt();
+    let along = equations.along(&way, &mean);
+    add(&mut way.increments, -along, &mean.increments);
+    way.fraction -= along * mean.fraction;
+    equations.along(&way, &way).sqrt() / length
 }
 
 /// One step along the branch.
@@ -206,6 +326,30 @@ fn arrive_at_edge(
         next.point.tangent = reversed(next.point.tangent.clone());
     }
     Ok(Some(end))
+}
+
+/// The point of the branch of `near` that is the branch's first again: in value,
+/// shape, tangent and index.
+fn closing(equations: &mut Equations, first: &Point, near: &Point, step: f64) -> Option<Point> {
+    let mut near = near.clone();
+    for _ in 0..CLOSING {
+        let same = equations.along(&near.tangent, &first.tangent);
+        if same < BENT || near.index != first.index {
+            return None;
+        }
+        if distance(&near, first) < SAME {
+            return Some(near);
+        }
+        let way = equations.along(&chord(&near, first), &first.tangent) / same;
+        if way.abs() > 2.0 * step {
+            return None;
+        }
+        let increments = &near.tangent.increments;
+        let state = (equations.moved(&near.state, near.fraction, increments, way)).ok()?;
+        let fraction = near.fraction + way * near.tangent.fraction;
+        (near, _) = (equations.correct(&state, fraction, Some(&first.tangent))).ok()?;
+    }
+    None
 }
 
 /// Distance of two points: of the shapes, or in the parameter.

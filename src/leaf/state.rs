@@ -70,10 +70,17 @@ impl State {
         self.x[self.base(j) + self.segments]
     }
 
-    /// The largest displacement between this state and another on the same grid.
+    /// The largest displacement between this state and another, at the nodes that
+    /// their grids have in common: one is the other with all segments halved, some
+    /// times or none.
     pub fn shift_to(&self, other: &State) -> f64 {
-        let pairs = self.x.iter().zip(&other.x);
-        pairs.fold(0.0, |most, (a, b)| most.max(a.distance(*b)))
+        let n = self.segments.min(other.segments);
+        let distance = |j: usize, i: usize| {
+            let [a, b] = [self, other].map(|it| it.x[it.base(j) + i * (it.segments / n)]);
+            a.distance(b)
+        };
+        let nodes = (0..self.rods()).flat_map(|j| (0..=n).map(move |i| (j, i)));
+        nodes.fold(0.0, |most, (j, i)| most.max(distance(j, i)))
     }
 
     /// Turns and moves node `k` by `step` times the increment.

@@ -80,5 +80,6 @@ pub fn branch_end(end: &End) -> &'static str {
         End::Stuck(Stuck::OutOfRange(_)) => "ends where no leaf is",
         End::Stuck(Stuck::Unresolved) => "ends: grid too coarse",
         End::Stuck(_) => "lost",
+        End::Unverified(_) => "ends: not verified further",
     }
 }

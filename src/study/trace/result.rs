@@ -4,7 +4,7 @@ use glam::DVec3;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::law::Law;
-use crate::branch::{End, Stuck};
+use crate::branch::{Doubt, End, Stuck};
 use crate::scenario::Units;
 use crate::shape::serialize_tips;
 use crate::study::Keys;
@@ -29,7 +29,7 @@ pub struct Trace {
     /// Whether the tips share one point.
     #[serde(skip)]
     pub joined: bool,
-    /// Segments a rod of the grid on which branches were followed.
+    /// Segments a rod of the finest grid on which branches were followed.
     pub segments: usize,
     /// Wanted accuracy of the tips, relative to the longest rod.
     pub tolerance: f64,
@@ -76,7 +76,7 @@ pub struct TracePoint {
     /// The joint tip alone, or every tip.
     #[serde(flatten, serialize_with = "serialize_tips")]
     pub tips: Vec<DVec3>,
-    /// Bound on the error of the tips.
+    /// Bound on the error of the tips: within the tolerance.
     pub error: Option<f64>,
     /// Potential energy.
     pub energy: f64,
@@ -130,6 +130,7 @@ impl End {
             End::Stuck(Stuck::OutOfRange(_)) => "out-of-range",
             End::Stuck(Stuck::Unresolved) => "unresolved",
             End::Stuck(_) => "stuck",
+            End::Unverified(_) => "unverified",
         }
     }
 
@@ -143,10 +144,11 @@ impl End {
         match self {
             End::Reached | End::Returned | End::Closed => None,
             End::MostPoints => Some("there are more points: allow more".into()),
-            End::Stuck(Stuck::Unresolved) => {
-                Some(format!("{}: use more segments", Stuck::Unresolved))
-            }
             End::Stuck(stuck) => Some(stuck.to_string()),
+            End::Unverified(Doubt::Inaccurate) => {
+                Some(format!("{}: ask for a larger one", Doubt::Inaccurate))
+            }
+            End::Unverified(doubt) => Some(format!("what comes next is not verified: {doubt}")),
         }
     }
 }

@@ -3,23 +3,16 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
-use glam::DVec3;
-use rayon::prelude::*;
-
 use super::law::Law;
 use super::result::{PointKind, Trace, TraceBranch, TracePoint};
 use super::{MOST_BRANCHES, TraceError, TraceRequest};
-use crate::branch::{
-    self, Branch, Critical, Equations, Family, Kind, Point, Refined, Walk, refine, refine_critical,
-    switch, walk,
-};
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use crate::branch::{Family, Followed, Grids, Kind, Point, Refined, Walk, begin, switch};
 use crate::memory::Request;
-use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, node_state, project, relax};
+use crate::relax::{Options, RelaxError, SemiImplicit, check_segments, relax};
 use crate::scenario::{Key, Part, Scenario};
-use crate::shape::RodShape;
 use crate::study::Target;
 use crate::undulation::Undulation;
+use glam::DVec3;
 
 /// Longest step along a branch where few values are asked for.
 const LONGEST: f64 = 0.1;
@@ -60,9 +53,16 @@ pub fn trace(
         .into(),
         ..Options::default()
     };
-    let first = relax(&scenario, &options, &mut |_| {})?;
-    let leaf = Leaf::new(&scenario);
-    let (grid, state) = initial_state(&family, &leaf, &first, request.segments)?;
+    let rest = relax(&scenario, &options, &mut |_| {})?;
+    let wanted = match request.segments {
+        None => None,
+        wanted @ Some(least) => {
+            let segments = check_segments(family.first(), wanted, least)?;
+            let rods = scenario.rods.len();
+            (Request::Branches { rods, segments }.weigh()).map_err(RelaxError::Memory)?;
+            Some(segments)
+        }
+    };
     let mut trace = Trace {
         scenario: scenario.name.clone(),
         keys: keys.clone(),
@@ -70,7 +70,7 @@ pub fn trace(
         units: scenario.units.clone(),
         rods: scenario.rods.len(),
         joined: scenario.joined,
-        segments: grid.segments(),
+        segments: wanted.unwrap_or(2 * (rest.shape.stations.len() - 1)),
         tolerance,
         complete: false,
         remark: None,
@@ -79,25 +79,31 @@ pub fn trace(
         factorizations: 0,
         wall_seconds: 0.0,
     };
-    if first.stability.negative_eigenvalues.is_some() {
-        let mut run = Run {
-            family: &family,
-            request,
-            grid,
-            tolerance,
-            crossings: Vec::new(),
-            progress,
-        };
-        run.follow_all(&state, &mut trace);
-    } else {
-        trace.remark = Some(format!(
-            "no equilibrium to begin with at {keys} = {}: {}",
-            keys.text(ends[0]),
-            first.remark.as_deref().unwrap_or("the leaf is not at rest")
-        ));
+    let why = match rest.stability.negative_eigenvalues {
+        Some(_) => match begin(&family, &rest, wanted) {
+            Ok((grids, first)) => {
+                let mut run = Run {
+                    family: &family,
+                    request,
+                    grids,
+                    tolerance,
+                    crossings: Vec::new(),
+                    progress,
+                };
+                run.follow_all(first, &mut trace);
+                None
+            }
+            Err(stuck) => Some(stuck.to_string()),
+        },
+        None => Some(rest.remark.unwrap_or("the leaf is not at rest".into())),
+    };
+    if let Some(why) = why {
+        let at = keys.text(ends[0]);
+        let remark = format!("no equilibrium to begin with at {keys} = {at}: {why}");
+        trace.remark = Some(remark);
     }
     let branches = &trace.branches;
-    trace.complete = !branches.is_empty() && branches.iter().all(|branch| branch.end.complete());
+    trace.complete = trace.remark.is_none() && branches.iter().all(|branch| branch.end.complete());
     trace.law = branches.first().and_then(|branch| law(request, branch));
     trace.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(trace)
@@ -125,81 +131,23 @@ fn law(request: &TraceRequest, branch: &TraceBranch) -> Option<Law> {
     Law::of(*axis, &points?, request.cross_section)
 }
 
-/// The finest grid on which branches are followed unless told otherwise.
-const FINEST: usize = 128;
-
-/// The grid on which branches are followed, and the first equilibrium near it:
-/// as asked for, or one on which the index is that of the finest.
-fn initial_state(
-    family: &Family,
-    leaf: &Leaf,
-    first: &Equilibrium,
-    segments: Option<usize>,
-) -> Result<(Grid, State), TraceError> {
-    let coarse = Grid::through(&first.shape.stations, leaf.kinks());
-    let discrete = DiscreteLeaf::new(leaf, coarse);
-    let mut grid = discrete.grid.clone();
-    let mut state = project(leaf, &discrete, &first.shape.rods);
-    let wanted = match segments {
-        None => 2 * grid.segments(),
-        Some(wanted) => {
-            let segments = crate::relax::check_segments(leaf, Some(wanted), wanted)?;
-            let rods = leaf.rods();
-            (Request::Branches { rods, segments }.weigh()).map_err(RelaxError::Memory)?;
-            segments
-        }
-    };
-    while grid.segments() < wanted
-        || segments.is_none() && index_differs(family, &grid, &state, first)
-    {
-        let discrete = DiscreteLeaf::new(leaf, grid.clone());
-        state = branch::prolonged(&discrete, &state);
-        grid = grid.refined();
-    }
-    Ok((grid, state))
-}
-
-/// Whether the index on a grid is another than on the finest.
-fn index_differs(family: &Family, grid: &Grid, state: &State, first: &Equilibrium) -> bool {
-    if grid.segments() >= FINEST {
-        return false;
-    }
-    let found = Equations::new(family, grid.clone())
-        .ok()
-        .and_then(|mut equations| equations.correct(state, 0.0, None).ok());
-    found.is_none_or(|(point, _)| Some(point.index) != first.stability.negative_eigenvalues)
-}
-
 /// What all branches have in common.
 struct Run<'r, 'p> {
     family: &'r Family<'r>,
     request: &'r TraceRequest,
     /// On which branches are followed.
-    grid: Grid,
+    grids: Grids<'r>,
     tolerance: f64,
     /// Points where branches cross, found so far.
-    crossings: Vec<(f64, State)>,
+    crossings: Vec<Refined>,
     progress: &'p mut dyn FnMut(usize, usize, f64),
 }
 
 impl Run<'_, '_> {
-    /// Follows the branch of the equilibrium near `state` and, if that is asked for,
-    /// those that cross it, breadth first.
-    fn follow_all(&mut self, state: &State, trace: &mut Trace) {
-        let mut equations = match Equations::new(self.family, self.grid.clone()) {
-            Ok(equations) => equations,
-            Err(out_of_range) => {
-                trace.remark = Some(out_of_range.to_string());
-                return;
-            }
-        };
-        let mut first = match equations.correct(state, 0.0, None) {
-            Ok((point, _)) => point,
-            Err(stuck) => {
-                trace.remark = Some(format!("on {} segments: {stuck}", self.grid.segments()));
-                return;
-            }
-        };
+    /// Follows the branch of the first point and, if that is asked for, those that
+    /// cross it, breadth first.
+    fn follow_all(&mut self, mut first: Point, trace: &mut Trace) {
+        trace.segments = first.state.segments();
         first.tangent = first.tangent.towards(true);
         let values = self.request.vary.values.len();
         let how = Walk {
@@ -214,123 +162,76 @@ impl Run<'_, '_> {
                 break;
             }
             let (family, progress) = (self.family, &mut *self.progress);
-            let mut count = 0;
-            let branch = walk(&mut equations, first, &how, &mut |point| {
-                count += 1;
-                progress(number, count, family.value(point.fraction));
-            });
-            trace.branches.push(self.refined(&branch, from));
+            let mut tell = |points, at| progress(number, points, family.value(at));
+            let followed = (self.grids).follow(first, &how, self.tolerance, &mut tell);
+            let last = followed.branch.points.last();
+            let segments = last.map_or(0, |point| point.state.segments());
+            trace.segments = trace.segments.max(segments);
+            trace.branches.push(self.in_units(&followed, from));
             if self.request.switch {
-                self.enter_crossing(&mut equations, &branch, number, &mut entrances);
+                self.enter_crossing(&followed, number, &mut entrances);
             }
         }
-        trace.factorizations = equations.factorizations;
+        trace.factorizations = self.grids.factorizations();
     }
 
     /// Adds first points of the branches that cross, each with the indices of the
     /// branch and the point it was entered from, where that is new.
     fn enter_crossing(
         &mut self,
-        equations: &mut Equations,
-        branch: &Branch,
+        followed: &Followed,
         number: usize,
         entrances: &mut VecDeque<(Point, Option<[usize; 2]>)>,
     ) {
-        for (which, (after, critical)) in branch.critical.iter().enumerate() {
-            let mut crossings = self.crossings.iter();
-            let known = crossings.any(|(fraction, state)| near(*fraction, state, critical));
+        let critical = followed.branch.critical.iter().zip(&followed.critical);
+        for (which, ((after, critical), refined)) in critical.enumerate() {
+            let known = self.crossings.iter().any(|other| near(other, refined));
             if critical.kind != Kind::Branching || known {
                 continue;
             }
-            let crossing = (critical.fraction, critical.state.clone());
-            self.crossings.push(crossing);
+            self.crossings.push(refined.clone());
             // Where several modes become neutral at once for reasons of symmetry,
             // branches of any mixture of them are the same, turned.
-            let new = switch(equations, critical, 0).into_iter();
+            let new = switch(self.grids.of(&critical.state), critical, 0).into_iter();
             let from = Some([number, after + 1 + which]);
             entrances.extend(new.map(|point| (point, from)));
         }
     }
 
-    /// A branch in the scenario's units, without the error of its grid.
-    fn refined(&self, branch: &Branch, from: Option<[usize; 2]>) -> TraceBranch {
-        let (family, grid, tolerance) = (self.family, &self.grid, self.tolerance);
-        let regular: Vec<Option<Refined>> = (branch.points.par_iter())
-            .map(|point| refine(family, grid, point, tolerance).ok())
-            .collect();
-        let critical: Vec<Option<Refined>> = (branch.critical.par_iter())
-            .map(|(_, point)| refine_critical(family, grid, point).ok())
-            .collect();
+    /// A branch in the scenario's units.
+    fn in_units(&self, followed: &Followed, from: Option<[usize; 2]>) -> TraceBranch {
+        let branch = &followed.branch;
         let mut points = Vec::new();
-        let mut critical = branch.critical.iter().zip(critical).peekable();
-        for (i, (point, refined)) in branch.points.iter().zip(regular).enumerate() {
-            let refined = refined.unwrap_or_else(|| self.unrefined(&point.state, point.fraction));
+        let mut critical = branch.critical.iter().zip(&followed.critical).peekable();
+        for (i, (point, refined)) in branch.points.iter().zip(&followed.points).enumerate() {
             let number = points.len() + 1;
-            points.push(self.point(number, PointKind::Regular, point.index, &refined));
+            points.push(self.point(number, PointKind::Regular, point.index, refined));
             while let Some(((_, point), refined)) = critical.next_if(|((after, _), _)| *after == i)
             {
                 let kind = match point.kind {
                     Kind::Fold => PointKind::Fold,
                     Kind::Branching => PointKind::Branching(point.modes.len()),
                 };
-                let refined =
-                    refined.unwrap_or_else(|| self.unrefined(&point.state, point.fraction));
                 let number = points.len() + 1;
-                points.push(self.point(number, kind, point.indices[1], &refined));
+                points.push(self.point(number, kind, point.indices[1], refined));
             }
         }
-        let missed = match branch.missed.len() {
-            0 => None,
-            count => Some(format!(
-                "the index changes in {count} places that could not be located"
-            )),
-        };
         TraceBranch {
             from,
             points,
-            end: branch.end.clone(),
-            remark: branch.end.remark().or(missed),
-        }
-    }
-
-    /// What is known of a point on one grid.
-    fn unrefined(&self, state: &State, fraction: f64) -> Refined {
-        let energy = (self.family).with(fraction, &self.grid, |leaf| leaf.energy(state));
-        Refined {
-            fraction,
-            energy: energy.unwrap_or(f64::NAN),
-            tips: (0..state.rods()).map(|j| state.tip(j).to_array()).collect(),
-            error: None,
-            fraction_error: None,
-            state: state.clone(),
-            grid: self.grid.clone(),
+            end: followed.end.clone(),
+            remark: followed.end.remark(),
         }
     }
 
     /// Waves and twist of a point's leaf, by its finest grid.
     fn undulation(&self, refined: &Refined) -> Option<Undulation> {
-        let (family, state, grid) = (self.family, &refined.state, &refined.grid);
-        let scenario = family.scenario(refined.fraction).ok()?;
-        let scale = family.scale();
-        let shapes = |leaf: &DiscreteLeaf| -> Vec<RodShape> {
-            let rod = |j: usize| RodShape {
-                length: leaf.leaf.length(j) * scale.length,
-                nodes: (0..=grid.segments())
-                    .map(|i| {
-                        let mut node = node_state(leaf, state, j, i);
-                        node.position *= scale.length;
-                        node.n *= scale.force();
-                        node
-                    })
-                    .collect(),
-            };
-            (0..leaf.rods()).map(rod).collect()
-        };
-        let rods = family.with(refined.fraction, grid, shapes).ok()?;
-        let error = refined.error.map(|error| error * scale.length);
+        let scenario = self.family.scenario(refined.fraction).ok()?;
+        let rods = refined.shapes(self.family).ok()?;
+        let error = Some(refined.error * self.family.scale().length);
         Some(Undulation::at_stations(
             &scenario,
-            grid.sigma(),
+            refined.grid.sigma(),
             &rods,
             error,
         ))
@@ -351,13 +252,13 @@ impl Run<'_, '_> {
             value,
             value_error: match kind {
                 PointKind::Regular => None,
-                _ => refined.fraction_error.map(|error| {
-                    let above = self.family.value(refined.fraction + error);
-                    (above - value).abs()
-                }),
+                _ => {
+                    let above = refined.fraction + refined.fraction_error;
+                    Some((self.family.value(above) - value).abs())
+                }
             },
             tips: tips.take(if joined { 1 } else { usize::MAX }).collect(),
-            error: refined.error.map(|error| error * scale.length),
+            error: Some(refined.error * scale.length),
             energy: refined.energy * scale.moment(),
             index,
             undulation: self.undulation(refined).unwrap_or_default(),
@@ -368,6 +269,6 @@ impl Run<'_, '_> {
     }
 }
 
-fn near(fraction: f64, state: &State, critical: &Critical) -> bool {
-    (fraction - critical.fraction).abs() < SAME && state.shift_to(&critical.state) < SAME.sqrt()
+fn near(a: &Refined, b: &Refined) -> bool {
+    (a.fraction - b.fraction).abs() < SAME && a.state.shift_to(&b.state) < SAME.sqrt()
 }

@@ -1,0 +1,189 @@
+//! Every point of a branch is an equilibrium within its stated error, every change
+//! of the index is at a critical point that is reported, and no branch is lost.
+
+mod common;
+
+use common::random::{drawn, leaves};
+use common::{relaxed, to};
+use glam::DVec3;
+use leafdyn::internals::branch::{End, Family, Followed, Walk, begin};
+use leafdyn::internals::bvp::{self, Precision::LocalError, Start};
+use leafdyn::internals::relax::index_near;
+use leafdyn::scenario::{Profile, Scenario};
+use rayon::prelude::*;
+
+/// Accuracy of the tips, relative to the longest vein.
+const TOLERANCE: f64 = 1e-6;
+
+/// Points of every branch that are solved again, and the local error of that.
+const AGAIN: usize = 5;
+const SHARP: f64 = 1e-11;
+
+/// Traces, unless the environment asks for more.
+const TRACES: usize = 24;
+
+/// A leaf of which one thing changes from what it is.
+fn varied(leaf: &Scenario, what: usize, part: f64) -> Scenario {
+    let mut leaf = leaf.clone();
+    let scaled = |profile: &mut Profile, factor: f64| *profile = profile.scaled(factor);
+    match what {
+        // Its loads are turned over, or grow threefold.
+        0 | 1 => {
+            let factor = 1.0 + part * [-4.0, 2.0][what];
+            leaf.gravity = leaf.gravity.map(|g| factor * g);
+            leaf.tip_force = leaf.tip_force.map(|f| factor * f);
+        }
+        // Its veins bend up and down ever more easily.
+        2 => {
+            for rod in &mut leaf.rods {
+                scaled(&mut rod.couple_stiffness[1], 1.0 - 0.8 * part);
+            }
+        }
+        // One vein curls up.
+        3 => scaled(&mut leaf.rods[0].rest_curvature[1], 1.0 + 4.0 * part),
+        _ => {
+            let factor = 1.0 + 20.0 * part;
+            let gaps = leaf.coupling.iter_mut().flatten();
+            gaps.for_each(|k| *k *= factor);
+        }
+    }
+    leaf
+}
+
+/// What a trace came to.
+#[derive(Clone, Copy, Debug, Default)]
+struct Found {
+    at_rest: usize,
+    lost: usize,
+    points: usize,
+    critical: usize,
+    solved_again: usize,
+    not_solved: usize,
+}
+
+impl std::ops::Add for Found {
+    type Output = Found;
+
+    fn add(self, other: Found) -> Found {
+        Found {
+            at_rest: self.at_rest + other.at_rest,
+            lost: self.lost + other.lost,
+            points: self.points + other.points,
+            critical: self.critical + other.critical,
+            solved_again: self.solved_again + other.solved_again,
+            not_solved: self.not_solved + other.not_solved,
+        }
+    }
+}
+
+fn follow(case: usize, leaf: &Scenario) -> Found {
+    let make = |part: f64| Ok(varied(leaf, case % 5, part));
+    let family = Family::new(&make, (0.0, 1.0), false).unwrap();
+    let rest = relaxed(leaf, &to(TOLERANCE));
+    let mut found = Found::default();
+    if !rest.outcome.is_success() {
+        return found;
+    }
+    found.at_rest = 1;
+    let (mut grids, mut first) = match begin(&family, &rest, None) {
+        Ok(begun) => begun,
+        Err(stuck) => {
+            println!("{case}: does not begin: {stuck}");
+            found.lost = 1;
+            return found;
+        }
+    };
+    first.tangent = first.tangent.towards(true);
+    let how = Walk {
+        longest: 0.1,
+        most: 200,
+    };
+    let branch = grids.follow(first, &how, TOLERANCE, &mut |_, _| {});
+    match &branch.end {
+        End::Reached | End::Returned | End::Closed | End::MostPoints => {}
+        end => {
+            println!("{case}: {end:?} after {} points", branch.points.len());
+            found.lost = 1;
+        }
+    }
+    found.points = branch.points.len();
+    found.critical = branch.critical.len();
+    let index = index_is_explained(case, &branch);
+    // Spread over the branch by the golden ratio: at random, and the same in every run.
+    for k in 0..AGAIN {
+        let part = ((case * AGAIN + k) as f64 * 0.618_033_988_749_895).fract();
+        let number = (part * branch.points.len() as f64) as usize;
+        match is_equilibrium(&format!("{case}, point {number}"), &family, &branch, number) {
+            Some(counted) => {
+                found.solved_again += 1;
+                assert_eq!(counted, index[number], "{case}, point {number}");
+            }
+            None => found.not_solved += 1,
+        }
+    }
+    found
+}
+
+/// That bounds are kept, and that critical points explain every change of the index:
+/// the indices of the points.
+fn index_is_explained(case: usize, branch: &Followed) -> Vec<usize> {
+    let (points, critical) = (&branch.branch.points, &branch.branch.critical);
+    assert_eq!(points.len(), branch.points.len(), "{case}");
+    assert_eq!(critical.len(), branch.critical.len(), "{case}");
+    for refined in branch.points.iter().chain(&branch.critical) {
+        let (error, own) = (refined.error, refined.fraction_error);
+        assert!(error <= TOLERANCE && own < 1e-3, "{case}: {error} {own}");
+    }
+    for (i, pair) in points.windows(2).enumerate() {
+        let mut index = pair[0].index;
+        for (_, critical) in critical.iter().filter(|(after, _)| *after == i) {
+            assert_eq!(critical.indices[0], index, "{case}, behind point {i}");
+            index = critical.indices[1];
+        }
+        assert_eq!(index, pair[1].index, "{case}, behind point {i}");
+    }
+    points.iter().map(|point| point.index).collect()
+}
+
+/// That the boundary-value problem has a solution where a point says it has; returns its
+/// index. None if shooting finds none: next to a singular point it may not.
+fn is_equilibrium(what: &str, family: &Family, branch: &Followed, number: usize) -> Option<usize> {
+    let point = &branch.points[number];
+    let scenario = family.scenario(point.fraction).unwrap();
+    let (stations, rods) = (point.grid.sigma(), point.shapes(family).unwrap());
+    let start = Start::Leaf {
+        stations,
+        rods: &rods,
+    };
+    let options = bvp::Options::new(start, stations, LocalError(SHARP));
+    let shot = bvp::solve(&scenario, &options).ok()?;
+    let length = family.scale().length;
+    for (rod, tip) in shot.rods.iter().zip(&point.tips) {
+        let off = rod.nodes.last()?.position / length - DVec3::from_array(*tip);
+        let allowed = point.error + shot.error.position / length + 1e-9;
+        let off = off.length();
+        assert!(
+            off <= allowed,
+            "{what}: off by {off:.1e}, {allowed:.1e} stated"
+        );
+    }
+    index_near(&scenario, point.grid.clone(), &rods)
+}
+
+/// More: `LEAFDYN_TRACES=200 cargo test --release --test trace_verified -- --nocapture`.
+#[test]
+fn random_traces() {
+    let asked = std::env::var("LEAFDYN_TRACES").ok();
+    let count = asked.map_or(TRACES, |count| count.parse().unwrap());
+    let cases: Vec<(usize, Scenario)> = drawn(leaves(), count).into_iter().enumerate().collect();
+    let each = cases.par_iter().map(|(case, leaf)| follow(*case, leaf));
+    let found = each.reduce(Found::default, |a, b| a + b);
+    println!("{count} traces: {found:?}");
+    assert!(found.at_rest + count / 100 >= count, "{found:?}");
+    assert_eq!(found.lost, 0, "{found:?}");
+    assert!(
+        found.points > 8 * count && 40 * found.critical > count,
+        "{found:?}"
+    );
+    assert!(20 * found.not_solved < found.solved_again, "{found:?}");
+}
