@@ -79,13 +79,14 @@ impl std::ops::Add for Found {
 fn follow(case: usize, leaf: &Scenario) -> Found {
     let make = |part: f64| Ok(varied(leaf, case % 5, part));
     let family = Family::new(&make, (0.0, 1.0), false).unwrap();
-    let rest = relaxed(leaf, &to(TOLERANCE));
+    let options = to(TOLERANCE);
+    let rest = relaxed(leaf, &options);
     let mut found = Found::default();
     if !rest.outcome.is_success() {
         return found;
     }
     found.at_rest = 1;
-    let (mut grids, mut first) = match begin(&family, &rest, None) {
+    let (mut grids, mut first) = match begin(&family, &rest, &options, None) {
         Ok(begun) => begun,
         Err(stuck) => {
             println!("{case}: does not begin: {stuck}");

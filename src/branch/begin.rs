@@ -4,37 +4,77 @@ use super::equations::Stuck;
 use super::family::Family;
 use super::follow::Grids;
 use super::{Point, prolonged};
-use crate::leaf::{DiscreteLeaf, Grid};
-use crate::relax::{Equilibrium, project};
+use crate::leaf::{DiscreteLeaf, Grid, System};
+use crate::relax::{Equilibrium, Options, Work, polish, project, relax};
 
 /// The finest grid on which the first point is sought.
 const FINEST: usize = 512;
 
-/// The first point of a branch with its grid: the equilibrium `rest` at the fraction
-/// 0, on a grid of so many segments or more, or on one twice as fine as the coarsest
-/// of the relaxation or finer on which the index is that of the finest.
+/// By how much the tips of one grid may differ from the extrapolated ones, relative to
+/// the leaf.
+const SAME_LEAF: f64 = 0.02;
+
+/// The first point of a branch with its grid: the equilibrium `rest`, found with these
+/// `options`, at the fraction 0; on a grid of so many segments or more, or on one twice
+/// as fine as the coarsest of the relaxation or finer on which the index is that of the
+/// finest.
 ///
 /// # Errors
 /// If Newton's method finds it on no grid, what it says on the finest.
 pub fn begin<'a>(
     family: &'a Family<'a>,
     rest: &Equilibrium,
+    options: &Options,
     segments: Option<usize>,
+) -> Result<(Grids<'a>, Point), Stuck> {
+    let least = segments.unwrap_or(2 * (rest.shape.stations.len() - 1));
+    search(family, rest, least, segments.is_some()).or_else(|stuck| {
+        // Between the stations too little is known: relax it once more, on the finest
+        // grid alone, and begin there.
+        let finest = rest.accuracy.segments.iter().max().copied();
+        let options = Options {
+            method: options.method.on_grid(finest),
+            ..options.clone()
+        };
+        let alone = relax(&family.scenario(0.0)?, &options, &mut |_| {});
+        let Ok(alone) = alone else {
+            return Err(stuck);
+        };
+        let mut tips = rest.tips.iter().zip(&alone.tips);
+        let near = SAME_LEAF * family.scale().length;
+        match tips.all(|(a, b)| a.distance(*b) < near) {
+            true => search(family, &alone, alone.shape.stations.len() - 1, true),
+            false => Err(stuck),
+        }
+    })
+}
+
+/// The first point on a grid of at least so many segments; of any index, or on one that
+/// is fine enough for that of `rest`.
+fn search<'a>(
+    family: &'a Family<'a>,
+    rest: &Equilibrium,
+    least: usize,
+    any_index: bool,
 ) -> Result<(Grids<'a>, Point), Stuck> {
     let leaf = family.first();
     let mut grid = Grid::new(rest.shape.stations.len() - 1, leaf.kinks());
     let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
     let mut state = project(leaf, &discrete, &rest.shape.rods);
-    let least = segments.unwrap_or(2 * grid.segments());
     let mut found = Err(Stuck::NotConverged);
     loop {
         if grid.segments() >= least {
             let mut grids = Grids::new(family, grid.clone())?;
-            match grids.of(&state).correct(&state, 0.0, None) {
+            let point = grids.of(&state).correct(&state, 0.0, None).or_else(|_| {
+                let mut system = System::new(&discrete);
+                polish(&discrete, &mut state, &mut system, &mut Work::default());
+                grids.of(&state).correct(&state, 0.0, None)
+            });
+            match point {
                 Ok((point, _)) => {
                     let same = Some(point.index) == rest.stability.negative_eigenvalues;
                     found = Ok((grids, point));
-                    if same || segments.is_some() {
+                    if same || any_index {
                         return found;
                     }
                 }

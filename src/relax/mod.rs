@@ -38,6 +38,7 @@ pub use options::{
     check_tolerance,
 };
 pub use request::Relaxation;
+pub(crate) use saddle::polish;
 pub(crate) use segments::check_segments;
 pub(crate) use shape::node as node_state;
 pub use solve::relax;

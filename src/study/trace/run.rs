@@ -80,7 +80,7 @@ pub fn trace(
         wall_seconds: 0.0,
     };
     let why = match rest.stability.negative_eigenvalues {
-        Some(_) => match begin(&family, &rest, wanted) {
+        Some(_) => match begin(&family, &rest, &options, wanted) {
             Ok((grids, first)) => {
                 let mut run = Run {
                     family: &family,
