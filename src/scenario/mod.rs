@@ -20,7 +20,6 @@ mod section;
 mod tip;
 mod value;
 
-pub(crate) use check::MOST_RODS;
 pub use dynamics::{Dynamics, Start};
 #[cfg(feature = "cli")]
 pub(crate) use error::printable;

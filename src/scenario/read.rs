@@ -88,7 +88,7 @@ pub(crate) fn utf8(bytes: Vec<u8>, file: &str) -> Result<String, ScenarioError> 
         return Err(refused(file, None, problem));
     }
     let weight = Request::Scenario { bytes: bytes.len() };
-    (weight.weigh()).map_err(|why| refuse(None, why.to_string()))?;
+    (weight.weigh()).map_err(|why| refused(file, None, why.to_string()))?;
     String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
         let bytes = error.as_bytes();
