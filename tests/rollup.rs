@@ -5,7 +5,7 @@ mod common;
 
 use std::f64::consts::PI;
 
-use common::{Both, TIGHT, close, set_stiffness, solve, table, tip_node};
+use common::{Both, TIGHT, close, rod, set_stiffness, settle, solve, table, tip, tip_node};
 use glam::DVec3;
 
 /// An arc of the angle M L/EI, with no force in it, whatever its stretch and
@@ -76,5 +76,17 @@ fn one_coil_and_ten_end_where_the_boundary_value_problem_says() {
         leaf.tip_is(&what, wanted, length * 1e-12, length * 1e-11);
         // No potential, so no count of eigenvalues: nothing is claimed.
         assert_eq!(leaf.relaxed.stability.negative_eigenvalues, None);
+    }
+}
+
+/// More turns than are applied by steps: from the shape of the moment alone.
+#[test]
+fn hundreds_of_turns_are_found() {
+    for moment in [300.0_f64, 1500.0] {
+        let leaf = settle(&rod(&format!("load.tip_moment=[0, 0, {moment:?}]")), 1e-6);
+        let arc = DVec3::new(moment.sin(), 1.0 - moment.cos(), 0.0) / moment;
+        let off = (tip(&leaf) - arc).length();
+        let estimate = leaf.accuracy.error_estimate.unwrap();
+        assert!(off <= estimate, "{moment}: {off:.1e}");
     }
 }

@@ -90,6 +90,17 @@ impl DiscreteLeaf {
         soft
     }
 
+    /// Gives every segment the force of its strain, whatever it is.
+    pub fn strain_forces(&self, state: &mut State) {
+        let n = self.segments();
+        for (j, i) in self.each(0..n) {
+            let section = self.section(j, i);
+            let idle = self.segment(state, j, i, DVec3::ZERO);
+            let strain = idle.v(section) - section.rest_strain;
+            state.n[j * n + i] = idle.frame * (strain / section.compliance);
+        }
+    }
+
     /// A shift of the matrix (times the mass matrix) that is far below the
     /// squared frequency of any bending mode, and above what rounding and
     /// unfinished iterations make of a neutral mode's zero.

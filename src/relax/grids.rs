@@ -6,9 +6,9 @@ use crate::newton::Stop;
 use crate::relax::method::Method;
 use crate::relax::options::MAX_NODES;
 use crate::relax::prolong::{between, predict, prolong};
-use crate::relax::run::{Level, Run, positions};
+use crate::relax::run::{BUDGET, Level, Run, positions};
 use crate::relax::segments::{COARSEST_TURN, FINEST};
-use crate::relax::settle::{BUDGET, InitialGuess, Settled};
+use crate::relax::settle::{InitialGuess, Settled};
 
 /// Two grids on which the leaf moved far are said to have settled in the same place
 /// if no station differs by more than this, in lengths.
@@ -77,7 +77,7 @@ impl Run<'_, '_> {
                 // So coarse a grid cannot decide where a leaf that moves settles.
                 _ if self.too_coarse(level.leaf.segments())
                     && (moved || rest.is_err() || largest_turn(&level) > COARSEST_TURN) => {}
-                Ok(_) if !moved || last => {
+                Ok(_) if !moved || last || self.by_steps => {
                     self.push(level);
                     return Ok(());
                 }

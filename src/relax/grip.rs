@@ -76,6 +76,9 @@ impl Run<'_, '_> {
                 limit: &self.options.limit,
                 convex_only: false,
                 moved: false,
+                by_steps: false,
+                moved_softened: false,
+                part: 0.0,
             };
             let before = relaxation.work.force_evaluations;
             let rest = relaxation.settle(leaf, system);

@@ -236,6 +236,10 @@ fn unpack(leaf: &DiscreteLeaf, j: usize, i: usize, values: &[f64]) -> NodeState 
     node
 }
 
+/// Of a leaf that moved far while it was softer than it is.
+const SOFTENED: &str = "stiff rods were softened while the leaf moved: \
+     where it has several equilibria, its own motion may end in another; simulate shows it";
+
 /// How a run ended, at rest (to the tolerance or not) or stopped before: a word, and
 /// a sentence where one helps.
 pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) {
@@ -251,7 +255,8 @@ pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) 
             run.index.is_none().then(|| match run.leaf.loads.tip_moment == DVec3::ZERO {
                 true => "the leaf is too large to count its negative eigenvalues: its stability is not known".into(),
                 false => "a dead moment has no potential, so that no count of eigenvalues decides stability: it is not stated".into(),
-            }),
+            })
+            .or_else(|| run.moved_softened.then(|| SOFTENED.into())),
         ),
         Ok(false) => (
             Outcome::ToleranceNotReached,
@@ -265,7 +270,8 @@ pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) 
         Err(Stop::Stuck) => (
             Outcome::Diverged,
             Some(format!(
-                "no step lowers the energy on {finest} segments: use more segments, or raise the softest stiffness or lower the load"
+                "no step lowers the energy on {finest} segments{}",
+                what_to_change(run)
             )),
         ),
         Err(stop) => (
@@ -278,12 +284,59 @@ pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) 
                     "the step limit came before rest on {finest} segments: use fewer, or the semi-implicit method"
                 ),
                 Stop::Unresolved => format!(
-                    "a vein bends by more than a right angle within one of {finest} segments: use more segments or smaller loads"
+                    "a vein bends by more than a right angle within one of {finest} segments{}",
+                    what_to_change(run)
                 ),
                 _ => format!(
-                    "the step limit came before rest on {finest} segments: the load may admit no stable equilibrium; lower it"
+                    "the step limit came before rest on {finest} segments: the load may admit no stable equilibrium{}",
+                    what_to_change(run)
                 ),
             }),
         ),
     }
+}
+
+/// How far a leaf came that did not come to rest, and what about it may be changed:
+/// the larger of its loads, and the softest stiffness of the vein that bends most.
+fn what_to_change(run: &Run) -> String {
+    let Some(level) = run.levels.last() else {
+        return String::new();
+    };
+    let bends = |j: usize| {
+        let base = level.state.base(j);
+        let rate = |i: usize| {
+            let ends = [level.state.q[base + i], level.state.q[base + i + 1]];
+            ends[0].angle_between(ends[1]) / level.leaf.section(j, i).ds
+        };
+        (0..level.leaf.segments()).map(rate).fold(0.0, f64::max)
+    };
+    let rods = 0..level.leaf.rods();
+    let vein = rods
+        .max_by(|&a, &b| bends(a).total_cmp(&bends(b)))
+        .unwrap_or(0);
+    let stiffness = level.leaf.leaf.section(vein, 0.5, 1.0).couple_stiffness;
+    let softest = match stiffness.min_element() {
+        least if least == stiffness.x => "torsion",
+        least if least == stiffness.y => "bending_2",
+        _ => "bending_3",
+    };
+    let loads = run.leaf.loads;
+    let [weight, tip, moment] =
+        [loads.gravity, loads.tip_force, loads.tip_moment].map(|load| load.length());
+    let load = match weight * run.leaf.rods() as f64 > tip {
+        _ if moment > weight.max(tip) => "lower load.tip_moment",
+        true => "lower load.gravity",
+        false if tip > 0.0 => "lower load.tip_force",
+        false => "lower the curvatures at rest",
+    };
+    let reached = match run.part {
+        part if part > 0.0 && part < 0.995 => {
+            format!(" (it rests under {:.2} % of the loads)", 100.0 * part)
+        }
+        _ => String::new(),
+    };
+    format!(
+        "{reached}: {load}, or raise stiffness.{softest} of vein {}",
+        vein + 1
+    )
 }

@@ -7,6 +7,7 @@ use crate::relax::equilibrium::Saddle;
 use crate::relax::method::Method;
 use crate::relax::options::{Options, Progress};
 use crate::relax::richardson::Richardson;
+use glam::DVec3;
 
 /// Segments of the coarsest grid, in two panels or more if profiles have kinks.
 pub const COARSEST: usize = 8;
@@ -22,6 +23,10 @@ const TWO_COARSE: f64 = 1.5;
 
 /// Part of the rounding error that grows with the number of segments.
 const ROUNDING: f64 = 4e-15;
+
+/// Nodes times force evaluations after which a leaf that has not come to rest
+/// is given up: some seconds.
+pub const BUDGET: usize = 3_000_000;
 
 /// A leaf settled on one grid.
 pub struct Level {
@@ -62,6 +67,12 @@ pub struct Run<'a, 'o> {
     pub pushes: i32,
     /// The matrix with which the last grid came to rest.
     pub last: Option<System>,
+    /// Whether the leaf did not come to rest in a first attempt.
+    pub by_steps: bool,
+    /// Whether it had to move while it was softer than it is.
+    pub moved_softened: bool,
+    /// Part of the loads under which it then came to rest.
+    pub part: f64,
 }
 
 impl<'a, 'o> Run<'a, 'o> {
@@ -92,7 +103,27 @@ impl<'a, 'o> Run<'a, 'o> {
             spent: 0,
             pushes: 0,
             last: None,
+            by_steps: false,
+            moved_softened: false,
+            part: 0.0,
         }
+    }
+
+    /// Forgets all grids, to begin anew by steps of loads and stiffness.
+    pub fn begin_by_steps(&mut self) {
+        if !self.by_steps {
+            self.spent = BUDGET / 2;
+        }
+        self.by_steps = true;
+        self.moved_softened = false;
+        self.saddle = None;
+        self.levels.clear();
+        self.drop_between();
+        self.effects = [None; 2];
+        self.index = None;
+        self.remaining = 0.0;
+        self.pushes = 0;
+        self.last = None;
     }
 
     /// The run as if it had been one of the whole leaf.
@@ -114,6 +145,15 @@ impl<'a, 'o> Run<'a, 'o> {
     /// Whether an unstable equilibrium is wanted as much as a stable one.
     pub fn keeps_unstable(&self) -> bool {
         matches!(self.options.method, Method::SemiImplicit(how) if how.keep_unstable)
+    }
+
+    /// Whether a leaf that did not come to rest gets a second attempt.
+    pub fn may_go_by_steps(&self) -> bool {
+        let settles =
+            matches!(self.options.method, Method::SemiImplicit(how) if !how.keep_unstable);
+        // A tip that is held is led to its place by steps already.
+        let free = self.leaf.held.is_none() && self.leaf.loads.tip_moment == DVec3::ZERO;
+        settles && free && !self.late()
     }
 
     /// Whether the time allowed is over.

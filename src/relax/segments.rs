@@ -3,6 +3,7 @@
 use crate::leaf::{Grid, Leaf};
 use crate::memory::Request;
 use crate::relax::method::Method;
+use crate::relax::methods::moment;
 use crate::relax::options::{MAX_NODES, RelaxError};
 use crate::relax::run::COARSEST;
 use crate::scenario::Profile;
@@ -78,7 +79,10 @@ pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
         let bending = moment / section.couple_stiffness.min_element();
         (section.rest_curvature.length() + bending) * leaf.length(j)
     };
-    let turn = (0..leaf.rods()).map(turn).fold(0.0, f64::max);
+    let turn = match moment::turning(leaf, FINEST) {
+        Some(rate) => rate * leaf.length(0),
+        None => (0..leaf.rods()).map(turn).fold(0.0, f64::max),
+    };
     let mut segments = least;
     while ((segments as f64) * COARSEST_TURN < turn || steep(leaf, segments)) && segments < FINEST {
         segments *= 2;

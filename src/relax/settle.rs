@@ -6,7 +6,7 @@ use crate::relax::method::{Method, SemiImplicit};
 use crate::relax::methods::semi_implicit::Relaxation;
 use crate::relax::methods::{explicit, moment};
 use crate::relax::options::Progress;
-use crate::relax::run::{Level, Run};
+use crate::relax::run::{BUDGET, Level, Run};
 use crate::relax::saddle::{self, saddle_of};
 use crate::relax::start::{disturb, start};
 use glam::DVec3;
@@ -22,13 +22,11 @@ const FIXED_ACCURACY: f64 = 1e-12;
 /// Accuracy of the first solutions with conjugate gradients far from rest.
 const FAR_FROM_REST: f64 = 1e-2;
 
-/// Nodes times force evaluations after which a leaf that has not come to rest
-/// is given up: some seconds.
-pub const BUDGET: usize = 3_000_000;
-
 /// Force evaluations that even the largest leaf is granted on every grid,
-/// whatever was spent before.
-const LEAST_EVALUATIONS: usize = 600;
+/// whatever was spent before; on one of more segments than [`COARSE`] in proportion
+/// fewer, but never less than the second number.
+const LEAST_EVALUATIONS: (usize, usize) = (600, 100);
+const COARSE: usize = 64;
 
 /// Newton iterations towards an equilibrium of any kind.
 const MAX_ITERATIONS: usize = 200;
@@ -67,7 +65,8 @@ impl Run<'_, '_> {
         self.last = None;
         let mut leaf = DiscreteLeaf::new(self.leaf, grid);
         let mut near_rest = matches!(guess, InitialGuess::Coarser(_) | InitialGuess::Finer(_));
-        let grip = leaf.leaf.held.is_some() && matches!(guess, InitialGuess::Start);
+        let from_start = matches!(guess, InitialGuess::Start);
+        let grip = leaf.leaf.held.is_some() && from_start;
         let cg_tolerance = match guess {
             InitialGuess::Start | InitialGuess::Pushed(_) => FAR_FROM_REST,
             InitialGuess::Coarser(_) => 3e-6,
@@ -89,7 +88,9 @@ impl Run<'_, '_> {
         let explicit = matches!(self.options.method, Method::Explicit { .. });
         let follows = leaf.tip_moment() != DVec3::ZERO;
         if !explicit && !follows && !self.keeps_unstable() {
-            let settled = self.settle_in_a_valley(leaf, state, near_rest, cg_tolerance);
+            let by_steps = self.by_steps && from_start;
+            let how = (near_rest, by_steps, cg_tolerance);
+            let settled = self.settle_in_a_valley(leaf, state, how);
             return Settled {
                 moved: moved || settled.moved,
                 ..settled
@@ -120,7 +121,10 @@ impl Run<'_, '_> {
                 progress,
             };
             match follows {
-                true => moment::settle(&mut leaf, &mut state, &mut system, near_rest, newton),
+                true => {
+                    let limit = &self.options.limit;
+                    moment::settle(&mut leaf, &mut state, &mut system, near_rest, limit, newton)
+                }
                 // To the next equilibrium, stable or not.
                 false => newton.solve(&leaf, &mut state, &mut system, saddle::ANY_SIGN),
             }
@@ -161,14 +165,15 @@ impl Run<'_, '_> {
         &mut self,
         leaf: DiscreteLeaf,
         mut state: State,
-        mut near_rest: bool,
-        mut cg_tolerance: f64,
+        (mut near_rest, mut by_steps, mut cg_tolerance): (bool, bool, f64),
     ) -> Settled {
         let accuracy = self.accuracy(&leaf);
         let convex_only = self.whole.is_some() || self.too_coarse(leaf.segments());
         let mut system = System::new(&leaf);
         let nodes = leaf.rods() * leaf.segments();
-        let allowed = (BUDGET.saturating_sub(self.spent) / nodes).max(LEAST_EVALUATIONS);
+        let (most, least) = LEAST_EVALUATIONS;
+        let granted = (most * COARSE / leaf.segments()).clamp(least, most);
+        let allowed = (BUDGET.saturating_sub(self.spent) / nodes).max(granted);
         let begun = self.work.force_evaluations;
         let mut moved = false;
         for pushes in 0..MAX_SADDLES {
@@ -189,12 +194,17 @@ impl Run<'_, '_> {
                 limit: &self.options.limit,
                 convex_only,
                 moved: false,
+                by_steps,
+                moved_softened: false,
+                part: 0.0,
             };
             let before = relaxation.work.force_evaluations;
             let rest = relaxation.settle(&leaf, &mut system);
             let spent = relaxation.work.force_evaluations - before;
             moved |= relaxation.moved;
             let direct = relaxation.solver.direct.is_some();
+            self.part = relaxation.part.max(self.part);
+            self.moved_softened |= relaxation.moved_softened;
             state = relaxation.state;
             self.spent += nodes * spent;
             if let Ok(remaining) = rest {
@@ -217,7 +227,7 @@ impl Run<'_, '_> {
                 None => {}
             }
             saddle::push_off(&leaf, &mut state, &mut system, &mut self.work);
-            (near_rest, cg_tolerance) = (false, FAR_FROM_REST);
+            (near_rest, cg_tolerance, by_steps) = (false, FAR_FROM_REST, false);
         }
         let (level, rest) = (Level { leaf, state }, Err(Stop::StepLimit));
         Settled { level, rest, moved }

@@ -9,7 +9,7 @@ use crate::relax::methods::{explicit, shooting};
 use crate::relax::modes;
 use crate::relax::options::{MOST_MODES, Options, Progress, RelaxError, check_tolerance};
 use crate::relax::result;
-use crate::relax::run::Run;
+use crate::relax::run::{BUDGET, Run};
 use crate::relax::segments::{check_segments, least, reducible};
 use crate::scenario::Scenario;
 use std::time::Instant;
@@ -60,6 +60,11 @@ pub fn relax(
     ))
 }
 
+/// The coarsest and the finest grid on which a leaf that did not come to rest is
+/// loaded and stiffened by steps.
+const COARSEST_BY_STEPS: usize = 32;
+const FINEST_BY_STEPS: usize = 512;
+
 /// Relaxes on nested grids.
 fn relax_on_grids(
     scenario: &Scenario,
@@ -90,7 +95,25 @@ fn relax_on_grids(
     }
     let mut run = Run::new(&leaf, options, tolerance, progress);
     run.work = work;
-    let end = run.solve(grid);
+    let mut end = run.solve(grid.clone());
+    let mut next = Some(grid);
+    while end.is_err()
+        && run.may_go_by_steps()
+        && let Some(mut grid) = next
+    {
+        // On the grid that is asked for, or each time on a finer one.
+        let fixed = run.segments().is_some();
+        while !fixed && grid.segments() < COARSEST_BY_STEPS {
+            grid = grid.refined();
+        }
+        run.begin_by_steps();
+        end = run.solve(grid);
+        let failed = run.levels.last().filter(|_| !fixed);
+        next = failed
+            .filter(|_| run.spent <= BUDGET)
+            .map(|level| level.leaf.grid.refined())
+            .filter(|grid| grid.segments() <= FINEST_BY_STEPS);
+    }
     Ok(finished(run, end, clock))
 }
 

@@ -5,9 +5,17 @@
 //! quasi-statically instead: all loads grow together from zero, in steps of
 //! about one radian of tip rotation, each followed by Newton's method with the
 //! exact, unsymmetric tangent.
+//!
+//! Where that would be too many steps, the loads grow from the shape that the moment
+//! alone makes. It is the same along the whole rod, so that this shape follows
+//! segment by segment from the clamp.
 
-use crate::leaf::{DiscreteLeaf, State, System};
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
+use crate::limit::Limit;
 use crate::newton::{Equations, Newton, Stop};
+use crate::rod::{RESOLVED_TURN, Section};
+use crate::rotation;
+use glam::{DMat3, DQuat, DVec3};
 
 /// Rotation of the tip (radians) that one load step may bring about by bending.
 const TURN_PER_STEP: f64 = 1.0;
@@ -21,12 +29,27 @@ const STEP_ACCURACY: f64 = 1e-3;
 /// Smallest load step, as a part of the load.
 const SMALLEST_STEP: f64 = 1e-6;
 
+/// Rotation (radians) from which on the moment is not applied by steps, and
+/// steps that the other loads may then take.
+const LARGEST_BY_STEPS: f64 = 250.0;
+const MAX_STEPS: usize = 100;
+
+/// Iterations for the turn of one segment, their accuracy relative to the moment,
+/// and the step of their differences, radians.
+const SEGMENT_ITERATIONS: usize = 20;
+const SEGMENT_ACCURACY: f64 = 1e-13;
+const DIFFERENCE: f64 = 1e-7;
+
+/// Squared half turn below which series replace quotients that tend to 0/0.
+const SMALL: f64 = 1e-5;
+
 /// Loads the rod from its rest shape, or corrects a state `near_rest`.
 pub fn settle(
     leaf: &mut DiscreteLeaf,
     state: &mut State,
     system: &mut System,
     near_rest: bool,
+    limit: &Limit,
     how: Newton,
 ) -> Result<f64, Stop> {
     let mut newton = |leaf: &DiscreteLeaf, state: &mut State, accuracy| {
@@ -41,24 +64,43 @@ pub fn settle(
     if near_rest {
         return newton(leaf, state, how.accuracy);
     }
+    let moment_first = largest_turn(&leaf.leaf) > LARGEST_BY_STEPS;
     let stiffness = (leaf.sections.iter()).map(|s| s.couple_stiffness.min_element());
     let softest = stiffness.fold(f64::INFINITY, f64::min);
     let turn = leaf.leaf.loads.tip_moment.length() * leaf.leaf.length(0) / softest;
     let mut step = 1.0 / (turn / TURN_PER_STEP).ceil().max(1.0);
+    let mut steps = usize::MAX;
+    let loads = leaf.loads;
+    if moment_first {
+        shape_by_moment(leaf, state)?;
+        (step, steps) = (1.0, MAX_STEPS);
+    }
     let (mut reached, mut before) = (0.0, state.clone());
     while reached < 1.0 {
-        leaf.load_factor = (reached + step).min(1.0);
-        let wanted = match leaf.load_factor < 1.0 {
+        if steps == 0 || limit.reached() {
+            return Err(Stop::StepLimit);
+        }
+        steps -= 1;
+        let part: f64 = (reached + step).min(1.0);
+        if moment_first {
+            leaf.loads.gravity = part * loads.gravity;
+            leaf.loads.tip_force = part * loads.tip_force;
+        } else {
+            leaf.load_factor = part;
+        }
+        let wanted = match part < 1.0 {
             true => STEP_ACCURACY,
             false => how.accuracy,
         };
         match newton(leaf, state, wanted) {
-            Ok(remaining) if leaf.load_factor == 1.0 => return Ok(remaining),
+            Ok(remaining) if part == 1.0 => return Ok(remaining),
             Ok(_) => {
-                reached = leaf.load_factor;
+                reached = part;
                 before.clone_from(state);
             }
-            Err(stop) if stop == Stop::Unresolved || step < SMALLEST_STEP => return Err(stop),
+            Err(stop) if stop == Stop::Unresolved && !moment_first || step < SMALLEST_STEP => {
+                return Err(stop);
+            }
             Err(_) => {
                 step /= 2.0;
                 state.clone_from(&before);
@@ -66,4 +108,85 @@ pub fn settle(
         }
     }
     Err(Stop::StepLimit)
+}
+
+/// At most so much (radians) the moment can turn the tip of a rod, if its softest
+/// stiffness took it all.
+fn largest_turn(leaf: &Leaf) -> f64 {
+    let moment = leaf.loads.tip_moment.length();
+    let softest = leaf.section(0, 0.5, 1.0).couple_stiffness.min_element();
+    moment * leaf.length(0) / softest
+}
+
+/// The largest rate (radians a length) at which a large moment alone turns the
+/// rod; `None` if it is small, or too large for a grid of so many segments.
+pub fn turning(leaf: &Leaf, segments: usize) -> Option<f64> {
+    if largest_turn(leaf) <= LARGEST_BY_STEPS {
+        return None;
+    }
+    let leaf = DiscreteLeaf::new(leaf, Grid::new(segments, leaf.kinks()));
+    let mut base = leaf.leaf.base(0);
+    let (mut turn, mut largest) = (DVec3::ZERO, 0.0_f64);
+    for section in &leaf.sections {
+        turn = segment_turn(section, base, leaf.tip_moment(), turn)?;
+        largest = largest.max(turn.length() / section.ds);
+        base = (base * rotation::exp(turn)).normalize();
+    }
+    Some(largest)
+}
+
+/// Gives the rod the shape that the moment alone makes.
+fn shape_by_moment(leaf: &DiscreteLeaf, state: &mut State) -> Result<(), Stop> {
+    let mut turn = DVec3::ZERO;
+    for (i, section) in leaf.sections.iter().enumerate() {
+        let base = state.q[i];
+        turn = segment_turn(section, base, leaf.tip_moment(), turn).ok_or(Stop::Unresolved)?;
+        let next = (base * rotation::exp(turn)).normalize();
+        state.q[i + 1] = next;
+        state.x[i + 1] =
+            state.x[i] + section.ds * (rotation::midpoint(base, next) * section.rest_strain);
+        state.n[i] = DVec3::ZERO;
+    }
+    Ok(())
+}
+
+/// S a, S being the derivative of the rotation vector psi half-way:
+/// s a + sigma y (y . a), with y = psi/2, s = |y|/sin |y|, sigma = (1 - s)/|y|^2.
+fn pulled_back(psi: DVec3, a: DVec3) -> DVec3 {
+    let y = 0.5 * psi;
+    let squared = y.length_squared();
+    let (s, sigma) = match squared < SMALL {
+        true => (1.0 + squared / 6.0, -1.0 / 6.0 - 7.0 / 360.0 * squared),
+        false => {
+            let s = squared.sqrt() / squared.sqrt().sin();
+            (s, (1.0 - s) / squared)
+        }
+    };
+    s * a + sigma * y.dot(a) * y
+}
+
+/// The rotation vector of a segment that carries the moment and no force, from
+/// its neighbour's: S A (psi/ds - u0) = exp(-psi/2) R^T M in the frame half-way.
+fn segment_turn(section: &Section, base: DQuat, moment: DVec3, near: DVec3) -> Option<DVec3> {
+    let moment = base.conjugate() * moment;
+    let unbalanced = |psi: DVec3| {
+        let couple = section.couple_stiffness * (psi / section.ds - section.rest_curvature);
+        pulled_back(psi, couple) - rotation::exp(-0.5 * psi) * moment
+    };
+    let mut psi = near;
+    for _ in 0..SEGMENT_ITERATIONS {
+        let value = unbalanced(psi);
+        let column = |axis: DVec3| (unbalanced(psi + DIFFERENCE * axis) - value) / DIFFERENCE;
+        let rate = DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z));
+        let step = rate.inverse() * value;
+        psi -= step;
+        if psi.is_nan() || psi.length() > RESOLVED_TURN {
+            return None;
+        }
+        if step.length() <= SEGMENT_ACCURACY {
+            return Some(psi);
+        }
+    }
+    // What is left is corrected with the forces.
+    Some(psi)
 }

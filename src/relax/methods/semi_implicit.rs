@@ -52,18 +52,18 @@ const ENERGY_SLACK: f64 = 1e-9;
 /// Smallest compliance (units of L^2/A) of a leaf that is moved by its strain
 /// energy. A stiffer one is first settled with this compliance, which also
 /// gives the forces it carries, and then made stiff.
-const MOVING_COMPLIANCE: f64 = 2e-3;
+pub(super) const MOVING_COMPLIANCE: f64 = 2e-3;
 
 /// The load stretches a softened leaf by no more than about this.
-const MOVING_STRETCH: f64 = 0.05;
+pub(super) const MOVING_STRETCH: f64 = 0.05;
 
 /// Accuracy to which a softened leaf is settled.
-const SOFT_ACCURACY: f64 = 1e-1;
+pub(super) const SOFT_ACCURACY: f64 = 1e-1;
 
 /// Factor by which a softened leaf is made stiffer when Newton's method does not
 /// get from it to the stiffness wanted, and where that ends.
 const STIFFER: f64 = 0.1;
-const SMALLEST_MOVING_COMPLIANCE: f64 = 1e-8;
+pub(super) const SMALLEST_MOVING_COMPLIANCE: f64 = 1e-8;
 
 /// Newton iterations of a stiff leaf before it is made stiffer by steps.
 const STIFF_ITERATIONS: usize = 12;
@@ -92,11 +92,20 @@ pub struct Relaxation<'a> {
     pub convex_only: bool,
     /// Whether the leaf had to move: its energy was not convex where it moved.
     pub moved: bool,
+    /// Whether this is a second attempt, from the start.
+    pub by_steps: bool,
+    /// Whether it had to move while softened.
+    pub moved_softened: bool,
+    /// Part of the loads under which the leaf came to rest, in such an attempt.
+    pub part: f64,
 }
 
 impl Relaxation<'_> {
     /// Lets the leaf come to rest.
     pub fn settle(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Result<f64, Stop> {
+        if self.by_steps {
+            return self.settle_by_steps(leaf, system);
+        }
         let stiffest = leaf.stiffest();
         let load = leaf.leaf.loads.tip_force.length() + leaf.leaf.loads.gravity.length();
         let moving = (MOVING_COMPLIANCE * 0.1_f64.powi(self.pushes)).min(MOVING_STRETCH / load);
@@ -107,10 +116,14 @@ impl Relaxation<'_> {
         let mut soften = !self.near_rest;
         loop {
             if soften {
-                self.move_to_rest(&leaf.softened(floor), system, SOFT_ACCURACY)?;
+                let moved = std::mem::take(&mut self.moved);
+                let rest = self.move_to_rest(&leaf.softened(floor), system, SOFT_ACCURACY);
+                self.moved_softened |= self.moved;
+                self.moved |= moved;
+                rest?;
             }
             let before = self.state.clone();
-            match self.newton(leaf, system) {
+            match self.newton(leaf, system, self.accuracy) {
                 Err(Stop::Stuck) => self.state = before,
                 settled => return settled,
             }
@@ -129,9 +142,14 @@ impl Relaxation<'_> {
     }
 
     /// Newton's method in the mixed form, for a leaf that is nearly at rest.
-    fn newton(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Result<f64, Stop> {
+    pub(super) fn newton(
+        &mut self,
+        leaf: &DiscreteLeaf,
+        system: &mut System,
+        accuracy: f64,
+    ) -> Result<f64, Stop> {
         let newton = Newton {
-            accuracy: self.accuracy,
+            accuracy,
             iterations: STIFF_ITERATIONS,
             work: self.work,
             progress: self.progress,
@@ -145,7 +163,7 @@ impl Relaxation<'_> {
     }
 
     /// Damped motion until rest.
-    fn move_to_rest(
+    pub(super) fn move_to_rest(
         &mut self,
         leaf: &DiscreteLeaf,
         system: &mut System,
@@ -197,6 +215,10 @@ impl Relaxation<'_> {
             if !next_energy.is_finite() || next_energy > energy + slack {
                 if !pace.shorten() {
                     return Err(Stop::Stuck);
+                }
+                if self.by_steps {
+                    // The increment is then one down the energy, if it is small.
+                    leaf.strain_forces(&mut self.state);
                 }
                 sums = leaf.assemble(&self.state, system);
                 self.work.force_evaluations += 1;

@@ -1,0 +1,249 @@
+//! Random leaves come to rest: wild ones, and ones at the edge of what could be
+//! a leaf. How many are drawn, from which seed, and where those that fail are
+//! written, the environment says:
+//! `LEAVES=1000 SEED=7 FAILED=folder cargo test --release --test coming_to_rest -- --nocapture`.
+
+mod common;
+
+use std::fmt::{Display, Write};
+use std::time::Instant;
+
+use common::{parse, relaxed};
+use leafdyn::relax::Options;
+
+/// A generator of random numbers (splitmix64), the same everywhere.
+struct Draw(u64);
+
+impl Draw {
+    fn uniform(&mut self, low: f64, high: f64) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        let unit = ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64;
+        low + (high - low) * unit
+    }
+
+    fn log(&mut self, low: f64, high: f64) -> f64 {
+        self.uniform(low.ln(), high.ln()).exp()
+    }
+
+    fn chance(&mut self, part: f64) -> bool {
+        self.uniform(0.0, 1.0) < part
+    }
+
+    /// A vector of a random direction, of a length up to `most`, over all its `decades`.
+    fn vector(&mut self, most: f64, decades: i32) -> Vec<f64> {
+        let length = self.log(most * 0.1_f64.powi(decades), most);
+        let (z, turn) = (self.uniform(-1.0, 1.0), self.uniform(-3.2, 3.2));
+        let (sin, cos) = turn.sin_cos();
+        let across = (1.0 - z * z).sqrt();
+        vec![length * across * cos, length * across * sin, length * z]
+    }
+
+    /// A quantity: alike in all rods, each rod's own, or profiles.
+    fn quantity(&mut self, rods: usize, next: impl Fn(&mut Self) -> f64) -> String {
+        let some = |draw: &mut Self, count: usize| -> Vec<f64> {
+            (0..count).map(|_| next(draw)).collect()
+        };
+        match self.uniform(0.0, 1.0) {
+            kind if kind < 0.4 => some(self, 1)[0].to_string(),
+            kind if kind < 0.8 => list(some(self, rods)),
+            _ => {
+                let (value, knot) = (next(self), self.uniform(0.1, 0.9));
+                let values: Vec<f64> = (0..3).map(|_| value * self.uniform(0.3, 1.0)).collect();
+                match value.is_finite() {
+                    true => format!("{{ at = [0.0, {knot}, 1.0], value = {} }}", list(values)),
+                    false => "inf".into(),
+                }
+            }
+        }
+    }
+}
+
+fn list<T: Display>(values: Vec<T>) -> String {
+    let values: Vec<String> = values.iter().map(T::to_string).collect();
+    format!("[{}]", values.join(", "))
+}
+
+/// What leaves of a kind have at most.
+struct Kind {
+    name: &'static str,
+    /// Torsion and bending stiffness: smallest and largest.
+    couple: [f64; 2],
+    /// Stretch and shear stiffness, over the mean of that.
+    force: [f64; 2],
+    lengths: [f64; 2],
+    rest_curvature: f64,
+    stretch: f64,
+    /// Weight and tip force a vein, in units of `load_unit`.
+    weight: f64,
+    tip_force: f64,
+    /// Over so many decades.
+    decades: i32,
+    /// Whether the unit is that of the softest bending stiffness.
+    of_the_softest: bool,
+}
+
+const WILD: Kind = Kind {
+    name: "wild",
+    couple: [0.1, 10.0],
+    force: [3.0, 1e5],
+    lengths: [0.7, 1.3],
+    rest_curvature: 10.0,
+    stretch: 1.0,
+    weight: 50.0,
+    tip_force: 10.0,
+    decades: 2,
+    of_the_softest: false,
+};
+
+const EDGE: Kind = Kind {
+    name: "edge",
+    couple: [0.03, 30.0],
+    force: [3.0, 1e5],
+    lengths: [0.5, 1.5],
+    rest_curvature: 20.0,
+    stretch: 2.0,
+    weight: 1e4,
+    tip_force: 1e4,
+    decades: 4,
+    of_the_softest: true,
+};
+
+/// A random leaf.
+fn leaf(draw: &mut Draw, kind: &Kind, name: &str) -> String {
+    let rods = draw.uniform(1.0, 9.0) as usize;
+    let mut text = format!("name = \"{name}\"\n[leaf]\nrods = {rods}\n");
+    let lengths = match draw.chance(0.5) {
+        true => "1.0".into(),
+        false => list(
+            (0..rods)
+                .map(|_| draw.uniform(kind.lengths[0], kind.lengths[1]))
+                .collect(),
+        ),
+    };
+    let fan = match draw.uniform(0.0, 1.0) {
+        which if which < 0.25 => "\"paper\"".into(),
+        which if which < 0.5 => "\"symmetric\"".into(),
+        _ => list((0..rods).map(|_| draw.uniform(-1.6, 1.6)).collect()),
+    };
+    writeln!(
+        text,
+        "length = {lengths}\nfan = {fan}\njoined = {}",
+        draw.chance(0.85)
+    )
+    .unwrap();
+    text += "[stiffness]\n";
+    let mut softest = f64::INFINITY;
+    for key in ["torsion", "bending_2", "bending_3"] {
+        let [low, high] = kind.couple;
+        let seen = std::cell::Cell::new(softest);
+        let value = draw.quantity(rods, |draw| {
+            let value = draw.log(low, high);
+            seen.set(seen.get().min(value));
+            value
+        });
+        softest = seen.get();
+        writeln!(text, "{key} = {value}").unwrap();
+    }
+    let all_rigid = draw.chance(0.1);
+    for key in ["axial", "shear_2", "shear_3"] {
+        let [low, high] = kind.force;
+        let value = draw.quantity(rods, |draw| match all_rigid || draw.chance(0.25) {
+            true => f64::INFINITY,
+            false => draw.log(low, high),
+        });
+        writeln!(text, "{key} = {value}").unwrap();
+    }
+    text += "[rest]\n";
+    for key in ["twist", "bend_2", "bend_3"] {
+        if draw.chance(0.6) {
+            let most = kind.rest_curvature * [1.0, 0.3][usize::from(draw.chance(0.5))];
+            let value = draw.quantity(rods, |draw| draw.uniform(-most, most));
+            writeln!(text, "{key} = {value}").unwrap();
+        }
+    }
+    if kind.stretch > 1.0 && draw.chance(0.5) {
+        let value = draw.quantity(rods, |draw| draw.uniform(1.0, kind.stretch));
+        writeln!(text, "stretch = {value}").unwrap();
+    }
+    if rods > 1 && draw.chance(0.7) {
+        text += "[coupling]\n";
+        let most = draw.log(0.1, 1e3);
+        for key in ["x", "y", "z"] {
+            writeln!(text, "{key} = {}", draw.uniform(0.0, most)).unwrap();
+        }
+    }
+    let unit = if kind.of_the_softest { softest } else { 1.0 };
+    let gravity = draw.vector(kind.weight * unit, kind.decades);
+    let veins = if kind.of_the_softest { 1 } else { rods };
+    let tip_force = draw.vector(kind.tip_force * unit * veins as f64, kind.decades);
+    text += "[load]\n";
+    if draw.chance(0.8) {
+        writeln!(text, "gravity = {}", list(gravity)).unwrap();
+    }
+    if draw.chance(0.6) {
+        writeln!(text, "tip_force = {}", list(tip_force)).unwrap();
+    }
+    text
+}
+
+/// Number of leaves as the environment says it, and the seed.
+fn asked(least: u64) -> [u64; 2] {
+    [("LEAVES", least), ("SEED", 1)].map(|(name, otherwise)| {
+        std::env::var(name).map_or(otherwise, |text| text.parse().unwrap())
+    })
+}
+
+/// Relaxes so many leaves; returns how many of them did not come to rest, and the
+/// number of all.
+fn failures(kind: &Kind, least: u64) -> (u64, u64) {
+    let [count, seed] = asked(least);
+    let mut failed = 0;
+    let (mut slowest, mut total) = (0.0_f64, 0.0);
+    for k in 0..count {
+        let mut draw = Draw(
+            seed.wrapping_mul(0x1234_5678_9abc_def1)
+                .wrapping_add(k << 20),
+        );
+        let name = format!("{}-{seed}-{k}", kind.name);
+        let text = leaf(&mut draw, kind, &name);
+        let scenario = parse(&text);
+        let clock = Instant::now();
+        let found = relaxed(&scenario, &Options::default());
+        let seconds = clock.elapsed().as_secs_f64();
+        slowest = slowest.max(seconds);
+        total += seconds;
+        if !found.outcome.is_success() {
+            failed += 1;
+            let outcome = found.outcome.word();
+            let remark = found.remark.unwrap_or_default();
+            println!(
+                "{name}: {outcome} after {seconds:.1} s, {:?}: {remark}",
+                found.work
+            );
+            if let Ok(folder) = std::env::var("FAILED") {
+                std::fs::write(format!("{folder}/{name}.toml"), text).unwrap();
+            }
+        }
+    }
+    println!(
+        "{}: {failed} of {count} did not come to rest; {:.1} ms each, {slowest:.2} s at most",
+        kind.name,
+        1e3 * total / count as f64
+    );
+    (failed, count)
+}
+
+#[test]
+fn wild_leaves() {
+    let (failed, count) = failures(&WILD, 40);
+    assert!(failed <= count / 1000);
+}
+
+#[test]
+fn edge_leaves() {
+    let (failed, count) = failures(&EDGE, 12);
+    assert!(failed <= count / 100);
+}
