@@ -1,8 +1,9 @@
 //! Newton's method for the equilibrium of a discrete leaf: the iteration, its
 //! convergence test, and the solution of its linear equations.
 
-use crate::leaf::{DiscreteLeaf, Increment, Solved, SparsePattern, State, System};
+use crate::leaf::{DiscreteLeaf, Field, Increment, Solved, SparsePattern, State, System};
 use crate::rod::RESOLVED_TURN;
+use crate::rotation;
 use serde::Serialize;
 use std::ops::Add;
 
@@ -31,6 +32,9 @@ const SADDLE_RESIDUAL: f64 = 1e-6;
 const FIRST_SHIFT: f64 = 30.0;
 const LEAST_SHIFT: f64 = 1.0;
 const LARGEST_SHIFT: f64 = 1e6;
+
+/// Relative accuracy of the conjugate gradients for a leaf that is held.
+const HELD_ACCURACY: f64 = 1e-6;
 
 /// Work done by a solver, counted so that tests can pin it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -199,6 +203,16 @@ pub enum Equations<'s> {
         /// Relative accuracy of the conjugate gradients in the first step.
         cg_tolerance: f64,
     },
+    /// Of a leaf whose nodes are held where they are in `at` by springs of `rate`
+    /// times their masses: a step of implicit Euler, or of the proximal point
+    /// method. The matrix must be positive definite; an increment above the given
+    /// size ends the iteration.
+    Held {
+        solver: &'s mut Definite,
+        at: &'s State,
+        rate: f64,
+        largest: f64,
+    },
 }
 
 /// What is asked of an iteration.
@@ -219,6 +233,8 @@ struct Linear<'s> {
     neutral: f64,
     /// What is added to it to make the matrix positive definite.
     shift: f64,
+    /// Increments back to where nodes are held.
+    back: Field,
 }
 
 impl Newton<'_> {
@@ -241,6 +257,7 @@ impl Newton<'_> {
                 refused = *largest;
                 space = solver.space.is_some().then(|| leaf.in_space());
             }
+            Equations::Held { largest, .. } => refused = *largest,
         }
         let any_sign = longest.is_finite();
         let mut linear = Linear {
@@ -248,6 +265,7 @@ impl Newton<'_> {
             pattern: None,
             neutral: leaf.neutral_shift(),
             shift: 0.0,
+            back: Field::new(),
         };
         let mut next = state.clone();
         let mut previous = f64::INFINITY;
@@ -294,6 +312,20 @@ impl Newton<'_> {
     }
 }
 
+/// Writes the increments of all nodes but the bases from a state to another.
+fn increments(from: &State, to: &State, field: &mut Field) {
+    let n = from.segments();
+    field.resize_with(from.rods(), || vec![[0.0; 6]; n]);
+    for (j, rod) in field.iter_mut().enumerate() {
+        for (i, increment) in rod.iter_mut().enumerate() {
+            let k = from.base(j) + i + 1;
+            let turn = rotation::log(to.q[k] * from.q[k].conjugate());
+            let shift = to.x[k] - from.x[k];
+            *increment = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
+        }
+    }
+}
+
 impl Linear<'_> {
     /// Solves the assembled equations; returns the relative accuracy of the
     /// solution, or `None` if there is none.
@@ -323,6 +355,15 @@ impl Linear<'_> {
                 // One rod has no coupling: this is a direct solution.
                 system.solve(None, 0.0);
                 Some(0.0)
+            }
+            Equations::Held {
+                solver, at, rate, ..
+            } => {
+                increments(state, at, &mut self.back);
+                let springs = Some((self.back.as_slice(), *rate));
+                let shift = self.neutral + *rate;
+                let positive = solver.solve(system, shift, springs, HELD_ACCURACY, work);
+                positive.then_some(HELD_ACCURACY)
             }
             Equations::Definite {
                 solver,

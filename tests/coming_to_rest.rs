@@ -8,7 +8,7 @@ mod common;
 use std::fmt::{Display, Write};
 use std::time::Instant;
 
-use common::{parse, relaxed};
+use common::{parse, relaxed, scenario, settled};
 use leafdyn::relax::Options;
 
 /// A generator of random numbers (splitmix64), the same everywhere.
@@ -246,4 +246,14 @@ fn wild_leaves() {
 fn edge_leaves() {
     let (failed, count) = failures(&EDGE, 12);
     assert!(failed <= count / 100);
+}
+
+/// On 16 segments this leaf's waves bend a segment by more than a right angle; on
+/// finer ones it is at rest.
+#[test]
+fn waves_that_a_grid_on_the_way_does_not_resolve() {
+    let stretch = "1.0625, 1.192, 1.108, 1.048, 1.012, 1.0, 1.012, 1.048, 1.108, 1.192, 1.0625";
+    let changes = format!("stiffness.torsion=10; rest.stretch=[{stretch}]");
+    let leaf = settled(&scenario("study/undulation", &changes), &Options::default());
+    assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
 }

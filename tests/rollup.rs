@@ -5,8 +5,11 @@ mod common;
 
 use std::f64::consts::PI;
 
-use common::{Both, TIGHT, close, rod, set_stiffness, settle, solve, table, tip, tip_node};
+use common::{
+    Both, TIGHT, close, relaxed, rod, set_stiffness, settle, solve, table, tip, tip_node,
+};
 use glam::DVec3;
+use leafdyn::relax::{Options, Outcome};
 
 /// An arc of the angle M L/EI, with no force in it, whatever its stretch and
 /// shear stiffness (closed form).
@@ -88,5 +91,23 @@ fn hundreds_of_turns_are_found() {
         let off = (tip(&leaf) - arc).length();
         let estimate = leaf.accuracy.error_estimate.unwrap();
         assert!(off <= estimate, "{moment}: {off:.1e}");
+    }
+}
+
+/// A section that is hardly stiff against twist, and no twist; more turns than any
+/// grid resolves.
+#[test]
+fn no_twist_where_there_is_none_and_too_many_turns_are_refused() {
+    let leaf = settle(
+        &rod("stiffness.torsion=1e-8; load.tip_moment=[0, 0, 1]"),
+        1e-6,
+    );
+    let arc = DVec3::new(1.0_f64.sin(), 1.0 - 1.0_f64.cos(), 0.0);
+    assert!((tip(&leaf) - arc).length() <= leaf.accuracy.error_estimate.unwrap());
+    for moment in ["[0, 0, 1e5]", "[1e7, 0, 1e7]"] {
+        let turned = rod(&format!("load.tip_moment={moment}"));
+        let lost = relaxed(&turned, &Options::default());
+        assert_eq!(lost.outcome, Outcome::NotAtRest);
+        assert!(lost.remark.unwrap().contains("lower load.tip_moment"));
     }
 }

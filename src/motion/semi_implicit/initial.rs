@@ -16,6 +16,9 @@ const LAST: f64 = 1e-15;
 /// A length by which rounding may strain a rigid segment.
 const VIOLATION: f64 = 1e-12;
 
+/// One that is not closed.
+const STRAINED: f64 = 1e-8;
+
 impl SemiImplicit {
     /// Gives the segments their forces and the nodes their accelerations.
     pub(super) fn initialise(&mut self) {
@@ -24,9 +27,20 @@ impl SemiImplicit {
         if self.leaf.stiffest() > 0.0 {
             return self.set_accelerations();
         }
-        if violation > VIOLATION && self.first_step() {
+        if violation > VIOLATION {
             // To where rigid segments are not strained.
-            std::mem::swap(&mut self.state, &mut self.trial);
+            let strained = self.state.clone();
+            if self.first_step() {
+                std::mem::swap(&mut self.state, &mut self.trial);
+            }
+            let forces = self.state.n.clone();
+            if self.set_segment_forces() < STRAINED {
+                self.state.n = forces;
+            } else {
+                self.state = strained;
+                self.close();
+                self.set_segment_forces();
+            }
         }
         match self.first_step() {
             true => {

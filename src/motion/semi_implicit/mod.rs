@@ -16,6 +16,7 @@
 //! (1 - alpha_m) a1 + alpha_m a0 = (1 - alpha_f) w1 + alpha_f w0
 //! ```
 
+mod closing;
 mod exchange;
 mod initial;
 mod step;

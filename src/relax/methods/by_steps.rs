@@ -10,7 +10,7 @@
 //! Where there is no equilibrium nearby any more the leaf moves on.
 
 use crate::leaf::{DiscreteLeaf, System};
-use crate::newton::Stop;
+use crate::newton::{Equations, Newton, Stop, at_saddle};
 use crate::relax::methods::semi_implicit::{
     MOVING_COMPLIANCE, MOVING_STRETCH, Relaxation, SMALLEST_MOVING_COMPLIANCE, SOFT_ACCURACY,
 };
@@ -24,6 +24,22 @@ const SHORTEST_LOADING: f64 = 0.3;
 
 /// Saddles that are left on the way at one place.
 const SADDLES: usize = 4;
+
+/// Rates (squared frequencies; the lowest of a clamped rod is 12) of steps: the
+/// first, by what they rise after a step that fails and fall at most after one that
+/// succeeds, below which there is none, and where motion ends, resolved or not.
+const FIRST_RATE: f64 = 10.0;
+const HARDER: f64 = 8.0;
+const LARGEST_EASE: f64 = 8.0;
+const LEAST_RATE: f64 = 0.1;
+const LARGEST_RATE: f64 = 1e12;
+const LARGEST_UNRESOLVED: f64 = 1e6;
+
+/// Newton iterations of a step, their accuracy, and the largest of them (radians,
+/// lengths).
+const ITERATIONS: usize = 12;
+const STEP_ACCURACY: f64 = 1e-3;
+const LARGEST_STEP: f64 = 1.5;
 
 /// The leaves on the way, by the logarithm of what has grown.
 struct Way<'a> {
@@ -113,17 +129,61 @@ impl Relaxation<'_> {
         }
     }
 
-    /// Moves a softened leaf to rest, off saddles too.
+    /// Moves a softened leaf to rest, off saddles too: down its energy, by steps of
+    /// implicit Euler without inertia. Each is solved to its end, so that segments
+    /// carry the forces of their strains however stiff they are; without end in
+    /// time such a step is Newton's.
     fn move_from(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Result<(), Stop> {
-        for _ in 0..SADDLES {
-            leaf.strain_forces(&mut self.state);
-            match self.move_to_rest(leaf, system, SOFT_ACCURACY) {
-                Err(Stop::Saddle) => {
+        leaf.strain_forces(&mut self.state);
+        let (mut rate, mut ease): (f64, f64) = (0.0, 1.0);
+        let mut saddles = 0;
+        while self.work.force_evaluations <= self.most_evaluations && !self.limit.reached() {
+            let from = self.state.clone();
+            let accuracy = if rate > 0.0 {
+                STEP_ACCURACY
+            } else {
+                SOFT_ACCURACY
+            };
+            let step = Newton {
+                accuracy,
+                iterations: ITERATIONS,
+                work: self.work,
+                progress: self.progress,
+            };
+            let held = Equations::Held {
+                solver: &mut self.solver,
+                at: &from,
+                rate,
+                largest: LARGEST_STEP,
+            };
+            match step.solve(leaf, &mut self.state, system, held) {
+                Ok(_) if rate == 0.0 => return Ok(()),
+                Ok(size) if at_saddle(leaf, &self.state, self.state.shift_to(&from).max(size)) => {
+                    saddles += 1;
+                    if saddles > SADDLES {
+                        return Err(Stop::Saddle);
+                    }
                     saddle::push_off(leaf, &mut self.state, system, self.work);
+                    leaf.strain_forces(&mut self.state);
                 }
-                rest => return rest.map(|_| ()),
+                Ok(_) => {
+                    rate /= ease;
+                    ease = (2.0 * ease).min(LARGEST_EASE);
+                    if rate < LEAST_RATE {
+                        rate = 0.0;
+                    }
+                }
+                Err(stop) => {
+                    self.state = from;
+                    rate = (HARDER * rate).max(FIRST_RATE);
+                    ease = 1.0;
+                    if rate > LARGEST_RATE || stop == Stop::Unresolved && rate > LARGEST_UNRESOLVED
+                    {
+                        return Err(stop);
+                    }
+                }
             }
         }
-        Err(Stop::Saddle)
+        Err(Stop::StepLimit)
     }
 }

@@ -163,7 +163,7 @@ impl Relaxation<'_> {
     }
 
     /// Damped motion until rest.
-    pub(super) fn move_to_rest(
+    fn move_to_rest(
         &mut self,
         leaf: &DiscreteLeaf,
         system: &mut System,
@@ -215,10 +215,6 @@ impl Relaxation<'_> {
             if !next_energy.is_finite() || next_energy > energy + slack {
                 if !pace.shorten() {
                     return Err(Stop::Stuck);
-                }
-                if self.by_steps {
-                    // The increment is then one down the energy, if it is small.
-                    leaf.strain_forces(&mut self.state);
                 }
                 sums = leaf.assemble(&self.state, system);
                 self.work.force_evaluations += 1;

@@ -1,0 +1,57 @@
+//! Rigid rods whose arcs do not meet are released from a shape near the arcs in
+//! which they do, and their energy is kept from there on.
+
+mod common;
+
+use common::{entries, scenario};
+use glam::DVec3;
+use leafdyn::scenario::Scenario;
+use leafdyn::simulate::{Options, Simulation};
+
+fn leaf(overrides: &str) -> Scenario {
+    let rigid = "stiffness.axial=inf; stiffness.shear_2=inf; stiffness.shear_3=inf";
+    let moving = "dynamics.external_damping=0; dynamics.internal_damping=0; dynamics.duration=0.3";
+    assert!(!entries(overrides).is_empty());
+    scenario("motion/swing", &format!("{rigid}; {moving}; {overrides}"))
+}
+
+#[test]
+fn they_are_closed_and_their_energy_is_kept() {
+    for overrides in [
+        "leaf.rods=3; leaf.length=[1.0, 0.8, 1.1]",
+        "leaf.rods=2; leaf.length=[1.0, 0.6]; leaf.fan=[0.9, -0.2]",
+        "leaf.rods=5; leaf.fan=[-1.2, -0.3, 0.1, 0.5, 1.4]; rest.bend_2=2.0",
+        "leaf.rods=3; leaf.fan=[-1.0, 0.1, 1.2]; stiffness.shear_2=100.0",
+    ] {
+        let leaf = leaf(overrides);
+        let mut simulation = Simulation::new(&leaf, &Options::default()).unwrap();
+        let first = simulation.frame();
+        let segments = simulation.segments();
+        for (j, rod) in leaf.rods.iter().enumerate() {
+            for ends in first.centerline(j).windows(2) {
+                let off = (ends[1] - ends[0]).length() * segments as f64 / rod.length - 1.0;
+                let shears = overrides.contains("shear_2");
+                assert!(shears || off.abs() < 1e-9, "{overrides}: {off:.1e}");
+            }
+            // It leaves the base as it must, and stays near the plane of its arcs.
+            let base = first.rotations[j * (segments + 1)] * DVec3::X;
+            let towards = DVec3::new(rod.angle.cos(), rod.angle.sin(), 0.0);
+            assert!((base - towards).length() < 1e-12);
+        }
+        let begin = first.energy.balance();
+        let mut largest = 0.0_f64;
+        while !simulation.done() {
+            let frame = simulation.next_frame().unwrap_or_else(|stopped| {
+                panic!("{overrides}: {stopped}");
+            });
+            largest = largest.max(frame.energy.kinetic);
+            let off = frame.energy.balance() - begin;
+            assert!(
+                off.abs() < 1e-3 * (1.0 + begin.abs()),
+                "{overrides}: {off:.1e}"
+            );
+        }
+        println!("{overrides}: {begin} kept, {largest} moved");
+        assert!(largest > 1e-4, "{overrides}: it moves");
+    }
+}
