@@ -217,6 +217,9 @@ pub mod simulate;
 pub mod study;
 pub mod undulation;
 
+#[cfg(feature = "cli")]
+pub use figure::view;
+
 /// What this project's own tests and benchmarks reach besides: it may change with
 /// any release.
 #[doc(hidden)]

@@ -150,7 +150,9 @@ fn missing_keys() {
     let error = Scenario::from_toml("name = \"leaf\"").unwrap_err();
     assert_eq!(
         error.to_string(),
-        "scenario: leaf.rods is missing: add the table [leaf], and below it a line such as `rods = 5`"
+        "scenario: leaf.rods is missing: add the table [leaf], and below it a line such as `rods = 5`; \
+         also missing: leaf.length, leaf.fan, stiffness.torsion, stiffness.bending_2, \
+         stiffness.bending_3, stiffness.axial, stiffness.shear_2, stiffness.shear_3"
     );
 }
 

@@ -2,8 +2,10 @@
 
 mod chart;
 mod check;
+mod help;
 mod job;
 mod map;
+mod new;
 mod progress;
 mod relax;
 mod request;
@@ -40,6 +42,10 @@ enum Verb {
     Map(map::Map),
     Simulate(simulate::Simulate),
     Trace(trace::Trace),
+    New(new::New),
+    Schema(help::Schema),
+    Completions(help::Completions),
+    Man(help::Man),
 }
 
 impl Cli {
@@ -52,6 +58,10 @@ impl Cli {
             Verb::Map(map) => map.run(),
             Verb::Simulate(simulate) => simulate.run(),
             Verb::Trace(trace) => trace.run(),
+            Verb::New(new) => new.run(),
+            Verb::Schema(schema) => schema.run(),
+            Verb::Completions(completions) => completions.run(),
+            Verb::Man(man) => man.run(),
         };
         done.map_err(as_typed)
     }
@@ -89,7 +99,7 @@ pub fn main() -> ExitCode {
     let command_line = match Cli::try_parse() {
         Ok(command_line) => command_line,
         Err(error) if error.use_stderr() => {
-            let message = error.render().to_string();
+            let message = error.render().to_string() + offer(&error);
             return fail(
                 message.trim_start_matches("error: ").trim_end(),
                 Status::Refused,
@@ -128,6 +138,19 @@ fn show_refused(error: &str, exit_status: i32) {
     if json::write(&refused, &mut bytes).is_ok() {
         // There is nobody left to tell.
         let _ = show(&bytes);
+    }
+}
+
+/// Where a scenario can be had, if none is named.
+fn offer(error: &clap::Error) -> &'static str {
+    let missing = error.kind() == clap::error::ErrorKind::MissingRequiredArgument;
+    match missing && error.to_string().contains("<SCENARIO>") {
+        false => "",
+        true => {
+            "\nA scenario says what the leaf is made of. To begin with one of your own:\n  \
+             leafdyn new leaf        writes leaf.toml; leafdyn new --help: what else there is\n  \
+             leafdyn relax leaf.toml"
+        }
     }
 }
 

@@ -17,6 +17,7 @@ mod check;
 mod differences;
 mod drawing;
 mod energy;
+mod film;
 mod filmstrip;
 mod font;
 mod leaf;
@@ -31,6 +32,7 @@ mod space;
 mod svg;
 mod trace;
 mod veins;
+pub mod view;
 
 use std::io::{self, Write};
 
@@ -38,13 +40,14 @@ pub use all::draw as all;
 pub use chart::{draw_chart as chart, draw_scaling as scaling};
 pub use check::draw as check;
 pub use energy::draw as energy;
+pub use film::write as film;
 pub use filmstrip::draw as filmstrip;
 pub use leaf::draw as leaf;
 pub use map::draw as map;
 pub use modes::draw as modes;
 pub use trace::draw as trace;
 
-use crate::report::Format;
+use crate::report::{Document, Format};
 use drawing::Drawing;
 
 pub struct Picture<R> {
@@ -72,8 +75,8 @@ impl<R> Format<R> for Picture<R> {
         self.file
     }
 
-    fn write(&self, result: &R, out: &mut dyn Write) -> io::Result<()> {
-        (self.write)(&(self.draw)(result), out)
+    fn write(&self, document: &Document<R>, out: &mut dyn Write) -> io::Result<()> {
+        (self.write)(&(self.draw)(document.result), out)
     }
 }
 

@@ -16,6 +16,11 @@ const CHUNK: usize = 1 << 16;
 const DOTS_PER_METRE: u32 = 7559;
 
 pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
+    encode(&paint(drawing), out)
+}
+
+/// The drawing as pixels.
+pub fn paint(drawing: &Drawing) -> Pixmap {
     let pixels = |length: f64| (length * SCALE).ceil() as u32;
     let mut canvas = Pixmap::new(pixels(drawing.width), pixels(drawing.height))
         .expect("a page has a width and a height");
@@ -36,7 +41,7 @@ pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
             Mark::Label(label) => paint_label(&mut canvas, label, &font),
         }
     }
-    encode(&canvas, out)
+    canvas
 }
 
 fn page_to_pixels() -> Transform {

@@ -81,12 +81,12 @@ fn number(value: f64) -> String {
     (hundredths + 0.0).to_string()
 }
 
-fn hex(Color(red, green, blue): Color) -> String {
+pub fn hex(Color(red, green, blue): Color) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
 /// Text as XML allows it: markup escaped, control characters left out.
-fn escaped(text: &str) -> String {
+pub fn escaped(text: &str) -> String {
     text.chars()
         .filter(|c| !c.is_control())
         .map(|c| match c {

@@ -19,6 +19,7 @@ pub use owner::{check_owner, source};
 pub use peers::read_peers;
 pub use recording::{Checkpointer, Recording};
 
+use crate::figure::view::{self, Page, Series, glb, vtk};
 use crate::figure::{self, Picture};
 use crate::relax::Equilibrium;
 use crate::report::table::Table;
@@ -33,6 +34,9 @@ impl Written for Equilibrium {
         &Table("centerlines.csv", report::centerlines),
         &Picture::svg("figure.svg", figure::leaf),
         &Picture::png("figure.png", figure::leaf),
+        &Page("view.html"),
+        &Table("leaf.vtp", vtk::leaf),
+        &Table("leaf.glb", glb::leaf),
     ];
 
     const MORE: &'static [&'static dyn Format<Self>] = &[
@@ -69,6 +73,7 @@ impl Written for All {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
         &Picture::svg("equilibria.svg", figure::all),
         &Picture::png("equilibria.png", figure::all),
+        &Page("equilibria.html"),
     ];
 }
 
@@ -78,6 +83,8 @@ impl Written for Trace {
         &Table("trace.csv", report::trace_table),
         &Picture::svg("trace.svg", figure::trace),
         &Picture::png("trace.png", figure::trace),
+        &Page("trace.html"),
+        &Series("trace.pvd", view::points),
     ];
 }
 
@@ -89,6 +96,10 @@ impl Written for Record {
         &Picture::png("energy.png", figure::energy),
         &Picture::svg("filmstrip.svg", figure::filmstrip),
         &Picture::png("filmstrip.png", figure::filmstrip),
+        &Page("motion.html"),
+        &Series("motion.pvd", view::instants),
+        &Table("motion.glb", glb::motion),
+        &Table("motion.gif", figure::film),
     ];
 }
 
@@ -161,7 +172,17 @@ pub fn write_all<R: Written>(
         || -> Vec<_> {
             let formats = formats.par_iter();
             formats
-                .map(|format| write(format.file_name(), &|out| format.write(result, out)))
+                .map(|format| {
+                    let parts = format.parts(document);
+                    if let Some((part, _)) = parts.first() {
+                        let part = folder.join(part);
+                        atomic::make_folder(part.parent().unwrap_or(folder))?;
+                    }
+                    for (part, fill) in &parts {
+                        write(part, fill)?;
+                    }
+                    write(format.file_name(), &|out| format.write(document, out))
+                })
                 .collect()
         },
     );

@@ -4,11 +4,19 @@ use crate::report::numbers::power_of_ten;
 use crate::study::{All, Found};
 
 use super::numbers::{seconds, veins};
-use super::table::lay_out;
+use super::table::{Lines, lay_out};
 
 /// The equilibria, lowest energy first.
 pub fn report(all: &All, files: Option<String>) -> String {
-    let mut lines: Vec<(&str, String)> = Vec::new();
+    let leaf = all.found.first();
+    let veins = leaf.map_or("a leaf".into(), |found| veins(&found.equilibrium));
+    let heading = format!("{}: {veins}, all shapes", all.scenario);
+    lay_out(&heading, &lines(all, files))
+}
+
+/// The lines of it.
+pub fn lines(all: &All, files: Option<String>) -> Lines {
+    let mut lines = Lines::new();
     for (number, found) in all.found.iter().enumerate() {
         let name = if number == 0 { "found" } else { "" };
         lines.push((name, line(number, found)));
@@ -33,9 +41,7 @@ pub fn report(all: &All, files: Option<String>) -> String {
         "remark",
         "there may be more: no number of starts proves that these are all".into(),
     ));
-    let leaf = all.found.first();
-    let veins = leaf.map_or("a leaf".into(), |found| veins(&found.equilibrium));
-    lay_out(&format!("{}: {veins}, all shapes", all.scenario), &lines)
+    lines
 }
 
 fn line(number: usize, found: &Found) -> String {

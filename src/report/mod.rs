@@ -1,6 +1,7 @@
 //! Results shown: as lines on the console, as rows of tables, as JSON.
 
 mod all;
+pub mod base64;
 mod centerlines;
 mod chart;
 mod chart_table;
@@ -25,7 +26,7 @@ use serde::Serialize;
 
 use crate::scenario::{Scenario, printable};
 
-pub use all::report as all_report;
+pub use all::{lines as all_lines, report as all_report};
 pub use centerlines::{centerlines, modes_table};
 pub use chart::report as chart_report;
 pub use chart_table::{chart_table, scaling_table};
@@ -33,9 +34,9 @@ pub use check::report as check_report;
 pub use error::FileError;
 pub use map::{Told as MapTold, report as map_report};
 pub use map_table::{lines, map_table, read_rows, table};
-pub use relax::report as relax_report;
-pub use simulate::report as simulate_report;
-pub use trace::report as trace_report;
+pub use relax::{lines as relax_lines, report as relax_report};
+pub use simulate::{lines as simulate_lines, report as simulate_report};
+pub use trace::{lines as trace_lines, report as trace_report};
 pub use trace_table::trace_table;
 
 /// One way to write a result down.
@@ -44,8 +45,19 @@ pub trait Format<R>: Sync {
     fn file_name(&self) -> &'static str;
 
     /// Writes the whole file. The only errors are those of `out`.
-    fn write(&self, result: &R, out: &mut dyn Write) -> io::Result<()>;
+    fn write(&self, document: &Document<R>, out: &mut dyn Write) -> io::Result<()>;
+
+    /// Files that this one lists, which are written before it.
+    fn parts<'d>(&self, _document: &'d Document<R>) -> Vec<Part<'d>> {
+        Vec::new()
+    }
 }
+
+/// A file that another one lists: its name within the folder, and what writes it.
+pub type Part<'d> = (
+    String,
+    Box<dyn Fn(&mut dyn Write) -> io::Result<()> + Sync + 'd>,
+);
 
 /// A result that is written to a folder.
 pub trait Written: Serialize + Sync + Sized + 'static {
@@ -98,11 +110,31 @@ pub enum Kind {
     Svg,
     /// Figures as pixels.
     Png,
+    /// A page that shows the leaf in space.
+    Html,
+    /// For ParaView.
+    Vtk,
+    /// For Blender.
+    Glb,
+    /// A film.
+    Gif,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Kind; 4] = [Kind::Json, Kind::Csv, Kind::Svg, Kind::Png];
+    pub const ALL: [Kind; 8] = [
+        Kind::Json,
+        Kind::Csv,
+        Kind::Svg,
+        Kind::Png,
+        Kind::Html,
+        Kind::Vtk,
+        Kind::Glb,
+        Kind::Gif,
+    ];
+
+    /// Those for which a motion is kept as a film.
+    pub const FILMS: [Kind; 4] = [Kind::Html, Kind::Vtk, Kind::Glb, Kind::Gif];
 
     /// Those that are written unasked.
     pub const USUAL: [Kind; 4] = [Kind::Json, Kind::Csv, Kind::Svg, Kind::Png];
@@ -114,6 +146,10 @@ impl Kind {
             Kind::Csv => "csv",
             Kind::Svg => "svg",
             Kind::Png => "png",
+            Kind::Html => "html",
+            Kind::Vtk => "vtk",
+            Kind::Glb => "glb",
+            Kind::Gif => "gif",
         }
     }
 
@@ -121,7 +157,10 @@ impl Kind {
     pub fn of(file: &str) -> Kind {
         let end = file.rsplit('.').next();
         let named = Kind::ALL.into_iter().find(|kind| Some(kind.word()) == end);
-        named.unwrap_or(Kind::Csv)
+        named.unwrap_or(match end {
+            Some("vtp" | "pvd") => Kind::Vtk,
+            _ => Kind::Csv,
+        })
     }
 }
 
@@ -139,7 +178,7 @@ pub struct Document<'a, R> {
     #[serde(flatten)]
     pub result: &'a R,
     /// The scenario, every entry in place that was left out or overridden.
-    input: &'a Scenario,
+    pub input: &'a Scenario,
     /// Why its files could not be written, and the exit status then.
     #[serde(flatten)]
     pub refused: Option<Refused>,

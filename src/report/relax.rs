@@ -6,13 +6,24 @@ use crate::report::words::{shooting, verdict};
 use super::numbers::{
     bound, brief, decimals, eigenvalues, grids, point, seconds, significant, veins,
 };
-use super::table::lay_out;
+use super::table::{Lines, lay_out};
 
 /// Modes whose numbers are told.
 const MODES_TOLD: usize = 6;
 
 /// What was solved, what was found, how well, and where the files are.
 pub fn report(equilibrium: &Equilibrium, files: Option<String>) -> String {
+    let heading = format!(
+        "{}: {}, method {}",
+        equilibrium.scenario,
+        veins(equilibrium),
+        equilibrium.method
+    );
+    lay_out(&heading, &lines(equilibrium, files))
+}
+
+/// The lines of it.
+pub fn lines(equilibrium: &Equilibrium, files: Option<String>) -> Lines {
     let mut lines = vec![("found", found(equilibrium))];
     if let Some(saddle) = &equilibrium.stability.saddle {
         lines.push((
@@ -46,13 +57,7 @@ pub fn report(equilibrium: &Equilibrium, files: Option<String>) -> String {
     lines.push(("work", work(equilibrium)));
     lines.extend(files.map(|files| ("written", files)));
     lines.extend((equilibrium.remark.iter()).map(|remark| ("remark", remark.clone())));
-    let heading = format!(
-        "{}: {}, method {}",
-        equilibrium.scenario,
-        veins(equilibrium),
-        equilibrium.method
-    );
-    lay_out(&heading, &lines)
+    lines
 }
 
 /// The kind of equilibrium, or how far from one.

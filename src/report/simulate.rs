@@ -11,6 +11,17 @@ const DECIMALS: f64 = 7.0;
 
 /// How far the leaf came, with what steps, and where its energy went.
 pub fn report(record: &Record, files: Option<String>) -> String {
+    let heading = format!(
+        "{}: {}, method {}",
+        record.scenario,
+        veins_of(record.rods, record.joined),
+        record.scheme.name()
+    );
+    lay_out(&heading, &lines(record, files))
+}
+
+/// The lines of it.
+pub fn lines(record: &Record, files: Option<String>) -> Lines {
     let mut lines = vec![
         ("moved", moved(record)),
         ("grid", format!("{} segments a vein", record.segments)),
@@ -23,13 +34,7 @@ pub fn report(record: &Record, files: Option<String>) -> String {
     if let Some(stopped) = record.stopped {
         lines.push(("remark", stopped.to_string()));
     }
-    let heading = format!(
-        "{}: {}, method {}",
-        record.scenario,
-        veins_of(record.rods, record.joined),
-        record.scheme.name()
-    );
-    lay_out(&heading, &lines)
+    lines
 }
 
 fn moved(record: &Record) -> String {

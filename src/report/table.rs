@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
-use super::Format;
+use super::{Document, Format};
 
 /// Lines of a report, each with its name; one without a name continues the one
 /// above.
@@ -37,7 +37,7 @@ pub fn named(folder: &Path, files: &[PathBuf]) -> String {
     format!("{}: {}", folder.display(), names.join(", "))
 }
 
-/// A table of a result in a file of this name.
+/// A table of a result, or another text or array, in a file of this name.
 pub struct Table<R>(
     pub &'static str,
     pub fn(&R, &mut dyn Write) -> io::Result<()>,
@@ -48,8 +48,8 @@ impl<R> Format<R> for Table<R> {
         self.0
     }
 
-    fn write(&self, result: &R, out: &mut dyn Write) -> io::Result<()> {
-        (self.1)(result, out)
+    fn write(&self, document: &Document<R>, out: &mut dyn Write) -> io::Result<()> {
+        (self.1)(document.result, out)
     }
 }
 

@@ -3,11 +3,18 @@
 use crate::study::{Law, PointKind, Trace, TraceBranch, TracePoint};
 
 use super::numbers::{power_of_ten, seconds, veins_of};
-use super::table::{lay_out, under};
+use super::table::{Lines, lay_out, under};
 use super::words::branch_end;
 
 /// The branches, their ends, and where the index changes.
 pub fn report(trace: &Trace, files: Option<String>) -> String {
+    let veins = veins_of(trace.rods, trace.joined);
+    let heading = format!("{}: {veins}, followed", trace.scenario);
+    lay_out(&heading, &lines(trace, files))
+}
+
+/// The lines of it.
+pub fn lines(trace: &Trace, files: Option<String>) -> Lines {
     let [from, to] = trace.range.map(|value| trace.keys.text(value));
     let mut lines = vec![("vary", format!("{} from {from} to {to}", trace.keys))];
     let branches = trace.branches.iter().enumerate();
@@ -33,8 +40,7 @@ pub fn report(trace: &Trace, files: Option<String>) -> String {
     ));
     lines.extend(files.map(|files| ("written", files)));
     lines.extend((trace.remark.iter()).map(|remark| ("remark", remark.clone())));
-    let veins = veins_of(trace.rods, trace.joined);
-    lay_out(&format!("{}: {veins}, followed", trace.scenario), &lines)
+    lines
 }
 
 /// How a branch ended, its ends and its critical points.

@@ -16,6 +16,7 @@ mod raw;
 mod read;
 mod scale;
 mod schedule;
+mod schema;
 mod section;
 mod tip;
 mod value;
@@ -34,6 +35,7 @@ pub(crate) use read::{MOST_BYTES, utf8};
 pub use scale::Scale;
 pub(crate) use scale::longest;
 pub use schedule::Schedule;
+pub use schema::schema;
 pub use section::{Property, Section};
 pub use tip::{Clamp, HeldTip};
 

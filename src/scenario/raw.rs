@@ -201,12 +201,35 @@ impl<'a> Raw<'a> {
                 _ => format!("add the table [{table}], and below it {entry}"),
             };
             let (file, line) = (self.file.to_string(), None);
+            let others = self.missing().filter(|other| *other != key);
+            let others: Vec<&str> = others.map(Key::path).collect();
+            let also = match others.is_empty() {
+                true => String::new(),
+                false => format!("; also missing: {}", others.join(", ")),
+            };
             ScenarioError {
                 place: Place::File { file, line },
                 key: Some(key),
-                problem: format!("{} is missing: {how}", key.path()),
+                problem: format!("{} is missing: {how}{also}", key.path()),
             }
         })
+    }
+
+    /// Keys that every scenario needs and this one has not: of stiffnesses, one whose
+    /// rods have no section.
+    fn missing(&self) -> impl Iterator<Item = Key> {
+        let section = self.tables.contains(&"section");
+        let needed = move |key: &Key| {
+            let refused = matches!(key.left_out(), LeftOut::Refused(_));
+            refused
+                && match key.parts().0 {
+                    "" | "leaf" => true,
+                    "stiffness" => !section,
+                    _ => false,
+                }
+        };
+        let keys = Key::all().filter(needed);
+        keys.filter(|key| self.entries[*key as usize].is_none())
     }
 
     fn entry(&self, key: Key) -> Option<Item<'_>> {

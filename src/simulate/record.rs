@@ -86,6 +86,9 @@ pub struct Record {
     /// Shapes at some of the outputs, the last among them.
     #[serde(skip)]
     pub stills: Vec<Still>,
+    /// Shapes at many outputs, for films, if they are wanted.
+    #[serde(skip)]
+    pub film: Vec<Still>,
     /// Time on the clock for the motion alone.
     pub wall_seconds: f64,
 }
@@ -121,6 +124,7 @@ impl Record {
                 false => tips.collect(),
             },
             stills,
+            film: Vec::new(),
             wall_seconds: simulation.wall_time().as_secs_f64(),
         }
     }

@@ -34,6 +34,10 @@ use motion::{Form, Size};
 /// Shapes that a film strip shows.
 const STILLS: usize = 8;
 
+/// Shapes of a film, and nodes of all of them, at most.
+const FILM: usize = 401;
+const FILM_NODES: usize = 4_000_000;
+
 /// The files of a simulation that is under way.
 ///
 /// ```
@@ -238,9 +242,37 @@ impl Recording {
         };
         let stills = chosen.into_iter().zip(shapes.chunks(nodes * size.rods));
         let moments = mem::take(&mut self.moments);
-        let mut record = Record::new(simulation, stopped, moments, stills.map(still).collect());
+        let stills = stills.map(still).collect();
+        let mut record = Record::new(simulation, stopped, moments, stills);
+        record.film = self.film(record.moments.len())?;
         record.wall_seconds += self.wall.as_secs_f64();
         Ok(record)
+    }
+
+    /// Evenly many of so many outputs, if a film is wanted; the last is among them.
+    fn film(&self, outputs: usize) -> Result<Vec<Still>, FileError> {
+        let wanted = |kind: &Kind| Kind::FILMS.contains(kind);
+        let (Some([motion, _]), true) = (&self.growing, self.selection.kinds.iter().any(wanted))
+        else {
+            return Ok(Vec::new());
+        };
+        let (form, size) = (self.form, self.size);
+        let most = FILM.min(FILM_NODES / size.rows()).max(2);
+        let stride = outputs.div_ceil(most - 1).max(1);
+        let mut chosen: Vec<usize> = (0..outputs).step_by(stride).collect();
+        if chosen.last() != Some(&(outputs - 1)) {
+            chosen.push(outputs - 1);
+        }
+        let shapes = motion.read(|file| form.positions(size, &chosen, file))?;
+        let still = |(moment, shape): (usize, &[DVec3])| Still {
+            moment,
+            curves: shape.chunks(size.nodes).map(<[DVec3]>::to_vec).collect(),
+        };
+        Ok(chosen
+            .into_iter()
+            .zip(shapes.chunks(size.rows()))
+            .map(still)
+            .collect())
     }
 
     /// Writes all else about the simulation, gives all files their names, and

@@ -21,6 +21,9 @@ pub struct Trace {
     pub keys: Keys,
     /// Its values at the ends of the range.
     pub range: [f64; 2],
+    /// Whether its logarithm varies evenly.
+    #[serde(skip)]
+    pub log: bool,
     /// Names of the units, if the scenario gives any.
     #[serde(skip)]
     pub units: Units,

@@ -67,6 +67,7 @@ pub fn trace(
         scenario: scenario.name.clone(),
         keys: keys.clone(),
         range: ends,
+        log: vary.log,
         units: scenario.units.clone(),
         rods: scenario.rods.len(),
         joined: scenario.joined,

@@ -1,0 +1,212 @@
+//! What the page is given: results as they are, thinned to what can be seen, with
+//! large arrays as base64 of little-endian numbers.
+
+use glam::DVec3;
+use serde::Serialize;
+
+use crate::figure::veins::is_near;
+use crate::relax::RodShape;
+use crate::report::base64::encode as base64;
+
+/// Numbers of a [`Leaf`]'s state per node: rotation w, x, y, z, then v, u, n, m.
+const STATE: usize = 16;
+
+/// Everything on a page.
+#[derive(Serialize)]
+pub struct View {
+    /// `leaf`, `motion`, `trace` or `equilibria`.
+    pub kind: &'static str,
+    pub title: String,
+    /// The result in a phrase, and whether it is as it was asked for.
+    pub verdict: String,
+    pub success: bool,
+    /// Its numbers: names and what is said of them.
+    pub summary: Vec<(&'static str, String)>,
+    /// Names of the units of length and force, if there are any.
+    pub units: [Option<String>; 2],
+    /// Gravity per length of vein.
+    pub gravity: [f64; 3],
+    /// The longest vein.
+    pub longest: f64,
+    pub joined: bool,
+    /// Number of veins; those that are drawn, counted from 1, with their lengths
+    /// and colours.
+    pub rods: usize,
+    pub drawn: Vec<usize>,
+    pub lengths: Vec<f64>,
+    pub colors: Vec<String>,
+    /// The leaves: one, or all equilibria, points of a trace, instants of a motion.
+    pub leaves: Vec<Leaf>,
+    pub modes: Vec<ModeShape>,
+    /// What is drawn beside the leaf of a motion or trace.
+    pub chart: Option<Chart>,
+}
+
+/// A shape of the leaf.
+#[derive(Serialize)]
+pub struct Leaf {
+    /// What it is, in a few words, and its numbers where they are its own.
+    pub label: String,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub summary: Vec<(&'static str, String)>,
+    /// Its time, in a motion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<f64>,
+    /// Fractions of the length, where they are known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stations: Option<Vec<f64>>,
+    /// Nodes of a vein.
+    pub nodes: usize,
+    /// Positions, vein by vein.
+    pub points: Points,
+    /// [`STATE`] numbers a node.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub state: Option<String>,
+}
+
+/// Positions: as they are, or as 65,536 steps of the box that holds them.
+#[derive(Serialize)]
+#[serde(untagged)]
+pub enum Points {
+    Full { f32: String },
+    Coarse { u16: String, low: DVec3, size: f64 },
+}
+
+/// A mode of the leaf at rest.
+#[derive(Serialize)]
+pub struct ModeShape {
+    pub label: String,
+    /// Nodes of a vein; their positions at rest, and displacements.
+    pub nodes: usize,
+    pub rest: String,
+    pub displacement: String,
+}
+
+/// Curves, one of whose coordinates is chosen.
+#[derive(Serialize)]
+pub struct Chart {
+    pub across: String,
+    pub log: bool,
+    /// Names of what can be drawn upwards.
+    pub choices: Vec<String>,
+    pub curves: Vec<Curve>,
+}
+
+#[derive(Serialize)]
+pub struct Curve {
+    /// Which of the choices it belongs to.
+    pub choice: usize,
+    pub name: String,
+    pub color: usize,
+    pub x: Vec<f64>,
+    pub y: Vec<f64>,
+    /// The leaf that belongs to each point; empty: the nearest in time.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub leaves: Vec<usize>,
+    /// Which points are unstable, and which are special, with a word.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unstable: Vec<bool>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub special: Vec<(usize, &'static str)>,
+}
+
+impl Leaf {
+    /// Of veins in full, with strains and forces; `drawn` are the numbers of those
+    /// that are shown.
+    pub fn full(label: String, stations: &[f64], rods: &[RodShape], drawn: &[usize]) -> Self {
+        let shown = || drawn.iter().flat_map(|&number| &rods[number - 1].nodes);
+        let mut state = Vec::with_capacity(STATE * stations.len() * drawn.len());
+        for node in shown() {
+            let q = node.rotation;
+            state.extend([q.w, q.x, q.y, q.z]);
+            state.extend(
+                [node.v, node.u, node.n, node.m]
+                    .map(|v| v.to_array())
+                    .as_flattened(),
+            );
+        }
+        Leaf {
+            nodes: stations.len(),
+            stations: Some(stations.into()),
+            points: Points::Full {
+                f32: vectors(shown().map(|node| node.position)),
+            },
+            state: Some(floats(state)),
+            ..Leaf::empty(label)
+        }
+    }
+
+    /// Of centrelines, for one of many.
+    pub fn coarse(label: String, curves: &[Vec<DVec3>], drawn: &[usize], most: usize) -> Self {
+        let nodes = curves.first().map_or(0, Vec::len);
+        let stride = nodes.saturating_sub(1).div_ceil(most).max(1);
+        // The tip is among them.
+        let stride = (stride..nodes).find(|k| (nodes - 1) % k == 0).unwrap_or(1);
+        let shown = || {
+            let curves = drawn.iter().map(|&number| &curves[number - 1]);
+            curves.flat_map(move |curve| curve.iter().step_by(stride).copied())
+        };
+        let near = || shown().filter(|point| is_near(*point));
+        let low = near().reduce(DVec3::min).unwrap_or_default();
+        let high = near().reduce(DVec3::max).unwrap_or_default();
+        let size = (high - low).max_element().max(f64::MIN_POSITIVE);
+        let step = |point: DVec3| ((point - low) / size * 65535.0).round().to_array();
+        // What is no number becomes a corner of the box.
+        let steps = shown()
+            .flat_map(step)
+            .flat_map(|x| (x as u16).to_le_bytes());
+        Leaf {
+            nodes: nodes.saturating_sub(1) / stride + 1,
+            points: Points::Coarse {
+                u16: base64(steps),
+                low,
+                size,
+            },
+            ..Leaf::empty(label)
+        }
+    }
+
+    fn empty(label: String) -> Self {
+        Leaf {
+            label,
+            summary: Vec::new(),
+            time: None,
+            stations: None,
+            nodes: 0,
+            points: Points::Full { f32: String::new() },
+            state: None,
+        }
+    }
+}
+
+/// Vectors as 32-bit numbers.
+pub fn vectors(vectors: impl Iterator<Item = DVec3>) -> String {
+    floats(vectors.flat_map(|vector| vector.to_array()))
+}
+
+fn floats(numbers: impl IntoIterator<Item = f64>) -> String {
+    base64(
+        numbers
+            .into_iter()
+            .flat_map(|number| (number as f32).to_le_bytes()),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thinned_vein_keeps_its_tip() {
+        for (nodes, kept) in [(65, 33), (33, 33), (61, 31), (2, 2), (1, 1), (0, 1)] {
+            let curve = (0..nodes).map(|i| DVec3::X * f64::from(i)).collect();
+            let leaf = Leaf::coarse(String::new(), &[curve], &[1], 32);
+            assert_eq!(leaf.nodes, kept);
+            let Points::Coarse { u16, size, .. } = leaf.points else {
+                panic!()
+            };
+            assert_eq!(u16.len(), if nodes == 0 { 0 } else { 8 * kept });
+            assert!(size == f64::from(nodes - 1) || nodes < 2);
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! The page of all equilibria of a leaf, side by side.
+
+use super::Viewed;
+use super::data::{Leaf, View};
+use crate::figure::drawing::Drawing;
+use crate::report::numbers::short;
+use crate::report::words::equilibrium_of_index;
+use crate::report::{all_lines, relax_lines};
+use crate::study::{All, Found};
+
+/// More would not be told apart side by side.
+const MOST: usize = 24;
+
+impl Viewed for All {
+    fn fill(&self, view: &mut View) {
+        view.kind = "equilibria";
+        let count = self.found.len();
+        view.verdict = match count {
+            1 => "1 equilibrium".into(),
+            _ => format!("{count} equilibria"),
+        };
+        if count > MOST {
+            view.verdict += &format!(", the first {MOST} shown");
+        }
+        view.success = count > 0;
+        view.summary = all_lines(self, None);
+        let shown = self.found.iter().take(MOST).enumerate();
+        view.leaves = shown
+            .map(|(k, found)| leaf(k + 1, found, &view.drawn))
+            .collect();
+    }
+
+    fn still(&self) -> Drawing {
+        crate::figure::all(self)
+    }
+}
+
+fn leaf(number: usize, found: &Found, drawn: &[usize]) -> Leaf {
+    let leaf = &found.equilibrium;
+    let kind = equilibrium_of_index(leaf.stability.negative_eigenvalues);
+    let energy = short(leaf.energy.unwrap_or(f64::NAN));
+    let label = format!("{number}. {kind}, energy {energy}");
+    Leaf {
+        summary: relax_lines(leaf, None),
+        ..Leaf::full(label, &leaf.shape.stations, &leaf.shape.rods, drawn)
+    }
+}

@@ -1,0 +1,299 @@
+//! Veins as tubes for Blender and others: binary glTF 2.0, the motion as an
+//! animation of morph targets.
+//!
+//! Source: Khronos Group, "glTF 2.0 Specification" (ISO/IEC 12113:2022).
+
+use std::io::{self, Write};
+
+use glam::{DVec3, Vec3};
+use serde_json::{Value, json};
+
+use super::tubes::Tubes;
+use crate::figure::drawing::{Color, vein_color};
+use crate::figure::veins::is_near;
+use crate::relax::Equilibrium;
+use crate::simulate::{Record, Still};
+
+/// A film has no more shapes than this: each has all vertices.
+const MOST_SHAPES: usize = 61;
+/// Nor a vein more points, but for the first.
+const MOST_POINTS: usize = 32;
+/// Length of a film in seconds: what the unit of time is, nobody knows.
+const SECONDS: f64 = 10.0;
+/// Half the width of a vein, as part of the longest.
+const RADIUS: f64 = 0.004;
+
+const FLOAT: u32 = 5126;
+const UNSIGNED_INT: u32 = 5125;
+const UNSIGNED_BYTE: u32 = 5121;
+const ARRAY: u32 = 34962;
+const ELEMENT_ARRAY: u32 = 34963;
+
+/// A leaf at rest.
+///
+/// # Errors
+/// Those of `out`.
+pub fn leaf(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
+    let radius = RADIUS * equilibrium.shape.longest();
+    let curves = &equilibrium.shape.curves;
+    write(&equilibrium.scenario, &[(0.0, &curves[..])], radius, out)
+}
+
+/// A leaf that moves.
+///
+/// # Errors
+/// Those of `out`.
+pub fn motion(record: &Record, out: &mut dyn Write) -> io::Result<()> {
+    let film = &record.film;
+    let stride = film
+        .len()
+        .saturating_sub(1)
+        .div_ceil(MOST_SHAPES - 1)
+        .max(1);
+    let shape = |still: &'_ Still| record.moments[still.moment].time;
+    let mut shapes: Vec<(f64, &[Vec<DVec3>])> = film
+        .iter()
+        .step_by(stride)
+        .map(|still| (shape(still), &still.curves[..]))
+        .collect();
+    if let Some(last) = film
+        .last()
+        .filter(|_| !(film.len().saturating_sub(1)).is_multiple_of(stride))
+    {
+        shapes.push((shape(last), &last.curves[..]));
+    }
+    write(&record.scenario, &shapes, RADIUS * record.length, out)
+}
+
+/// The document, and the bytes that it is about.
+#[derive(Default)]
+struct File {
+    bytes: Vec<u8>,
+    views: Vec<Value>,
+    accessors: Vec<Value>,
+}
+
+impl File {
+    /// Adds an array, and returns its number.
+    fn add(
+        &mut self,
+        bytes: impl IntoIterator<Item = u8>,
+        target: Option<u32>,
+        mut accessor: Value,
+    ) -> usize {
+        let start = self.bytes.len();
+        self.bytes.extend(bytes);
+        let mut view =
+            json!({ "buffer": 0, "byteOffset": start, "byteLength": self.bytes.len() - start });
+        if let Some(target) = target {
+            view["target"] = json!(target);
+        }
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        accessor["bufferView"] = json!(self.views.len());
+        self.views.push(view);
+        self.accessors.push(accessor);
+        self.accessors.len() - 1
+    }
+
+    fn vectors(&mut self, vectors: &[Vec3]) -> usize {
+        let low = vectors
+            .iter()
+            .copied()
+            .reduce(Vec3::min)
+            .unwrap_or_default();
+        let high = vectors
+            .iter()
+            .copied()
+            .reduce(Vec3::max)
+            .unwrap_or_default();
+        let accessor = json!({
+            "componentType": FLOAT, "count": vectors.len(), "type": "VEC3",
+            "min": low.to_array(), "max": high.to_array(),
+        });
+        let bytes = vectors
+            .iter()
+            .flat_map(|v| v.to_array())
+            .flat_map(f32::to_le_bytes);
+        self.add(bytes, Some(ARRAY), accessor)
+    }
+
+    fn scalars(&mut self, numbers: &[f32]) -> usize {
+        let (low, high) = (
+            numbers.iter().copied().fold(f32::MAX, f32::min),
+            numbers.iter().copied().fold(f32::MIN, f32::max),
+        );
+        let accessor = json!({
+            "componentType": FLOAT, "count": numbers.len(), "type": "SCALAR", "min": [low], "max": [high],
+        });
+        let bytes = numbers.iter().copied().flat_map(f32::to_le_bytes);
+        self.add(bytes, None, accessor)
+    }
+}
+
+/// Shapes at times; the first is the one that the others are morphed from.
+fn write(
+    name: &str,
+    shapes: &[(f64, &[Vec<DVec3>])],
+    radius: f64,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let thinned: Vec<Vec<Vec<DVec3>>> = shapes.iter().map(|(_, curves)| thin(curves)).collect();
+    let Some(first) = thinned
+        .first()
+        .filter(|curves| curves.iter().any(|curve| curve.len() > 1))
+    else {
+        return finish(name, &File::default(), json!([]), None, out);
+    };
+    let (veins, points) = (first.len(), first[0].len());
+    let base = Tubes::around(first, radius);
+    let mut file = File::default();
+    let (position, normal) = (file.vectors(&base.positions), file.vectors(&base.normals));
+    let colors = (0..veins).flat_map(|vein| {
+        let color = linear(vein_color(if veins > 1 {
+            vein as f64 / (veins - 1) as f64
+        } else {
+            0.3
+        }));
+        std::iter::repeat_n(color, Tubes::vertices(points)).flatten()
+    });
+    let count = base.positions.len();
+    let accessor = json!({ "componentType": UNSIGNED_BYTE, "normalized": true, "count": count, "type": "VEC4" });
+    let color = file.add(colors, Some(ARRAY), accessor);
+    let corners = Tubes::triangles(veins, points);
+    let accessor =
+        json!({ "componentType": UNSIGNED_INT, "count": corners.len(), "type": "SCALAR" });
+    let indices = file.add(
+        corners.into_iter().flat_map(u32::to_le_bytes),
+        Some(ELEMENT_ARRAY),
+        accessor,
+    );
+
+    let mut targets = Vec::new();
+    for curves in &thinned[1..] {
+        let tubes = Tubes::around(curves, radius);
+        let minus =
+            |a: &[Vec3], b: &[Vec3]| -> Vec<Vec3> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
+        targets.push(json!({
+            "POSITION": file.vectors(&minus(&tubes.positions, &base.positions)),
+            "NORMAL": file.vectors(&minus(&tubes.normals, &base.normals)),
+        }));
+    }
+    let mut mesh = json!([{ "name": "veins", "primitives": [{
+        "attributes": { "POSITION": position, "NORMAL": normal, "COLOR_0": color },
+        "indices": indices, "material": 0,
+    }]}]);
+    let mut animation = None;
+    if !targets.is_empty() {
+        mesh[0]["weights"] = json!(vec![0.0; targets.len()]);
+        animation = Some(animate(&mut file, shapes));
+        mesh[0]["primitives"][0]["targets"] = Value::Array(targets);
+    }
+    finish(name, &file, mesh, animation, out)
+}
+
+/// At the time of a shape its weight is one, and all others are zero.
+fn animate(file: &mut File, shapes: &[(f64, &[Vec<DVec3>])]) -> Value {
+    let (start, end) = (shapes[0].0, shapes[shapes.len() - 1].0);
+    let rate = if end > start {
+        SECONDS / (end - start)
+    } else {
+        1.0
+    };
+    let times: Vec<f32> = shapes
+        .iter()
+        .map(|(time, _)| ((time - start) * rate) as f32)
+        .collect();
+    let targets = shapes.len() - 1;
+    let weight = |shape: usize, target: usize| f32::from(u8::from(shape == target + 1));
+    let weights =
+        (0..shapes.len()).flat_map(|shape| (0..targets).map(move |target| weight(shape, target)));
+    let weights: Vec<f32> = weights.collect();
+    json!([{ "name": "motion",
+        "samplers": [{ "input": file.scalars(&times), "output": file.scalars(&weights), "interpolation": "LINEAR" }],
+        "channels": [{ "sampler": 0, "target": { "node": 0, "path": "weights" } }],
+    }])
+}
+
+/// The header, the document and the bytes.
+fn finish(
+    name: &str,
+    file: &File,
+    meshes: Value,
+    animations: Option<Value>,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let generator = concat!("leafdyn ", env!("CARGO_PKG_VERSION"));
+    let mut document = json!({ "asset": { "version": "2.0", "generator": generator }, "scene": 0, "scenes": [{ "name": name }] });
+    if !file.accessors.is_empty() {
+        document["scenes"][0]["nodes"] = json!([0]);
+        // Up is y in this format.
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        document["nodes"] =
+            json!([{ "name": "leaf", "mesh": 0, "rotation": [-half, 0.0, 0.0, half] }]);
+        document["meshes"] = meshes;
+        document["materials"] = json!([{ "name": "vein", "doubleSided": true,
+            "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 0.6 } }]);
+        document["buffers"] = json!([{ "byteLength": file.bytes.len() }]);
+        document["bufferViews"] = Value::Array(file.views.clone());
+        document["accessors"] = Value::Array(file.accessors.clone());
+    }
+    if let Some(animations) = animations {
+        document["animations"] = animations;
+    }
+    let mut text = document.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let mut chunks = vec![(*b"JSON", &text)];
+    if !file.bytes.is_empty() {
+        chunks.push((*b"BIN\0", &file.bytes));
+    }
+    let size = 12
+        + chunks
+            .iter()
+            .map(|(_, chunk)| 8 + chunk.len())
+            .sum::<usize>();
+    let sizes = [
+        2,
+        u32::try_from(size).map_err(|_| io::ErrorKind::FileTooLarge)?,
+    ];
+    out.write_all(b"glTF")?;
+    out.write_all(sizes.map(u32::to_le_bytes).as_flattened())?;
+    for (kind, chunk) in chunks {
+        out.write_all(&(chunk.len() as u32).to_le_bytes())?;
+        out.write_all(&kind)?;
+        out.write_all(chunk)?;
+    }
+    Ok(())
+}
+
+/// Fewer points of every vein, the tip among them; numbers gone wild end it.
+fn thin(curves: &[Vec<DVec3>]) -> Vec<Vec<DVec3>> {
+    let last = curves
+        .first()
+        .map_or(0, |curve| curve.len().saturating_sub(1));
+    let stride = (last.div_ceil(MOST_POINTS).max(1)..=last.max(1))
+        .find(|stride| last.is_multiple_of(*stride));
+    let near = |mut curve: Vec<DVec3>| {
+        for i in 0..curve.len() {
+            if !is_near(curve[i]) {
+                curve[i] = if i > 0 { curve[i - 1] } else { DVec3::ZERO };
+            }
+        }
+        curve
+    };
+    let kept = |curve: &Vec<DVec3>| curve.iter().copied().step_by(stride.unwrap_or(1)).collect();
+    curves.iter().map(|curve| near(kept(curve))).collect()
+}
+
+/// From the colour of a screen to that which light is reckoned with, opaque.
+fn linear(Color(red, green, blue): Color) -> [u8; 4] {
+    let of = |value: u8| {
+        let value = f64::from(value) / 255.0;
+        let linear = if value <= 0.04045 {
+            value / 12.92
+        } else {
+            ((value + 0.055) / 1.055).powf(2.4)
+        };
+        (255.0 * linear).round() as u8
+    };
+    [of(red), of(green), of(blue), 255]
+}

@@ -1,0 +1,284 @@
+//! Leaves in space for browsers ([`page`]), ParaView ([`vtk`]) and Blender ([`glb`]).
+//!
+//! The page is a leaf to be turned, played and asked for its numbers, as one HTML file
+//! that needs nothing else.
+//!
+//! ```
+//! use leafdyn::relax::{Options, relax};
+//! use leafdyn::scenario::Scenario;
+//! use leafdyn::view;
+//!
+//! let scenario = Scenario::read("scenarios/paper/fig04.toml")?;
+//! let leaf = relax(&scenario, &Options::default(), &mut |_| {})?;
+//! let page = view::page(&leaf, &scenario);
+//! assert!(page.starts_with("<!DOCTYPE html>") && page.len() < 1_000_000);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! `data.rs` says what the page is given, one file each how a result gives it; the
+//! scripts draw it. `three/` holds what is used of three.js, and how it is bundled.
+
+mod data;
+mod equilibria;
+pub mod glb;
+mod leaf;
+mod motion;
+mod trace;
+mod tubes;
+pub mod vtk;
+
+use super::drawing::{Drawing, vein_color};
+use super::svg::{self, hex};
+use crate::report::{Document, Format, Part, json};
+use crate::scenario::{self, Scenario};
+use crate::simulate::Record;
+use crate::study::Trace;
+use data::View;
+use glam::DVec3;
+use std::io::{self, Write};
+use std::path::Path;
+
+/// More veins would not be told apart.
+const MOST_VEINS: usize = 200;
+
+const FRAME: &str = include_str!("page.html");
+const STYLE: &str = include_str!("page.css");
+const THREE: &str = include_str!("three/three.min.js");
+const SCRIPTS: [&str; 5] = [
+    include_str!("data.js"),
+    include_str!("space.js"),
+    include_str!("axes.js"),
+    include_str!("chart.js"),
+    include_str!("page.js"),
+];
+
+/// A result that has a page.
+pub trait Viewed {
+    /// What the page is given.
+    #[doc(hidden)]
+    fn fill(&self, view: &mut View);
+
+    /// The figure that stands in its place where a browser draws nothing in space.
+    #[doc(hidden)]
+    fn still(&self) -> Drawing;
+}
+
+/// The page of a result as a file of this name.
+pub(crate) struct Page(pub &'static str);
+
+impl<R: Viewed> Format<R> for Page {
+    fn file_name(&self) -> &'static str {
+        self.0
+    }
+
+    fn write(&self, document: &Document<R>, out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(page(document.result, document.input).as_bytes())
+    }
+}
+
+/// Shapes one after the other: their times, or numbers, and centrelines.
+type Shapes<'r> = Vec<(f64, &'r [Vec<DVec3>])>;
+
+/// Shapes for ParaView: a list of this name, and a folder of them beside it.
+pub(crate) struct Series<R>(pub &'static str, pub fn(&R) -> Shapes<'_>);
+
+impl<R> Series<R> {
+    /// The name of a shape's file.
+    fn part(&self, number: usize) -> String {
+        let stem = Path::new(self.0).file_stem().unwrap_or_default();
+        format!("{}_vtp/{number:05}.vtp", stem.display())
+    }
+}
+
+impl<R> Format<R> for Series<R> {
+    fn file_name(&self) -> &'static str {
+        self.0
+    }
+
+    fn write(&self, document: &Document<R>, out: &mut dyn Write) -> io::Result<()> {
+        let shapes = (self.1)(document.result);
+        let files = shapes.iter().enumerate();
+        let files: Vec<_> = files.map(|(k, (time, _))| (*time, self.part(k))).collect();
+        vtk::series(&files, out)
+    }
+
+    fn parts<'d>(&self, document: &'d Document<R>) -> Vec<Part<'d>> {
+        let shapes = (self.1)(document.result).into_iter().enumerate();
+        let part = |(k, (_, curves)): (usize, (f64, &'d [Vec<DVec3>]))| -> Part<'d> {
+            let fill = move |out: &mut dyn Write| vtk::curves(curves, out);
+            (self.part(k), Box::new(fill))
+        };
+        shapes.map(part).collect()
+    }
+}
+
+/// The instants of a motion.
+pub(crate) fn instants(record: &Record) -> Shapes<'_> {
+    let film = record.film.iter();
+    film.map(|still| (record.moments[still.moment].time, &still.curves[..]))
+        .collect()
+}
+
+/// All points of a trace, numbered branch after branch.
+pub(crate) fn points(trace: &Trace) -> Shapes<'_> {
+    let points = trace.branches.iter().flat_map(|branch| &branch.points);
+    (points.enumerate())
+        .map(|(number, point)| (number as f64, &point.curves[..]))
+        .collect()
+}
+
+/// The page of a result of this scenario: a whole HTML file, which loads nothing.
+pub fn page(result: &impl Viewed, scenario: &Scenario) -> String {
+    let count = scenario.rods.len();
+    let every = count.div_ceil(MOST_VEINS).max(1);
+    let chosen = |number: &usize| (number - 1).is_multiple_of(every) || *number == count;
+    let drawn: Vec<usize> = (1..=count).filter(chosen).collect();
+    let color = |&number: &usize| match count {
+        1 => hex(vein_color(0.3)),
+        _ => hex(vein_color((number - 1) as f64 / (count - 1) as f64)),
+    };
+    let mut view = View {
+        kind: "leaf",
+        title: scenario.name.clone(),
+        verdict: String::new(),
+        success: true,
+        summary: Vec::new(),
+        units: [&scenario.units.length, &scenario.units.force].map(Clone::clone),
+        gravity: scenario.gravity,
+        longest: scenario::longest(&scenario.rods),
+        lengths: (drawn.iter().map(|&number| scenario.rods[number - 1].length)).collect(),
+        joined: scenario.joined,
+        rods: count,
+        colors: drawn.iter().map(color).collect(),
+        drawn,
+        leaves: Vec::new(),
+        modes: Vec::new(),
+        chart: None,
+    };
+    result.fill(&mut view);
+    assemble(&view, &result.still())
+}
+
+fn assemble(view: &View, still: &Drawing) -> String {
+    let (mut data, mut figure) = (Vec::new(), Vec::new());
+    // Writing to memory cannot fail.
+    let _ = json::write(view, &mut data);
+    let _ = svg::write(still, &mut figure);
+    // In a script only `</script` and `<!--` would end the text.
+    let data = String::from_utf8_lossy(&data).replace('<', "\\u003c");
+    let figure = String::from_utf8_lossy(&figure);
+    let scripts = SCRIPTS.concat();
+    let parts = [
+        ("TITLE", svg::escaped(&view.title)),
+        ("STYLE", STYLE.into()),
+        ("FIGURE", figure.into()),
+        ("DATA", data),
+        ("THREE", THREE.into()),
+        ("SCRIPT", scripts),
+    ];
+    let size: usize = parts.iter().map(|(_, part)| part.len()).sum();
+    let mut page = String::with_capacity(FRAME.len() + size);
+    let mut rest = FRAME;
+    // What is put in is not searched for further places.
+    while let Some((before, after)) = rest.split_once("{{") {
+        let Some((name, after)) = after.split_once("}}") else {
+            break;
+        };
+        page.push_str(before);
+        let part = parts.iter().find(|(part, _)| *part == name);
+        page.push_str(part.map_or("", |(_, text)| text));
+        rest = after;
+    }
+    page + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+    use serde_json::Value;
+
+    fn scenario(rods: usize) -> Scenario {
+        let text = format!(
+            r#"
+            name = "a < b </script>"
+            leaf = {{ rods = {rods}, length = 1.0, fan = "symmetric" }}
+            stiffness = {{ torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }}
+            units = {{ length = "cm" }}
+        "#
+        );
+        Scenario::from_toml(&text).unwrap()
+    }
+
+    /// What a page was given.
+    fn data(page: &str) -> Value {
+        let (_, rest) = page.split_once("type=\"application/json\">").unwrap();
+        serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
+    }
+
+    #[test]
+    fn the_bundle_is_the_one_that_was_made() {
+        let fnv1a = THREE
+            .bytes()
+            .fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
+                (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+            });
+        let noted = include_str!("three/three.min.js.fnv1a");
+        assert_eq!(format!("{fnv1a:016x}"), noted.trim());
+        assert!(THREE.contains("SPDX-License-Identifier: MIT"));
+        assert!(!THREE.contains("</script") && !THREE.contains("<!--"));
+    }
+
+    #[test]
+    fn a_page_is_whole_and_loads_nothing() {
+        let mut leaf = sample::fan(21, 32);
+        leaf.scenario = "a < b </script>".into();
+        let page = page(&leaf, &scenario(21));
+        assert!(page.len() < 1_000_000, "{}", page.len());
+        assert!(page.contains("<title>a &lt; b &lt;/script&gt;</title>"));
+        assert!(!page.contains("{{"));
+        let outside = page.replace(THREE, "");
+        for load in ["src=", "href=\"", "@import", "url(", "import("] {
+            assert!(!outside.contains(load), "{load}");
+        }
+        assert_eq!(outside.matches("</script>").count(), 3);
+        let data = data(&page);
+        assert_eq!(data["title"], "a < b </script>");
+        assert_eq!(data["units"], serde_json::json!(["cm", null]));
+        assert_eq!(data["leaves"][0]["nodes"], leaf.shape.stations.len());
+    }
+
+    #[test]
+    fn a_motion_has_its_instants_and_energies() {
+        let mut record = sample::record(5, 8);
+        record.film = record.stills.clone();
+        let data = data(&page(&record, &scenario(5)));
+        assert_eq!(data["leaves"].as_array().unwrap().len(), record.film.len());
+        let curves = data["chart"]["curves"].as_array().unwrap();
+        let names: Vec<&str> = curves.iter().filter_map(|c| c["name"].as_str()).collect();
+        assert!(names.contains(&"kinetic") && names.contains(&"tip z"));
+        assert!(!names.contains(&"work put in"), "{names:?}");
+    }
+
+    #[test]
+    fn of_a_wide_leaf_some_veins_are_drawn() {
+        let data = data(&page(&sample::fan(401, 4), &scenario(401)));
+        let drawn = data["drawn"].as_array().unwrap();
+        assert!(drawn.len() <= 202 && drawn[0] == 1 && *drawn.last().unwrap() == 401);
+    }
+
+    #[test]
+    fn numbers_gone_wild_make_a_page() {
+        for wild in [f64::NAN, f64::INFINITY, 1e300] {
+            let mut leaf = sample::fan(3, 8);
+            leaf.shape.rods[1].nodes[3].position.z = wild;
+            leaf.energy = Some(wild);
+            data(&page(&leaf, &scenario(3)));
+            let mut record = sample::record(3, 8);
+            record.moments[3].energy.kinetic = wild;
+            record.film = record.stills.clone();
+            record.film[1].curves[0][2].x = wild;
+            data(&page(&record, &scenario(3)));
+        }
+    }
+}

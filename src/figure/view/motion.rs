@@ -1,0 +1,87 @@
+//! The page of a leaf that moves.
+
+use super::Viewed;
+use super::data::{Chart, Curve, Leaf, View};
+use crate::figure::drawing::Drawing;
+use crate::report::numbers::short;
+use crate::report::simulate_lines;
+use crate::simulate::{Moment, Record};
+
+/// Nodes of a vein that are drawn, but for the first.
+const MOST_NODES: usize = 64;
+
+/// Points of a curve.
+const MOST_POINTS: usize = 1000;
+
+impl Viewed for Record {
+    fn fill(&self, view: &mut View) {
+        view.kind = "motion";
+        view.verdict = match self.stopped {
+            None => format!("followed to t = {}", short(self.time)),
+            Some(_) => format!(
+                "ended early at t = {}: {}",
+                short(self.time),
+                self.outcome()
+            ),
+        };
+        view.success = self.stopped.is_none();
+        view.summary = simulate_lines(self, None);
+        let shapes = self.film.iter().map(|still| {
+            let time = self.moments[still.moment].time;
+            let label = format!("t = {}", short(time));
+            let time = Some(time);
+            Leaf {
+                time,
+                ..Leaf::coarse(label, &still.curves, &view.drawn, MOST_NODES)
+            }
+        });
+        view.leaves = shapes.collect();
+        view.chart = Some(chart(&self.moments));
+    }
+
+    fn still(&self) -> Drawing {
+        crate::figure::filmstrip(self)
+    }
+}
+
+/// Energies and the tip in time.
+fn chart(moments: &[Moment]) -> Chart {
+    let stride = moments.len().div_ceil(MOST_POINTS).max(1);
+    let shown = || moments.iter().step_by(stride);
+    let curve = |choice, color, name: &str, of: &dyn Fn(&Moment) -> f64| Curve {
+        choice,
+        name: name.into(),
+        color,
+        x: shown().map(|moment| moment.time).collect(),
+        y: shown().map(of).collect(),
+        leaves: Vec::new(),
+        unstable: Vec::new(),
+        special: Vec::new(),
+    };
+    let energies: [(&str, &dyn Fn(&Moment) -> f64); 7] = [
+        ("kinetic", &|m| m.energy.kinetic),
+        ("elastic", &|m| m.energy.elastic),
+        ("coupling", &|m| m.energy.coupling),
+        ("potential of the loads", &|m| m.energy.potential),
+        ("dissipated", &|m| m.energy.dissipated),
+        ("work put in", &|m| m.energy.work),
+        ("balance", &|m| m.energy.balance()),
+    ];
+    let mut curves: Vec<Curve> = Vec::new();
+    for (color, (name, of)) in energies.into_iter().enumerate() {
+        let curve = curve(0, color, name, of);
+        // What is not there needs no curve.
+        if curve.y.iter().any(|&y| y != 0.0) {
+            curves.push(curve);
+        }
+    }
+    for (axis, name) in ["tip x", "tip y", "tip z"].into_iter().enumerate() {
+        curves.push(curve(1, axis, name, &|m| m.tip[axis]));
+    }
+    Chart {
+        across: "time".into(),
+        log: false,
+        choices: ["energy", "tip"].map(String::from).into(),
+        curves,
+    }
+}

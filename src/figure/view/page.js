@@ -1,0 +1,582 @@
+// The page: what is shown, how it is turned, played and asked.
+const root = document.documentElement;
+const css = (name) => getComputedStyle(root).getPropertyValue(name).trim();
+const [under, canvas, over] = ["under", "space", "over"].map(find);
+const several = view.kind === "equilibria" && view.leaves.length > 1;
+const sequence = view.kind === "motion" || view.kind === "trace";
+
+/// What is shown: a leaf, perhaps between two; a mode and its phase; the chosen one of several.
+const shown = { at: 0, mode: -1, phase: 0, alone: several ? -1 : 0, playing: false, dirty: true, quantity: 0 };
+let space = null;
+let diagram = null;
+let leaf = null;
+
+function row(name, ...cells) {
+  const tr = document.createElement("tr");
+  const th = document.createElement("th");
+  th.scope = "row";
+  th.textContent = name;
+  tr.append(th);
+  for (const cell of cells) tr.append(Object.assign(document.createElement("td"), { textContent: cell }));
+  return tr;
+}
+
+function fillText() {
+  const stable = find("verdict");
+  stable.textContent = view.verdict;
+  stable.classList.toggle("bad", !view.success || /unstable|index/.test(view.verdict));
+  const many = view.rods === 1 ? "1 vein" : `${view.rods} veins${view.joined ? " joined at the tip" : " with free tips"}`;
+  const part = view.drawn.length < view.rods ? `, ${view.drawn.length} drawn` : "";
+  find("what").textContent = many + part;
+  fillSummary();
+}
+
+/// The numbers of the result, or of the chosen one of several.
+function fillSummary() {
+  const own = several && shown.alone >= 0 ? view.leaves[shown.alone] : null;
+  const lines = own && own.summary ? own.summary : view.summary;
+  find("summary").tBodies[0].replaceChildren(...lines.map(([name, text]) => row(name, text)));
+  find("summary").caption.textContent = own ? own.label : "Result";
+}
+
+function setTheme(name) {
+  root.dataset.theme = name;
+  find("theme").textContent = name === "dark" ? "light" : "dark";
+  shown.dirty = true;
+  if (space) space.meshes.forEach((mesh) => mesh.theme(css));
+}
+
+/// Everything that is drawn in space; throws where that cannot be.
+function openSpace() {
+  const renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+  const scene = new THREE.Scene();
+  const sun = new THREE.DirectionalLight(0xffffff, 2.2);
+  scene.add(new THREE.AmbientLight(0xffffff, 1.5), sun);
+  const camera = new THREE.OrthographicCamera(-1, 1, 1, -1, -1e4, 1e4);
+  camera.up.set(0, 0, 1);
+  const controls = new THREE.OrbitControls(camera, canvas);
+  controls.enableDamping = false;
+  controls.minZoom = 0.2;
+  controls.maxZoom = 200;
+  controls.addEventListener("change", () => (shown.dirty = true));
+  const first = several ? view.leaves.map((_, i) => leafAt(i)) : sequence ? sampled(60) : [leafAt(0)];
+  return { renderer, scene, sun, camera, controls, meshes: [], box: boxOf(first), fit: [1, 1], panels: [] };
+}
+
+/// Some leaves of a sequence, the first and the last among them.
+function sampled(most) {
+  const last = view.leaves.length - 1;
+  const count = Math.min(most, last + 1);
+  return Array.from({ length: count }, (_, i) => leafAt(Math.round((i * last) / Math.max(1, count - 1))));
+}
+
+/// A mesh for a leaf in a panel, of which there is one for each number of nodes.
+function meshFor(panel, shape) {
+  let mesh = space.meshes.find((mesh) => mesh.panel === panel && mesh.nodes === shape.nodes);
+  if (!mesh) {
+    mesh = new LeafMesh(shape);
+    mesh.panel = panel;
+    mesh.theme(css);
+    space.scene.add(mesh.group);
+    space.meshes.push(mesh);
+  }
+  return mesh;
+}
+
+/// The leaf in the first panel: as given, between two instants, or in a mode.
+function currentLeaf() {
+  if (shown.mode >= 0) return inMode(view.modes[shown.mode], Math.sin(shown.phase));
+  const index = Math.min(Math.floor(shown.at), view.leaves.length - 1);
+  const [a, part] = [leafAt(index), shown.at - index];
+  if (view.kind !== "motion" || part < 1e-6 || index + 1 >= view.leaves.length) return a;
+  const b = leafAt(index + 1);
+  return { ...a, points: a.points.map((x, i) => x + part * (b.points[i] - x)) };
+}
+
+function inMode(mode, amplitude) {
+  if (!mode.decoded) {
+    mode.decoded = new Float32Array(bytes(mode.rest));
+    mode.by = new Float32Array(bytes(mode.displacement));
+    const largest = Math.max(...mode.by.map(Math.abs), 1e-30);
+    mode.size = Math.min(1, (0.2 * space.box.extent) / largest);
+    mode.stations = Array.from({ length: mode.nodes }, (_, i) => i / Math.max(1, mode.nodes - 1));
+  }
+  const points = mode.decoded.map((x, i) => x + amplitude * mode.size * mode.by[i]);
+  return { label: mode.label, nodes: mode.nodes, stations: mode.stations, points, state: null };
+}
+
+const activeQuantities = () => (shown.mode >= 0 ? GEOMETRY : quantities);
+const quantity = () => activeQuantities()[shown.quantity] || activeQuantities()[0];
+
+/// Limits of the colours: over all that is shown side by side or one after the other.
+const limitsKnown = new Map();
+
+function limitsOf(quantity) {
+  const key = `${quantity.name} ${shown.mode}`;
+  if (!limitsKnown.has(key)) {
+    const leaves = shown.mode >= 0 ? [inMode(view.modes[shown.mode], 1), inMode(view.modes[shown.mode], -1)] : several ? view.leaves.map((_, i) => leafAt(i)) : sampled(40);
+    let [low, high] = range(leaves.flatMap((leaf) => [...range(valuesOf(leaf, quantity).filter(Number.isFinite))]));
+    // A signed quantity has its zero in the middle; one that does not vary has some width.
+    if (quantity.signed) [low, high] = [-Math.max(Math.abs(low), Math.abs(high)), Math.max(Math.abs(low), Math.abs(high))];
+    else low = Math.min(0, low);
+    if (!(high - low > 1e-7 * Math.abs(high))) [low, high] = quantity.signed ? [-1, 1] : [low, low + (Math.abs(low) || 1)];
+    limitsKnown.set(key, [low, high]);
+  }
+  return limitsKnown.get(key);
+}
+
+const mapOf = (quantity) => (quantity.signed ? MAPS.signed : MAPS.sequential);
+
+/// Brings the mesh of a panel to a leaf.
+function put(panel, shape, again) {
+  const mesh = meshFor(panel, shape);
+  mesh.surface.visible = find("surface").checked && veins > 1;
+  mesh.shape(shape);
+  const colors = quantity();
+  if (colors.name === "vein") {
+    if (again || mesh.painted !== "vein") mesh.paint(null);
+  } else mesh.paint(valuesOf(shape, colors), limitsOf(colors), mapOf(colors));
+  mesh.painted = colors.name;
+  return mesh;
+}
+
+/// Brings everything up to date: `again` after a setting has changed.
+function update(again) {
+  if (space) {
+    if (several && shown.alone < 0) space.panels = view.leaves.map((_, i) => ({ leaf: leafAt(i), mesh: put(i, leafAt(i), again), label: view.leaves[i].label }));
+    else {
+      const index = several ? shown.alone : 0;
+      leaf = several ? leafAt(index) : currentLeaf();
+      space.panels = [{ leaf, mesh: put(index, leaf, again), label: several ? leaf.label : "" }];
+    }
+  } else leaf = leafAt(Math.floor(shown.at));
+  shown.dirty = true;
+  if (sequence || shown.mode >= 0) tellFrame();
+  if (find("probe").open) fillProbe();
+}
+
+function tellFrame() {
+  const index = Math.round(shown.at);
+  if (shown.mode >= 0) {
+    find("now").textContent = view.modes[shown.mode].label;
+    return;
+  }
+  const one = view.leaves[index];
+  find("now").textContent = `${one.label}   (${index + 1} of ${view.leaves.length})`;
+  find("frame").value = index;
+  if (diagram) {
+    const time = one.time === undefined ? undefined : timeAt(shown.at);
+    diagram.show(index, time);
+  }
+}
+
+function timeAt(at) {
+  const index = Math.min(Math.floor(at), view.leaves.length - 1);
+  const next = view.leaves[Math.min(index + 1, view.leaves.length - 1)];
+  const [a, b] = [view.leaves[index].time, next.time];
+  return a + (at - index) * (b - a);
+}
+
+/// The place, between two leaves, of a time.
+function atTime(time) {
+  const next = view.leaves.findIndex((leaf) => leaf.time > time);
+  if (next < 0) return view.leaves.length - 1;
+  if (next === 0) return 0;
+  const [a, b] = [view.leaves[next - 1].time, view.leaves[next].time];
+  return next - 1 + (time - a) / (b - a);
+}
+
+/// Looks from a direction, at all of the box.
+function look(name) {
+  const from = { free: [-0.55, -1, 0.75], above: [0, -1e-4, 1], side: [0, -1, 0], front: [1, 0, 0] }[name];
+  const { camera, controls, box } = space;
+  controls.target.fromArray(box.middle);
+  const away = new THREE.Vector3(...from).normalize().multiplyScalar(10 * box.extent);
+  camera.position.copy(controls.target).add(away);
+  camera.near = 0;
+  camera.far = 30 * box.extent;
+  camera.zoom = 1;
+  controls.update();
+  camera.updateMatrixWorld();
+  fitBox();
+  document.querySelectorAll("#views button").forEach((button) => button.setAttribute("aria-pressed", button.dataset.view === name));
+  shown.dirty = true;
+}
+
+/// Extents of the box across the line of sight.
+function fitBox() {
+  const { camera, box } = space;
+  const [right, up] = [0, 1].map((k) => new THREE.Vector3().setFromMatrixColumn(camera.matrixWorld, k));
+  const extent = (way) => [0, 1, 2].reduce((sum, k) => sum + Math.abs(way.getComponent(k)) * (box.high[k] - box.low[k]), 0);
+  space.fit = [extent(right), extent(up)];
+}
+
+/// Rectangles of the panels on the stage.
+function layout(width, height) {
+  const count = space.panels.length;
+  let best = { scale: 0 };
+  for (let columns = 1; columns <= count; columns++) {
+    const rows = Math.ceil(count / columns);
+    const [w, h] = [width / columns, height / rows];
+    const scale = Math.min(w / space.fit[0], h / space.fit[1]);
+    if (scale > best.scale) best = { scale, columns, w, h };
+  }
+  space.panels.forEach((panel, i) => {
+    panel.rect = [(i % best.columns) * best.w, Math.floor(i / best.columns) * best.h, best.w, best.h];
+  });
+}
+
+/// How a point of a panel lies on the stage, in pixels of the page.
+function placeIn(panel) {
+  const { camera } = space;
+  const [left, top, width, height] = panel.rect;
+  const point = new THREE.Vector3();
+  frustum(width, height);
+  const place = (at) => {
+    point.set(at[0], at[1], at[2]).project(camera);
+    return [left + (0.5 + 0.5 * point.x) * width, top + (0.5 - 0.5 * point.y) * height];
+  };
+  place.scale = (camera.zoom * width) / (camera.right - camera.left);
+  return place;
+}
+
+function frustum(width, height) {
+  const { camera, fit } = space;
+  const small = space.panels.length > 1;
+  const [marginX, marginY] = small ? [30, 34] : find("axes").checked ? [90, 78] : [40, 50];
+  const scale = Math.min(Math.max(40, width - 2 * marginX) / fit[0], Math.max(40, height - 2 * marginY) / fit[1]);
+  camera.right = width / 2 / scale;
+  camera.left = -camera.right;
+  camera.top = height / 2 / scale;
+  camera.bottom = -camera.top;
+  camera.updateProjectionMatrix();
+}
+
+function render() {
+  if (!space) return;
+  const { renderer, scene, sun, camera, controls } = space;
+  const stage = find("stage").getBoundingClientRect();
+  const [width, height] = [Math.round(stage.width), Math.round(stage.height)];
+  const ratio = Math.min(2, window.devicePixelRatio || 1);
+  renderer.setPixelRatio(ratio);
+  renderer.setSize(width, height, false);
+  for (const layer of [under, over]) if (layer.width !== width * ratio || layer.height !== height * ratio) [layer.width, layer.height] = [width * ratio, height * ratio];
+  const pen = under.getContext("2d");
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.fillStyle = css("--paper");
+  pen.fillRect(0, 0, width, height);
+  layout(width, height);
+  renderer.setScissorTest(true);
+  // Light from over the reader's left shoulder.
+  sun.position.copy(camera.position).sub(controls.target).applyAxisAngle(camera.up, -0.5).add(new THREE.Vector3(0, 0, 4 * space.box.extent));
+  space.meshes.forEach((mesh) => (mesh.group.visible = false));
+  space.panels.forEach((panel, i) => {
+    const [left, top, w, h] = panel.rect;
+    const place = placeIn(panel);
+    const small = space.panels.length > 1;
+    if (find("axes").checked) drawAxes(pen, space.box, place, css, small);
+    if (i === 0) drawGravity(pen, space.box, place, css, small ? [width - 44, 32] : [44, height - 64]);
+    if (panel.label) drawLabel(pen, panel, small);
+    const bottom = height - top - h;
+    renderer.setViewport(left, bottom, w, h);
+    renderer.setScissor(left, bottom, w, h);
+    panel.mesh.group.visible = true;
+    renderer.render(scene, camera);
+    panel.mesh.group.visible = false;
+  });
+  const colors = quantity();
+  drawScale(pen, colors, colors.name === "vein" ? null : limitsOf(colors), mapOf(colors), css, width, height);
+}
+
+function drawLabel(pen, panel, small) {
+  const [left, top, width] = panel.rect;
+  pen.fillStyle = css("--ink");
+  pen.font = `${small ? 12 : 14}px system-ui, "DejaVu Sans", sans-serif`;
+  pen.textAlign = "center";
+  pen.textBaseline = "top";
+  pen.fillText(panel.label, left + width / 2, top + (small && top > 0 ? 6 : 46), width - 12);
+}
+
+/// The node nearest to a place on the stage.
+function nearest(x, y) {
+  let best = { far: 14 };
+  for (const panel of space ? space.panels : []) {
+    const [left, top, width, height] = panel.rect;
+    if (x < left || y < top || x > left + width || y > top + height) continue;
+    const place = placeIn(panel);
+    const { points } = panel.leaf;
+    for (let i = 0; 3 * i < points.length; i++) {
+      const at = place(points.subarray(3 * i, 3 * i + 3));
+      const far = Math.hypot(at[0] - x, at[1] - y);
+      if (far < best.far) best = { far, node: i, at, leaf: panel.leaf };
+    }
+  }
+  return best.leaf ? best : null;
+}
+
+/// What is known of a node: names and numbers.
+function told(leaf, node) {
+  const [j, i] = [Math.floor(node / leaf.nodes), node % leaf.nodes];
+  const list = (numbers) => [...numbers].map(short).join(", ");
+  const lines = [
+    ["vein, station", `${view.drawn[j]}, ${short(leaf.stations[i])} of its length`],
+    [withUnit("x, y, z", lengthUnit), list(leaf.points.subarray(3 * node, 3 * node + 3))],
+  ];
+  if (!leaf.state) return lines;
+  const part = (at) => leaf.state.subarray(16 * node + at, 16 * node + at + 3);
+  return [
+    ...lines,
+    ["stretch, shear 2, 3", list(part(V))],
+    [withUnit("twist, bend 2, 3", lengthUnit && `(1/${lengthUnit})`), list(part(U))],
+    [withUnit("tension, shear force 2, 3", forceUnit), list(part(N))],
+    [withUnit("moment: twisting, bending 2, 3", momentUnit), list(part(M))],
+  ];
+}
+
+function hover(event) {
+  const stage = find("stage").getBoundingClientRect();
+  const [x, y] = [event.clientX - stage.left, event.clientY - stage.top];
+  const found = event.buttons ? null : nearest(x, y);
+  const hint = find("hint");
+  const pen = over.getContext("2d");
+  pen.setTransform(1, 0, 0, 1, 0, 0);
+  pen.clearRect(0, 0, over.width, over.height);
+  hint.style.display = found ? "block" : "none";
+  if (!found) return;
+  hint.textContent = told(found.leaf, found.node).map(([name, text]) => `${name}: ${text}`).join("\n");
+  hint.style.left = `${Math.min(x + 16, stage.width - hint.offsetWidth - 8)}px`;
+  hint.style.top = `${Math.min(y + 16, stage.height - hint.offsetHeight - 8)}px`;
+  const ratio = over.width / stage.width;
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.strokeStyle = css("--accent");
+  pen.lineWidth = 2;
+  pen.beginPath();
+  pen.arc(found.at[0], found.at[1], 7, 0, 7);
+  pen.stroke();
+}
+
+/// The same numbers without a mouse.
+function fillProbe() {
+  const one = leaf || (space && space.panels[0] && space.panels[0].leaf) || leafAt(0);
+  find("station").max = one.nodes - 1;
+  const wanted = Number(find("vein").value);
+  const j = view.drawn.reduce((best, number, k) => (Math.abs(number - wanted) < Math.abs(view.drawn[best] - wanted) ? k : best), 0);
+  const node = j * one.nodes + Math.min(Number(find("station").value), one.nodes - 1);
+  find("numbers").tBodies[0].replaceChildren(...told(one, node).map(([name, text]) => row(name, text)));
+}
+
+function play(on) {
+  shown.playing = on;
+  find("play").textContent = on ? "❚❚" : "▶";
+  find("play").setAttribute("aria-label", on ? "pause (space)" : "play (space)");
+  if (on && sequence && shown.at >= view.leaves.length - 1) shown.at = 0;
+}
+
+/// Goes on in a sequence, or in the vibration, by so many seconds.
+function advance(seconds) {
+  if (shown.mode >= 0) {
+    shown.phase += (2 * Math.PI * seconds) / 1.6;
+    return update(false);
+  }
+  const part = seconds / Number(find("speed").value);
+  const last = view.leaves.length - 1;
+  if (view.kind === "motion") {
+    const [from, to] = [view.leaves[0].time, view.leaves[last].time];
+    shown.at = atTime(timeAt(shown.at) + part * (to - from));
+  } else shown.at = Math.min(last, shown.at + part * last);
+  if (shown.at >= last) play(false);
+  update(false);
+}
+
+function step(by) {
+  if (!sequence) return;
+  play(false);
+  shown.at = Math.min(Math.max(Math.round(shown.at) + by, 0), view.leaves.length - 1);
+  update(false);
+}
+
+/// Turns by angles, moves by parts of the panel, zooms by a factor.
+function turn(azimuth, polar) {
+  const { camera, controls } = space;
+  const away = camera.position.clone().sub(controls.target);
+  const [flat, distance] = [Math.hypot(away.x, away.y), away.length()];
+  const height = Math.min(Math.max(Math.atan2(away.z, flat) + polar, -1.57), 1.57);
+  const around = Math.atan2(away.y, away.x) + azimuth;
+  away.set(Math.cos(height) * Math.cos(around), Math.cos(height) * Math.sin(around), Math.sin(height)).multiplyScalar(distance);
+  camera.position.copy(controls.target).add(away);
+  controls.update();
+}
+
+function move(right, up) {
+  const { camera, controls, box } = space;
+  const size = box.extent / camera.zoom;
+  const by = new THREE.Vector3().setFromMatrixColumn(camera.matrixWorld, 0).multiplyScalar(right * size);
+  by.add(new THREE.Vector3().setFromMatrixColumn(camera.matrixWorld, 1).multiplyScalar(up * size));
+  camera.position.add(by);
+  controls.target.add(by);
+  controls.update();
+}
+
+function zoom(factor) {
+  space.camera.zoom = Math.min(Math.max(space.camera.zoom * factor, 0.2), 200);
+  space.camera.updateProjectionMatrix();
+  shown.dirty = true;
+}
+
+function key(event) {
+  if (event.ctrlKey || event.metaKey || event.altKey || /INPUT|SELECT|TEXTAREA/.test(event.target.tagName)) return;
+  const views = { 1: "free", 2: "above", 3: "side", 4: "front" };
+  const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+  if (event.key === " " && event.target.tagName !== "BUTTON" && event.target.tagName !== "SUMMARY" && !find("player").hidden) play(!shown.playing);
+  else if (event.key === ",") step(-1);
+  else if (event.key === ".") step(1);
+  else if (!space) return;
+  else if (views[event.key]) look(views[event.key]);
+  else if (event.target === canvas && arrows[event.key]) {
+    const [x, y] = arrows[event.key];
+    if (event.shiftKey) move(-0.04 * x, -0.04 * y);
+    else turn(0.06 * x, 0.06 * y);
+  } else if (event.key === "+" || event.key === "=") zoom(1.15);
+  else if (event.key === "-" || event.key === "−") zoom(1 / 1.15);
+  else return;
+  event.preventDefault();
+}
+
+/// The picture as it stands.
+function picture() {
+  render();
+  const paper = Object.assign(document.createElement("canvas"), { width: under.width, height: under.height });
+  const pen = paper.getContext("2d");
+  for (const layer of [under, canvas]) pen.drawImage(layer, 0, 0, paper.width, paper.height);
+  return paper;
+}
+
+function savePicture() {
+  picture().toBlob((blob) => {
+    const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: `${view.title}.png` });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  });
+}
+
+function fillQuantities() {
+  find("quantity").replaceChildren(...activeQuantities().map((one, i) => new Option(withUnit(one.name, one.unit), i)));
+  shown.quantity = Math.min(shown.quantity, activeQuantities().length - 1);
+  find("quantity").value = shown.quantity;
+}
+
+function fillModes() {
+  if (!view.modes.length) return;
+  find("mode-row").hidden = false;
+  find("mode").replaceChildren(new Option("at rest", -1), ...view.modes.map((mode, i) => new Option(mode.label, i)));
+  find("mode").addEventListener("change", () => {
+    shown.mode = Number(find("mode").value);
+    [shown.quantity, shown.phase] = [0, Math.PI / 2];
+    fillQuantities();
+    find("player").hidden = shown.mode < 0;
+    play(shown.mode >= 0 && !matchMedia("(prefers-reduced-motion: reduce)").matches);
+    update(true);
+  });
+  for (const id of ["frame", "speed-row", "choice-row", "chart"]) find(id).style.display = "none";
+}
+
+function fillPlayer() {
+  if (!sequence || !view.leaves.length) return;
+  find("player").hidden = false;
+  find("frame").max = view.leaves.length - 1;
+  find("frame").addEventListener("input", () => {
+    play(false);
+    shown.at = Number(find("frame").value);
+    update(false);
+  });
+  if (view.chart) {
+    find("choice").replaceChildren(...view.chart.choices.map((name, i) => new Option(name, i)));
+    diagram = new Diagram(find("chart"), find("key"), view.chart, ({ leaf, time }) => {
+      play(false);
+      shown.at = leaf !== undefined ? leaf : atTime(time);
+      update(false);
+    });
+    find("choice").addEventListener("change", () => {
+      diagram.draw(Number(find("choice").value));
+      tellFrame();
+    });
+  }
+}
+
+/// One of several alone, or all of them again.
+function choose(event) {
+  if (!several) return;
+  const stage = find("stage").getBoundingClientRect();
+  const [x, y] = [event.clientX - stage.left, event.clientY - stage.top];
+  const index = space.panels.findIndex(({ rect: [left, top, width, height] }) => x >= left && y >= top && x < left + width && y < top + height);
+  shown.alone = shown.alone < 0 ? index : -1;
+  fillSummary();
+  update(true);
+}
+
+function listen() {
+  find("theme").addEventListener("click", () => setTheme(root.dataset.theme === "dark" ? "light" : "dark"));
+  find("quantity").addEventListener("change", () => {
+    shown.quantity = Number(find("quantity").value);
+    update(true);
+  });
+  for (const id of ["surface", "axes"]) find(id).addEventListener("change", () => update(true));
+  find("png").addEventListener("click", savePicture);
+  find("play").addEventListener("click", () => play(!shown.playing));
+  for (const id of ["vein", "station"]) find(id).addEventListener("input", fillProbe);
+  find("probe").addEventListener("toggle", fillProbe);
+  find("settings").addEventListener("submit", (event) => event.preventDefault());
+  document.addEventListener("keydown", key);
+  new ResizeObserver(() => {
+    shown.dirty = true;
+    if (diagram) {
+      diagram.draw(diagram.choice);
+      tellFrame();
+    }
+  }).observe(find("stage"));
+  if (!space) return;
+  canvas.addEventListener("pointermove", hover);
+  canvas.addEventListener("pointerleave", hover);
+  canvas.addEventListener("dblclick", choose);
+  document.querySelectorAll("#views button").forEach((button) => button.addEventListener("click", () => look(button.dataset.view)));
+}
+
+/// A frame of the screen: draws only what has changed.
+let before = 0;
+function tick(now) {
+  const seconds = Math.min(0.2, (now - before) / 1000);
+  before = now;
+  if (shown.playing) advance(seconds);
+  if (shown.dirty) {
+    shown.dirty = false;
+    render();
+    shown.drawn = (shown.drawn || 0) + 1;
+  }
+  requestAnimationFrame(tick);
+}
+
+function open() {
+  fillText();
+  find("vein").max = view.rods;
+  if (!view.leaves.length) throw new Error("there is no leaf to show");
+  space = openSpace();
+  fillQuantities();
+  look("free");
+}
+
+try {
+  open();
+} catch (reason) {
+  space = null;
+  document.body.classList.add("flat");
+  find("why").textContent = `Nothing can be drawn in space here (${reason.message}): the figure stands in its place.`;
+  ["quantity", "surface", "axes", "png"].forEach((id) => (find(id).disabled = true));
+}
+fillPlayer();
+if (space) fillModes();
+setTheme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+listen();
+if (view.leaves.length) update(true);
+requestAnimationFrame(tick);
+/// For tests, and for whoever builds on the page.
+window.leafdyn = { view, shown, place: (point, panel = 0) => placeIn(space.panels[panel])(point), picture, nearest };

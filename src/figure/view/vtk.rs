@@ -1,0 +1,149 @@
+//! Veins as poly-lines for ParaView: VTK's XML format `.vtp` with numbers in base64,
+//! and `.pvd`, which lists several in time.
+//!
+//! Source: "VTK XML formats", version 1.0, of the VTK documentation.
+
+use std::io::{self, Write};
+
+use glam::DVec3;
+
+use crate::figure::svg::escaped;
+use crate::relax::Equilibrium;
+use crate::report::base64;
+use crate::shape::NodeState;
+
+/// Numbers at all nodes, vein by vein: name, numbers a node, all of them.
+struct Array<'a>(&'a str, usize, Vec<f64>);
+
+/// A leaf at rest: per node its vein, place along it, directors, strains, forces
+/// and moments.
+///
+/// # Errors
+/// Those of `out`.
+pub fn leaf(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
+    let shape = &equilibrium.shape;
+    let nodes = || shape.rods.iter().flat_map(|rod| &rod.nodes);
+    let along = |of: &dyn Fn(&NodeState) -> DVec3| vectors(nodes().map(of));
+    let lengths = shape.rods.iter().map(|rod| rod.length);
+    let s = lengths.flat_map(|length| shape.stations.iter().map(move |sigma| sigma * length));
+    let arrays = [
+        Array("s", 1, s.collect()),
+        Array("d1", 3, along(&|node| node.rotation * DVec3::X)),
+        Array("d2", 3, along(&|node| node.rotation * DVec3::Y)),
+        Array("d3", 3, along(&|node| node.rotation * DVec3::Z)),
+        Array("v", 3, along(&|node| node.v)),
+        Array("u", 3, along(&|node| node.u)),
+        Array("n", 3, along(&|node| node.n)),
+        Array("m", 3, along(&|node| node.m)),
+    ];
+    let points: Vec<Vec<DVec3>> = (shape.rods.iter())
+        .map(|rod| rod.nodes.iter().map(|node| node.position).collect())
+        .collect();
+    write(&points, &shape.stations, &arrays, out)
+}
+
+/// Centrelines alone, with the vein and the place along it.
+///
+/// # Errors
+/// Those of `out`.
+pub fn curves(curves: &[Vec<DVec3>], out: &mut dyn Write) -> io::Result<()> {
+    let nodes = curves.first().map_or(0, Vec::len);
+    let last = nodes.saturating_sub(1).max(1) as f64;
+    let stations: Vec<f64> = (0..nodes).map(|i| i as f64 / last).collect();
+    write(curves, &stations, &[], out)
+}
+
+/// Files that belong to values of time, or of what varies in its place.
+///
+/// # Errors
+/// Those of `out`.
+pub fn series(files: &[(f64, String)], out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "<?xml version=\"1.0\"?>")?;
+    writeln!(
+        out,
+        "<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n<Collection>"
+    )?;
+    for (time, file) in files {
+        let file = escaped(file);
+        writeln!(
+            out,
+            "<DataSet timestep=\"{time:?}\" part=\"0\" file=\"{file}\"/>"
+        )?;
+    }
+    writeln!(out, "</Collection>\n</VTKFile>")
+}
+
+fn vectors(vectors: impl Iterator<Item = DVec3>) -> Vec<f64> {
+    vectors.flat_map(|vector| vector.to_array()).collect()
+}
+
+fn write(
+    veins: &[Vec<DVec3>],
+    stations: &[f64],
+    arrays: &[Array],
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let (count, nodes) = (veins.len(), veins.iter().map(Vec::len).sum::<usize>());
+    writeln!(out, "<?xml version=\"1.0\"?>")?;
+    writeln!(
+        out,
+        "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n\
+         <PolyData>\n<Piece NumberOfPoints=\"{nodes}\" NumberOfVerts=\"0\" NumberOfLines=\"{count}\" \
+         NumberOfStrips=\"0\" NumberOfPolys=\"0\">\n<Points>"
+    )?;
+    floats("Points", 3, &vectors(veins.iter().flatten().copied()), out)?;
+    writeln!(out, "</Points>\n<Lines>")?;
+    integers("connectivity", 0..nodes, out)?;
+    let ends = veins.iter().scan(0, |end, vein| {
+        *end += vein.len();
+        Some(*end)
+    });
+    integers("offsets", ends, out)?;
+    writeln!(out, "</Lines>\n<PointData>")?;
+    let numbers = veins.iter().enumerate();
+    integers(
+        "rod",
+        numbers.flat_map(|(j, vein)| vein.iter().map(move |_| j + 1)),
+        out,
+    )?;
+    let sigma = veins
+        .iter()
+        .flat_map(|vein| stations.iter().copied().take(vein.len()));
+    floats("sigma", 1, &sigma.collect::<Vec<f64>>(), out)?;
+    for Array(name, components, numbers) in arrays {
+        floats(name, *components, numbers, out)?;
+    }
+    writeln!(out, "</PointData>\n<CellData>")?;
+    integers("rod", 1..count + 1, out)?;
+    writeln!(out, "</CellData>\n</Piece>\n</PolyData>\n</VTKFile>")
+}
+
+fn floats(name: &str, components: usize, numbers: &[f64], out: &mut dyn Write) -> io::Result<()> {
+    let bytes = numbers.iter().flat_map(|number| number.to_le_bytes());
+    array("Float64", name, components, bytes.collect(), out)
+}
+
+fn integers(
+    name: &str,
+    numbers: impl Iterator<Item = usize>,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let bytes = numbers.flat_map(|number| (number as i64).to_le_bytes());
+    array("Int64", name, 1, bytes.collect(), out)
+}
+
+/// The number of bytes, and these, as one text.
+fn array(
+    kind: &str,
+    name: &str,
+    components: usize,
+    bytes: Vec<u8>,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let size = (bytes.len() as u64).to_le_bytes();
+    let text = base64::encode(size.into_iter().chain(bytes));
+    writeln!(
+        out,
+        "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"binary\">{text}</DataArray>"
+    )
+}

@@ -1,0 +1,110 @@
+//! The JSON schema of scenarios, made from the table of keys.
+
+use serde_json::{Map, Value, json};
+
+use super::key::{Form, Key, LeftOut, Range};
+
+/// The schema of scenarios (JSON Schema, draft 7), for editors that complete and check
+/// them. Rules that hold between entries are checked by the program alone.
+pub fn schema() -> Value {
+    let mut tables: Vec<(&str, Map<String, Value>, Vec<&str>)> = vec![("", Map::new(), Vec::new())];
+    for key in Key::all() {
+        let (table, name) = key.parts();
+        if !tables.iter().any(|(known, ..)| *known == table) {
+            tables.push((table, Map::new(), Vec::new()));
+        }
+        for (known, properties, required) in &mut tables {
+            if *known == table {
+                properties.insert(name.into(), entry(key));
+                // Of alternatives none is required here.
+                if matches!(key.left_out(), LeftOut::Refused(_)) && matches!(table, "" | "leaf") {
+                    required.push(name);
+                }
+            }
+        }
+    }
+    let object = |properties: Map<String, Value>, required: Vec<&str>| {
+        let mut object = json!({
+            "type": "object", "properties": properties, "additionalProperties": false,
+        });
+        if !required.is_empty() {
+            object["required"] = json!(required);
+        }
+        object
+    };
+    let (_, mut properties, mut required) = tables.remove(0);
+    for (table, entries, needed) in tables {
+        if !needed.is_empty() {
+            required.push(table);
+        }
+        properties.insert(table.into(), object(entries, needed));
+    }
+    let mut schema = object(properties, required);
+    schema["$schema"] = json!("http://json-schema.org/draft-07/schema#");
+    schema["title"] = json!("a leaf, as leafdyn reads it");
+    schema
+}
+
+/// What a key takes, with what it means.
+fn entry(key: Key) -> Value {
+    let mut entry = match key.form() {
+        Form::Text => json!({ "type": "string" }),
+        Form::Switch => json!({ "type": "boolean" }),
+        Form::Whole => json!({ "type": "integer", "minimum": 1 }),
+        Form::Number(range) => number(range),
+        Form::PerRod(range) | Form::PerGap(range) => {
+            json!({ "anyOf": [number(range), list(number(range))] })
+        }
+        Form::Quantity(range) => {
+            let values = list(number(range));
+            let profile = knots(
+                "value",
+                json!({ "anyOf": [values, list(list(number(range)))] }),
+            );
+            json!({ "anyOf": [number(range), list(number(range)), profile] })
+        }
+        Form::Vector => vector(),
+        Form::Fan => json!({ "anyOf": [
+            { "enum": ["paper", "symmetric"] }, list(number(Range::Finite)),
+        ] }),
+        Form::VectorInTime => knots("value", list(vector())),
+        Form::FactorInTime => knots("factor", list(number(Range::Finite))),
+    };
+    entry["description"] = json!(key.description());
+    // Defaults are TOML; those that JSON reads alike are told.
+    if let LeftOut::Means(text) = key.left_out()
+        && let Ok(value) = serde_json::from_str::<Value>(text)
+    {
+        entry["default"] = value;
+    }
+    entry
+}
+
+/// JSON knows no infinite number: editors take `inf` of TOML for a number.
+fn number(range: Range) -> Value {
+    match range {
+        Range::Finite => json!({ "type": "number" }),
+        Range::NotNegative => json!({ "type": "number", "minimum": 0 }),
+        Range::Positive | Range::PositiveOrInfinite => {
+            json!({ "type": "number", "exclusiveMinimum": 0 })
+        }
+    }
+}
+
+fn list(of: Value) -> Value {
+    json!({ "type": "array", "items": of })
+}
+
+fn vector() -> Value {
+    json!({ "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 })
+}
+
+/// Places or times, and what is there.
+fn knots(name: &str, values: Value) -> Value {
+    json!({
+        "type": "object",
+        "properties": { "at": list(number(Range::Finite)), name: values },
+        "required": ["at", name],
+        "additionalProperties": false,
+    })
+}

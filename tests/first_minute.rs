@@ -1,0 +1,174 @@
+//! A scenario of one's own, help from editor and shell, and what is offered where
+//! something is missing.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use leafdyn::scenario::{Scenario, schema};
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn leafdyn(folder: &TempDir, arguments: &[&str]) -> assert_cmd::assert::Assert {
+    let mut command = Command::cargo_bin("leafdyn").unwrap();
+    command.current_dir(folder.path()).args(arguments).assert()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+#[test]
+fn every_example_does_what_its_last_line_says() {
+    let folder = TempDir::new().unwrap();
+    for example in ["leaf", "rod", "pull-test", "motion"] {
+        let said = leafdyn(&folder, &["new", example]).success();
+        let said = text(&said.get_output().stdout);
+        let next = said.lines().last().unwrap().trim().to_string();
+        let arguments: Vec<&str> = next.split(' ').skip(1).collect();
+        leafdyn(&folder, &arguments).success();
+    }
+}
+
+#[test]
+fn what_is_there_is_not_replaced() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("mine.toml");
+    fs::write(&file, "mine").unwrap();
+    let said = leafdyn(&folder, &["new", "rod", "mine.toml"]).code(2);
+    assert!(text(&said.get_output().stderr).contains("mine.toml: is there already"));
+    assert_eq!(fs::read_to_string(&file).unwrap(), "mine");
+}
+
+#[test]
+fn without_a_scenario_one_is_offered() {
+    let folder = TempDir::new().unwrap();
+    for verb in ["relax", "simulate", "check"] {
+        let said = leafdyn(&folder, &[verb]).code(2);
+        let said = text(&said.get_output().stderr);
+        assert!(
+            said.contains("<SCENARIO>") && said.contains("leafdyn new leaf"),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn shells_and_manuals_know_every_verb() {
+    let folder = TempDir::new().unwrap();
+    for shell in ["bash", "zsh", "fish"] {
+        let said = leafdyn(&folder, &["completions", shell]).success();
+        let said = text(&said.get_output().stdout);
+        assert!(
+            said.contains("relax") && said.contains("keep-unstable"),
+            "{shell}"
+        );
+    }
+    let said = leafdyn(&folder, &["man"]).success();
+    assert!(text(&said.get_output().stdout).contains("simulate"));
+    let said = leafdyn(&folder, &["man", "relax"]).success();
+    let said = text(&said.get_output().stdout);
+    assert!(
+        said.contains(".TH leafdyn\\-relax") || said.contains(".TH leafdyn-relax"),
+        "{said}"
+    );
+    leafdyn(&folder, &["man", "dance"]).code(2);
+}
+
+/// What the schema refuses of a scenario: unknown keys and wrong types.
+fn refused(schema: &Value, value: &Value, path: &str) -> Vec<String> {
+    if let Some(alternatives) = schema["anyOf"].as_array() {
+        let fits = |one: &&Value| refused(one, value, path).is_empty();
+        return match alternatives.iter().find(fits) {
+            Some(_) => Vec::new(),
+            None => vec![format!("{path}: fits nothing")],
+        };
+    }
+    if let Some(words) = schema["enum"].as_array() {
+        return match words.contains(value) {
+            true => Vec::new(),
+            false => vec![format!("{path}: no such word")],
+        };
+    }
+    let fits = match schema["type"].as_str() {
+        Some("object") => value.is_object(),
+        Some("array") => value.is_array(),
+        Some("string") => value.is_string(),
+        Some("boolean") => value.is_boolean(),
+        Some("integer") => value.is_u64(),
+        Some("number") => value.is_number(),
+        _ => false,
+    };
+    let mut wrong = match fits {
+        true => Vec::new(),
+        false => vec![format!("{path}: {value} is no {}", schema["type"])],
+    };
+    for (key, value) in value.as_object().into_iter().flatten() {
+        match schema["properties"].get(key) {
+            Some(schema) => wrong.extend(refused(schema, value, &format!("{path}.{key}"))),
+            None => wrong.push(format!("{path}.{key}: unknown")),
+        }
+    }
+    for value in value.as_array().into_iter().flatten() {
+        wrong.extend(refused(&schema["items"], value, path));
+    }
+    for required in schema["required"].as_array().into_iter().flatten() {
+        if value.get(required.as_str().unwrap()).is_none() {
+            wrong.push(format!("{path}: {required} is missing"));
+        }
+    }
+    wrong
+}
+
+/// TOML as JSON, in which `inf` is a number.
+fn json(value: toml::Value) -> Value {
+    match value {
+        toml::Value::Float(number) => Value::from(if number.is_finite() { number } else { 1e300 }),
+        toml::Value::Array(list) => list.into_iter().map(json).collect(),
+        toml::Value::Table(table) => Value::Object(
+            table
+                .into_iter()
+                .map(|(key, value)| (key, json(value)))
+                .collect(),
+        ),
+        other => serde_json::to_value(other).unwrap(),
+    }
+}
+
+fn scenarios(folder: &Path, found: &mut Vec<String>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            scenarios(&path, found);
+        } else if path.extension().is_some_and(|it| it == "toml") {
+            found.push(fs::read_to_string(&path).unwrap());
+        }
+    }
+}
+
+#[test]
+fn the_schema_fits_every_scenario_and_no_slip() {
+    let schema = schema();
+    let mut texts = Vec::new();
+    let top = Path::new(env!("CARGO_MANIFEST_DIR"));
+    scenarios(&top.join("scenarios"), &mut texts);
+    scenarios(&top.join("src/cli/examples"), &mut texts);
+    assert!(texts.len() > 30);
+    let judge = |text: &str| refused(&schema, &json(text.parse().unwrap()), "");
+    for text in &texts {
+        assert_eq!(judge(text), Vec::<String>::new(), "{text}");
+    }
+    let good = include_str!("../src/cli/examples/rod.toml");
+    for (from, to) in [
+        ("rods = 1", "rod = 1"),
+        ("rods = 1", "rods = 1.5"),
+        ("[load]", "[loads]"),
+        ("fan = [0.0]", "fan = \"round\""),
+        ("torsion = 1.0", "torsion = \"stiff\""),
+        ("gravity = [0.0, 0.0, 0.0]", "gravity = 1.0"),
+    ] {
+        let slip = good.replacen(from, to, 1);
+        assert!(slip != good && Scenario::from_toml(&slip).is_err());
+        assert!(!judge(&slip).is_empty(), "{to}");
+    }
+}
