@@ -1,4 +1,4 @@
-//! Where the energy of a moving leaf is, in time.
+//! Where the energy of a moving leaf is, and where its tip, in time.
 
 use super::axes::{Axes, Curve};
 use super::axis::Axis;
@@ -10,6 +10,7 @@ use crate::simulate::Record;
 
 const ENERGIES: f64 = 300.0;
 const BALANCE: f64 = 120.0;
+const TIP: f64 = 200.0;
 /// Above the lower panel, which has its ticks labelled as the upper.
 const BETWEEN: f64 = 30.0;
 const BOTTOM: f64 = 4.0;
@@ -33,7 +34,8 @@ pub fn draw(record: &Record) -> Drawing {
     let upper = HEADER + PANEL_TITLE;
     let lower = upper + ENERGIES + BETWEEN + PANEL_TITLE;
     let mut drawing = new_page(LEFT, &name, &notes(record), None);
-    drawing.height = lower + BALANCE + PANEL_AXIS + BOTTOM;
+    let lowest = lower + BALANCE + BETWEEN + PANEL_TITLE;
+    drawing.height = lowest + TIP + PANEL_AXIS + BOTTOM;
     let end = match record.time {
         time if time > 0.0 => time,
         _ => record.duration,
@@ -62,7 +64,7 @@ pub fn draw(record: &Record) -> Drawing {
     });
     let axes = Axes {
         cell: Cell::beside_key(lower, BALANCE, KEY),
-        across: Axis::linear("time, in the scenario's unit", 0.0, end),
+        across: Axis::linear("", 0.0, end),
         up: Axis::holding("balance", balance.values().chain([0.0])),
     };
     drawing.group("balance", |page| {
@@ -72,7 +74,39 @@ pub fn draw(record: &Record) -> Drawing {
         axes.draw(page);
         axes.curve(page, &balance.points, Stroke::new(INK, 1.3));
     });
+    let cell = Cell::beside_key(lowest, TIP, KEY);
+    drawing.group("tip", |page| draw_tip(page, record, cell, end));
     drawing
+}
+
+/// The coordinates of the joint tip, or the means of free ones.
+fn draw_tip(page: &mut Drawing, record: &Record, cell: Cell, end: f64) {
+    let coordinate = |axis: usize| Curve {
+        name: ["x", "y", "z"][axis],
+        color: CURVES[axis],
+        points: (record.moments.iter())
+            .map(|moment| (moment.time, moment.tip[axis]))
+            .collect(),
+    };
+    let curves = [0, 1, 2].map(coordinate);
+    let axes = Axes {
+        cell,
+        across: Axis::linear("time, in the scenario's unit", 0.0, end),
+        up: Axis::holding("tip", curves.iter().flat_map(Curve::values).chain([0.0])),
+    };
+    let what = match record.joined {
+        true => "where the tip is",
+        false => "where the tips are, in the mean",
+    };
+    title(page, cell.corner, "(c)", what);
+    axes.draw(page);
+    let mut key = Key::beside(cell);
+    for curve in &curves {
+        axes.curve(page, &curve.points, Stroke::new(curve.color, 1.6));
+        let last = curve.points.last().map_or(0.0, |point| point.1);
+        let note = format!("at the end {}", short(last));
+        key.line(page, curve.name, &note, Stroke::new(curve.color, 1.6));
+    }
 }
 
 /// All energies but those that are always zero; last their balance.

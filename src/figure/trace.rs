@@ -154,7 +154,7 @@ fn draw_branches(page: &mut Drawing, trace: &Trace, shown: &[[usize; 2]], cell: 
     let up = with_unit(&up, &trace.units.length);
     let axes = Axes {
         cell,
-        across: Axis::holding(&across, all().map(|point| at(point).0)),
+        across: across_axis(trace, &across, all().map(|point| at(point).0)),
         up: Axis::holding(&up, all().map(|point| at(point).1)),
     };
     let what = "equilibria: stable drawn solid, unstable dashed";
@@ -177,6 +177,19 @@ fn draw_branches(page: &mut Drawing, trace: &Trace, shown: &[[usize; 2]], cell: 
     let shown = shown.iter().map(|&[b, p]| &trace.branches[b].points[p]);
     number(page, shown.map(|point| axes.at(at(point))));
     draw_key(page, trace, cell);
+}
+
+/// The axis of what varies: logarithmic if its logarithm varies evenly, and from small
+/// to large.
+fn across_axis(trace: &Trace, name: &str, values: impl Iterator<Item = f64>) -> Axis {
+    if !trace.log {
+        return Axis::holding(name, values);
+    }
+    let sign = trace.range[0].signum();
+    Axis {
+        sign: Some(sign),
+        ..Axis::logarithmic(name, values.map(|value| sign * value), 1.0)
+    }
 }
 
 /// Numbers the leaves that are drawn beside their points.

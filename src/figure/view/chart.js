@@ -26,7 +26,9 @@ class Diagram {
     this.y = widened(range(ys), 0.06);
     this.frame(cell);
     for (const curve of this.curves) this.curve(curve);
-    this.mark = this.add("g", {});
+    // On a layer of its own: what moves does not draw the curves anew.
+    this.mark = find("mark");
+    this.mark.setAttribute("viewBox", svg.getAttribute("viewBox"));
     this.drawKey();
   }
 

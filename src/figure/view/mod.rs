@@ -166,12 +166,13 @@ fn assemble(view: &View, still: &Drawing) -> String {
     let _ = svg::write(still, &mut figure);
     // In a script only `</script` and `<!--` would end the text.
     let data = String::from_utf8_lossy(&data).replace('<', "\\u003c");
-    let figure = String::from_utf8_lossy(&figure);
+    // The page has names of its own.
+    let figure = String::from_utf8_lossy(&figure).replace("<g id=", "<g class=");
     let scripts = SCRIPTS.concat();
     let parts = [
         ("TITLE", svg::escaped(&view.title)),
         ("STYLE", STYLE.into()),
-        ("FIGURE", figure.into()),
+        ("FIGURE", figure),
         ("DATA", data),
         ("THREE", THREE.into()),
         ("SCRIPT", scripts),

@@ -1,12 +1,17 @@
 // The page: what is shown, how it is turned, played and asked.
 const root = document.documentElement;
-const css = (name) => getComputedStyle(root).getPropertyValue(name).trim();
+/// Colours of the theme, which are asked for in every picture.
+const themed = new Map();
+const css = (name) => {
+  if (!themed.has(name)) themed.set(name, getComputedStyle(root).getPropertyValue(name).trim());
+  return themed.get(name);
+};
 const [under, canvas, over] = ["under", "space", "over"].map(find);
 const several = view.kind === "equilibria" && view.leaves.length > 1;
 const sequence = view.kind === "motion" || view.kind === "trace";
 
 /// What is shown: a leaf, perhaps between two; a mode and its phase; the chosen one of several.
-const shown = { at: 0, mode: -1, phase: 0, alone: several ? -1 : 0, playing: false, dirty: true, quantity: 0 };
+const shown = { at: 0, mode: -1, phase: 0, alone: several ? -1 : 0, playing: false, dirty: true, stale: true, quantity: 0 };
 let space = null;
 let diagram = null;
 let leaf = null;
@@ -41,14 +46,22 @@ function fillSummary() {
 
 function setTheme(name) {
   root.dataset.theme = name;
+  themed.clear();
   find("theme").textContent = name === "dark" ? "light" : "dark";
-  shown.dirty = true;
+  redraw();
   if (space) space.meshes.forEach((mesh) => mesh.theme(css));
+}
+
+/// Whether there is no graphics processor, so that smooth edges would take most of the time.
+function drawnBySoftware() {
+  const probe = document.createElement("canvas").getContext("webgl2");
+  const known = probe && probe.getExtension("WEBGL_debug_renderer_info");
+  return known ? /swiftshader|llvmpipe|software/i.test(probe.getParameter(known.UNMASKED_RENDERER_WEBGL)) : false;
 }
 
 /// Everything that is drawn in space; throws where that cannot be.
 function openSpace() {
-  const renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+  const renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawnBySoftware(), alpha: true });
   const scene = new THREE.Scene();
   const sun = new THREE.DirectionalLight(0xffffff, 2.2);
   scene.add(new THREE.AmbientLight(0xffffff, 1.5), sun);
@@ -58,7 +71,7 @@ function openSpace() {
   controls.enableDamping = false;
   controls.minZoom = 0.2;
   controls.maxZoom = 200;
-  controls.addEventListener("change", () => (shown.dirty = true));
+  controls.addEventListener("change", redraw);
   const first = several ? view.leaves.map((_, i) => leafAt(i)) : sequence ? sampled(60) : [leafAt(0)];
   return { renderer, scene, sun, camera, controls, meshes: [], box: boxOf(first), fit: [1, 1], panels: [] };
 }
@@ -140,6 +153,11 @@ function put(panel, shape, again) {
   return mesh;
 }
 
+/// Asks for a new picture, with all that lies below the leaf.
+function redraw() {
+  shown.dirty = shown.stale = true;
+}
+
 /// Brings everything up to date: `again` after a setting has changed.
 function update(again) {
   if (space) {
@@ -151,6 +169,7 @@ function update(again) {
     }
   } else leaf = leafAt(Math.floor(shown.at));
   shown.dirty = true;
+  if (again) shown.stale = true;
   if (sequence || shown.mode >= 0) tellFrame();
   if (find("probe").open) fillProbe();
 }
@@ -162,6 +181,8 @@ function tellFrame() {
     return;
   }
   const one = view.leaves[index];
+  if (shown.told === index && shown.playing) return;
+  shown.told = index;
   find("now").textContent = `${one.label}   (${index + 1} of ${view.leaves.length})`;
   find("frame").value = index;
   if (diagram) {
@@ -200,7 +221,7 @@ function look(name) {
   camera.updateMatrixWorld();
   fitBox();
   document.querySelectorAll("#views button").forEach((button) => button.setAttribute("aria-pressed", button.dataset.view === name));
-  shown.dirty = true;
+  redraw();
 }
 
 /// Extents of the box across the line of sight.
@@ -258,25 +279,25 @@ function render() {
   const stage = find("stage").getBoundingClientRect();
   const [width, height] = [Math.round(stage.width), Math.round(stage.height)];
   const ratio = Math.min(2, window.devicePixelRatio || 1);
-  renderer.setPixelRatio(ratio);
-  renderer.setSize(width, height, false);
-  for (const layer of [under, over]) if (layer.width !== width * ratio || layer.height !== height * ratio) [layer.width, layer.height] = [width * ratio, height * ratio];
-  const pen = under.getContext("2d");
-  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-  pen.fillStyle = css("--paper");
-  pen.fillRect(0, 0, width, height);
+  const size = `${width} ${height} ${ratio}`;
+  if (size !== space.size) {
+    // Only now: a canvas that is given a size is made anew.
+    space.size = size;
+    shown.stale = true;
+    renderer.setPixelRatio(ratio);
+    renderer.setSize(width, height, false);
+    for (const layer of [under, over]) [layer.width, layer.height] = [Math.floor(width * ratio), Math.floor(height * ratio)];
+  }
   layout(width, height);
+  if (shown.stale) drawUnder(width, height, ratio);
+  shown.stale = false;
   renderer.setScissorTest(true);
   // Light from over the reader's left shoulder.
   sun.position.copy(camera.position).sub(controls.target).applyAxisAngle(camera.up, -0.5).add(new THREE.Vector3(0, 0, 4 * space.box.extent));
   space.meshes.forEach((mesh) => (mesh.group.visible = false));
-  space.panels.forEach((panel, i) => {
+  space.panels.forEach((panel) => {
     const [left, top, w, h] = panel.rect;
-    const place = placeIn(panel);
-    const small = space.panels.length > 1;
-    if (find("axes").checked) drawAxes(pen, space.box, place, css, small);
-    if (i === 0) drawGravity(pen, space.box, place, css, small ? [width - 44, 32] : [44, height - 64]);
-    if (panel.label) drawLabel(pen, panel, small);
+    frustum(w, h);
     const bottom = height - top - h;
     renderer.setViewport(left, bottom, w, h);
     renderer.setScissor(left, bottom, w, h);
@@ -284,6 +305,21 @@ function render() {
     renderer.render(scene, camera);
     panel.mesh.group.visible = false;
   });
+}
+
+/// Axes, gravity, captions and the scale of colours.
+function drawUnder(width, height, ratio) {
+  const pen = under.getContext("2d");
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.fillStyle = css("--paper");
+  pen.fillRect(0, 0, width, height);
+  const small = space.panels.length > 1;
+  for (const panel of space.panels) {
+    const place = placeIn(panel);
+    if (find("axes").checked) drawAxes(pen, space.box, place, css, small);
+    if (panel === space.panels[0]) drawGravity(pen, space.box, place, css, small ? [width - 44, 32] : [44, height - 64]);
+    if (panel.label) drawLabel(pen, panel, small);
+  }
   const colors = quantity();
   drawScale(pen, colors, colors.name === "vein" ? null : limitsOf(colors), mapOf(colors), css, width, height);
 }
@@ -420,7 +456,7 @@ function move(right, up) {
 function zoom(factor) {
   space.camera.zoom = Math.min(Math.max(space.camera.zoom * factor, 0.2), 200);
   space.camera.updateProjectionMatrix();
-  shown.dirty = true;
+  redraw();
 }
 
 function key(event) {
@@ -477,7 +513,7 @@ function fillModes() {
     play(shown.mode >= 0 && !matchMedia("(prefers-reduced-motion: reduce)").matches);
     update(true);
   });
-  for (const id of ["frame", "speed-row", "choice-row", "chart"]) find(id).style.display = "none";
+  for (const id of ["frame", "speed-row", "choice-row", "diagram"]) find(id).style.display = "none";
 }
 
 function fillPlayer() {
@@ -528,7 +564,7 @@ function listen() {
   find("settings").addEventListener("submit", (event) => event.preventDefault());
   document.addEventListener("keydown", key);
   new ResizeObserver(() => {
-    shown.dirty = true;
+    redraw();
     if (diagram) {
       diagram.draw(diagram.choice);
       tellFrame();
@@ -579,4 +615,13 @@ listen();
 if (view.leaves.length) update(true);
 requestAnimationFrame(tick);
 /// For tests, and for whoever builds on the page.
-window.leafdyn = { view, shown, place: (point, panel = 0) => placeIn(space.panels[panel])(point), picture, nearest };
+window.leafdyn = {
+  view,
+  shown,
+  picture,
+  place: (point, panel = 0) => placeIn(space.panels[panel])(point),
+  nodes: (panel = 0) => {
+    const { points } = space.panels[panel].leaf;
+    return Array.from({ length: points.length / 3 }, (_, i) => [...points.subarray(3 * i, 3 * i + 3)]);
+  },
+};
