@@ -10,7 +10,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 fn leafdyn(folder: &TempDir, arguments: &[&str]) -> assert_cmd::assert::Assert {
-    let mut command = Command::cargo_bin("leafdyn").unwrap();
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("leafdyn"));
     command.current_dir(folder.path()).args(arguments).assert()
 }
 
@@ -154,7 +154,13 @@ fn the_schema_fits_every_scenario_and_no_slip() {
     scenarios(&top.join("scenarios"), &mut texts);
     scenarios(&top.join("src/cli/examples"), &mut texts);
     assert!(texts.len() > 30);
-    let judge = |text: &str| refused(&schema, &json(text.parse().unwrap()), "");
+    let judge = |text: &str| {
+        refused(
+            &schema,
+            &json(toml::Value::Table(text.parse().unwrap())),
+            "",
+        )
+    };
     for text in &texts {
         assert_eq!(judge(text), Vec::<String>::new(), "{text}");
     }

@@ -21,7 +21,7 @@ impl Tubes {
                 let (before, after) = (i.saturating_sub(1), (i + 1).min(curve.len() - 1));
                 let tangent = (curve[after] - curve[before]).normalize_or(DVec3::X);
                 across = across.reject_from_normalized(tangent);
-                if !(across.length() > 0.1) {
+                if across.length() < 0.1 {
                     // Straight up, or a sharp kink: any direction across will do.
                     across = tangent.any_orthonormal_vector();
                 }
