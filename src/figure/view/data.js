@@ -52,17 +52,18 @@ const withUnit = (name, unit) => (unit ? `${name} / ${unit}` : name);
 const [Q, V, U, N, M] = [0, 4, 7, 10, 13];
 const hypot = Math.hypot;
 
-/// What veins can be coloured by. `of` has the state from offset `s` on, or reads positions.
+/// What veins can be coloured by. `of` has the state of a node from offset `s` on; the three numbers of its `group`
+/// are of one kind, and tell what is no more than rounding.
 const QUANTITIES = [
   { name: "vein" },
-  { name: "curvature", unit: lengthUnit && `(1/${lengthUnit})`, of: (x, s) => hypot(x[s + U + 1], x[s + U + 2]) },
-  { name: "twist", unit: lengthUnit && `(1/${lengthUnit})`, of: (x, s) => x[s + U], signed: true },
-  { name: "stretch − 1", of: (x, s) => x[s + V] - 1, signed: true },
-  { name: "shear strain", of: (x, s) => hypot(x[s + V + 1], x[s + V + 2]) },
-  { name: "tension", unit: forceUnit, of: (x, s) => x[s + N], signed: true },
-  { name: "shear force", unit: forceUnit, of: (x, s) => hypot(x[s + N + 1], x[s + N + 2]) },
-  { name: "bending moment", unit: momentUnit, of: (x, s) => hypot(x[s + M + 1], x[s + M + 2]) },
-  { name: "twisting moment", unit: momentUnit, of: (x, s) => x[s + M], signed: true },
+  { name: "curvature", group: U, unit: lengthUnit && `(1/${lengthUnit})`, of: (x, s) => hypot(x[s + U + 1], x[s + U + 2]) },
+  { name: "twist", group: U, unit: lengthUnit && `(1/${lengthUnit})`, of: (x, s) => x[s + U], signed: true },
+  { name: "stretch − 1", group: V, of: (x, s) => x[s + V] - 1, signed: true },
+  { name: "shear strain", group: V, of: (x, s) => hypot(x[s + V + 1], x[s + V + 2]) },
+  { name: "tension", group: N, unit: forceUnit, of: (x, s) => x[s + N], signed: true },
+  { name: "shear force", group: N, unit: forceUnit, of: (x, s) => hypot(x[s + N + 1], x[s + N + 2]) },
+  { name: "bending moment", group: M, unit: momentUnit, of: (x, s) => hypot(x[s + M + 1], x[s + M + 2]) },
+  { name: "twisting moment", group: M, unit: momentUnit, of: (x, s) => x[s + M], signed: true },
 ];
 const GEOMETRY = [
   { name: "vein" },

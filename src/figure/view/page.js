@@ -132,10 +132,21 @@ function limitsOf(quantity) {
     // A signed quantity has its zero in the middle; one that does not vary has some width.
     if (quantity.signed) [low, high] = [-Math.max(Math.abs(low), Math.abs(high)), Math.max(Math.abs(low), Math.abs(high))];
     else low = Math.min(0, low);
+    // What is rounding beside its like is shown as nothing.
+    const like = quantity.group === undefined ? 0 : largestOf(leaves, quantity.group);
+    if (high - low < 1e-6 * like) [low, high] = quantity.signed ? [-1e-3 * like, 1e-3 * like] : [0, 1e-3 * like];
     if (!(high - low > 1e-7 * Math.abs(high))) [low, high] = quantity.signed ? [-1, 1] : [low, low + (Math.abs(low) || 1)];
     limitsKnown.set(key, [low, high]);
   }
   return limitsKnown.get(key);
+}
+
+/// The largest of three numbers of every node.
+function largestOf(leaves, group) {
+  let largest = 0;
+  for (const { state } of leaves)
+    for (let s = group; s < state.length; s += 16) for (let k = 0; k < 3; k++) largest = Math.max(largest, Math.abs(state[s + k]) || 0);
+  return Number.isFinite(largest) ? largest : 0;
 }
 
 const mapOf = (quantity) => (quantity.signed ? MAPS.signed : MAPS.sequential);
