@@ -4,13 +4,20 @@ mod common;
 mod workplace;
 
 use common::scenario;
-use leafdyn::relax::{Equilibrium, SemiImplicit};
+use leafdyn::relax::{Equilibrium, Limit, SemiImplicit};
 use leafdyn::study::{All, all};
 use workplace::{Workplace, timeless};
 
 fn search(entries: &str) -> All {
     let fig10 = scenario("paper/fig10", &format!("leaf.rods=5; {entries}"));
-    all(&fig10, SemiImplicit::default(), Some(1e-5), &mut |_, _| {}).unwrap()
+    all(
+        &fig10,
+        SemiImplicit::default(),
+        Some(1e-5),
+        &Limit::default(),
+        &mut |_, _| {},
+    )
+    .unwrap()
 }
 
 fn stable(all: &All) -> Vec<&Equilibrium> {

@@ -42,6 +42,7 @@ impl Check {
             tolerance: self.request.tolerance,
             keep_unstable: self.keep_unstable,
             intervals: self.intervals,
+            ..CheckOptions::default()
         };
         let mut line = job.progress();
         let check = study::check(&job.scenario, &options, &mut |progress| {

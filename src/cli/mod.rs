@@ -14,6 +14,7 @@ mod trace;
 
 use std::env;
 use std::error::Error;
+use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};
 use std::process::{self, ExitCode};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -93,28 +94,28 @@ fn as_typed(refusal: Refusal) -> Refusal {
 
 /// The program: does what the process was asked for, and returns its exit status.
 pub fn main() -> ExitCode {
+    main_with(env::args_os().collect()).into()
+}
+
+/// The same with these arguments, the first of which is the program's name: returns the
+/// exit status.
+pub fn main_with(arguments: Vec<OsString>) -> u8 {
     // Also of a request that cannot be understood.
-    let json = env::args_os().any(|argument| argument == "--json");
+    let json = arguments.iter().any(|argument| argument == "--json");
     JSON.store(json, Ordering::Relaxed);
-    let command_line = match Cli::try_parse() {
+    let command_line = match Cli::try_parse_from(arguments) {
         Ok(command_line) => command_line,
         Err(error) if error.use_stderr() => {
             let message = error.render().to_string() + offer(&error);
-            return fail(
-                message.trim_start_matches("error: ").trim_end(),
-                Status::Refused,
-                json,
-            )
-            .into();
+            let message = message.trim_start_matches("error: ").trim_end();
+            return fail(message, Status::Refused, json) as u8;
         }
         // Help, or the version.
         Err(told) => told.exit(),
     };
     let interrupted = stop_at_once_on_interrupt();
-    match interrupted.and_then(|()| command_line.run()) {
-        Ok(status) => status.into(),
-        Err(refusal) => fail(&refusal.to_string(), Status::Refused, json).into(),
-    }
+    let status = interrupted.and_then(|()| command_line.run());
+    status.unwrap_or_else(|refusal| fail(&refusal.to_string(), Status::Refused, json)) as u8
 }
 
 /// Whether standard output is for JSON.
@@ -183,12 +184,6 @@ impl Status {
 
 /// Status of a run ended by Ctrl-C: 128 and the number of the signal.
 const INTERRUPTED: i32 = 130;
-
-impl From<Status> for ExitCode {
-    fn from(status: Status) -> Self {
-        ExitCode::from(status as u8)
-    }
-}
 
 /// What writes a checkpoint of a simulation when the process is stopped, if there is one.
 static CHECKPOINTER: Mutex<Option<Checkpointer>> = Mutex::new(None);

@@ -144,6 +144,7 @@ impl Relax {
             &job.scenario,
             how,
             self.request.tolerance,
+            &relax::Limit::default(),
             &mut |starts, found| {
                 line.say(|elapsed| {
                     let seconds = elapsed.as_secs_f64();

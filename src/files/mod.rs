@@ -23,8 +23,8 @@ use crate::figure::view::{self, Page, Series, glb, vtk};
 use crate::figure::{self, Picture};
 use crate::relax::Equilibrium;
 use crate::report::table::Table;
-use crate::report::{self, FileError, Format, Written, json};
-pub use crate::report::{Document, Kind};
+use crate::report::{self, FileError, Format, json};
+pub use crate::report::{Document, Kind, Written};
 use crate::simulate::Record;
 use crate::study::{All, Chart, Check, Map, Scaling, Trace};
 
@@ -139,6 +139,36 @@ impl Default for Selection {
             stations: None,
         }
     }
+}
+
+/// Names of the files of a result, of every kind.
+pub fn names<R: Written>(result: &R) -> Vec<&'static str> {
+    let formats = result.formats(&Kind::ALL).into_iter();
+    let others = formats.map(|format| format.file_name());
+    R::JSON.into_iter().chain(others).collect()
+}
+
+/// What would stand in the file of this name of a result, if it has such a file.
+///
+/// ```
+/// # use leafdyn::{files::{self, Document}, scenario::Scenario};
+/// let scenario = Scenario::read("scenarios/paper/fig04.toml")?;
+/// let leaf = scenario.relax()?;
+/// let document = Document::new(&leaf, &scenario, None);
+/// let picture = files::contents(&document, "figure.svg").unwrap_or_default();
+/// assert!(picture.starts_with(b"<svg"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn contents<R: Written>(document: &Document<R>, name: &str) -> Option<Vec<u8>> {
+    let mut bytes = Vec::new();
+    if R::JSON == Some(name) {
+        json::write(document, &mut bytes).ok()?;
+        return Some(bytes);
+    }
+    let mut formats = document.result.formats(&Kind::ALL).into_iter();
+    let format = formats.find(|format| format.file_name() == name)?;
+    format.write(document.result, &mut bytes).ok()?;
+    Some(bytes)
 }
 
 /// Writes a result into `folder`, which is made if it is not there, as files of

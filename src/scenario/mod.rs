@@ -29,7 +29,7 @@ pub(crate) use key::Form;
 pub use key::Key;
 pub use part::Part;
 pub use profile::Profile;
-pub(crate) use read::text;
+pub use read::text;
 #[cfg(feature = "cli")]
 pub(crate) use read::{MOST_BYTES, utf8};
 pub use scale::Scale;

@@ -65,8 +65,11 @@ impl Scenario {
     }
 }
 
-/// The text of a scenario's file.
-pub(crate) fn text(path: &Path) -> Result<String, ScenarioError> {
+/// The text of a scenario's file, as it is written.
+///
+/// # Errors
+/// If it cannot be read, or is no text.
+pub fn text(path: &Path) -> Result<String, ScenarioError> {
     let file = path.display().to_string();
     let mut bytes = Vec::new();
     // Opening a folder succeeds on some systems, and reading it fails.

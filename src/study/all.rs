@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
 use super::judge::common;
+use crate::limit::Limit;
 use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax, serialize_index};
 use crate::scenario::Scenario;
 use crate::shape::serialize_tips;
@@ -83,7 +84,8 @@ impl Serialize for Found {
 
 /// Lets the leaf come to rest from its plain start, from many disturbed ones,
 /// and to the equilibrium, stable or not, that Newton's method finds. Which
-/// equilibria there are no number of starts can prove.
+/// equilibria there are no number of starts can prove. When `limit` is reached, what
+/// has been found until then is all.
 ///
 /// # Errors
 /// Requests that cannot be met.
@@ -91,6 +93,7 @@ pub fn all(
     scenario: &Scenario,
     how: SemiImplicit,
     tolerance: Option<f64>,
+    limit: &Limit,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<All, RelaxError> {
     let clock = std::time::Instant::now();
@@ -105,6 +108,7 @@ pub fn all(
         let options = Options {
             method: how.into(),
             tolerance,
+            limit: limit.clone(),
             ..Options::default()
         };
         relax(scenario, &options, &mut |_| {})
@@ -118,7 +122,7 @@ pub fn all(
     all.take(any, false);
     let mut in_vain = 0;
     let mut next = 0;
-    while next < MOST && in_vain < IN_VAIN {
+    while next < MOST && in_vain < IN_VAIN && !limit.reached() {
         let batch: Vec<Result<Equilibrium, RelaxError>> = (next..next + BATCH)
             .into_par_iter()
             .map(|number| {

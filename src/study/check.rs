@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::judge::{fine_grid, index_at, same_places, timed, with_those_of};
 use super::words::words;
 use crate::bvp::{self, Solution, Start};
+use crate::limit::Limit;
 use crate::relax::{self, Equilibrium, Options, Outcome, Progress, RelaxError, SemiImplicit};
 use crate::scenario::Scenario;
 use crate::shape::Difference;
@@ -29,6 +30,8 @@ pub struct CheckOptions {
     /// Intervals of the shooting; `None`: as many as the growth of
     /// perturbations needs.
     pub intervals: Option<usize>,
+    /// When to give up: the leaf is then not at rest, or there is no second solution.
+    pub limit: Limit,
 }
 
 /// What a check says.
@@ -231,16 +234,17 @@ pub fn check(
             ..SemiImplicit::default()
         }
         .into(),
+        limit: options.limit.clone(),
         ..Options::default()
     };
     let relaxed = relax::relax(scenario, &asked, progress)?;
     let lost = matches!(relaxed.outcome, Outcome::NotAtRest | Outcome::Diverged);
-    let shot = (!lost).then(|| shoot(scenario, &relaxed, options.intervals));
+    let shot = (!lost).then(|| shoot(scenario, &relaxed, options));
     Ok(Check::new(relaxed, shot))
 }
 
 /// Solves the boundary-value problem from a relaxed leaf, as accurately.
-fn shoot(scenario: &Scenario, relaxed: &Equilibrium, intervals: Option<usize>) -> Shot {
+fn shoot(scenario: &Scenario, relaxed: &Equilibrium, asked: &CheckOptions) -> Shot {
     let grid = fine_grid(scenario, relaxed.shape.stations.len() - 1);
     let start = Start::Leaf {
         stations: &relaxed.shape.stations,
@@ -249,7 +253,8 @@ fn shoot(scenario: &Scenario, relaxed: &Equilibrium, intervals: Option<usize>) -
     let precision = bvp::Precision::Error(relaxed.accuracy.tolerance);
     let stations = with_those_of(grid.sigma(), &relaxed.shape.stations);
     let options = bvp::Options {
-        intervals,
+        intervals: asked.intervals,
+        limit: asked.limit.clone(),
         ..bvp::Options::new(start, &stations, precision)
     };
     let (found, wall_seconds) = timed(|| bvp::solve(scenario, &options));

@@ -1,0 +1,53 @@
+"""How a leaf of coupled elastic veins comes to rest, with an error bar and a statement of stability.
+
+>>> import leafdyn
+>>> leaf = leafdyn.relax("scenarios/paper/fig04.toml", set={"leaf.rods": 5})
+>>> leaf.stable, leaf.negative_eigenvalues
+(True, 0)
+>>> leaf.positions.shape  # rods, stations, x y z
+(5, 9, 3)
+>>> bool(leaf.error_estimate < 1e-6)
+True
+
+A scenario is a path, a text in TOML, or a dict of the same form. All quantities are in the units that it is written
+in. Every verb of the program ``leafdyn`` is a function here; it returns what the program writes into files.
+"""
+
+from ._errors import LeafWarning, ScenarioError
+from ._leaf import Equilibrium
+from ._leafdyn import __version__, set_threads, threads
+from ._motion import Frame, Motion
+from ._result import Result
+from ._scenario import Scenario, Source
+from ._study import Branch, Chart, Check, Map, Shapes, Trace
+from ._verbs import all_shapes, chart, check, frames, map, modes, relax, relax_many, simulate, trace
+
+__all__ = [
+    "Branch",
+    "Chart",
+    "Check",
+    "Equilibrium",
+    "Frame",
+    "LeafWarning",
+    "Map",
+    "Motion",
+    "Result",
+    "Scenario",
+    "ScenarioError",
+    "Shapes",
+    "Source",
+    "Trace",
+    "__version__",
+    "all_shapes",
+    "chart",
+    "check",
+    "frames",
+    "map",
+    "modes",
+    "relax",
+    "relax_many",
+    "set_threads",
+    "simulate",
+    "threads",
+    "trace",
+]

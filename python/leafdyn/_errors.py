@@ -1,0 +1,42 @@
+"""What is refused, and what is said beside a result."""
+
+from __future__ import annotations
+
+
+class ScenarioError(ValueError):
+    """A scenario that is refused; its text is the message of the program.
+
+    >>> import leafdyn
+    >>> try:
+    ...     leafdyn.relax("scenarios/paper/fig04.toml", set={"stiffness.torsion": -1})
+    ... except leafdyn.ScenarioError as error:
+    ...     print(error.key, "|", error.remedy)
+    stiffness.torsion | must be greater than 0
+    """
+
+    key: str | None
+    """The key it is about, if there is such a key."""
+    file: str | None
+    """The file, ``"scenario"`` for a text or a dict; none for an entry of ``set``."""
+    line: int | None
+    """The line, counted from 1, if there is one. The text of a dict has an entry a line."""
+    remedy: str | None
+    """What to change."""
+
+    def __init__(
+        self,
+        message: str,
+        key: str | None = None,
+        file: str | None = None,
+        line: int | None = None,
+        remedy: str | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.key, self.file, self.line, self.remedy = key, file, line, remedy
+
+    def __reduce__(self) -> tuple[type[ScenarioError], tuple[object, ...]]:
+        return type(self), (str(self), self.key, self.file, self.line, self.remedy)
+
+
+class LeafWarning(UserWarning):
+    """What the program says beside a result: why it is not at rest, say, and what would help."""

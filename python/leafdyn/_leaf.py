@@ -1,0 +1,287 @@
+"""A leaf at rest."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _leafdyn
+from ._result import Kept, Result, keep
+
+if TYPE_CHECKING:
+    from ._scenario import Scenario
+
+Array = NDArray[np.float64]
+
+
+class Equilibrium(Result):
+    """A leaf at rest, or as far as it came, with N rods at K + 1 stations, in the units of its scenario.
+
+    Arrays are made when they are first asked for, of float64, and equal the numbers of the files to the last bit.
+
+    >>> import leafdyn
+    >>> leaf = leafdyn.relax("scenarios/paper/fig04.toml")
+    >>> leaf
+    <Equilibrium fig04: stable, tip (0.95666, 0.047746, -0.14736) within 3.6e-07>
+    >>> leaf.positions.shape, leaf.rotations.shape, leaf.forces.shape
+    ((21, 9, 3), (21, 9, 4), (21, 9, 3))
+    """
+
+    name: str
+    """The name of the scenario."""
+    scenario: Scenario | None
+    """The scenario; none of a leaf that another result holds."""
+    method: str
+    """The method."""
+    outcome: str
+    """How the run ended, in one word: ``"converged"`` and so on, as in ``summary.json``."""
+    success: bool
+    """Whether the leaf is at rest within the tolerance."""
+    remark: str | None
+    """What would help, if the run did not succeed."""
+    rods: int
+    """The number of rods N."""
+    joined: bool
+    """Whether the tips are one point."""
+    segments: list[int]
+    """Segments a rod of each grid, coarse to fine; none if the leaf was shot."""
+    tolerance: float
+    """The accuracy that was wanted, relative to the longest rod."""
+    residual: float | None
+    """The largest unbalanced force or moment, without units."""
+    error_estimate: float | None
+    """Bound on the error of `positions`, in units of length; none on a single grid."""
+    energy: float | None
+    """The potential energy."""
+    negative_eigenvalues: int | None
+    """The Morse index: 0 for a stable leaf; none if it is not known."""
+    wall_seconds: float
+    """The time of the solution alone."""
+
+    def __init__(self, core: _leafdyn.Leaf, request: tuple[Scenario, dict[str, Any]] | None = None) -> None:
+        self._files = core
+        self._request = request
+        self.scenario = request[0] if request else None
+        for name in _SCALARS:
+            setattr(self, name, getattr(core, name))
+
+    @property
+    def _core(self) -> _leafdyn.Leaf:
+        if not isinstance(self._files, _leafdyn.Leaf):
+            raise AttributeError("this part of a pickled leaf is not there")
+        return self._files
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether the leaf is stable; none if that is not known."""
+        return None if self.negative_eigenvalues is None else self.negative_eigenvalues == 0
+
+    @property
+    def tip(self) -> Array | None:
+        """The joint tip, or the only rod's: shape (3,); none if there are several."""
+        return self.tips[0] if len(self.tips) == 1 else None
+
+    @cached_property
+    def tips(self) -> Array:
+        """The joint tip alone, shape (1, 3), or every tip, shape (N, 3)."""
+        return self._core.tips()
+
+    @cached_property
+    def tip_force_sum(self) -> Array:
+        """The sum of the forces that the rods pass to their tips, shape (3,)."""
+        return self._core.tip_force_sum()
+
+    @cached_property
+    def stations(self) -> Array:
+        """Fractions of the length, base to tip, shape (K + 1,)."""
+        return self._core.stations()
+
+    @cached_property
+    def lengths(self) -> Array:
+        """The lengths of the rods, shape (N,)."""
+        return self._core.lengths()
+
+    @cached_property
+    def positions(self) -> Array:
+        """Centerlines, shape (N, K + 1, 3): the best values known, within `error_estimate`."""
+        return self._core.nodes("positions")
+
+    @cached_property
+    def rotations(self) -> Array:
+        """The directors as unit quaternions w, x, y, z, shape (N, K + 1, 4)."""
+        return self._core.nodes("rotations")
+
+    @cached_property
+    def strains(self) -> Array:
+        """Stretch and shears v along the directors, shape (N, K + 1, 3), without a unit."""
+        return self._core.nodes("strains")
+
+    @cached_property
+    def curvatures(self) -> Array:
+        """Twist and bends u along the directors, shape (N, K + 1, 3), per length."""
+        return self._core.nodes("curvatures")
+
+    @cached_property
+    def forces(self) -> Array:
+        """Axial force and shear forces n along the directors, shape (N, K + 1, 3)."""
+        return self._core.nodes("forces")
+
+    @cached_property
+    def moments(self) -> Array:
+        """Twisting and bending moments m along the directors, shape (N, K + 1, 3)."""
+        return self._core.nodes("moments")
+
+    @cached_property
+    def curves(self) -> Array:
+        """Centerlines at all nodes of the finest grid, for drawing: shape (N, M + 1, 3)."""
+        return self._core.curves()
+
+    @cached_property
+    def _modes(self) -> tuple[Array, Array] | None:
+        return self._core.eigenvalues()
+
+    @property
+    def eigenvalues(self) -> Array | None:
+        """The lowest eigenvalues omega^2 over the masses, ascending, shape (modes,); none if they are not known."""
+        return None if self._modes is None else self._modes[0]
+
+    @property
+    def eigenvalue_errors(self) -> Array | None:
+        """Bounds on their errors, not a number on a single grid."""
+        return None if self._modes is None else self._modes[1]
+
+    @property
+    def frequencies(self) -> Array | None:
+        """Angular frequencies omega, radians per time; not a number of modes that are unstable."""
+        if self.eigenvalues is None:
+            return None
+        with np.errstate(invalid="ignore"):
+            return np.sqrt(self.eigenvalues)
+
+    @cached_property
+    def _mode_shapes(self) -> tuple[Array, Array]:
+        return self._core.mode_shapes()
+
+    @property
+    def mode_displacements(self) -> Array:
+        """Displacements of the nodes of `curves` in each mode, shape (modes, N, M + 1, 3): see `leafdyn.modes`."""
+        return self._mode_shapes[0]
+
+    @property
+    def mode_rotations(self) -> Array:
+        """Rotation vectors of these nodes along the lab axes, radians, shape (modes, N, M + 1, 3)."""
+        return self._mode_shapes[1]
+
+    def plot(self, ax: Any = None, **style: Any) -> Any:
+        """Draw the veins with matplotlib: in space, or from the side in axes without a third axis.
+
+        Parameters
+        ----------
+        ax
+            Where; left out: axes in space, in a new figure.
+        style
+            What ``Axes.plot`` takes.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        if ax is None:
+            from matplotlib import pyplot
+
+            ax = pyplot.figure().add_subplot(projection="3d")
+        solid = hasattr(ax, "get_zlim")
+        for curve in self.curves:
+            ax.plot(*(curve.T if solid else curve.T[[0, 2]]), **style)
+        if solid:
+            ax.set(xlabel="x", ylabel="y", zlabel="z")
+        else:
+            ax.set(xlabel="x", ylabel="z")
+        ax.set_aspect("equal")
+        return ax
+
+    def __repr__(self) -> str:
+        index = self.negative_eigenvalues
+        stable = {None: "stability unknown", 0: "stable"}.get(index, f"unstable ({index} negative eigenvalues)")
+        words = [stable if self.success else f"{self.outcome}, {stable}"]
+        if self.tip is not None:
+            within = "" if self.error_estimate is None else f" within {self.error_estimate:.1e}"
+            words.append(f"tip ({', '.join(f'{x:.5g}' for x in self.tip)}){within}")
+        elif self.error_estimate is not None:
+            words.append(f"{self.rods} rods within {self.error_estimate:.1e}")
+        return f"<Equilibrium {self.name}: {', '.join(words)}>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        if isinstance(self._files, _leafdyn.Leaf):
+            for name in _ARRAYS:
+                getattr(self, name)
+        state = self.__dict__.copy()
+        if self._request is None:
+            state["_files"] = keep(self._files)
+        elif isinstance(self._files, _leafdyn.Leaf):
+            state["_files"] = Drawn(self._files.contents("summary.json"), self._files.names(), self)
+        return state
+
+
+class Drawn(Kept):
+    """The files of a leaf that has been pickled and knows what was asked: they are drawn again when they are asked
+    for, of the same numbers."""
+
+    def __init__(self, summary: bytes, names: list[str], leaf: Equilibrium) -> None:
+        super().__init__({"summary.json": summary})
+        self._names = names
+        self._leaf = leaf
+
+    def names(self) -> list[str]:
+        return self._names
+
+    def contents(self, name: str) -> bytes:
+        if name not in self.files:
+            self.files[name] = self._again().contents(name)
+        return self.files[name]
+
+    def _again(self) -> _leafdyn.Leaf:
+        leaf = self._leaf
+        assert leaf._request is not None
+        scenario, asked = leaf._request
+        again = _leafdyn.relax(scenario._core, asked, None)
+        if not np.array_equal(again.nodes("positions"), leaf.positions):
+            raise RuntimeError("this version of leafdyn finds other numbers than the pickled leaf has: solve it again")
+        return again
+
+
+_SCALARS = (
+    "name",
+    "method",
+    "outcome",
+    "success",
+    "remark",
+    "rods",
+    "joined",
+    "segments",
+    "tolerance",
+    "residual",
+    "error_estimate",
+    "energy",
+    "negative_eigenvalues",
+    "wall_seconds",
+)
+
+_ARRAYS = (
+    "tips",
+    "tip_force_sum",
+    "stations",
+    "lengths",
+    "positions",
+    "rotations",
+    "strains",
+    "curvatures",
+    "forces",
+    "moments",
+    "curves",
+    "_modes",
+    "_mode_shapes",
+)

@@ -1,0 +1,115 @@
+"""A leaf in motion."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from . import _leafdyn
+from ._leaf import Array
+from ._result import Result, _kinds
+
+ENERGIES = ("kinetic", "elastic", "coupling", "potential", "dissipated", "work")
+
+
+class Frame(NamedTuple):
+    """A leaf at an instant, with N rods of M + 1 nodes."""
+
+    time: float
+    """The time."""
+    positions: Array
+    """Positions, shape (N, M + 1, 3)."""
+    rotations: Array
+    """The directors as unit quaternions w, x, y, z, shape (N, M + 1, 4)."""
+    velocities: Array
+    """Velocities along the lab axes, shape (N, M + 1, 3)."""
+    angular_velocities: Array
+    """Angular velocities along the lab axes, shape (N, M + 1, 3)."""
+    energies: dict[str, float]
+    """Energies: kinetic, elastic, of the coupling, potential of the loads; dissipated and put in until then."""
+
+
+class Motion(Result):
+    """A leaf followed in time: T outputs of N rods with M + 1 nodes, in the units of its scenario.
+
+    What has been pickled has its arrays, summary and pictures, but no longer writes ``motion.csv`` and ``energy.csv``.
+    """
+
+    outcome: str
+    """``"completed"``, or why it ended early."""
+    remark: str | None
+    """The same in a sentence."""
+    method: str
+    """The method."""
+    stations: Array
+    """Fractions of the length at which the nodes are, shape (M + 1,)."""
+    times: Array
+    """Times of the outputs, shape (T,)."""
+    positions: Array
+    """Positions, shape (T, N, M + 1, 3)."""
+    rotations: Array
+    """The directors as unit quaternions w, x, y, z, shape (T, N, M + 1, 4)."""
+    velocities: Array
+    """Velocities along the lab axes, shape (T, N, M + 1, 3)."""
+    angular_velocities: Array
+    """Angular velocities along the lab axes, shape (T, N, M + 1, 3)."""
+    energies: dict[str, Array]
+    """Energies by their names, shape (T,) each: as in ``energy.csv``."""
+
+    def __init__(self, core: _leafdyn.Motion, name: str, joined: bool) -> None:
+        self._files = core.files()
+        self._core: _leafdyn.Motion | None = core
+        self.name, self._joined = name, joined
+        self.outcome, self.remark = core.outcome
+        self.method = core.method
+        self.stations = core.stations()
+        outputs = core.outputs()
+        self.energies = {energy: outputs.pop(energy) for energy in ENERGIES}
+        self.__dict__.update(outputs)
+
+    @property
+    def tips(self) -> Array:
+        """The joint tip in time, shape (T, 1, 3), or every tip, shape (T, N, 3)."""
+        return self.positions[:, : 1 if self._joined else None, -1]
+
+    def save(self, folder: str | os.PathLike[str], write: str | Iterable[str] | None = None) -> list[Path]:
+        """As `Result.save`; among the files are ``motion.csv`` (or ``.npy``) and ``energy.csv``."""
+        kinds = _kinds(write)
+        if self._core is None or not kinds & {"csv"}:
+            return super().save(folder, write)
+        place = Path(folder)
+        if write is None:
+            return self._core.save(place)
+        place.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=place) as drafts:
+            # An array is what a long table is written as.
+            files = [file for file in self._core.save(Path(drafts)) if file.suffix[1:] in kinds | {"npy"}]
+            return [Path(shutil.move(file, place / file.name)) for file in files]
+
+    def plot(self, ax: Any = None, **style: Any) -> Any:
+        """Draw the height of the tip in time with matplotlib."""
+        if ax is None:
+            from matplotlib import pyplot
+
+            ax = pyplot.figure().add_subplot()
+        ax.plot(self.times, self.tips[..., 2], **style)
+        ax.set(xlabel="time", ylabel="tip z")
+        return ax
+
+    def __repr__(self) -> str:
+        end = self.times[-1] if len(self.times) else 0.0
+        return f"<Motion {self.name}: {self.outcome}, {len(self.times)} outputs until t = {end:.6g}, {self.method}>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**super().__getstate__(), "_core": None}
+
+
+def frame(outputs: dict[str, Array]) -> Frame:
+    """The only output."""
+    energies = {name: float(outputs.pop(name)[0]) for name in ENERGIES}
+    time = float(outputs.pop("times")[0])
+    return Frame(time=time, energies=energies, **{name: array[0] for name, array in outputs.items()})

@@ -1,0 +1,137 @@
+"""What all results have in common: they are what the program writes into files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+KINDS = ("json", "csv", "svg", "png")
+
+
+class Contents(Protocol):
+    """The files of a result; each is made when it is asked for."""
+
+    def names(self) -> list[str]: ...
+
+    def contents(self, name: str) -> bytes: ...
+
+
+class Kept:
+    """The files of a result that has been pickled."""
+
+    def __init__(self, files: dict[str, bytes]) -> None:
+        self.files = files
+
+    def names(self) -> list[str]:
+        return list(self.files)
+
+    def contents(self, name: str) -> bytes:
+        return self.files[name]
+
+
+def keep(files: Contents) -> Kept:
+    """All files as they are."""
+    return Kept({name: files.contents(name) for name in files.names()})
+
+
+class Result:
+    """A result: numbers as attributes, and the files of the program on request. It can be pickled."""
+
+    _files: Contents
+
+    def to_dict(self) -> dict[str, Any]:
+        """What the program writes as JSON. Numbers that are not finite are none."""
+        found: dict[str, Any] = json.loads(self._files.contents(self._files.names()[0]))
+        return found
+
+    def save(self, folder: str | os.PathLike[str], write: str | Iterable[str] | None = None) -> list[Path]:
+        """Write the files of the program into a folder, which is made if it is not there.
+
+        Parameters
+        ----------
+        folder
+            The folder.
+        write
+            Which kinds: ``"json,csv,svg,png"`` or a list of such words; left out: all.
+
+        Returns
+        -------
+        list of Path
+            The files. Each is complete, whatever happens meanwhile.
+        """
+        kinds = _kinds(write)
+        place = Path(folder)
+        place.mkdir(parents=True, exist_ok=True)
+        written = []
+        for name in self._files.names():
+            if Path(name).suffix[1:] in kinds:
+                file = place / name
+                draft = place / f".{name}.{os.getpid()}.part"
+                draft.write_bytes(self._files.contents(name))
+                os.replace(draft, file)
+                written.append(file)
+        return written
+
+    def figure(self, name: str | None = None) -> str:
+        """A figure of the program as SVG; left out, the first it draws."""
+        names = [file for file in self._files.names() if file.endswith(".svg")]
+        return self._files.contents(name or names[0]).decode()
+
+    def _repr_svg_(self) -> str:
+        return self.figure()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_files": keep(self._files)}
+
+
+class Tabular(Result):
+    """A result with a table."""
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """The columns of its table by their names, as arrays; an empty cell is not a number."""
+        table = next(name for name in self._files.names() if name.endswith(".csv"))
+        return columns(self._files.contents(table))
+
+    def to_pandas(self) -> Any:
+        """Its table as a ``pandas.DataFrame``."""
+        import pandas
+
+        return pandas.DataFrame(self.columns)
+
+
+def _kinds(write: str | Iterable[str] | None) -> set[str]:
+    if write is None:
+        return set(KINDS)
+    words = write.split(",") if isinstance(write, str) else list(write)
+    kinds = {word.strip() for word in words} - {"none", ""}
+    unknown = sorted(kinds - set(KINDS))
+    if unknown:
+        raise ValueError(f"write = {unknown[0]}: must be of {', '.join(KINDS)}, or none")
+    return kinds
+
+
+def columns(table: bytes) -> dict[str, NDArray[Any]]:
+    """The columns of a table in CSV."""
+    rows = list(csv.reader(io.StringIO(table.decode())))
+    cells = zip(*rows[1:]) if len(rows) > 1 else [()] * len(rows[0])
+    return {name: _column(column) for name, column in zip(rows[0], cells)}
+
+
+def _column(cells: tuple[str, ...]) -> NDArray[Any]:
+    if cells and all(cell in ("true", "false") for cell in cells):
+        return np.array([cell == "true" for cell in cells])
+    for kind in (int, float):
+        try:
+            return np.array([kind(cell or ("nan" if kind is float else "")) for cell in cells], dtype=kind)
+        except (ValueError, OverflowError):
+            pass
+    return np.array(cells, dtype=str)

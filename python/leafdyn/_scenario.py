@@ -1,0 +1,132 @@
+"""Scenarios: from a path, a text, or a dict."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any, TypeAlias, Union
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _leafdyn
+
+
+class Scenario:
+    """A checked scenario, which can be used over and over, pickled, and sent elsewhere.
+
+    Parameters
+    ----------
+    source
+        A path; a text in TOML (what has a line break, or an equals sign and does not end in ``.toml``); a dict of the
+        same form, in which lists may be arrays; or another scenario.
+    set
+        Entries that are replaced: ``{"leaf.rods": 5, "load.gravity": [0, 0, -0.5]}``.
+
+    Raises
+    ------
+    ScenarioError
+        If it is refused.
+    OSError
+        Never: a file that cannot be read is a `ScenarioError`, too.
+
+    Examples
+    --------
+    >>> import leafdyn
+    >>> fan = leafdyn.Scenario("scenarios/paper/fig04.toml", set={"leaf.rods": 5})
+    >>> fan
+    <Scenario fig04: 5 rods>
+    >>> leafdyn.relax(fan).stable
+    True
+    """
+
+    __slots__ = ("_core",)
+
+    def __init__(self, source: Source, set: Mapping[str, Any] | None = None) -> None:
+        entries = _leafdyn.overrides(set) if set else []
+        if isinstance(source, Scenario):
+            known = source._core
+            self._core = _leafdyn.Scenario(known.text, known.overrides + entries, known.file) if entries else known
+        elif isinstance(source, Mapping):
+            self._core = _leafdyn.Scenario.from_dict(source, entries)
+        elif isinstance(source, str) and _is_text(source):
+            self._core = _leafdyn.Scenario(source, entries)
+        else:
+            self._core = _leafdyn.Scenario.read(os.fspath(source), entries)
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self._core.name
+
+    @property
+    def text(self) -> str:
+        """The TOML it was read from, or that was made of the dict."""
+        return self._core.text
+
+    @property
+    def overrides(self) -> list[str]:
+        """The entries of ``set``, as ``KEY=VALUE``."""
+        return self._core.overrides
+
+    @property
+    def rods(self) -> int:
+        """The number of rods N."""
+        return self._core.rods
+
+    @property
+    def joined(self) -> bool:
+        """Whether all tips share one point."""
+        return self._core.joined
+
+    @property
+    def lengths(self) -> NDArray[np.float64]:
+        """The lengths of the rods, shape (N,)."""
+        return np.array(self._core.lengths)
+
+    @property
+    def tolerance(self) -> float:
+        """The accuracy wanted, relative to the longest rod."""
+        return self._core.tolerance
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The names of the units of length and force, if the scenario gives any."""
+        names = zip(("length", "force"), self._core.units)
+        return {quantity: unit for quantity, unit in names if unit is not None}
+
+    def __repr__(self) -> str:
+        return f"<Scenario {self.name}: {self.rods} rod{'s' * (self.rods != 1)}>"
+
+    def _key(self) -> tuple[str, list[str], str]:
+        return self._core.text, self._core.overrides, self._core.file
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scenario) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash((self._core.text, *self._core.overrides))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restore, self._key()
+
+
+Source: TypeAlias = Union[str, "os.PathLike[str]", Mapping[str, Any], Scenario]
+"""What a scenario can be given as."""
+
+
+def _is_text(source: str) -> bool:
+    return "\n" in source or ("=" in source and not source.endswith(".toml"))
+
+
+def _restore(text: str, overrides: list[str], file: str) -> Scenario:
+    scenario = Scenario.__new__(Scenario)
+    scenario._core = _leafdyn.Scenario(text, overrides, file)
+    return scenario
+
+
+def checked(source: Source, set: Mapping[str, Any] | None) -> Scenario:
+    """The scenario that is meant."""
+    if isinstance(source, Scenario) and not set:
+        return source
+    return Scenario(source, set)

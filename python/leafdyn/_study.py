@@ -1,0 +1,212 @@
+"""What is built on leaves at rest: checks, other shapes, traces, maps and charts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._leaf import Array, Equilibrium
+from ._result import Contents, Result, Tabular
+
+
+class Check(Result):
+    """Two independent methods on the same leaf, and how far apart they end."""
+
+    verdict: str
+    """``"agree"``, ``"differ"`` or ``"not-compared"``."""
+    reason: str | None
+    """Why there was nothing to compare."""
+    difference: dict[str, float] | None
+    """The largest differences: ``position`` (length), ``rotation`` (radians), ``force``, ``moment``."""
+    within_estimates: bool | None
+    """Whether the positions differ by no more than both error estimates allow."""
+    leaf: Equilibrium
+    """The relaxed leaf."""
+    stations: Array | None
+    """Fractions of the length at which the second solution is given, shape (K + 1,); none without one."""
+    positions: Array | None
+    """Positions of the second solution, shape (N, K + 1, 3); none without one."""
+
+    def __init__(self, files: Contents, leaf: Equilibrium, solution: tuple[Array, Array] | None) -> None:
+        self._files = files
+        self.leaf = leaf
+        self.stations, self.positions = solution or (None, None)
+        said = self.to_dict()
+        self.verdict = said["verdict"]
+        self.reason = said.get("reason")
+        self.difference = said["difference"]
+        self.within_estimates = said["within_estimates"]
+
+    @property
+    def agree(self) -> bool:
+        """Whether both find the same."""
+        return self.verdict == "agree"
+
+    def __repr__(self) -> str:
+        apart = "" if self.difference is None else f", positions differ by {self.difference['position']:.1e}"
+        return f"<Check {self.leaf.name}: {self.verdict}{apart}>"
+
+
+class Shapes(Result, Sequence[Equilibrium]):
+    """The equilibria of a leaf that were found, lowest energy first: a sequence of `Equilibrium`."""
+
+    starts: NDArray[np.int64]
+    """How many starts ended in each."""
+    plain: NDArray[np.bool_]
+    """Whether the start of a relaxation did."""
+    failed: int
+    """Starts that did not come to rest."""
+
+    def __init__(self, files: Contents, leaves: list[Equilibrium], starts: list[int], plain: list[bool]) -> None:
+        self._files = files
+        self._leaves = leaves
+        self.starts = np.array(starts, dtype=np.int64)
+        self.plain = np.array(plain, dtype=bool)
+        self.failed = self.to_dict()["failed"]
+
+    @overload
+    def __getitem__(self, index: int) -> Equilibrium: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[Equilibrium]: ...
+
+    def __getitem__(self, index: int | slice) -> Equilibrium | list[Equilibrium]:
+        return self._leaves[index]
+
+    def __len__(self) -> int:
+        return len(self._leaves)
+
+    def __iter__(self) -> Iterator[Equilibrium]:
+        return iter(self._leaves)
+
+    def __repr__(self) -> str:
+        stable = sum(leaf.stable is True for leaf in self)
+        return f"<Shapes: {len(self)} equilibria, {stable} stable>"
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """A branch of equilibria with P points."""
+
+    end: str
+    """How it ended: ``"reached"``, ``"returned"``, ``"closed"`` and so on."""
+    columns: dict[str, NDArray[Any]]
+    """Its columns of ``trace.csv``."""
+    curves: list[Array]
+    """Centerlines at each point, shape (N, M + 1, 3)."""
+
+    @property
+    def values(self) -> Array:
+        """The number that varies, shape (P,)."""
+        return self.columns["value"]
+
+    @property
+    def tips(self) -> Array:
+        """The joint tip or the first rod's, shape (P, 3)."""
+        return np.stack([self.columns[name] for name in ("tip_x", "tip_y", "tip_z")], axis=1)
+
+    @property
+    def energies(self) -> Array:
+        """Potential energies, shape (P,)."""
+        return self.columns["energy"]
+
+    @property
+    def negative_eigenvalues(self) -> NDArray[np.int64]:
+        """The Morse index, shape (P,)."""
+        return self.columns["negative_eigenvalues"]
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Whether the leaf is stable there, shape (P,)."""
+        return self.columns["stable"]
+
+    @property
+    def kinds(self) -> NDArray[np.str_]:
+        """``"regular"``, ``"fold"`` or ``"branch-point"``, shape (P,)."""
+        return self.columns["kind"]
+
+    @property
+    def critical(self) -> NDArray[np.int64]:
+        """Where the folds and branch points are."""
+        return np.flatnonzero(self.kinds != "regular")
+
+    def __repr__(self) -> str:
+        return f"<Branch: {len(self.values)} points, {len(self.critical)} critical, {self.end}>"
+
+
+class Trace(Tabular):
+    """An equilibrium followed through a number of its scenario."""
+
+    complete: bool
+    """Whether all branches are known as far as was asked."""
+    remark: str | None
+    """Why not, if they are not."""
+    branches: list[Branch]
+    """The branches, first that of the first equilibrium."""
+
+    def __init__(self, files: Contents, complete: bool, remark: str | None, curves: list[list[Array]]) -> None:
+        self._files = files
+        self.complete, self.remark = complete, remark
+        said = self.to_dict()
+        self.name, self.vary = said["scenario"], said["vary"]
+        table = self.columns
+        self.branches = []
+        for number, (branch, lines) in enumerate(zip(said["branches"], curves), start=1):
+            here = table["branch"] == number
+            rows = {name: column[here] for name, column in table.items()}
+            self.branches.append(Branch(branch["end"], rows, lines))
+
+    def plot(self, ax: Any = None, **style: Any) -> Any:
+        """Draw the height of the tip with matplotlib: solid where the leaf is stable, dashed where not, dots where
+        branches fold or cross."""
+        if ax is None:
+            from matplotlib import pyplot
+
+            ax = pyplot.figure().add_subplot()
+        for branch in self.branches:
+            values, height = branch.values, branch.tips[:, 2]
+            (line,) = ax.plot(values, np.where(branch.stable, height, np.nan), **style)
+            unstable = ~branch.stable
+            # A dashed line begins where the solid one ends.
+            unstable[:-1] |= unstable[1:]
+            unstable[1:] |= ~branch.stable[:-1]
+            ax.plot(values, np.where(unstable, height, np.nan), "--", **{"color": line.get_color(), **style})
+            ax.plot(values[branch.critical], height[branch.critical], "o", color=line.get_color())
+        ax.set(xlabel=self.vary, ylabel="tip z")
+        return ax
+
+    def __repr__(self) -> str:
+        count = len(self.branches)
+        ends = "complete" if self.complete else "not complete"
+        return f"<Trace {self.name} over {self.vary}: {count} branch{'es' * (count != 1)}, {ends}>"
+
+
+class Map(Tabular):
+    """Every method in every cell of one or two numbers, as ``map.csv`` has it: a row a cell and method."""
+
+    def __init__(self, files: Contents) -> None:
+        self._files = files
+
+    def __repr__(self) -> str:
+        return f"<Map: {len(self.columns['method'])} rows>"
+
+
+class Chart(Tabular):
+    """Speed against accuracy, as ``chart.csv`` has it: a row a method and setting."""
+
+    confirmed: bool
+    """Whether two independent methods agree on what errors are measured against."""
+    remarks: list[str]
+    """What is to be said of the measurement."""
+
+    def __init__(self, files: Contents, confirmed: bool, remarks: list[str]) -> None:
+        self._files = files
+        self.confirmed, self.remarks = confirmed, remarks
+
+    def __repr__(self) -> str:
+        said = "confirmed" if self.confirmed else "not confirmed"
+        return f"<Chart: {len(self.columns['method'])} rows, reference {said}>"

@@ -1,0 +1,36 @@
+//! `leafdyn._leafdyn`: what the package `leafdyn` for Python is made of. Computations, arrays and
+//! the contents of files; how they are shown and documented is in the package.
+
+use pyo3::prelude::*;
+
+mod arrays;
+mod errors;
+mod motion;
+mod result;
+mod run;
+mod scenario;
+mod toml_text;
+mod verbs;
+
+/// What `leafdyn` for Python computes with.
+#[pymodule]
+mod _leafdyn {
+    #[pymodule_export]
+    use super::motion::Motion;
+    #[pymodule_export]
+    use super::result::{Files, Leaf};
+    #[pymodule_export]
+    use super::run::{panic_on_purpose, set_threads, threads};
+    #[pymodule_export]
+    use super::scenario::Scenario;
+    #[pymodule_export]
+    use super::toml_text::overrides;
+    #[pymodule_export]
+    use super::verbs::{
+        all_shapes, chart, check, library_seconds, map, program, relax_many, relax_one, trace,
+    };
+
+    #[expect(non_upper_case_globals, reason = "it is the name that Python knows")]
+    #[pymodule_export]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+}

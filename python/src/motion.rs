@@ -1,0 +1,245 @@
+//! A leaf in motion: followed to its end, or an output at a time.
+
+use std::error::Error;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use leafdyn::files::Recording;
+use leafdyn::scenario;
+use leafdyn::simulate::{
+    Frame, Moment, Options, Record, Scheme, Simulation, Still, Stopped, stills,
+};
+use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{Array, array, flat};
+use crate::errors::cannot;
+use crate::result::Files;
+use crate::run::{elapsed, run};
+use crate::scenario::Scenario;
+
+/// Shapes that a film strip shows.
+const STILLS: usize = 8;
+
+/// A leaf in motion.
+#[pyclass(frozen, module = "leafdyn._leafdyn")]
+pub struct Motion {
+    scenario: Arc<scenario::Scenario>,
+    options: Options,
+    state: Arc<Mutex<State>>,
+}
+
+struct State {
+    simulation: Simulation,
+    /// Those since the beginning, if they are kept.
+    frames: Vec<Frame>,
+    stopped: Option<Stopped>,
+}
+
+impl Motion {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn joined(&self) -> bool {
+        self.scenario.joined
+    }
+
+    fn record(&self, state: &State) -> Record {
+        let moments: Vec<Moment> = (state.frames.iter())
+            .map(|frame| Moment::of(frame, self.joined()))
+            .collect();
+        let longest = self.scenario.rods.iter().map(|rod| rod.length);
+        let chosen = stills(&moments, STILLS, longest.fold(0.0, f64::max));
+        let still = |moment: usize| {
+            let frame = &state.frames[moment];
+            let curves = (0..frame.rods).map(|rod| frame.centerline(rod).to_vec());
+            Still {
+                moment,
+                curves: curves.collect(),
+            }
+        };
+        let shapes = chosen.into_iter().map(still).collect();
+        Record::new(&state.simulation, state.stopped, moments, shapes)
+    }
+}
+
+#[pymethods]
+impl Motion {
+    /// The leaf of a scenario at time 0.
+    #[new]
+    #[pyo3(signature = (scenario, method, segments, step, tolerance))]
+    fn new(
+        py: Python,
+        scenario: &Scenario,
+        method: Option<&str>,
+        segments: Option<usize>,
+        step: Option<f64>,
+        tolerance: Option<f64>,
+    ) -> PyResult<Self> {
+        let scheme = match method {
+            None => None,
+            Some("explicit") => Some(Scheme::Explicit),
+            Some("semi-implicit") => Some(Scheme::SemiImplicit),
+            Some(other) => {
+                let message = format!("method = {other}: must be one of explicit, semi-implicit");
+                return Err(PyValueError::new_err(message));
+            }
+        };
+        let options = Options {
+            scheme,
+            segments,
+            step,
+            tolerance,
+        };
+        let scenario = scenario.checked.clone();
+        let (leaf, asked) = (scenario.clone(), options.clone());
+        let simulation = run(py, None, move |_| Simulation::new(&leaf, &asked))?;
+        let state = State {
+            simulation: simulation.map_err(cannot)?,
+            frames: Vec::new(),
+            stopped: None,
+        };
+        Ok(Motion {
+            scenario,
+            options,
+            state: Arc::new(Mutex::new(state)),
+        })
+    }
+
+    /// Follows the leaf from time 0 to the end, or as far as it goes, and keeps all outputs.
+    fn follow(&self, py: Python, progress: Option<&Bound<PyAny>>) -> PyResult<()> {
+        let state = self.state.clone();
+        let duration = self.scenario.dynamics.duration;
+        run(py, progress, move |monitor| {
+            let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+            let State {
+                simulation,
+                frames,
+                stopped,
+            } = &mut *state;
+            let clock = Instant::now();
+            frames.push(simulation.frame());
+            while !simulation.done() && !monitor.cancelled() {
+                match simulation.next_frame() {
+                    Ok(frame) => frames.push(frame),
+                    Err(why) => {
+                        *stopped = Some(why);
+                        break;
+                    }
+                }
+                let time = simulation.time();
+                monitor.say(time, Some(duration), || {
+                    format!("t = {time:.4} of {duration}, {}", elapsed(clock))
+                });
+            }
+        })
+    }
+
+    /// The leaf now, before the first output that `next` moves on to.
+    fn frame<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let frame = self.state().simulation.frame();
+        self.arrays(py, &[frame])
+    }
+
+    /// Moves on to the next output; none behind the last.
+    fn next<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let state = self.state.clone();
+        let frame = run(py, None, move |_| {
+            let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+            if state.simulation.done() || state.stopped.is_some() {
+                return None;
+            }
+            let frame = state.simulation.next_frame();
+            frame.map_err(|why| state.stopped = Some(why)).ok()
+        })?;
+        frame.map(|frame| self.arrays(py, &[frame])).transpose()
+    }
+
+    /// All outputs that were kept.
+    fn outputs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.arrays(py, &self.state().frames)
+    }
+
+    /// Fractions of the length at which the nodes are.
+    fn stations<'py>(&self, py: Python<'py>) -> Array<'py> {
+        let stations = self.state().simulation.stations().to_vec();
+        let count = stations.len();
+        array(py, stations, &[count])
+    }
+
+    /// How it ended, in one word, and if that was early in a sentence.
+    #[getter]
+    fn outcome(&self) -> (&'static str, Option<String>) {
+        let stopped = self.state().stopped;
+        (
+            stopped.map_or("completed", Stopped::word),
+            stopped.map(|why| why.to_string()),
+        )
+    }
+
+    #[getter]
+    fn method(&self) -> &'static str {
+        self.state().simulation.scheme().name()
+    }
+
+    /// The summary and the pictures of the outputs that were kept.
+    fn files(&self) -> Files {
+        Files::of(self.record(&self.state()))
+    }
+
+    /// Writes the files of the program into a folder.
+    fn save(&self, py: Python, folder: PathBuf) -> PyResult<Vec<PathBuf>> {
+        let written = py.detach(|| {
+            let state = self.state();
+            let mut again = Simulation::new(&self.scenario, &self.options)?;
+            let mut recording = Recording::begin(&folder, &mut again)?;
+            for frame in state.frames.iter().skip(1) {
+                recording.add(&again, frame)?;
+            }
+            let record = recording.record(&state.simulation, state.stopped)?;
+            Ok(recording.finish(&record)?)
+        });
+        written.map_err(|error: Box<dyn Error + Send + Sync>| PyOSError::new_err(error.to_string()))
+    }
+}
+
+impl Motion {
+    /// Outputs by the names of their quantities; the first axis is time.
+    fn arrays<'py>(&self, py: Python<'py>, frames: &[Frame]) -> PyResult<Bound<'py, PyDict>> {
+        let rods = self.scenario.rods.len();
+        let nodes = frames.first().map_or(0, |frame| frame.positions.len()) / rods;
+        let shape = [frames.len(), rods, nodes];
+        let found = PyDict::new(py);
+        let with = |components: usize| [&shape[..], &[components]].concat();
+        let vectors = |of: &dyn Fn(&Frame) -> Vec<f64>, components: usize| {
+            array(py, frames.iter().flat_map(of).collect(), &with(components))
+        };
+        let numbers = |of: &dyn Fn(&Frame) -> f64| {
+            let numbers = frames.iter().map(|frame| of(frame) + 0.0).collect();
+            array(py, numbers, &[frames.len()])
+        };
+        found.set_item("times", numbers(&|frame| frame.time)?)?;
+        let positions = vectors(&|frame| flat(frame.positions.iter().copied()), 3)?;
+        found.set_item("positions", positions)?;
+        let rotations = |frame: &Frame| {
+            let rotations = frame.rotations.iter();
+            let numbers = rotations.flat_map(|q| [q.w, q.x, q.y, q.z]);
+            numbers.map(|value| value + 0.0).collect()
+        };
+        found.set_item("rotations", vectors(&rotations, 4)?)?;
+        let velocities = |frame: &Frame| flat(frame.velocities.iter().map(|v| v.linear));
+        found.set_item("velocities", vectors(&velocities, 3)?)?;
+        let angular = |frame: &Frame| flat(frame.velocities.iter().map(|v| v.angular));
+        found.set_item("angular_velocities", vectors(&angular, 3)?)?;
+        found.set_item("kinetic", numbers(&|frame| frame.energy.kinetic)?)?;
+        found.set_item("elastic", numbers(&|frame| frame.energy.elastic)?)?;
+        found.set_item("coupling", numbers(&|frame| frame.energy.coupling)?)?;
+        found.set_item("potential", numbers(&|frame| frame.energy.potential)?)?;
+        found.set_item("dissipated", numbers(&|frame| frame.energy.dissipated)?)?;
+        found.set_item("work", numbers(&|frame| frame.energy.work)?)?;
+        Ok(found)
+    }
+}

@@ -1,0 +1,189 @@
+//! Computations outside the interpreter: on a pool of threads of their own, while the thread that
+//! asked waits without the interpreter's lock and looks for Ctrl-C.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+use std::{mem, process};
+
+use leafdyn::relax::Limit;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+/// Between two looks for signals and at how far a run has come.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// How long a run that was cancelled is waited for. It ends by itself later if this is too short.
+const FAREWELL: Duration = Duration::from_millis(50);
+
+/// Most threads that can be asked for.
+const MOST_THREADS: usize = 1024;
+
+/// The threads that compute. A process that was forked has none of its parent's and makes new ones.
+struct Pool {
+    process: u32,
+    threads: Arc<ThreadPool>,
+}
+
+static POOL: Mutex<Option<Pool>> = Mutex::new(None);
+
+fn pool(wanted: Option<usize>) -> PyResult<Arc<ThreadPool>> {
+    let mut pool = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    let process = process::id();
+    if let (Some(known), None) = (&*pool, wanted)
+        && known.process == process
+    {
+        return Ok(known.threads.clone());
+    }
+    // Left out, the number is that of RAYON_NUM_THREADS, or of the processors.
+    let threads = ThreadPoolBuilder::new()
+        .num_threads(wanted.unwrap_or(0))
+        .thread_name(|_| "leafdyn".into())
+        .build();
+    let threads = threads.map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
+    let threads = Arc::new(threads);
+    let new = Pool {
+        process,
+        threads: threads.clone(),
+    };
+    if let Some(old) = pool.replace(new)
+        && old.process != process
+    {
+        // Its threads are those of another process and cannot be told to end.
+        mem::forget(old);
+    }
+    Ok(threads)
+}
+
+/// Compute on so many threads from now on.
+#[pyfunction]
+pub fn set_threads(count: usize) -> PyResult<()> {
+    if !(1..=MOST_THREADS).contains(&count) {
+        let message = format!("threads = {count}: allowed are 1 to {MOST_THREADS}");
+        return Err(PyValueError::new_err(message));
+    }
+    pool(Some(count)).map(drop)
+}
+
+/// The number of threads that compute.
+#[pyfunction]
+pub fn threads() -> PyResult<usize> {
+    Ok(pool(None)?.current_num_threads())
+}
+
+/// Panics in a computation: for the tests.
+#[pyfunction]
+pub fn panic_on_purpose(py: Python) -> PyResult<()> {
+    run(py, None, |_| panic!("on purpose"))
+}
+
+/// How far a run has come: how much is done, of how much if that is known, and in words.
+type Said = (f64, Option<f64>, String);
+
+/// What a run and the thread that waits for it have in common.
+#[derive(Default)]
+pub struct Monitor {
+    heard: bool,
+    said: Mutex<Option<Said>>,
+    cancel: Arc<AtomicBool>,
+}
+
+impl Monitor {
+    /// The limit that is reached when the run is cancelled.
+    pub fn limit(&self) -> Limit {
+        Limit {
+            cancel: Some(self.cancel.clone()),
+            ..Limit::default()
+        }
+    }
+
+    pub fn cancelled(&self) -> bool {
+        self.cancel.load(Ordering::Relaxed)
+    }
+
+    /// Says how far the run has come, if anybody hears it.
+    pub fn say(&self, done: f64, total: Option<f64>, words: impl FnOnce() -> String) {
+        if self.heard {
+            *self.said() = Some((done, total, words()));
+        }
+    }
+
+    /// As [`Monitor::say`], for what has no limit: ends the run here if it was cancelled.
+    pub fn say_or_end(&self, done: f64, total: Option<f64>, words: impl FnOnce() -> String) {
+        if self.cancelled() {
+            // Nobody waits for it. No message is printed of what is resumed.
+            resume_unwind(Box::new("cancelled"));
+        }
+        self.say(done, total, words);
+    }
+
+    fn said(&self) -> MutexGuard<'_, Option<Said>> {
+        self.said.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn tell(&self, progress: Option<&Bound<PyAny>>) -> PyResult<()> {
+        let said = self.said().take();
+        if let (Some(progress), Some(said)) = (progress, said) {
+            progress.call1(said)?;
+        }
+        Ok(())
+    }
+}
+
+/// Does `work` on the pool. Ctrl-C, and an exception of `progress`, cancel it.
+pub fn run<T: Send + 'static>(
+    py: Python,
+    progress: Option<&Bound<PyAny>>,
+    work: impl FnOnce(&Monitor) -> T + Send + 'static,
+) -> PyResult<T> {
+    let monitor = Arc::new(Monitor {
+        heard: progress.is_some(),
+        ..Monitor::default()
+    });
+    let (done, mut result) = sync_channel(1);
+    let seen = monitor.clone();
+    pool(None)?.spawn(move || {
+        let found = catch_unwind(AssertUnwindSafe(|| work(&seen)));
+        // After Ctrl-C nobody may wait for it.
+        let _ = done.send(found);
+    });
+    loop {
+        let received;
+        (received, result) = py.detach(move || (result.recv_timeout(LOOK), result));
+        match received {
+            Ok(Ok(found)) => {
+                monitor.tell(progress)?;
+                return Ok(found);
+            }
+            Ok(Err(panic)) => return Err(panicked(&*panic)),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return Err(panicked(&"a thread ended")),
+        }
+        if let Err(stop) = py.check_signals().and_then(|()| monitor.tell(progress)) {
+            monitor.cancel.store(true, Ordering::Relaxed);
+            py.detach(move || {
+                let _ = result.recv_timeout(FAREWELL);
+            });
+            return Err(stop);
+        }
+    }
+}
+
+/// A fault of this program as an exception.
+fn panicked(panic: &(dyn Any + Send)) -> PyErr {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+    let text = text.unwrap_or("no message");
+    PyRuntimeError::new_err(format!(
+        "leafdyn panicked, which is a fault of its own: {text}"
+    ))
+}
+
+/// The time on the clock since something began, in words.
+pub fn elapsed(clock: Instant) -> String {
+    format!("{:.0} s", clock.elapsed().as_secs_f64())
+}

@@ -1,0 +1,108 @@
+"""What is refused arrives as a ScenarioError with the program's message."""
+
+import pickle
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from leaves import fan, program
+
+import leafdyn
+
+HOSTILE = Path(__file__).parents[2] / "tests" / "hostile_scenarios.rs"
+TEXT = r'"((?:[^"\\]|\\.)*)"'
+
+
+def unescape(text: str) -> str:
+    return re.sub(r"\\\n\s*", "", text).replace('\\"', '"').replace("\\n", "\n").replace("\\\\", "\\")
+
+
+def hostile() -> tuple[str, list[tuple[str, list[str]]]]:
+    """The valid scenario of the tests in Rust, and every line that they put into it with parts of the message."""
+    source = HOSTILE.read_text()
+    valid = source.split('r#"', 1)[1].split('"#', 1)[0]
+    rows = []
+    for table in re.findall(r"each! \{ refused;\n(.*?)\n    \}", source, re.S):
+        for row in re.finditer(rf"{TEXT}\s*=>\s*((?:{TEXT}\s*,?\s*)+);", table):
+            parts = [unescape(part) for part in re.findall(TEXT, row.group(2))]
+            rows.append((unescape(row.group(1)), parts))
+    return valid, rows
+
+
+VALID, ROWS = hostile()
+
+
+def test_the_rows_are_found() -> None:
+    assert len(ROWS) > 40
+
+
+@pytest.mark.parametrize("line, parts", ROWS, ids=[line[:40] for line, _ in ROWS])
+def test_every_hostile_line(line: str, parts: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    key = line.split("=")[0]
+    before = next(text for text in VALID.splitlines() if text.startswith(key))
+    (tmp_path / "leaf.toml").write_text(VALID.replace(before, line, 1))
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(leafdyn.ScenarioError) as refused:
+        leafdyn.relax("leaf.toml")
+    for part in parts:
+        assert part in str(refused.value)
+    assert isinstance(refused.value, ValueError)
+
+
+def test_key_line_and_remedy() -> None:
+    leaf = fan(3)
+    leaf["stiffness"]["torsion"] = -1.0
+    with pytest.raises(leafdyn.ScenarioError) as refused:
+        leafdyn.relax(leaf)
+    error = refused.value
+    assert (error.key, error.file, error.remedy) == ("stiffness.torsion", "scenario", "must be greater than 0")
+    assert error.line is not None
+    assert leafdyn.Scenario(fan(3)).text.splitlines()[error.line - 1] == "torsion = 1.0"
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.key, again.line, again.remedy) == (str(error), error.key, error.line, error.remedy)
+
+
+def test_the_message_is_that_of_the_program(tmp_path: Path) -> None:
+    file = tmp_path / "fan.toml"
+    file.write_text(leafdyn.Scenario(fan(3)).text)
+    for entry in ["leaf.rods=0", "stiffness.torsoin=1", "load.gravity=[0, 1]", "leaf.fan=3.5"]:
+        key, value = entry.split("=")
+        with pytest.raises(leafdyn.ScenarioError) as refused:
+            leafdyn.relax(file, set={key: eval(value)})
+        told = program("relax", file, "--set", f"{key}={value}", "--out", tmp_path / "out")
+        assert told.returncode == 2
+        assert told.stderr == f"error: {refused.value}\n"
+
+
+@pytest.mark.parametrize(
+    "entry", [None, object(), {1, 2}, 1j, b"text", {1: 2}, [[[[[[[[[[1]]]]]]]]]], float("nan"), 10**30, "\x00", ""]
+)
+def test_what_no_scenario_can_hold(entry: Any) -> None:
+    leaf = fan(3)
+    leaf["stiffness"]["torsion"] = entry
+    with pytest.raises(leafdyn.ScenarioError, match="torsion"):
+        leafdyn.relax(leaf)
+    with pytest.raises(leafdyn.ScenarioError):
+        leafdyn.relax(fan(3), set={"stiffness.torsion": entry})
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    with pytest.raises(leafdyn.ScenarioError, match="cannot be read"):
+        leafdyn.relax(tmp_path / "none.toml")
+    with pytest.raises(leafdyn.ScenarioError, match="is a folder"):
+        leafdyn.relax(tmp_path)
+    (tmp_path / "latin.toml").write_bytes(b'name = "\xe9"')
+    with pytest.raises(leafdyn.ScenarioError, match="UTF-8"):
+        leafdyn.relax(tmp_path / "latin.toml")
+
+
+def test_one_refused_of_many_is_said_before_any_is_solved() -> None:
+    with pytest.raises(leafdyn.ScenarioError, match="leaf.rods"):
+        leafdyn.relax_many([fan(3), fan(0)])
+
+
+def test_a_fault_of_the_program_is_an_exception(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(RuntimeError, match="panicked.*on purpose"):
+        leafdyn._leafdyn.panic_on_purpose()
+    assert leafdyn.relax(fan(2)).stable

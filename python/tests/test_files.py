@@ -1,0 +1,149 @@
+"""The package and the program find the same, file by file."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from leaves import fan, program
+
+import leafdyn
+
+SCENARIOS = sorted(Path(__file__).parents[2].glob("scenarios/*/*.toml"))
+TIMES = {"wall_seconds", "version"}
+
+
+def without_times(found: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in found.items() if key not in TIMES}
+
+
+def column(rows: list[dict[str, str]], names: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    return np.array([[float(row[name]) for name in names.split()] for row in rows])
+
+
+@pytest.mark.filterwarnings("ignore::leafdyn.LeafWarning")
+@pytest.mark.parametrize("file", SCENARIOS, ids=lambda file: file.stem)
+def test_every_scenario_by_both_roads(file: Path, tmp_path: Path) -> None:
+    told = program("relax", file, "--out", tmp_path)
+    leaf = leafdyn.relax(file, modes=3)
+    assert told.returncode == (0 if leaf.success else 1), told.stderr
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert without_times(leaf.to_dict()) == without_times(summary)
+    assert (leaf.outcome, leaf.stable, leaf.energy) == (summary["outcome"], summary["stable"], summary["energy"])
+    assert leaf.error_estimate == summary["error_estimate"]
+    if leaf.eigenvalues is not None:
+        assert leaf.eigenvalues.tolist() == summary["lowest_eigenvalues"]
+    table = (tmp_path / "centerlines.csv").read_bytes()
+    rows = list(csv.DictReader(table.decode().splitlines()))
+    for name, columns in [
+        ("positions", "x y z"),
+        ("rotations", "qw qx qy qz"),
+        ("strains", "v1 v2 v3"),
+        ("curvatures", "u1 u2 u3"),
+        ("forces", "n1 n2 n3"),
+        ("moments", "m1 m2 m3"),
+    ]:
+        array = getattr(leaf, name)
+        wanted = column(rows, columns).reshape(array.shape)
+        # To the bit: zeros have their signs.
+        assert array.tobytes() == wanted.tobytes(), name
+    assert np.array_equal(np.array(summary["positions"]), leaf.positions)
+
+
+def test_saved_files_are_those_of_the_program(tmp_path: Path) -> None:
+    file = tmp_path / "fan.toml"
+    file.write_text(leafdyn.Scenario(fan(3)).text)
+    assert program("relax", file, "--out", tmp_path / "program").returncode == 0
+    written = leafdyn.relax(file, modes=3).save(tmp_path / "package")
+    for path in written:
+        other = tmp_path / "program" / path.name
+        if path.suffix == ".json":
+            assert without_times(json.loads(path.read_text())) == without_times(json.loads(other.read_text()))
+        else:
+            assert path.read_bytes() == other.read_bytes()
+    assert {path.name for path in written} >= {"summary.json", "centerlines.csv", "figure.svg", "figure.png"}
+    assert not list((tmp_path / "package").glob(".*"))
+
+
+def test_only_what_is_asked_for_is_written(tmp_path: Path) -> None:
+    leaf = leafdyn.relax(fan(2))
+    assert [path.suffix for path in leaf.save(tmp_path / "a", write="json")] == [".json"]
+    assert {path.suffix for path in leaf.save(tmp_path / "b", write=["csv", "svg"])} == {".csv", ".svg"}
+    assert leaf.save(tmp_path / "c", write="none") == []
+    with pytest.raises(ValueError, match="write = gif: must be of json, csv"):
+        leaf.save(tmp_path / "d", write="json,gif")
+
+
+def test_a_motion_by_both_roads(tmp_path: Path) -> None:
+    file = Path("scenarios/motion/swing.toml")
+    assert program("simulate", file, "--set", "dynamics.duration=1", "--out", tmp_path / "program").returncode == 0
+    motion = leafdyn.simulate(file, set={"dynamics.duration": 1})
+    written = motion.save(tmp_path / "package")
+    assert {path.name for path in written} >= {"motion.csv", "energy.csv", "filmstrip.svg"}
+    for path in written:
+        if path.suffix != ".json":
+            assert path.read_bytes() == (tmp_path / "program" / path.name).read_bytes(), path.name
+    rows = list(csv.DictReader((tmp_path / "program" / "motion.csv").read_text().splitlines()))
+    for array, columns in [
+        (motion.positions, "x y z"),
+        (motion.rotations, "qw qx qy qz"),
+        (motion.velocities, "vx vy vz"),
+        (motion.angular_velocities, "wx wy wz"),
+    ]:
+        assert array.tobytes() == column(rows, columns).tobytes()
+    energies = list(csv.DictReader((tmp_path / "program" / "energy.csv").read_text().splitlines()))
+    assert np.array_equal(motion.energies["kinetic"], column(energies, "kinetic")[:, 0])
+    assert np.array_equal(motion.times, column(energies, "time")[:, 0])
+    one_by_one = list(leafdyn.frames(file, set={"dynamics.duration": 1}))
+    assert np.array_equal([frame.positions for frame in one_by_one], motion.positions)
+    assert {path.suffix for path in motion.save(tmp_path / "c", write="csv")} == {".csv"}
+
+
+def test_a_check_a_trace_and_all_shapes_by_both_roads(tmp_path: Path) -> None:
+    file = tmp_path / "fan.toml"
+    file.write_text(leafdyn.Scenario(fan(3)).text)
+
+    def told(verb: str, *more: str) -> dict[str, Any]:
+        answer = program(verb, file, *more, "--json", "--out", tmp_path / verb)
+        found: dict[str, Any] = json.loads(answer.stdout)
+        return found
+
+    def alike(one: Any, other: Any) -> None:
+        if isinstance(one, dict):
+            for key in one.keys() - TIMES:
+                alike(one[key], other[key])
+        else:
+            assert one == other
+
+    check = leafdyn.check(file)
+    alike(check.to_dict(), told("check"))
+    assert check.agree
+    assert check.positions is not None
+    trace = leafdyn.trace(file, "load.gravity[2]=-1..-3:5")
+    alike(trace.to_dict(), told("trace", "--vary", "load.gravity[2]=-1..-3:5"))
+    (branch,) = trace.branches
+    assert len(branch.curves) == len(branch.values) == len(branch.tips)
+    assert branch.curves[0].shape[0] == 3
+    assert trace.columns["value"][0] == -1.0
+    shapes = leafdyn.all_shapes(file, tolerance=1e-4)
+    alike(shapes.to_dict(), told("relax", "--all", "--tolerance", "1e-4"))
+    assert shapes.starts.sum() + shapes.failed == shapes.to_dict()["starts"]
+
+
+def test_a_map_and_a_chart() -> None:
+    vary = ["load.gravity[2]=-1..-4:2", "stiffness.torsion=0.1..1:2"]
+    found = leafdyn.map(fan(2), vary, methods=["semi-implicit", "shooting"])
+    columns = found.columns
+    assert len(columns["outcome"]) == 8
+    assert set(columns["method"]) == {"semi-implicit", "shooting"}
+    assert columns["tip_z"].dtype == np.float64
+    assert (columns["outcome"] == "right").all()
+    chart = leafdyn.chart(fan(2), seconds=0.2, methods=["semi-implicit"])
+    assert chart.confirmed
+    assert np.nanmin(chart.columns["seconds"]) > 0
+    with pytest.raises(ValueError, match="methods = newton"):
+        leafdyn.chart(fan(2), methods=["newton"])
+    with pytest.raises(ValueError, match="KEY=FROM"):
+        leafdyn.map(fan(2), "load.gravity")

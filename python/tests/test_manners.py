@@ -1,0 +1,170 @@
+"""How computations behave towards the interpreter that waits for them."""
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from leaves import fan
+
+import leafdyn
+
+FIG10 = "scenarios/paper/fig10.toml"
+
+LONG: dict[str, Callable[[], Any]] = {
+    "relax": lambda: leafdyn.relax(fan(3000), tolerance=1e-9),
+    "explicit": lambda: leafdyn.relax(fan(50), tolerance=1e-10, method="explicit"),
+    "shooting": lambda: leafdyn.relax(fan(60), tolerance=1e-10, method="shooting"),
+    "relax_many": lambda: leafdyn.relax_many([fan(5)] * 20_000),
+    "check": lambda: leafdyn.check(fan(60), tolerance=1e-10),
+    "all_shapes": lambda: leafdyn.all_shapes(FIG10, tolerance=1e-7),
+    "trace": lambda: leafdyn.trace(FIG10, "load.gravity[2]=-0.01..-3", set={"leaf.rods": 9}, switch=True),
+    "simulate": lambda: leafdyn.simulate(fan(20), set={"dynamics.duration": 1e5, "dynamics.output_interval": 1.0}),
+    "map": lambda: leafdyn.map(fan(9), ["load.gravity[2]=-1..-9:40", "stiffness.torsion=0.01..1:40"]),
+    "chart": lambda: leafdyn.chart(fan(21), seconds=60.0),
+}
+
+
+def time_to_stop(run: Callable[[], Any]) -> float:
+    sent = []
+
+    def send() -> None:
+        sent.append(time.perf_counter())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Timer(0.3, send)
+    timer.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            run()
+            timer.cancel()
+    finally:
+        timer.cancel()
+    return time.perf_counter() - sent[0]
+
+
+@pytest.mark.filterwarnings("ignore::leafdyn.LeafWarning")
+@pytest.mark.parametrize("verb", LONG)
+def test_ctrl_c_ends_every_run_within_a_tenth_of_a_second(verb: str) -> None:
+    # Of three: another process may have the processor.
+    assert min(time_to_stop(LONG[verb]) for _ in range(3)) < 0.1
+    # Nothing goes on behind the interpreter's back for long.
+    deadline = time.monotonic() + 20
+    while time.monotonic() < deadline:
+        before = time.process_time()
+        time.sleep(0.2)
+        if time.process_time() - before < 0.05:
+            break
+    else:
+        pytest.fail("the run goes on")
+    assert leafdyn.relax(fan(2)).stable
+
+
+def test_the_lock_is_released() -> None:
+    beats = []
+    stop = threading.Event()
+
+    def beat() -> None:
+        while not stop.is_set():
+            beats.append(time.perf_counter())
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=beat)
+    thread.start()
+    begin = time.perf_counter()
+    leafdyn.relax_many([fan(9)] * 300)
+    end = time.perf_counter()
+    stop.set()
+    thread.join()
+    during = [beat for beat in beats if begin < beat < end]
+    assert len(during) > 0.2 * (end - begin) / 0.01
+
+
+def test_threads_of_python_may_call_at_the_same_time() -> None:
+    wanted = leafdyn.relax(fan(5)).positions
+    found: list[Any] = []
+    threads = [threading.Thread(target=lambda: found.append(leafdyn.relax(fan(5)).positions)) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == 8
+    assert all(np.array_equal(positions, wanted) for positions in found)
+
+
+def test_progress_is_told() -> None:
+    told: list[tuple[float, float | None, str]] = []
+    leafdyn.relax_many([fan(9)] * 400, progress=lambda *said: told.append(said))
+    assert told
+    assert told[-1][:2] == (400.0, 400.0)
+    assert [done for done, _, _ in told] == sorted(done for done, _, _ in told)
+    told.clear()
+    leafdyn.relax(fan(300), tolerance=1e-9, progress=lambda *said: told.append(said))
+    assert "segments a vein" in told[-1][2]
+
+
+def test_an_exception_of_the_listener_ends_the_run() -> None:
+    def listen(done: float, total: float | None, text: str) -> None:
+        raise LookupError(text)
+
+    begin = time.perf_counter()
+    with pytest.raises(LookupError, match="of 20000 leaves"):
+        leafdyn.relax_many([leafdyn.Scenario(fan(5))] * 20_000, progress=listen)
+    assert time.perf_counter() - begin < 5
+
+
+def test_a_bar_if_asked(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("tqdm")
+    leaves = leafdyn.relax_many([fan(9)] * 200, progress=True)
+    assert len(leaves) == 200
+
+
+def test_the_number_of_threads() -> None:
+    before = leafdyn.threads()
+    wanted = leafdyn.relax(fan(60)).positions
+    try:
+        for count in (1, 3):
+            leafdyn.set_threads(count)
+            assert leafdyn.threads() == count
+            assert np.array_equal(leafdyn.relax(fan(60)).positions, wanted)
+    finally:
+        leafdyn.set_threads(before)
+    with pytest.raises(ValueError, match="threads = 0: allowed are 1 to"):
+        leafdyn.set_threads(0)
+    said = subprocess.run(
+        [sys.executable, "-c", "import leafdyn; print(leafdyn.threads())"],
+        env={**os.environ, "RAYON_NUM_THREADS": "5"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert said.stdout == "5\n"
+
+
+def forked(queue: Any) -> None:
+    queue.put(leafdyn.relax(fan(5)).positions)
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_other_processes_compute_too(method: str) -> None:
+    wanted = leafdyn.relax(fan(5)).positions
+    context = multiprocessing.get_context(method)
+    queue = context.Queue()
+    process = context.Process(target=forked, args=(queue,))
+    process.start()
+    assert np.array_equal(queue.get(timeout=60), wanted)
+    process.join(timeout=60)
+    assert process.exitcode == 0
+
+
+def test_the_program_is_there() -> None:
+    said = subprocess.run(["leafdyn", "--version"], capture_output=True, text=True, check=True)
+    assert said.stdout == f"leafdyn {leafdyn.__version__}\n"

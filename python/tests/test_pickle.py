@@ -1,0 +1,63 @@
+"""Results, scenarios and exceptions travel."""
+
+import copy
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from leaves import fan
+
+import leafdyn
+
+
+def travelled(thing: Any) -> Any:
+    return pickle.loads(pickle.dumps(thing))
+
+
+def test_a_scenario() -> None:
+    scenario = leafdyn.Scenario(fan(3), set={"leaf.rods": 4})
+    again = travelled(scenario)
+    assert again == scenario
+    assert hash(again) == hash(scenario)
+    assert (again.name, again.rods, again.text) == (scenario.name, 4, scenario.text)
+    assert copy.deepcopy(scenario) == scenario
+    assert again != leafdyn.Scenario(fan(3))
+
+
+def same(one: leafdyn.Equilibrium, other: leafdyn.Equilibrium) -> None:
+    for name in ("positions", "rotations", "strains", "curvatures", "forces", "moments", "stations", "tips", "curves"):
+        assert np.array_equal(getattr(one, name), getattr(other, name)), name
+    assert repr(one) == repr(other)
+    assert one.to_dict() == other.to_dict()
+    assert (one.energy, one.segments, one.wall_seconds) == (other.energy, other.segments, other.wall_seconds)
+
+
+def test_a_leaf_with_its_figure() -> None:
+    leaf = leafdyn.relax(fan(4), tolerance=1e-7)
+    once = travelled(leaf)
+    same(leaf, once)
+    same(leaf, travelled(once))
+    assert once.figure() == leaf.figure()
+    assert len(pickle.dumps(leaf)) < 60_000
+    modes = leafdyn.modes(fan(2), 2)
+    assert np.array_equal(travelled(modes).mode_displacements, modes.mode_displacements)
+    assert np.array_equal(travelled(modes).frequencies, modes.frequencies)
+
+
+def test_every_other_result(tmp_path: Path) -> None:
+    check = leafdyn.check(fan(2))
+    shapes = leafdyn.all_shapes(fan(2), tolerance=1e-4)
+    trace = leafdyn.trace(fan(2), "load.gravity[2]=-1..-2:3")
+    motion = leafdyn.simulate(fan(2), set={"dynamics.duration": 0.2})
+    found = leafdyn.map(fan(2), "load.gravity[2]=-1..-2:2", methods=["semi-implicit"])
+    for number, result in enumerate([check, shapes, trace, motion, found]):
+        again = travelled(result)
+        assert repr(again) == repr(result)
+        assert again.to_dict() == result.to_dict()
+        assert again.figure() == result.figure()
+        written = again.save(tmp_path / str(number))
+        assert {file.suffix for file in written} >= {".json", ".svg", ".png"}
+    same(shapes[0], travelled(shapes)[0])
+    assert np.array_equal(travelled(motion).positions, motion.positions)
+    assert np.array_equal(travelled(trace).branches[0].tips, trace.branches[0].tips)

@@ -1,0 +1,148 @@
+"""A leaf at rest: what it can be asked with, and what it holds."""
+
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+from leaves import fan
+
+import leafdyn
+
+
+def test_shapes_and_kinds() -> None:
+    leaf = leafdyn.relax(fan(5))
+    count = len(leaf.stations)
+    for name, components in [
+        ("positions", 3),
+        ("rotations", 4),
+        ("strains", 3),
+        ("curvatures", 3),
+        ("forces", 3),
+        ("moments", 3),
+    ]:
+        array = getattr(leaf, name)
+        assert array.shape == (5, count, components), name
+        assert array.dtype == np.float64
+        assert array.flags.c_contiguous
+        assert getattr(leaf, name) is array
+    assert leaf.tip is not None
+    assert leaf.tip.shape == (3,)
+    assert np.array_equal(leaf.positions[2, -1], leaf.tip)
+    assert (leaf.stations[0], leaf.stations[-1]) == (0.0, 1.0)
+    assert np.allclose(np.linalg.norm(leaf.rotations, axis=-1), 1.0, atol=1e-14)
+    # Weight and reaction: all that hangs on the base.
+    axial = leaf.forces[:, 0]
+    assert np.isfinite(axial).all()
+    assert leaf.stable is True
+    assert leaf.negative_eigenvalues == 0
+
+
+def test_free_tips() -> None:
+    leaf = leafdyn.relax(fan(3), set={"leaf.joined": False})
+    assert leaf.tip is None
+    assert leaf.tips.shape == (3, 3)
+    assert np.array_equal(leaf.tips, leaf.positions[:, -1])
+
+
+def test_every_form_of_a_scenario_gives_the_same_leaf(tmp_path: Path) -> None:
+    as_dict = fan(4)
+    wanted = leafdyn.relax(as_dict)
+    text = leafdyn.Scenario(as_dict).text
+    file = tmp_path / "fan.toml"
+    file.write_text(text)
+    arrays = fan(4)
+    arrays["load"] = {"gravity": np.array([0.0, 0.0, -1.0])}
+    arrays["leaf"]["rods"] = np.int64(4)
+    arrays["stiffness"]["torsion"] = np.float32(1.0)
+    arrays["stiffness"]["bending_2"] = np.ones(4)
+    for source in [text, file, str(file), leafdyn.Scenario(file), arrays, MappingProxyType(as_dict)]:
+        leaf = leafdyn.relax(source)
+        assert np.array_equal(leaf.positions, wanted.positions), source
+
+
+def test_numbers_of_a_dict_keep_every_digit() -> None:
+    for number in [1.0 / 3.0, np.float64(2.0 / 3.0), np.nextafter(1.0, 2.0), 2, np.pi]:
+        leaf = {**fan(3), "leaf": {"rods": 3, "length": [1.0, number, 2.0], "fan": "paper"}}
+        assert leafdyn.Scenario(leaf).lengths[1] == number
+    for number in [1e-7, 1e-12, np.nextafter(1e-3, 1.0)]:
+        assert leafdyn.Scenario({**fan(3), "solve": {"tolerance": number}}).tolerance == number
+
+
+def test_replaced_entries_hold_and_add_up() -> None:
+    base = leafdyn.Scenario(fan(3), set={"leaf.rods": 4})
+    assert base.rods == 4
+    again = leafdyn.Scenario(base, set={"leaf.fan": "symmetric", "leaf.joined": False})
+    assert (again.rods, again.joined) == (4, False)
+    assert again.overrides == ["leaf.rods=4", 'leaf.fan="symmetric"', "leaf.joined=false"]
+    direct = fan(4)
+    direct["leaf"] |= {"fan": "symmetric", "joined": False}
+    assert np.array_equal(leafdyn.relax(again).positions, leafdyn.relax(direct).positions)
+
+
+def test_many_are_the_same_as_one_by_one() -> None:
+    scenarios = [leafdyn.Scenario(fan(5, gravity=weight)) for weight in np.linspace(0.0, 3.0, 12)]
+    together = leafdyn.relax_many(scenarios, tolerance=1e-7)
+    for scenario, leaf in zip(scenarios, together):
+        assert np.array_equal(leaf.positions, leafdyn.relax(scenario, tolerance=1e-7).positions)
+    assert leafdyn.relax_many([]) == []
+
+
+def test_methods_agree() -> None:
+    found = {method: leafdyn.relax(fan(2), method=method) for method in ("semi-implicit", "shooting", "explicit")}
+    tips = np.array([leaf.tip for leaf in found.values()])
+    assert np.ptp(tips, axis=0).max() < 3e-6
+    assert [leaf.method for leaf in found.values()] == list(found)
+
+
+def test_one_grid_has_no_error_estimate() -> None:
+    leaf = leafdyn.relax(fan(3), segments=10)
+    assert leaf.error_estimate is None
+    assert leaf.segments == [10]
+    assert leaf.positions.shape == (3, 11, 3)
+
+
+def test_modes() -> None:
+    leaf = leafdyn.modes(fan(3), 4)
+    assert leaf.frequencies is not None
+    assert leaf.frequencies.shape == (4,)
+    assert np.all(np.diff(leaf.frequencies) >= 0)
+    assert leaf.mode_displacements.shape == (4, *leaf.curves.shape)
+    # The base is held.
+    assert not leaf.mode_displacements[:, :, 0].any()
+    assert leafdyn.relax(fan(3)).frequencies is None
+
+
+@pytest.mark.parametrize(
+    "request_, part",
+    [
+        ({"tolerance": 0.0}, "tolerance = 0: allowed are"),
+        ({"method": "newton"}, "method = newton: must be one of semi-implicit, "),
+        ({"segments": 3, "method": "shooting"}, "shooting has no grid"),
+        ({"intervals": 3}, "only the method shooting has intervals"),
+        ({"keep_unstable": True, "method": "explicit"}, "keep_unstable: "),
+        ({"segments": 10**9}, "nodes"),
+    ],
+)
+def test_requests_that_cannot_be_met(request_: dict[str, object], part: str) -> None:
+    with pytest.raises(ValueError) as refused:  # noqa: PT011
+        leafdyn.relax(fan(3), **request_)  # type: ignore[arg-type]
+    assert part in str(refused.value)
+    assert "--" not in str(refused.value)
+
+
+def test_a_run_that_ends_otherwise_is_a_result_and_a_warning() -> None:
+    with pytest.warns(leafdyn.LeafWarning, match="allowed, do not reach the tolerance|no step lowers|rounding"):
+        leaf = leafdyn.relax(fan(3), tolerance=1e-12, set={"load.gravity": [0, 0, -1000.0]})
+    assert not leaf.success
+    assert leaf.remark is not None
+    assert leaf.outcome in repr(leaf)
+
+
+def test_repr_says_what_matters() -> None:
+    leaf = leafdyn.relax(fan(5))
+    assert leaf.tip is not None
+    words = repr(leaf)
+    assert words.startswith("<Equilibrium fan: stable, tip (")
+    assert f"{leaf.error_estimate:.1e}" in words
+    assert f"{leaf.tip[0]:.5g}" in words
