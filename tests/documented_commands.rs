@@ -1,5 +1,5 @@
 //! What the README and the pages of `docs` show can be done: every command runs,
-//! here or in one of two scripts, prints what the page says, and links lead
+//! here or in one of three scripts, prints what the page says, and links lead
 //! somewhere.
 
 use std::collections::HashSet;
@@ -11,7 +11,7 @@ use std::process::Command;
 use tempfile::TempDir;
 
 /// Scripts that run what takes long or needs other programs.
-const SCRIPTS: [&str; 2] = ["docs/draw.sh", "benches/measure.sh"];
+const SCRIPTS: [&str; 3] = ["docs/draw.sh", "benches/measure.sh", "python/test.sh"];
 
 /// The command of which this test is a part.
 const TESTS: &str = "cargo test --release";

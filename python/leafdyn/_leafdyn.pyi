@@ -9,6 +9,27 @@ from numpy.typing import NDArray
 _Array: TypeAlias = NDArray[np.float64]
 _Heard: TypeAlias = Callable[[float, float | None, str], object] | None
 
+__all__ = [
+    "Files",
+    "Leaf",
+    "Motion",
+    "Scenario",
+    "__version__",
+    "all_shapes",
+    "chart",
+    "check",
+    "library_seconds",
+    "main",
+    "map",
+    "overrides",
+    "panic_on_purpose",
+    "relax",
+    "relax_many",
+    "set_threads",
+    "threads",
+    "trace",
+]
+
 __version__: str
 
 def set_threads(count: int) -> None:

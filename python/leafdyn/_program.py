@@ -10,7 +10,3 @@ from . import _leafdyn
 def main() -> int:
     """Do what the arguments of the process ask for, and return the exit status."""
     return _leafdyn.main(["leafdyn", *sys.argv[1:]])
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -41,6 +41,7 @@ class Scenario:
     """
 
     __slots__ = ("_core",)
+    _core: _leafdyn.Scenario
 
     def __init__(self, source: Source, set: Mapping[str, Any] | None = None) -> None:
         entries = _leafdyn.overrides(set) if set else []

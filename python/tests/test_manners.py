@@ -1,5 +1,6 @@
 """How computations behave towards the interpreter that waits for them."""
 
+import importlib.metadata
 import multiprocessing
 import os
 import signal
@@ -8,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -166,5 +168,10 @@ def test_other_processes_compute_too(method: str) -> None:
 
 
 def test_the_program_is_there() -> None:
-    said = subprocess.run(["leafdyn", "--version"], capture_output=True, text=True, check=True)
+    try:
+        importlib.metadata.distribution("leafdyn")
+    except importlib.metadata.PackageNotFoundError:
+        pytest.skip("the package is not installed")
+    command = Path(sys.executable).with_name("leafdyn")
+    said = subprocess.run([command, "--version"], capture_output=True, text=True, check=True)
     assert said.stdout == f"leafdyn {leafdyn.__version__}\n"

@@ -1,0 +1,19 @@
+#!/usr/bin/env bash
+# The package for Python: built as one wheel, installed as users do it, and tested.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+python3 -m venv --clear target/venv
+PATH="$PWD/target/venv/bin:$PATH"
+pip install --quiet ./python
+pip install --quiet maturin pytest mypy matplotlib tqdm pandas "dask[distributed]" nbmake ipykernel
+# The wheel is one for all versions of Python.
+rm -rf target/wheels
+maturin build --release --locked --quiet --manifest-path python/Cargo.toml --out target/wheels
+test "$(ls target/wheels/*cp310-abi3*.whl | wc -l)" = 1
+
+cd python
+pytest
+pytest --nbmake examples
+mypy leafdyn examples
+python -m mypy.stubtest leafdyn --mypy-config-file pyproject.toml --ignore-missing-stub
