@@ -17,10 +17,11 @@ from ._errors import LeafWarning, ScenarioError
 from ._leaf import Equilibrium
 from ._leafdyn import __version__, set_threads, threads
 from ._motion import Frame, Motion
-from ._result import Result
+from ._relax import modes, relax, relax_many
+from ._result import Result, Table
 from ._scenario import Scenario, Source
 from ._study import Branch, Chart, Check, Map, Shapes, Trace
-from ._verbs import all_shapes, chart, check, frames, map, modes, relax, relax_many, simulate, trace
+from ._verbs import all_shapes, chart, check, frames, map, simulate, trace
 
 __all__ = [
     "Branch",
@@ -36,6 +37,7 @@ __all__ = [
     "ScenarioError",
     "Shapes",
     "Source",
+    "Table",
     "Trace",
     "__version__",
     "all_shapes",

@@ -165,5 +165,9 @@ def map(
     progress: _Heard,
 ) -> Files: ...
 def chart(
-    scenario: Scenario, seconds: float | None, methods: Sequence[str] | None, progress: _Heard
-) -> tuple[Files, bool, list[str]]: ...
+    scenario: Scenario,
+    seconds: float | None,
+    methods: Sequence[str] | None,
+    leaves: Sequence[Scenario],
+    progress: _Heard,
+) -> tuple[Files, Files | None, bool, list[str]]: ...

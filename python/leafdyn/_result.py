@@ -92,8 +92,11 @@ class Result:
         return {**self.__dict__, "_files": keep(self._files)}
 
 
-class Tabular(Result):
+class Table(Result):
     """A result with a table."""
+
+    def __init__(self, files: Contents) -> None:
+        self._files = files
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._leaf import Array, Equilibrium
-from ._result import Contents, Result, Tabular
+from ._result import Contents, Result, Table
 
 
 class Check(Result):
@@ -138,7 +138,7 @@ class Branch:
         return f"<Branch: {len(self.values)} points, {len(self.critical)} critical, {self.end}>"
 
 
-class Trace(Tabular):
+class Trace(Table):
     """An equilibrium followed through a number of its scenario."""
 
     complete: bool
@@ -185,17 +185,14 @@ class Trace(Tabular):
         return f"<Trace {self.name} over {self.vary}: {count} branch{'es' * (count != 1)}, {ends}>"
 
 
-class Map(Tabular):
+class Map(Table):
     """Every method in every cell of one or two numbers, as ``map.csv`` has it: a row a cell and method."""
-
-    def __init__(self, files: Contents) -> None:
-        self._files = files
 
     def __repr__(self) -> str:
         return f"<Map: {len(self.columns['method'])} rows>"
 
 
-class Chart(Tabular):
+class Chart(Table):
     """Speed against accuracy, as ``chart.csv`` has it: a row a method and setting."""
 
     confirmed: bool
@@ -203,8 +200,12 @@ class Chart(Tabular):
     remarks: list[str]
     """What is to be said of the measurement."""
 
-    def __init__(self, files: Contents, confirmed: bool, remarks: list[str]) -> None:
+    scaling: Table | None
+    """Time against the number of rods, as ``chart_rods.csv`` has it, if it was asked for."""
+
+    def __init__(self, files: Contents, scaling: Contents | None, confirmed: bool, remarks: list[str]) -> None:
         self._files = files
+        self.scaling = None if scaling is None else Table(scaling)
         self.confirmed, self.remarks = confirmed, remarks
 
     def __repr__(self) -> str:

@@ -1,184 +1,17 @@
-"""The verbs of the program."""
+"""What is built on leaves at rest, and leaves in motion."""
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from . import _leafdyn
-from ._errors import LeafWarning
 from ._leaf import Equilibrium
 from ._motion import Frame, Motion, frame
 from ._progress import Progress, reporter
+from ._relax import warn
 from ._scenario import Scenario, Source, checked
 from ._study import Chart, Check, Map, Shapes, Trace
-
-
-def _asked(
-    method: str = "semi-implicit",
-    tolerance: float | None = None,
-    segments: int | None = None,
-    intervals: int | None = None,
-    keep_unstable: bool = False,
-    full_model: bool = False,
-    modes: int = 0,
-    mode_shapes: bool = False,
-) -> dict[str, Any]:
-    return locals()
-
-
-def _warn(name: str, remark: str | None) -> None:
-    if remark is not None:
-        warnings.warn(f"{name}: {remark}", LeafWarning, stacklevel=3)
-
-
-def relax(
-    scenario: Source,
-    *,
-    set: Mapping[str, Any] | None = None,
-    tolerance: float | None = None,
-    method: str = "semi-implicit",
-    segments: int | None = None,
-    intervals: int | None = None,
-    keep_unstable: bool = False,
-    full_model: bool = False,
-    modes: int = 0,
-    progress: Progress = None,
-) -> Equilibrium:
-    """Find how a leaf comes to rest.
-
-    Parameters
-    ----------
-    scenario
-        A path, a text in TOML, a dict of the same form, or a `Scenario`.
-    set
-        Entries that are replaced: ``{"leaf.rods": 5}``.
-    tolerance
-        Accuracy of the centerlines, relative to the longest rod; left out: the scenario's.
-    method
-        ``"semi-implicit"``, ``"explicit"``, ``"single-shooting"``, ``"shooting"`` or ``"shooting-from-rest"``.
-    segments
-        One fixed grid of so many segments a rod, without extrapolation; left out: as fine as the tolerance needs.
-    intervals
-        Of shooting; left out: as many as it needs.
-    keep_unstable
-        Stop at a saddle instead of leaving it.
-    full_model
-        Solve for the whole leaf, in space, even if half of it or its plane would do.
-    modes
-        How many of the lowest eigenvalues to find, too (the program finds 3); `leafdyn.modes` finds their shapes.
-    progress
-        A function of how much is done, of how much (none if unknown), and a text; or true for a bar of tqdm.
-
-    Returns
-    -------
-    Equilibrium
-        Whatever came out; its ``outcome`` says how the run ended.
-
-    Raises
-    ------
-    ScenarioError
-        If the scenario is refused.
-    ValueError
-        If the request cannot be met.
-
-    Warns
-    -----
-    LeafWarning
-        What would help, if the leaf is not at rest within the tolerance.
-
-    Examples
-    --------
-    >>> import leafdyn
-    >>> leaf = leafdyn.relax("scenarios/paper/fig04.toml", tolerance=1e-8)
-    >>> leaf.outcome, leaf.stable, leaf.error_estimate < 1e-8
-    ('converged', True, True)
-    >>> leaf.tip.round(6)
-    array([ 0.956663,  0.047746, -0.147358])
-    """
-    asked = _asked(method, tolerance, segments, intervals, keep_unstable, full_model, modes)
-    leaf = checked(scenario, set)
-    with reporter(progress) as heard:
-        found = Equilibrium(_leafdyn.relax(leaf._core, asked, heard), (leaf, asked))
-    _warn(found.name, found.remark)
-    return found
-
-
-def relax_many(
-    scenarios: Iterable[Source],
-    *,
-    set: Mapping[str, Any] | None = None,
-    tolerance: float | None = None,
-    method: str = "semi-implicit",
-    segments: int | None = None,
-    intervals: int | None = None,
-    keep_unstable: bool = False,
-    full_model: bool = False,
-    modes: int = 0,
-    progress: Progress = None,
-) -> list[Equilibrium]:
-    """Find how many leaves come to rest, side by side on all threads.
-
-    Parameters are those of `relax`, and hold for all. All scenarios are checked before the first is solved.
-
-    Returns
-    -------
-    list of Equilibrium
-        In the order of the scenarios; the numbers are those of `relax` to the last bit.
-
-    Examples
-    --------
-    >>> import leafdyn
-    >>> fan = leafdyn.Scenario("scenarios/paper/fig04.toml", set={"leaf.rods": 5})
-    >>> weights = [0.5, 1.0, 2.0]
-    >>> leaves = leafdyn.relax_many(leafdyn.Scenario(fan, {"load.gravity": [0, 0, -q]}) for q in weights)
-    >>> [round(float(leaf.tip[2]), 4) for leaf in leaves]
-    [-0.0739, -0.146, -0.2791]
-    """
-    asked = _asked(method, tolerance, segments, intervals, keep_unstable, full_model, modes)
-    leaves = [checked(scenario, set) for scenario in scenarios]
-    with reporter(progress) as heard:
-        cores = _leafdyn.relax_many([leaf._core for leaf in leaves], asked, heard)
-    found = [Equilibrium(core, (leaf, asked)) for core, leaf in zip(cores, leaves)]
-    for leaf in found:
-        _warn(leaf.name, leaf.remark)
-    return found
-
-
-def modes(
-    scenario: Source,
-    count: int = 3,
-    *,
-    set: Mapping[str, Any] | None = None,
-    tolerance: float | None = None,
-    segments: int | None = None,
-    keep_unstable: bool = False,
-    full_model: bool = False,
-    progress: Progress = None,
-) -> Equilibrium:
-    """Find how a leaf comes to rest, and its lowest modes of vibration there, with their shapes.
-
-    Parameters are those of `relax`; ``count``: how many modes.
-
-    Returns
-    -------
-    Equilibrium
-        With ``eigenvalues``, ``eigenvalue_errors``, ``frequencies``, ``mode_displacements`` and ``mode_rotations``.
-
-    Examples
-    --------
-    >>> import leafdyn
-    >>> leaf = leafdyn.modes("scenarios/paper/fig04.toml", 2, set={"leaf.rods": 5})
-    >>> leaf.frequencies.shape, leaf.mode_displacements.shape == (2, *leaf.curves.shape)
-    ((2,), True)
-    """
-    asked = _asked("semi-implicit", tolerance, segments, None, keep_unstable, full_model, count, True)
-    leaf = checked(scenario, set)
-    with reporter(progress) as heard:
-        found = Equilibrium(_leafdyn.relax(leaf._core, asked, heard), (leaf, asked))
-    _warn(found.name, found.remark)
-    return found
 
 
 def check(
@@ -205,7 +38,7 @@ def check(
     with reporter(progress) as heard:
         files, relaxed, solution = _leafdyn.check(leaf._core, tolerance, keep_unstable, intervals, heard)
     found = Check(files, Equilibrium(relaxed), solution)
-    _warn(found.leaf.name, found.reason)
+    warn(found.leaf.name, found.reason)
     return found
 
 
@@ -277,7 +110,7 @@ def trace(
                 leaf._core, vary, switch, keep_unstable, segments, tolerance, points, cross_section, heard
             )
         )
-    _warn(found.name, found.remark)
+    warn(found.name, found.remark)
     return found
 
 
@@ -329,6 +162,7 @@ def chart(
     set: Mapping[str, Any] | None = None,
     seconds: float | None = None,
     methods: Iterable[str] | None = None,
+    rods: Iterable[int] = (),
     progress: Progress = None,
 ) -> Chart:
     """Measure every method over its own accuracy: time against true error.
@@ -339,15 +173,18 @@ def chart(
         About how long to measure.
     methods
         Left out: all.
+    rods
+        Also measure time against the number of rods, at the tolerance: ``[5, 15, 35]``.
 
     The others are those of `relax`.
     """
     leaf = checked(scenario, set)
     words = None if methods is None else list(methods)
+    leaves = [Scenario(leaf, {"leaf.rods": count})._core for count in rods]
     with reporter(progress) as heard:
-        found = Chart(*_leafdyn.chart(leaf._core, seconds, words, heard))
+        found = Chart(*_leafdyn.chart(leaf._core, seconds, words, leaves, heard))
     for remark in found.remarks:
-        _warn(leaf.name, remark)
+        warn(leaf.name, remark)
     return found
 
 
@@ -388,7 +225,7 @@ def simulate(
     with reporter(progress) as heard:
         core.follow(heard)
     found = Motion(core, leaf.name, leaf.joined)
-    _warn(found.name, found.remark)
+    warn(found.name, found.remark)
     return found
 
 
@@ -418,4 +255,4 @@ def frames(
     while outputs is not None:
         yield frame(outputs)
         outputs = core.next()
-    _warn(leaf.name, core.outcome[1])
+    warn(leaf.name, core.outcome[1])

@@ -6,6 +6,7 @@ use pyo3::prelude::*;
 mod arrays;
 mod errors;
 mod motion;
+mod relax;
 mod result;
 mod run;
 mod scenario;
@@ -18,6 +19,8 @@ mod _leafdyn {
     #[pymodule_export]
     use super::motion::Motion;
     #[pymodule_export]
+    use super::relax::{library_seconds, relax_many, relax_one};
+    #[pymodule_export]
     use super::result::{Files, Leaf};
     #[pymodule_export]
     use super::run::{panic_on_purpose, set_threads, threads};
@@ -26,9 +29,7 @@ mod _leafdyn {
     #[pymodule_export]
     use super::toml_text::overrides;
     #[pymodule_export]
-    use super::verbs::{
-        all_shapes, chart, check, library_seconds, map, program, relax_many, relax_one, trace,
-    };
+    use super::verbs::{all_shapes, chart, check, map, program, trace};
 
     #[expect(non_upper_case_globals, reason = "it is the name that Python knows")]
     #[pymodule_export]

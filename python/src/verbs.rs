@@ -1,158 +1,22 @@
-//! The verbs of the program, without files.
+//! What is built on leaves at rest, and the program.
 
 use std::ffi::OsString;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use leafdyn::relax::{self, Equilibrium, Method, Options, RelaxError, SemiImplicit};
+use leafdyn::relax::SemiImplicit;
 use leafdyn::study::{
-    self, CELL_SECONDS, ChartOptions, CheckOptions, Contender, MOST_POINTS, Map, MapMethod,
-    MapRequest, MapShow, TraceError, TraceRequest, Vary,
+    self, CELL_SECONDS, ChartError, ChartOptions, CheckOptions, Contender, MOST_POINTS, Map,
+    MapMethod, MapRequest, MapShow, TraceError, TraceRequest, Turn, Vary,
 };
 use leafdyn::{cli, scenario};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use rayon::prelude::*;
 
 use crate::arrays::{array, curves, nodes};
 use crate::errors::{cannot, cannot_vary};
+use crate::relax::{heard, refuse};
 use crate::result::{Files, Leaf};
-use crate::run::{Monitor, elapsed, run};
+use crate::run::{elapsed, run};
 use crate::scenario::Scenario;
-
-/// What is asked of a relaxation besides its scenario.
-#[derive(FromPyObject)]
-#[pyo3(from_item_all)]
-pub struct Asked {
-    method: String,
-    tolerance: Option<f64>,
-    segments: Option<usize>,
-    intervals: Option<usize>,
-    keep_unstable: bool,
-    full_model: bool,
-    modes: usize,
-    mode_shapes: bool,
-}
-
-fn refuse<T>(message: impl Into<String>) -> PyResult<T> {
-    Err(PyValueError::new_err(message.into()))
-}
-
-impl Asked {
-    /// The method with its own options; refused where they do not fit each other.
-    fn method(&self) -> PyResult<Method> {
-        let method: Method = self
-            .method
-            .parse()
-            .or_else(|error| refuse(format!("method = {error}")))?;
-        let (segments, intervals) = (self.segments, self.intervals);
-        if let Some(found) = intervals
-            && !matches!(
-                method,
-                Method::Shooting { .. } | Method::ShootingFromRest { .. }
-            )
-        {
-            return refuse(format!(
-                "intervals = {found}: only the method shooting has intervals"
-            ));
-        }
-        if let (Some(found), true) = (segments, method.is_shooting()) {
-            return refuse(format!(
-                "segments = {found}: shooting has no grid; leave it out, or set the number of intervals"
-            ));
-        }
-        Ok(match method {
-            Method::SemiImplicit(how) => Method::SemiImplicit(SemiImplicit {
-                segments,
-                keep_unstable: self.keep_unstable,
-                full_model: self.full_model,
-                ..how
-            }),
-            Method::Explicit { .. } if self.keep_unstable => {
-                return refuse(
-                    "keep_unstable: explicit motion leaves unstable equilibria; use the method semi-implicit or shooting",
-                );
-            }
-            Method::Explicit { .. } => Method::Explicit { segments },
-            Method::SingleShooting => Method::SingleShooting,
-            Method::Shooting { .. } => Method::Shooting { intervals },
-            Method::ShootingFromRest { .. } => Method::ShootingFromRest { intervals },
-        })
-    }
-
-    fn options(&self) -> PyResult<Options> {
-        Ok(Options {
-            method: self.method()?,
-            tolerance: self.tolerance,
-            modes: self.modes,
-            mode_shapes: self.mode_shapes,
-            ..Options::default()
-        })
-    }
-}
-
-/// Says how far a relaxation has come.
-fn heard<'a>(monitor: &'a Monitor, name: &'a str) -> impl FnMut(&relax::Progress) + 'a {
-    move |progress| {
-        monitor.say(progress.step as f64, None, || {
-            let relax::Progress {
-                grid,
-                step,
-                residual,
-            } = progress;
-            format!("{name}: {grid} segments a vein, step {step}, residual {residual:.1e}")
-        });
-    }
-}
-
-/// Lets a leaf come to rest.
-#[pyfunction]
-#[pyo3(name = "relax")]
-pub fn relax_one(
-    py: Python,
-    scenario: &Scenario,
-    asked: Asked,
-    progress: Option<&Bound<PyAny>>,
-) -> PyResult<Leaf> {
-    let mut options = asked.options()?;
-    let scenario = scenario.checked.clone();
-    let found = run(py, progress, move |monitor| {
-        options.limit = monitor.limit();
-        relax::relax(&scenario, &options, &mut heard(monitor, &scenario.name))
-    })?;
-    Ok(Leaf(found.map_err(cannot)?))
-}
-
-/// Lets many leaves come to rest, side by side.
-#[pyfunction]
-pub fn relax_many(
-    py: Python,
-    scenarios: Vec<PyRef<Scenario>>,
-    asked: Asked,
-    progress: Option<&Bound<PyAny>>,
-) -> PyResult<Vec<Leaf>> {
-    let mut options = asked.options()?;
-    let scenarios: Vec<Arc<scenario::Scenario>> = (scenarios.iter())
-        .map(|scenario| scenario.checked.clone())
-        .collect();
-    let found = run(py, progress, move |monitor| {
-        options.limit = monitor.limit();
-        let (done, all, clock) = (AtomicUsize::new(0), scenarios.len(), Instant::now());
-        let one = |scenario: &Arc<scenario::Scenario>| {
-            let found = relax::relax(scenario, &options, &mut |_| {});
-            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            monitor.say(done as f64, Some(all as f64), || {
-                format!("{done} of {all} leaves, {}", elapsed(clock))
-            });
-            found
-        };
-        // One by one: a leaf may take a thousand times as long as its neighbour.
-        let leaves = scenarios.par_iter().with_max_len(1).map(one);
-        leaves.collect::<Result<Vec<Equilibrium>, RelaxError>>()
-    })?;
-    Ok(found.map_err(cannot)?.into_iter().map(Leaf).collect())
-}
 
 /// A check: its files, the relaxed leaf, and if there is one the boundary-value solution: its
 /// stations and positions.
@@ -329,15 +193,20 @@ pub fn map(
     Ok(Files::of(map))
 }
 
-/// Measures speed against accuracy.
+/// A chart: its files, those of the cost against the number of veins if that was asked for, whether
+/// its reference is confirmed, and remarks.
+type Charted = (Files, Option<Files>, bool, Vec<String>);
+
+/// Measures speed against accuracy, and cost against the number of veins over `leaves`.
 #[pyfunction]
 pub fn chart(
     py: Python,
     scenario: &Scenario,
     seconds: Option<f64>,
     methods: Option<Vec<String>>,
+    leaves: Vec<PyRef<Scenario>>,
     progress: Option<&Bound<PyAny>>,
-) -> PyResult<(Files, bool, Vec<String>)> {
+) -> PyResult<Charted> {
     let mut options = ChartOptions::default();
     options.seconds = seconds.unwrap_or(options.seconds);
     if let Some(words) = methods {
@@ -345,33 +214,33 @@ pub fn chart(
         let wanted = wanted.or_else(|error| refuse(format!("methods = {error}")))?;
         options.contenders.retain(|who| wanted.contains(who));
     }
+    let leaves: Vec<scenario::Scenario> = (leaves.iter())
+        .map(|leaf| (*leaf.checked).clone())
+        .collect();
     let scenario = scenario.checked.clone();
     let found = run(py, progress, move |monitor| {
-        study::chart(&scenario, &options, &mut |turn| {
+        let mut heard = |turn: &Turn| {
             monitor.say_or_end(turn.round as f64, Some(turn.rounds as f64), || {
-                format!("{}, round {} of {}", turn.knob, turn.round, turn.rounds)
+                let Turn {
+                    rods,
+                    round,
+                    rounds,
+                    ..
+                } = turn;
+                format!("{rods} veins, {}, round {round} of {rounds}", turn.knob)
             });
-        })
+        };
+        let mut chart = study::chart(&scenario, &options, &mut heard)?;
+        if !leaves.is_empty() {
+            let scaling = study::scaling(&leaves, scenario.tolerance, &options, &mut heard)?;
+            chart.scaling = Some(scaling);
+        }
+        Ok::<_, ChartError>(chart)
     })?;
     let chart = found.map_err(cannot)?;
     let (confirmed, remarks) = (chart.confirmed(), chart.remarks.clone());
-    Ok((Files::of(chart), confirmed, remarks))
-}
-
-/// The shortest of so many times in which the library alone reads a scenario's text and lets the leaf
-/// come to rest: for the tests.
-#[pyfunction]
-pub fn library_seconds(py: Python, text: &str, runs: usize) -> f64 {
-    py.detach(|| {
-        let times = (0..runs).map(|_| {
-            let clock = Instant::now();
-            let leaf = scenario::Scenario::from_toml(text).map(|scenario| scenario.relax());
-            let time = clock.elapsed().as_secs_f64();
-            drop(leaf);
-            time
-        });
-        times.fold(f64::INFINITY, f64::min)
-    })
+    let scaling = chart.scaling.clone().map(Files::of);
+    Ok((Files::of(chart), scaling, confirmed, remarks))
 }
 
 /// The program: does what these arguments ask for, the first of which is its name, and returns its

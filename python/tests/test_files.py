@@ -140,8 +140,10 @@ def test_a_map_and_a_chart() -> None:
     assert set(columns["method"]) == {"semi-implicit", "shooting"}
     assert columns["tip_z"].dtype == np.float64
     assert (columns["outcome"] == "right").all()
-    chart = leafdyn.chart(fan(2), seconds=0.2, methods=["semi-implicit"])
+    chart = leafdyn.chart(fan(2), set={"leaf.fan": "symmetric"}, seconds=0.2, methods=["semi-implicit"], rods=[2, 3])
     assert chart.confirmed
+    assert chart.scaling is not None
+    assert set(chart.scaling.columns["rods"]) == {2, 3}
     assert np.nanmin(chart.columns["seconds"]) > 0
     with pytest.raises(ValueError, match="methods = newton"):
         leafdyn.chart(fan(2), methods=["newton"])

@@ -1,0 +1,166 @@
+//! Leaves that come to rest.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use leafdyn::relax::{self, Equilibrium, Method, Options, Progress, RelaxError, SemiImplicit};
+use leafdyn::scenario;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use rayon::prelude::*;
+
+use crate::errors::cannot;
+use crate::result::Leaf;
+use crate::run::{Monitor, elapsed, run};
+use crate::scenario::Scenario;
+
+/// What is asked of a relaxation besides its scenario.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Asked {
+    method: String,
+    tolerance: Option<f64>,
+    segments: Option<usize>,
+    intervals: Option<usize>,
+    keep_unstable: bool,
+    full_model: bool,
+    modes: usize,
+    mode_shapes: bool,
+}
+
+/// Refuses what cannot be asked.
+pub fn refuse<T>(message: impl Into<String>) -> PyResult<T> {
+    Err(PyValueError::new_err(message.into()))
+}
+
+impl Asked {
+    /// The method with its own options; refused where they do not fit each other.
+    fn method(&self) -> PyResult<Method> {
+        let method: Method = self
+            .method
+            .parse()
+            .or_else(|error| refuse(format!("method = {error}")))?;
+        let (segments, intervals) = (self.segments, self.intervals);
+        if let Some(found) = intervals
+            && !matches!(
+                method,
+                Method::Shooting { .. } | Method::ShootingFromRest { .. }
+            )
+        {
+            return refuse(format!(
+                "intervals = {found}: only the method shooting has intervals"
+            ));
+        }
+        if let (Some(found), true) = (segments, method.is_shooting()) {
+            return refuse(format!(
+                "segments = {found}: shooting has no grid; leave it out, or set the number of intervals"
+            ));
+        }
+        Ok(match method {
+            Method::SemiImplicit(how) => Method::SemiImplicit(SemiImplicit {
+                segments,
+                keep_unstable: self.keep_unstable,
+                full_model: self.full_model,
+                ..how
+            }),
+            Method::Explicit { .. } if self.keep_unstable => {
+                return refuse(
+                    "keep_unstable: explicit motion leaves unstable equilibria; use the method semi-implicit or shooting",
+                );
+            }
+            Method::Explicit { .. } => Method::Explicit { segments },
+            Method::SingleShooting => Method::SingleShooting,
+            Method::Shooting { .. } => Method::Shooting { intervals },
+            Method::ShootingFromRest { .. } => Method::ShootingFromRest { intervals },
+        })
+    }
+
+    fn options(&self) -> PyResult<Options> {
+        Ok(Options {
+            method: self.method()?,
+            tolerance: self.tolerance,
+            modes: self.modes,
+            mode_shapes: self.mode_shapes,
+            ..Options::default()
+        })
+    }
+}
+
+/// Says how far a relaxation has come, step by step.
+pub fn heard<'a>(monitor: &'a Monitor, name: &'a str) -> impl FnMut(&Progress) + 'a {
+    move |progress| {
+        monitor.say(progress.step as f64, None, || {
+            let Progress {
+                grid,
+                step,
+                residual,
+            } = progress;
+            format!("{name}: {grid} segments a vein, step {step}, residual {residual:.1e}")
+        });
+    }
+}
+
+/// Lets a leaf come to rest.
+#[pyfunction]
+#[pyo3(name = "relax")]
+pub fn relax_one(
+    py: Python,
+    scenario: &Scenario,
+    asked: Asked,
+    progress: Option<&Bound<PyAny>>,
+) -> PyResult<Leaf> {
+    let mut options = asked.options()?;
+    let scenario = scenario.checked.clone();
+    let found = run(py, progress, move |monitor| {
+        options.limit = monitor.limit();
+        relax::relax(&scenario, &options, &mut heard(monitor, &scenario.name))
+    })?;
+    Ok(Leaf(found.map_err(cannot)?))
+}
+
+/// Lets many leaves come to rest, side by side.
+#[pyfunction]
+pub fn relax_many(
+    py: Python,
+    scenarios: Vec<PyRef<Scenario>>,
+    asked: Asked,
+    progress: Option<&Bound<PyAny>>,
+) -> PyResult<Vec<Leaf>> {
+    let mut options = asked.options()?;
+    let scenarios: Vec<Arc<scenario::Scenario>> = (scenarios.iter())
+        .map(|scenario| scenario.checked.clone())
+        .collect();
+    let found = run(py, progress, move |monitor| {
+        options.limit = monitor.limit();
+        let (done, all, clock) = (AtomicUsize::new(0), scenarios.len(), Instant::now());
+        let one = |scenario: &Arc<scenario::Scenario>| {
+            let found = relax::relax(scenario, &options, &mut |_| {});
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            monitor.say(done as f64, Some(all as f64), || {
+                format!("{done} of {all} leaves, {}", elapsed(clock))
+            });
+            found
+        };
+        // One by one: a leaf may take a thousand times as long as its neighbour.
+        let leaves = scenarios.par_iter().with_max_len(1).map(one);
+        leaves.collect::<Result<Vec<Equilibrium>, RelaxError>>()
+    })?;
+    Ok(found.map_err(cannot)?.into_iter().map(Leaf).collect())
+}
+
+/// The shortest of so many times in which the library alone reads a scenario's text and lets the leaf
+/// come to rest: for the tests.
+#[pyfunction]
+pub fn library_seconds(py: Python, text: &str, runs: usize) -> f64 {
+    py.detach(|| {
+        let times = (0..runs).map(|_| {
+            let clock = Instant::now();
+            let leaf = scenario::Scenario::from_toml(text).map(|scenario| scenario.relax());
+            let time = clock.elapsed().as_secs_f64();
+            drop(leaf);
+            time
+        });
+        times.fold(f64::INFINITY, f64::min)
+    })
+}
