@@ -52,8 +52,6 @@ class Equilibrium(Result):
     """The accuracy that was wanted, relative to the longest rod."""
     residual: float | None
     """The largest unbalanced force or moment, without units."""
-    error_estimate: float | None
-    """Bound on the error of `positions`, in units of length; none on a single grid."""
     energy: float | None
     """The potential energy."""
     negative_eigenvalues: int | None
@@ -83,6 +81,11 @@ class Equilibrium(Result):
     def tip(self) -> Array | None:
         """The joint tip, or the only rod's: shape (3,); none if there are several."""
         return self.tips[0] if len(self.tips) == 1 else None
+
+    @cached_property
+    def error_estimate(self) -> float | None:
+        """Bound on the error of `positions`, in units of length; none on a single grid."""
+        return self._core.error_estimate
 
     @cached_property
     def tips(self) -> Array:
@@ -216,7 +219,7 @@ class Equilibrium(Result):
 
     def __getstate__(self) -> dict[str, Any]:
         if isinstance(self._files, _leafdyn.Leaf):
-            for name in _ARRAYS:
+            for name in _LATER:
                 getattr(self, name)
         state = self.__dict__.copy()
         if self._request is None:
@@ -264,13 +267,13 @@ _SCALARS = (
     "segments",
     "tolerance",
     "residual",
-    "error_estimate",
     "energy",
     "negative_eigenvalues",
     "wall_seconds",
 )
 
-_ARRAYS = (
+_LATER = (
+    "error_estimate",
     "tips",
     "tip_force_sum",
     "stations",

@@ -142,7 +142,7 @@ def check(
     scenario: Scenario, tolerance: float | None, keep_unstable: bool, intervals: int | None, progress: _Heard
 ) -> tuple[Files, Leaf, tuple[_Array, _Array] | None]: ...
 def all_shapes(
-    scenario: Scenario, tolerance: float | None, full_model: bool, progress: _Heard
+    scenario: Scenario, tolerance: float | None, full_model: bool, stations: int | None, progress: _Heard
 ) -> tuple[Files, list[tuple[Leaf, int, bool]]]: ...
 def trace(
     scenario: Scenario,

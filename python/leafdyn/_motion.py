@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from . import _leafdyn
 from ._leaf import Array
-from ._result import Result, _kinds
+from ._result import Result, chosen, kind
 
 ENERGIES = ("kinetic", "elastic", "coupling", "potential", "dissipated", "work")
 
@@ -78,7 +78,7 @@ class Motion(Result):
 
     def save(self, folder: str | os.PathLike[str], write: str | Iterable[str] | None = None) -> list[Path]:
         """As `Result.save`; among the files are ``motion.csv`` (or ``.npy``) and ``energy.csv``."""
-        kinds = _kinds(write)
+        kinds = chosen(write, self._files.names())
         if self._core is None or not kinds & {"csv"}:
             return super().save(folder, write)
         place = Path(folder)
@@ -87,7 +87,7 @@ class Motion(Result):
         place.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=place) as drafts:
             # An array is what a long table is written as.
-            files = [file for file in self._core.save(Path(drafts)) if file.suffix[1:] in kinds | {"npy"}]
+            files = [file for file in self._core.save(Path(drafts)) if kind(file.name) in kinds | {"npy"}]
             return [Path(shutil.move(file, place / file.name)) for file in files]
 
     def plot(self, ax: Any = None, **style: Any) -> Any:

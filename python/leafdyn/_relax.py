@@ -22,6 +22,7 @@ def _asked(
     full_model: bool = False,
     modes: int = 0,
     mode_shapes: bool = False,
+    stations: int | None = None,
 ) -> dict[str, Any]:
     return locals()
 
@@ -42,6 +43,7 @@ def relax(
     keep_unstable: bool = False,
     full_model: bool = False,
     modes: int = 0,
+    stations: int | None = None,
     progress: Progress = None,
 ) -> Equilibrium:
     """Find how a leaf comes to rest.
@@ -66,6 +68,8 @@ def relax(
         Solve for the whole leaf, in space, even if half of it or its plane would do.
     modes
         How many of the lowest eigenvalues to find, too (the program finds 3); `leafdyn.modes` finds their shapes.
+    stations
+        At ``stations + 1`` equally spaced stations of every vein; left out: those of the finest grid, at least 17.
     progress
         A function of how much is done, of how much (none if unknown), and a text; or true for a bar of tqdm.
 
@@ -95,7 +99,7 @@ def relax(
     >>> leaf.tip.round(6)
     array([ 0.956663,  0.047746, -0.147358])
     """
-    asked = _asked(method, tolerance, segments, intervals, keep_unstable, full_model, modes)
+    asked = _asked(method, tolerance, segments, intervals, keep_unstable, full_model, modes, False, stations)
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
         found = Equilibrium(_leafdyn.relax(leaf._core, asked, heard), (leaf, asked))
@@ -114,6 +118,7 @@ def relax_many(
     keep_unstable: bool = False,
     full_model: bool = False,
     modes: int = 0,
+    stations: int | None = None,
     progress: Progress = None,
 ) -> list[Equilibrium]:
     """Find how many leaves come to rest, side by side on all threads.
@@ -134,7 +139,7 @@ def relax_many(
     >>> [round(float(leaf.tip[2]), 4) for leaf in leaves]
     [-0.0739, -0.146, -0.2791]
     """
-    asked = _asked(method, tolerance, segments, intervals, keep_unstable, full_model, modes)
+    asked = _asked(method, tolerance, segments, intervals, keep_unstable, full_model, modes, False, stations)
     leaves = [checked(scenario, set) for scenario in scenarios]
     with reporter(progress) as heard:
         cores = _leafdyn.relax_many([leaf._core for leaf in leaves], asked, heard)
@@ -153,6 +158,7 @@ def modes(
     segments: int | None = None,
     keep_unstable: bool = False,
     full_model: bool = False,
+    stations: int | None = None,
     progress: Progress = None,
 ) -> Equilibrium:
     """Find how a leaf comes to rest, and its lowest modes of vibration there, with their shapes.
@@ -171,7 +177,7 @@ def modes(
     >>> leaf.frequencies.shape, leaf.mode_displacements.shape == (2, *leaf.curves.shape)
     ((2,), True)
     """
-    asked = _asked("semi-implicit", tolerance, segments, None, keep_unstable, full_model, count, True)
+    asked = _asked("semi-implicit", tolerance, segments, None, keep_unstable, full_model, count, True, stations)
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
         found = Equilibrium(_leafdyn.relax(leaf._core, asked, heard), (leaf, asked))

@@ -38,8 +38,13 @@ class Kept:
 
 
 def keep(files: Contents) -> Kept:
-    """All files as they are."""
-    return Kept({name: files.contents(name) for name in files.names()})
+    """The usual files as they are."""
+    return Kept({name: files.contents(name) for name in files.names() if kind(name) in KINDS})
+
+
+def kind(name: str) -> str:
+    """That of a file."""
+    return Path(name).suffix[1:]
 
 
 class Result:
@@ -60,19 +65,21 @@ class Result:
         folder
             The folder.
         write
-            Which kinds: ``"json,csv,svg,png"`` or a list of such words; left out: all.
+            Which kinds: ``"json,csv,svg,png"`` or a list of such words, or ``"none"``; left out: these four. The
+            program may know more.
 
         Returns
         -------
         list of Path
             The files. Each is complete, whatever happens meanwhile.
         """
-        kinds = _kinds(write)
+        names = self._files.names()
+        kinds = chosen(write, names)
         place = Path(folder)
         place.mkdir(parents=True, exist_ok=True)
         written = []
-        for name in self._files.names():
-            if Path(name).suffix[1:] in kinds:
+        for name in names:
+            if kind(name) in kinds:
                 file = place / name
                 draft = place / f".{name}.{os.getpid()}.part"
                 draft.write_bytes(self._files.contents(name))
@@ -100,6 +107,30 @@ class Table(Result):
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
+        """The columns of its table by their names, as arrays; an empty cell is not a number."""
+        table = next(name for name in self._files.names() if name.endswith(".csv"))
+        return columns(self._files.contents(table))
+
+    def to_pandas(self) -> Any:
+        """Its table as a ``pandas.DataFrame``."""
+        import pandas
+
+        return pandas.DataFrame(self.columns)
+
+
+def chosen(write: str | Iterable[str] | None, names: Iterable[str]) -> set[str]:
+    """The kinds of files that are to be written, of those that there are."""
+    if write is None:
+        return set(KINDS)
+    words = write.split(",") if isinstance(write, str) else list(write)
+    kinds = {word.strip() for word in words} - {"none", ""}
+    known = sorted({*KINDS, *(kind(name) for name in names)})
+    for unknown in sorted(kinds.difference(known)):
+        raise ValueError(f"write = {unknown}: must be of {', '.join(known)}, or none")
+    return kinds
+
+
+def columns(self) -> dict[str, NDArray[Any]]:
         """The columns of its table by their names, as arrays; an empty cell is not a number."""
         table = next(name for name in self._files.names() if name.endswith(".csv"))
         return columns(self._files.contents(table))

@@ -117,7 +117,7 @@ Source: TypeAlias = Union[str, "os.PathLike[str]", Mapping[str, Any], Scenario]
 
 
 def _is_text(source: str) -> bool:
-    return "\n" in source or ("=" in source and not source.endswith(".toml"))
+    return "\n" in source or source.startswith("{") or ("=" in source and not source.endswith(".toml"))
 
 
 def _restore(text: str, overrides: list[str], file: str) -> Scenario:

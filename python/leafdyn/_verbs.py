@@ -48,6 +48,7 @@ def all_shapes(
     set: Mapping[str, Any] | None = None,
     tolerance: float | None = None,
     full_model: bool = False,
+    stations: int | None = None,
     progress: Progress = None,
 ) -> Shapes:
     """Look for all equilibria of a leaf, from many starts. Which there are no number of starts can prove.
@@ -63,7 +64,7 @@ def all_shapes(
     """
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
-        files, found = _leafdyn.all_shapes(leaf._core, tolerance, full_model, heard)
+        files, found = _leafdyn.all_shapes(leaf._core, tolerance, full_model, stations, heard)
     leaves = [Equilibrium(core) for core, _, _ in found]
     return Shapes(files, leaves, [starts for _, starts, _ in found], [plain for _, _, plain in found])
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use leafdyn::files::Recording;
+use leafdyn::files::{Document, Recording, Selection};
 use leafdyn::scenario;
 use leafdyn::simulate::{
     Frame, Moment, Options, Record, Scheme, Simulation, Still, Stopped, stills,
@@ -187,7 +187,7 @@ impl Motion {
 
     /// The summary and the pictures of the outputs that were kept.
     fn files(&self) -> Files {
-        Files::of(self.record(&self.state()))
+        Files::of(self.record(&self.state()), self.scenario.clone())
     }
 
     /// Writes the files of the program into a folder.
@@ -195,12 +195,13 @@ impl Motion {
         let written = py.detach(|| {
             let state = self.state();
             let mut again = Simulation::new(&self.scenario, &self.options)?;
-            let mut recording = Recording::begin(&folder, &mut again)?;
+            let all = Selection::default();
+            let mut recording = Recording::begin(&folder, &mut again, &all)?;
             for frame in state.frames.iter().skip(1) {
                 recording.add(&again, frame)?;
             }
             let record = recording.record(&state.simulation, state.stopped)?;
-            Ok(recording.finish(&record)?)
+            Ok(recording.finish(&Document::new(&record, &self.scenario, None))?)
         });
         written.map_err(|error: Box<dyn Error + Send + Sync>| PyOSError::new_err(error.to_string()))
     }

@@ -15,6 +15,9 @@ use crate::result::Leaf;
 use crate::run::{Monitor, elapsed, run};
 use crate::scenario::Scenario;
 
+/// Most parts that stations can cut a vein into.
+const MOST_STATIONS: usize = 1_000_000;
+
 /// What is asked of a relaxation besides its scenario.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -27,11 +30,22 @@ pub struct Asked {
     full_model: bool,
     modes: usize,
     mode_shapes: bool,
+    stations: Option<usize>,
 }
 
 /// Refuses what cannot be asked.
 pub fn refuse<T>(message: impl Into<String>) -> PyResult<T> {
     Err(PyValueError::new_err(message.into()))
+}
+
+/// Refuses a number of stations that is none, or too large to be meant.
+pub fn check_stations(found: Option<usize>) -> PyResult<()> {
+    match found {
+        Some(found) if !(1..=MOST_STATIONS).contains(&found) => refuse(format!(
+            "stations = {found}: allowed are 1 to {MOST_STATIONS}"
+        )),
+        _ => Ok(()),
+    }
 }
 
 impl Asked {
@@ -77,6 +91,7 @@ impl Asked {
     }
 
     fn options(&self) -> PyResult<Options> {
+        check_stations(self.stations)?;
         Ok(Options {
             method: self.method()?,
             tolerance: self.tolerance,
@@ -112,11 +127,12 @@ pub fn relax_one(
 ) -> PyResult<Leaf> {
     let mut options = asked.options()?;
     let scenario = scenario.checked.clone();
+    let input = scenario.clone();
     let found = run(py, progress, move |monitor| {
         options.limit = monitor.limit();
         relax::relax(&scenario, &options, &mut heard(monitor, &scenario.name))
     })?;
-    Ok(Leaf(found.map_err(cannot)?))
+    Ok(Leaf::new(found.map_err(cannot)?, input, asked.stations))
 }
 
 /// Lets many leaves come to rest, side by side.
@@ -131,6 +147,7 @@ pub fn relax_many(
     let scenarios: Vec<Arc<scenario::Scenario>> = (scenarios.iter())
         .map(|scenario| scenario.checked.clone())
         .collect();
+    let inputs = scenarios.clone();
     let found = run(py, progress, move |monitor| {
         options.limit = monitor.limit();
         let (done, all, clock) = (AtomicUsize::new(0), scenarios.len(), Instant::now());
@@ -146,7 +163,9 @@ pub fn relax_many(
         let leaves = scenarios.par_iter().with_max_len(1).map(one);
         leaves.collect::<Result<Vec<Equilibrium>, RelaxError>>()
     })?;
-    Ok(found.map_err(cannot)?.into_iter().map(Leaf).collect())
+    let leaves = found.map_err(cannot)?.into_iter().zip(inputs);
+    let leaf = |(found, input)| Leaf::new(found, input, asked.stations);
+    Ok(leaves.map(leaf).collect())
 }
 
 /// The shortest of so many times in which the library alone reads a scenario's text and lets the leaf

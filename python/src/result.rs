@@ -1,7 +1,10 @@
 //! Results: a leaf at rest, and what stands in the files of any result.
 
-use leafdyn::files::{self, Written};
+use std::sync::{Arc, OnceLock};
+
+use leafdyn::files::{self, Document, Written};
 use leafdyn::relax::{Equilibrium, Mode};
+use leafdyn::scenario::Scenario;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -11,16 +14,16 @@ use crate::arrays::{Array, array, curves, flat, nodes, vectors};
 /// A result that files are written of, whatever it is.
 trait Contents: Send + Sync {
     fn names(&self) -> Vec<&'static str>;
-    fn contents(&self, name: &str) -> Option<Vec<u8>>;
+    fn contents(&self, input: &Scenario, name: &str) -> Option<Vec<u8>>;
 }
 
-impl<R: Written + Send + Sync> Contents for R {
+impl<R: Written + Send> Contents for R {
     fn names(&self) -> Vec<&'static str> {
-        self.file_names()
+        files::names(self)
     }
 
-    fn contents(&self, name: &str) -> Option<Vec<u8>> {
-        files::contents(self, name)
+    fn contents(&self, input: &Scenario, name: &str) -> Option<Vec<u8>> {
+        files::contents(&Document::new(self, input, None), name)
     }
 }
 
@@ -28,20 +31,26 @@ impl<R: Written + Send + Sync> Contents for R {
 fn read<'py>(
     py: Python<'py>,
     result: &(impl Contents + ?Sized),
+    input: &Scenario,
     name: &str,
 ) -> PyResult<Bound<'py, PyBytes>> {
-    let found = py.detach(|| result.contents(name));
+    let found = py.detach(|| result.contents(input, name));
     let bytes = found.ok_or_else(|| PyKeyError::new_err(name.to_string()))?;
     Ok(PyBytes::new(py, &bytes))
 }
 
 /// The files of a result.
 #[pyclass(frozen, module = "leafdyn._leafdyn")]
-pub struct Files(Box<dyn Contents>);
+pub struct Files {
+    result: Box<dyn Contents>,
+    input: Arc<Scenario>,
+}
 
 impl Files {
-    pub fn of(result: impl Written + Send + Sync) -> Self {
-        Files(Box::new(result))
+    /// Of a result, made from a scenario.
+    pub fn of(result: impl Written + Send, input: Arc<Scenario>) -> Self {
+        let result = Box::new(result);
+        Files { result, input }
     }
 }
 
@@ -49,134 +58,169 @@ impl Files {
 impl Files {
     /// The names of the files.
     fn names(&self) -> Vec<&'static str> {
-        self.0.names()
+        self.result.names()
     }
 
     /// What stands in the file of this name.
     fn contents<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyBytes>> {
-        read(py, &*self.0, name)
+        read(py, &*self.result, &self.input, name)
     }
 }
 
 /// A leaf at rest, or as far as it came.
 #[pyclass(frozen, module = "leafdyn._leafdyn")]
-pub struct Leaf(pub Equilibrium);
+pub struct Leaf {
+    found: Equilibrium,
+    input: Arc<Scenario>,
+    stations: Option<usize>,
+    /// The same at the stations that are shown, as soon as somebody looks at them.
+    shown: OnceLock<Equilibrium>,
+}
+
+impl Leaf {
+    /// Shown at so many parts of equal length, or at the nodes of the finest grid.
+    pub fn new(found: Equilibrium, input: Arc<Scenario>, stations: Option<usize>) -> Self {
+        Leaf {
+            found,
+            input,
+            stations,
+            shown: OnceLock::new(),
+        }
+    }
+
+    /// Shown at the stations where it was found.
+    pub fn as_found(found: Equilibrium, input: Arc<Scenario>) -> Self {
+        Leaf {
+            shown: found.clone().into(),
+            ..Leaf::new(found, input, None)
+        }
+    }
+
+    fn shown(&self, py: Python) -> &Equilibrium {
+        self.shown.get().unwrap_or_else(|| {
+            py.detach(|| {
+                let shown = || self.found.clone().at_stations(&self.input, self.stations);
+                self.shown.get_or_init(shown)
+            })
+        })
+    }
+}
 
 #[pymethods]
 impl Leaf {
     /// The names of the files.
     fn names(&self) -> Vec<&'static str> {
-        self.0.file_names()
+        files::names(&self.found)
     }
 
     /// What stands in the file of this name.
     fn contents<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyBytes>> {
-        read(py, &self.0, name)
+        read(py, self.shown(py), &self.input, name)
     }
 
     #[getter]
     fn name(&self) -> &str {
-        &self.0.scenario
+        &self.found.scenario
     }
 
     #[getter]
     fn method(&self) -> &'static str {
-        self.0.method.word()
+        self.found.method.word()
     }
 
     #[getter]
     fn outcome(&self) -> &'static str {
-        self.0.outcome.word()
+        self.found.outcome.word()
     }
 
     #[getter]
     fn success(&self) -> bool {
-        self.0.outcome.is_success()
+        self.found.outcome.is_success()
     }
 
     #[getter]
     fn remark(&self) -> Option<&str> {
-        self.0.remark.as_deref()
+        self.found.remark.as_deref()
     }
 
     #[getter]
     fn rods(&self) -> usize {
-        self.0.rod_count
+        self.found.rod_count
     }
 
     #[getter]
     fn segments(&self) -> Vec<usize> {
-        self.0.accuracy.segments.clone()
+        self.found.accuracy.segments.clone()
     }
 
     #[getter]
     fn tolerance(&self) -> f64 {
-        self.0.accuracy.tolerance
+        self.found.accuracy.tolerance
     }
 
     #[getter]
     fn residual(&self) -> Option<f64> {
-        self.0.accuracy.residual
+        self.found.accuracy.residual
     }
 
     #[getter]
-    fn error_estimate(&self) -> Option<f64> {
-        self.0.accuracy.error_estimate
+    fn error_estimate(&self, py: Python) -> Option<f64> {
+        self.shown(py).accuracy.error_estimate
     }
 
     #[getter]
     fn energy(&self) -> Option<f64> {
-        self.0.energy
+        self.found.energy
     }
 
     #[getter]
     fn negative_eigenvalues(&self) -> Option<usize> {
-        self.0.stability.negative_eigenvalues
+        self.found.stability.negative_eigenvalues
     }
 
     #[getter]
     fn wall_seconds(&self) -> f64 {
-        self.0.wall_seconds
+        self.found.wall_seconds
     }
 
     #[getter]
     fn joined(&self) -> bool {
-        self.0.shape.joined
+        self.found.shape.joined
     }
 
     /// The joint tip alone, or the tips of all rods.
     fn tips<'py>(&self, py: Python<'py>) -> Array<'py> {
-        vectors(py, &self.0.tips)
+        vectors(py, &self.found.tips)
     }
 
     fn tip_force_sum<'py>(&self, py: Python<'py>) -> Array<'py> {
-        array(py, self.0.tip_force_sum.to_array().to_vec(), &[3])
+        array(py, self.found.tip_force_sum.to_array().to_vec(), &[3])
     }
 
     fn stations<'py>(&self, py: Python<'py>) -> Array<'py> {
-        let stations = &self.0.shape.stations;
+        let stations = &self.shown(py).shape.stations;
         array(py, stations.clone(), &[stations.len()])
     }
 
     fn lengths<'py>(&self, py: Python<'py>) -> Array<'py> {
-        let rods = &self.0.shape.rods;
+        let rods = &self.found.shape.rods;
         let lengths = rods.iter().map(|rod| rod.length).collect();
         array(py, lengths, &[rods.len()])
     }
 
     /// A quantity at all stations of all rods, by its name.
     fn nodes<'py>(&self, py: Python<'py>, quantity: &str) -> Array<'py> {
-        nodes(py, &self.0.shape.rods, quantity)
+        nodes(py, &self.shown(py).shape.rods, quantity)
     }
 
     /// All nodes of the finest grid.
     fn curves<'py>(&self, py: Python<'py>) -> Array<'py> {
-        curves(py, &self.0.shape.curves)
+        curves(py, &self.found.shape.curves)
     }
 
     /// Eigenvalues of the modes that were asked for and found, and bounds on their errors.
     fn eigenvalues<'py>(&self, py: Python<'py>) -> PyResult<Option<[Bound<'py, PyAny>; 2]>> {
-        let Some(modes) = &self.0.stability.modes else {
+        let Some(modes) = &self.found.stability.modes else {
             return Ok(None);
         };
         let numbers = |of: fn(&Mode) -> f64| {
@@ -189,10 +233,10 @@ impl Leaf {
 
     /// Displacements and rotations of the modes on the finest grid.
     fn mode_shapes<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyAny>; 2]> {
-        let modes = self.0.stability.modes.as_deref().unwrap_or_default();
+        let modes = self.found.stability.modes.as_deref().unwrap_or_default();
         let (rods, nodes) = match modes.first() {
             Some(mode) => (mode.displacement.len(), mode.displacement[0].len()),
-            None => (self.0.rod_count, 0),
+            None => (self.found.rod_count, 0),
         };
         let of = |shape: fn(&Mode) -> &Vec<Vec<_>>| {
             let vectors = modes.iter().flat_map(shape).flatten().copied();

@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{array, curves, nodes};
 use crate::errors::{cannot, cannot_vary};
-use crate::relax::{heard, refuse};
+use crate::relax::{check_stations, heard, refuse};
 use crate::result::{Files, Leaf};
 use crate::run::{elapsed, run};
 use crate::scenario::Scenario;
@@ -33,6 +33,7 @@ pub fn check<'py>(
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Checked<'py>> {
     let scenario = scenario.checked.clone();
+    let input = scenario.clone();
     let found = run(py, progress, move |monitor| {
         let options = CheckOptions {
             tolerance,
@@ -51,8 +52,8 @@ pub fn check<'py>(
             Some([stations, nodes(py, &solution.rods, "positions")?])
         }
     };
-    let leaf = Leaf(check.relaxed.clone());
-    Ok((Files::of(check), leaf, solution))
+    let leaf = Leaf::as_found(check.relaxed.clone(), input.clone());
+    Ok((Files::of(check, input), leaf, solution))
 }
 
 /// Equilibria: the files of all, and each with the number of starts that ended there and whether
@@ -66,9 +67,12 @@ pub fn all_shapes(
     scenario: &Scenario,
     tolerance: Option<f64>,
     full_model: bool,
+    stations: Option<usize>,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<All> {
+    check_stations(stations)?;
     let scenario = scenario.checked.clone();
+    let input = scenario.clone();
     let found = run(py, progress, move |monitor| {
         let how = SemiImplicit {
             full_model,
@@ -81,11 +85,16 @@ pub fn all_shapes(
         };
         study::all(&scenario, how, tolerance, &monitor.limit(), &mut heard)
     })?;
-    let all = found.map_err(cannot)?;
-    let found = all.found.iter();
-    let leaves = found.map(|one| (Leaf(one.equilibrium.clone()), one.starts, one.plain));
+    let mut all = found.map_err(cannot)?;
+    for one in &mut all.found {
+        one.equilibrium = one.equilibrium.clone().at_stations(&input, stations);
+    }
+    let leaves = all.found.iter().map(|one| {
+        let leaf = Leaf::as_found(one.equilibrium.clone(), input.clone());
+        (leaf, one.starts, one.plain)
+    });
     let leaves = leaves.collect();
-    Ok((Files::of(all), leaves))
+    Ok((Files::of(all, input), leaves))
 }
 
 /// A trace: its files, whether it is complete, its remark, and the centerlines of the points of
@@ -141,7 +150,8 @@ pub fn trace<'py>(
         })
         .collect();
     let (complete, remark) = (trace.complete, trace.remark.clone());
-    Ok((Files::of(trace), complete, remark, lines?))
+    let files = Files::of(trace, scenario.checked.clone());
+    Ok((files, complete, remark, lines?))
 }
 
 /// Solves a leaf by several methods over one or two numbers.
@@ -190,7 +200,7 @@ pub fn map(
         Map::new(request, rows)
     })?;
     map.show = show;
-    Ok(Files::of(map))
+    Ok(Files::of(map, scenario.checked.clone()))
 }
 
 /// A chart: its files, those of the cost against the number of veins if that was asked for, whether
@@ -218,6 +228,7 @@ pub fn chart(
         .map(|leaf| (*leaf.checked).clone())
         .collect();
     let scenario = scenario.checked.clone();
+    let input = scenario.clone();
     let found = run(py, progress, move |monitor| {
         let mut heard = |turn: &Turn| {
             monitor.say_or_end(turn.round as f64, Some(turn.rounds as f64), || {
@@ -239,8 +250,9 @@ pub fn chart(
     })?;
     let chart = found.map_err(cannot)?;
     let (confirmed, remarks) = (chart.confirmed(), chart.remarks.clone());
-    let scaling = chart.scaling.clone().map(Files::of);
-    Ok((Files::of(chart), scaling, confirmed, remarks))
+    let scaling = chart.scaling.clone();
+    let scaling = scaling.map(|scaling| Files::of(scaling, input.clone()));
+    Ok((Files::of(chart, input), scaling, confirmed, remarks))
 }
 
 /// The program: does what these arguments ask for, the first of which is its name, and returns its
