@@ -98,6 +98,20 @@ class Equilibrium(Result):
         return self._core.tip_force_sum()
 
     @cached_property
+    def _reaction(self) -> tuple[Array, Array] | None:
+        return self._core.tip_reaction()
+
+    @property
+    def tip_reaction(self) -> Array | None:
+        """The force that the holder of the tip feels, shape (3,); none if the tip is free."""
+        return None if self._reaction is None else self._reaction[0]
+
+    @property
+    def tip_reaction_moments(self) -> Array | None:
+        """The moments that the holder of a clamped tip feels, shape (N, 3), or (0, 3) if it is pinned; none if free."""
+        return None if self._reaction is None else self._reaction[1]
+
+    @cached_property
     def stations(self) -> Array:
         """Fractions of the length, base to tip, shape (K + 1,)."""
         return self._core.stations()
@@ -141,6 +155,11 @@ class Equilibrium(Result):
     def curves(self) -> Array:
         """Centerlines at all nodes of the finest grid, for drawing: shape (N, M + 1, 3)."""
         return self._core.curves()
+
+    @cached_property
+    def curve_stations(self) -> Array:
+        """Fractions of the length at which `curves` are given, shape (M + 1,)."""
+        return self._core.curve_stations()
 
     @cached_property
     def _modes(self) -> tuple[Array, Array] | None:
@@ -285,6 +304,8 @@ _LATER = (
     "forces",
     "moments",
     "curves",
+    "curve_stations",
+    "_reaction",
     "_modes",
     "_mode_shapes",
 )

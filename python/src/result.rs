@@ -197,6 +197,18 @@ impl Leaf {
         array(py, self.found.tip_force_sum.to_array().to_vec(), &[3])
     }
 
+    /// The force that the holder of a held tip feels, and the moment of each rod if there are any.
+    fn tip_reaction<'py>(&self, py: Python<'py>) -> PyResult<Option<[Bound<'py, PyAny>; 2]>> {
+        let Some(reaction) = &self.found.reaction else {
+            return Ok(None);
+        };
+        let force = array(py, flat([reaction.force]), &[3])?;
+        Ok(Some([
+            force,
+            vectors(py, reaction.moments.as_deref().unwrap_or_default())?,
+        ]))
+    }
+
     fn stations<'py>(&self, py: Python<'py>) -> Array<'py> {
         let stations = &self.shown(py).shape.stations;
         array(py, stations.clone(), &[stations.len()])
@@ -216,6 +228,12 @@ impl Leaf {
     /// All nodes of the finest grid.
     fn curves<'py>(&self, py: Python<'py>) -> Array<'py> {
         curves(py, &self.found.shape.curves)
+    }
+
+    /// Where the nodes of the finest grid are.
+    fn curve_stations<'py>(&self, py: Python<'py>) -> Array<'py> {
+        let stations = &self.found.shape.curve_stations;
+        array(py, stations.clone(), &[stations.len()])
     }
 
     /// Eigenvalues of the modes that were asked for and found, and bounds on their errors.

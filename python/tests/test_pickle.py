@@ -26,7 +26,7 @@ def test_a_scenario() -> None:
 
 
 def same(one: leafdyn.Equilibrium, other: leafdyn.Equilibrium) -> None:
-    for name in ("positions", "rotations", "strains", "curvatures", "forces", "moments", "stations", "tips", "curves"):
+    for name in ("positions", "rotations", "strains", "curvatures", "forces", "moments", "stations", "tips", "curves", "curve_stations"):
         assert np.array_equal(getattr(one, name), getattr(other, name)), name
     assert repr(one) == repr(other)
     assert one.to_dict() == other.to_dict()

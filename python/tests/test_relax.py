@@ -38,6 +38,33 @@ def test_shapes_and_kinds() -> None:
     assert leaf.negative_eigenvalues == 0
 
 
+def test_a_held_tip_pushes_back() -> None:
+    vein = {**fan(1), "tip": {"held": "pinned", "position": [0.9, 0.0, 0.0]}}
+    vein["leaf"] = {"rods": 1, "length": 1.0, "fan": [0.0]}
+    leaf = leafdyn.relax(vein)
+    assert leaf.tip is not None
+    assert leaf.tip_reaction is not None
+    assert np.allclose(leaf.tip, [0.9, 0.0, 0.0], atol=1e-12)
+    assert leaf.tip_reaction.tolist() == leaf.to_dict()["tip_reaction"]
+    assert np.abs(leaf.tip_reaction).max() > 0.1
+    assert leafdyn.relax(fan(1), set={"leaf.fan": [0.0]}).tip_reaction is None
+
+
+def test_stations_that_are_asked_for() -> None:
+    leaf = leafdyn.relax(fan(3), stations=10)
+    assert np.allclose(leaf.stations, np.linspace(0.0, 1.0, 11), atol=1e-15)
+    assert leaf.positions.shape == (3, 11, 3)
+    assert len(leafdyn.relax(fan(3)).stations) >= 17
+    with pytest.raises(ValueError, match="stations = 0"):
+        leafdyn.relax(fan(3), stations=0)
+
+
+def test_the_input_of_a_result_is_a_scenario() -> None:
+    leaf = leafdyn.relax(fan(3), set={"stiffness.axial": float("inf")})
+    again = leafdyn.relax(leaf.to_dict()["input"])
+    assert np.array_equal(again.positions, leaf.positions)
+
+
 def test_free_tips() -> None:
     leaf = leafdyn.relax(fan(3), set={"leaf.joined": False})
     assert leaf.tip is None
