@@ -130,29 +130,6 @@ def chosen(write: str | Iterable[str] | None, names: Iterable[str]) -> set[str]:
     return kinds
 
 
-def columns(self) -> dict[str, NDArray[Any]]:
-        """The columns of its table by their names, as arrays; an empty cell is not a number."""
-        table = next(name for name in self._files.names() if name.endswith(".csv"))
-        return columns(self._files.contents(table))
-
-    def to_pandas(self) -> Any:
-        """Its table as a ``pandas.DataFrame``."""
-        import pandas
-
-        return pandas.DataFrame(self.columns)
-
-
-def _kinds(write: str | Iterable[str] | None) -> set[str]:
-    if write is None:
-        return set(KINDS)
-    words = write.split(",") if isinstance(write, str) else list(write)
-    kinds = {word.strip() for word in words} - {"none", ""}
-    unknown = sorted(kinds - set(KINDS))
-    if unknown:
-        raise ValueError(f"write = {unknown[0]}: must be of {', '.join(KINDS)}, or none")
-    return kinds
-
-
 def columns(table: bytes) -> dict[str, NDArray[Any]]:
     """The columns of a table in CSV."""
     rows = list(csv.reader(io.StringIO(table.decode())))
@@ -163,9 +140,9 @@ def columns(table: bytes) -> dict[str, NDArray[Any]]:
 def _column(cells: tuple[str, ...]) -> NDArray[Any]:
     if cells and all(cell in ("true", "false") for cell in cells):
         return np.array([cell == "true" for cell in cells])
-    for kind in (int, float):
+    for number in (int, float):
         try:
-            return np.array([kind(cell or ("nan" if kind is float else "")) for cell in cells], dtype=kind)
+            return np.array([number(cell or ("nan" if number is float else "")) for cell in cells], dtype=number)
         except (ValueError, OverflowError):
             pass
     return np.array(cells, dtype=str)

@@ -41,7 +41,7 @@ def test_many_share_the_processors() -> None:
     before = leafdyn.threads()
     try:
         best = {count: np.inf for count in (1, 2)}
-        for _ in range(3):
+        for _ in range(5):
             for count in best:
                 leafdyn.set_threads(count)
                 best[count] = min(best[count], seconds(lambda: leafdyn.relax_many(scenarios)))
