@@ -24,10 +24,10 @@ class Equilibrium(Result):
 
     >>> import leafdyn
     >>> leaf = leafdyn.relax("scenarios/paper/fig04.toml")
-    >>> leaf
-    <Equilibrium fig04: stable, tip (0.95666, 0.047746, -0.14736) within 3.6e-07>
-    >>> leaf.positions.shape, leaf.rotations.shape, leaf.forces.shape
-    ((21, 9, 3), (21, 9, 4), (21, 9, 3))
+    >>> leaf  # doctest: +ELLIPSIS
+    <Equilibrium fig04: stable, tip (0.95666, 0.047746, -0.14736) within ...>
+    >>> leaf.positions.shape == leaf.forces.shape == (21, len(leaf.stations), 3)
+    True
     """
 
     name: str

@@ -105,7 +105,11 @@ fn value(text: &mut String, entry: &Bound<PyAny>, path: &str, depth: usize) -> P
             }
         }
     } else if let Ok(words) = entry.cast::<PyString>() {
-        text.push_str(&quoted(&words.to_cow()?));
+        match &*words.to_cow()? {
+            // As results have it in JSON, which knows no infinity.
+            "inf" if path.starts_with("stiffness.") => text.push_str("inf"),
+            words => text.push_str(&quoted(words)),
+        }
     } else if entry.is_instance_of::<PyList>() || entry.is_instance_of::<PyTuple>() {
         text.push('[');
         for (at, item) in entry.try_iter()?.enumerate() {

@@ -1,5 +1,6 @@
 """A leaf at rest: what it can be asked with, and what it holds."""
 
+import json
 from pathlib import Path
 from types import MappingProxyType
 
@@ -61,8 +62,8 @@ def test_stations_that_are_asked_for() -> None:
 
 def test_the_input_of_a_result_is_a_scenario() -> None:
     leaf = leafdyn.relax(fan(3), set={"stiffness.axial": float("inf")})
-    again = leafdyn.relax(leaf.to_dict()["input"])
-    assert np.array_equal(again.positions, leaf.positions)
+    for source in (leaf.to_dict()["input"], json.dumps(leaf.to_dict()["input"])):
+        assert np.array_equal(leafdyn.relax(source).positions, leaf.positions)
 
 
 def test_free_tips() -> None:
@@ -126,7 +127,9 @@ def test_one_grid_has_no_error_estimate() -> None:
     leaf = leafdyn.relax(fan(3), segments=10)
     assert leaf.error_estimate is None
     assert leaf.segments == [10]
-    assert leaf.positions.shape == (3, 11, 3)
+    # Its nodes, and as many between them as make at least 17 stations.
+    assert leaf.positions.shape == (3, 21, 3)
+    assert leaf.curves.shape == (3, 11, 3)
 
 
 def test_modes() -> None:
