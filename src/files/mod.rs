@@ -167,7 +167,7 @@ pub fn contents<R: Written>(document: &Document<R>, name: &str) -> Option<Vec<u8
     }
     let mut formats = document.result.formats(&Kind::ALL).into_iter();
     let format = formats.find(|format| format.file_name() == name)?;
-    format.write(document.result, &mut bytes).ok()?;
+    format.write(document, &mut bytes).ok()?;
     Some(bytes)
 }
 
