@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use std::time::Duration;
 
-use leafdyn::files::{Recording, read_peers};
+use leafdyn::files::{Recording, Selection, read_peers};
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Options, Simulation};
 use leafdyn::study::{Base, Vary};
@@ -105,7 +105,7 @@ pub fn stopped() -> (TempDir, Scenario) {
     let scenario = Scenario::from_toml(&LEAF.replace("inf", "100.0")).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let mut simulation = Simulation::new(&scenario, &Options::default()).unwrap();
-    let mut recording = Recording::begin(folder.path(), &mut simulation).unwrap();
+    let mut recording = Recording::begin(folder.path(), &mut simulation, &Selection::default()).unwrap();
     let frame = simulation.next_frame().unwrap();
     recording.add(&simulation, &frame).unwrap();
     recording.checkpointer().write().unwrap().unwrap();
@@ -139,7 +139,7 @@ pub fn resumed(name: &str, data: &[u8]) {
     fs::write(folder.path().join(name), data).unwrap();
     let before = contents(folder.path());
     let mut simulation = Simulation::new(scenario, &Options::default()).unwrap();
-    match Recording::resume(folder.path(), &mut simulation) {
+    match Recording::resume(folder.path(), &mut simulation, &Selection::default()) {
         Ok(_) => assert_eq!(simulation.frames().1, 1),
         Err(error) => {
             assert!(error.to_string().len() < 2_000, "{error}");
