@@ -105,7 +105,8 @@ pub fn stopped() -> (TempDir, Scenario) {
     let scenario = Scenario::from_toml(&LEAF.replace("inf", "100.0")).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let mut simulation = Simulation::new(&scenario, &Options::default()).unwrap();
-    let mut recording = Recording::begin(folder.path(), &mut simulation, &Selection::default()).unwrap();
+    let mut recording =
+        Recording::begin(folder.path(), &mut simulation, &Selection::default()).unwrap();
     let frame = simulation.next_frame().unwrap();
     recording.add(&simulation, &frame).unwrap();
     recording.checkpointer().write().unwrap().unwrap();

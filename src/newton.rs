@@ -75,12 +75,6 @@ pub enum Stop {
     Stuck,
 }
 
-/// An increment whose equations are solved to a relative accuracy in the energy
-/// norm is that accurate times this, as a displacement: what is left is soft, and
-/// most of the norm is stiff. Fifteen times was seen, in leaves with stiffnesses over
-/// three decades.
-const SOFTNESS: f64 = 30.0;
-
 /// The error that is left after an increment of this `size`, which follows one of
 /// size `previous`: of second order at best, and never less than what the solution
 /// of its equations left. `None` if that is more than `accuracy`, unless the
@@ -96,7 +90,7 @@ pub fn converged(
         true => size * (rate * rate),
         false => 10.0 * size * size,
     };
-    let remaining = quadratic.max(SOFTNESS * cg_tolerance * size);
+    let remaining = quadratic.max(cg_tolerance * size);
     match size < rounding && rate > SHRINKS {
         true => Some(size),
         false => (remaining <= accuracy).then_some(remaining),
@@ -113,7 +107,7 @@ pub fn at_saddle(leaf: &DiscreteLeaf, state: &State, size: f64) -> bool {
 /// `previous`: an iteration is cheap beside a new assembly, so that the next
 /// step is never held up by them.
 pub fn cg_tolerance(previous: f64, loosest: f64) -> f64 {
-    (1e-4 * previous).clamp(1e-10, loosest)
+    (3e-3 * previous).clamp(1e-10, loosest)
 }
 
 /// Solves with matrices that must be positive definite: by conjugate gradients

@@ -33,7 +33,10 @@ fn columns_buckle_at_eulers_loads() {
         ("clamped", 39.47841760435743),
         ("pinned", 20.19072855642663),
     ] {
-        let stiff = format!("{}; stiffness.bending_2=3.0", set_stiffness(1e3, f64::INFINITY));
+        let stiff = format!(
+            "{}; stiffness.bending_2=3.0",
+            set_stiffness(1e3, f64::INFINITY)
+        );
         let load = 500.0 * (1.0 - (1.0_f64 - 4e-3 * load).sqrt());
         let buckled = 1.0 - load / 1e3;
         let to = 1.0 - 1.4 * load / 1e3;
@@ -58,7 +61,10 @@ fn columns_buckle_at_eulers_loads() {
 #[test]
 fn a_twisted_rod_becomes_unstable_in_two_directions() {
     let torsion = 0.8;
-    let stiff = format!("{}; stiffness.torsion={torsion}", set_stiffness(1e8, f64::INFINITY));
+    let stiff = format!(
+        "{}; stiffness.torsion={torsion}",
+        set_stiffness(1e8, f64::INFINITY)
+    );
     let found = follow(&held("clamped"), &stiff, "tip.twist=0..14", false);
     let twist = 8.986818915818128 / torsion;
     changes_at("twist", &found, &[(twist, 2)], 1e-8);

@@ -19,18 +19,18 @@ fn what_takes_more_memory_than_is_allowed_is_refused() {
         --segments 100000 --memory 100MB => 5 rods of 100000 segments would take about 1.4 GB of memory, and 100.0 MB are allowed: use fewer rods or segments, or raise the limit with --memory
         --segments 1000 --memory 1e6 => and 1.0 MB are allowed
         --method shooting --memory 250kB => use fewer rods or intervals
-        --method shooting --intervals 4000 --memory 1GB => shooting with 5 rods, intervals: 4000, would
+        --method shooting --intervals 4000 --memory 500MB => shooting with 5 rods, intervals: 4000, would
         --method shooting --set leaf.rods=100000 => shooting with 100000 rods
         --method single-shooting --set leaf.rods=100000 => shooting with 100000 rods
         --memory 10kB => a scenario of 
         --memory lots => must be a size, as in 500MB or 2GB
-        --memory -1GB => must be a size
+        --memory=-1GB => must be a size
         ",
     );
     workplace::all_refused(
         "",
         "
-        check leaf.toml --intervals 4000 --memory 1GB => shooting with 5 rods
+        check leaf.toml --intervals 4000 --memory 500MB => shooting with 5 rods
         check leaf.toml --set leaf.rods=100000 => shooting with 100000 rods
         simulate leaf.toml --segments 100000 --memory 1GB => 5 rods of 100000 segments
         trace leaf.toml --segments 10000 --vary load.gravity[2]=-1..0 --memory 1GB => branches of 5 rods of 10000 segments

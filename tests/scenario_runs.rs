@@ -27,7 +27,9 @@ fn every_scenario_file_ends_at_rest_within_its_tolerance() {
         let moment = matches!(name, "rollup" | "helical_rollup");
         let stable = if moment { Value::Null } else { true.into() };
         assert_eq!(summary["stable"], stable, "{name}");
-        assert_eq!(run.err.is_empty(), !moment, "{name}: {}", run.err);
+        // So is what softening may have decided.
+        let remark = moment || run.err.contains("softened");
+        assert_eq!(run.err.is_empty(), !remark, "{name}: {}", run.err);
 
         let number = |key: &str| summary[key].as_f64().unwrap();
         let rods = read(&file, "").rods;

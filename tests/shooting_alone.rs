@@ -23,7 +23,10 @@ fn it_finds_the_relaxed_leaf() {
     });
     let buckled = path("classic/elastica_buckled");
     let classic = files("classic").into_iter().filter(|file| *file != buckled);
-    for leaf in paper.chain(classic.map(|file| read(&file, ""))) {
+    let classic = classic.map(|file| read(&file, ""));
+    // From arcs there is no way to where a tip is held.
+    let classic = classic.filter(|leaf| leaf.held_tip.is_none());
+    for leaf in paper.chain(classic) {
         let what = format!("{}, {} veins", leaf.name, leaf.rods.len());
         let relaxed = settle(&leaf, TIGHT);
         let alone = shot_alone(&leaf, &relaxed.shape.stations);

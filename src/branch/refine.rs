@@ -24,6 +24,9 @@ const STILL: f64 = 1e-4;
 /// branches.
 const SAME_WAY: f64 = 0.85;
 
+/// Largest error of the tips of a critical point (lengths).
+const NEUTRAL_TIPS: f64 = 1e-3;
+
 /// A critical parameter within this part of its range is exact.
 const EXACT: f64 = 1e-12;
 
@@ -255,7 +258,15 @@ pub fn refine_critical(
         if enough && table.error() <= accuracy {
             return Ok(table.refined(critical.state, equations.grid().clone()));
         }
-        if 2 * equations.grid().segments() > FINEST {
+        let grids = if rigid { CRITICAL_GRIDS } else { GRIDS };
+        let last = level + 1 == grids || 2 * equations.grid().segments() > FINEST;
+        // Along the neutral mode a singular matrix leaves tips as rounding has them, and
+        // that of a nearly rigid leaf the more, the finer the grid: the point is known by
+        // its parameter, and says how well its tips are.
+        if last && table.error() <= NEUTRAL_TIPS {
+            return Ok(table.refined(critical.state, equations.grid().clone()));
+        }
+        if last {
             break;
         }
     }

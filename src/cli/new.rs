@@ -43,7 +43,7 @@ impl Example {
             Example::PullTest => (
                 "pull-test",
                 include_str!("examples/pull-test.toml"),
-                "trace FILE --vary load.tip_force[0]=0..5",
+                "trace FILE --vary load.tip_force[0]=1.5..5",
             ),
             Example::Motion => (
                 "motion",

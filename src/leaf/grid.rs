@@ -128,7 +128,10 @@ mod tests {
             Grid::new(32, &[0.3404]),
             Grid::new(8, &[0.3404]).refined().refined(),
         ] {
-            assert_eq!(Grid::through(grid.sigma(), &[0.3404]), grid);
+            let through = Grid::through(grid.sigma(), &[0.3404]);
+            let pairs = through.sigma().iter().zip(grid.sigma());
+            assert!(pairs.map(|(a, b)| (a - b).abs()).all(|off| off < 1e-15));
+            assert_eq!(through.segments(), grid.segments());
         }
         // However many kinks there are, every panel has a segment.
         assert_eq!(Grid::new(1, &[0.25, 0.5]).segments(), 3);

@@ -1,12 +1,11 @@
 //! Segments of the coarsest grid, as wanted or as needed.
 
-use crate::leaf::{Grid, Leaf};
+use crate::leaf::Leaf;
 use crate::memory::Request;
 use crate::relax::method::Method;
 use crate::relax::methods::moment;
 use crate::relax::options::{MAX_NODES, RelaxError};
 use crate::relax::run::COARSEST;
-use crate::scenario::Profile;
 
 /// Segments of the finest grid.
 pub const FINEST: usize = 16_384;
@@ -20,10 +19,6 @@ const LOOSE: f64 = 1e-3;
 /// rest curvature and tip moment alone tell it, and the most that one of a loose
 /// tolerance may come to.
 pub const COARSEST_TURN: f64 = 0.8;
-
-/// Factor by which a stiffness may change over a segment of the coarsest grid: where
-/// it grows from next to nothing, errors of coarser grids have no series in ds^2 yet.
-const STEEPEST: f64 = 4.0;
 
 /// Whether the leaf settles in the valley it starts in: where the path to rest is
 /// Newton's, nothing keeps it from leaving saddles, and nothing disturbs it.
@@ -84,23 +79,8 @@ pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
         None => (0..leaf.rods()).map(turn).fold(0.0, f64::max),
     };
     let mut segments = least;
-    while ((segments as f64) * COARSEST_TURN < turn || steep(leaf, segments)) && segments < FINEST {
+    while (segments as f64) * COARSEST_TURN < turn && segments < FINEST {
         segments *= 2;
     }
     segments
-}
-
-/// Whether a stiffness changes by more than [`STEEPEST`] over a segment.
-fn steep(leaf: &Leaf, segments: usize) -> bool {
-    let grid = Grid::new(segments, leaf.kinks());
-    let rods = leaf.scenario().rods.iter();
-    let mut profiles = rods.flat_map(|rod| rod.couple_stiffness.iter().chain(&rod.force_stiffness));
-    profiles.any(|profile| {
-        let varies = matches!(profile, Profile::Linear { .. });
-        varies
-            && grid.sigma().windows(2).any(|ends| {
-                let [a, b] = [profile.at(ends[0]), profile.at(ends[1])];
-                a.max(b) > STEEPEST * a.min(b)
-            })
-    })
 }

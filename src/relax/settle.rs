@@ -69,7 +69,7 @@ impl Run<'_, '_> {
         let grip = leaf.leaf.held.is_some() && from_start;
         let cg_tolerance = match guess {
             InitialGuess::Start | InitialGuess::Pushed(_) => FAR_FROM_REST,
-            InitialGuess::Coarser(_) => 3e-6,
+            InitialGuess::Coarser(_) => 1e-4,
             // The error of interpolation is one of stiff modes, the error that
             // is to be removed one of soft ones: a small part of the energy.
             InitialGuess::Finer(_) => 1e-8,

@@ -305,7 +305,7 @@ mod tests {
             assert_eq!(Key::from_path(key.path()), Some(key));
             assert_eq!(key.row().key, key);
         }
-        assert_eq!(Key::tables().len(), 9);
+        assert_eq!(Key::tables().len(), 10);
     }
 
     #[test]

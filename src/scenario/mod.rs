@@ -28,6 +28,7 @@ pub use error::{Place, ScenarioError};
 pub(crate) use key::Form;
 pub use key::Key;
 pub use part::Part;
+pub(crate) use part::resolve;
 pub use profile::Profile;
 pub use read::text;
 #[cfg(feature = "cli")]

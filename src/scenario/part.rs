@@ -118,7 +118,7 @@ impl fmt::Display for Part {
 }
 
 /// An override with the whole value of its key.
-pub(super) struct Override {
+pub(crate) struct Override {
     /// As it was given.
     pub given: String,
     pub key: Key,
@@ -127,7 +127,7 @@ pub(super) struct Override {
 
 /// Overrides of whole entries, from those of parts of entries of the scenario in
 /// `text`, which may have errors that are found elsewhere.
-pub(super) fn resolve(text: &str, overrides: &[String]) -> Result<Vec<Override>, ScenarioError> {
+pub(crate) fn resolve(text: &str, overrides: &[String]) -> Result<Vec<Override>, ScenarioError> {
     let mut resolved: Vec<Override> = Vec::new();
     for given in overrides {
         let refuse = |problem: String| {

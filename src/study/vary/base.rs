@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{Keys, Knob, Knobs, Target, VaryError};
-use crate::scenario::{self, Scenario};
+use crate::scenario::{self, Key, Scenario, resolve};
 
 /// A scenario as text, with some entries replaced: what numbers are put into.
 #[derive(Clone, Debug)]
@@ -96,6 +96,12 @@ impl Base {
                     }
                 }
             }
+        }
+        // A part that is not there is not there at any value, unless rods are added.
+        let mut targets = values.iter().flat_map(|(keys, _)| keys.targets());
+        let adds = |target: &Target| matches!(target, Target::Entry(part) if part.key == Key::Rods);
+        if !targets.any(adds) {
+            resolve(&self.text, &overrides).map_err(|error| VaryError::Key(error.to_string()))?;
         }
         Ok(Varied {
             scenario: Scenario::from_toml_with(&self.text, &self.file, &overrides)?,
