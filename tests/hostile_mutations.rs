@@ -162,7 +162,8 @@ fn checkpoints() {
 #[test]
 fn the_corpus_of_the_fuzz_targets() {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus");
-    let bodies: [(&str, fn(&[u8])); 4] = [
+    type Body = fn(&[u8]);
+    let bodies: [(&str, Body); 4] = [
         ("scenario", bodies::scenario),
         ("typed", bodies::typed),
         ("peers", bodies::peers),

@@ -15,6 +15,10 @@ const HERMITE: usize = 4;
 /// Most nodes of one whose slopes are not known.
 const LAGRANGE: usize = 6;
 
+/// What helps where stations between those that were solved for are less accurate.
+const BETWEEN: &str = "the tolerance is kept where the leaf was solved for, but not at all of the \
+    stations between: ask for a smaller tolerance, or for other stations";
+
 impl Equilibrium {
     /// The same at stations that cut every vein into so many equal parts; `None`:
     /// at the nodes of the finest grid, and as many between them as make at least
@@ -23,9 +27,29 @@ impl Equilibrium {
     /// Between the stations where it was found, a vein is the polynomial that has
     /// its positions and tangents there, and rotations and moments with the slopes
     /// that the equations give; never across a knot of a profile. What this may be
-    /// wrong by is added to the error estimate.
+    /// wrong by is added to the error estimate; where that is more than the tolerance
+    /// then, the outcome says so, but stations that were not asked for are left out.
     #[must_use]
-    pub fn at_stations(mut self, scenario: &Scenario, parts: Option<usize>) -> Self {
+    pub fn at_stations(self, scenario: &Scenario, parts: Option<usize>) -> Self {
+        let within = |leaf: &Equilibrium| {
+            let allowed = leaf.accuracy.tolerance * leaf.shape.longest();
+            (leaf.accuracy.error_estimate).is_none_or(|error| error <= allowed)
+        };
+        let mut there = self.clone().interpolated(scenario, parts);
+        if within(&there) || !within(&self) {
+            return there;
+        }
+        if parts.is_none() {
+            return self;
+        }
+        if there.outcome.is_success() {
+            there.outcome = Outcome::ToleranceNotReached;
+            there.remark = Some(BETWEEN.into());
+        }
+        there
+    }
+
+    fn interpolated(mut self, scenario: &Scenario, parts: Option<usize>) -> Self {
         let to = match parts {
             Some(parts) => equally_spaced(parts),
             None => finest(&self.shape),

@@ -198,7 +198,7 @@ impl<S: Simd> SpatialElement<S> {
 
     /// F K F^T from the columns of K, F having the directors as columns.
     #[inline(always)]
-    fn to_lab(&self, [a, b, c]: Rows<S>) -> Rows<S> {
+    fn in_lab(&self, [a, b, c]: Rows<S>) -> Rows<S> {
         let (a, b, c) = (
             a.along(self.frame),
             b.along(self.frame),
@@ -232,7 +232,7 @@ impl<S: Simd> SpatialElement<S> {
         let number = |value: f64| Lanes::splat(simd, value);
         let (half, quarter, eighth) = (number(0.5), number(0.25), number(0.125));
         let [stiff, midpoint] = self.midpoint(sections);
-        let (stiff, p) = (self.to_lab(stiff), self.to_lab(midpoint));
+        let (stiff, p) = (self.in_lab(stiff), self.in_lab(midpoint));
         let xx = self.diagonal_to_lab(sections.condensing.scale(sections.per_ds));
         let lab = |v: Vectors<S>| v.along(self.frame);
         let tau = lab(self.relative.tau);

@@ -52,7 +52,7 @@ fn perp_dot<S: Simd>(a: Pair<S>, b: Pair<S>) -> Lanes<S> {
 impl<S: Simd> PlanarElement<S> {
     /// R v.
     #[inline(always)]
-    fn to_lab(&self, v: Pair<S>) -> Pair<S> {
+    fn in_lab(&self, v: Pair<S>) -> Pair<S> {
         let [x, y] = self.d1;
         [y.times_from(v[1], x * v[0]), y.times(v[0], x * v[1])]
     }
@@ -60,7 +60,7 @@ impl<S: Simd> PlanarElement<S> {
     /// First derivatives from those with respect to R^T dx and the two angles.
     #[inline(always)]
     fn pull_back(&self, nu: Pair<S>, turns: Pair<S>) -> [[Lanes<S>; 3]; 2] {
-        let [x, y] = self.to_lab(nu);
+        let [x, y] = self.in_lab(nu);
         [[turns[0], -x, -y], [turns[1], x, y]]
     }
 }
@@ -168,7 +168,7 @@ impl<S: Simd> Element<S, 3> for PlanarElement<S> {
         let mean = mean * number(0.25);
         let bending = sections.couple_stiffness.z * sections.per_ds;
         let half = number(-0.5);
-        let [tx, ty] = self.to_lab([stiff_rate[0] * half, stiff_rate[1] * half]);
+        let [tx, ty] = self.in_lab([stiff_rate[0] * half, stiff_rate[1] * half]);
         let (k1, k2) = (k.x * sections.per_ds, k.y * sections.per_ds);
         let (xx, xy) = (x.times(x * k1, y * y * k2), x * y * (k1 - k2));
         let yy = y.times(y * k1, x * x * k2);
@@ -200,7 +200,7 @@ impl<S: Simd> Element<S, 3> for PlanarElement<S> {
             k.x * gap[0] * sections.per_ds,
             k.y * gap[1] * sections.per_ds,
         ];
-        let [x, y] = self.to_lab(nu);
+        let [x, y] = self.in_lab(nu);
         Vectors::new(x, y, number(0.0))
     }
 }

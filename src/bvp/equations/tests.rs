@@ -42,13 +42,13 @@ fn paper<D: DualNum<Primitive = f64> + Copy>(
         let turn = cross_product(t, director);
         [0, 1, 2].map(|i| director[i] + turn[i])
     });
-    let to_lab = [0, 1, 2].map(|i| [0, 1, 2].map(|c| columns[c][i]));
+    let in_lab = [0, 1, 2].map(|i| [0, 1, 2].map(|c| columns[c][i]));
     let (n, m) = (part(2, rod.n), part(3, rod.m));
     let (n_d, m_d) = (turned(&columns, n), turned(&columns, m));
     let v = [0, 1, 2].map(|i| n_d[i] * law.compliance[i] + law.rest_strain[i]);
     let u = [0, 1, 2].map(|i| m_d[i] * law.flexibility[i] + law.rest_curvature[i]);
-    let tangent = turned(&to_lab, v).map(|x| x * length);
-    let bend = turned(&to_lab, u).map(|x| x * length);
+    let tangent = turned(&in_lab, v).map(|x| x * length);
+    let bend = turned(&in_lab, u).map(|x| x * length);
     let moment = cross_product(n, tangent);
     SVector::from_fn(|k, _| match k / 3 {
         0 => tangent[k % 3],

@@ -141,7 +141,9 @@ impl Leaf {
         let nodes = curves.first().map_or(0, Vec::len);
         let stride = nodes.saturating_sub(1).div_ceil(most).max(1);
         // The tip is among them.
-        let stride = (stride..nodes).find(|k| (nodes - 1) % k == 0).unwrap_or(1);
+        let stride = (stride..nodes)
+            .find(|k| (nodes - 1).is_multiple_of(*k))
+            .unwrap_or(1);
         let shown = || {
             let curves = drawn.iter().map(|&number| &curves[number - 1]);
             curves.flat_map(move |curve| curve.iter().step_by(stride).copied())

@@ -58,18 +58,19 @@ fn chart(moments: &[Moment]) -> Chart {
         unstable: Vec::new(),
         special: Vec::new(),
     };
-    let energies: [(&str, &dyn Fn(&Moment) -> f64); 7] = [
-        ("kinetic", &|m| m.energy.kinetic),
-        ("elastic", &|m| m.energy.elastic),
-        ("coupling", &|m| m.energy.coupling),
-        ("potential of the loads", &|m| m.energy.potential),
-        ("dissipated", &|m| m.energy.dissipated),
-        ("work put in", &|m| m.energy.work),
-        ("balance", &|m| m.energy.balance()),
+    type Energy = fn(&Moment) -> f64;
+    let energies: [(&str, Energy); 7] = [
+        ("kinetic", |m| m.energy.kinetic),
+        ("elastic", |m| m.energy.elastic),
+        ("coupling", |m| m.energy.coupling),
+        ("potential of the loads", |m| m.energy.potential),
+        ("dissipated", |m| m.energy.dissipated),
+        ("work put in", |m| m.energy.work),
+        ("balance", |m| m.energy.balance()),
     ];
     let mut curves: Vec<Curve> = Vec::new();
     for (color, (name, of)) in energies.into_iter().enumerate() {
-        let curve = curve(0, color, name, of);
+        let curve = curve(0, color, name, &of);
         // What is not there needs no curve.
         if curve.y.iter().any(|&y| y != 0.0) {
             curves.push(curve);
