@@ -9,6 +9,9 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
 
+/// What messages call a text that is not from a file.
+pub const TEXT: &str = "scenario";
+
 static SCENARIO_ERROR: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 
 /// A refused scenario: `leafdyn.ScenarioError`.
@@ -39,6 +42,23 @@ fn remedy(problem: &str) -> Option<&str> {
         Some(at) => Some(&sentence[at + 2..]),
         None => sentence.rsplit_once(": ").map(|(_, end)| end),
     }
+}
+
+/// Refuses what no TOML can be made of.
+pub fn refuse_entry(found: &Bound<PyAny>, key: &str, allowed: &str) -> PyErr {
+    let kind = found.get_type().name();
+    let kind = kind.map_or("an object".into(), |name| name.to_string());
+    let problem = format!("{key} = {kind}: {allowed}");
+    let place = Place::File {
+        file: TEXT.into(),
+        line: None,
+    };
+    let error = ScenarioError {
+        place,
+        key: None,
+        problem,
+    };
+    refused(found.py(), &error)
 }
 
 /// A request that cannot be met: a `ValueError`.

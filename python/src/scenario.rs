@@ -3,16 +3,13 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use leafdyn::scenario::{self, Place, ScenarioError};
+use leafdyn::scenario;
 use leafdyn::study::Base;
 use pyo3::prelude::*;
 use pyo3::types::PyMapping;
 
-use crate::errors::{cannot_vary, refused};
+use crate::errors::{TEXT, cannot_vary, refused};
 use crate::toml_text;
-
-/// What messages call a text that is not from a file.
-const TEXT: &str = "scenario";
 
 /// A checked scenario, with the text it is from.
 #[pyclass(frozen, module = "leafdyn._leafdyn")]
@@ -109,21 +106,4 @@ impl Scenario {
         let base = Base::of_text(self.text.clone(), self.file.clone(), &self.overrides);
         base.map_err(|error| cannot_vary(py, error))
     }
-}
-
-/// Refuses what no TOML can be made of.
-pub fn refuse_entry(found: &Bound<PyAny>, key: &str, allowed: &str) -> PyErr {
-    let kind = found.get_type().name();
-    let kind = kind.map_or("an object".into(), |name| name.to_string());
-    let problem = format!("{key} = {kind}: {allowed}");
-    let place = Place::File {
-        file: TEXT.into(),
-        line: None,
-    };
-    let error = ScenarioError {
-        place,
-        key: None,
-        problem,
-    };
-    refused(found.py(), &error)
 }

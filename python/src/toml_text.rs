@@ -5,7 +5,7 @@ use std::fmt::Write;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyMapping, PyString, PyTuple};
 
-use crate::scenario::refuse_entry;
+use crate::errors::refuse_entry;
 
 /// How deep lists and tables may stand in each other: none of a scenario stands deeper.
 const DEEPEST: usize = 8;

@@ -98,9 +98,9 @@ fn veins(raw: &Raw, rods: usize, sections: Option<&Sections>) -> Result<Vec<Rod>
     let stretch = quantity(Key::RestStretch)?;
     let (couple, force) = match sections {
         Some(sections) => (sections.couple(), sections.force()),
-        None => (triple(limits::COUPLE)?, triple(limits::FORCE)?),
+        None => (triple(Key::COUPLE)?, triple(Key::FORCE)?),
     };
-    let rest = triple(limits::REST)?;
+    let rest = triple(Key::REST)?;
     let of = |all: &[Vec<Profile>; 3], rod: usize| all.each_ref().map(|one| one[rod].clone());
     Ok((0..rods)
         .map(|rod| Rod {
@@ -135,7 +135,7 @@ fn angles(item: Item, rods: usize) -> Result<Vec<f64>> {
 
 fn coupling(raw: &Raw, gaps: usize) -> Result<Vec<[f64; 3]>> {
     let mut coupling = vec![[0.0; 3]; gaps];
-    for (axis, key) in limits::COUPLING.into_iter().enumerate() {
+    for (axis, key) in Key::COUPLING.into_iter().enumerate() {
         let stiffness = raw.item(key)?.one_each(gaps)?;
         for (gap, stiffness) in coupling.iter_mut().zip(stiffness) {
             gap[axis] = stiffness;

@@ -5,7 +5,6 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::error::{Place, ScenarioError};
 use super::key::Range;
-use super::limits::{COUPLE, COUPLING, FORCE, REST};
 use super::section::{Outline, Section};
 use super::{Key, Profile, Rod, Scenario, Schedule, Start};
 
@@ -96,18 +95,18 @@ impl Scenario {
                 return None;
             }
             Key::Torsion | Key::Bending2 | Key::Bending3 => {
-                self.of_rods(COUPLE, key, |rod| &rod.couple_stiffness)
+                self.of_rods(Key::COUPLE, key, |rod| &rod.couple_stiffness)
             }
             Key::Axial | Key::Shear2 | Key::Shear3 => {
-                self.of_rods(FORCE, key, |rod| &rod.force_stiffness)
+                self.of_rods(Key::FORCE, key, |rod| &rod.force_stiffness)
             }
             Key::RestTwist | Key::RestBend2 | Key::RestBend3 => {
-                self.of_rods(REST, key, |rod| &rod.rest_curvature)
+                self.of_rods(Key::REST, key, |rod| &rod.rest_curvature)
             }
             Key::RestStretch => quantity(self.rods.iter().map(|rod| &rod.rest_stretch)),
             Key::CouplingX | Key::CouplingY | Key::CouplingZ => {
                 // A single rod has no gap: any number says so.
-                let axis = COUPLING.iter().position(|axis| *axis == key)?;
+                let axis = Key::COUPLING.iter().position(|axis| *axis == key)?;
                 each(self.coupling.iter().map(|gap| gap[axis]))
             }
             Key::Gravity => list(self.gravity),

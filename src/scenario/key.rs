@@ -3,7 +3,7 @@
 //! A new key is a row here, a field of the checked scenario, and the line in
 //! `check` that reads the one into the other.
 
-use super::error::shorten;
+use super::excerpt::shorten;
 use Form::*;
 use LeftOut::*;
 use Range::*;
@@ -194,6 +194,12 @@ keys! {
 
 impl Key {
     pub(super) const COUNT: usize = FORMAT.len();
+    /// Of torsion and bending, in the order of the directors.
+    pub(super) const COUPLE: [Key; 3] = [Key::Torsion, Key::Bending2, Key::Bending3];
+    /// Of stretch and shear.
+    pub(super) const FORCE: [Key; 3] = [Key::Axial, Key::Shear2, Key::Shear3];
+    pub(super) const REST: [Key; 3] = [Key::RestTwist, Key::RestBend2, Key::RestBend3];
+    pub(super) const COUPLING: [Key; 3] = [Key::CouplingX, Key::CouplingY, Key::CouplingZ];
 
     fn row(self) -> &'static Row {
         &FORMAT[self as usize]

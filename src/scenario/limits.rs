@@ -11,11 +11,6 @@ use super::{Profile, Rod, Scale, Scenario};
 
 type Result = std::result::Result<(), ScenarioError>;
 
-pub(super) const COUPLE: [Key; 3] = [Key::Torsion, Key::Bending2, Key::Bending3];
-pub(super) const FORCE: [Key; 3] = [Key::Axial, Key::Shear2, Key::Shear3];
-pub(super) const REST: [Key; 3] = [Key::RestTwist, Key::RestBend2, Key::RestBend3];
-pub(super) const COUPLING: [Key; 3] = [Key::CouplingX, Key::CouplingY, Key::CouplingZ];
-
 /// The range of a number free of units.
 struct Limit {
     /// The number.
@@ -192,10 +187,10 @@ fn rods(raw: &Raw, rods: &[Rod]) -> Result {
     let stiffest = stiffnesses.fold(0.0, |most: f64, stiffness| most.max(stiffness.max_abs()));
     for (index, rod) in rods.iter().enumerate() {
         let natural = |key, value| value * per(key, softest(rod), 1.0);
-        for (key, stiffness) in COUPLE.into_iter().zip(&rod.couple_stiffness) {
+        for (key, stiffness) in Key::COUPLE.into_iter().zip(&rod.couple_stiffness) {
             check(key, index, &STIFFNESSES, stiffest / stiffness.min())?;
         }
-        for (key, stiffness) in FORCE.into_iter().zip(&rod.force_stiffness) {
+        for (key, stiffness) in Key::FORCE.into_iter().zip(&rod.force_stiffness) {
             check(key, index, &FORCE_STIFFNESS, natural(key, stiffness.min()))?;
         }
         // Stiffnesses that are not given follow from the size of a section.
@@ -203,11 +198,11 @@ fn rods(raw: &Raw, rods: &[Rod]) -> Result {
             let couple = rod.couple_stiffness.iter().map(Profile::min);
             let least = couple.fold(f64::INFINITY, f64::min);
             STIFFNESSES.check(item.entry(index), stiffest / least)?;
-            for (key, stiffness) in FORCE.into_iter().zip(&rod.force_stiffness) {
+            for (key, stiffness) in Key::FORCE.into_iter().zip(&rod.force_stiffness) {
                 FORCE_STIFFNESS.check(item.entry(index), natural(key, stiffness.min()))?;
             }
         }
-        for (key, curvature) in REST.into_iter().zip(&rod.rest_curvature) {
+        for (key, curvature) in Key::REST.into_iter().zip(&rod.rest_curvature) {
             check(key, index, &REST_ANGLE, natural(key, curvature.max_abs()))?;
         }
         let (least, most) = (rod.rest_stretch.min(), rod.rest_stretch.max_abs());
@@ -225,7 +220,7 @@ fn coupling(raw: &Raw, scenario: &Scenario) -> Result {
             length: one.length.max(other.length),
             stiffness: one.stiffness.min(other.stiffness),
         };
-        for (key, stiffness) in COUPLING.into_iter().zip(stiffness) {
+        for (key, stiffness) in Key::COUPLING.into_iter().zip(stiffness) {
             if let Some(item) = raw.given(key) {
                 KAPPA.check(item.entry(gap), stiffness * per(key, both, 1.0))?;
             }

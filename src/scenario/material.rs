@@ -7,7 +7,6 @@ use toml::de::DeValue;
 use super::Profile;
 use super::error::ScenarioError;
 use super::key::Key;
-use super::limits::{COUPLE, FORCE};
 use super::raw::{Item, Raw};
 use super::section::{Outline, Property, Section};
 use super::value::MAGNITUDES;
@@ -42,7 +41,7 @@ impl Sections {
         if TABLE.iter().all(|&key| raw.given(key).is_none()) {
             return Ok(None);
         }
-        for key in COUPLE.into_iter().chain(FORCE) {
+        for key in Key::COUPLE.into_iter().chain(Key::FORCE) {
             if let Some(item) = raw.given(key) {
                 let why =
                     "[section] gives the stiffnesses: leave out either [stiffness] or [section]";

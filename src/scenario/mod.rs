@@ -6,6 +6,7 @@
 mod check;
 mod dynamics;
 mod error;
+mod excerpt;
 mod form;
 mod key;
 mod limits;
@@ -22,9 +23,9 @@ mod tip;
 mod value;
 
 pub use dynamics::{Dynamics, Start};
-#[cfg(feature = "cli")]
-pub(crate) use error::printable;
 pub use error::{Place, ScenarioError};
+#[cfg(feature = "cli")]
+pub(crate) use excerpt::printable;
 pub(crate) use key::Form;
 pub use key::Key;
 pub use part::Part;

@@ -6,7 +6,8 @@ use std::fmt;
 
 use toml::Value;
 
-use super::error::{Place, ScenarioError, shorten};
+use super::error::{Place, ScenarioError};
+use super::excerpt::shorten;
 use super::key::{Form, Key, LeftOut, unknown};
 
 /// Lists that a table can have.

@@ -6,7 +6,8 @@ use std::fmt::Display;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{Place, ScenarioError, line_of, shorten, snippet};
+use super::error::{Place, ScenarioError};
+use super::excerpt::{line_of, shorten, snippet};
 use super::key::{Form, Key, LeftOut, nearest};
 use super::part::Override;
 

@@ -4,7 +4,8 @@ use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-use super::error::{Place, ScenarioError, line_of};
+use super::error::{Place, ScenarioError};
+use super::excerpt::line_of;
 use super::form::from_json;
 use super::part::resolve;
 use super::raw::Raw;
