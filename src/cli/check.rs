@@ -31,7 +31,7 @@ impl Check {
     pub fn run(self) -> Result<Status, Refusal> {
         let how = How {
             varies: false,
-            stations: true,
+            stations: false,
             side_by_side: false,
         };
         self.request.each::<Checked>(how, |job| self.one(job))

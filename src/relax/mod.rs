@@ -2,6 +2,7 @@
 //! the nested grids with their extrapolation, saddles, modes, and the result.
 
 mod equilibrium;
+mod fields;
 mod grids;
 mod grip;
 pub(crate) mod index;
@@ -9,6 +10,7 @@ mod method;
 mod methods;
 mod modes;
 mod options;
+mod place;
 pub(crate) mod prolong;
 mod request;
 mod result;

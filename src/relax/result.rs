@@ -1,18 +1,16 @@
 //! From the settled grids to the result in the units of the scenario.
 
-use crate::leaf::DiscreteLeaf;
 use crate::newton::Stop;
 use crate::relax::equilibrium::{
     Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
 };
+use crate::relax::fields::{Fields, fields};
 use crate::relax::method::Method;
-use crate::relax::prolong::lagrange;
 use crate::relax::richardson::Richardson;
 use crate::relax::run::{Level, Run};
-use crate::relax::shape;
-use crate::shape::{NodeState, RodShape};
+use crate::shape::RodShape;
 use crate::undulation::{Centerline, Undulation};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 /// Assembles the result.
 pub fn equilibrium(
@@ -26,7 +24,13 @@ pub fn equilibrium(
     let best = run.table.best();
     let columns = best.map_or(0, |best| best.columns);
     let series = run.series();
-    let (stations, rods) = fields(&series, columns);
+    let error = run.error();
+    let room = error.map(|error| run.tolerance - error);
+    let Fields {
+        stations,
+        rods,
+        between,
+    } = fields(&series, columns, room);
     let joined = run.leaf.joined();
     let tips = rods.iter().take(if joined { 1 } else { rods.len() });
     let tips = tips.filter_map(|rod| rod.nodes.last());
@@ -34,7 +38,7 @@ pub fn equilibrium(
     for level in &series {
         energies.push(level.leaf.segments(), vec![level.leaf.energy(&level.state)]);
     }
-    let error_estimate = run.error().map(|error| error * scale.length);
+    let error_estimate = error.map(|error| (error + between) * scale.length);
     let lines = centerlines(finest);
     let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
     let segments: Vec<usize> = series.iter().map(|level| level.leaf.segments()).collect();
@@ -117,123 +121,6 @@ fn centerlines(level: &Level) -> Vec<Centerline> {
     bases
         .map(|base| (base..=base + n).map(node).collect())
         .collect()
-}
-
-/// Values carried per node through the extrapolation: position, quaternion, n, m.
-const FIELDS: usize = 13;
-
-/// Stations at which a result is given, if it is known there.
-const STATIONS: usize = 8;
-
-/// All nodal fields, in the scenario's units, with `columns` extrapolations: at
-/// the stations of the first level, or if these are few of the second. What the
-/// first level corrects is interpolated then.
-fn fields(levels: &[&Level], columns: usize) -> (Vec<f64>, Vec<RodShape>) {
-    let first = levels[0];
-    let (n, length) = (first.leaf.segments(), first.leaf.leaf.scale.length);
-    let used = &levels[levels.len() - 1 - columns..];
-    let reported = match levels {
-        [_, second, ..] if n < STATIONS => second,
-        _ => first,
-    };
-    let rods = (0..first.leaf.rods())
-        .map(|j| {
-            let mut nodes = extrapolated(used, j, n);
-            let stations = reported.leaf.segments();
-            if stations > n {
-                let from = used.len().min(levels.len() - 1);
-                let mut finer = extrapolated(&used[used.len() - from..], j, stations);
-                let stride = stations / n;
-                for (i, node) in nodes.iter_mut().enumerate() {
-                    for (value, finer) in node.iter_mut().zip(&finer[i * stride]) {
-                        *value -= finer;
-                    }
-                }
-                interpolate(&nodes, &mut finer);
-                nodes = finer;
-            }
-            let node = |(i, values): (usize, &[f64; FIELDS])| unpack(&reported.leaf, j, i, values);
-            RodShape {
-                length: first.leaf.leaf.length(j) * length,
-                nodes: nodes.iter().enumerate().map(node).collect(),
-            }
-        })
-        .collect();
-    (reported.leaf.grid.sigma().to_vec(), rods)
-}
-
-/// The nodal fields of rod `j` at the ends of `n` parts.
-fn extrapolated(levels: &[&Level], j: usize, n: usize) -> Vec<[f64; FIELDS]> {
-    let reference = rotations(levels[0], j, n);
-    let mut table = Richardson::default();
-    for level in levels {
-        let stride = level.leaf.segments() / n;
-        let node = |i: usize| shape::node(&level.leaf, &level.state, j, i * stride);
-        let values = (0..=n).flat_map(|i| pack(&node(i), reference[i]));
-        table.push(level.leaf.segments(), values.collect());
-    }
-    table.column(levels.len() - 1).as_chunks().0.to_vec()
-}
-
-/// Rotations of rod `j` at the ends of `n` parts, of a continuous sign.
-fn rotations(level: &Level, j: usize, n: usize) -> Vec<DQuat> {
-    let stride = level.leaf.segments() / n;
-    let mut rotations: Vec<DQuat> = Vec::new();
-    for i in 0..=n {
-        let q = level.state.q[level.state.base(j) + i * stride];
-        rotations.push(alike(q, rotations.last().copied().unwrap_or(q)));
-    }
-    rotations
-}
-
-/// Adds to `nodes` what `corrections` at fewer of them are in between.
-fn interpolate(corrections: &[[f64; FIELDS]], nodes: &mut [[f64; FIELDS]]) {
-    let count = corrections.len().min(5);
-    let width = (corrections.len() - 1) as f64 / (nodes.len() - 1) as f64;
-    for (k, values) in nodes.iter_mut().enumerate() {
-        let at = k as f64 * width;
-        let before = (at as usize).saturating_sub(1);
-        let begin = before.min(corrections.len() - count);
-        for a in 0..count {
-            let weight = lagrange(count, a, at - begin as f64);
-            for (value, correction) in values.iter_mut().zip(&corrections[begin + a]) {
-                *value += weight * correction;
-            }
-        }
-    }
-}
-
-fn pack(node: &NodeState, reference: DQuat) -> [f64; FIELDS] {
-    // A rotation's two quaternions must not be mixed up between grids.
-    let q = alike(node.rotation, reference);
-    let (x, n, m) = (node.position, node.n, node.m);
-    [
-        x.x, x.y, x.z, q.x, q.y, q.z, q.w, n.x, n.y, n.z, m.x, m.y, m.z,
-    ]
-}
-
-/// That quaternion of a rotation which is nearer to another.
-fn alike(q: DQuat, other: DQuat) -> DQuat {
-    if q.dot(other) < 0.0 { -q } else { q }
-}
-
-fn unpack(leaf: &DiscreteLeaf, j: usize, i: usize, values: &[f64]) -> NodeState {
-    let vector = |k: usize| DVec3::new(values[k], values[k + 1], values[k + 2]);
-    let mut node = NodeState {
-        position: vector(0),
-        rotation: DQuat::from_xyzw(values[3], values[4], values[5], values[6]).normalize(),
-        v: DVec3::X,
-        u: DVec3::ZERO,
-        n: vector(7),
-        m: vector(10),
-    };
-    shape::strains(leaf, j, leaf.grid.sigma()[i], &mut node);
-    let scale = leaf.leaf.scale;
-    node.position *= scale.length;
-    node.u /= scale.length;
-    node.n *= scale.force();
-    node.m *= scale.moment();
-    node
 }
 
 /// Of a leaf that moved far while it was softer than it is.

@@ -2,18 +2,13 @@
 
 use crate::leaf::Leaf;
 use crate::relax::equilibrium::{Equilibrium, Outcome, Shape};
+use crate::relax::place::{self, Place, Slopes};
 use crate::scenario::{Profile, Rod, Scenario};
-use crate::shape::{NodeState, RodShape, equally_spaced, weights};
+use crate::shape::{NodeState, RodShape, equally_spaced};
 use glam::{DQuat, DVec3};
 
 /// Parts that the stations of a result cut a vein into, at least.
 const PARTS: usize = 16;
-
-/// Most nodes that a polynomial goes through whose slopes there are known.
-const HERMITE: usize = 4;
-
-/// Most nodes of one whose slopes are not known.
-const LAGRANGE: usize = 6;
 
 /// What helps where stations between those that were solved for are less accurate.
 const BETWEEN: &str = "the tolerance is kept where the leaf was solved for, but not at all of the \
@@ -54,6 +49,9 @@ impl Equilibrium {
             Some(parts) => equally_spaced(parts),
             None => finest(&self.shape),
         };
+        if to == self.shape.stations {
+            return self;
+        }
         let at_rest = !matches!(
             self.outcome,
             Outcome::NotAtRest | Outcome::Singular | Outcome::Diverged
@@ -62,7 +60,7 @@ impl Equilibrium {
             let leaf = Leaf::new(scenario);
             let places = to
                 .iter()
-                .map(|&at| Place::new(&self.shape, leaf.kinks(), at));
+                .map(|&at| Place::new(&self.shape.stations, leaf.kinks(), at));
             places.collect()
         };
         let mut differences = [0.0_f64; 2];
@@ -92,12 +90,7 @@ impl Equilibrium {
         self.shape.rods = rods.collect();
         self.shape.stations = to;
         if let Some(error) = &mut self.accuracy.error_estimate {
-            let [best, second] = differences;
-            *error += if second > best {
-                best * (best / second)
-            } else {
-                best
-            };
+            *error += place::error(differences);
         }
         self
     }
@@ -113,61 +106,6 @@ fn finest(shape: &Shape) -> Vec<f64> {
         stations = stations[..1].iter().copied().chain(middles).collect();
     }
     stations
-}
-
-/// A place along the veins, and the stations around it.
-struct Place {
-    /// The station that it is.
-    node: Option<usize>,
-    at: f64,
-    /// Stations between the same knots, and the first of them.
-    near: Vec<f64>,
-    first: usize,
-}
-
-/// Weights of a value and of its slope at a station.
-type Weights = Vec<(usize, f64, f64)>;
-
-impl Place {
-    fn new(shape: &Shape, kinks: &[f64], at: f64) -> Self {
-        let known = &shape.stations;
-        let node = known
-            .iter()
-            .position(|station| (station - at).abs() < 1e-14);
-        let right = kinks.partition_point(|kink| *kink <= at);
-        let left = right.checked_sub(1).map_or(0.0, |left| kinks[left]);
-        let right = kinks.get(right).copied().unwrap_or(1.0);
-        let first = known.partition_point(|station| *station < left - 1e-14);
-        let last = known.partition_point(|station| *station <= right + 1e-14);
-        let near = known[first..last].to_vec();
-        Place {
-            node,
-            at,
-            near,
-            first,
-        }
-    }
-
-    /// With the nearest stations, so many fewer than can be.
-    fn hermite(&self, fewer: usize) -> Weights {
-        let count = HERMITE.min(self.near.len()).saturating_sub(fewer).max(1);
-        let (first, lagrange) = weights(&self.near, self.at, count);
-        let near = &self.near[first..first + count];
-        let each = lagrange.iter().enumerate().map(|(i, weight)| {
-            let others = (0..count).filter(|&j| j != i);
-            let slope: f64 = others.map(|j| 1.0 / (near[i] - near[j])).sum();
-            let (away, squared) = (self.at - near[i], weight * weight);
-            let value = squared * (1.0 - 2.0 * slope * away);
-            (self.first + first + i, value, squared * away)
-        });
-        each.collect()
-    }
-
-    fn lagrange(&self) -> Weights {
-        let (first, weights) = weights(&self.near, self.at, LAGRANGE);
-        let each = (self.first + first..).zip(weights);
-        each.map(|(i, weight)| (i, weight, 0.0)).collect()
-    }
 }
 
 /// What is known of a vein at its stations, along the lab axes, with slopes by the
@@ -212,7 +150,9 @@ impl Known {
     /// The state at a place, without its strains. Without equilibrium slopes are
     /// not what the equations say.
     fn at(&self, place: &Place, at_rest: bool) -> NodeState {
-        let lagrange = place.lagrange();
+        let lagrange: Slopes = (place.lagrange(0).into_iter())
+            .map(|(i, weight)| (i, weight, 0.0))
+            .collect();
         let hermite = match at_rest {
             true => &place.hermite(0),
             false => &lagrange,
@@ -236,7 +176,7 @@ impl Known {
     }
 }
 
-fn sum(weights: &Weights, values: &[DVec3], slopes: &[DVec3]) -> DVec3 {
+fn sum(weights: &Slopes, values: &[DVec3], slopes: &[DVec3]) -> DVec3 {
     let terms = weights.iter();
     terms
         .map(|&(i, value, slope)| value * values[i] + slope * slopes[i])
@@ -273,10 +213,10 @@ mod tests {
         for tolerance in [1e-3, 1e-6, 1e-8] {
             let found = scenario.relaxation().tolerance(tolerance).run().unwrap();
             let there = found.clone().at_stations(&scenario, None);
-            let (known, finest) = (found.shape.stations.len(), found.shape.curves[0].len());
-            // Those that were found, where others would not keep the tolerance.
+            let finest = found.shape.curves[0].len();
+            assert_eq!(found.shape.stations.len(), finest);
             let count = there.shape.stations.len();
-            assert!(known <= finest && (count >= finest.max(PARTS + 1) || count == known));
+            assert!(count >= PARTS + 1 && count >= finest);
             let within = there.accuracy.error_estimate.unwrap();
             assert!(within <= tolerance * found.shape.longest());
             let sharp = sharp.clone().at_stations(&scenario, Some(40));

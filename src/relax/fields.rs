@@ -1,0 +1,163 @@
+//! The fields along the veins, extrapolated over the grids.
+
+use crate::leaf::DiscreteLeaf;
+use crate::relax::place::{self, Place, Values};
+use crate::relax::richardson::Richardson;
+use crate::relax::run::Level;
+use crate::relax::shape;
+use crate::shape::{NodeState, RodShape};
+use glam::{DQuat, DVec3};
+
+/// Values carried per node through the extrapolation: position, quaternion, n, m.
+const FIELDS: usize = 13;
+
+type Node = [f64; FIELDS];
+
+/// A leaf at the stations of one of its grids, in the scenario's units.
+pub struct Fields {
+    pub stations: Vec<f64>,
+    pub rods: Vec<RodShape>,
+    /// What positions may be wrong by beside the error at the coarsest grid's
+    /// nodes, dimensionless.
+    pub between: f64,
+}
+
+/// All nodal fields with `columns` extrapolations, at the nodes of the finest grid
+/// whose error leaves `room`.
+///
+/// Nodes of the coarsest grid have the whole extrapolation. Those that a finer
+/// grid adds have that of the grids from there on, and the rest of the coarser
+/// ones' correction, which is small and smooth, interpolated.
+pub fn fields(levels: &[&Level], columns: usize, room: Option<f64>) -> Fields {
+    let (first, finest) = (levels[0], levels[levels.len() - 1]);
+    let leaf = &first.leaf.leaf;
+    let used = &levels[levels.len() - 1 - columns..];
+    let rods = 0..first.leaf.rods();
+    let signs: Vec<_> = rods.clone().map(|j| rotations(finest, j)).collect();
+    let on = |grid: &Level| -> Vec<Vec<Node>> {
+        let extrapolated = |j| extrapolated(used, j, grid.leaf.segments(), &signs[j]);
+        rods.clone().map(extrapolated).collect()
+    };
+    let (mut reported, mut nodes, mut between) = (first, on(first), 0.0_f64);
+    for &finer in &levels[1..] {
+        let coarse = reported.leaf.segments();
+        if !finer.leaf.segments().is_multiple_of(coarse) {
+            continue;
+        }
+        let stride = finer.leaf.segments() / coarse;
+        let known = reported.leaf.grid.sigma();
+        let place = |&at| Place::new(known, leaf.kinks(), at);
+        let weights = |at| [0, 1, 2].map(|fewer| place(at).lagrange(fewer));
+        let weights: Vec<_> = finer.leaf.grid.sigma().iter().map(weights).collect();
+        let mut added = on(finer);
+        let mut error = 0.0_f64;
+        for (added, nodes) in added.iter_mut().zip(&nodes) {
+            error = error.max(correct(added, nodes, stride, &weights));
+        }
+        if room.is_some_and(|room| room >= 0.0 && between + error > room) {
+            break;
+        }
+        (reported, nodes, between) = (finer, added, between + error);
+    }
+    let rods = nodes.iter().enumerate().map(|(j, nodes)| {
+        let node = |(i, values)| unpack(&reported.leaf, j, i, values);
+        RodShape {
+            length: leaf.length(j) * leaf.scale.length,
+            nodes: nodes.iter().enumerate().map(node).collect(),
+        }
+    });
+    Fields {
+        stations: reported.leaf.grid.sigma().to_vec(),
+        rods: rods.collect(),
+        between,
+    }
+}
+
+/// The nodal fields of rod `j` at the ends of `n` parts, from those grids that have
+/// them.
+fn extrapolated(levels: &[&Level], j: usize, n: usize, signs: &[DQuat]) -> Vec<Node> {
+    let mut table = Richardson::default();
+    let has = |level: &&&Level| level.leaf.segments().is_multiple_of(n);
+    let mut count = 0;
+    for level in levels.iter().filter(has) {
+        let stride = level.leaf.segments() / n;
+        let node = |i: usize| shape::node(&level.leaf, &level.state, j, i * stride);
+        let sign = |i: usize| signs[i * ((signs.len() - 1) / n)];
+        let values = (0..=n).flat_map(|i| pack(&node(i), sign(i)));
+        table.push(level.leaf.segments(), values.collect());
+        count += 1;
+    }
+    table.column(count - 1).as_chunks().0.to_vec()
+}
+
+/// Puts `known` at every `stride`th node of a finer grid, and between these the
+/// difference interpolated. How much that may be wrong by in the positions.
+fn correct(nodes: &mut [Node], known: &[Node], stride: usize, weights: &[[Values; 3]]) -> f64 {
+    let mut corrections = known.to_vec();
+    for (correction, own) in corrections.iter_mut().zip(nodes.iter().step_by(stride)) {
+        for (value, own) in correction.iter_mut().zip(own) {
+            *value -= own;
+        }
+    }
+    let term = |&(i, weight): &(usize, f64)| weight * DVec3::from_slice(&corrections[i]);
+    let position = |weights: &Values| -> DVec3 { weights.iter().map(term).sum() };
+    let mut differences = [0.0_f64; 2];
+    for (k, (node, weights)) in nodes.iter_mut().zip(weights).enumerate() {
+        if k.is_multiple_of(stride) {
+            *node = known[k / stride];
+            continue;
+        }
+        for &(i, weight) in &weights[0] {
+            for (value, correction) in node.iter_mut().zip(&corrections[i]) {
+                *value += weight * correction;
+            }
+        }
+        let [best, second, third] = weights.each_ref().map(position);
+        differences[0] = differences[0].max((best - second).length());
+        differences[1] = differences[1].max((second - third).length());
+    }
+    place::error(differences)
+}
+
+/// Rotations of rod `j` at all nodes, of a continuous sign.
+fn rotations(level: &Level, j: usize) -> Vec<DQuat> {
+    let base = level.state.base(j);
+    let mut rotations: Vec<DQuat> = Vec::new();
+    for &q in &level.state.q[base..=base + level.leaf.segments()] {
+        rotations.push(alike(q, rotations.last().copied().unwrap_or(q)));
+    }
+    rotations
+}
+
+fn pack(node: &NodeState, reference: DQuat) -> Node {
+    // A rotation's two quaternions must not be mixed up between grids.
+    let q = alike(node.rotation, reference);
+    let (x, n, m) = (node.position, node.n, node.m);
+    [
+        x.x, x.y, x.z, q.x, q.y, q.z, q.w, n.x, n.y, n.z, m.x, m.y, m.z,
+    ]
+}
+
+/// That quaternion of a rotation which is nearer to another.
+fn alike(q: DQuat, other: DQuat) -> DQuat {
+    if q.dot(other) < 0.0 { -q } else { q }
+}
+
+fn unpack(leaf: &DiscreteLeaf, j: usize, i: usize, values: &Node) -> NodeState {
+    let vector = |k: usize| DVec3::new(values[k], values[k + 1], values[k + 2]);
+    let mut node = NodeState {
+        position: vector(0),
+        rotation: DQuat::from_xyzw(values[3], values[4], values[5], values[6]).normalize(),
+        v: DVec3::X,
+        u: DVec3::ZERO,
+        n: vector(7),
+        m: vector(10),
+    };
+    shape::strains(leaf, j, leaf.grid.sigma()[i], &mut node);
+    let scale = leaf.leaf.scale;
+    node.position *= scale.length;
+    node.u /= scale.length;
+    node.n *= scale.force();
+    node.m *= scale.moment();
+    node
+}
