@@ -108,8 +108,8 @@ fn bad_requests_are_refused_before_anything_is_written() {
         leaf.toml --modes -1 => --modes
         leaf.toml --modes all => --modes
         leaf.toml --method shooting --segments 8 => --segments 8: shooting has no grid
-        leaf.toml --intervals 4 => add --method shooting
-        leaf.toml --method explicit --keep-unstable => --keep-unstable: explicit motion leaves unstable equilibria; use --method semi-implicit
+        leaf.toml --intervals 4 => --intervals 4: only the method shooting has intervals
+        leaf.toml --method explicit --keep-unstable => --keep-unstable: explicit motion leaves unstable equilibria; use the method semi-implicit
         leaf.toml --method shooting --intervals 0 => --intervals 0: allowed are 1 to 4096",
     );
     all_refused("grow", "leaf.toml => grow");

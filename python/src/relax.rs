@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use leafdyn::relax::{self, Equilibrium, Method, Options, Progress, RelaxError, SemiImplicit};
+use leafdyn::relax::{self, Equilibrium, Method, Options, Progress, RelaxError, Settings};
 use leafdyn::scenario;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -55,38 +55,20 @@ impl Asked {
             .method
             .parse()
             .or_else(|error| refuse(format!("method = {error}")))?;
-        let (segments, intervals) = (self.segments, self.intervals);
-        if let Some(found) = intervals
-            && !matches!(
-                method,
-                Method::Shooting { .. } | Method::ShootingFromRest { .. }
-            )
-        {
-            return refuse(format!(
-                "intervals = {found}: only the method shooting has intervals"
-            ));
-        }
-        if let (Some(found), true) = (segments, method.is_shooting()) {
-            return refuse(format!(
-                "segments = {found}: shooting has no grid; leave it out, or set the number of intervals"
-            ));
-        }
-        Ok(match method {
-            Method::SemiImplicit(how) => Method::SemiImplicit(SemiImplicit {
-                segments,
-                keep_unstable: self.keep_unstable,
-                full_model: self.full_model,
-                ..how
-            }),
-            Method::Explicit { .. } if self.keep_unstable => {
-                return refuse(
-                    "keep_unstable: explicit motion leaves unstable equilibria; use the method semi-implicit or shooting",
-                );
-            }
-            Method::Explicit { .. } => Method::Explicit { segments },
-            Method::SingleShooting => Method::SingleShooting,
-            Method::Shooting { .. } => Method::Shooting { intervals },
-            Method::ShootingFromRest { .. } => Method::ShootingFromRest { intervals },
+        let settings = Settings {
+            segments: self.segments,
+            intervals: self.intervals,
+            keep_unstable: self.keep_unstable,
+            full_model: self.full_model,
+        };
+        method.with(settings).or_else(|unfit| {
+            let value = unfit.value.map(|value| format!(" = {value}"));
+            refuse(format!(
+                "{}{}: {}",
+                unfit.setting,
+                value.unwrap_or_default(),
+                unfit.why
+            ))
         })
     }
 

@@ -3,7 +3,7 @@
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
-use crate::relax::{self, Equilibrium, Method, Options, SemiImplicit};
+use crate::relax::{self, Equilibrium, Method, Options, Settings};
 use crate::report;
 use crate::study::{self, All};
 
@@ -89,35 +89,16 @@ impl Relax {
 
     /// The method with its own options; refused where they do not fit each other.
     fn method(&self) -> Result<Method, Refusal> {
-        let (segments, intervals) = (self.segments, self.intervals);
-        if let Some(found) = intervals
-            && !matches!(
-                self.method,
-                Method::Shooting { .. } | Method::ShootingFromRest { .. }
-            )
-        {
-            let why = "only shooting has intervals; add --method shooting";
-            return Err(format!("--intervals {found}: {why}").into());
-        }
-        if let (Some(found), true) = (segments, self.method.is_shooting()) {
-            let why = "shooting has no grid; leave it out, or set the number of intervals with --intervals";
-            return Err(format!("--segments {found}: {why}").into());
-        }
-        Ok(match self.method {
-            Method::SemiImplicit(how) => Method::SemiImplicit(SemiImplicit {
-                segments,
-                keep_unstable: self.keep_unstable,
-                full_model: self.full_model,
-                ..how
-            }),
-            Method::Explicit { .. } if self.keep_unstable => {
-                let why = "explicit motion leaves unstable equilibria; use --method semi-implicit or shooting";
-                return Err(format!("--keep-unstable: {why}").into());
-            }
-            Method::Explicit { .. } => Method::Explicit { segments },
-            Method::SingleShooting => Method::SingleShooting,
-            Method::Shooting { .. } => Method::Shooting { intervals },
-            Method::ShootingFromRest { .. } => Method::ShootingFromRest { intervals },
+        let settings = Settings {
+            segments: self.segments,
+            intervals: self.intervals,
+            keep_unstable: self.keep_unstable,
+            full_model: self.full_model,
+        };
+        self.method.with(settings).map_err(|unfit| {
+            let value = unfit.value.map(|value| format!(" {value}"));
+            let flag = unfit.setting.replace('_', "-");
+            format!("--{flag}{}: {}", value.unwrap_or_default(), unfit.why).into()
         })
     }
 

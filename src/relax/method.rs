@@ -117,6 +117,53 @@ impl Method {
         }
     }
 
+    /// The same method with what was set for it by name.
+    ///
+    /// # Errors
+    /// Of a setting that the method does not have.
+    pub fn with(self, settings: Settings) -> Result<Method, Unfit> {
+        let Settings {
+            segments,
+            intervals,
+            keep_unstable,
+            full_model,
+        } = settings;
+        let shooting = matches!(
+            self,
+            Method::Shooting { .. } | Method::ShootingFromRest { .. }
+        );
+        let unfit = |setting, value, why| Unfit {
+            setting,
+            value,
+            why,
+        };
+        if intervals.is_some() && !shooting {
+            let why = "only the method shooting has intervals";
+            return Err(unfit("intervals", intervals, why));
+        }
+        if segments.is_some() && self.is_shooting() {
+            let why = "shooting has no grid; leave it out, or set the number of intervals";
+            return Err(unfit("segments", segments, why));
+        }
+        Ok(match self {
+            Method::SemiImplicit(how) => Method::SemiImplicit(SemiImplicit {
+                segments,
+                keep_unstable,
+                full_model,
+                ..how
+            }),
+            Method::Explicit { .. } if keep_unstable => {
+                let why = "explicit motion leaves unstable equilibria; \
+                    use the method semi-implicit or shooting";
+                return Err(unfit("keep_unstable", None, why));
+            }
+            Method::Explicit { .. } => Method::Explicit { segments },
+            Method::SingleShooting => Method::SingleShooting,
+            Method::Shooting { .. } => Method::Shooting { intervals },
+            Method::ShootingFromRest { .. } => Method::ShootingFromRest { intervals },
+        })
+    }
+
     /// Whether it solves the boundary-value problem.
     pub fn is_shooting(self) -> bool {
         !matches!(self, Method::SemiImplicit(_) | Method::Explicit { .. })
@@ -139,6 +186,30 @@ impl Serialize for Method {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.word())
     }
+}
+
+/// Settings by name, whatever the method.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Settings {
+    /// One grid of so many segments a rod.
+    pub segments: Option<usize>,
+    /// Number of intervals of shooting.
+    pub intervals: Option<usize>,
+    /// Whether to stop at a saddle.
+    pub keep_unstable: bool,
+    /// Whether to solve for the whole leaf, in space.
+    pub full_model: bool,
+}
+
+/// A setting that a method does not have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unfit {
+    /// The setting's name among [`Settings`].
+    pub setting: &'static str,
+    /// Its value, if it is a number.
+    pub value: Option<usize>,
+    /// Why, and what to change.
+    pub why: &'static str,
 }
 
 /// A word that names no method.

@@ -33,7 +33,7 @@ pub use equilibrium::{
     Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Saddle, Shape, Stability,
 };
 pub(crate) use index::{index_near, project};
-pub use method::{Method, SemiImplicit, UnknownMethod};
+pub use method::{Method, SemiImplicit, Settings, Unfit, UnknownMethod};
 pub(crate) use methods::shooting::{START as SHOOTING_START, check_intervals};
 pub use options::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
