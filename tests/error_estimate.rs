@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use common::random::{drawn, leaves, uneven_leaves};
 use common::{distance, files, kept, paper_leaf, read, relaxed, scenario, to};
+use leafdyn::relax::Options;
 use leafdyn::scenario::Scenario;
 
 const TOLERANCES: [f64; 5] = [1e-2, 1e-3, 1e-4, 1e-6, 1e-8];
@@ -22,7 +23,11 @@ impl Verdict {
     /// Judges a scene at all tolerances. The truth is the solution at 1e-10,
     /// itself uncertain by its own estimate.
     fn judge(&mut self, name: &str, scenario: &Scenario) {
-        let truth = relaxed(scenario, &to(1e-10));
+        let at_every_node = |tolerance| Options {
+            every_node: true,
+            ..to(tolerance)
+        };
+        let truth = relaxed(scenario, &at_every_node(1e-10));
         if !truth.outcome.is_success() {
             let outcome = truth.outcome;
             return self.wrong.push(format!("{name} at 1e-10: {outcome:?}"));
@@ -31,7 +36,7 @@ impl Verdict {
         let length = lengths.fold(0.0, f64::max);
         let uncertain = truth.accuracy.error_estimate.unwrap();
         for tolerance in TOLERANCES {
-            let leaf = relaxed(scenario, &to(tolerance));
+            let leaf = relaxed(scenario, &at_every_node(tolerance));
             if !leaf.outcome.is_success() {
                 let wrong = format!("{name} at {tolerance:e}: {:?}", leaf.outcome);
                 self.wrong.push(wrong);

@@ -79,6 +79,7 @@ impl Asked {
             tolerance: self.tolerance,
             modes: self.modes,
             mode_shapes: self.mode_shapes,
+            every_node: true,
             ..Options::default()
         })
     }

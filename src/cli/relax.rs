@@ -108,6 +108,7 @@ impl Relax {
             tolerance: self.request.tolerance,
             modes: self.modes.unwrap_or(MODES),
             mode_shapes: self.modes.is_some_and(|count| count > 0),
+            every_node: true,
             ..Options::default()
         };
         let mut line = job.progress();

@@ -13,6 +13,9 @@ const FIELDS: usize = 13;
 
 type Node = [f64; FIELDS];
 
+/// Segments of the coarsest grid whose nodes are stations enough.
+const STATIONS: usize = 8;
+
 /// A leaf at the stations of one of its grids, in the scenario's units.
 pub struct Fields {
     pub stations: Vec<f64>,
@@ -22,13 +25,20 @@ pub struct Fields {
     pub between: f64,
 }
 
-/// All nodal fields with `columns` extrapolations, at the nodes of the finest grid
-/// whose error leaves `room`.
+/// All nodal fields with `columns` extrapolations, at the nodes of the coarsest grid,
+/// or if these are few of the next; if every node is asked for of the finest that
+/// keeps the tolerance as those of the coarsest do, which have that `error`.
 ///
 /// Nodes of the coarsest grid have the whole extrapolation. Those that a finer
 /// grid adds have that of the grids from there on, and the rest of the coarser
 /// ones' correction, which is small and smooth, interpolated.
-pub fn fields(levels: &[&Level], columns: usize, room: Option<f64>) -> Fields {
+pub fn fields(
+    levels: &[&Level],
+    columns: usize,
+    error: Option<f64>,
+    tolerance: f64,
+    every_node: bool,
+) -> Fields {
     let (first, finest) = (levels[0], levels[levels.len() - 1]);
     let leaf = &first.leaf.leaf;
     let used = &levels[levels.len() - 1 - columns..];
@@ -38,8 +48,13 @@ pub fn fields(levels: &[&Level], columns: usize, room: Option<f64>) -> Fields {
         let extrapolated = |j| extrapolated(used, j, grid.leaf.segments(), &signs[j]);
         rods.clone().map(extrapolated).collect()
     };
-    let (mut reported, mut nodes, mut between) = (first, on(first), 0.0_f64);
-    for &finer in &levels[1..] {
+    let (mut reported, mut nodes, mut between) = (first, on(first), 0.0);
+    let known_error = error.unwrap_or(0.0);
+    let most = match every_node {
+        true => levels.len(),
+        false => 1 + usize::from(first.leaf.segments() < STATIONS),
+    };
+    for &finer in levels.iter().take(most).skip(1) {
         let coarse = reported.leaf.segments();
         if !finer.leaf.segments().is_multiple_of(coarse) {
             continue;
@@ -47,14 +62,19 @@ pub fn fields(levels: &[&Level], columns: usize, room: Option<f64>) -> Fields {
         let stride = finer.leaf.segments() / coarse;
         let known = reported.leaf.grid.sigma();
         let place = |&at| Place::new(known, leaf.kinks(), at);
-        let weights = |at| [0, 1, 2].map(|fewer| place(at).lagrange(fewer));
+        let weights = |at| place(at).lagrange();
         let weights: Vec<_> = finer.leaf.grid.sigma().iter().map(weights).collect();
+        let others: Vec<_> = known.iter().map(|at| place(at).others()).collect();
         let mut added = on(finer);
         let mut error = 0.0_f64;
         for (added, nodes) in added.iter_mut().zip(&nodes) {
-            error = error.max(correct(added, nodes, stride, &weights));
+            error = error.max(correct(added, nodes, stride, &weights, &others));
         }
-        if room.is_some_and(|room| room >= 0.0 && between + error > room) {
+        let error = match reported.leaf.segments() == first.leaf.segments() {
+            true => error + known_error * (hidden(levels) - 1.0),
+            false => error,
+        };
+        if known_error <= tolerance && known_error + between + error > tolerance {
             break;
         }
         (reported, nodes, between) = (finer, added, between + error);
@@ -70,6 +90,36 @@ pub fn fields(levels: &[&Level], columns: usize, room: Option<f64>) -> Fields {
         stations: reported.leaf.grid.sigma().to_vec(),
         rods: rods.collect(),
         between,
+    }
+}
+
+/// How many times more the last grid changed the positions at the nodes of the one
+/// before than at those of the first: as much more may be wrong there, as it is where
+/// a boundary layer hides between the nodes of the first.
+fn hidden(levels: &[&Level]) -> f64 {
+    let (first, finest) = (levels[0], levels[levels.len() - 1]);
+    let n = finest.leaf.segments();
+    let before = levels.iter().rev().skip(1);
+    let Some(before) = before
+        .into_iter()
+        .find(|it| n.is_multiple_of(it.leaf.segments()))
+    else {
+        return 1.0;
+    };
+    let count = before.leaf.segments();
+    let (stride, coarse) = (n / count, count / first.leaf.segments());
+    let mut most = [0.0_f64; 2];
+    for j in 0..finest.leaf.rods() {
+        for i in 0..=count {
+            let x = before.state.x[before.state.base(j) + i];
+            let change = (finest.state.x[finest.state.base(j) + i * stride] - x).length();
+            let known = i.is_multiple_of(coarse);
+            most[usize::from(known)] = most[usize::from(known)].max(change);
+        }
+    }
+    match most {
+        [between, known] if known > 0.0 => (between / known).max(1.0),
+        _ => 1.0,
     }
 }
 
@@ -91,32 +141,43 @@ fn extrapolated(levels: &[&Level], j: usize, n: usize, signs: &[DQuat]) -> Vec<N
 }
 
 /// Puts `known` at every `stride`th node of a finer grid, and between these the
-/// difference interpolated. How much that may be wrong by in the positions.
-fn correct(nodes: &mut [Node], known: &[Node], stride: usize, weights: &[[Values; 3]]) -> f64 {
-    let mut corrections = known.to_vec();
-    for (correction, own) in corrections.iter_mut().zip(nodes.iter().step_by(stride)) {
-        for (value, own) in correction.iter_mut().zip(own) {
-            *value -= own;
+/// difference interpolated.
+/// How much that may be wrong by in the positions: as the
+/// difference at a known node is by what its neighbours say, which lie further apart.
+fn correct(
+    nodes: &mut [Node],
+    known: &[Node],
+    stride: usize,
+    weights: &[Values],
+    others: &[[Values; 2]],
+) -> f64 {
+    let own = nodes.iter().step_by(stride);
+    let corrections: Vec<Node> = known.iter().zip(own).map(|(a, b)| minus(a, b)).collect();
+    let position = |node: &Node| DVec3::from_slice(node);
+    let term = |&(i, weight): &(usize, f64)| weight * position(&corrections[i]);
+    let told = |weights: &Values| -> DVec3 { weights.iter().map(term).sum() };
+    let mut errors = [0.0_f64; 2];
+    for (correction, others) in corrections.iter().zip(others) {
+        for (error, weights) in errors.iter_mut().zip(others) {
+            *error = error.max((told(weights) - position(correction)).length());
         }
     }
-    let term = |&(i, weight): &(usize, f64)| weight * DVec3::from_slice(&corrections[i]);
-    let position = |weights: &Values| -> DVec3 { weights.iter().map(term).sum() };
-    let mut differences = [0.0_f64; 2];
     for (k, (node, weights)) in nodes.iter_mut().zip(weights).enumerate() {
         if k.is_multiple_of(stride) {
             *node = known[k / stride];
             continue;
         }
-        for &(i, weight) in &weights[0] {
+        for &(i, weight) in weights {
             for (value, correction) in node.iter_mut().zip(&corrections[i]) {
                 *value += weight * correction;
             }
         }
-        let [best, second, third] = weights.each_ref().map(position);
-        differences[0] = differences[0].max((best - second).length());
-        differences[1] = differences[1].max((second - third).length());
     }
-    place::error(differences)
+    place::error(errors)
+}
+
+fn minus(a: &Node, b: &Node) -> Node {
+    std::array::from_fn(|k| a[k] - b[k])
 }
 
 /// Rotations of rod `j` at all nodes, of a continuous sign.

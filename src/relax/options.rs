@@ -17,6 +17,9 @@ pub struct Options {
     /// Whether their shapes are wanted. Without them modes are left out where
     /// the leaf is large, and are known a little less accurately.
     pub mode_shapes: bool,
+    /// Whether the leaf is wanted at the nodes of the finest grid, not only at those
+    /// of the coarsest, of the semi-implicit and the explicit method.
+    pub every_node: bool,
     /// When to give up, at rest or not: the leaf is then not at rest.
     pub limit: Limit,
 }

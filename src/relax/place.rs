@@ -60,17 +60,28 @@ impl Place {
         each.collect()
     }
 
-    /// The polynomial with the values at the nearest stations, so many fewer than
-    /// can be.
-    pub fn lagrange(&self, fewer: usize) -> Values {
-        let count = LAGRANGE.min(self.near.len()).saturating_sub(fewer).max(1);
-        let (first, weights) = weights(&self.near, self.at, count);
+    /// The polynomial with the values at the nearest stations.
+    pub fn lagrange(&self) -> Values {
+        let (first, weights) = weights(&self.near, self.at, LAGRANGE);
         (self.first + first..).zip(weights).collect()
+    }
+
+    /// The polynomial with the values at the nearest other stations, and that with
+    /// those of two fewer.
+    pub fn others(&self) -> [Values; 2] {
+        let mut near = self.near.clone();
+        let own = near.iter().position(|at| *at == self.at);
+        own.map(|own| near.remove(own));
+        [LAGRANGE, LAGRANGE - 2].map(|count| {
+            let (first, weights) = weights(&near, self.at, count);
+            let station = |i: usize| self.first + i + usize::from(own.is_some_and(|own| i >= own));
+            (first..).map(station).zip(weights).collect()
+        })
     }
 }
 
-/// What the best of three polynomials may be wrong by, from how far it is from the
-/// second, and that from the third.
+/// What a polynomial may be wrong by, from a measure of that and the same of one of
+/// lower order.
 pub fn error([best, second]: [f64; 2]) -> f64 {
     match second > best {
         true => best * (best / second),

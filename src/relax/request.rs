@@ -84,6 +84,12 @@ impl<'a> Relaxation<'a> {
         self
     }
 
+    /// At the nodes of the finest grid, not only at those of the coarsest.
+    pub fn every_node(mut self) -> Self {
+        self.options.every_node = true;
+        self
+    }
+
     /// Giving up, not at rest, when so much time is over.
     pub fn time_limit(mut self, time: Duration) -> Self {
         self.options.limit.deadline = Some(Instant::now() + time);

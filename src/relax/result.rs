@@ -25,12 +25,17 @@ pub fn equilibrium(
     let columns = best.map_or(0, |best| best.columns);
     let series = run.series();
     let error = run.error();
-    let room = error.map(|error| run.tolerance - error);
     let Fields {
         stations,
         rods,
         between,
-    } = fields(&series, columns, room);
+    } = fields(
+        &series,
+        columns,
+        error,
+        run.tolerance,
+        run.options.every_node,
+    );
     let joined = run.leaf.joined();
     let tips = rods.iter().take(if joined { 1 } else { rods.len() });
     let tips = tips.filter_map(|rod| rod.nodes.last());

@@ -357,7 +357,7 @@ impl Group {
             }
         }
         Group {
-            matrix: GroupMatrix::new(n, leaf.leaf.joined() && leaf.rods() > 1, leaf.leaf.planar),
+            matrix: GroupMatrix::new(n, leaf.tips_move_together(), leaf.leaf.planar),
             active,
             rhs: zeros.clone(),
             solution: zeros.clone(),
