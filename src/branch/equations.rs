@@ -1,7 +1,7 @@
 //! The equations of a branch on one grid, linearised and solved.
 
 use super::family::{Family, Leaves, OutOfRange, clamp};
-use super::field::{dot, is_finite, largest, plus, times};
+use super::field::{between, dot, is_finite, largest, plus, times};
 use super::{Point, Tangent};
 use crate::leaf::{Field, Grid, Solved, SparseFactor, SparsePattern, State, System};
 use crate::newton::converged;
@@ -9,7 +9,7 @@ use crate::rod::RESOLVED_TURN;
 
 /// Part of the parameter's range over which forces are differenced: the error
 /// is a ten-thousand-millionth, and what rounding makes of it no larger.
-const DIFFERENCE: f64 = 1e-5;
+pub(super) const DIFFERENCE: f64 = 1e-5;
 
 /// Newton iterations that lead back to a branch.
 pub(super) const ITERATIONS: usize = 10;
@@ -66,6 +66,24 @@ pub struct Equations<'a> {
     rodwise: bool,
     /// Matrices factorised so far.
     pub factorizations: usize,
+}
+
+/// A plane in which a point is sought.
+pub(super) struct Plane {
+    /// Its normal, times the masses per unit of the leaf's mass; and that of the
+    /// parameter.
+    pub dual: Field,
+    pub own: f64,
+    /// A state of it; none: that from which the search sets out.
+    pub through: Option<State>,
+}
+
+impl Plane {
+    /// How far from it a state is, the parameter aside.
+    fn distance(&self, state: &State) -> f64 {
+        let through = self.through.as_ref();
+        through.map_or(0.0, |through| dot(&self.dual, &between(through, state)))
+    }
 }
 
 /// Forces and their derivative at some state.
@@ -207,16 +225,35 @@ impl<'a> Equations<'a> {
         fraction: f64,
         normal: Option<&Tangent>,
     ) -> Result<(Point, usize), Stuck> {
+        let plane = normal.map(|t| Plane {
+            dual: self.momentum(&t.increments),
+            own: t.fraction,
+            through: None,
+        });
+        let (mut point, iterations) = self.correct_within(state, fraction, plane.as_ref())?;
+        if normal.is_some_and(|normal| self.along(&point.tangent, normal) < 0.0) {
+            point.tangent = reversed(point.tangent);
+        }
+        Ok((point, iterations))
+    }
+
+    /// As [`Equations::correct`], within a plane however it is given; the parameter
+    /// grows along the tangent.
+    pub(super) fn correct_within(
+        &mut self,
+        state: &State,
+        fraction: f64,
+        plane: Option<&Plane>,
+    ) -> Result<(Point, usize), Stuck> {
         let (mut state, mut fraction) = (state.clone(), fraction);
-        let dual = normal.map(|t| (self.momentum(&t.increments), t.fraction));
         let mut previous = f64::INFINITY;
         for iteration in 1..=ITERATIONS {
             let linear = self.linearise(&mut state, fraction)?;
             let (forces, rate, counted) = self.solve(&linear)?;
-            let step = match &dual {
-                None => 0.0,
-                Some((dual, own)) => -dot(dual, &forces) / (dot(dual, &rate) + own),
-            };
+            let step = plane.map_or(0.0, |plane| {
+                let off = plane.distance(&state) + dot(&plane.dual, &forces);
+                -off / (dot(&plane.dual, &rate) + plane.own)
+            });
             let increments = plus(&forces, step, &rate);
             let size = largest(&increments).max(step.abs());
             if !is_finite(&increments) || !step.is_finite() || size > LARGEST {
@@ -226,13 +263,10 @@ impl<'a> Equations<'a> {
             fraction += step;
             if at_rest(size, previous) {
                 clamp(self.leaves.at(fraction)?, &mut state);
-                let mut tangent = self.normalised(Tangent {
+                let tangent = self.normalised(Tangent {
                     increments: rate,
                     fraction: 1.0,
                 });
-                if normal.is_some_and(|normal| self.along(&tangent, normal) < 0.0) {
-                    tangent = reversed(tangent);
-                }
                 // The matrix at hand is that of the state before.
                 let index = match counted {
                     Some(index) if size < SAME_INDEX => index,

@@ -71,6 +71,13 @@ pub fn prolong(a: &Field) -> Field {
     a.iter().map(|rod| prolong_rod(rod)).collect()
 }
 
+/// Forces at the nodes of the grid with half of the segments, at the nodes of this one:
+/// those between have none.
+pub fn at_same_nodes(a: &Field) -> Field {
+    let rod = |rod: &Vec<Increment>| rod.iter().flat_map(|f| [[0.0; 6], *f]).collect();
+    a.iter().map(rod).collect()
+}
+
 fn prolong_rod(rod: &[Increment]) -> Vec<Increment> {
     let n = rod.len();
     let at = |i: usize| match i {

@@ -6,7 +6,9 @@ use rayon::prelude::*;
 use super::Point;
 use super::equations::{Equations, Stuck};
 use super::family::{Family, OutOfRange};
-use super::refine::{Doubt, Refined, refine, refine_critical};
+use super::refine::refine;
+use super::refine_critical::refine_critical;
+use super::refined::{Doubt, Refined};
 use super::walk::{Branch, End, Walk};
 use crate::leaf::{Grid, State};
 

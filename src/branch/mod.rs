@@ -32,6 +32,8 @@ mod family;
 mod field;
 mod follow;
 mod refine;
+mod refine_critical;
+mod refined;
 mod switch;
 mod walk;
 
@@ -40,7 +42,7 @@ pub use critical::Kind;
 pub use equations::{Equations, Stuck};
 pub use family::Family;
 pub use follow::{Followed, Grids};
-pub use refine::{Doubt, Refined};
+pub use refined::{Doubt, Refined};
 pub use switch::switch;
 pub use walk::{End, Walk, walk};
 

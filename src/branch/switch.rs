@@ -2,22 +2,37 @@
 
 use super::critical::Critical;
 use super::equations::{Equations, Stuck, reversed};
+use super::refine::refine;
 use super::{Point, Tangent};
 
 /// How far from the crossing the other branch is looked for, in turn.
 const AWAY: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
 
 /// The first points of the branches that cross at `critical` in the plane of
-/// one of its neutral modes, one to either side.
-pub fn switch(equations: &mut Equations, critical: &Critical, mode: usize) -> Vec<Point> {
+/// one of its neutral modes, one to either side: next to the crossing, but so far from
+/// it that finer grids have them, too, to this accuracy of their tips.
+pub fn switch(
+    equations: &mut Equations,
+    critical: &Critical,
+    mode: usize,
+    accuracy: f64,
+) -> Vec<Point> {
     let across = critical.across(equations, mode);
+    let (family, grid) = (equations.leaves.family, equations.grid().clone());
     [across.clone(), reversed(across)]
         .iter()
         .filter_map(|direction| {
-            let tries = AWAY.iter();
-            tries
-                .filter_map(|&away| leave(equations, critical, direction, away).ok())
-                .next()
+            let mut nearest = None;
+            for away in AWAY {
+                let Ok(point) = leave(equations, critical, direction, away) else {
+                    continue;
+                };
+                if refine(family, &grid, &point, accuracy).is_ok() {
+                    return Some(point);
+                }
+                nearest = nearest.or(Some(point));
+            }
+            nearest
         })
         .collect()
 }

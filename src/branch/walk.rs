@@ -3,7 +3,8 @@
 use super::critical::{Critical, Kind, locate};
 use super::equations::{Equations, Stuck, reversed};
 use super::field::{add, between, plus};
-use super::refine::{Doubt, on_finer};
+use super::refine::on_finer;
+use super::refined::Doubt;
 use super::{Point, Tangent};
 
 /// First step as a part of the longest, and the shortest.
@@ -174,11 +175,11 @@ impl Branch {
     /// Takes its last point to the grid with all segments halved.
     pub fn refine(&mut self, equations: &mut Equations) -> Result<(), Stuck> {
         let last = self.points.len() - 1;
-        let finer = on_finer(equations, &self.points[last])?.point;
+        let (_, finer) = on_finer(equations, &self.points[last])?;
         let first = self.first.take();
         self.first = match last {
             0 => Some(finer.clone()),
-            _ => first.and_then(|first| Some(on_finer(equations, &first).ok()?.point)),
+            _ => first.and_then(|first| Some(on_finer(equations, &first).ok()?.1)),
         };
         self.points[last] = finer;
         Ok(())

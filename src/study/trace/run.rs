@@ -193,7 +193,8 @@ impl Run<'_, '_> {
             self.crossings.push(refined.clone());
             // Where several modes become neutral at once for reasons of symmetry,
             // branches of any mixture of them are the same, turned.
-            let new = switch(self.grids.of(&critical.state), critical, 0).into_iter();
+            let new = switch(self.grids.of(&critical.state), critical, 0, self.tolerance);
+            let new = new.into_iter();
             let from = Some([number, after + 1 + which]);
             entrances.extend(new.map(|point| (point, from)));
         }

@@ -1,0 +1,181 @@
+//! Critical points of a branch on finer and finer grids.
+
+use super::Tangent;
+use super::critical::{Critical, Kind};
+use super::equations::{Equations, Stuck};
+use super::family::{Family, Leaves};
+use super::field::prolong as prolong_field;
+use super::refine::{FINEST, GRIDS, STILL};
+use super::refined::{Doubt, Refined, Table, Values};
+use crate::leaf::Grid;
+use crate::relax::prolong::prolong;
+
+/// Grids of a critical point unless its tips need more.
+const CRITICAL_GRIDS: usize = 4;
+
+/// A critical parameter within this part of its range is exact.
+const EXACT: f64 = 1e-12;
+
+/// Compliance by which matrices of nearly rigid leaves are softened, in units
+/// of L^2/A, times one to four; and the stiffness from which on they are.
+const SOFTENING: f64 = 1e-4;
+const NEARLY_RIGID: f64 = 1.01e5;
+
+/// Distances from a crossing (as of arclength) between which the branch is
+/// interpolated, in turn, until tips are within this part of their accuracy.
+const APART: [f64; 4] = [0.03, 0.01, 0.003, 0.001];
+const ENOUGH: f64 = 0.1;
+
+/// A critical point, to the given accuracy of its tips, on four grids or more.
+pub fn refine_critical(
+    family: &Family,
+    grid: &Grid,
+    found: &Critical,
+    accuracy: f64,
+) -> Result<Refined, Doubt> {
+    let mut table = Table::default();
+    let mut equations = Equations::new(family, grid.clone())?;
+    let mut critical = found.clone();
+    let mut moved = f64::INFINITY;
+    for level in 0..GRIDS {
+        if level > 0 {
+            let leaf = equations.leaves.at(critical.fraction)?;
+            let state = prolong(leaf, &critical.state);
+            equations = equations.refined()?;
+            let tangent = equations.normalised(Tangent {
+                increments: prolong_field(&critical.tangent.increments),
+                ..critical.tangent
+            });
+            let finer = Critical {
+                state,
+                tangent,
+                held: critical.held.iter().map(prolong_field).collect(),
+                ..critical.clone()
+            };
+            critical = finer.again(&mut equations)?;
+            let way = finer.state.shift_to(&critical.state);
+            if way > moved.max(STILL) {
+                return Err(Doubt::OtherBranch);
+            }
+            moved = way;
+        }
+        let leaf = equations.leaves.at(critical.fraction)?;
+        let rigid = leaf.stiffest() * NEARLY_RIGID < 1.0;
+        let limit = match rigid {
+            true => 1.0 / SOFTENING,
+            false => f64::INFINITY,
+        };
+        let condensing = leaf.sections.iter().map(|it| it.condensing.max_element());
+        let stiffest = condensing.fold(0.0_f64, |most, it| most.max(it.min(limit)));
+        let segments = leaf.segments() as f64;
+        let rounding = f64::EPSILON * stiffest * segments * segments / critical.steepness();
+        table.rounding = table.rounding.max(rounding);
+        let mut values = match rigid {
+            false => Values::of(&mut equations, &critical.state, critical.fraction)?,
+            true => unsoftened(family, equations.grid(), &critical)?,
+        };
+        if critical.kind == Kind::Branching {
+            let across = tips_across(&mut equations, &critical, values.fraction, accuracy);
+            if let Some(across) = across {
+                table.common = table.common.max(across.error);
+                table.slope = Some(across.slope);
+                values = across.values;
+            }
+        }
+        table.push(equations.grid().segments(), values);
+        // A finer grid would only add rounding.
+        let exact = table.fraction_error() < table.rounding.max(EXACT);
+        let enough = exact || level + 1 >= CRITICAL_GRIDS;
+        if enough && table.error() <= accuracy {
+            return Ok(table.refined(critical.state, equations.grid().clone()));
+        }
+        if 2 * equations.grid().segments() > FINEST {
+            break;
+        }
+    }
+    Err(Doubt::Inaccurate)
+}
+
+/// A critical point of a nearly rigid leaf: by softened matrices, extrapolated to none.
+fn unsoftened(family: &Family, grid: &Grid, critical: &Critical) -> Result<Values, Stuck> {
+    // The cubic through values at 1, 2, 3, 4 at zero.
+    const WEIGHTS: [f64; 4] = [4.0, -6.0, 4.0, -1.0];
+    let mut parts = Vec::new();
+    let mut near = critical.clone();
+    for (k, weight) in WEIGHTS.into_iter().enumerate().rev() {
+        let soft = family.softened(SOFTENING * (k + 1) as f64);
+        let mut equations = Equations::new(family, grid.clone())?;
+        equations.softened = Some(Leaves::new(&soft, grid.clone()));
+        near = near.again(&mut equations)?;
+        let values = Values::of(&mut equations, &near.state, near.fraction)?;
+        parts.push((weight, values));
+    }
+    Ok(Values::sum(&parts))
+}
+
+/// A branch where it is crossed.
+struct Across {
+    values: Values,
+    /// A bound on the error of the tips.
+    error: f64,
+    /// Change of the values with the fraction.
+    slope: Values,
+}
+
+/// A branch where it is crossed at this fraction. Along the neutral mode the singular
+/// matrix leaves a leaf as rounding has it; but the branch is smooth through the
+/// crossing, and points beside it are known. None where there are none on both sides:
+/// at an end of the range, or next to a fold.
+fn tips_across(
+    equations: &mut Equations,
+    critical: &Critical,
+    fraction: f64,
+    accuracy: f64,
+) -> Option<Across> {
+    // From values at -3, -2, -1, 1, 2, 3 that at 0 and the slope to sixth order; from
+    // four of them that at 0 to fourth.
+    const SIXTH: [f64; 3] = [0.75, -0.3, 0.05];
+    const FOURTH: [f64; 3] = [2.0 / 3.0, -1.0 / 6.0, 0.0];
+    const SLOPE: [f64; 3] = [0.75, -0.15, 1.0 / 60.0];
+    let mut best: Option<Across> = None;
+    for apart in APART {
+        let unit = apart * critical.tangent.fraction;
+        let mut beside = |side: f64| {
+            let increments = &critical.tangent.increments;
+            let moved =
+                equations.moved(&critical.state, critical.fraction, increments, side * apart);
+            let at = fraction + side * unit;
+            let (point, _) = equations.correct(&moved.ok()?, at, None).ok()?;
+            Values::of(equations, &point.state, at).ok()
+        };
+        let pairs = [1.0, 2.0, 3.0].into_iter();
+        let pairs: Option<Vec<[Values; 2]>> =
+            pairs.map(|k| Some([beside(-k)?, beside(k)?])).collect();
+        let Some(pairs) = pairs else {
+            continue;
+        };
+        let sum = |weights: [f64; 3], sign: f64| {
+            let parts = pairs.iter().zip(weights);
+            let parts = parts.flat_map(|([before, behind], weight)| {
+                [(sign * weight, before.clone()), (weight, behind.clone())]
+            });
+            Values::sum(&parts.collect::<Vec<_>>())
+        };
+        let values = Values {
+            fraction,
+            ..sum(SIXTH, 1.0)
+        };
+        let error = values.distance(&sum(FOURTH, 1.0));
+        if best.as_ref().is_none_or(|best| error < best.error) {
+            best = Some(Across {
+                values,
+                error,
+                slope: sum(SLOPE.map(|weight| weight / unit), -1.0),
+            });
+        }
+        if error < ENOUGH * accuracy {
+            break;
+        }
+    }
+    best
+}
