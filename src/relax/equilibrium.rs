@@ -3,6 +3,7 @@
 use crate::newton::Work;
 use crate::numbers::power_of_ten;
 use crate::relax::method::Method;
+use crate::relax::sensitivity::Sensitivity;
 use crate::shape::{self, RodShape};
 use crate::undulation::Undulation;
 use glam::DVec3;
@@ -43,6 +44,11 @@ impl Outcome {
             Outcome::Singular => "singular",
             Outcome::Diverged => "diverged",
         }
+    }
+
+    /// Whether the leaf is at rest, to the tolerance or not.
+    pub fn is_at_rest(self) -> bool {
+        self.is_success() || self == Outcome::ToleranceNotReached
     }
 
     /// Whether the leaf is at rest within the tolerance (exit status 0).
@@ -273,6 +279,9 @@ pub struct Equilibrium {
     /// Whether it is stable.
     #[serde(flatten)]
     pub stability: Stability,
+    /// How the results change with numbers of the scenario, of those asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensitivities: Option<Vec<Sensitivity>>,
     /// Waves and twist of the veins on the finest grid.
     pub undulation: Undulation,
     /// What was solved.

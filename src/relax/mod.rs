@@ -2,12 +2,14 @@
 //! the nested grids with their extrapolation, saddles, modes, and the result.
 
 mod equilibrium;
+mod follow;
 mod grids;
 mod grip;
 pub(crate) mod index;
 mod method;
 mod methods;
 mod modes;
+mod number;
 mod options;
 pub(crate) mod prolong;
 mod request;
@@ -16,6 +18,7 @@ pub(crate) mod richardson;
 mod run;
 mod saddle;
 mod segments;
+mod sensitivity;
 mod settle;
 mod shape;
 mod solve;
@@ -30,16 +33,22 @@ pub(crate) use equilibrium::serialize_index;
 pub use equilibrium::{
     Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Saddle, Shape, Stability,
 };
+pub(crate) use follow::{AtRest, Lost, extrapolation};
 pub(crate) use index::{index_near, project};
 pub use method::{Method, SemiImplicit, UnknownMethod};
 pub(crate) use methods::shooting::{START as SHOOTING_START, check_intervals};
+pub(crate) use number::Number;
 pub use options::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
     check_tolerance,
 };
 pub use request::Relaxation;
+pub(crate) use run::Level;
 pub(crate) use saddle::polish;
 pub(crate) use segments::check_segments;
+pub use sensitivity::Sensitivity;
+pub(crate) use sensitivity::{eigenvalue_rate, responses, sensitivities};
 pub(crate) use shape::node as node_state;
 pub use solve::relax;
+pub(crate) use solve::relax_on_grids;
 pub(crate) use start::start;

@@ -16,7 +16,7 @@ use glam::{DQuat, DVec3};
 
 /// Assembles the result.
 pub fn equilibrium(
-    run: Run,
+    run: &Run,
     outcome: Outcome,
     remark: Option<String>,
     wall_seconds: f64,
@@ -54,6 +54,7 @@ pub fn equilibrium(
             mode_shapes: run.options.mode_shapes,
             saddle: run.saddle,
         },
+        sensitivities: None,
         undulation: Undulation::of(scenario, &lines, &stations, &rods, error_estimate),
         model: Model::new(
             rods.len(),
