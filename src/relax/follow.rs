@@ -136,7 +136,8 @@ impl AtRest {
     }
 
     /// Nodes and weights on each grid by which values at nodes are interpolated at the
-    /// fraction `sigma`, and the derivatives of the weights with it.
+    /// fraction `sigma`, and the derivatives of the weights with it; beyond the ends the
+    /// values go on linearly.
     pub fn stencils(&self, sigma: f64) -> Vec<Stencil> {
         let on = |level: &Level| Stencil::new(level, sigma);
         self.levels.iter().map(on).collect()
@@ -214,6 +215,7 @@ pub(crate) struct Stencil {
 
 impl Stencil {
     fn new(level: &Level, sigma: f64) -> Stencil {
+        let (beyond, sigma) = (sigma - sigma.clamp(0.0, 1.0), sigma.clamp(0.0, 1.0));
         let nodes = level.leaf.grid.sigma();
         // A polynomial does not reach across a kink.
         let kinks = level.leaf.leaf.kinks();
@@ -240,10 +242,12 @@ impl Stencil {
             };
             others.map(term).sum::<f64>() / width
         };
+        let slopes: Vec<f64> = (0..count).map(slope).collect();
+        let weight = |a: usize| weight(a) + beyond * slopes[a];
         Stencil {
             first,
             weights: (0..count).map(weight).collect(),
-            slopes: (0..count).map(slope).collect(),
+            slopes,
         }
     }
 

@@ -61,7 +61,7 @@ pub fn relax_with_sensitivities(
     let (mut leaf, levels) = relax_on_grids(scenario, options, tolerance, progress)?;
     let at_rest = leaf.accuracy.residual.is_some() && leaf.outcome.is_at_rest();
     leaf.sensitivities = Some(match at_rest {
-        true => sensitivities(&levels, &numbers, tolerance, options.modes > 0),
+        true => sensitivities(&levels, &numbers, tolerance, options.modes),
         false => Vec::new(),
     });
     Ok(leaf)

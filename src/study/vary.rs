@@ -199,11 +199,11 @@ impl Keys {
             .any(|one| other.0.iter().any(|two| one.overlaps(*two)))
     }
 
-    /// Whether a scenario is linear in the number.
+    /// Whether a scenario is linear in the number. One that is several keys may be a
+    /// product of itself, as that of coupling and lengths.
     pub(crate) fn is_linear(&self) -> bool {
-        (self.0.iter())
-            .filter_map(|target| target.key())
-            .all(Key::is_linear)
+        let mut keys = self.0.iter().filter_map(|target| target.key());
+        self.0.len() == 1 && keys.all(Key::is_linear)
     }
 
     /// Whether only whole numbers make sense.

@@ -3,13 +3,14 @@
 use nalgebra::DMatrix;
 
 use super::FitError;
+use super::case::{Component, What};
 use super::data::{Data, Experiment};
 use super::judge::Judge;
-use super::model::{Component, Model, What};
+use super::model::Model;
 use super::result::FitCandidate;
 
 /// What is known of a coordinate beforehand: a factor of ten each way, as 95 %.
-const BEFORE: f64 = std::f64::consts::LN_10 / super::judge::NORMAL;
+const BEFORE: f64 = std::f64::consts::LN_10 / super::directions::NORMAL;
 
 /// What each of these experiments would add to what the fit knows, the one that adds
 /// most first. Its data are as accurate as said, or as those of the fit.
@@ -56,7 +57,7 @@ fn added(judge: &Judge, model: &Model) -> Result<DMatrix<f64>, String> {
     let (mut point, _) = found.map_err(|refused| refused.to_string())?;
     (model.differentiate(&mut point)).map_err(|_| "its equilibrium is singular".to_string())?;
     let sd = |component: &Component| match component.what {
-        What::Result(quantity) => component.sd.or(judge.assumed(quantity.is_length())),
+        What::Result(quantity) => component.sd.or(judge.assumed(quantity.kind())),
         What::Vein { .. } => component.sd,
     };
     let sd: Option<Vec<f64>> = point.components().map(sd).collect();

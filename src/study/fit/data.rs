@@ -1,56 +1,10 @@
 //! Measured data, as read from CSV: experiments and traced veins.
 
 use std::collections::BTreeMap;
-use std::str::FromStr;
 
 use super::FitError;
+use super::quantity::Quantity;
 use crate::study::Keys;
-
-/// What can be measured on a leaf.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// A coordinate of the joint tip, or of the only rod's: 0, 1, 2.
-    Tip(usize),
-    /// The frequency of a mode in cycles per time; modes are numbered from 1.
-    Frequency(usize),
-}
-
-impl Quantity {
-    /// What is measured, in words that allow for their plural.
-    const ALL: &str = "tip_x, tip_y, tip_z, frequency_1, frequency_2, ...";
-
-    /// Whether it is a length.
-    pub(super) fn is_length(self) -> bool {
-        matches!(self, Quantity::Tip(_))
-    }
-}
-
-impl FromStr for Quantity {
-    type Err = ();
-
-    fn from_str(text: &str) -> Result<Self, ()> {
-        match text.split_once('_') {
-            Some(("tip", axis)) => {
-                let axis = ["x", "y", "z"].iter().position(|name| *name == axis);
-                axis.map(Quantity::Tip).ok_or(())
-            }
-            Some(("frequency", mode)) => match mode.parse() {
-                Ok(mode @ 1..=crate::relax::MOST_MODES) => Ok(Quantity::Frequency(mode)),
-                _ => Err(()),
-            },
-            _ => Err(()),
-        }
-    }
-}
-
-impl std::fmt::Display for Quantity {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        match self {
-            Quantity::Tip(axis) => write!(f, "tip_{}", ["x", "y", "z"][*axis]),
-            Quantity::Frequency(mode) => write!(f, "frequency_{mode}"),
-        }
-    }
-}
 
 /// Where a number was read: a file and a line of it.
 #[derive(Clone, Debug, PartialEq, Eq)]

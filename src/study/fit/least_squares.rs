@@ -1,8 +1,13 @@
-//! Least squares: Levenberg's and Marquardt's method, within bounds, along
-//! equilibria that are followed and never jumped between.
+//! Least squares: Gauss's and Newton's method within a region of trust and within
+//! bounds, along equilibria that are followed and never jumped between.
+//!
+//! Whether a point is a minimum is asked of the longest step that is ever taken, not of
+//! the one within the present region: that may be short for another direction's sake,
+//! and then gains little from a point that is none along what the data feel weakly.
 
 use nalgebra::{DMatrix, DVector};
 
+use super::directions::{NULL, singular};
 use super::free::LONGEST_STEP;
 use super::model::{Model, Point};
 use crate::relax::Lost;
@@ -10,22 +15,24 @@ use crate::relax::Lost;
 /// Steps tried before a minimum is given up.
 const MOST_STEPS: usize = 100;
 
-/// Damping at first, relative to the largest diagonal entry, and its least.
-const DAMPING: f64 = 1e-4;
-const LEAST_DAMPING: f64 = 1e-13;
-const LARGEST_DAMPING: f64 = 1e12;
+/// The longest step at first, in logarithms or units, and the least that is tried.
+const FIRST_STEP: f64 = 0.7;
+const LEAST_STEP: f64 = 1e-12;
 
-/// A step this small, in logarithms or units, ends the iteration; and one that is
+/// A step this small ends the iteration; and a point from which the longest step is
 /// expected to gain no more than this part of one datum's variance.
 const STEP: f64 = 1e-9;
 const GAIN: f64 = 1e-7;
 
 /// Gains below this part of it may be the finite accuracy of the equilibria: two in
 /// succession end the iteration, and so does a loss.
-const ACCURACY: f64 = 1e-3;
+const ACCURACY: f64 = 1e-2;
 
-/// A minimum is none where a step was expected to gain more than this part of it.
+/// A minimum is none where the longest step was expected to gain more than this part.
 const WORTHWHILE: f64 = 0.1;
+
+/// Bisections to the damping that shortens a step.
+const BISECTIONS: usize = 40;
 
 /// The least variance that is reckoned with, of residuals in units of the assumed
 /// deviation: equilibria are not known better.
@@ -116,6 +123,8 @@ pub(super) struct Iteration<'m, 'a> {
     /// Coordinates that are held.
     pub held: Vec<bool>,
     pub most_steps: usize,
+    /// What the longest step may be expected to gain at the end, of a datum's variance.
+    pub enough: f64,
     /// Told the number of the step and the sum.
     pub progress: &'m mut dyn FnMut(usize, f64),
 }
@@ -131,6 +140,7 @@ impl<'m, 'a> Iteration<'m, 'a> {
             weighing,
             held: vec![false; model.coordinates.len()],
             most_steps: MOST_STEPS,
+            enough: GAIN,
             progress,
         }
     }
@@ -140,8 +150,7 @@ impl<'m, 'a> Iteration<'m, 'a> {
         if let Err(lost) = self.model.differentiate(&mut point) {
             return (point, End::Stuck(Some(lost)), 0);
         }
-        let mut damping = DAMPING;
-        let mut growth = 2.0;
+        let mut radius = FIRST_STEP;
         let mut evaluations = 0;
         let mut small = 0;
         for step in 0..self.most_steps {
@@ -149,43 +158,24 @@ impl<'m, 'a> Iteration<'m, 'a> {
             let bound = self.weighing.bound(&residuals);
             let sum = self.weighing.sum(&residuals, bound);
             (self.progress)(step, sum);
-            let roots = self.weighing.roots(&residuals);
-            let mut jacobian = self.weighing.jacobian(&point);
-            for (mut row, root) in jacobian.row_iter_mut().zip(roots.iter()) {
-                row *= *root;
-            }
-            let weighed = residuals.component_mul(&roots);
-            let gradient = jacobian.transpose() * &weighed;
-            let active = self.active(&point, &gradient);
-            let normal = jacobian.transpose() * &jacobian;
-            let largest = (0..active.len())
-                .filter(|&k| active[k])
-                .fold(0.0_f64, |m, k| m.max(normal[(k, k)]));
-            if largest == 0.0 {
+            let linear = self.linear(&point, &residuals);
+            let variance = linear.variance(&point, sum);
+            let longest = self.clamped(&point.theta, &linear.step(LONGEST_STEP));
+            let open = linear.gain(&change(&point.theta, &longest));
+            if open < self.enough * variance {
                 return (point, End::Converged, evaluations);
             }
-            let known = point.components().all(|component| component.sd.is_some());
-            let variance = match known {
-                true => 1.0,
-                false => (sum / residuals.len() as f64).max(LEAST_VARIANCE),
-            };
+            let nearly = open < ACCURACY * variance;
             let mut lost = None;
-            let mut expected = None;
             loop {
-                let change = damped(&normal, &gradient, &active, damping * largest);
-                let theta = self.clamped(&point.theta, &change);
-                let change: DVector<f64> =
-                    DVector::from_vec(theta.clone()) - DVector::from_vec(point.theta.clone());
-                let size = change.amax();
-                let predicted =
-                    -(2.0 * gradient.dot(&change) + (jacobian.clone() * &change).norm_squared());
-                // What was expected of the first of these steps, and did not come.
-                let worthwhile = *expected.get_or_insert(predicted) > WORTHWHILE * variance;
-                let end = |lost: Option<Lost>| match worthwhile || lost.is_some() {
+                let theta = self.clamped(&point.theta, &linear.step(radius));
+                let change = change(&point.theta, &theta);
+                let (size, predicted) = (change.norm(), linear.gain(&change));
+                let end = |lost: Option<Lost>| match open > WORTHWHILE * variance {
                     true => End::Stuck(lost),
                     false => End::Converged,
                 };
-                if size < STEP || predicted < GAIN * variance {
+                if size < STEP || predicted < GAIN * variance || radius < LEAST_STEP {
                     return (point, end(lost), evaluations);
                 }
                 evaluations += 1;
@@ -195,32 +185,52 @@ impl<'m, 'a> Iteration<'m, 'a> {
                         let gained = sum - self.weighing.sum(&found, bound);
                         if gained > 0.0 && self.model.differentiate(&mut trial).is_ok() {
                             let ratio = gained / predicted;
-                            damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(0.1);
-                            damping = damping.max(LEAST_DAMPING);
-                            growth = 2.0;
+                            if ratio < 0.25 {
+                                radius = 0.5 * size;
+                            } else if ratio > 0.75 {
+                                radius = radius.max(2.0 * size).min(LONGEST_STEP);
+                            }
                             point = trial;
-                            let little = gained.max(predicted) < ACCURACY * variance;
-                            small = if little { small + 1 } else { 0 };
+                            small = if nearly { small + 1 } else { 0 };
                             if small == 2 {
                                 return (point, End::Converged, evaluations);
                             }
                             break;
                         }
-                        if gained.abs().max(predicted) < ACCURACY * variance {
-                            return (point, end(None), evaluations);
+                        if nearly {
+                            return (point, End::Converged, evaluations);
                         }
                         lost = None;
                     }
                     Err(why) => lost = Some(why),
                 }
-                damping *= growth;
-                growth *= 2.0;
-                if damping > LARGEST_DAMPING {
-                    return (point, End::Stuck(lost), evaluations);
-                }
+                radius = 0.25 * size;
             }
         }
         (point, End::MostSteps, evaluations)
+    }
+
+    /// The residuals as they change with the coordinates that may move.
+    fn linear(&self, point: &Point, residuals: &DVector<f64>) -> Linear {
+        let roots = self.weighing.roots(residuals);
+        let mut jacobian = self.weighing.jacobian(point);
+        for (mut row, root) in jacobian.row_iter_mut().zip(roots.iter()) {
+            row *= *root;
+        }
+        let gradient = jacobian.tr_mul(&residuals.component_mul(&roots));
+        let active = self.active(point, &gradient);
+        for k in (0..active.len()).filter(|&k| !active[k]) {
+            jacobian.column_mut(k).fill(0.0);
+        }
+        let (values, directions) = singular(&jacobian);
+        let slopes = directions.tr_mul(&gradient);
+        let least = NULL * values.last().copied().unwrap_or(0.0);
+        Linear {
+            unfelt: values.iter().filter(|value| **value <= least).count(),
+            slopes,
+            values,
+            directions,
+        }
     }
 
     /// Coordinates that may move: not held, nor at a bound that the gradient drives
@@ -248,29 +258,72 @@ impl<'m, 'a> Iteration<'m, 'a> {
     }
 }
 
-/// The step of the damped normal equations in the active coordinates. Damping is
-/// the same along all, so that nothing moves along combinations that no datum feels.
-fn damped(
-    normal: &DMatrix<f64>,
-    gradient: &DVector<f64>,
-    active: &[bool],
-    damping: f64,
-) -> DVector<f64> {
-    let mut matrix = normal.clone();
-    let mut right = -gradient;
-    for k in 0..active.len() {
-        matrix[(k, k)] += damping;
-        if !active[k] {
-            right[k] = 0.0;
-            for other in 0..active.len() {
-                matrix[(k, other)] = 0.0;
-                matrix[(other, k)] = 0.0;
-            }
-            matrix[(k, k)] = 1.0;
+fn change(from: &[f64], to: &[f64]) -> DVector<f64> {
+    DVector::from_iterator(to.len(), to.iter().zip(from).map(|(to, from)| to - from))
+}
+
+/// Weighed residuals, linear in the coordinates, along their singular directions.
+struct Linear {
+    /// Singular values, ascending, and their directions as columns.
+    values: Vec<f64>,
+    directions: DMatrix<f64>,
+    /// Derivatives of half the sum of squares along these.
+    slopes: DVector<f64>,
+    /// Directions that no datum feels: the first so many. Nothing moves along them.
+    unfelt: usize,
+}
+
+impl Linear {
+    /// The variance of a datum, in units of its assumed one.
+    fn variance(&self, point: &Point, sum: f64) -> f64 {
+        let felt = self.values.len() - self.unfelt;
+        let mut count = 0_usize;
+        let mut known = true;
+        for component in point.components() {
+            count += usize::from(!component.free);
+            known &= component.sd.is_some();
+        }
+        match known {
+            true => 1.0,
+            false => (sum / count.saturating_sub(felt).max(1) as f64).max(LEAST_VARIANCE),
         }
     }
-    match matrix.cholesky() {
-        Some(factor) => factor.solve(&right),
-        None => DVector::zeros(active.len()),
+
+    /// The step within a radius to where the sum of squares is least.
+    fn step(&self, radius: f64) -> DVector<f64> {
+        let along = |damping: f64| {
+            let part = |k: usize, slope: f64| match k < self.unfelt {
+                true => 0.0,
+                false => -slope / (self.values[k].powi(2) + damping),
+            };
+            let parts = self.slopes.iter().enumerate();
+            DVector::from_iterator(self.slopes.len(), parts.map(|(k, slope)| part(k, *slope)))
+        };
+        let mut parts = along(0.0);
+        if parts.norm() > radius {
+            // The length falls with the damping.
+            let (mut low, mut high) = (0.0, self.slopes.norm() / radius);
+            for _ in 0..BISECTIONS {
+                let middle = match low > 0.0 {
+                    true => f64::sqrt(low * high),
+                    false => 1e-4 * high,
+                };
+                match along(middle).norm() > radius {
+                    true => low = middle,
+                    false => high = middle,
+                }
+            }
+            parts = along(high);
+        }
+        &self.directions * parts
+    }
+
+    /// What a step is expected to take off the sum of squares.
+    fn gain(&self, step: &DVector<f64>) -> f64 {
+        let parts = self.directions.tr_mul(step);
+        let terms = parts.iter().enumerate();
+        terms
+            .map(|(k, part)| -part * (2.0 * self.slopes[k] + self.values[k].powi(2) * part))
+            .sum()
     }
 }

@@ -6,17 +6,23 @@
 //! branches. Positive numbers are fitted by their logarithms.
 
 mod candidates;
+mod case;
 mod data;
+mod directions;
+mod found;
 mod free;
+mod interval;
 mod judge;
 mod least_squares;
 mod model;
+mod quantity;
 mod result;
 mod vein;
 mod words;
 
-pub use data::{Data, Experiment, Measured, Origin, Quantity as MeasuredQuantity, Traced};
+pub use data::{Data, Experiment, Measured, Origin, Traced};
 pub use free::Free;
+pub use quantity::Quantity as MeasuredQuantity;
 pub use result::{Fit, FitCandidate, FitLeaf, FitOutcome, FitParameter, FitResidual, FitWork};
 
 use std::time::Instant;
@@ -26,8 +32,11 @@ use crate::limit::Limit;
 use crate::relax::{Options, RelaxError, check_tolerance};
 use free::Coordinate;
 use judge::Judge;
-use least_squares::{ASSUMED, Iteration, Weighing};
+use least_squares::{ASSUMED, End, Iteration, Weighing};
 use model::Model;
+
+/// Minima that are left for better ones.
+const MOST_MINIMA: usize = 4;
 
 /// Why nothing can be fitted.
 #[derive(Debug, thiserror::Error)]
@@ -125,16 +134,51 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result
             ),
         }));
     }
+    if !known && coordinates.len() == count {
+        return Err(FitError::Free(format!(
+            "{count} numbers are free, and there are as many data, whose standard deviations are not \
+             known: nothing is left to tell them: add columns sd_tip_x, ..., free fewer, or measure more"
+        )));
+    }
     let weighing = Weighing {
-        assumed: ASSUMED * base.scenario().scale().length,
+        assumed: ASSUMED * unit(&first, base.scenario().scale().length),
         robust: request.robust,
     };
-    let mut iteration = Iteration::new(&model, weighing, progress);
-    let (point, end, evaluations) = iteration.run(first);
-    let judge = Judge::new(&model, weighing, known, &point, evaluations);
-    let mut found = judge.fit(&end, &request.candidates, progress);
+    let mut point = first;
+    let mut evaluations = 0;
+    let mut attempts = 0;
+    let mut found = loop {
+        let (least, end, more) = Iteration::new(&model, weighing, progress).run(point);
+        evaluations += more;
+        attempts += 1;
+        let judge = Judge::new(&model, weighing, known, &least, evaluations);
+        let parameters = match end {
+            End::Converged => interval::intervals(&judge, progress),
+            _ => Ok(interval::without_intervals(&judge)),
+        };
+        match parameters {
+            Ok(parameters) => break found::fit(&judge, &end, parameters, &request.candidates),
+            Err(better) if attempts < MOST_MINIMA => point = better,
+            Err(_) => {
+                let parameters = interval::without_intervals(&judge);
+                break found::fit(&judge, &End::MostSteps, parameters, &request.candidates);
+            }
+        }
+    };
     found.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(found)
+}
+
+/// What the data are measured by: the length of the leaf, or the largest of them.
+fn unit(point: &model::Point, length: f64) -> f64 {
+    let kind = point.components().next().map(|first| first.what.kind());
+    match kind {
+        None | Some(quantity::Kind::Length) => length,
+        Some(_) => {
+            let sizes = point.components().map(|component| component.observed.abs());
+            sizes.fold(0.0, f64::max).max(f64::MIN_POSITIVE)
+        }
+    }
 }
 
 /// The free numbers, with every entry of a list or a profile in its place.

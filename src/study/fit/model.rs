@@ -1,23 +1,18 @@
 //! What the leaf of a scenario predicts for the data, and how that changes with the
 //! free numbers.
 
-use glam::DVec3;
 use rayon::prelude::*;
 
 use super::FitError;
-use super::data::{Data, Experiment, Measured, Origin, Quantity, Traced};
+use super::case::{Case, CaseAt, Component, What};
+use super::data::{Data, Experiment, Measured, Origin};
 use super::free::Coordinate;
-use super::vein::Vein;
+use super::quantity::Kind;
 use crate::leaf::{Forces, LeafRate, Response};
-use crate::modes;
-use crate::motion::Physics;
 use crate::newton::Work;
-use crate::relax::{AtRest, Equilibrium, Level, Lost, Number, Options, eigenvalue_rate, responses};
+use crate::relax::{AtRest, Equilibrium, Lost, Number, Options, responses};
 use crate::scenario::Scenario;
 use crate::study::{Base, Keys};
-
-/// Unknowns of the finest grid on which modes are looked for, but for the first.
-const FEW_UNKNOWNS: usize = 4_000;
 
 /// What all points of a fit have in common.
 pub(super) struct Model<'a> {
@@ -25,55 +20,6 @@ pub(super) struct Model<'a> {
     pub coordinates: &'a [Coordinate],
     pub options: &'a Options,
     pub cases: Vec<Case>,
-}
-
-/// A leaf under the conditions of one experiment, and what was seen of it.
-pub(super) struct Case {
-    pub name: String,
-    pub settings: Vec<(Keys, f64)>,
-    pub measured: Vec<Measured>,
-    pub traced: Vec<Traced>,
-    pub origin: Option<Origin>,
-}
-
-/// One number that is compared.
-#[derive(Clone, Debug)]
-pub(super) struct Component {
-    /// The experiment.
-    pub case: usize,
-    pub what: What,
-    pub observed: f64,
-    pub model: f64,
-    /// Its standard deviation, if it is known.
-    pub sd: Option<f64>,
-    /// Whether another of the same point takes its place in the count: a point beside
-    /// a curve says nothing about the place along it.
-    pub free: bool,
-    pub origin: Option<Origin>,
-}
-
-/// What is compared.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum What {
-    Result(Quantity),
-    /// A coordinate of a point of a rod, at this fraction of its length.
-    Vein {
-        rod: usize,
-        axis: usize,
-        sigma: f64,
-    },
-}
-
-/// A leaf at rest for some values of the free numbers.
-pub(super) struct CaseAt {
-    pub at: AtRest,
-    /// Modes on the first grids.
-    modes: Vec<Vec<modes::Eigenpair>>,
-    pub components: Vec<Component>,
-    /// How it answers each number, on every grid, and the gradients of the
-    /// components; empty until asked for.
-    responses: Vec<Vec<Response>>,
-    pub gradients: Vec<Vec<f64>>,
 }
 
 /// The leaves of all experiments.
@@ -136,14 +82,25 @@ impl<'a> Model<'a> {
         }
         cases.retain(|case| !case.measured.is_empty() || !case.traced.is_empty());
         for case in &cases {
-            let tip = |m: &&Measured| m.quantity.is_length();
-            if let Some(measured) = case.measured.iter().find(tip)
+            let of_a_tip = |m: &&Measured| m.quantity.kind() == Kind::Length;
+            if let Some(measured) = case.measured.iter().find(of_a_tip)
                 && rods > 1
                 && !base.scenario().joined
             {
                 let why = format!(
                     "{} of free tips: there are {rods} of them: give the tips as points on \
                      veins (rod, sigma = 1, x, y, z)",
+                    measured.quantity
+                );
+                return Err(FitError::Data(why));
+            }
+            let of_a_holder = |m: &&Measured| m.quantity.kind() == Kind::Force;
+            if let Some(measured) = case.measured.iter().find(of_a_holder)
+                && base.scenario().held_tip.is_none()
+            {
+                let why = format!(
+                    "{} is what the holder of a tip feels, and the scenario's tip is free: add \
+                     [tip] with held = \"pinned\" or \"clamped\"",
                     measured.quantity
                 );
                 return Err(FitError::Data(why));
@@ -187,7 +144,7 @@ impl<'a> Model<'a> {
             let scenario = self.scenario(&self.cases[case], theta)?;
             let found = AtRest::find(&scenario, self.options)?;
             let (at, leaf) = found.map_err(|lost| self.no_equilibrium(case, &lost))?;
-            let case_at = self.compare(case, at);
+            let case_at = CaseAt::new(&self.cases[case], case, at);
             Ok((
                 case_at.map_err(|lost| self.no_equilibrium(case, &lost))?,
                 leaf,
@@ -228,85 +185,13 @@ impl<'a> Model<'a> {
             let at = from
                 .at
                 .follow(&scenario, &from.responses, &steps, self.options)?;
-            self.compare(case, at)
+            CaseAt::new(&self.cases[case], case, at)
         };
         let cases = (0..self.cases.len()).into_par_iter().map(follow);
         Ok(Point {
             theta: theta.to_vec(),
             cases: cases.collect::<Result<_, _>>()?,
         })
-    }
-
-    /// Predictions of a leaf at rest, beside the data.
-    fn compare(&self, case: usize, at: AtRest) -> Result<CaseAt, Lost> {
-        let of = &self.cases[case];
-        let frequencies = of
-            .measured
-            .iter()
-            .filter_map(|measured| match measured.quantity {
-                Quantity::Frequency(mode) => Some(mode),
-                Quantity::Tip(_) => None,
-            });
-        let count = frequencies.max().unwrap_or(0);
-        let mut modes = Vec::new();
-        for level in at.levels.iter().filter(|_| count > 0) {
-            let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
-            if modes.is_empty() || unknowns < FEW_UNKNOWNS {
-                let physics = Physics::new(&level.leaf.leaf);
-                let pairs = modes::lowest(&level.leaf, &physics, &level.state, count);
-                let lost = || Lost::NotAtRest("its frequencies cannot be found".into());
-                let pairs = pairs
-                    .filter(|pairs| pairs.len() == count)
-                    .ok_or_else(lost)?;
-                modes.push(pairs);
-            }
-        }
-        let mut found = CaseAt {
-            at,
-            modes,
-            components: Vec::new(),
-            responses: Vec::new(),
-            gradients: Vec::new(),
-        };
-        for measured in &of.measured {
-            found.components.push(Component {
-                case,
-                what: What::Result(measured.quantity),
-                observed: measured.value.unwrap_or(f64::NAN),
-                model: found.result(measured.quantity),
-                sd: measured.sd,
-                free: false,
-                origin: of.origin.clone(),
-            });
-        }
-        let mut veins: Vec<Option<Vein>> = Vec::new();
-        for traced in &of.traced {
-            veins.resize_with(veins.len().max(traced.rod + 1), || None);
-            let vein = veins[traced.rod].get_or_insert_with(|| Vein::of(&found.at, traced.rod));
-            let (sigma, beside) = match traced.sigma {
-                Some(sigma) => (sigma, false),
-                None => vein.nearest(traced.at),
-            };
-            let model = vein.at(sigma);
-            let seen = traced.at.iter().enumerate();
-            let seen = seen.filter_map(|(axis, value)| value.map(|value| (axis, value)));
-            for (number, (axis, observed)) in seen.enumerate() {
-                found.components.push(Component {
-                    case,
-                    what: What::Vein {
-                        rod: traced.rod,
-                        axis,
-                        sigma,
-                    },
-                    observed,
-                    model: model[axis],
-                    sd: traced.sd,
-                    free: beside && number == 0,
-                    origin: Some(traced.origin.clone()),
-                });
-            }
-        }
-        Ok(found)
     }
 
     /// Finds how the components of a point change with the coordinates.
@@ -406,35 +291,27 @@ impl<'a> Model<'a> {
         self.options.tolerance.unwrap_or(scenario.tolerance)
     }
 
-    /// Standard deviations are known of all data, or of none, which are then lengths.
+    /// Standard deviations are known of all data, or of none, which are then of one kind.
     pub fn check_deviations(&self, point: &Point) -> Result<bool, FitError> {
-        let known = point
-            .components()
-            .filter(|component| component.sd.is_some())
-            .count();
-        let all = point.components().count();
-        let frequency = |c: &&Component| match c.what {
-            What::Result(quantity) => !quantity.is_length(),
-            What::Vein { .. } => false,
-        };
-        let frequencies = point.components().filter(frequency).count();
-        if known == all {
+        let known = |component: &&Component| component.sd.is_some();
+        let count = point.components().filter(known).count();
+        if count == point.components().count() {
             return Ok(true);
         }
-        if known > 0 {
-            let without = point.components().find(|component| component.sd.is_none());
-            let place = without
-                .and_then(|c| c.origin.as_ref())
-                .map(Origin::to_string);
-            let place = place.unwrap_or_default();
+        let without = point.components().find(|component| !known(component));
+        if count > 0 {
+            let place = without.and_then(|c| c.origin.as_ref());
+            let place = place.map(Origin::to_string).unwrap_or_default();
             return Err(FitError::Data(format!(
                 "{place}: has no standard deviation, and others have: give all or none"
             )));
         }
-        if frequencies > 0 && frequencies < all {
+        let mut kinds = point.components().map(|component| component.what.kind());
+        let first = kinds.next();
+        if kinds.any(|kind| Some(kind) != first) {
             return Err(FitError::Data(
-                "lengths and frequencies can only be weighed against each other by their standard \
-                 deviations: add columns sd_frequency_1, sd_tip_x, ... (sd of points on veins)"
+                "lengths, forces and frequencies can only be weighed against each other by their \
+                 standard deviations: add columns sd_frequency_1, sd_tip_x, ... (sd of points on veins)"
                     .into(),
             ));
         }
@@ -444,110 +321,5 @@ impl<'a> Model<'a> {
     pub fn work(point: &Point) -> Work {
         let works = point.cases.iter().map(|case| case.at.work);
         works.fold(Work::default(), |sum, work| sum + work)
-    }
-}
-
-impl CaseAt {
-    fn length(&self) -> f64 {
-        self.at.levels[0].leaf.leaf.scale.length
-    }
-
-    fn result(&self, quantity: Quantity) -> f64 {
-        match quantity {
-            Quantity::Tip(axis) => {
-                let tip = self.at.best(|_, level| level.state.tip(0));
-                tip[axis] * self.length()
-            }
-            Quantity::Frequency(mode) => {
-                let physics = Physics::new(&self.at.levels[0].leaf.leaf);
-                self.eigenvalue(mode).max(0.0).sqrt() / (std::f64::consts::TAU * physics.time)
-            }
-        }
-    }
-
-    /// An eigenvalue, extrapolated over the grids on which modes are known.
-    fn eigenvalue(&self, mode: usize) -> f64 {
-        self.over_modes(|level| self.modes[level][mode - 1].eigenvalue)
-    }
-
-    fn over_modes(&self, value: impl Fn(usize) -> f64) -> f64 {
-        let segments = self.at.levels.iter().map(|level| level.leaf.segments());
-        let segments: Vec<usize> = segments.take(self.modes.len()).collect();
-        let weights = crate::relax::extrapolation(&segments, segments.len() - 1);
-        weights
-            .iter()
-            .enumerate()
-            .map(|(k, weight)| weight * value(k))
-            .sum()
-    }
-
-    /// The change of a result with a number of the scenario.
-    fn result_rate(
-        &self,
-        quantity: Quantity,
-        (number, rate, answers): (&Number, &LeafRate, &[Response]),
-    ) -> f64 {
-        match quantity {
-            Quantity::Tip(axis) => {
-                let tip = |k: usize, level: &Level| {
-                    crate::leaf::shift(&answers[k].nodes[0][level.leaf.segments() - 1])
-                };
-                self.at.best(tip)[axis] * self.length()
-            }
-            Quantity::Frequency(mode) => {
-                let of = |k: usize| {
-                    let shape = &self.modes[k][mode - 1].shape;
-                    let (level, answer) = (&self.at.levels[k], &answers[k]);
-                    eigenvalue_rate(level, number, (rate, answer), shape).unwrap_or(0.0)
-                };
-                // omega^2 = (2 pi f)^2.
-                let frequency = self.result(quantity);
-                self.over_modes(of) / (2.0 * std::f64::consts::TAU.powi(2) * frequency)
-            }
-        }
-    }
-
-    /// The changes of the coordinates of a point on a vein; of the nearest one to a
-    /// point that was not marked only those across the vein.
-    fn vein_rates(
-        &self,
-        rod: usize,
-        sigma: f64,
-        point: &[&Component],
-        slopes: &[f64],
-    ) -> Vec<Vec<f64>> {
-        let stencils = self.at.stencils(sigma);
-        let axes: Vec<usize> = (point.iter())
-            .map(|component| match component.what {
-                What::Vein { axis, .. } => axis,
-                What::Result(_) => 0,
-            })
-            .collect();
-        let mut along = DVec3::ZERO;
-        if point.iter().any(|component| component.free) {
-            let slope = self.at.best(|k, level| {
-                let base = level.state.base(rod);
-                stencils[k].slope(|i| level.state.x[base + i])
-            });
-            axes.iter().for_each(|&axis| along[axis] = slope[axis]);
-            along = along.normalize_or_zero();
-        }
-        let change = |answers: &Vec<Response>| {
-            let change = self.at.best(|k, _| {
-                stencils[k].value(|i| match i {
-                    0 => DVec3::ZERO,
-                    _ => crate::leaf::shift(&answers[k].nodes[rod][i - 1]),
-                })
-            }) * self.length();
-            let mut seen = DVec3::ZERO;
-            axes.iter().for_each(|&axis| seen[axis] = change[axis]);
-            seen - seen.dot(along) * along
-        };
-        let changes: Vec<DVec3> = self.responses.iter().map(change).collect();
-        let row = |&axis: &usize| {
-            let all = changes.iter().zip(slopes);
-            all.map(|(change, slope)| change[axis] * slope).collect()
-        };
-        axes.iter().map(row).collect()
     }
 }

@@ -4,84 +4,103 @@ use glam::DVec3;
 
 use crate::relax::AtRest;
 
-/// Places along a vein that are tried first.
-const PLACES: usize = 64;
-
-/// Iterations to the nearest point between them.
+/// Iterations to the nearest point between two nodes, and how exactly it is found.
 const ITERATIONS: usize = 60;
+const EXACT: f64 = 1e-13;
 
-/// A vein at many places.
+/// A vein at the nodes of its finest grid.
 pub(super) struct Vein<'a> {
     at: &'a AtRest,
     rod: usize,
-    places: Vec<DVec3>,
-}
-
-/// The point of a rod at a fraction of its length, in the scenario's units.
-fn point(at: &AtRest, rod: usize, sigma: f64) -> DVec3 {
-    let stencils = at.stencils(sigma);
-    let length = at.levels[0].leaf.leaf.scale.length;
-    let best = at.best(|k, level| {
-        let base = level.state.base(rod);
-        stencils[k].value(|i| level.state.x[base + i])
-    });
-    best * length
+    /// Fractions of the length, and places in the scenario's units.
+    nodes: Vec<(f64, DVec3)>,
 }
 
 impl<'a> Vein<'a> {
     pub fn of(at: &'a AtRest, rod: usize) -> Self {
-        let place = |k: usize| point(at, rod, k as f64 / PLACES as f64);
-        Vein {
-            at,
-            rod,
-            places: (0..=PLACES).map(place).collect(),
-        }
+        let nodes = at.levels.last().map_or(Vec::new(), |level| {
+            let (base, length) = (level.state.base(rod), level.leaf.leaf.scale.length);
+            let sigma = level.leaf.grid.sigma().iter().enumerate();
+            sigma
+                .map(|(i, sigma)| (*sigma, level.state.x[base + i] * length))
+                .collect()
+        });
+        Vein { at, rod, nodes }
     }
 
+    /// The point at a fraction of the length, in the scenario's units. Beyond its ends
+    /// the vein goes on straight.
     pub fn at(&self, sigma: f64) -> DVec3 {
-        point(self.at, self.rod, sigma)
+        self.point(sigma).0
+    }
+
+    /// The point and its derivative with the fraction.
+    fn point(&self, sigma: f64) -> (DVec3, DVec3) {
+        let stencils = self.at.stencils(sigma);
+        let length = self.at.levels[0].leaf.leaf.scale.length;
+        let x = self.at.best(|k, level| {
+            let base = level.state.base(self.rod);
+            stencils[k].value(|i| level.state.x[base + i])
+        });
+        let slope = self.at.best(|k, level| {
+            let base = level.state.base(self.rod);
+            stencils[k].slope(|i| level.state.x[base + i])
+        });
+        (x * length, slope * length)
     }
 
     /// The fraction of the length nearest to a point of which these coordinates were
-    /// seen, and whether it lies between the ends.
-    pub fn nearest(&self, seen: [Option<f64>; 3]) -> (f64, bool) {
-        let square = |x: DVec3| -> f64 {
-            let axes = seen.iter().enumerate();
-            axes.filter_map(|(axis, value)| Some((x[axis] - (*value)?).powi(2)))
-                .sum()
+    /// seen. The vein goes on straight beyond its ends: a traced point beside them is
+    /// compared across the vein like all others, so that noise along it, of which half
+    /// is beyond the end, does not lengthen the vein.
+    pub fn nearest(&self, seen: [Option<f64>; 3]) -> f64 {
+        let mask = DVec3::from_array(seen.map(|value| f64::from(u8::from(value.is_some()))));
+        let seen = DVec3::from_array(seen.map(|value| value.unwrap_or(0.0)));
+        let square = |node: &(f64, DVec3)| (mask * (node.1 - seen)).length_squared();
+        let order =
+            |a: &usize, b: &usize| square(&self.nodes[*a]).total_cmp(&square(&self.nodes[*b]));
+        let last = self.nodes.len().saturating_sub(1);
+        let best = (0..=last).min_by(order).unwrap_or(0);
+        // The derivative of half the squared distance.
+        let rate = |sigma: f64| {
+            let (x, slope) = self.point(sigma);
+            (mask * (x - seen)).dot(slope)
         };
-        let distances: Vec<f64> = self.places.iter().map(|place| square(*place)).collect();
-        let order = |a: &usize, b: &usize| distances[*a].total_cmp(&distances[*b]);
-        let best = (0..=PLACES).min_by(order).unwrap_or(0);
-        let step = 1.0 / PLACES as f64;
-        let place = |k: usize| k as f64 * step;
-        let (mut low, mut high) = (place(best.saturating_sub(1)), place((best + 1).min(PLACES)));
-        // Where the distance stops falling: along the vein it has one minimum here.
-        let falls = |sigma: f64| {
-            let stencils = self.at.stencils(sigma);
-            let length = self.at.levels[0].leaf.leaf.scale.length;
-            let slope = self.at.best(|k, level| {
-                let base = level.state.base(self.rod);
-                stencils[k].slope(|i| level.state.x[base + i])
-            }) * length;
-            let x = self.at(sigma);
-            let axes = seen.iter().enumerate();
-            let terms = axes.filter_map(|(axis, value)| Some((x[axis] - (*value)?) * slope[axis]));
-            terms.sum::<f64>() < 0.0
-        };
-        if falls(high) && high == 1.0 {
-            return (1.0, false);
-        }
-        if !falls(low) && low == 0.0 {
-            return (0.0, false);
-        }
-        for _ in 0..ITERATIONS {
-            let middle = 0.5 * (low + high);
-            match falls(middle) {
-                true => low = middle,
-                false => high = middle,
+        let [mut low, mut high] =
+            [best.saturating_sub(1), (best + 1).min(last)].map(|node| self.nodes[node].0);
+        let [mut at_low, mut at_high] = [low, high].map(rate);
+        for (end, rate, beyond) in [(low, at_low, at_low > 0.0), (high, at_high, at_high < 0.0)] {
+            if beyond && (end == 0.0 || end == 1.0) {
+                let slope = (mask * self.point(end).1).length_squared();
+                return match slope > 0.0 {
+                    true => end - rate / slope,
+                    false => end,
+                };
             }
         }
-        (0.5 * (low + high), true)
+        if at_low > 0.0 || at_high < 0.0 {
+            return self.nodes[best].0;
+        }
+        // The rule of false position; the end that stays counts half (Illinois).
+        let mut sigma = self.nodes[best].0;
+        for _ in 0..ITERATIONS {
+            let middle = low + (high - low) * at_low / (at_low - at_high);
+            if (middle - sigma).abs() < EXACT || !middle.is_finite() {
+                break;
+            }
+            sigma = middle;
+            let at_middle = rate(middle);
+            if at_middle == 0.0 {
+                break;
+            }
+            if at_middle < 0.0 {
+                (low, at_low) = (middle, at_middle);
+                at_high *= 0.5;
+            } else {
+                (high, at_high) = (middle, at_middle);
+                at_low *= 0.5;
+            }
+        }
+        sigma
     }
 }

@@ -2,9 +2,12 @@
 //! state, and of its energy. Exact but for the combination of scenarios by which
 //! the number's effect on the scenario itself is given.
 
+mod held;
+
+use self::held::HeldRate;
 use super::dimensionless::Leaf;
 use super::discrete::DiscreteLeaf;
-use super::state::{Field, State};
+use super::state::{Field, Increment, State};
 use crate::rod::{Section, SectionRate};
 use crate::rotation;
 use crate::scenario::{Profile, Scenario};
@@ -18,6 +21,7 @@ pub struct LeafRate<'s> {
     gravity: DVec3,
     tip_force: DVec3,
     tip_moment: DVec3,
+    held: Option<HeldRate>,
 }
 
 /// How a leaf answers forces.
@@ -55,6 +59,8 @@ pub struct Forces {
     pub gaps: Vec<DVec3>,
     /// To the energy.
     pub energy: f64,
+    /// What it moves the tips by where they are held; none where it does not.
+    pub tips: Vec<Increment>,
 }
 
 impl<'s> Slope<'s> {
@@ -131,6 +137,7 @@ impl<'s> LeafRate<'s> {
             gravity: vector(|s| s.gravity, scale.force() / scale.length),
             tip_force: vector(|s| s.tip_force, scale.force()),
             tip_moment: vector(|s| s.tip_moment, scale.moment()),
+            held: HeldRate::new(leaf, terms),
         }
     }
 }
@@ -139,6 +146,11 @@ impl LeafRate<'_> {
     /// The angle by which the base of rod `j` turns.
     pub fn base_turn(&self, j: usize) -> f64 {
         self.rods[j].angle
+    }
+
+    /// Whether a dead moment on the tip changes.
+    pub fn changes_moment(&self) -> bool {
+        self.rods.len() == 1 && self.tip_moment != DVec3::ZERO
     }
 }
 
@@ -176,6 +188,7 @@ impl DiscreteLeaf {
             nodes: vec![vec![[0.0; 6]; n]; self.rods()],
             gaps: vec![DVec3::ZERO; self.rods() * n],
             energy: 0.0,
+            tips: Vec::new(),
         };
         for (j, rod) in rate.rods.iter().enumerate() {
             if !rod.keeps_sections() {
@@ -185,6 +198,9 @@ impl DiscreteLeaf {
             if rod.angle != 0.0 {
                 self.turn_base(state, j, rod.angle, &mut forces);
             }
+        }
+        if let Some(held) = &rate.held {
+            self.move_tips(state, held, &mut forces);
         }
         forces
     }

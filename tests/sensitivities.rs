@@ -3,13 +3,15 @@
 
 mod common;
 
+use std::f64::consts::TAU;
+
 use common::on;
 use glam::DVec3;
 use leafdyn::relax::{Equilibrium, Options, Outcome, Sensitivity};
 use leafdyn::study::{Base, Keys, relax_with_sensitivities};
 
 /// Leaves to be tried; `LEAFDYN_LEAVES` in the environment asks for more.
-const LEAVES: usize = 12;
+const LEAVES: usize = 24;
 
 /// Numbers between 0 and 1 that are always the same.
 struct Draw(usize);
@@ -107,11 +109,28 @@ fn random(number: usize) -> (String, Vec<&'static str>) {
             )
         }
     };
+    // Tips that are held, pinned and clamped; such have no moment.
+    let tip = match number % 6 {
+        1 | 3 if rods > 1 && joined => {
+            keys.extend(["tip.position[0]", "tip.position[2]"]);
+            "tip = { held = \"pinned\", position = [0.7, 0.05, -0.2] }".to_string()
+        }
+        2 | 5 if rods > 1 && joined => {
+            keys.extend(["tip.position[1]", "tip.angles[0]", "tip.twist[0]"]);
+            let angles = draw.list(rods, -0.2, 0.2);
+            let twist = draw.list(rods, -0.3, 0.3);
+            format!(
+                "tip = {{ held = \"clamped\", position = [0.8, 0.02, -0.1], angles = {angles}, twist = {twist} }}"
+            )
+        }
+        _ => String::new(),
+    };
     let moment = if rods == 1 { coupling.as_str() } else { "" };
     let coupling = if rods == 1 { "" } else { coupling.as_str() };
     let text = format!(
         r#"
         name = "leaf{number}"
+        {tip}
         {moment}
         {coupling}
         leaf.rods = {rods}
@@ -157,23 +176,37 @@ fn derivatives(base: &Base, wanted: &[&str], options: &Options) -> (Equilibrium,
     (leaf, found)
 }
 
-/// Tips, energy and lowest eigenvalue.
-fn results(leaf: &Equilibrium) -> Vec<f64> {
-    let tips = leaf.tips.iter().flat_map(|tip| tip.to_array());
-    let modes = leaf.stability.modes.iter().flatten().take(1);
-    tips.chain(leaf.energy)
-        .chain(modes.map(|mode| mode.eigenvalue))
-        .collect()
+/// Tips, places of the stations, energy, what the holder of the tip feels, the lowest
+/// eigenvalue and the frequencies; and how many of them are not of modes.
+fn results(leaf: &Equilibrium) -> (Vec<f64>, usize) {
+    let stations = leaf.shape.rods.iter().flat_map(|rod| &rod.nodes);
+    let places = leaf.tips.iter().copied();
+    let places = places.chain(stations.map(|node| node.position));
+    let of_holder = leaf.reaction.iter().flat_map(|held| {
+        let moments = held.moments.iter().flatten().copied();
+        [held.force].into_iter().chain(moments)
+    });
+    let mut all: Vec<f64> = places.flat_map(|it| it.to_array()).collect();
+    all.extend(leaf.energy);
+    all.extend(of_holder.flat_map(|it| it.to_array()));
+    let count = all.len();
+    let modes = leaf.stability.modes.as_deref().unwrap_or_default();
+    all.extend(modes.iter().take(1).map(|mode| mode.eigenvalue));
+    all.extend(
+        modes
+            .iter()
+            .map(|mode| mode.frequency().unwrap_or(f64::NAN) / TAU),
+    );
+    (all, count)
 }
 
-/// The same derivatives from five relaxations, and a bound on what rounding makes
-/// of them.
+/// The same derivatives from eight relaxations.
 fn differenced(base: &Base, key: &Keys, options: &Options) -> Vec<f64> {
     let value = base.value(key).unwrap();
     let size = if value == 0.0 { 1.0 } else { value.abs() };
     let at = |steps: f64, step: f64| -> Option<Vec<f64>> {
         let scenario = base.at(&[(key, value + steps * step)]).ok()?.scenario;
-        Some(results(&common::relaxed(&scenario, options)))
+        Some(results(&common::relaxed(&scenario, options)).0)
     };
     let central = [(-2.0, 1.0), (-1.0, -8.0), (1.0, 8.0), (2.0, -1.0)].as_slice();
     let forward = [
@@ -194,15 +227,27 @@ fn differenced(base: &Base, key: &Keys, options: &Options) -> Vec<f64> {
         }
         Some(sums)
     };
-    by(central, 3e-3 * size)
-        .or_else(|| by(forward, 1e-3 * size))
-        .unwrap()
+    // With half the step, of the error of the fourth order a sixteenth is left.
+    let (Some(coarse), Some(fine)) = (by(central, 3e-3 * size), by(central, 1.5e-3 * size)) else {
+        return by(forward, 1e-3 * size).unwrap();
+    };
+    let both = fine.iter().zip(coarse);
+    both.map(|(fine, coarse)| fine + (fine - coarse) / 15.0)
+        .collect()
 }
 
 fn of(found: &Sensitivity) -> Vec<f64> {
-    let tips = found.tips.iter().flat_map(|tip: &DVec3| tip.to_array());
-    tips.chain([found.energy])
+    let places = found.tips.iter().chain(found.positions.iter().flatten());
+    let of_holder = found.reaction.iter().flat_map(|held| {
+        let moments = held.moments.iter().flatten().copied();
+        [held.force].into_iter().chain(moments)
+    });
+    let places = places.flat_map(|it: &DVec3| it.to_array());
+    places
+        .chain([found.energy])
+        .chain(of_holder.flat_map(|it| it.to_array()))
         .chain(found.lowest_eigenvalue)
+        .chain(found.frequencies.iter().map(|it| it.unwrap_or(f64::NAN)))
         .collect()
 }
 
@@ -211,31 +256,35 @@ fn of(found: &Sensitivity) -> Vec<f64> {
 fn they_are_those_of_whole_relaxations() {
     let leaves = std::env::var("LEAFDYN_LEAVES").ok();
     let leaves = leaves.and_then(|text| text.parse().ok()).unwrap_or(LEAVES);
-    let options = Options { modes: 1, ..on(12) };
     let mut worst = 0.0_f64;
     for number in 0..leaves {
         let (text, wanted) = random(number);
         let base = base(&text);
+        let options = Options {
+            // Higher modes of a nearly rigid leaf are known too roughly to be differenced.
+            modes: if number % 5 == 4 { 1 } else { 2 },
+            tolerance: Some(1e-9),
+            ..on(12)
+        };
         let (leaf, found) = derivatives(&base, &wanted, &options);
         assert_eq!(found.len(), wanted.len());
         for (key, found) in keys(&wanted).iter().zip(&found) {
             let value = base.value(key).unwrap().abs();
             let size = if value == 0.0 { 1.0 } else { value };
-            let (ours, theirs) = (of(found), differenced(&base, key, &options));
-            assert_eq!(ours.len(), theirs.len(), "{key}");
-            let units: Vec<f64> = results(&leaf);
-            let tips = 3 * leaf.tips.len();
+            let (ours, mut theirs) = (of(found), differenced(&base, key, &options));
+            let (units, count) = results(&leaf);
+            if key.to_string().starts_with("load.tip_moment") {
+                // With a moment there are no modes.
+                theirs.truncate(count);
+            }
+            assert_eq!(ours.len(), theirs.len(), "{number} {key}");
             for (k, (ours, theirs)) in ours.iter().zip(&theirs).enumerate() {
                 // What a change by the whole number would change, against the result.
-                let unit = if k < tips {
-                    1.0
-                } else {
-                    units[k].abs().max(1.0)
-                };
+                let unit = units[k].abs().max(1.0);
                 let error = (ours - theirs).abs() * size / (unit + theirs.abs() * size);
                 // Eigenvalues are differenced to the second order.
                 // and the modes of a stiff leaf are those of a softened one.
-                let allowed = match (k > tips, number % 5 == 4) {
+                let allowed = match (k >= count, number % 5 == 4) {
                     (false, _) => 1e-7,
                     (true, false) => 1e-6,
                     (true, true) => 2e-5,
