@@ -3,7 +3,6 @@
 use crate::newton::Work;
 use crate::numbers::power_of_ten;
 use crate::relax::method::Method;
-use crate::relax::sensitivity::Sensitivity;
 use crate::shape::{self, RodShape};
 use crate::undulation::Undulation;
 use glam::DVec3;
@@ -219,6 +218,49 @@ pub struct Reaction {
         skip_serializing_if = "Option::is_none"
     )]
     pub moments: Option<Vec<DVec3>>,
+}
+
+/// How the results of a leaf at rest change with a number of its scenario: by one
+/// of its units, in those of the scenario.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Sensitivity {
+    /// The number.
+    pub key: String,
+    /// Its value.
+    pub value: f64,
+    /// Change of the joint tip alone, or one per rod.
+    #[serde(flatten, serialize_with = "shape::serialize_tips")]
+    pub tips: Vec<DVec3>,
+    /// Bound on its error; `None` on a single grid.
+    pub tip_error: Option<f64>,
+    /// Change of the energy.
+    pub energy: f64,
+    /// Bound on its error.
+    pub energy_error: Option<f64>,
+    /// Change of the lowest eigenvalue, if that is known: of the squared frequency.
+    pub lowest_eigenvalue: Option<f64>,
+    /// Bound on its error.
+    pub lowest_eigenvalue_error: Option<f64>,
+    /// Changes of the frequencies of the modes that were asked for, in cycles per time;
+    /// of an unstable one there is none, and of a nearly rigid leaf only the lowest.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub frequencies: Vec<Option<f64>>,
+    /// Change of what the holder of the tip feels, if it is held.
+    #[serde(flatten)]
+    pub reaction: Option<Reaction>,
+    /// Bound on the error of its force.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tip_reaction_error: Option<f64>,
+    /// Fractions of the length that the nodes of all grids have in common.
+    #[serde(skip)]
+    pub stations: Vec<f64>,
+    /// Changes of the positions there, rod after rod; none where more numbers are asked
+    /// for than equations are solved for.
+    #[serde(skip)]
+    pub positions: Vec<Vec<DVec3>>,
+    /// Bound on their error.
+    #[serde(skip)]
+    pub positions_error: Option<f64>,
 }
 
 /// The shape of a leaf.

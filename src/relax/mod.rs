@@ -31,7 +31,7 @@ pub use crate::newton::Work;
 pub use crate::shape::{NodeState, RodShape};
 pub(crate) use equilibrium::serialize_index;
 pub use equilibrium::{
-    Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Saddle, Shape, Stability,
+    Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Saddle, Sensitivity, Shape, Stability,
 };
 pub(crate) use follow::{AtRest, Lost, extrapolation};
 pub(crate) use index::{index_near, project};
@@ -46,7 +46,6 @@ pub use request::Relaxation;
 pub(crate) use run::Level;
 pub(crate) use saddle::polish;
 pub(crate) use segments::check_segments;
-pub use sensitivity::Sensitivity;
 pub(crate) use sensitivity::{eigenvalue_rate, responses, sensitivities};
 pub(crate) use shape::node as node_state;
 pub use solve::relax;

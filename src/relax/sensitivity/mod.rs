@@ -13,13 +13,11 @@ use self::series::Series;
 use crate::leaf::{DiscreteLeaf, Forces, LeafRate, Response, shift, turn};
 use crate::modes;
 use crate::motion::Physics;
-use crate::relax::equilibrium::Reaction;
+use crate::relax::equilibrium::{Reaction, Sensitivity};
 use crate::relax::number::Number;
 use crate::relax::run::Level;
 use crate::scenario::Scenario;
-use crate::shape::serialize_tips;
 use glam::DVec3;
-use serde::Serialize;
 
 /// Numbers up to which the equations are solved for each, and everything is known
 /// of it; of more of them for each component of the tip.
@@ -33,49 +31,6 @@ const SOFTENED_COMPLIANCE: f64 = 1e-6;
 /// Unknowns of the finest grid on which eigenvalues are differenced, but for the
 /// first.
 const FEW_UNKNOWNS: usize = 4_000;
-
-/// How the results of a leaf at rest change with a number of its scenario: by one
-/// of its units, in those of the scenario.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Sensitivity {
-    /// The number.
-    pub key: String,
-    /// Its value.
-    pub value: f64,
-    /// Change of the joint tip alone, or one per rod.
-    #[serde(flatten, serialize_with = "serialize_tips")]
-    pub tips: Vec<DVec3>,
-    /// Bound on its error; `None` on a single grid.
-    pub tip_error: Option<f64>,
-    /// Change of the energy.
-    pub energy: f64,
-    /// Bound on its error.
-    pub energy_error: Option<f64>,
-    /// Change of the lowest eigenvalue, if that is known: of the squared frequency.
-    pub lowest_eigenvalue: Option<f64>,
-    /// Bound on its error.
-    pub lowest_eigenvalue_error: Option<f64>,
-    /// Changes of the frequencies of the modes that were asked for, in cycles per time;
-    /// of an unstable one there is none, and of a nearly rigid leaf only the lowest.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub frequencies: Vec<Option<f64>>,
-    /// Change of what the holder of the tip feels, if it is held.
-    #[serde(flatten)]
-    pub reaction: Option<Reaction>,
-    /// Bound on the error of its force.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tip_reaction_error: Option<f64>,
-    /// Fractions of the length that the nodes of all grids have in common.
-    #[serde(skip)]
-    pub stations: Vec<f64>,
-    /// Changes of the positions there, rod after rod; none where more numbers are asked
-    /// for than equations are solved for.
-    #[serde(skip)]
-    pub positions: Vec<Vec<DVec3>>,
-    /// Bound on their error.
-    #[serde(skip)]
-    pub positions_error: Option<f64>,
-}
 
 /// A number by its name, and the change of the scenario with it.
 type Known<'n, 'a> = (&'n String, &'n Number<'a>, Vec<(f64, Scenario)>);
