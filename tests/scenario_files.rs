@@ -14,6 +14,8 @@ fn files() -> Vec<PathBuf> {
     let top = list(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios"));
     let folders = top.iter().filter(|path| path.is_dir());
     let mut files: Vec<_> = folders.flat_map(|folder| list(folder)).collect();
+    // Measured data stand beside their scenarios.
+    files.retain(|file| file.extension().is_none_or(|kind| kind != "csv"));
     files.sort();
     files
 }

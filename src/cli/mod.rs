@@ -2,6 +2,7 @@
 
 mod chart;
 mod check;
+mod fit;
 mod help;
 mod job;
 mod map;
@@ -39,6 +40,7 @@ struct Cli {
 enum Verb {
     Relax(relax::Relax),
     Check(check::Check),
+    Fit(fit::Fit),
     Chart(chart::Chart),
     Map(map::Map),
     Simulate(simulate::Simulate),
@@ -55,6 +57,7 @@ impl Cli {
         let done = match self.verb {
             Verb::Relax(relax) => relax.run(),
             Verb::Check(check) => check.run(),
+            Verb::Fit(fit) => fit.run(),
             Verb::Chart(chart) => chart.run(),
             Verb::Map(map) => map.run(),
             Verb::Simulate(simulate) => simulate.run(),

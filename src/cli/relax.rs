@@ -5,7 +5,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::relax::{self, Equilibrium, Method, Options, Settings};
 use crate::report;
-use crate::study::{self, All};
+use crate::study::{self, All, Keys, SensitivityError};
 
 use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status};
@@ -46,6 +46,15 @@ pub struct Relax {
     #[arg(long, conflicts_with_all = ["keep_unstable", "modes", "segments"])]
     all: bool,
 
+    /// Also find how the tip, the energy and the lowest eigenvalue change with these numbers of the scenario
+    #[arg(
+        long,
+        value_name = "KEY,...",
+        value_delimiter = ',',
+        conflicts_with = "all"
+    )]
+    sensitivity: Vec<Keys>,
+
     /// Solve for the whole leaf, in space, even if half of it or its plane would do
     #[arg(long)]
     full_model: bool,
@@ -67,7 +76,7 @@ fn method_parser() -> impl TypedValueParser<Value = Method> {
 impl Relax {
     pub fn run(self) -> Result<Status, Refusal> {
         let how = How {
-            varies: false,
+            varies: !self.sensitivity.is_empty(),
             stations: true,
             side_by_side: true,
         };
@@ -112,6 +121,16 @@ impl Relax {
             ..Options::default()
         };
         let mut line = job.progress();
+        if !self.sensitivity.is_empty() {
+            let (base, keys) = (job.base()?, &self.sensitivity);
+            let found = study::relax_with_sensitivities(&base, keys, &options, &mut |progress| {
+                line.update(progress);
+            });
+            return found.map_err(|error| match error {
+                SensitivityError::Relax(error) => error.into(),
+                error => format!("--sensitivity {error}").into(),
+            });
+        }
         Ok(relax::relax(&job.scenario, &options, &mut |progress| {
             line.update(progress)
         })?)

@@ -26,7 +26,7 @@ use crate::report::table::Table;
 use crate::report::{self, FileError, Format, json};
 pub use crate::report::{Document, Kind, Written};
 use crate::simulate::Record;
-use crate::study::{All, Chart, Check, Map, Scaling, Trace};
+use crate::study::{All, Chart, Check, Fit, Map, Scaling, Trace};
 
 impl Written for Equilibrium {
     const JSON: Option<&'static str> = Some("summary.json");
@@ -43,9 +43,14 @@ impl Written for Equilibrium {
         &Table("modes.csv", report::modes_table),
         &Picture::svg("modes.svg", figure::modes),
         &Picture::png("modes.png", figure::modes),
+        &Picture::svg("sensitivity.svg", figure::sensitivity),
+        &Picture::png("sensitivity.png", figure::sensitivity),
     ];
 
-    fn has_more(&self) -> bool {
+    fn has_more(&self, file: &str) -> bool {
+        if file.starts_with("sensitivity.") {
+            return (self.sensitivities.as_ref()).is_some_and(|found| !found.is_empty());
+        }
         let modes = self.stability.modes.as_deref();
         self.stability.mode_shapes && modes.is_some_and(|modes| !modes.is_empty())
     }
@@ -56,6 +61,16 @@ impl Written for Check {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
         &Picture::svg("check.svg", figure::check),
         &Picture::png("check.png", figure::check),
+    ];
+}
+
+impl Written for Fit {
+    const JSON: Option<&'static str> = Some("fit.json");
+    const FORMATS: &'static [&'static dyn Format<Self>] = &[
+        &Table("fitted.toml", report::fitted),
+        &Table("fit.csv", report::fit_table),
+        &Picture::svg("fit.svg", figure::fit),
+        &Picture::png("fit.png", figure::fit),
     ];
 }
 
@@ -216,10 +231,10 @@ pub fn write_all<R: Written>(
                 .collect()
         },
     );
-    if !result.has_more() {
-        for format in R::MORE {
+    for name in R::MORE.iter().map(|format| format.file_name()) {
+        if !result.has_more(name) {
             // Of another result. That there is none is the rule.
-            let _ = fs::remove_file(folder.join(format.file_name()));
+            let _ = fs::remove_file(folder.join(name));
         }
     }
     json.into_iter().chain(others).collect()

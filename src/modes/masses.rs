@@ -1,6 +1,6 @@
 //! The mass matrix: a tensor for the turn of every node, a mass for its shift.
 
-use crate::leaf::{DiscreteLeaf, SparsePattern, State, System};
+use crate::leaf::{DiscreteLeaf, Increment, SparsePattern, State, System, shift, turn};
 use crate::motion::Physics;
 use glam::{DMat3, DVec3};
 
@@ -64,4 +64,15 @@ impl Masses {
             system.add(j, i, (node.tensor * factor, node.mass * factor), none);
         }
     }
+}
+
+/// The mass of a shape: twice its kinetic energy.
+pub fn mass(leaf: &DiscreteLeaf, physics: &Physics, state: &State, shape: &[Increment]) -> f64 {
+    let node = |(j, i)| {
+        let inertia = physics.inertia(leaf, j, i);
+        let k = state.base(j) + i;
+        let (turn, shift) = (turn(&shape[k]), shift(&shape[k]));
+        turn.dot(inertia.tensor(state.q[k]) * turn) + inertia.mass * shift.length_squared()
+    };
+    leaf.each(1..=leaf.segments()).map(node).sum()
 }

@@ -22,6 +22,7 @@ use crate::leaf::{
     DiscreteLeaf, Increment, SparseError, SparseFactor, SparsePattern, State, System,
 };
 use crate::motion::Physics;
+use glam::DVec3;
 use lanczos::{Lanczos, Mode};
 use masses::Masses;
 use quotient::quotient;
@@ -78,11 +79,7 @@ pub fn lowest(
     state: &State,
     count: usize,
 ) -> Option<Vec<Eigenpair>> {
-    let mut soft = leaf.clone();
-    let tension = state.n.iter().fold(0.0_f64, |m, n| m.max(n.length()));
-    for section in &mut soft.sections {
-        *section = section.condense(STIFFEST.max(STIFFER * tension));
-    }
+    let soft = softened(leaf, state);
     let system = System::new(&soft);
     let pattern = SparsePattern::new(&system).ok()?;
     let mut vibration = Vibration {
@@ -101,6 +98,35 @@ pub fn lowest(
     let mut pairs: Vec<Eigenpair> = found.iter().map(pair).collect();
     pairs.sort_by(|a, b| a.eigenvalue.total_cmp(&b.eigenvalue));
     Some(pairs)
+}
+
+/// The leaf with a matrix that keeps the digits of its soft modes.
+fn softened(leaf: &DiscreteLeaf, state: &State) -> DiscreteLeaf {
+    let mut soft = leaf.clone();
+    let tension = state.n.iter().fold(0.0_f64, |m, n| m.max(n.length()));
+    for section in &mut soft.sections {
+        *section = section.condense(STIFFEST.max(STIFFER * tension));
+    }
+    soft
+}
+
+/// The spatial forces that a mode lets the segments carry.
+pub fn mode_forces(leaf: &DiscreteLeaf, state: &State, shape: &[Increment]) -> Vec<DVec3> {
+    quotient::forces(&softened(leaf, state), state, shape)
+}
+
+/// The eigenvalue by the shape and the forces of a mode, be they those of a leaf and
+/// a state nearby: an error of theirs enters in the second order only. In the
+/// scenario's unit of time.
+pub fn eigenvalue(
+    leaf: &DiscreteLeaf,
+    physics: &Physics,
+    state: &State,
+    shape: &[Increment],
+    forces: &[DVec3],
+) -> f64 {
+    let quotient = quotient::with_forces(leaf, state, shape, forces);
+    quotient / masses::mass(leaf, physics, state, shape) * physics.time.powi(-2)
 }
 
 impl Vibration<'_> {

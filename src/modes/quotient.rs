@@ -35,6 +35,55 @@ pub fn quotient(leaf: &DiscreteLeaf, state: &State, shape: &[Increment]) -> f64 
     sum
 }
 
+/// The spatial forces that a shape lets the segments carry.
+pub fn forces(leaf: &DiscreteLeaf, state: &State, shape: &[Increment]) -> Vec<DVec3> {
+    let n = leaf.segments();
+    let force = |(j, i): (usize, usize)| {
+        let mut segment = leaf.segment(state, j, i, state.n[j * n + i]);
+        segment.gap = DVec3::ZERO;
+        let [a, b] = [0, 1].map(|end| &shape[state.base(j) + i + end]);
+        segment.force_increment(leaf.section(j, i), shift(b) - shift(a), turn(a), turn(b))
+    };
+    leaf.each(0..n).map(force).collect()
+}
+
+/// The quotient of a shape with given forces, of both of which an error enters in the
+/// second order only, for a leaf and a state near those that they are of.
+pub fn with_forces(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    shape: &[Increment],
+    forces: &[DVec3],
+) -> f64 {
+    let n = leaf.segments();
+    let mut sum = 0.0;
+    for (j, i) in leaf.each(0..n) {
+        let section = leaf.section(j, i);
+        let segment = leaf.segment(state, j, i, state.n[j * n + i]);
+        let [a, b] = [0, 1].map(|end| &shape[state.base(j) + i + end]);
+        let (dx, a, b) = (shift(b) - shift(a), turn(a), turn(b));
+        let force = segment.frame.transpose() * forces[j * n + i];
+        let gap = segment.gap_increment(section, dx, a, b);
+        sum += 2.0 * force.dot(gap) - section.ds * (section.compliance * force).dot(force);
+        sum += turns(&segment, section, a, b);
+    }
+    for (j, i) in leaf.each(1..n + 1).filter(|(j, _)| j + 1 < leaf.rods()) {
+        let [a, b] = [j, j + 1].map(|rod| shift(&shape[state.base(rod) + i]));
+        sum += (b - a).dot(leaf.spring(j, i) * (b - a));
+    }
+    sum
+}
+
+/// The second derivatives with the turns, at constant force.
+fn turns(segment: &Segment, section: &Section, a: DVec3, b: DVec3) -> f64 {
+    let bare = Section {
+        condensing: DVec3::ZERO,
+        ..*section
+    };
+    let k = segment.hessian(&bare);
+    a.dot(k.aa * a) + 2.0 * a.dot(k.ab * b) + b.dot(k.bb * b)
+}
+
 /// The part of a segment with the increments `a` and `b` of its nodes.
 fn of_segment(mut segment: Segment, section: &Section, a: &Increment, b: &Increment) -> f64 {
     let (dx, a, b) = (shift(b) - shift(a), turn(a), turn(b));
@@ -43,12 +92,5 @@ fn of_segment(mut segment: Segment, section: &Section, a: &Increment, b: &Increm
     let force = segment.force_increment(section, dx, a, b);
     let force = segment.frame.transpose() * force;
     let compliance = 2.0 * section.condensing.recip() - section.compliance;
-    // The rest of the second derivatives, at constant force.
-    let bare = Section {
-        condensing: DVec3::ZERO,
-        ..*section
-    };
-    let k = segment.hessian(&bare);
-    let turns = a.dot(k.aa * a) + 2.0 * a.dot(k.ab * b) + b.dot(k.bb * b);
-    section.ds * (compliance * force * force).element_sum() + turns
+    section.ds * (compliance * force * force).element_sum() + turns(&segment, section, a, b)
 }

@@ -45,6 +45,11 @@ impl Outcome {
         }
     }
 
+    /// Whether the leaf is at rest, to the tolerance or not.
+    pub fn is_at_rest(self) -> bool {
+        self.is_success() || self == Outcome::ToleranceNotReached
+    }
+
     /// Whether the leaf is at rest within the tolerance (exit status 0).
     pub fn is_success(self) -> bool {
         matches!(
@@ -215,6 +220,49 @@ pub struct Reaction {
     pub moments: Option<Vec<DVec3>>,
 }
 
+/// How the results of a leaf at rest change with a number of its scenario: by one
+/// of its units, in those of the scenario.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Sensitivity {
+    /// The number.
+    pub key: String,
+    /// Its value.
+    pub value: f64,
+    /// Change of the joint tip alone, or one per rod.
+    #[serde(flatten, serialize_with = "shape::serialize_tips")]
+    pub tips: Vec<DVec3>,
+    /// Bound on its error; `None` on a single grid.
+    pub tip_error: Option<f64>,
+    /// Change of the energy.
+    pub energy: f64,
+    /// Bound on its error.
+    pub energy_error: Option<f64>,
+    /// Change of the lowest eigenvalue, if that is known: of the squared frequency.
+    pub lowest_eigenvalue: Option<f64>,
+    /// Bound on its error.
+    pub lowest_eigenvalue_error: Option<f64>,
+    /// Changes of the frequencies of the modes that were asked for, in cycles per time;
+    /// of an unstable one there is none, and of a nearly rigid leaf only the lowest.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub frequencies: Vec<Option<f64>>,
+    /// Change of what the holder of the tip feels, if it is held.
+    #[serde(flatten)]
+    pub reaction: Option<Reaction>,
+    /// Bound on the error of its force.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tip_reaction_error: Option<f64>,
+    /// Fractions of the length that the nodes of all grids have in common.
+    #[serde(skip)]
+    pub stations: Vec<f64>,
+    /// Changes of the positions there, rod after rod; none where more numbers are asked
+    /// for than equations are solved for.
+    #[serde(skip)]
+    pub positions: Vec<Vec<DVec3>>,
+    /// Bound on their error.
+    #[serde(skip)]
+    pub positions_error: Option<f64>,
+}
+
 /// The shape of a leaf.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Shape {
@@ -273,6 +321,9 @@ pub struct Equilibrium {
     /// Whether it is stable.
     #[serde(flatten)]
     pub stability: Stability,
+    /// How the results change with numbers of the scenario, of those asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensitivities: Option<Vec<Sensitivity>>,
     /// Waves and twist of the veins on the finest grid.
     pub undulation: Undulation,
     /// What was solved.

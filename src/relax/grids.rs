@@ -1,6 +1,6 @@
 //! Nested grids: as fine as the tolerance needs, with an error estimate.
 
-use crate::leaf::Grid;
+use crate::leaf::{Grid, State};
 use crate::memory::Request;
 use crate::newton::Stop;
 use crate::relax::method::Method;
@@ -29,6 +29,21 @@ impl Run<'_, '_> {
     /// whether the finest grid allowed reaches it.
     pub fn solve(&mut self, grid: Grid) -> Result<bool, Stop> {
         self.settle_from_start(grid)?;
+        self.refine()
+    }
+
+    /// The same from guesses on nested grids, near which the leaf is at rest.
+    pub fn follow(&mut self, guesses: Vec<(Grid, State)>) -> Result<bool, Stop> {
+        for (grid, state) in guesses {
+            let Settled { level, rest, .. } = self.settle(grid, InitialGuess::Coarser(state));
+            self.push(level);
+            rest?;
+        }
+        self.refine()
+    }
+
+    /// Refines until the tolerance is reached.
+    fn refine(&mut self) -> Result<bool, Stop> {
         loop {
             if (self.accurate() || self.accurate_with_between()) && self.judge_stability()? {
                 return Ok(true);

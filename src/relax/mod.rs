@@ -3,12 +3,14 @@
 
 mod equilibrium;
 mod fields;
+mod follow;
 mod grids;
 mod grip;
 pub(crate) mod index;
 mod method;
 mod methods;
 mod modes;
+mod number;
 mod options;
 mod place;
 pub(crate) mod prolong;
@@ -18,6 +20,7 @@ pub(crate) mod richardson;
 mod run;
 mod saddle;
 mod segments;
+mod sensitivity;
 mod settle;
 mod shape;
 mod solve;
@@ -30,18 +33,23 @@ pub use crate::newton::Work;
 pub use crate::shape::{NodeState, RodShape};
 pub(crate) use equilibrium::serialize_index;
 pub use equilibrium::{
-    Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Saddle, Shape, Stability,
+    Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Saddle, Sensitivity, Shape, Stability,
 };
+pub(crate) use follow::{AtRest, Lost, extrapolation};
 pub(crate) use index::{index_near, project};
 pub use method::{Method, SemiImplicit, Settings, Unfit, UnknownMethod};
 pub(crate) use methods::shooting::{START as SHOOTING_START, check_intervals};
+pub(crate) use number::Number;
 pub use options::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
     check_tolerance,
 };
 pub use request::Relaxation;
+pub(crate) use run::Level;
 pub(crate) use saddle::polish;
 pub(crate) use segments::check_segments;
+pub(crate) use sensitivity::{eigenvalue_rate, responses, sensitivities};
 pub(crate) use shape::node as node_state;
 pub use solve::relax;
+pub(crate) use solve::relax_on_grids;
 pub(crate) use start::start;

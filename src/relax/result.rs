@@ -14,7 +14,7 @@ use glam::DVec3;
 
 /// Assembles the result.
 pub fn equilibrium(
-    run: Run,
+    run: &Run,
     outcome: Outcome,
     remark: Option<String>,
     wall_seconds: f64,
@@ -63,6 +63,7 @@ pub fn equilibrium(
             mode_shapes: run.options.mode_shapes,
             saddle: run.saddle,
         },
+        sensitivities: None,
         undulation: Undulation::of(scenario, &lines, &stations, &rods, error_estimate),
         model: Model::new(
             rods.len(),

@@ -9,7 +9,7 @@ use crate::relax::methods::{explicit, shooting};
 use crate::relax::modes;
 use crate::relax::options::{MOST_MODES, Options, Progress, RelaxError, check_tolerance};
 use crate::relax::result;
-use crate::relax::run::{BUDGET, Run};
+use crate::relax::run::{BUDGET, Level, Run};
 use crate::relax::segments::{check_segments, least, reducible};
 use crate::scenario::Scenario;
 use std::time::Instant;
@@ -32,7 +32,7 @@ pub fn relax(
     }
     let intervals = match options.method {
         Method::SemiImplicit(_) | Method::Explicit { .. } => {
-            return relax_on_grids(scenario, options, tolerance, progress);
+            return Ok(relax_on_grids(scenario, options, tolerance, progress)?.0);
         }
         Method::SingleShooting => Some(1),
         Method::Shooting { intervals } | Method::ShootingFromRest { intervals } => intervals,
@@ -65,13 +65,14 @@ pub fn relax(
 const COARSEST_BY_STEPS: usize = 32;
 const FINEST_BY_STEPS: usize = 512;
 
-/// Relaxes on nested grids.
-fn relax_on_grids(
+/// Relaxes on nested grids; returns also the leaf on each that was extrapolated, from
+/// coarse to fine.
+pub(crate) fn relax_on_grids(
     scenario: &Scenario,
     options: &Options,
     tolerance: f64,
     progress: &mut dyn FnMut(&Progress),
-) -> Result<Equilibrium, RelaxError> {
+) -> Result<(Equilibrium, Vec<Level>), RelaxError> {
     let clock = Instant::now();
     let leaf = Leaf::new(scenario);
     if let Method::Explicit { .. } = options.method {
@@ -119,11 +120,15 @@ fn relax_on_grids(
 
 /// The result of a run, and of a leaf at rest its modes, which are not counted
 /// in the time of the solution.
-fn finished(run: Run, end: Result<bool, Stop>, clock: Instant) -> Equilibrium {
+fn finished(run: Run, end: Result<bool, Stop>, clock: Instant) -> (Equilibrium, Vec<Level>) {
     let (outcome, remark) = result::outcome(&run, end);
     let seconds = clock.elapsed().as_secs_f64();
     let modes = end.ok().and_then(|_| modes::lowest(&run));
-    let mut found = result::equilibrium(run, outcome, remark, seconds);
+    let mut found = result::equilibrium(&run, outcome, remark, seconds);
     found.stability.modes = modes;
-    found
+    let mut levels = run.levels;
+    if let Some(between) = run.between {
+        levels.insert(levels.len() - 1, between);
+    }
+    (found, levels)
 }

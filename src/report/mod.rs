@@ -7,6 +7,7 @@ mod chart;
 mod chart_table;
 mod check;
 mod error;
+mod fit;
 pub mod json;
 mod map;
 mod map_table;
@@ -32,6 +33,7 @@ pub use chart::report as chart_report;
 pub use chart_table::{chart_table, scaling_table};
 pub use check::report as check_report;
 pub use error::FileError;
+pub use fit::{fitted, report as fit_report, table as fit_table};
 pub use map::{Told as MapTold, report as map_report};
 pub use map_table::{lines, map_table, read_rows, table};
 pub use relax::{lines as relax_lines, report as relax_report};
@@ -70,12 +72,12 @@ pub trait Written: Serialize + Sync + Sized + 'static {
     /// Kinds of files that are written on the way to the result.
     const GROWING: &'static [Kind] = &[];
 
-    /// Formats of what not every result has, written after the others. If this
-    /// one has not, what an earlier run has left of them is removed.
+    /// Formats of what not every result has, written after the others. Of those that
+    /// this one has not, what an earlier run has left is removed.
     const MORE: &'static [&'static dyn Format<Self>] = &[];
 
-    /// Whether these are written.
-    fn has_more(&self) -> bool {
+    /// Whether it has what the one of these in a file of this name shows.
+    fn has_more(&self, _file: &str) -> bool {
         false
     }
 
@@ -92,7 +94,8 @@ pub trait Written: Serialize + Sync + Sized + 'static {
 
     /// Its formats of these kinds.
     fn formats(&self, kinds: &[Kind]) -> Vec<&'static dyn Format<Self>> {
-        let more = if self.has_more() { Self::MORE } else { &[] };
+        let more = Self::MORE.iter();
+        let more = more.filter(|format| self.has_more(format.file_name()));
         let formats = Self::FORMATS.iter().chain(more).copied();
         let wanted = |format: &&dyn Format<Self>| kinds.contains(&Kind::of(format.file_name()));
         formats.filter(wanted).collect()

@@ -1,12 +1,12 @@
 //! The summary of a relaxation that people read.
 
-use crate::relax::{Equilibrium, Mode, Outcome};
+use crate::relax::{Equilibrium, Mode, Outcome, Sensitivity};
 use crate::report::words::{shooting, verdict};
 
 use super::numbers::{
     bound, brief, decimals, eigenvalues, grids, point, seconds, significant, veins,
 };
-use super::table::{Lines, lay_out};
+use super::table::{Lines, lay_out, under};
 
 /// Modes whose numbers are told.
 const MODES_TOLD: usize = 6;
@@ -51,6 +51,7 @@ pub fn lines(equilibrium: &Equilibrium, files: Option<String>) -> Lines {
     lines.extend(waves(equilibrium).map(|waves| ("waves", waves)));
     lines.push(("error", error(equilibrium)));
     lines.extend(modes(equilibrium).map(|modes| ("modes", modes)));
+    lines.extend(under("changes", changes(equilibrium)));
     if !equilibrium.accuracy.segments.is_empty() {
         lines.push(("model", equilibrium.model.description.clone()));
     }
@@ -147,6 +148,22 @@ fn modes(equilibrium: &Equilibrium) -> Option<String> {
     let unjudged = modes.iter().any(|mode| mode.error.is_none());
     let roughly = if unjudged { " (on one grid)" } else { "" };
     (!told.is_empty()).then(|| told.join("; ") + roughly)
+}
+
+/// What a hundredth of each number, or of its unit if it is zero, does to the tip.
+fn changes(equilibrium: &Equilibrium) -> Vec<String> {
+    let change = |found: &Sensitivity| {
+        let (by, what) = match found.value == 0.0 {
+            true => (1.0, "one unit".into()),
+            false => (0.01 * found.value, format!("1 % of {}", brief(found.value))),
+        };
+        let tips = found.tips.iter().map(|tip| (*tip * by).to_array());
+        let tips = tips.map(|tip| format!("({})", tip.map(brief).join(", ")));
+        let tips: Vec<String> = tips.take(1).collect();
+        format!("{}: by {what} the tip moves {}", found.key, tips.join(""))
+    };
+    let found = equilibrium.sensitivities.as_deref().unwrap_or_default();
+    found.iter().map(change).collect()
 }
 
 fn work(equilibrium: &Equilibrium) -> String {

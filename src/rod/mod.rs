@@ -8,7 +8,7 @@ mod segment;
 pub use element::{Element, Nodes, SpatialElement};
 pub use planar::PlanarElement;
 pub use section::{Section, Sections};
-pub use segment::{Ends, Segment};
+pub use segment::{Ends, SectionRate, Segment};
 
 /// A segment that is bent by more than this (radians) is not resolved by its grid.
 pub const RESOLVED_TURN: f64 = 1.6;

@@ -25,6 +25,34 @@ impl From<&Ends> for Nodes<Scalar> {
     }
 }
 
+/// The change of a section with a number it depends on.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SectionRate {
+    /// Of its reference length.
+    pub ds: f64,
+    /// Of its couple stiffness.
+    pub couple_stiffness: DVec3,
+    /// Of its rest curvature.
+    pub rest_curvature: DVec3,
+    /// Of its rest strain.
+    pub rest_strain: DVec3,
+    /// Of its compliance.
+    pub compliance: DVec3,
+}
+
+/// The change of a segment with a number that its section depends on, nodes and
+/// force held.
+#[derive(Clone, Copy, Debug)]
+pub struct SegmentRate {
+    /// Of the derivatives of Pi with respect to the rotations of its nodes; that with
+    /// respect to their positions does not change.
+    pub gradient: [DVec3; 2],
+    /// Of its gap.
+    pub gap: DVec3,
+    /// Of Pi itself, the elastic energy at rest.
+    pub energy: f64,
+}
+
 /// A segment in a given state.
 #[derive(Clone, Copy, Debug)]
 pub struct Segment {
@@ -159,5 +187,50 @@ impl Segment {
         let (element, turns) = (self.element(), [a.into(), b.into()]);
         let change = element.force_increment(&section.into(), dx.into(), turns);
         change.into()
+    }
+
+    /// The change of the gap with these increments, the spatial force held.
+    pub fn gap_increment(&self, section: &Section, dx: DVec3, a: DVec3, b: DVec3) -> DVec3 {
+        let to_directors = self.frame.transpose();
+        let (alpha, beta) = (to_directors * a, to_directors * b);
+        let tau = DVec3::from(self.relative.tau);
+        let mu = 0.5 * (alpha + beta) + 0.5 * (beta - alpha).cross(tau);
+        let d_mu = section.compliance * self.nu.cross(mu) - self.w.cross(mu);
+        to_directors * dx - section.ds * d_mu
+    }
+
+    /// The change with a number of the section.
+    pub fn rate(&self, section: &Section, rate: &SectionRate) -> SegmentRate {
+        let strain = rate.rest_strain + rate.compliance * self.nu;
+        let bent = self.u - section.rest_curvature;
+        // A longer segment between the same nodes is less curved.
+        let bending = -self.u * (rate.ds / section.ds) - rate.rest_curvature;
+        let moment = rate.couple_stiffness * bent + section.couple_stiffness * bending;
+        let g_mu = rate.ds * self.nu.cross(self.w) + section.ds * self.nu.cross(strain);
+        let moment = DVec3::from(self.relative.derivative(moment.into()));
+        let half = 0.5 * section.compliance * self.nu + section.rest_strain;
+        let half_rate = 0.5 * rate.compliance * self.nu + rate.rest_strain;
+        let bending_energy = 0.5 * rate.ds * self.m.dot(bent)
+            + section.ds * (0.5 * (rate.couple_stiffness * bent).dot(bent) + self.m.dot(bending));
+        SegmentRate {
+            gradient: self.on_nodes(g_mu, moment),
+            gap: -rate.ds * self.w - section.ds * strain,
+            energy: bending_energy - self.nu.dot(rate.ds * half + section.ds * half_rate),
+        }
+    }
+
+    /// What the condensed gradient gains from a change of the gap.
+    pub fn gap_gradient(&self, section: &Section, gap: DVec3) -> (DVec3, DVec3, DVec3) {
+        let correction = section.condensing * gap;
+        let g_mu = self.nu.cross(section.compliance * correction) - self.w.cross(correction);
+        let [a, b] = self.on_nodes(g_mu, DVec3::ZERO);
+        (self.frame * (correction / section.ds), a, b)
+    }
+
+    /// From derivatives with respect to the turn of the midpoint, and the difference of
+    /// the turns of the two nodes, to these.
+    fn on_nodes(&self, g_mu: DVec3, moment: DVec3) -> [DVec3; 2] {
+        let g_delta = 0.5 * DVec3::from(self.relative.tau).cross(g_mu) + moment;
+        [0.5 * g_mu - g_delta, 0.5 * g_mu + g_delta].map(|g| self.frame * g)
     }
 }

@@ -230,6 +230,16 @@ impl Key {
         self.row().left_out
     }
 
+    /// Whether its numbers are greater than zero, or not below it.
+    pub(crate) fn is_positive(self) -> bool {
+        self.form().range() != Finite
+    }
+
+    /// Whether what the scenario is made of changes in proportion to its numbers.
+    pub(crate) fn is_linear(self) -> bool {
+        self.parts().0 != "section"
+    }
+
     /// The table it stands in, empty at the top, and its name within that.
     pub(super) fn parts(self) -> (&'static str, &'static str) {
         self.path().split_once('.').unwrap_or(("", self.path()))

@@ -29,7 +29,7 @@ pub(crate) use excerpt::printable;
 pub(crate) use key::Form;
 pub use key::Key;
 pub use part::Part;
-pub(crate) use part::resolve;
+pub(crate) use part::{resolve, value_at, with_overrides};
 pub use profile::Profile;
 pub use read::text;
 #[cfg(feature = "cli")]
@@ -75,6 +75,13 @@ impl Scenario {
     /// The units in which it is dimensionless.
     pub fn scale(&self) -> Scale {
         Scale::of(&self.rods)
+    }
+
+    /// What a quantity of this key is measured by.
+    pub(crate) fn unit(&self, key: Key) -> f64 {
+        let [length, force, time] = key.dimension();
+        let scale = self.scale();
+        scale.length.powi(length) * scale.force().powi(force) * self.time().powi(time)
     }
 
     /// T: the natural unit of time, sqrt(rho L^4/A).

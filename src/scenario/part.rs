@@ -130,6 +130,7 @@ pub(crate) struct Override {
 /// `text`, which may have errors that are found elsewhere.
 pub(crate) fn resolve(text: &str, overrides: &[String]) -> Result<Vec<Override>, ScenarioError> {
     let mut resolved: Vec<Override> = Vec::new();
+    let mut entries: Option<Entries> = None;
     for given in overrides {
         let refuse = |problem: String| {
             let given = shorten(given);
@@ -151,10 +152,14 @@ pub(crate) fn resolve(text: &str, overrides: &[String]) -> Result<Vec<Override>,
                     key: Some(part.key),
                     ..refuse(format!("{part}: {why}"))
                 };
-                let entries = Entries::new(text, &resolved);
+                let entries = entries.get_or_insert_with(|| Entries::new(text, &resolved));
                 entries.changed(part, value).map_err(about)?.to_string()
             }
         };
+        if let Some(entries) = &mut entries {
+            let new = value_of(&whole).map(|value| (part.key.path(), value));
+            entries.0.extend(new);
+        }
         resolved.push(Override {
             given: given.clone(),
             key: part.key,
@@ -162,6 +167,79 @@ pub(crate) fn resolve(text: &str, overrides: &[String]) -> Result<Vec<Override>,
         });
     }
     Ok(resolved)
+}
+
+/// The value of a part of the scenario in `text`, with entries overridden.
+pub(crate) fn value_at(text: &str, overrides: &[String], part: Part) -> Option<Value> {
+    let toml = super::form::from_json(text, "").and_then(Result::ok);
+    let text = toml.as_deref().unwrap_or(text);
+    let resolved = resolve(text, overrides).ok()?;
+    let entries = Entries::new(text, &resolved);
+    let mut place = entries.0.get(part.key.path())?;
+    if let Some(list) = part.list {
+        place = place.get(list)?;
+    }
+    for index in part.indices.into_iter().flatten() {
+        // One number for all rods is that of each.
+        if number(place).is_none() {
+            place = place.get(index)?;
+        }
+    }
+    Some(place.clone())
+}
+
+/// The scenario in `text` as TOML, with entries overridden.
+pub(crate) fn with_overrides(text: &str, overrides: &[String]) -> Option<String> {
+    let toml = super::form::from_json(text, "").and_then(Result::ok);
+    let text = toml.as_deref().unwrap_or(text);
+    let mut document = text.parse::<toml::Table>().ok()?;
+    for given in resolve(text, overrides).ok()? {
+        let value = value_of(&given.value)?;
+        match given.key.parts() {
+            ("", name) => document.insert(name.into(), value),
+            (table, name) => {
+                let empty = || Value::Table(toml::Table::new());
+                let table = document.entry(table).or_insert_with(empty);
+                table.as_table_mut()?.insert(name.into(), value)
+            }
+        };
+    }
+    Some(document.to_string())
+}
+
+impl Part {
+    /// The parts that are numbers: of a list or a profile with this value every entry.
+    pub(crate) fn numbers(self, value: &Value) -> Vec<Part> {
+        let depth = self.indices.iter().flatten().count();
+        match value {
+            _ if self.scale => vec![self],
+            Value::Array(list) if depth < self.indices.len() => {
+                let entry = |(index, value): (usize, &Value)| {
+                    let mut part = self;
+                    part.indices[depth] = Some(index);
+                    part.numbers(value)
+                };
+                list.iter().enumerate().flat_map(entry).collect()
+            }
+            Value::Table(table) if self.list.is_none() => match table.get("value") {
+                Some(value) => {
+                    let list = Some("value");
+                    Part { list, ..self }.numbers(value)
+                }
+                None => vec![self],
+            },
+            _ => vec![self],
+        }
+    }
+
+    /// Whether some number is of both.
+    pub(crate) fn overlaps(&self, other: &Part) -> bool {
+        let same =
+            |one: Option<usize>, two: Option<usize>| one.is_none() || two.is_none() || one == two;
+        let lists = self.list.is_none() || other.list.is_none() || self.list == other.list;
+        let mut pairs = self.indices.iter().zip(other.indices);
+        self.key == other.key && lists && pairs.all(|(one, two)| same(*one, two))
+    }
 }
 
 /// Every entry by its key, as far as it can be read, those left out included

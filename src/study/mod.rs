@@ -3,8 +3,10 @@
 mod all;
 mod chart;
 mod check;
+mod fit;
 mod judge;
 mod map;
+mod sensitivity;
 mod trace;
 mod vary;
 mod words;
@@ -15,10 +17,15 @@ pub use chart::{
     Scaling, ScalingRow, Setting, Spread, Turn, chart, scaling,
 };
 pub use check::{Check, CheckOptions, Place, Quantity, Shot, Verdict, check};
+pub use fit::{
+    Data, Experiment, Fit, FitCandidate, FitError, FitLeaf, FitOutcome, FitParameter, FitRequest,
+    FitResidual, FitWork, Free, Measured, MeasuredQuantity, Origin, Traced, fit,
+};
 pub use map::{
     CELL_SECONDS, Confidence, Map, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow, MapShow,
     map,
 };
+pub use sensitivity::{SensitivityError, relax_with_sensitivities};
 pub use trace::{
     Law, MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceError, TracePoint,
     TraceRequest, trace,

@@ -32,7 +32,7 @@ use std::fmt;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-use crate::scenario::{Form, Part, ScenarioError};
+use crate::scenario::{Form, Key, Part, Scenario, ScenarioError};
 
 /// Values where no count is given.
 const COUNT: usize = 11;
@@ -106,6 +106,21 @@ pub enum Target {
 }
 
 impl Target {
+    /// The key of the scenario, if it is of that.
+    pub(crate) fn key(self) -> Option<Key> {
+        match self {
+            Target::Entry(part) => Some(part.key),
+            Target::Knob(_) => None,
+        }
+    }
+
+    fn overlaps(self, other: Target) -> bool {
+        match (self, other) {
+            (Target::Entry(one), Target::Entry(two)) => one.overlaps(&two),
+            _ => self == other,
+        }
+    }
+
     fn is_whole(self) -> bool {
         match self {
             Target::Entry(part) => part.key.form() == Form::Whole,
@@ -157,6 +172,38 @@ impl Keys {
     /// Each of them; at least one.
     pub fn targets(&self) -> &[Target] {
         &self.0
+    }
+
+    /// What the number is measured by where it is zero, in a scenario's units.
+    pub(crate) fn unit(&self, scenario: &Scenario) -> f64 {
+        let unit = |target: &Target| match target {
+            Target::Entry(part) if part.scale => 1.0,
+            Target::Entry(part) => scenario.unit(part.key),
+            Target::Knob(_) => 0.0,
+        };
+        self.0.iter().map(unit).fold(0.0, f64::max)
+    }
+
+    /// Whether all are greater than zero, or not below it.
+    pub(crate) fn is_positive(&self) -> bool {
+        self.0.iter().all(|target| match target {
+            Target::Entry(part) => part.scale || part.key.is_positive(),
+            Target::Knob(_) => false,
+        })
+    }
+
+    /// Whether some number is among both.
+    pub(crate) fn overlaps(&self, other: &Keys) -> bool {
+        self.0
+            .iter()
+            .any(|one| other.0.iter().any(|two| one.overlaps(*two)))
+    }
+
+    /// Whether a scenario is linear in the number. One that is several keys may be a
+    /// product of itself, as that of coupling and lengths.
+    pub(crate) fn is_linear(&self) -> bool {
+        let mut keys = self.0.iter().filter_map(|target| target.key());
+        self.0.len() == 1 && keys.all(Key::is_linear)
     }
 
     /// Whether only whole numbers make sense.

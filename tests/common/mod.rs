@@ -4,6 +4,7 @@
 #![allow(dead_code, unused_imports)]
 
 pub mod branch;
+pub mod fit;
 pub mod motion;
 pub mod random;
 mod shot;

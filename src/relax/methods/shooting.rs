@@ -142,6 +142,7 @@ pub fn shoot(
             mode_shapes: options.mode_shapes,
             ..Stability::default()
         },
+        sensitivities: None,
         undulation: Undulation::at_stations(scenario, &stations, &rods, accuracy.error_estimate),
         accuracy,
         model: Model::new(rods.len(), (rods.len(), false), &[], [None; 2]),

@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
+use toml::Value;
+
 use super::{Keys, Knob, Knobs, Target, VaryError};
-use crate::scenario::{self, Key, Scenario, resolve};
+use crate::scenario::{self, Form, Key, Scenario, resolve, value_at, with_overrides};
 
 /// A scenario as text, with some entries replaced: what numbers are put into.
 #[derive(Clone, Debug)]
@@ -86,17 +88,14 @@ impl Base {
     /// If it is refused, or has no such entry.
     pub fn at(&self, values: &[(&Keys, f64)]) -> Result<Varied, VaryError> {
         let mut knobs = self.knobs;
-        let mut overrides = self.overrides.clone();
         for (keys, value) in values {
             for &target in keys.targets() {
-                match target {
-                    Target::Knob(knob) => knobs.set(knob, *value)?,
-                    Target::Entry(part) => {
-                        overrides.push(format!("{part}={}", target.text(*value)));
-                    }
+                if let Target::Knob(knob) = target {
+                    knobs.set(knob, *value)?;
                 }
             }
         }
+        let overrides = self.with(values);
         // A part that is not there is not there at any value, unless rods are added.
         let mut targets = values.iter().flat_map(|(keys, _)| keys.targets());
         let adds = |target: &Target| matches!(target, Target::Entry(part) if part.key == Key::Rods);
@@ -107,6 +106,80 @@ impl Base {
             scenario: Scenario::from_toml_with(&self.text, &self.file, &overrides)?,
             knobs,
         })
+    }
+
+    /// All overrides, those that make these values among them.
+    fn with(&self, values: &[(&Keys, f64)]) -> Vec<String> {
+        let mut overrides = self.overrides.clone();
+        for (keys, value) in values {
+            for &target in keys.targets() {
+                if let Target::Entry(part) = target {
+                    overrides.push(format!("{part}={}", target.text(*value)));
+                }
+            }
+        }
+        overrides
+    }
+
+    /// The number that these keys have: one of which derivatives can be taken, the
+    /// same for all of them; 1 where numbers are scaled.
+    ///
+    /// # Errors
+    /// If it is whole, a setting of a method, no number by itself, or left out.
+    pub fn value(&self, keys: &Keys) -> Result<f64, VaryError> {
+        let mut found = None;
+        for &target in keys.targets() {
+            let refuse = |why: &str| Err(VaryError::Key(format!("{target}: {why}")));
+            let Target::Entry(part) = target else {
+                return refuse("is a setting of a method, not a number of the leaf");
+            };
+            if part.key.form() == Form::Whole {
+                return refuse("is a whole number, and cannot change by a little");
+            }
+            if part.list == Some("at") {
+                return refuse(
+                    "where knots are cannot change by a little: the grids have nodes there",
+                );
+            }
+            let Some(entry) = value_at(&self.text, &self.overrides, part) else {
+                return refuse(
+                    "is not in the scenario: write it there first; indices count from 0",
+                );
+            };
+            let value = match entry {
+                _ if part.scale => Some(1.0),
+                Value::Float(value) => Some(value),
+                Value::Integer(value) => Some(value as f64),
+                _ => None,
+            };
+            match value {
+                Some(value) if !value.is_finite() => {
+                    return refuse("is infinite, and cannot change by a little");
+                }
+                Some(value) if found.is_none_or(|found| found == value) => found = Some(value),
+                Some(_) => return refuse("has another value than the keys it is joined to"),
+                None => return refuse("is a list or a profile: name one of its entries"),
+            }
+        }
+        found.ok_or_else(|| VaryError::Key(format!("{keys}: no number")))
+    }
+
+    /// The same keys, or one of each entry if they are a list or a profile.
+    pub(crate) fn entries_of(&self, keys: &Keys) -> Vec<Keys> {
+        let [Target::Entry(part)] = keys.targets() else {
+            return vec![keys.clone()];
+        };
+        match value_at(&self.text, &self.overrides, *part) {
+            Some(value) => (part.numbers(&value).into_iter())
+                .map(|part| Keys(vec![Target::Entry(part)]))
+                .collect(),
+            None => vec![keys.clone()],
+        }
+    }
+
+    /// The scenario with these values, as TOML.
+    pub(crate) fn toml(&self, values: &[(&Keys, f64)]) -> Option<String> {
+        with_overrides(&self.text, &self.with(values))
     }
 }
 

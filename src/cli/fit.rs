@@ -1,0 +1,99 @@
+//! `leafdyn fit`: from measurements to the numbers of a scenario.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueHint};
+
+use crate::limit::Limit;
+use crate::report;
+use crate::study::{self, Data, Fit as Fitted, FitRequest, Free};
+
+use super::request::{Done, How, Job, Request};
+use super::{Refusal, Status};
+
+/// Fit numbers of the scenario to measurements, and say what these determine and what they do not.
+///
+/// Exit status: 0 a minimum at which the data determine every free number; 1 not
+/// (the files are still written and say which); 2 the request was refused.
+#[derive(Debug, Args)]
+pub struct Fit {
+    #[command(flatten)]
+    request: Request,
+
+    /// Measured data as CSV, with a header: experiments (keys of the scenario, results, their sd_), or points on veins (rod, sigma, x, y, z, sd, experiment); may repeat
+    #[arg(long, value_name = "FILE.csv", required = true, value_hint = ValueHint::FilePath)]
+    data: Vec<PathBuf>,
+
+    /// A number that is free, by its key as in --vary, and its bounds; of a list or a profile every entry; may repeat
+    #[arg(
+        long,
+        value_name = "KEY[=LOW..HIGH]",
+        required = true,
+        allow_negative_numbers = true
+    )]
+    free: Vec<Free>,
+
+    /// Let data far off the others count less
+    #[arg(long)]
+    robust: bool,
+
+    /// Experiments that could be made, as CSV like the data: which would say most?
+    #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath)]
+    candidates: Option<PathBuf>,
+}
+
+impl Fit {
+    pub fn run(self) -> Result<Status, Refusal> {
+        let how = How {
+            varies: true,
+            stations: false,
+            side_by_side: false,
+        };
+        self.request.each::<Fitted>(how, |job| self.one(job))
+    }
+
+    fn one(&self, job: &Job) -> Result<Done, Refusal> {
+        let base = job.base()?;
+        let mut data = Data::default();
+        for file in &self.data {
+            let text = read(file)?;
+            data.read(
+                &text,
+                &file.display().to_string(),
+                base.scenario().rods.len(),
+            )?;
+        }
+        let candidates = match &self.candidates {
+            Some(file) => {
+                let text = read(file)?;
+                FitRequest::read_candidates(&text, &file.display().to_string())?
+            }
+            None => Vec::new(),
+        };
+        let request = FitRequest {
+            base,
+            data,
+            free: self.free.clone(),
+            robust: self.robust,
+            candidates,
+            tolerance: self.request.tolerance,
+            limit: Limit::default(),
+        };
+        let mut line = job.progress();
+        let fit = study::fit(&request, &mut |step, sum| {
+            line.say(|time| {
+                let time = time.as_secs_f64();
+                format!("step {step}, sum of squares {sum:.6e}, {time:.0} s")
+            });
+        })?;
+        drop(line);
+        job.remark(fit.remarks.first());
+        job.deliver(&fit, fit.is_success(), |files| {
+            report::fit_report(&fit, files)
+        })
+    }
+}
+
+fn read(file: &Path) -> Result<String, Refusal> {
+    crate::scenario::text(file).map_err(|refused| refused.into())
+}

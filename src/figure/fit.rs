@@ -1,0 +1,221 @@
+//! A fit: results of experiments with the model and its band, traced points over the
+//! veins, and the residuals of all data.
+
+use glam::{DVec2, DVec3};
+
+use super::axes::Axes;
+use super::axis::{Axis, Ticks};
+use super::drawing::{BLUE, DOT, Drawing, INK, NOTE, Stroke};
+use super::markers::Marker;
+use super::page::{
+    Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, WIDTH, new_page, title,
+};
+use crate::report::numbers::{brief, power_of_ten};
+use crate::study::{Fit, FitLeaf, FitResidual};
+
+const RESULT: f64 = 190.0;
+const RESIDUALS: f64 = 120.0;
+const VEINS: f64 = 300.0;
+/// Right of the panels, for the key.
+const KEY: f64 = 190.0;
+const BOTTOM: f64 = 4.0;
+/// Kinds of results that are drawn, and leaves.
+const MOST_RESULTS: usize = 6;
+const MOST_LEAVES: usize = 3;
+/// Between the two views of a leaf.
+const GAP: f64 = 70.0;
+
+pub fn draw(fit: &Fit) -> Drawing {
+    let name = format!("{}: fit", fit.scenario);
+    let mut notes = vec![
+        format!(
+            "{} data, {} free numbers",
+            fit.residuals.len(),
+            fit.parameters.len()
+        ),
+        fit.outcome.word().into(),
+    ];
+    if let Some(sd) = fit.standard_deviation {
+        notes.push(format!("residuals of {}", power_of_ten(sd)));
+    }
+    let mut page = new_page(LEFT, &name, &notes, None);
+    let mut top = HEADER;
+    let mut letter = b'a';
+    let mut next = || {
+        let this = format!("({})", char::from(letter));
+        letter = (letter + 1).min(b'z');
+        this
+    };
+    let mut kinds: Vec<&str> = Vec::new();
+    for residual in fit
+        .residuals
+        .iter()
+        .filter(|residual| residual.rod.is_none())
+    {
+        if !kinds.contains(&residual.what.as_str()) {
+            kinds.push(&residual.what);
+        }
+    }
+    for kind in kinds.into_iter().take(MOST_RESULTS) {
+        let of: Vec<&FitResidual> = (fit.residuals.iter())
+            .filter(|residual| residual.rod.is_none() && residual.what == kind)
+            .collect();
+        let letter = next();
+        page.group("result", |page| draw_result(page, top, &letter, kind, &of));
+        top += PANEL_TITLE + RESULT + PANEL_AXIS;
+    }
+    let traced = fit
+        .leaves
+        .iter()
+        .filter(|(_, leaf)| !leaf.traced.is_empty());
+    for (experiment, leaf) in traced.take(MOST_LEAVES) {
+        let letter = next();
+        page.group("veins", |page| {
+            draw_veins(page, top, &letter, experiment, leaf)
+        });
+        top += PANEL_TITLE + VEINS + PANEL_AXIS;
+    }
+    let letter = next();
+    page.group("residuals", |page| draw_residuals(page, top, &letter, fit));
+    page.height = (top + PANEL_TITLE + RESIDUALS + PANEL_AXIS + BOTTOM).ceil();
+    page
+}
+
+/// An axis of whole numbers from 1.
+fn numbers(name: &str, count: usize) -> Axis {
+    let ticks = (1..=count).map(|k| k as f64).collect();
+    Axis {
+        ticks: Ticks::At(ticks),
+        ..Axis::linear(name, 0.5, count as f64 + 0.5)
+    }
+}
+
+fn draw_result(page: &mut Drawing, top: f64, letter: &str, kind: &str, of: &[&FitResidual]) {
+    let cell = Cell::beside_key(top + PANEL_TITLE, RESULT, KEY);
+    title(
+        page,
+        cell.corner,
+        letter,
+        &format!("{kind} of the experiments"),
+    );
+    let values = of.iter().flat_map(|r| {
+        let (band, sd) = (r.band, 2.0 * r.sd);
+        [r.data - sd, r.data + sd, r.model - band, r.model + band]
+    });
+    let mut up = Axis::holding(kind, values);
+    up.stresses_zero = false;
+    let axes = Axes {
+        cell,
+        across: numbers("experiment", of.len()),
+        up,
+    };
+    axes.draw(page);
+    let line = |value: &dyn Fn(&FitResidual) -> f64| -> Vec<(f64, f64)> {
+        let points = of.iter().enumerate();
+        points.map(|(k, r)| (k as f64 + 1.0, value(r))).collect()
+    };
+    let dashed = Stroke::new(BLUE, 1.0).dashed(true);
+    axes.curve(page, &line(&|r| r.model - r.band), dashed);
+    axes.curve(page, &line(&|r| r.model + r.band), dashed);
+    axes.curve(page, &line(&|r| r.model), Stroke::new(BLUE, 1.6));
+    for (k, r) in of.iter().enumerate() {
+        let x = k as f64 + 1.0;
+        let bar = [(x, r.data - 2.0 * r.sd), (x, r.data + 2.0 * r.sd)];
+        axes.curve(page, &bar, Stroke::new(DOT, 1.0));
+    }
+    axes.markers(page, line(&|r| r.data), Marker::Dot, DOT);
+    let mut key = Key::beside(cell);
+    key.marker(
+        page,
+        "data",
+        "with two standard deviations",
+        (Marker::Dot, DOT),
+    );
+    key.line(page, "model", "", Stroke::new(BLUE, 1.6));
+    key.line(page, "95 % band", "what the data leave open", dashed);
+}
+
+/// A leaf from above and from the side, with the points that were traced.
+fn draw_veins(page: &mut Drawing, top: f64, letter: &str, experiment: &str, leaf: &FitLeaf) {
+    let width = 0.5 * (WIDTH - LEFT - RIGHT - GAP);
+    for (k, (view, axes)) in [("from above", [0, 1]), ("from the side", [0, 2])]
+        .into_iter()
+        .enumerate()
+    {
+        let corner = DVec2::new(LEFT + k as f64 * (width + GAP), top + PANEL_TITLE);
+        let cell = Cell {
+            corner,
+            size: DVec2::new(width, VEINS),
+        };
+        let letter = if k == 0 { letter } else { "" };
+        title(
+            page,
+            corner,
+            letter,
+            &format!("experiment {experiment}, {view}"),
+        );
+        let seen = |point: [Option<f64>; 3]| Some((point[axes[0]]?, point[axes[1]]?));
+        let flat = |point: &DVec3| (point[axes[0]], point[axes[1]]);
+        let points: Vec<(f64, f64)> = leaf
+            .traced
+            .iter()
+            .filter_map(|(_, point)| seen(*point))
+            .collect();
+        let all: Vec<(f64, f64)> = leaf.curves.iter().flatten().map(flat).collect();
+        let all = all.iter().chain(&points);
+        let across = Axis::holding(["x", "y", "z"][axes[0]], all.clone().map(|p| p.0));
+        let up = Axis::holding(["x", "y", "z"][axes[1]], all.map(|p| p.1));
+        let (across, up) = equal_scales(across, up, cell.size);
+        let panel = Axes { cell, across, up };
+        panel.draw(page);
+        for curve in &leaf.curves {
+            let line: Vec<(f64, f64)> = curve.iter().map(flat).collect();
+            panel.curve(page, &line, Stroke::new(BLUE, 1.4));
+        }
+        panel.markers(page, points, Marker::Dot, DOT);
+    }
+}
+
+/// The axes, one widened so that both have the same pixels per length.
+fn equal_scales(mut across: Axis, mut up: Axis, size: DVec2) -> (Axis, Axis) {
+    let extents = [across.end - across.start, up.end - up.start];
+    let unit = (extents[0] / size.x).max(extents[1] / size.y);
+    for (axis, pixels) in [(&mut across, size.x), (&mut up, size.y)] {
+        let (middle, half) = (0.5 * (axis.start + axis.end), 0.5 * unit * pixels);
+        (axis.start, axis.end) = (middle - half, middle + half);
+        axis.stresses_zero = false;
+    }
+    (across, up)
+}
+
+fn draw_residuals(page: &mut Drawing, top: f64, letter: &str, fit: &Fit) {
+    let cell = Cell::beside_key(top + PANEL_TITLE, RESIDUALS, KEY);
+    title(
+        page,
+        cell.corner,
+        letter,
+        "residuals in standard deviations",
+    );
+    let points = fit.residuals.iter().enumerate();
+    let points: Vec<(f64, f64)> = points.map(|(k, r)| (k as f64 + 1.0, r.residual)).collect();
+    let count = points.len() as f64;
+    let values = points.iter().map(|point| point.1);
+    let axes = Axes {
+        cell,
+        across: Axis::linear("datum", 0.0, count + 1.0),
+        up: Axis::holding("residual", values.chain([-2.5, 2.5])),
+    };
+    axes.draw(page);
+    for bound in [-2.0, 2.0] {
+        let line = [(0.0, bound), (count + 1.0, bound)];
+        axes.curve(page, &line, Stroke::new(NOTE, 1.0).dashed(true));
+    }
+    axes.markers(page, points, Marker::Dot, INK);
+    let mut key = Key::beside(cell);
+    let freedom = fit.degrees_of_freedom;
+    let sum = format!(
+        "sum of squares {} for {freedom} degrees of freedom",
+        brief(fit.chi_squared)
+    );
+    key.marker(page, "data less model", &sum, (Marker::Dot, INK));
+}

@@ -1,0 +1,99 @@
+//! Tips that are held: what moving their holder does, and how the force on it changes.
+
+use super::{Forces, LeafRate, Response, add};
+use crate::leaf::dimensionless::Leaf;
+use crate::leaf::discrete::DiscreteLeaf;
+use crate::leaf::state::State;
+use crate::rod::Section;
+use crate::scenario::{Clamp, Scenario};
+use glam::{DQuat, DVec3};
+
+/// The change of where tips are held, in the leaf's units.
+pub(super) struct HeldRate {
+    shift: DVec3,
+    /// Turns of the clamps, one a rod; none of a pinned tip.
+    turns: Vec<DVec3>,
+}
+
+impl HeldRate {
+    /// `None` if tips are free, or do not move.
+    pub fn new(leaf: &Leaf, terms: &[(f64, Scenario)]) -> Option<Self> {
+        let held = leaf.held.as_ref()?;
+        let first = terms[0].1.held_tip.as_ref()?;
+        let of = |value: &dyn Fn(&Scenario) -> f64| -> f64 {
+            let first = value(&terms[0].1);
+            let change = |(weight, s): &(f64, Scenario)| weight * (value(s) - first);
+            terms.iter().map(change).sum()
+        };
+        let axis =
+            |axis: usize| of(&|s| s.held_tip.as_ref().map_or(0.0, |held| held.position[axis]));
+        let shift = DVec3::from_array([0, 1, 2].map(axis)) / leaf.scale.length;
+        let clamp = |s: &Scenario, j: usize| -> Clamp {
+            let held = s.held_tip.as_ref().or(Some(first));
+            let clamps = held.and_then(|held| held.clamps.as_ref());
+            clamps.map_or(
+                Clamp {
+                    angle: 0.0,
+                    twist: 0.0,
+                },
+                |clamps| clamps[j],
+            )
+        };
+        // By angle and twist about e3 and the d1 that results, as the clamp is made.
+        let turn = |(j, own): (usize, &Clamp)| {
+            let d1 = DQuat::from_rotation_z(own.angle) * DVec3::X;
+            of(&|s| clamp(s, j).angle) * DVec3::Z + of(&|s| clamp(s, j).twist) * d1
+        };
+        let clamps = held.clamps.iter().flatten().enumerate();
+        let turns: Vec<DVec3> = clamps.map(turn).collect();
+        let moves = shift != DVec3::ZERO || turns.iter().any(|turn| *turn != DVec3::ZERO);
+        moves.then_some(HeldRate { shift, turns })
+    }
+}
+
+impl DiscreteLeaf {
+    /// Holders that move, and turn.
+    pub(super) fn move_tips(&self, state: &State, rate: &HeldRate, forces: &mut Forces) {
+        let n = self.segments();
+        let moved = rate.shift;
+        for j in 0..self.rods() {
+            let turned = rate.turns.get(j).copied().unwrap_or(DVec3::ZERO);
+            let section = self.section(j, n - 1);
+            let segment = self.segment(state, j, n - 1, state.n[j * n + n - 1]);
+            let bare = Section {
+                condensing: DVec3::ZERO,
+                ..*section
+            };
+            let k = segment.hessian(&bare);
+            let nodes = &mut forces.nodes[j];
+            if n > 1 {
+                let moment = k.ab * turned + k.xa.transpose() * moved;
+                add(&mut nodes[n - 2], -moment, k.xx * moved + k.xb * turned);
+            }
+            // A tip that is only pinned turns freely.
+            let moment = k.bb * turned + k.xb.transpose() * moved;
+            add(&mut nodes[n - 1], -moment, DVec3::ZERO);
+            forces.gaps[j * n + n - 1] +=
+                segment.gap_increment(section, moved, DVec3::ZERO, turned);
+            let (g_x, _, g_b) = segment.gradient(section);
+            let load = self.load(state, j, n).0;
+            forces.energy += (g_x - load).dot(moved) + g_b.dot(turned);
+            let [a, b] = [turned.to_array(), moved.to_array()];
+            forces.tips.push([a[0], a[1], a[2], b[0], b[1], b[2]]);
+        }
+    }
+
+    /// The change of the force that the holder of the tip feels, as
+    /// [`DiscreteLeaf::reaction`]: that of the loads on the tip, and of the forces
+    /// that the last segments carry.
+    pub fn reaction_rate(&self, rate: &LeafRate, response: &Response) -> DVec3 {
+        let n = self.segments();
+        let weight = self.load_factor * self.grid.weight(n);
+        let mut force = self.load_factor * rate.tip_force;
+        for (j, rod) in rate.rods.iter().enumerate() {
+            let gravity = self.loads.gravity * rod.length + rate.gravity * self.leaf.length(j);
+            force += weight * gravity - response.carried[j * n + n - 1];
+        }
+        force
+    }
+}

@@ -1,0 +1,351 @@
+//! The change of a leaf with a number of its scenario: of its forces in a given
+//! state, and of its energy. Exact but for the combination of scenarios by which
+//! the number's effect on the scenario itself is given.
+
+mod held;
+
+use self::held::HeldRate;
+use super::dimensionless::Leaf;
+use super::discrete::DiscreteLeaf;
+use super::state::{Field, Increment, State};
+use crate::rod::{Section, SectionRate};
+use crate::rotation;
+use crate::scenario::{Profile, Scenario};
+use glam::DVec3;
+
+/// The change of a leaf: sums over scenarios that differ in the number, times
+/// weights that add up to zero.
+pub struct LeafRate<'s> {
+    rods: Vec<RodRate<'s>>,
+    coupling: Vec<DVec3>,
+    gravity: DVec3,
+    tip_force: DVec3,
+    tip_moment: DVec3,
+    held: Option<HeldRate>,
+}
+
+/// How a leaf answers forces.
+#[derive(Clone, Debug)]
+pub struct Response {
+    /// Increments of the nodes.
+    pub nodes: Field,
+    /// Of the spatial forces of the segments, rod after rod.
+    pub carried: Vec<DVec3>,
+}
+
+/// The change of a rod, in the leaf's units.
+struct RodRate<'s> {
+    length: f64,
+    angle: f64,
+    couple_stiffness: [Slope<'s>; 3],
+    force_stiffness: [Slope<'s>; 3],
+    rest_curvature: [Slope<'s>; 3],
+    rest_stretch: Slope<'s>,
+}
+
+/// The change of a profile.
+enum Slope<'s> {
+    None,
+    Constant(f64),
+    Along(Vec<(f64, &'s Profile)>),
+}
+
+/// What a change of the leaf does in a state that is held.
+#[derive(Clone, Debug)]
+pub struct Forces {
+    /// To the unbalanced forces on the nodes.
+    pub nodes: Field,
+    /// To the gaps of the segments, rod after rod.
+    pub gaps: Vec<DVec3>,
+    /// To the energy.
+    pub energy: f64,
+    /// What it moves the tips by where they are held; none where it does not.
+    pub tips: Vec<Increment>,
+}
+
+impl<'s> Slope<'s> {
+    fn of(
+        terms: &'s [(f64, Scenario)],
+        unit: f64,
+        profile: impl Fn(&'s Scenario) -> &'s Profile,
+    ) -> Self {
+        let profiles = || terms.iter().map(|(weight, s)| (weight * unit, profile(s)));
+        let (_, first) = (terms[0].0, profile(&terms[0].1));
+        if profiles().all(|(_, other)| other == first) {
+            return Slope::None;
+        }
+        if profiles().all(|(_, other)| matches!(other, Profile::Constant(_))) {
+            return Slope::Constant(profiles().map(|(weight, p)| weight * p.at(0.0)).sum());
+        }
+        Slope::Along(profiles().collect())
+    }
+
+    fn at(&self, sigma: f64) -> f64 {
+        match self {
+            Slope::None => 0.0,
+            Slope::Constant(value) => *value,
+            Slope::Along(terms) => terms.iter().map(|(weight, p)| weight * p.at(sigma)).sum(),
+        }
+    }
+
+    fn is_none(&self) -> bool {
+        matches!(self, Slope::None)
+    }
+}
+
+impl<'s> LeafRate<'s> {
+    /// Of a leaf, from scenarios like its own with weights.
+    pub fn new(leaf: &Leaf, terms: &'s [(f64, Scenario)]) -> Self {
+        let scale = leaf.scale;
+        let sum = |value: &dyn Fn(&Scenario) -> f64| -> f64 {
+            // Against the first: where nothing changes the sum is exactly zero.
+            let first = value(&terms[0].1);
+            let change = |(weight, s): &(f64, Scenario)| weight * (value(s) - first);
+            terms.iter().map(change).sum()
+        };
+        let vector = |value: fn(&Scenario) -> [f64; 3], unit: f64| {
+            DVec3::from_array([0, 1, 2].map(|axis| sum(&|s| value(s)[axis]))) / unit
+        };
+        let rod = |j: usize| RodRate {
+            length: sum(&|s| s.rods[j].length) / scale.length,
+            angle: sum(&|s| s.rods[j].angle),
+            couple_stiffness: [0, 1, 2].map(|k| {
+                Slope::of(terms, 1.0 / scale.stiffness, move |s| {
+                    &s.rods[j].couple_stiffness[k]
+                })
+            }),
+            force_stiffness: [0, 1, 2].map(|k| {
+                Slope::of(terms, 1.0 / scale.force(), move |s| {
+                    &s.rods[j].force_stiffness[k]
+                })
+            }),
+            rest_curvature: [0, 1, 2]
+                .map(|k| Slope::of(terms, scale.length, move |s| &s.rods[j].rest_curvature[k])),
+            rest_stretch: Slope::of(terms, 1.0, move |s| &s.rods[j].rest_stretch),
+        };
+        let rods = leaf.scenario().rods.len();
+        // Per unit of sigma, as in `Leaf::coupling`.
+        let gap = |s: &Scenario, g: usize| 0.5 * (s.rods[g].length + s.rods[g + 1].length);
+        let unit = scale.length / scale.force();
+        let coupling = |g: usize| {
+            let of = |axis: usize| sum(&|s| s.coupling[g][axis] * gap(s, g));
+            DVec3::from_array([0, 1, 2].map(of)) * unit
+        };
+        LeafRate {
+            rods: (0..rods).map(rod).collect(),
+            coupling: (0..rods - 1).map(coupling).collect(),
+            gravity: vector(|s| s.gravity, scale.force() / scale.length),
+            tip_force: vector(|s| s.tip_force, scale.force()),
+            tip_moment: vector(|s| s.tip_moment, scale.moment()),
+            held: HeldRate::new(leaf, terms),
+        }
+    }
+}
+
+impl LeafRate<'_> {
+    /// The angle by which the base of rod `j` turns.
+    pub fn base_turn(&self, j: usize) -> f64 {
+        self.rods[j].angle
+    }
+
+    /// Whether a dead moment on the tip changes.
+    pub fn changes_moment(&self) -> bool {
+        self.rods.len() == 1 && self.tip_moment != DVec3::ZERO
+    }
+}
+
+impl RodRate<'_> {
+    /// Whether no section of the rod changes.
+    fn keeps_sections(&self) -> bool {
+        let triples = [
+            &self.couple_stiffness,
+            &self.force_stiffness,
+            &self.rest_curvature,
+        ];
+        let mut slopes = triples.into_iter().flatten().chain([&self.rest_stretch]);
+        self.length == 0.0 && slopes.all(Slope::is_none)
+    }
+
+    /// The change of a section at `sigma` that is the fraction `width` of the rod.
+    fn section(&self, section: &Section, sigma: f64, width: f64) -> SectionRate {
+        let at = |slopes: &[Slope; 3]| DVec3::from_array(slopes.each_ref().map(|s| s.at(sigma)));
+        let compliance = section.compliance;
+        SectionRate {
+            ds: self.length * width,
+            couple_stiffness: at(&self.couple_stiffness),
+            rest_curvature: at(&self.rest_curvature),
+            rest_strain: DVec3::X * self.rest_stretch.at(sigma),
+            compliance: -compliance * compliance * at(&self.force_stiffness),
+        }
+    }
+}
+
+impl DiscreteLeaf {
+    /// What a change of the leaf (all of its rods, in space) does in a state.
+    pub fn rate(&self, state: &State, rate: &LeafRate) -> Forces {
+        let n = self.segments();
+        let mut forces = Forces {
+            nodes: vec![vec![[0.0; 6]; n]; self.rods()],
+            gaps: vec![DVec3::ZERO; self.rods() * n],
+            energy: 0.0,
+            tips: Vec::new(),
+        };
+        for (j, rod) in rate.rods.iter().enumerate() {
+            if !rod.keeps_sections() {
+                self.change_sections(state, j, rod, &mut forces);
+            }
+            self.change_loads(state, j, rate, &mut forces);
+            if rod.angle != 0.0 {
+                self.turn_base(state, j, rod.angle, &mut forces);
+            }
+        }
+        if let Some(held) = &rate.held {
+            self.move_tips(state, held, &mut forces);
+        }
+        forces
+    }
+
+    fn change_sections(&self, state: &State, j: usize, rod: &RodRate, forces: &mut Forces) {
+        let n = self.segments();
+        for i in 0..n {
+            let section = self.section(j, i);
+            let segment = self.segment(state, j, i, state.n[j * n + i]);
+            let change = rod.section(section, self.grid.middle(i), self.grid.width(i));
+            let change = segment.rate(section, &change);
+            let [left, right] = change.gradient;
+            let nodes = &mut forces.nodes[j];
+            if i > 0 {
+                add(&mut nodes[i - 1], -left, DVec3::ZERO);
+            }
+            add(&mut nodes[i], -right, DVec3::ZERO);
+            forces.gaps[j * n + i] += change.gap;
+            forces.energy += change.energy;
+        }
+    }
+
+    /// Loads and coupling of rod `j`, as in [`DiscreteLeaf::load`].
+    fn change_loads(&self, state: &State, j: usize, rate: &LeafRate, forces: &mut Forces) {
+        let n = self.segments();
+        let rod = &rate.rods[j];
+        let gravity = self.loads.gravity * rod.length + rate.gravity * self.leaf.length(j);
+        let ends_here = j == 0 || !self.leaf.joined();
+        for i in 1..=n {
+            let x = state.x[state.base(j) + i];
+            let mut force = gravity * (self.load_factor * self.grid.weight(i));
+            if i == n && ends_here {
+                force += self.load_factor * rate.tip_force;
+            }
+            forces.energy -= force.dot(x);
+            if j + 1 < self.rods() && !(self.leaf.joined() && i == n) {
+                let stretch = state.x[state.base(j + 1) + i] - x;
+                let pull = rate.coupling[j] * self.grid.weight(i) * stretch;
+                forces.energy += 0.5 * pull.dot(stretch);
+                force += pull;
+                add(&mut forces.nodes[j + 1][i - 1], DVec3::ZERO, -pull);
+            }
+            add(&mut forces.nodes[j][i - 1], DVec3::ZERO, force);
+        }
+        if self.rods() == 1 {
+            let moment = self.load_factor * rate.tip_moment;
+            add(&mut forces.nodes[j][n - 1], moment, DVec3::ZERO);
+        }
+    }
+
+    /// A base turned about the normal of the fan.
+    fn turn_base(&self, state: &State, j: usize, angle: f64, forces: &mut Forces) {
+        let n = self.segments();
+        let (section, turn) = (self.section(j, 0), angle * DVec3::Z);
+        let segment = self.segment(state, j, 0, state.n[j * n]);
+        let bare = Section {
+            condensing: DVec3::ZERO,
+            ..*section
+        };
+        let k = segment.hessian(&bare);
+        add(
+            &mut forces.nodes[j][0],
+            -(k.ab.transpose() * turn),
+            -(k.xa * turn),
+        );
+        forces.gaps[j * n] += segment.gap_increment(section, DVec3::ZERO, turn, DVec3::ZERO);
+        forces.energy += segment.gradient(section).1.dot(turn);
+    }
+
+    /// The work of forces on a response to others: by symmetry also that of the
+    /// others on the response to these.
+    pub fn work(&self, state: &State, forces: &Forces, response: &Response) -> f64 {
+        let n = self.segments();
+        let mut work = 0.0;
+        for (j, i) in self.each(0..n) {
+            let pairs = forces.nodes[j][i].iter().zip(&response.nodes[j][i]);
+            work += pairs.map(|(force, shift)| force * shift).sum::<f64>();
+            let gap = forces.gaps[j * n + i];
+            if gap != DVec3::ZERO {
+                let k = state.base(j) + i;
+                let frame = rotation::midpoint(state.q[k], state.q[k + 1]);
+                work -= response.carried[j * n + i].dot(frame * gap);
+            }
+        }
+        work
+    }
+
+    /// Adds to forces on the nodes what changes of the gaps come to when the forces
+    /// of the segments are condensed out.
+    pub fn condense_gaps(&self, state: &State, gaps: &[DVec3], nodes: &mut Field) {
+        let n = self.segments();
+        for (j, i) in self.each(0..n) {
+            let gap = gaps[j * n + i];
+            if gap == DVec3::ZERO {
+                continue;
+            }
+            let segment = self.segment(state, j, i, state.n[j * n + i]);
+            let (g_x, g_a, g_b) = segment.gap_gradient(self.section(j, i), gap);
+            if i > 0 {
+                add(&mut nodes[j][i - 1], -g_a, g_x);
+            }
+            add(&mut nodes[j][i], -g_b, -g_x);
+        }
+        // A tip that is held does not answer.
+        let [turns, shifts] = self.moves(n);
+        for node in nodes.iter_mut().filter_map(|rod| rod.last_mut()) {
+            let held = [turns, turns, turns, shifts, shifts, shifts].map(|moves| !moves);
+            for (force, held) in node.iter_mut().zip(held) {
+                if held {
+                    *force = 0.0;
+                }
+            }
+        }
+    }
+
+    /// The changes of the forces of all segments that go with increments of the
+    /// nodes and changes of the gaps, and the gaps that are left: those by which the
+    /// stiffness that condenses the forces out falls short of the segments' own.
+    pub fn carried(
+        &self,
+        state: &State,
+        increments: &Field,
+        gaps: &mut [DVec3],
+        carried: &mut [DVec3],
+    ) {
+        let n = self.segments();
+        for (j, rod) in increments.iter().enumerate() {
+            let (mut a, mut dx0) = (DVec3::ZERO, DVec3::ZERO);
+            for (i, increment) in rod.iter().enumerate() {
+                let k = j * n + i;
+                let (b, dx1) = (super::turn(increment), super::shift(increment));
+                let section = self.section(j, i);
+                let segment = self.segment(state, j, i, state.n[k]);
+                let gap = gaps[k] + segment.gap_increment(section, dx1 - dx0, a, b);
+                carried[k] += segment.frame * (section.condensing * gap / section.ds);
+                gaps[k] = gap * (DVec3::ONE - section.compliance * section.condensing);
+                (a, dx0) = (b, dx1);
+            }
+        }
+    }
+}
+
+fn add(increment: &mut [f64; 6], moment: DVec3, force: DVec3) {
+    for c in 0..3 {
+        increment[c] += moment[c];
+        increment[3 + c] += force[c];
+    }
+}

@@ -1,0 +1,267 @@
+//! An equilibrium followed as its scenario changes a little, on the same grids, and
+//! never into another valley.
+
+use crate::leaf::{DiscreteLeaf, Leaf, Response, State};
+use crate::newton::{Stop, Work};
+use crate::relax::options::{Options, Progress, RelaxError};
+use crate::relax::prolong::lagrange;
+use crate::relax::richardson::Richardson;
+use crate::relax::run::{Level, Run, positions};
+use crate::relax::solve::relax_on_grids;
+use crate::relax::{Equilibrium, Outcome};
+use crate::scenario::Scenario;
+use glam::DVec3;
+
+/// Nodes between which a position along a vein is interpolated.
+const STENCIL: usize = 7;
+
+/// How far from where it was expected an equilibrium may be: of the way that was
+/// expected, and in lengths of the leaf. Farther away it may be another one.
+const OFF_THE_WAY: f64 = 0.5;
+const NEARBY: f64 = 0.02;
+
+/// A stable leaf at rest on nested grids.
+pub(crate) struct AtRest {
+    /// The grids that are extrapolated, from coarse to fine.
+    pub levels: Vec<Level>,
+    /// What each contributes to the best values.
+    pub weights: Vec<f64>,
+    pub work: Work,
+}
+
+/// Why there is no equilibrium to go on with.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Lost {
+    /// The leaf does not come to rest; why.
+    NotAtRest(String),
+    /// It would have to jump.
+    Elsewhere,
+}
+
+impl AtRest {
+    /// From the start of the scenario.
+    pub fn find(
+        scenario: &Scenario,
+        options: &Options,
+    ) -> Result<Result<(AtRest, Equilibrium), Lost>, RelaxError> {
+        let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
+        let (leaf, levels) = relax_on_grids(scenario, options, tolerance, &mut |_| {})?;
+        if !leaf.outcome.is_at_rest() || leaf.outcome == Outcome::Saddle {
+            let remark = leaf.remark.clone();
+            let why = remark.unwrap_or_else(|| leaf.outcome.word().into());
+            return Ok(Err(Lost::NotAtRest(why)));
+        }
+        Ok(Ok((AtRest::on(levels, leaf.work), leaf)))
+    }
+
+    fn on(levels: Vec<Level>, work: Work) -> AtRest {
+        let first = levels.first().map_or(1, |level| level.leaf.segments());
+        let mut table = Richardson::default();
+        for level in &levels {
+            let segments = level.leaf.segments();
+            table.push(segments, positions(level, (segments / first).max(1)));
+        }
+        let columns = table.best().map_or(0, |best| best.columns);
+        let segments: Vec<usize> = levels.iter().map(|level| level.leaf.segments()).collect();
+        AtRest {
+            weights: extrapolation(&segments, columns),
+            levels,
+            work,
+        }
+    }
+
+    /// The equilibrium of a scenario that differs a little: from this one, moved along
+    /// these responses times these steps.
+    pub fn follow(
+        &self,
+        scenario: &Scenario,
+        responses: &[Vec<Response>],
+        steps: &[f64],
+        options: &Options,
+    ) -> Result<AtRest, Lost> {
+        let leaf = Leaf::new(scenario);
+        // The grid between two others is found again if it is needed.
+        let nested = |level: &&Level| {
+            let first = self.levels[0].leaf.segments();
+            (level.leaf.segments() / first).is_power_of_two()
+                && level.leaf.segments().is_multiple_of(first)
+        };
+        let guesses: Vec<_> = (self.levels.iter().enumerate())
+            .filter(|(_, level)| nested(level))
+            .map(|(k, level)| {
+                let moves = responses
+                    .iter()
+                    .zip(steps)
+                    .map(|(on, step)| (&on[k], *step));
+                let grid = level.leaf.grid.clone();
+                let mut state = moved(level, &leaf, moves);
+                DiscreteLeaf::new(&leaf, grid.clone()).hold_tips(&mut state);
+                (grid, state)
+            })
+            .collect();
+        let expected: Vec<State> = guesses.iter().map(|(_, state)| state.clone()).collect();
+        let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
+        let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
+        let mut run = Run::new(&leaf, options, tolerance, ignored);
+        // As of a reduced leaf: it gives up where the leaf would have to move far.
+        run.whole = Some(&leaf);
+        match run.follow(guesses) {
+            Ok(_) => {}
+            Err(Stop::StepLimit) if run.late() => {
+                return Err(Lost::NotAtRest("the time allowed was over".into()));
+            }
+            Err(_) => return Err(Lost::Elsewhere),
+        }
+        for ((level, expected), before) in run.levels.iter().zip(&expected).zip(&self.levels) {
+            let way = rescaled(before, &leaf).shift_to(expected);
+            if level.state.shift_to(expected) > OFF_THE_WAY * way + NEARBY {
+                return Err(Lost::Elsewhere);
+            }
+        }
+        let work = run.work;
+        let mut levels = run.levels;
+        if let Some(between) = run.between {
+            levels.insert(levels.len() - 1, between);
+        }
+        Ok(AtRest::on(levels, work))
+    }
+
+    /// The best value of what is `on` each grid.
+    pub fn best(&self, on: impl Fn(usize, &Level) -> DVec3) -> DVec3 {
+        let levels = self.levels.iter().zip(&self.weights).enumerate();
+        let known = levels.filter(|(_, (_, weight))| **weight != 0.0);
+        known
+            .map(|(k, (level, weight))| *weight * on(k, level))
+            .sum()
+    }
+
+    /// Nodes and weights on each grid by which values at nodes are interpolated at the
+    /// fraction `sigma`, and the derivatives of the weights with it; beyond the ends the
+    /// values go on linearly.
+    pub fn stencils(&self, sigma: f64) -> Vec<Stencil> {
+        let on = |level: &Level| Stencil::new(level, sigma);
+        self.levels.iter().map(on).collect()
+    }
+}
+
+/// The weights of grids in the values from which `columns` terms of the series in
+/// ds^2 are removed.
+pub(crate) fn extrapolation(segments: &[usize], columns: usize) -> Vec<f64> {
+    let first = segments.len().saturating_sub(columns + 1);
+    let squares: Vec<f64> = segments.iter().map(|&n| (n as f64).powi(2)).collect();
+    let weight = |k: usize| match k < first {
+        true => 0.0,
+        false => (first..segments.len())
+            .filter(|&other| other != k)
+            .map(|other| squares[k] / (squares[k] - squares[other]))
+            .product(),
+    };
+    (0..segments.len()).map(weight).collect()
+}
+
+/// The state of a level in the units of another leaf, whose bases hold it.
+fn rescaled(level: &Level, leaf: &Leaf) -> State {
+    let (from, to) = (level.leaf.leaf.scale, leaf.scale);
+    let (length, force) = (from.length / to.length, from.force() / to.force());
+    let mut state = level.state.clone();
+    state.x.iter_mut().for_each(|x| *x *= length);
+    state.n.iter_mut().for_each(|n| *n *= force);
+    for j in 0..leaf.rods() {
+        let base = state.base(j);
+        state.q[base] = leaf.base(j);
+    }
+    state
+}
+
+fn moved<'r>(
+    level: &Level,
+    leaf: &Leaf,
+    moves: impl Iterator<Item = (&'r Response, f64)>,
+) -> State {
+    let mut sum: Vec<Vec<[f64; 6]>> =
+        vec![vec![[0.0; 6]; level.leaf.segments()]; level.leaf.rods()];
+    let mut carried = vec![DVec3::ZERO; level.state.n.len()];
+    for (response, step) in moves {
+        let increments = sum.iter_mut().flatten().flatten();
+        for (sum, value) in increments.zip(response.nodes.iter().flatten().flatten()) {
+            *sum += step * value;
+        }
+        for (sum, value) in carried.iter_mut().zip(&response.carried) {
+            *sum += step * *value;
+        }
+    }
+    let mut start = Level {
+        leaf: level.leaf.clone(),
+        state: level.state.clone(),
+    };
+    for (j, rod) in sum.iter().enumerate() {
+        let base = start.state.base(j);
+        for (i, increment) in rod.iter().enumerate() {
+            start.state.advance(base + i + 1, increment, 1.0);
+        }
+    }
+    let forces = start.state.n.iter_mut().zip(carried);
+    forces.for_each(|(force, change)| *force += change);
+    rescaled(&start, leaf)
+}
+
+/// Nodes of a grid and their weights in a value between them.
+pub(crate) struct Stencil {
+    first: usize,
+    weights: Vec<f64>,
+    /// Derivatives of the weights with sigma.
+    slopes: Vec<f64>,
+}
+
+impl Stencil {
+    fn new(level: &Level, sigma: f64) -> Stencil {
+        let (beyond, sigma) = (sigma - sigma.clamp(0.0, 1.0), sigma.clamp(0.0, 1.0));
+        let nodes = level.leaf.grid.sigma();
+        // A polynomial does not reach across a kink.
+        let kinks = level.leaf.leaf.kinks();
+        let panel = kinks.partition_point(|&kink| kink < sigma);
+        let low = panel.checked_sub(1).map_or(0.0, |k| kinks[k]);
+        let high = kinks.get(panel).copied().unwrap_or(1.0);
+        let low = nodes.partition_point(|&node| node < low);
+        let high = nodes.partition_point(|&node| node < high);
+        let count = STENCIL.min(high - low + 1);
+        let right = nodes.partition_point(|&node| node < sigma);
+        let first = (right.saturating_sub(count / 2)).clamp(low, high + 1 - count);
+        // Nodes of a panel are equally spaced.
+        let width = nodes[first + 1] - nodes[first];
+        let t = (sigma - nodes[first]) / width;
+        let weight = |a: usize| lagrange(count, a, t);
+        let slope = |a: usize| {
+            let others = (0..count).filter(move |&b| b != a);
+            let term = |b: usize| {
+                let rest = (0..count).filter(|&c| c != a && c != b);
+                let product: f64 = rest
+                    .map(|c| (t - c as f64) / (a as f64 - c as f64))
+                    .product();
+                product / (a as f64 - b as f64)
+            };
+            others.map(term).sum::<f64>() / width
+        };
+        let slopes: Vec<f64> = (0..count).map(slope).collect();
+        let weight = |a: usize| weight(a) + beyond * slopes[a];
+        Stencil {
+            first,
+            weights: (0..count).map(weight).collect(),
+            slopes,
+        }
+    }
+
+    /// Of values at nodes from 0 on.
+    pub fn value(&self, at: impl Fn(usize) -> DVec3) -> DVec3 {
+        let weights = self.weights.iter().enumerate();
+        weights
+            .map(|(a, weight)| *weight * at(self.first + a))
+            .sum()
+    }
+
+    /// The derivative of that with sigma.
+    pub fn slope(&self, at: impl Fn(usize) -> DVec3) -> DVec3 {
+        let slopes = self.slopes.iter().enumerate();
+        slopes.map(|(a, slope)| *slope * at(self.first + a)).sum()
+    }
+}

@@ -1,0 +1,290 @@
+//! What a leaf at rest does when a number of its scenario changes: derivatives of
+//! its results, from the linearised equations on each grid, extrapolated like the
+//! results themselves.
+
+mod nearby;
+mod response;
+mod series;
+
+use self::nearby::clamp_moment_rates;
+pub(crate) use self::nearby::eigenvalue_rate;
+pub(crate) use self::response::responses;
+use self::series::Series;
+use crate::leaf::{DiscreteLeaf, Forces, LeafRate, Response, shift, turn};
+use crate::modes;
+use crate::motion::Physics;
+use crate::relax::equilibrium::{Reaction, Sensitivity};
+use crate::relax::number::Number;
+use crate::relax::run::Level;
+use crate::scenario::Scenario;
+use glam::DVec3;
+
+/// Numbers up to which the equations are solved for each, and everything is known
+/// of it; of more of them for each component of the tip.
+const EACH: usize = 100;
+
+/// Relative error of the eigenvalue's where modes are those of a softened leaf, and the
+/// compliance of one that is.
+const SOFTENED: f64 = 2e-5;
+const SOFTENED_COMPLIANCE: f64 = 1e-6;
+
+/// Unknowns of the finest grid on which eigenvalues are differenced, but for the
+/// first.
+const FEW_UNKNOWNS: usize = 4_000;
+
+/// A number by its name, and the change of the scenario with it.
+type Known<'n, 'a> = (&'n String, &'n Number<'a>, Vec<(f64, Scenario)>);
+
+/// Changes on one grid, in the leaf's units.
+struct Changes {
+    tips: Vec<DVec3>,
+    energy: f64,
+    eigenvalues: Vec<f64>,
+    /// Force, then moments.
+    reaction: Vec<DVec3>,
+    positions: Vec<DVec3>,
+}
+
+/// The derivatives of a leaf's results by these numbers, each of which has a name.
+/// `levels` are its grids from coarse to fine. A number of which the scenario cannot
+/// be differenced, and all where the leaf is at a singular point, are left out.
+pub(crate) fn sensitivities(
+    levels: &[Level],
+    numbers: &[(String, Number)],
+    tolerance: f64,
+    modes: usize,
+) -> Vec<Sensitivity> {
+    let (Some(coarsest), Some(finest)) = (levels.first(), levels.last()) else {
+        return Vec::new();
+    };
+    let leaf = &finest.leaf.leaf;
+    let known: Vec<Known> = (numbers.iter())
+        .filter_map(|(key, number)| Some((key, number, number.rate()?)))
+        .collect();
+    let rates: Vec<LeafRate> = (known.iter())
+        .map(|(_, _, terms)| LeafRate::new(leaf, terms))
+        .collect();
+    let mut found: Vec<[Series; 5]> = (rates.iter())
+        .map(|_| [(); 5].map(|()| Series::new()))
+        .collect();
+    let mut eigenvalues: Vec<f64> = Vec::new();
+    for (k, level) in levels.iter().enumerate() {
+        let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
+        let vibrates = k == 0 || unknowns < FEW_UNKNOWNS;
+        let grid = Grid {
+            level,
+            tolerance,
+            modes: if vibrates { modes } else { 0 },
+            stride: level.leaf.segments() / coarsest.leaf.segments(),
+        };
+        let Some((squared, changes)) = grid.changes(&known, &rates) else {
+            return Vec::new();
+        };
+        if !squared.is_empty() {
+            eigenvalues = squared;
+        }
+        let segments = level.leaf.segments();
+        for (series, changes) in found.iter_mut().zip(changes) {
+            let numbers = |values: Vec<f64>| values.into_iter().map(|value| DVec3::X * value);
+            let [tips, energy, eigenvalues, reaction, positions] = series;
+            tips.push(segments, changes.tips);
+            energy.push(segments, vec![DVec3::X * changes.energy]);
+            eigenvalues.push_any(segments, numbers(changes.eigenvalues).collect());
+            reaction.push_any(segments, changes.reaction);
+            positions.push_any(segments, changes.positions);
+        }
+    }
+    let softened = match finest.leaf.stiffest() < SOFTENED_COMPLIANCE {
+        true => SOFTENED,
+        false => 0.0,
+    };
+    let context = Context {
+        levels: [coarsest, finest],
+        tolerance,
+        softened,
+        eigenvalues,
+    };
+    (known.iter().zip(found))
+        .map(|(known, series)| context.sensitivity(known, series))
+        .collect()
+}
+
+/// What derivatives are put together with.
+struct Context<'l> {
+    /// The coarsest and the finest.
+    levels: [&'l Level; 2],
+    tolerance: f64,
+    /// Relative error of eigenvalues.
+    softened: f64,
+    eigenvalues: Vec<f64>,
+}
+
+impl Context<'_> {
+    fn sensitivity(&self, (key, number, _): &Known, series: [Series; 5]) -> Sensitivity {
+        let leaf = &self.levels[1].leaf.leaf;
+        let scale = leaf.scale;
+        let [tips, energy, eigenvalues, reaction, positions] =
+            series.map(|series| series.judged(self.tolerance));
+        let of = |values: &[DVec3], unit: f64| -> Vec<DVec3> {
+            values.iter().map(|value| *value * unit).collect()
+        };
+        let lowest = eigenvalues.0.first().map(|value| value.x);
+        // omega^2 = (2 pi f)^2, and an eigenvalue is omega^2.
+        let frequency = |(change, squared): (&DVec3, &f64)| {
+            let stable = *squared > 0.0;
+            stable.then(|| change.x / (2.0 * std::f64::consts::TAU * squared.sqrt()))
+        };
+        // Of a nearly rigid leaf higher modes are too rough to be differenced.
+        let known = if self.softened > 0.0 { 1 } else { usize::MAX };
+        let frequencies = eigenvalues.0.iter().zip(&self.eigenvalues);
+        let frequencies = frequencies.take(known).map(frequency);
+        let stations = self.levels[0].leaf.grid.sigma().to_vec();
+        let places = positions.0.chunks(stations.len().max(1));
+        let held = reaction.0.split_first().map(|(force, moments)| Reaction {
+            force: *force * scale.force(),
+            moments: (leaf.held.as_ref())
+                .is_some_and(|held| held.clamps.is_some())
+                .then(|| of(moments, scale.moment())),
+        });
+        Sensitivity {
+            key: (*key).clone(),
+            value: number.value,
+            tips: of(&tips.0, scale.length),
+            tip_error: tips.1.map(|error| error * scale.length),
+            energy: energy.0.first().map_or(f64::NAN, |it| it.x) * scale.moment(),
+            energy_error: energy.1.map(|error| error * scale.moment()),
+            lowest_eigenvalue: lowest,
+            lowest_eigenvalue_error: lowest
+                .and_then(|value| Some(eigenvalues.1? + self.softened * value.abs())),
+            frequencies: frequencies.collect(),
+            tip_reaction_error: (reaction.1)
+                .filter(|_| held.is_some())
+                .map(|error| error * scale.force()),
+            reaction: held,
+            positions: places.map(|rod| of(rod, scale.length)).collect(),
+            positions_error: positions.1.map(|error| error * scale.length),
+            stations,
+        }
+    }
+}
+
+/// A grid on which changes are looked for.
+struct Grid<'l> {
+    level: &'l Level,
+    tolerance: f64,
+    modes: usize,
+    /// From node to node of the coarsest grid.
+    stride: usize,
+}
+
+impl Grid<'_> {
+    /// The squared frequencies, and the changes with each number.
+    fn changes(&self, known: &[Known], rates: &[LeafRate]) -> Option<(Vec<f64>, Vec<Changes>)> {
+        let (leaf, state) = (&self.level.leaf, &self.level.state);
+        let forces: Vec<Forces> = rates.iter().map(|rate| leaf.rate(state, rate)).collect();
+        let moment = leaf.tip_moment();
+        // A dead moment has no potential, and the matrix no real modes.
+        let physics = Physics::new(&leaf.leaf);
+        let modes = match self.modes > 0 && moment == DVec3::ZERO {
+            true => modes::lowest(leaf, &physics, state, self.modes),
+            false => None,
+        };
+        let modes = modes.unwrap_or_default();
+        // In the scenario's unit of time, as their changes are.
+        let squared = |mode: &modes::Eigenpair| mode.eigenvalue / physics.time.powi(2);
+        let eigenvalues = modes.iter().map(squared).collect();
+        let held = leaf.leaf.held.is_some();
+        if forces.len() > EACH && modes.is_empty() && moment == DVec3::ZERO && !held {
+            return Some((eigenvalues, self.of_tips(&forces)?));
+        }
+        let responses = responses(self.level, &forces, self.tolerance)?;
+        let each = known.iter().zip(rates).zip(forces.iter().zip(&responses));
+        let changes = each.map(|(((_, number, _), rate), (forces, response))| {
+            let change = (rate, response);
+            let eigenvalue = |mode: &modes::Eigenpair| {
+                let rate = eigenvalue_rate(self.level, number, change, &mode.shape);
+                rate.filter(|_| !change.0.changes_moment())
+            };
+            let of_modes: Option<Vec<f64>> = modes.iter().map(eigenvalue).collect();
+            // What a dead moment does is not balanced in the energy.
+            let n = leaf.segments();
+            let work = moment.dot(turn(&response.nodes[0][n - 1]));
+            Changes {
+                tips: self
+                    .tips()
+                    .map(|j| shift(&response.nodes[j][n - 1]))
+                    .collect(),
+                energy: forces.energy + work,
+                eigenvalues: of_modes.unwrap_or_default(),
+                reaction: match held {
+                    true => self.reaction(number, change),
+                    false => Vec::new(),
+                },
+                positions: self.positions(response),
+            }
+        });
+        Some((eigenvalues, changes.collect()))
+    }
+
+    fn tips(&self) -> std::ops::Range<usize> {
+        let leaf = &self.level.leaf;
+        0..if leaf.leaf.joined() { 1 } else { leaf.rods() }
+    }
+
+    fn reaction(&self, number: &Number, change: (&LeafRate, &Response)) -> Vec<DVec3> {
+        let leaf = &self.level.leaf;
+        let mut all = vec![leaf.reaction_rate(change.0, change.1)];
+        let clamped = (leaf.leaf.held.as_ref()).is_some_and(|held| held.clamps.is_some());
+        if clamped {
+            all.extend(clamp_moment_rates(self.level, number, change).unwrap_or_default());
+        }
+        all
+    }
+
+    /// Displacements of the nodes that all grids have, rod after rod.
+    fn positions(&self, response: &Response) -> Vec<DVec3> {
+        let rods = response.nodes.iter();
+        let of = |rod: &Vec<[f64; 6]>| -> Vec<DVec3> {
+            let nodes = rod.iter().skip(self.stride - 1).step_by(self.stride);
+            [DVec3::ZERO].into_iter().chain(nodes.map(shift)).collect()
+        };
+        rods.flat_map(of).collect()
+    }
+
+    /// Changes of the tips and of the energy alone, by one solution for each component
+    /// of a tip.
+    fn of_tips(&self, forces: &[Forces]) -> Option<Vec<Changes>> {
+        let (leaf, state) = (&self.level.leaf, &self.level.state);
+        let units = unit_forces(leaf, self.tips().len());
+        let adjoint = responses(self.level, &units, self.tolerance)?;
+        let component = |forces: &Forces, k: usize| leaf.work(state, forces, &adjoint[k]);
+        let tip = |forces: &Forces, tip: usize| {
+            DVec3::from_array([0, 1, 2].map(|axis| component(forces, 3 * tip + axis)))
+        };
+        let changes = |forces: &Forces| Changes {
+            tips: self.tips().map(|k| tip(forces, k)).collect(),
+            energy: forces.energy,
+            eigenvalues: Vec::new(),
+            reaction: Vec::new(),
+            positions: Vec::new(),
+        };
+        Some(forces.iter().map(changes).collect())
+    }
+}
+
+/// A unit force on every tip along every axis.
+fn unit_forces(leaf: &DiscreteLeaf, tips: usize) -> Vec<Forces> {
+    let n = leaf.segments();
+    let force = |(tip, axis): (usize, usize)| {
+        let mut nodes = vec![vec![[0.0; 6]; n]; leaf.rods()];
+        nodes[tip][n - 1][3 + axis] = 1.0;
+        Forces {
+            nodes,
+            gaps: vec![DVec3::ZERO; leaf.rods() * n],
+            energy: 0.0,
+            tips: Vec::new(),
+        }
+    };
+    let all = (0..tips).flat_map(|tip| (0..3).map(move |axis| (tip, axis)));
+    all.map(force).collect()
+}

@@ -1,0 +1,87 @@
+//! A fit as people read it, and as a table.
+
+use std::io::{self, Write};
+
+use crate::study::{Fit, FitOutcome, FitParameter};
+
+use super::numbers::{brief, seconds};
+use super::table::{Lines, lay_out, under, write_csv};
+
+/// Candidates that are told.
+const CANDIDATES: usize = 5;
+
+/// What was found and what it is worth.
+pub fn report(fit: &Fit, files: Option<String>) -> String {
+    let found = match fit.outcome {
+        FitOutcome::Converged => "a minimum; the data determine every free number",
+        FitOutcome::Undetermined => "a minimum; the data do not determine every free number",
+        FitOutcome::NotConverged => "no minimum",
+    };
+    let mut lines: Lines = vec![("found", found.into())];
+    lines.extend(under(
+        "numbers",
+        fit.parameters.iter().map(number).collect(),
+    ));
+    lines.extend(under("data say", fit.says.clone()));
+    let (count, freedom) = (fit.residuals.len(), fit.degrees_of_freedom);
+    lines.push((
+        "misfit",
+        match fit.standard_deviation {
+            Some(sd) => format!(
+                "standard deviation {} over {count} data, {freedom} degrees of freedom",
+                brief(sd)
+            ),
+            None => format!(
+                "chi squared {} over {count} data, {freedom} degrees of freedom",
+                brief(fit.chi_squared)
+            ),
+        },
+    ));
+    let candidates = fit.candidates.iter().take(CANDIDATES).map(|candidate| {
+        let said = match &candidate.remark {
+            Some(remark) => remark.clone(),
+            None => format!(
+                "{:.1} bits; what is least known shrinks to {:.2} of it",
+                candidate.bits, candidate.shrinks
+            ),
+        };
+        format!("{}: {said}", candidate.experiment)
+    });
+    lines.extend(under("measure", candidates.collect()));
+    let time = seconds(fit.wall_seconds);
+    let evaluations = fit.work.evaluations;
+    lines.push((
+        "work",
+        format!("all leaves brought to rest {evaluations} times in {time}"),
+    ));
+    lines.extend(files.map(|files| ("written", files)));
+    lines.extend(under("remark", fit.remarks.clone()));
+    lay_out(
+        &format!(
+            "{}: fit of {} numbers to {count} data",
+            fit.scenario,
+            fit.parameters.len()
+        ),
+        &lines,
+    )
+}
+
+fn number(parameter: &FitParameter) -> String {
+    let end = |end: Option<f64>| end.map_or("?".into(), brief);
+    let (low, high) = (end(parameter.low), end(parameter.high));
+    let key = &parameter.key;
+    match parameter.determined {
+        true => format!("{key} = {} (95 %: {low} to {high})", brief(parameter.value)),
+        false => format!("{key} not determined (95 %: {low} to {high})"),
+    }
+}
+
+/// `fit.csv`: one row a datum.
+pub fn table(fit: &Fit, out: &mut dyn Write) -> io::Result<()> {
+    write_csv(&fit.residuals, out)
+}
+
+/// `fitted.toml`: the scenario with the values in place.
+pub fn fitted(fit: &Fit, out: &mut dyn Write) -> io::Result<()> {
+    out.write_all(fit.fitted.as_bytes())
+}

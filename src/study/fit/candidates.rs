@@ -1,0 +1,68 @@
+//! Which experiment would say most.
+
+use nalgebra::DMatrix;
+
+use super::FitError;
+use super::case::{Component, What};
+use super::data::{Data, Experiment};
+use super::judge::Judge;
+use super::model::Model;
+use super::result::FitCandidate;
+
+/// What is known of a coordinate beforehand: a factor of ten each way, as 95 %.
+const BEFORE: f64 = std::f64::consts::LN_10 / super::directions::NORMAL;
+
+/// What each of these experiments would add to what the fit knows, the one that adds
+/// most first. Its data are as accurate as said, or as those of the fit.
+pub(super) fn judge(judge: &Judge, wanted: &[Experiment]) -> Result<Vec<FitCandidate>, FitError> {
+    let count = judge.values.len();
+    let known = judge.jacobian.transpose() * &judge.jacobian / judge.spread.powi(2);
+    let known = known + DMatrix::identity(count, count) / BEFORE.powi(2);
+    let mut found = Vec::new();
+    for experiment in wanted {
+        let data = Data {
+            experiments: vec![experiment.clone()],
+            traced: Vec::new(),
+        };
+        let of = judge.model;
+        let model = Model::new(of.base, of.coordinates, of.options, data)?;
+        let mut candidate = FitCandidate {
+            experiment: experiment.name.clone(),
+            bits: 0.0,
+            shrinks: 1.0,
+            remark: None,
+        };
+        match added(judge, &model) {
+            Err(refused) => candidate.remark = Some(refused),
+            Ok(added) => {
+                let with = &known + &added;
+                let size = |matrix: &DMatrix<f64>| {
+                    let values = matrix.clone().symmetric_eigen().eigenvalues;
+                    let least = values.min();
+                    (values.iter().map(|value| value.log2()).sum::<f64>(), least)
+                };
+                let ((before, least_before), (after, least_after)) = (size(&known), size(&with));
+                candidate.bits = 0.5 * (after - before);
+                candidate.shrinks = (least_before / least_after).sqrt();
+            }
+        }
+        found.push(candidate);
+    }
+    found.sort_by(|a, b| b.bits.total_cmp(&a.bits));
+    Ok(found)
+}
+
+fn added(judge: &Judge, model: &Model) -> Result<DMatrix<f64>, String> {
+    let found = model.find(&judge.point.theta);
+    let (mut point, _) = found.map_err(|refused| refused.to_string())?;
+    (model.differentiate(&mut point)).map_err(|_| "its equilibrium is singular".to_string())?;
+    let sd = |component: &Component| match component.what {
+        What::Result(quantity) => component.sd.or(judge.assumed(quantity.kind())),
+        What::Vein { .. } => component.sd,
+    };
+    let sd: Option<Vec<f64>> = point.components().map(sd).collect();
+    let sd = sd.ok_or("its standard deviation must be given (sd_frequency_1, sd_tip_x, ...)")?;
+    let rows: Vec<&Vec<f64>> = point.gradients().collect();
+    let jacobian = DMatrix::from_fn(rows.len(), judge.values.len(), |i, k| rows[i][k] / sd[i]);
+    Ok(jacobian.transpose() * jacobian)
+}

@@ -1,0 +1,263 @@
+//! A leaf at rest under the conditions of one experiment, what it predicts for the
+//! data, and how that changes.
+
+use glam::DVec3;
+
+use super::data::{Measured, Origin, Traced};
+use super::quantity::{Kind, Quantity};
+use super::vein::Vein;
+use crate::leaf::{LeafRate, Response, shift};
+use crate::modes;
+use crate::motion::Physics;
+use crate::relax::{AtRest, Level, Lost, Number, eigenvalue_rate, extrapolation};
+use crate::study::Keys;
+
+/// Unknowns of the finest grid on which modes are looked for, but for the first.
+const FEW_UNKNOWNS: usize = 4_000;
+
+/// A leaf under the conditions of one experiment, and what was seen of it.
+pub(super) struct Case {
+    pub name: String,
+    pub settings: Vec<(Keys, f64)>,
+    pub measured: Vec<Measured>,
+    pub traced: Vec<Traced>,
+    pub origin: Option<Origin>,
+}
+
+/// One number that is compared.
+#[derive(Clone, Debug)]
+pub(super) struct Component {
+    /// The experiment.
+    pub case: usize,
+    pub what: What,
+    pub observed: f64,
+    pub model: f64,
+    /// Its standard deviation, if it is known.
+    pub sd: Option<f64>,
+    /// Whether another of the same point takes its place in the count: a point beside
+    /// a curve says nothing about the place along it.
+    pub free: bool,
+    pub origin: Option<Origin>,
+}
+
+/// What is compared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum What {
+    Result(Quantity),
+    /// A coordinate of a point of a rod, at this fraction of its length.
+    Vein {
+        rod: usize,
+        axis: usize,
+        sigma: f64,
+    },
+}
+
+impl What {
+    /// What kind of number it is.
+    pub fn kind(self) -> Kind {
+        match self {
+            What::Result(quantity) => quantity.kind(),
+            What::Vein { .. } => Kind::Length,
+        }
+    }
+}
+
+/// A leaf at rest for some values of the free numbers.
+pub(super) struct CaseAt {
+    pub at: AtRest,
+    /// Modes on the first grids.
+    pub modes: Vec<Vec<modes::Eigenpair>>,
+    pub components: Vec<Component>,
+    /// How it answers each number, on every grid, and the gradients of the
+    /// components; empty until asked for.
+    pub responses: Vec<Vec<Response>>,
+    pub gradients: Vec<Vec<f64>>,
+}
+
+impl CaseAt {
+    /// Predictions of a leaf at rest, beside the data of this experiment.
+    pub fn new(of: &Case, case: usize, at: AtRest) -> Result<CaseAt, Lost> {
+        let frequencies = of
+            .measured
+            .iter()
+            .filter_map(|measured| match measured.quantity {
+                Quantity::Frequency(mode) => Some(mode),
+                _ => None,
+            });
+        let count = frequencies.max().unwrap_or(0);
+        let mut modes = Vec::new();
+        for level in at.levels.iter().filter(|_| count > 0) {
+            let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
+            if modes.is_empty() || unknowns < FEW_UNKNOWNS {
+                let physics = Physics::new(&level.leaf.leaf);
+                let pairs = modes::lowest(&level.leaf, &physics, &level.state, count);
+                let lost = || Lost::NotAtRest("its frequencies cannot be found".into());
+                let pairs = pairs
+                    .filter(|pairs| pairs.len() == count)
+                    .ok_or_else(lost)?;
+                modes.push(pairs);
+            }
+        }
+        let mut found = CaseAt {
+            at,
+            modes,
+            components: Vec::new(),
+            responses: Vec::new(),
+            gradients: Vec::new(),
+        };
+        for measured in &of.measured {
+            found.components.push(Component {
+                case,
+                what: What::Result(measured.quantity),
+                observed: measured.value.unwrap_or(f64::NAN),
+                model: found.result(measured.quantity),
+                sd: measured.sd,
+                free: false,
+                origin: of.origin.clone(),
+            });
+        }
+        let mut veins: Vec<Option<Vein>> = Vec::new();
+        for traced in &of.traced {
+            veins.resize_with(veins.len().max(traced.rod + 1), || None);
+            let vein = veins[traced.rod].get_or_insert_with(|| Vein::of(&found.at, traced.rod));
+            let (sigma, beside) = match traced.sigma {
+                Some(sigma) => (sigma, false),
+                None => (vein.nearest(traced.at), true),
+            };
+            let model = vein.at(sigma);
+            let seen = traced.at.iter().enumerate();
+            let seen = seen.filter_map(|(axis, value)| value.map(|value| (axis, value)));
+            for (number, (axis, observed)) in seen.enumerate() {
+                found.components.push(Component {
+                    case,
+                    what: What::Vein {
+                        rod: traced.rod,
+                        axis,
+                        sigma,
+                    },
+                    observed,
+                    model: model[axis],
+                    sd: traced.sd,
+                    free: beside && number == 0,
+                    origin: Some(traced.origin.clone()),
+                });
+            }
+        }
+        Ok(found)
+    }
+
+    fn length(&self) -> f64 {
+        self.at.levels[0].leaf.leaf.scale.length
+    }
+
+    fn force(&self) -> f64 {
+        self.at.levels[0].leaf.leaf.scale.force()
+    }
+
+    pub fn result(&self, quantity: Quantity) -> f64 {
+        match quantity {
+            Quantity::Tip(axis) => {
+                let tip = self.at.best(|_, level| level.state.tip(0));
+                tip[axis] * self.length()
+            }
+            Quantity::Reaction(axis) => {
+                let force = self.at.best(|_, level| level.leaf.reaction(&level.state).0);
+                force[axis] * self.force()
+            }
+            Quantity::Frequency(mode) => {
+                let physics = Physics::new(&self.at.levels[0].leaf.leaf);
+                self.eigenvalue(mode).max(0.0).sqrt() / (std::f64::consts::TAU * physics.time)
+            }
+        }
+    }
+
+    /// An eigenvalue, extrapolated over the grids on which modes are known.
+    fn eigenvalue(&self, mode: usize) -> f64 {
+        self.over_modes(|level| self.modes[level][mode - 1].eigenvalue)
+    }
+
+    fn over_modes(&self, value: impl Fn(usize) -> f64) -> f64 {
+        let segments = self.at.levels.iter().map(|level| level.leaf.segments());
+        let segments: Vec<usize> = segments.take(self.modes.len()).collect();
+        let weights = extrapolation(&segments, segments.len() - 1);
+        weights
+            .iter()
+            .enumerate()
+            .map(|(k, weight)| weight * value(k))
+            .sum()
+    }
+
+    /// The change of a result with a number of the scenario.
+    pub fn result_rate(
+        &self,
+        quantity: Quantity,
+        (number, rate, answers): (&Number, &LeafRate, &[Response]),
+    ) -> f64 {
+        match quantity {
+            Quantity::Tip(axis) => {
+                let tip = |k: usize, level: &Level| {
+                    shift(&answers[k].nodes[0][level.leaf.segments() - 1])
+                };
+                self.at.best(tip)[axis] * self.length()
+            }
+            Quantity::Reaction(axis) => {
+                let force = |k: usize, level: &Level| level.leaf.reaction_rate(rate, &answers[k]);
+                self.at.best(force)[axis] * self.force()
+            }
+            Quantity::Frequency(mode) => {
+                let of = |k: usize| {
+                    let shape = &self.modes[k][mode - 1].shape;
+                    let (level, answer) = (&self.at.levels[k], &answers[k]);
+                    eigenvalue_rate(level, number, (rate, answer), shape).unwrap_or(0.0)
+                };
+                // omega^2 = (2 pi f)^2.
+                let frequency = self.result(quantity);
+                self.over_modes(of) / (2.0 * std::f64::consts::TAU.powi(2) * frequency)
+            }
+        }
+    }
+
+    /// The changes of the coordinates of a point on a vein; of the nearest one to a
+    /// point that was not marked only those across the vein.
+    pub fn vein_rates(
+        &self,
+        rod: usize,
+        sigma: f64,
+        point: &[&Component],
+        slopes: &[f64],
+    ) -> Vec<Vec<f64>> {
+        let stencils = self.at.stencils(sigma);
+        let axes: Vec<usize> = (point.iter())
+            .map(|component| match component.what {
+                What::Vein { axis, .. } => axis,
+                What::Result(_) => 0,
+            })
+            .collect();
+        let mut along = DVec3::ZERO;
+        if point.iter().any(|component| component.free) {
+            let slope = self.at.best(|k, level| {
+                let base = level.state.base(rod);
+                stencils[k].slope(|i| level.state.x[base + i])
+            });
+            axes.iter().for_each(|&axis| along[axis] = slope[axis]);
+            along = along.normalize_or_zero();
+        }
+        let change = |answers: &Vec<Response>| {
+            let change = self.at.best(|k, _| {
+                stencils[k].value(|i| match i {
+                    0 => DVec3::ZERO,
+                    _ => shift(&answers[k].nodes[rod][i - 1]),
+                })
+            }) * self.length();
+            let mut seen = DVec3::ZERO;
+            axes.iter().for_each(|&axis| seen[axis] = change[axis]);
+            seen - seen.dot(along) * along
+        };
+        let changes: Vec<DVec3> = self.responses.iter().map(change).collect();
+        let row = |&axis: &usize| {
+            let all = changes.iter().zip(slopes);
+            all.map(|(change, slope)| change[axis] * slope).collect()
+        };
+        axes.iter().map(row).collect()
+    }
+}

@@ -1,0 +1,348 @@
+//! Measured data, as read from CSV: experiments and traced veins.
+
+use std::collections::BTreeMap;
+
+use super::FitError;
+use super::quantity::Quantity;
+use crate::study::Keys;
+
+/// Where a number was read: a file and a line of it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Origin {
+    /// Name of the file.
+    pub file: String,
+    /// Line, counted from 1.
+    pub line: usize,
+}
+
+impl std::fmt::Display for Origin {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{}:{}", self.file, self.line)
+    }
+}
+
+/// A number that was measured.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// Of what.
+    pub quantity: Quantity,
+    /// Its value; of a candidate there is none.
+    pub value: Option<f64>,
+    /// Its standard deviation, if it is known.
+    pub sd: Option<f64>,
+}
+
+/// One experiment.
+#[derive(Clone, Debug)]
+pub struct Experiment {
+    /// Its name, or its number among all.
+    pub name: String,
+    /// Numbers of the scenario while it was made.
+    pub settings: Vec<(Keys, f64)>,
+    /// What was measured.
+    pub measured: Vec<Measured>,
+    /// Where it stands.
+    pub origin: Option<Origin>,
+}
+
+/// A point on a vein.
+#[derive(Clone, Debug)]
+pub struct Traced {
+    /// The name of its experiment; none: the scenario as it is.
+    pub experiment: Option<String>,
+    /// Rod, counted from 0.
+    pub rod: usize,
+    /// Fraction of the length, of a point that was marked.
+    pub sigma: Option<f64>,
+    /// Coordinates that were seen.
+    pub at: [Option<f64>; 3],
+    /// Standard deviation of each, if it is known.
+    pub sd: Option<f64>,
+    /// Where it stands.
+    pub origin: Origin,
+}
+
+/// All data.
+#[derive(Clone, Debug, Default)]
+pub struct Data {
+    /// Experiments.
+    pub experiments: Vec<Experiment>,
+    /// Points on veins.
+    pub traced: Vec<Traced>,
+}
+
+/// A table as written.
+struct Sheet<'t> {
+    file: &'t str,
+    header: Vec<&'t str>,
+    /// Lines, counted from 1, and their cells.
+    rows: Vec<(usize, Vec<&'t str>)>,
+}
+
+fn refuse(file: &str, line: usize, why: impl std::fmt::Display) -> FitError {
+    FitError::Data(format!("{file}:{line}: {why}"))
+}
+
+fn unquoted(cell: &str) -> &str {
+    let cell = cell.trim();
+    let inner = cell.strip_prefix('"').and_then(|c| c.strip_suffix('"'));
+    inner.unwrap_or(cell).trim()
+}
+
+impl<'t> Sheet<'t> {
+    fn of(text: &'t str, file: &'t str) -> Result<Self, FitError> {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line));
+        let mut lines = lines
+            .filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
+        let Some((first, header)) = lines.next() else {
+            return Err(refuse(
+                file,
+                1,
+                "is empty: give a header, and a row for each datum",
+            ));
+        };
+        let header: Vec<&str> = header.split(',').map(unquoted).collect();
+        if header.iter().any(|name| name.parse::<f64>().is_ok()) {
+            let why = "has no header: the first line names the columns, such as \
+                       load.tip_force[0],tip_x,sd_tip_x, or rod,sigma,x,y,z";
+            return Err(refuse(file, first, why));
+        }
+        for (k, name) in header.iter().enumerate() {
+            if header[..k].contains(name) {
+                let why = format!("the column {name} stands there twice: leave one out");
+                return Err(refuse(file, first, why));
+            }
+        }
+        let mut rows = Vec::new();
+        for (line, text) in lines {
+            let cells: Vec<&str> = text.split(',').map(unquoted).collect();
+            if cells.len() != header.len() {
+                let (found, wanted) = (cells.len(), header.len());
+                let why = format!(
+                    "has {found} cells, and the header {wanted}: cells are divided by commas, \
+                     numbers have a decimal point"
+                );
+                return Err(refuse(file, line, why));
+            }
+            rows.push((line, cells));
+        }
+        if rows.is_empty() {
+            return Err(refuse(file, first, "has no row below the header"));
+        }
+        Ok(Sheet { file, header, rows })
+    }
+
+    /// The number in a cell; `None` if it is empty.
+    fn number(&self, row: usize, column: usize) -> Result<Option<f64>, FitError> {
+        let (line, cells) = &self.rows[row];
+        let cell = cells[column];
+        if cell.is_empty() {
+            return Ok(None);
+        }
+        match cell.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(Some(value)),
+            _ => {
+                let name = self.header[column];
+                let why = format!(
+                    "{name} = {cell}: must be a finite number, or empty where nothing was measured"
+                );
+                Err(refuse(self.file, *line, why))
+            }
+        }
+    }
+
+    fn positive(&self, row: usize, column: usize) -> Result<Option<f64>, FitError> {
+        let number = self.number(row, column)?;
+        if let Some(value) = number.filter(|value| *value <= 0.0) {
+            let name = self.header[column];
+            let why = format!("{name} = {value}: a standard deviation is greater than 0");
+            return Err(refuse(self.file, self.rows[row].0, why));
+        }
+        Ok(number)
+    }
+}
+
+impl Data {
+    /// Adds a file of measured data; `veins` is the number of rods.
+    ///
+    /// # Errors
+    /// If it is not of the form.
+    pub fn read(&mut self, text: &str, file: &str, veins: usize) -> Result<(), FitError> {
+        let sheet = Sheet::of(text, file)?;
+        match sheet.header.contains(&"rod") {
+            true => self.read_traced(&sheet, veins),
+            false => {
+                let experiments = experiments(&sheet, false, self.experiments.len())?;
+                self.experiments.extend(experiments);
+                Ok(())
+            }
+        }
+    }
+
+    fn read_traced(&mut self, sheet: &Sheet, veins: usize) -> Result<(), FitError> {
+        let known = ["rod", "x", "y", "z", "sigma", "sd", "experiment"];
+        let strange = sheet.header.iter().find(|name| !known.contains(name));
+        if let Some(name) = strange {
+            let why = format!(
+                "unknown column {name}: points on veins have {}",
+                known.join(", ")
+            );
+            return Err(refuse(sheet.file, 1, why));
+        }
+        let column = |name: &str| sheet.header.iter().position(|known| *known == name);
+        for row in 0..sheet.rows.len() {
+            let line = sheet.rows[row].0;
+            let number = |name: &str| match column(name) {
+                Some(column) => sheet.number(row, column),
+                None => Ok(None),
+            };
+            let rod = number("rod")?.filter(|rod| rod.fract() == 0.0);
+            let Some(rod) = rod.filter(|rod| (1.0..=veins as f64).contains(rod)) else {
+                let why = format!("rod: must be a whole number from 1 to {veins} (leaf.rods)");
+                return Err(refuse(sheet.file, line, why));
+            };
+            let sigma = number("sigma")?;
+            if let Some(sigma) = sigma.filter(|sigma| !(0.0..=1.0).contains(sigma)) {
+                let why =
+                    format!("sigma = {sigma}: is a fraction of the vein's length, from 0 to 1");
+                return Err(refuse(sheet.file, line, why));
+            }
+            let at = [number("x")?, number("y")?, number("z")?];
+            let seen = at.iter().flatten().count();
+            if seen < 2 && sigma.is_none() || seen == 0 {
+                let why = "at least two of x, y, z are needed, or one and sigma";
+                return Err(refuse(sheet.file, line, why));
+            }
+            let experiment = column("experiment").map(|column| sheet.rows[row].1[column]);
+            self.traced.push(Traced {
+                experiment: experiment.filter(|name| !name.is_empty()).map(String::from),
+                rod: rod as usize - 1,
+                sigma,
+                at,
+                sd: match column("sd") {
+                    Some(column) => sheet.positive(row, column)?,
+                    None => None,
+                },
+                origin: Origin {
+                    file: sheet.file.into(),
+                    line,
+                },
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Experiments that could be made: as those that were, but nothing is measured yet.
+///
+/// # Errors
+/// If the table is not of the form.
+pub fn candidates(text: &str, file: &str) -> Result<Vec<Experiment>, FitError> {
+    experiments(&Sheet::of(text, file)?, true, 0)
+}
+
+/// What a column of experiments is.
+enum Column {
+    Name,
+    Setting(Keys),
+    Result(Quantity),
+    Deviation(Quantity),
+}
+
+fn column(sheet: &Sheet, name: &str) -> Result<Column, FitError> {
+    let quantity = |text: &str| text.parse::<Quantity>().ok();
+    if name == "experiment" {
+        return Ok(Column::Name);
+    }
+    if let Some(quantity) = quantity(name) {
+        return Ok(Column::Result(quantity));
+    }
+    if let Some(quantity) = name.strip_prefix("sd_").and_then(quantity) {
+        return Ok(Column::Deviation(quantity));
+    }
+    name.parse().map(Column::Setting).map_err(|refused| {
+        let why = match name.contains('.') {
+            true => format!("column {refused}"),
+            false => format!(
+                "unknown column {name}: columns are keys of the scenario, such as \
+                 load.tip_force[0], results ({}), their standard deviations (sd_tip_x), and \
+                 experiment, a name",
+                Quantity::ALL
+            ),
+        };
+        refuse(sheet.file, 1, why)
+    })
+}
+
+fn experiments(
+    sheet: &Sheet,
+    candidates: bool,
+    before: usize,
+) -> Result<Vec<Experiment>, FitError> {
+    let columns = sheet.header.iter().map(|name| column(sheet, name));
+    let columns = columns.collect::<Result<Vec<_>, _>>()?;
+    let results: Vec<Quantity> = (columns.iter())
+        .filter_map(|column| match column {
+            Column::Result(quantity) => Some(*quantity),
+            _ => None,
+        })
+        .collect();
+    for column in &columns {
+        if let Column::Deviation(quantity) = column
+            && !results.contains(quantity)
+        {
+            let why = format!("sd_{quantity} without {quantity}: add that column");
+            return Err(refuse(sheet.file, 1, why));
+        }
+    }
+    if results.is_empty() && candidates {
+        let why = format!("no column is a result ({})", Quantity::ALL);
+        return Err(refuse(sheet.file, 1, why));
+    }
+    let mut found = Vec::new();
+    for (row, (line, cells)) in sheet.rows.iter().enumerate() {
+        let mut experiment = Experiment {
+            name: (before + row + 1).to_string(),
+            settings: Vec::new(),
+            measured: Vec::new(),
+            origin: Some(Origin {
+                file: sheet.file.into(),
+                line: *line,
+            }),
+        };
+        let mut deviations = BTreeMap::new();
+        for (k, column) in columns.iter().enumerate() {
+            match column {
+                Column::Name if !cells[k].is_empty() => experiment.name = cells[k].into(),
+                Column::Name => {}
+                Column::Setting(keys) => {
+                    let Some(value) = sheet.number(row, k)? else {
+                        let why = format!("{keys} is empty: every experiment needs its value");
+                        return Err(refuse(sheet.file, *line, why));
+                    };
+                    experiment.settings.push((keys.clone(), value));
+                }
+                Column::Result(quantity) => {
+                    let value = sheet.number(row, k)?;
+                    if value.is_some() || candidates {
+                        experiment.measured.push(Measured {
+                            quantity: *quantity,
+                            value,
+                            sd: None,
+                        });
+                    }
+                }
+                Column::Deviation(quantity) => {
+                    deviations.insert(quantity.to_string(), sheet.positive(row, k)?);
+                }
+            }
+        }
+        for measured in &mut experiment.measured {
+            let sd = deviations.get(&measured.quantity.to_string());
+            measured.sd = sd.copied().flatten();
+        }
+        found.push(experiment);
+    }
+    Ok(found)
+}

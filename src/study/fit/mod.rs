@@ -1,0 +1,195 @@
+//! From measurements to the numbers of a scenario: least squares over experiments and
+//! traced veins, and what the data say about each number and what they do not.
+//!
+//! The leaves of all experiments are followed from equilibrium to equilibrium, with
+//! derivatives from their linearised equations, so that a fit does not hop between
+//! branches. Positive numbers are fitted by their logarithms.
+
+mod candidates;
+mod case;
+mod data;
+mod directions;
+mod found;
+mod free;
+mod interval;
+mod judge;
+mod least_squares;
+mod model;
+mod quantity;
+mod result;
+mod vein;
+mod words;
+
+pub use data::{Data, Experiment, Measured, Origin, Traced};
+pub use free::Free;
+pub use quantity::Quantity as MeasuredQuantity;
+pub use result::{Fit, FitCandidate, FitLeaf, FitOutcome, FitParameter, FitResidual, FitWork};
+
+use std::time::Instant;
+
+use super::{Base, VaryError};
+use crate::limit::Limit;
+use crate::relax::{Options, RelaxError, check_tolerance};
+use free::Coordinate;
+use judge::Judge;
+use least_squares::{ASSUMED, End, Iteration, Weighing};
+use model::Model;
+
+/// Minima that are left for better ones.
+const MOST_MINIMA: usize = 4;
+
+/// Why nothing can be fitted.
+#[derive(Debug, thiserror::Error)]
+pub enum FitError {
+    /// Data that cannot be used.
+    #[error("{0}")]
+    Data(String),
+    /// A number that cannot be free.
+    #[error("{0}")]
+    Free(String),
+    /// An experiment whose leaf does not come to rest.
+    #[error("{0}")]
+    NoEquilibrium(String),
+    /// A scenario that is refused.
+    #[error(transparent)]
+    Vary(#[from] VaryError),
+    /// A relaxation that cannot be.
+    #[error(transparent)]
+    Relax(#[from] RelaxError),
+}
+
+/// What is to be fitted to what.
+#[derive(Clone, Debug)]
+pub struct FitRequest {
+    /// The scenario: its numbers are where the fit starts.
+    pub base: Base,
+    /// The data.
+    pub data: Data,
+    /// The numbers that are free.
+    pub free: Vec<Free>,
+    /// Whether data far off the others count less (Huber's weights).
+    pub robust: bool,
+    /// Experiments that could be made: which of them would say most?
+    pub candidates: Vec<Experiment>,
+    /// Replaces the scenario's tolerance.
+    pub tolerance: Option<f64>,
+    /// When to give up.
+    pub limit: Limit,
+}
+
+impl FitRequest {
+    /// Experiments that could be made, from a table like that of experiments.
+    ///
+    /// # Errors
+    /// If it is not of the form.
+    pub fn read_candidates(text: &str, file: &str) -> Result<Vec<Experiment>, FitError> {
+        data::candidates(text, file)
+    }
+}
+
+/// Fits the free numbers to the data. `progress` is told the number of each step and
+/// the sum of squares.
+///
+/// # Errors
+/// Requests that cannot be met; how the fit itself ended is its outcome.
+pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result<Fit, FitError> {
+    let clock = Instant::now();
+    let base = &request.base;
+    if let Some(tolerance) = request.tolerance {
+        check_tolerance(tolerance)?;
+    }
+    let free = expanded(request)?;
+    let coordinates = free.iter().map(|free| Coordinate::new(base, free));
+    let coordinates = coordinates.collect::<Result<Vec<_>, _>>()?;
+    for (k, one) in coordinates.iter().enumerate() {
+        if coordinates[..k]
+            .iter()
+            .any(|other| other.keys.overlaps(&one.keys))
+        {
+            let keys = &one.keys;
+            return Err(FitError::Free(format!(
+                "{keys}: is free twice: leave one out"
+            )));
+        }
+    }
+    let options = Options {
+        tolerance: request.tolerance,
+        limit: request.limit.clone(),
+        ..Options::default()
+    };
+    let model = Model::new(base, &coordinates, &options, request.data.clone())?;
+    let start: Vec<f64> = coordinates.iter().map(|free| free.start).collect();
+    let (first, _) = model.find(&start)?;
+    let known = model.check_deviations(&first)?;
+    let count = first
+        .components()
+        .filter(|component| !component.free)
+        .count();
+    if coordinates.is_empty() || coordinates.len() > count {
+        let free = coordinates.len();
+        return Err(FitError::Free(match free {
+            0 => "no number is free: name at least one".into(),
+            _ => format!(
+                "{free} numbers are free, and there are {count} data: free fewer, or measure more"
+            ),
+        }));
+    }
+    if !known && coordinates.len() == count {
+        return Err(FitError::Free(format!(
+            "{count} numbers are free, and there are as many data, whose standard deviations are not \
+             known: nothing is left to tell them: add columns sd_tip_x, ..., free fewer, or measure more"
+        )));
+    }
+    let weighing = Weighing {
+        assumed: ASSUMED * unit(&first, base.scenario().scale().length),
+        robust: request.robust,
+    };
+    let mut point = first;
+    let mut evaluations = 0;
+    let mut attempts = 0;
+    let mut found = loop {
+        let (least, end, more) = Iteration::new(&model, weighing, progress).run(point);
+        evaluations += more;
+        attempts += 1;
+        let judge = Judge::new(&model, weighing, known, &least, evaluations);
+        let parameters = match end {
+            End::Converged => interval::intervals(&judge, progress),
+            _ => Ok(interval::without_intervals(&judge)),
+        };
+        match parameters {
+            Ok(parameters) => break found::fit(&judge, &end, parameters, &request.candidates),
+            Err(better) if attempts < MOST_MINIMA => point = better,
+            Err(_) => {
+                let parameters = interval::without_intervals(&judge);
+                break found::fit(&judge, &End::MostSteps, parameters, &request.candidates);
+            }
+        }
+    };
+    found.wall_seconds = clock.elapsed().as_secs_f64();
+    Ok(found)
+}
+
+/// What the data are measured by: the length of the leaf, or the largest of them.
+fn unit(point: &model::Point, length: f64) -> f64 {
+    let kind = point.components().next().map(|first| first.what.kind());
+    match kind {
+        None | Some(quantity::Kind::Length) => length,
+        Some(_) => {
+            let sizes = point.components().map(|component| component.observed.abs());
+            sizes.fold(0.0, f64::max).max(f64::MIN_POSITIVE)
+        }
+    }
+}
+
+/// The free numbers, with every entry of a list or a profile in its place.
+fn expanded(request: &FitRequest) -> Result<Vec<Free>, FitError> {
+    let mut all = Vec::new();
+    for free in &request.free {
+        let entries = request.base.entries_of(&free.keys);
+        all.extend(entries.into_iter().map(|keys| Free {
+            keys,
+            bounds: free.bounds,
+        }));
+    }
+    Ok(all)
+}

@@ -1,0 +1,71 @@
+//! What can be measured on a leaf.
+
+use std::str::FromStr;
+
+/// What can be measured on a leaf.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// A coordinate of the joint tip, or of the only rod's: 0, 1, 2.
+    Tip(usize),
+    /// A component of the force that the holder of a held tip feels: 0, 1, 2.
+    Reaction(usize),
+    /// The frequency of a mode in cycles per time; modes are numbered from 1.
+    Frequency(usize),
+}
+
+impl Quantity {
+    /// What is measured, in words that allow for their plural.
+    pub(super) const ALL: &str =
+        "tip_x, tip_y, tip_z, reaction_x, reaction_y, reaction_z, frequency_1, frequency_2, ...";
+
+    /// What kind of number it is.
+    pub(super) fn kind(self) -> Kind {
+        match self {
+            Quantity::Tip(_) => Kind::Length,
+            Quantity::Reaction(_) => Kind::Force,
+            Quantity::Frequency(_) => Kind::Frequency,
+        }
+    }
+}
+
+/// Kinds of data, which can only be weighed against each other by their deviations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Length,
+    Force,
+    Frequency,
+}
+
+/// Names of the axes.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+impl FromStr for Quantity {
+    type Err = ();
+
+    fn from_str(text: &str) -> Result<Self, ()> {
+        match text.split_once('_') {
+            Some((what @ ("tip" | "reaction"), axis)) => {
+                let axis = AXES.iter().position(|name| *name == axis).ok_or(())?;
+                Ok(match what {
+                    "tip" => Quantity::Tip(axis),
+                    _ => Quantity::Reaction(axis),
+                })
+            }
+            Some(("frequency", mode)) => match mode.parse() {
+                Ok(mode @ 1..=crate::relax::MOST_MODES) => Ok(Quantity::Frequency(mode)),
+                _ => Err(()),
+            },
+            _ => Err(()),
+        }
+    }
+}
+
+impl std::fmt::Display for Quantity {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Quantity::Tip(axis) => write!(f, "tip_{}", AXES[*axis]),
+            Quantity::Reaction(axis) => write!(f, "reaction_{}", AXES[*axis]),
+            Quantity::Frequency(mode) => write!(f, "frequency_{mode}"),
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! What the data say, in words.
+
+use std::collections::BTreeMap;
+
+use super::result::FitParameter;
+
+/// A combination along which the numbers could be others: coordinates and their parts.
+pub(super) struct Open {
+    /// Index of the free number, and its part; the largest is one.
+    pub parts: Vec<(usize, f64)>,
+    /// Whether the data say nothing at all about it, or only little.
+    pub exactly: bool,
+}
+
+/// The combination as the result has it.
+pub(super) fn map(open: &Open, keys: &[String], units: &[f64]) -> BTreeMap<String, f64> {
+    let part = |(k, part): &(usize, f64)| (keys[*k].clone(), rounded(part * units[*k]));
+    open.parts.iter().map(part).collect()
+}
+
+/// Without what rounding makes of a simple number.
+fn rounded(value: f64) -> f64 {
+    let digits = (value * 1e4).round() / 1e4;
+    if (digits - value).abs() < 1e-4 * value.abs().max(1e-3) {
+        digits
+    } else {
+        value
+    }
+}
+
+/// A sentence about each number and each open combination. `logs` says of which
+/// numbers the coordinate is a logarithm.
+pub(super) fn says(parameters: &[FitParameter], open: &[Open], logs: &[bool]) -> Vec<String> {
+    let mut said = Vec::new();
+    for (k, parameter) in parameters.iter().enumerate() {
+        let (low, high) = match (parameter.low, parameter.high) {
+            (Some(low), Some(high)) if parameter.determined => (low, high),
+            _ => continue,
+        };
+        let half = 0.5 * (high - low);
+        let key = &parameter.key;
+        said.push(match logs[k] {
+            true => format!("{key}: to {}", percent(half / parameter.value.abs())),
+            false => format!("{key}: to {half:.2e}"),
+        });
+    }
+    for open in open {
+        said.push(sentence(open, parameters, logs));
+    }
+    said
+}
+
+fn percent(part: f64) -> String {
+    match 100.0 * part {
+        percent if percent >= 10.0 => format!("{percent:.0} %"),
+        percent if percent >= 0.1 => format!("{percent:.1} %"),
+        percent => format!("{percent:.3} %"),
+    }
+}
+
+fn sentence(open: &Open, parameters: &[FitParameter], logs: &[bool]) -> String {
+    let key = |k: usize| parameters[k].key.as_str();
+    let all_logs = open.parts.iter().all(|(k, _)| logs[*k]);
+    match open.parts.as_slice() {
+        [(k, _)] if open.exactly => format!("{}: not at all", key(*k)),
+        [(k, _)] => match (parameters[*k].low, parameters[*k].high) {
+            (Some(low), None) => format!("{}: only that it is above {low:.2e}", key(*k)),
+            (None, Some(high)) => format!("{}: only that it is below {high:.2e}", key(*k)),
+            _ => format!("{}: hardly, to no better than a factor of ten", key(*k)),
+        },
+        [(a, one), (b, two)] if all_logs && (one.abs() - two.abs()).abs() < 1e-3 => {
+            let only = if one * two > 0.0 { "ratio" } else { "product" };
+            format!(
+                "{} and {}: {}only as their {only}",
+                key(*a),
+                key(*b),
+                hardly(open)
+            )
+        }
+        parts => {
+            let change = |(k, part): &(usize, f64)| match logs[*k] {
+                true => format!("{} in proportion to t^{}", key(*k), short(*part)),
+                false => format!("{} by {} t", key(*k), short(*part)),
+            };
+            let changes: Vec<String> = parts.iter().map(change).collect();
+            let unseen = if open.exactly {
+                "unseen"
+            } else {
+                "hardly seen"
+            };
+            format!("{unseen}: {} together, for any t", changes.join(", "))
+        }
+    }
+}
+
+fn hardly(open: &Open) -> &'static str {
+    if open.exactly { "" } else { "nearly " }
+}
+
+fn short(value: f64) -> String {
+    let text = format!("{value:.2}");
+    text.trim_end_matches('0').trim_end_matches('.').into()
+}

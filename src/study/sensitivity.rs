@@ -1,0 +1,68 @@
+//! A leaf at rest, and how it changes with numbers of its scenario.
+
+use super::{Base, Keys, VaryError};
+use crate::relax::{
+    Equilibrium, Number, Options, Progress, RelaxError, check_tolerance, relax_on_grids,
+    sensitivities,
+};
+use crate::scenario::Scenario;
+
+/// Why there are no derivatives.
+#[derive(Debug, thiserror::Error)]
+pub enum SensitivityError {
+    /// By numbers that cannot be.
+    #[error(transparent)]
+    Vary(#[from] VaryError),
+    /// A relaxation that cannot be.
+    #[error(transparent)]
+    Relax(#[from] RelaxError),
+    /// Shooting has no grids on which equations are linearised.
+    #[error("sensitivities are those of a relaxed leaf: use the method semi-implicit")]
+    Method,
+}
+
+/// Brings the leaf of `base` to rest and finds how its tip, its energy and its lowest
+/// eigenvalue change with these numbers of its scenario, as
+/// [`Equilibrium::sensitivities`]; of a leaf that is not at rest there are none.
+///
+/// # Errors
+/// Requests that cannot be met.
+pub fn relax_with_sensitivities(
+    base: &Base,
+    keys: &[Keys],
+    options: &Options,
+    progress: &mut dyn FnMut(&Progress),
+) -> Result<Equilibrium, SensitivityError> {
+    if options.method.is_shooting() {
+        return Err(SensitivityError::Method);
+    }
+    let scenario = base.scenario();
+    let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
+    check_tolerance(tolerance)?;
+    let values = keys.iter().map(|keys| base.value(keys));
+    let values = values.collect::<Result<Vec<f64>, _>>()?;
+    let made: Vec<_> = keys
+        .iter()
+        .map(|keys| {
+            move |value: f64| -> Option<Scenario> { Some(base.at(&[(keys, value)]).ok()?.scenario) }
+        })
+        .collect();
+    let numbers: Vec<(String, Number)> = (keys.iter().zip(&values).zip(&made))
+        .map(|((keys, &value), make)| {
+            let number = Number {
+                make,
+                value,
+                unit: keys.unit(scenario),
+                linear: keys.is_linear(),
+            };
+            (keys.to_string(), number)
+        })
+        .collect();
+    let (mut leaf, levels) = relax_on_grids(scenario, options, tolerance, progress)?;
+    let at_rest = leaf.accuracy.residual.is_some() && leaf.outcome.is_at_rest();
+    leaf.sensitivities = Some(match at_rest {
+        true => sensitivities(&levels, &numbers, tolerance, options.modes),
+        false => Vec::new(),
+    });
+    Ok(leaf)
+}

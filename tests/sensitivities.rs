@@ -1,0 +1,350 @@
+//! Derivatives of a leaf at rest by numbers of its scenario, against differences of
+//! whole relaxations.
+
+mod common;
+
+use std::f64::consts::TAU;
+
+use common::on;
+use glam::DVec3;
+use leafdyn::relax::{Equilibrium, Options, Outcome, Sensitivity};
+use leafdyn::study::{Base, Keys, relax_with_sensitivities};
+
+/// Leaves to be tried; `LEAFDYN_LEAVES` in the environment asks for more.
+const LEAVES: usize = 24;
+
+/// Numbers between 0 and 1 that are always the same.
+struct Draw(usize);
+
+impl Draw {
+    fn next(&mut self) -> f64 {
+        self.0 += 1;
+        (self.0 as f64 * 0.618_033_988_749_895 + (self.0 as f64).sqrt() * 0.37).fract()
+    }
+
+    fn between(&mut self, from: f64, to: f64) -> f64 {
+        from + self.next() * (to - from)
+    }
+
+    fn list(&mut self, count: usize, from: f64, to: f64) -> String {
+        let values: Vec<f64> = (0..count).map(|_| self.between(from, to)).collect();
+        format!("{values:?}")
+    }
+}
+
+/// A random leaf, and keys of all kinds of it.
+fn random(number: usize) -> (String, Vec<&'static str>) {
+    let mut draw = Draw(101 * number);
+    let rods = 1 + number % 4;
+    let joined = number % 3 != 0;
+    let mut keys = vec![
+        "rest.twist[0]",
+        "rest.bend_2[0]",
+        "rest.bend_3[0]",
+        "rest.stretch",
+        "load.gravity[0]",
+        "load.gravity[2]",
+        "load.tip_force[1]",
+        "leaf.length[0]",
+        "leaf.fan[0]",
+        "dynamics.density",
+    ];
+    let stiffness = match number % 5 {
+        // Nearly rigid: forces are condensed out with less than the stiffness.
+        4 => format!(
+            "stiffness = {{ torsion = 1.0, bending_2 = 2.0, bending_3 = 1.5, axial = 3e7, shear_2 = 1e9, shear_3 = {:?} }}",
+            draw.between(20.0, 100.0)
+        ),
+        3 => {
+            keys.extend([
+                "section.young",
+                "section.width",
+                "section.thickness",
+                "section.poisson",
+            ]);
+            "section = { shape = \"rectangle\", width = 0.2, thickness = 0.1, young = 2e4, poisson = 0.3 }".into()
+        }
+        2 => {
+            keys.extend(["section.young", "section.diameter[0]", "section.poisson"]);
+            format!(
+                "section = {{ shape = \"circle\", diameter = {}, young = 1e4 }}",
+                draw.list(rods, 0.15, 0.2)
+            )
+        }
+        _ => format!(
+            "stiffness = {{ torsion = {}, bending_2 = {{ at = [0.0, 0.4, 1.0], value = [2.0, 1.5, 0.7] }}, bending_3 = 1.5, axial = 50.0, shear_2 = {:?}, shear_3 = 80.0 }}",
+            draw.list(rods, 0.5, 2.0),
+            draw.between(20.0, 100.0),
+        ),
+    };
+    match number % 5 {
+        2 | 3 => {}
+        4 => keys.extend([
+            "stiffness.torsion",
+            "stiffness.bending_2",
+            "stiffness.axial",
+            "stiffness.shear_3",
+        ]),
+        _ => keys.extend([
+            "stiffness.torsion[0]",
+            "stiffness.bending_3",
+            "stiffness.axial+stiffness.axial",
+            "stiffness.shear_2",
+        ]),
+    }
+    let coupling = match rods {
+        1 => {
+            keys.push("load.tip_moment[1]");
+            format!(
+                "load.tip_moment = [0.0, {:?}, 0.0]\n",
+                if number % 8 == 0 { 0.3 } else { 0.0 }
+            )
+        }
+        // Coupling may be zero, and not below.
+        _ => {
+            keys.extend(["coupling.x", "coupling.z[0]"]);
+            format!(
+                "coupling = {{ x = 0.0, y = 1.0, z = {} }}\n",
+                draw.list(rods - 1, 0.5, 3.0)
+            )
+        }
+    };
+    // Tips that are held, pinned and clamped; such have no moment.
+    let tip = match number % 6 {
+        1 | 3 if rods > 1 && joined => {
+            keys.extend(["tip.position[0]", "tip.position[2]"]);
+            "tip = { held = \"pinned\", position = [0.7, 0.05, -0.2] }".to_string()
+        }
+        2 | 5 if rods > 1 && joined => {
+            keys.extend(["tip.position[1]", "tip.angles[0]", "tip.twist[0]"]);
+            let angles = draw.list(rods, -0.2, 0.2);
+            let twist = draw.list(rods, -0.3, 0.3);
+            format!(
+                "tip = {{ held = \"clamped\", position = [0.8, 0.02, -0.1], angles = {angles}, twist = {twist} }}"
+            )
+        }
+        _ => String::new(),
+    };
+    let moment = if rods == 1 { coupling.as_str() } else { "" };
+    let coupling = if rods == 1 { "" } else { coupling.as_str() };
+    let text = format!(
+        r#"
+        name = "leaf{number}"
+        {tip}
+        {moment}
+        {coupling}
+        leaf.rods = {rods}
+        leaf.joined = {joined}
+        leaf.length = {}
+        leaf.fan = {}
+        {stiffness}
+        rest = {{ twist = {}, bend_2 = {}, bend_3 = {}, stretch = 1.1 }}
+        load.gravity = [{:?}, 0.0, {:?}]
+        load.tip_force = {}
+        dynamics = {{ density = 1.3, rotary_inertia = 0.01 }}
+        "#,
+        draw.list(rods, 0.8, 1.2),
+        draw.list(rods, -0.7, 0.7),
+        draw.list(rods, -0.5, 0.5),
+        draw.list(rods, -0.8, 0.8),
+        draw.list(rods, -0.5, 0.5),
+        draw.between(-0.5, 0.5),
+        draw.between(-1.0, -0.2),
+        draw.list(3, -0.5, 0.5),
+    );
+    (text, keys)
+}
+
+fn base(text: &str) -> Base {
+    Base::of_text(text.into(), "leaf.toml".into(), &[]).unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+fn keys(keys: &[&str]) -> Vec<Keys> {
+    keys.iter().map(|key| key.parse().unwrap()).collect()
+}
+
+fn derivatives(base: &Base, wanted: &[&str], options: &Options) -> (Equilibrium, Vec<Sensitivity>) {
+    let leaf = relax_with_sensitivities(base, &keys(wanted), options, &mut |_| {}).unwrap();
+    assert_eq!(
+        leaf.outcome,
+        Outcome::Converged,
+        "{:?}\n{}",
+        leaf.remark,
+        base.text()
+    );
+    let found = leaf.sensitivities.clone().unwrap();
+    (leaf, found)
+}
+
+/// Tips, places of the stations, energy, what the holder of the tip feels, the lowest
+/// eigenvalue and the frequencies; and how many of them are not of modes.
+fn results(leaf: &Equilibrium) -> (Vec<f64>, usize) {
+    let stations = leaf.shape.rods.iter().flat_map(|rod| &rod.nodes);
+    let places = leaf.tips.iter().copied();
+    let places = places.chain(stations.map(|node| node.position));
+    let of_holder = leaf.reaction.iter().flat_map(|held| {
+        let moments = held.moments.iter().flatten().copied();
+        [held.force].into_iter().chain(moments)
+    });
+    let mut all: Vec<f64> = places.flat_map(|it| it.to_array()).collect();
+    all.extend(leaf.energy);
+    all.extend(of_holder.flat_map(|it| it.to_array()));
+    let count = all.len();
+    let modes = leaf.stability.modes.as_deref().unwrap_or_default();
+    all.extend(modes.iter().take(1).map(|mode| mode.eigenvalue));
+    all.extend(
+        modes
+            .iter()
+            .map(|mode| mode.frequency().unwrap_or(f64::NAN) / TAU),
+    );
+    (all, count)
+}
+
+/// The same derivatives from eight relaxations.
+fn differenced(base: &Base, key: &Keys, options: &Options) -> Vec<f64> {
+    let value = base.value(key).unwrap();
+    let size = if value == 0.0 { 1.0 } else { value.abs() };
+    let at = |steps: f64, step: f64| -> Option<Vec<f64>> {
+        let scenario = base.at(&[(key, value + steps * step)]).ok()?.scenario;
+        Some(results(&common::relaxed(&scenario, options)).0)
+    };
+    let central = [(-2.0, 1.0), (-1.0, -8.0), (1.0, 8.0), (2.0, -1.0)].as_slice();
+    let forward = [
+        (0.0, -25.0),
+        (1.0, 48.0),
+        (2.0, -36.0),
+        (3.0, 16.0),
+        (4.0, -3.0),
+    ]
+    .as_slice();
+    let by = |rule: &[(f64, f64)], step: f64| -> Option<Vec<f64>> {
+        let mut sums: Vec<f64> = Vec::new();
+        for (steps, weight) in rule {
+            let values = at(*steps, step)?;
+            sums.resize(values.len(), 0.0);
+            let terms = sums.iter_mut().zip(values);
+            terms.for_each(|(sum, value)| *sum += weight * value / (12.0 * step));
+        }
+        Some(sums)
+    };
+    // With half the step, of the error of the fourth order a sixteenth is left.
+    let (Some(coarse), Some(fine)) = (by(central, 3e-3 * size), by(central, 1.5e-3 * size)) else {
+        return by(forward, 1e-3 * size).unwrap();
+    };
+    let both = fine.iter().zip(coarse);
+    both.map(|(fine, coarse)| fine + (fine - coarse) / 15.0)
+        .collect()
+}
+
+fn of(found: &Sensitivity) -> Vec<f64> {
+    let places = found.tips.iter().chain(found.positions.iter().flatten());
+    let of_holder = found.reaction.iter().flat_map(|held| {
+        let moments = held.moments.iter().flatten().copied();
+        [held.force].into_iter().chain(moments)
+    });
+    let places = places.flat_map(|it: &DVec3| it.to_array());
+    places
+        .chain([found.energy])
+        .chain(of_holder.flat_map(|it| it.to_array()))
+        .chain(found.lowest_eigenvalue)
+        .chain(found.frequencies.iter().map(|it| it.unwrap_or(f64::NAN)))
+        .collect()
+}
+
+/// Every key, on one grid, which leaves no doubt about what is differenced.
+#[test]
+fn they_are_those_of_whole_relaxations() {
+    let leaves = std::env::var("LEAFDYN_LEAVES").ok();
+    let leaves = leaves.and_then(|text| text.parse().ok()).unwrap_or(LEAVES);
+    let mut worst = 0.0_f64;
+    for number in 0..leaves {
+        let (text, wanted) = random(number);
+        let base = base(&text);
+        let options = Options {
+            // Higher modes of a nearly rigid leaf are known too roughly to be differenced.
+            modes: if number % 5 == 4 { 1 } else { 2 },
+            tolerance: Some(1e-9),
+            ..on(12)
+        };
+        let (leaf, found) = derivatives(&base, &wanted, &options);
+        assert_eq!(found.len(), wanted.len());
+        for (key, found) in keys(&wanted).iter().zip(&found) {
+            let value = base.value(key).unwrap().abs();
+            let size = if value == 0.0 { 1.0 } else { value };
+            let (ours, mut theirs) = (of(found), differenced(&base, key, &options));
+            let (units, count) = results(&leaf);
+            if key.to_string().starts_with("load.tip_moment") {
+                // With a moment there are no modes.
+                theirs.truncate(count);
+            }
+            assert_eq!(ours.len(), theirs.len(), "{number} {key}");
+            for (k, (ours, theirs)) in ours.iter().zip(&theirs).enumerate() {
+                // What a change by the whole number would change, against the result.
+                let unit = units[k].abs().max(1.0);
+                let error = (ours - theirs).abs() * size / (unit + theirs.abs() * size);
+                // Eigenvalues are differenced to the second order.
+                // and the modes of a stiff leaf are those of a softened one.
+                let allowed = match (k >= count, number % 5 == 4) {
+                    (false, _) => 1e-7,
+                    (true, false) => 1e-6,
+                    (true, true) => 2e-5,
+                };
+                worst = worst.max(error / allowed);
+                assert!(
+                    error < allowed,
+                    "leaf {number}, {key}, result {k}: {ours} {theirs}\n{text}"
+                );
+            }
+        }
+    }
+    println!("largest difference, as a part of what is allowed: {worst:.2e}");
+}
+
+/// Over several grids they are as accurate as they say, by one solution for each
+/// number or for each result.
+#[test]
+fn their_errors_are_bounds() {
+    for number in [1, 2, 7] {
+        let (text, wanted) = random(number);
+        let base = base(&text);
+        for count in [2, wanted.len()] {
+            let rough = derivatives(&base, &wanted[..count], &common::to(1e-5)).1;
+            let fine = derivatives(&base, &wanted[..count], &common::to(1e-10)).1;
+            for (rough, fine) in rough.iter().zip(&fine) {
+                let key = &rough.key;
+                let apart = rough
+                    .tips
+                    .iter()
+                    .zip(&fine.tips)
+                    .map(|(a, b)| (*a - *b).length());
+                let apart = apart.fold(0.0, f64::max);
+                let error = rough.tip_error.unwrap() + fine.tip_error.unwrap();
+                assert!(apart <= error, "{number} {key}: {apart:e} {error:e}");
+                assert!(fine.tip_error.unwrap() < 1e-3 * rough.tip_error.unwrap() + 1e-8);
+                let apart = (rough.energy - fine.energy).abs();
+                let error = rough.energy_error.unwrap() + fine.energy_error.unwrap();
+                assert!(apart <= error, "{number} {key}: {apart:e} {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_has_no_derivative_is_refused() {
+    let (text, _) = random(4);
+    let base = base(&text.replace("axial = 3e7", "axial = inf"));
+    for (key, said) in [
+        ("stiffness.axial", "is infinite"),
+        ("leaf.rods", "whole number"),
+        ("method.step", "setting of a method"),
+        ("leaf.length", "name one of its entries"),
+        ("leaf.length[7]", "count from 0"),
+        ("dynamics.duration", "write it there first"),
+        ("stiffness.torsion+stiffness.bending_2", "another value"),
+    ] {
+        let keys = keys(&[key]);
+        let refused = relax_with_sensitivities(&base, &keys, &Options::default(), &mut |_| {});
+        let refused = refused.map(|leaf| leaf.outcome).unwrap_err().to_string();
+        assert!(refused.contains(said), "{key}: {refused}");
+    }
+}
