@@ -38,6 +38,24 @@ fn every_file_is_accepted_named_after_itself_and_explained() {
     }
 }
 
+/// Editors complete and check them by it.
+#[test]
+fn every_file_names_the_schema_which_is_todays() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let kept = fs::read_to_string(folder.join("scenario.schema.json")).unwrap();
+    let kept: serde_json::Value = serde_json::from_str(&kept).unwrap();
+    let why = "leafdyn schema > scenarios/scenario.schema.json";
+    assert_eq!(kept, leafdyn::scenario::schema(), "{why}");
+    for path in files() {
+        let text = fs::read_to_string(&path).unwrap();
+        let (first, _) = text.split_once('\n').unwrap();
+        let schema = first.strip_prefix("#:schema ").unwrap();
+        let schema = path.parent().unwrap().join(schema).canonicalize();
+        let wanted = folder.join("scenario.schema.json").canonicalize();
+        assert_eq!(schema.unwrap(), wanted.unwrap(), "{}", path.display());
+    }
+}
+
 #[test]
 fn the_papers_figures_share_what_the_paper_says_of_all() {
     let paper: Vec<_> = files()

@@ -16,6 +16,7 @@ use crate::study::{
 
 use crate::report;
 
+use super::progress::time_left;
 use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status};
 
@@ -200,7 +201,10 @@ impl Map {
             rows.extend(new);
             finished += 1;
             let cells = todo.len();
-            line.say(|time| format!("{finished} of {cells} cells, {:.0} s", time.as_secs_f64()));
+            line.say(|time| {
+                let time = time_left(time, finished, cells);
+                format!("{finished} of {cells} cells, {time}")
+            });
             failed.is_none()
         });
         match failed {

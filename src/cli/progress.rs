@@ -72,6 +72,25 @@ impl ProgressLine {
     }
 }
 
+/// How long a run has taken after `done` of `all` equal parts, and about how long it
+/// will still take.
+pub fn time_left(elapsed: Duration, done: usize, all: usize) -> String {
+    let taken = elapsed.as_secs_f64();
+    let left = taken * (all as f64 / done.max(1) as f64 - 1.0);
+    format!("{taken:.0} s, {} left", duration(left))
+}
+
+/// A time for people.
+pub fn duration(seconds: f64) -> String {
+    let seconds = seconds.ceil();
+    match seconds as u64 {
+        _ if !seconds.is_finite() => "?".into(),
+        seconds @ 0..120 => format!("{seconds} s"),
+        seconds @ 120..7200 => format!("{} min", seconds.div_ceil(60)),
+        seconds => format!("{} h", seconds.div_ceil(3600)),
+    }
+}
+
 impl Drop for ProgressLine {
     fn drop(&mut self) {
         if let Some(bar) = &self.bar {

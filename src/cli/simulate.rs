@@ -9,7 +9,7 @@ use crate::files::Recording;
 use crate::report::{self, FileError, numbers::brief};
 use crate::simulate::{Options, Record, Scheme, Simulation, Stopped};
 
-use super::progress::ProgressLine;
+use super::progress::{self, ProgressLine};
 use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status, checkpoint_on_interrupt, note, show_checkpoint};
 
@@ -77,7 +77,7 @@ impl Simulate {
         if let Some((steps, seconds)) = simulation.expected()
             && seconds > WORTH_TELLING
         {
-            let (time, steps) = (duration(seconds), brief(steps));
+            let (time, steps) = (progress::duration(seconds), brief(steps));
             note(&format!(
                 "{}: {steps} steps to make, some {time}",
                 job.scenario.name
@@ -146,24 +146,13 @@ fn record(
 
 /// How far a simulation has come, at so many units of time per second.
 fn progress(time: f64, duration: f64, speed: f64) -> String {
-    let left = self::duration((duration - time) / speed);
+    let left = progress::duration((duration - time) / speed);
     format!(
         "t = {} of {}, {} a second, {left} left",
         brief(time),
         brief(duration),
         brief(speed)
     )
-}
-
-/// A time for people.
-fn duration(seconds: f64) -> String {
-    let seconds = seconds.ceil();
-    match seconds as u64 {
-        _ if !seconds.is_finite() => "?".into(),
-        seconds @ 0..120 => format!("{seconds} s"),
-        seconds @ 120..7200 => format!("{} min", seconds.div_ceil(60)),
-        seconds => format!("{} h", seconds.div_ceil(3600)),
-    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::Viewed;
 use super::data::{Chart, Curve, Leaf, View};
 use crate::figure::drawing::Drawing;
-use crate::report::numbers::significant;
+use crate::report::numbers::{brief, significant};
 use crate::report::trace_lines;
 use crate::report::words::equilibrium_of_index;
 use crate::study::{PointKind, Trace, TraceBranch, TracePoint};
@@ -37,7 +37,10 @@ fn leaf(trace: &Trace, point: &TracePoint, drawn: &[usize]) -> Leaf {
         PointKind::Regular => equilibrium_of_index(Some(point.index)),
         kind => kind.word().replace('-', " "),
     };
-    let at = trace.keys.text(point.value);
+    let at = match point.kind {
+        PointKind::Regular => brief(point.value),
+        _ => trace.keys.text(point.value),
+    };
     Leaf {
         summary: vec![("energy", significant(point.energy))],
         ..Leaf::coarse(format!("{at}: {kind}"), &point.curves, drawn, MOST_NODES)
