@@ -104,8 +104,9 @@ fn with_program(command: &str) -> Option<String> {
 /// A folder with the scenarios that come with the program and those of a page.
 fn workplace(page: &Page) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    for kind in fs::read_dir(top().join("scenarios")).unwrap() {
-        let kind = kind.unwrap().path();
+    let kinds = fs::read_dir(top().join("scenarios")).unwrap();
+    let kinds = kinds.map(|kind| kind.unwrap().path());
+    for kind in kinds.filter(|kind| kind.is_dir()) {
         let copies = folder
             .path()
             .join("scenarios")
