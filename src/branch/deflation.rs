@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::equations::{Equations, ITERATIONS, LARGEST, Linear, Stuck, at_rest, factorized};
-use super::field::{add, combined, dot, is_finite, largest, plus, times};
+use super::equations::{Equations, ITERATIONS, LARGEST, Stuck, at_rest, factorized};
+use super::field::{add, combined, dot, is_finite, largest, times};
 use super::{Point, Tangent};
 use crate::leaf::{Bordered, Field, SparsePattern, State, System};
 
@@ -45,7 +45,6 @@ impl Equations<'_> {
         let (mut state, mut fraction) = (state.clone(), fraction);
         let border: Vec<Field> = modes.iter().map(|mode| self.momentum(mode)).collect();
         let (dual, own) = (self.momentum(&normal.increments), normal.fraction);
-        let p = modes.len();
         let mut previous = f64::INFINITY;
         let mut finished = false;
         for _ in 0..=ITERATIONS {
@@ -53,57 +52,65 @@ impl Equations<'_> {
                 true => self.linearise_softened(&mut state, fraction)?,
                 false => self.linearise(&mut state, fraction)?,
             };
-            let mut solve = self.factor_bordered(&border)?;
-            let none = vec![0.0; p];
-            let forces = solve(&linear.forces, &none);
-            let rate = solve(&linear.rate, &none);
-            let zero = times(&linear.forces, 0.0);
-            let unit = |i: usize| (0..p).map(|k| if k == i { 1.0 } else { 0.0 }).collect();
-            let units: Vec<Vec<f64>> = (0..p).map(unit).collect();
-            let columns: Vec<Bordered> = units.iter().map(|unit| solve(&zero, unit)).collect();
-            drop(solve);
-            let h = DMatrix::from_fn(p, p, |r, c| {
-                0.5 * (columns[c].multipliers[r] + columns[r].multipliers[c])
-            });
+            let solved = self.solve_bordered(&border, &linear.forces, &[&linear.rate])?;
             if finished {
+                let [rate] = solved.rates.try_into().map_err(|_| Stuck::NotConverged)?;
                 return Ok(Deflated {
                     state,
                     fraction,
-                    h,
+                    h: solved.h,
                     drive: DVector::from_vec(rate.multipliers),
                     rate: linear.rate,
-                    modes: columns.into_iter().map(|it| it.increments).collect(),
+                    modes: solved.modes,
                 });
             }
-            let step = bordered_step(&linear, &h, (&forces, &rate, &columns), (&dual, own))?;
-            let (increments, change) = step;
-            let size = largest(&increments).max(change.abs());
+            let (increments, changes) = solved.step(&[(&dual, &[own])], linear.noise)?;
+            let size = largest(&increments).max(changes[0].abs());
             if !is_finite(&increments) || size > LARGEST {
                 return Err(Stuck::NotConverged);
             }
             state = self.moved(&state, fraction, &increments, 1.0)?;
-            fraction += change;
+            fraction += changes[0];
             finished = at_rest(size, previous);
             previous = size;
         }
         Err(Stuck::NotConverged)
     }
 
-    /// Factorises the matrix of the system with a border.
-    fn factor_bordered(
+    /// Solves with the matrix of the system, bordered, for forces, their rates, and the
+    /// units of the border.
+    pub(super) fn solve_bordered(
         &mut self,
         border: &[Field],
-    ) -> Result<impl FnMut(&Field, &[f64]) -> Bordered, Stuck> {
-        let rows = border.len();
-        if self.bordered.as_ref().is_none_or(|(held, _)| *held != rows) {
-            let pattern = SparsePattern::bordered(&self.system, rows);
-            self.bordered = Some((rows, pattern.map_err(|_| Stuck::TooLarge)?));
+        forces: &Field,
+        rates: &[&Field],
+    ) -> Result<Solved, Stuck> {
+        let p = border.len();
+        if self.bordered.as_ref().is_none_or(|(held, _)| *held != p) {
+            let pattern = SparsePattern::bordered(&self.system, p);
+            self.bordered = Some((p, pattern.map_err(|_| Stuck::TooLarge)?));
         }
         let (_, pattern) = self.bordered.as_ref().ok_or(Stuck::TooLarge)?;
         self.factorizations += 1;
         let factor = pattern.factorize_bordered(&self.system, 0.0, border);
         let mut factor = factor.map_err(|_| Stuck::TooLarge)?;
-        Ok(move |rhs: &Field, below: &[f64]| factor.solve_bordered(rhs, below))
+        let none = vec![0.0; p];
+        let zero = times(forces, 0.0);
+        let unit = |i: usize| (0..p).map(|k| if k == i { 1.0 } else { 0.0 }).collect();
+        let units: Vec<Vec<f64>> = (0..p).map(unit).collect();
+        let columns = units.iter().map(|unit| factor.solve_bordered(&zero, unit));
+        let columns: Vec<Bordered> = columns.collect();
+        Ok(Solved {
+            h: DMatrix::from_fn(p, p, |r, c| {
+                0.5 * (columns[c].multipliers[r] + columns[r].multipliers[c])
+            }),
+            modes: columns.into_iter().map(|it| it.increments).collect(),
+            forces: factor.solve_bordered(forces, &none),
+            rates: (rates.iter())
+                .map(|rate| factor.solve_bordered(rate, &none))
+                .collect(),
+            negative: factor.negative(),
+        })
     }
 
     /// The `count` modes whose eigenvalues are next to zero at a point, by
@@ -161,37 +168,62 @@ impl Equations<'_> {
     }
 }
 
-/// Newton's increments and change of the parameter within the plane normal to
-/// `dual` and its `own` part, from the solutions of the bordered equations for the
-/// forces, their rate, and the units of the border.
-fn bordered_step(
-    linear: &Linear,
-    h: &DMatrix<f64>,
-    (forces, rate, columns): (&Bordered, &Bordered, &[Bordered]),
-    (dual, own): (&Field, f64),
-) -> Result<(Field, f64), Stuck> {
-    let p = columns.len();
-    let mut matrix = h.clone().resize(p + 1, p + 1, 0.0);
-    let mut right = DVector::zeros(p + 1);
-    for r in 0..p {
-        matrix[(r, p)] = rate.multipliers[r];
-        matrix[(p, r)] = dot(dual, &columns[r].increments);
-        // What is below rounding decides nothing.
-        right[r] = match -forces.multipliers[r] {
-            force if force.abs() < linear.noise => -0.0,
-            force => force,
-        };
+/// Solutions of the bordered equations at some state.
+pub(super) struct Solved {
+    /// For the forces, and for the rates at which they change with each number.
+    pub forces: Bordered,
+    pub rates: Vec<Bordered>,
+    /// H and X of the border.
+    pub h: DMatrix<f64>,
+    pub modes: Vec<Field>,
+    /// Negative eigenvalues of the bordered matrix: those of the matrix alone and of H
+    /// together.
+    pub negative: usize,
+}
+
+impl Solved {
+    /// Newton's increments and changes of the numbers within the plane normal to as many
+    /// directions: each by its momentum, and its own changes of the numbers.
+    pub fn step(
+        &self,
+        normals: &[(&Field, &[f64])],
+        noise: f64,
+    ) -> Result<(Field, Vec<f64>), Stuck> {
+        let (p, numbers) = (self.modes.len(), self.rates.len());
+        let mut matrix = self.h.clone().resize(p + numbers, p + numbers, 0.0);
+        let mut right = DVector::zeros(p + numbers);
+        for r in 0..p {
+            for (i, rate) in self.rates.iter().enumerate() {
+                matrix[(r, p + i)] = rate.multipliers[r];
+            }
+            for (k, (dual, _)) in normals.iter().enumerate() {
+                matrix[(p + k, r)] = dot(dual, &self.modes[r]);
+            }
+            // What is below rounding decides nothing.
+            right[r] = match -self.forces.multipliers[r] {
+                force if force.abs() < noise => -0.0,
+                force => force,
+            };
+        }
+        for (k, (dual, own)) in normals.iter().enumerate() {
+            for (i, rate) in self.rates.iter().enumerate() {
+                matrix[(p + k, p + i)] = dot(dual, &rate.increments) + own[i];
+            }
+            right[p + k] = -dot(dual, &self.forces.increments);
+        }
+        let svd = matrix.svd(true, true);
+        let least = NEUTRAL * svd.singular_values.max();
+        let solution = svd.solve(&right, least).map_err(|_| Stuck::NotConverged)?;
+        let mut increments = self.forces.increments.clone();
+        for (i, rate) in self.rates.iter().enumerate() {
+            add(&mut increments, solution[p + i], &rate.increments);
+        }
+        for (mode, part) in self.modes.iter().zip(solution.iter()) {
+            add(&mut increments, *part, mode);
+        }
+        let changes = solution.iter().skip(p).copied().collect();
+        Ok((increments, changes))
     }
-    matrix[(p, p)] = dot(dual, &rate.increments) + own;
-    right[p] = -dot(dual, &forces.increments);
-    let svd = matrix.svd(true, true);
-    let least = NEUTRAL * svd.singular_values.max();
-    let solution = svd.solve(&right, least).map_err(|_| Stuck::NotConverged)?;
-    let mut increments = plus(&forces.increments, solution[p], &rate.increments);
-    for (column, part) in columns.iter().zip(solution.iter()) {
-        add(&mut increments, *part, &column.increments);
-    }
-    Ok((increments, solution[p]))
 }
 
 /// Forces that excite many modes, each `k` with another pattern along the rods.

@@ -3,7 +3,7 @@
 use super::family::{Family, Leaves, OutOfRange, clamp};
 use super::field::{between, dot, is_finite, largest, plus, times};
 use super::{Point, Tangent};
-use crate::leaf::{Field, Grid, Solved, SparseFactor, SparsePattern, State, System};
+use crate::leaf::{DiscreteLeaf, Field, Grid, Solved, SparseFactor, SparsePattern, State, System};
 use crate::newton::converged;
 use crate::rod::RESOLVED_TURN;
 
@@ -309,21 +309,49 @@ fn linearise(
     state: &mut State,
     fraction: f64,
 ) -> Result<Linear, Stuck> {
+    let rate = rate(|step| {
+        let leaf = leaves.at(fraction + step)?;
+        Ok(forces_on(leaf, state, system))
+    })?;
+    let leaf = leaves.at(fraction)?;
+    let (forces, noise) = assembled(leaf, system, state)?;
+    Ok(Linear {
+        forces,
+        rate,
+        shift: leaf.neutral_shift(),
+        noise,
+    })
+}
+
+/// The change of forces with a number of which `forces` are given at some distance
+/// from where it is.
+pub(super) fn rate(
+    mut forces: impl FnMut(f64) -> Result<Field, OutOfRange>,
+) -> Result<Field, OutOfRange> {
     let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
         // At an end of the range there may be nothing beyond.
-        let mut at = |step: f64| {
-            let leaf = leaves.at(fraction + step)?;
-            let mut moved = state.clone();
-            clamp(leaf, &mut moved);
-            leaf.assemble(&moved, system);
-            Ok((step, system.rhs()))
-        };
+        let mut at = |step: f64| Ok((step, forces(step)?));
         at(step).or_else(|_: OutOfRange| at(0.0))
     });
     let ((after, forces_after), (before, forces_before)) = (after?, before?);
     let rate = plus(&forces_after, -1.0, &forces_before);
-    let rate = times(&rate, 1.0 / (after - before));
-    let leaf = leaves.at(fraction)?;
+    Ok(times(&rate, 1.0 / (after - before)))
+}
+
+/// The unbalanced forces of a leaf in a state, but for its clamps, which are its own.
+pub(super) fn forces_on(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> Field {
+    let mut moved = state.clone();
+    clamp(leaf, &mut moved);
+    leaf.assemble(&moved, system);
+    system.rhs()
+}
+
+/// The forces and their rounding; the matrix is left in the system.
+pub(super) fn assembled(
+    leaf: &DiscreteLeaf,
+    system: &mut System,
+    state: &mut State,
+) -> Result<(Field, f64), Stuck> {
     clamp(leaf, state);
     system.set_coupling(leaf);
     let turn = leaf.assemble(state, system).turn;
@@ -332,12 +360,7 @@ fn linearise(
     }
     let sections = leaf.sections.iter();
     let stiffest = sections.fold(1.0, |m: f64, s| m.max(s.condensing.max_element()));
-    Ok(Linear {
-        forces: system.rhs(),
-        rate,
-        shift: leaf.neutral_shift(),
-        noise: ROUNDING * f64::EPSILON * stiffest,
-    })
+    Ok((system.rhs(), ROUNDING * f64::EPSILON * stiffest))
 }
 
 /// A direct factorisation of the assembled matrix K + `shift` M.

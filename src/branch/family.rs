@@ -97,8 +97,8 @@ impl<'a> Family<'a> {
         })
     }
 
-    /// One of its leaves on a grid.
-    fn discretised(&self, leaf: &Leaf, grid: &Grid) -> DiscreteLeaf {
+    /// A leaf in its units, on a grid.
+    pub(super) fn discretised(&self, leaf: &Leaf, grid: &Grid) -> DiscreteLeaf {
         let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
         for section in &mut discrete.sections {
             section.condensing = match self.softening {

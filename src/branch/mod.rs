@@ -25,6 +25,7 @@
 //! from the last point that counts.
 
 mod begin;
+pub mod boundary;
 mod critical;
 mod deflation;
 mod equations;
@@ -38,7 +39,7 @@ mod switch;
 mod walk;
 
 pub use begin::begin;
-pub use critical::Kind;
+pub use critical::{Critical, Kind};
 pub use equations::{Equations, Stuck};
 pub use family::Family;
 pub use follow::{Followed, Grids};

@@ -2,16 +2,18 @@
 
 use clap::Args;
 
-use crate::study::{self, MOST_POINTS, Trace as Traced, TraceError, TraceRequest, Vary};
+use crate::study::{
+    self, Boundary, BoundaryRequest, MOST_POINTS, Trace as Traced, TraceError, TraceRequest, Vary,
+};
 
 use crate::report;
 
 use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status};
 
-/// Follow an equilibrium through one number of the scenario: through folds, with the Morse index along the way.
+/// Follow an equilibrium through one number of the scenario: through folds, with the Morse index along the way. With a second number: follow the points at which that index changes through both, as curves.
 ///
-/// Exit status: 0 all branches are followed to an end of the range or in a
+/// Exit status: 0 all branches, or curves, are followed to an end of a range or in a
 /// circle; 1 not (the files are still written and say how far); 2 the request
 /// was refused.
 #[derive(Debug, Args)]
@@ -19,9 +21,9 @@ pub struct Trace {
     #[command(flatten)]
     request: Request,
 
-    /// What varies: a number of the scenario as in --set, an entry of a list counted from 0 (load.gravity[2]); several keys that vary together are joined by +; COUNT values set the longest step
+    /// What varies, once or twice: a number of the scenario as in --set, an entry of a list counted from 0 (load.gravity[2]); several keys that vary together are joined by +; COUNT values set the longest step
     #[arg(long, value_name = "KEY=FROM..TO[:COUNT][log]", required = true)]
-    vary: Vary,
+    vary: Vec<Vary>,
 
     /// Also follow the branches that cross
     #[arg(long)]
@@ -35,7 +37,7 @@ pub struct Trace {
     #[arg(long, value_name = "N")]
     segments: Option<usize>,
 
-    /// Most points of a branch
+    /// Most points of a branch, or of a curve to either side
     #[arg(long, value_name = "N", default_value_t = MOST_POINTS)]
     points: usize,
 
@@ -51,20 +53,58 @@ impl Trace {
             stations: false,
             side_by_side: false,
         };
-        self.request.each::<Traced>(how, |job| self.one(job))
+        match self.vary.as_slice() {
+            [along] => (self.request).each::<Traced>(how, |job| self.one(job, along)),
+            [along, across] => (self.request)
+                .each::<Boundary>(how, |job| self.boundary(job, along, across)),
+            more => Err(format!(
+                "--vary is given {} times: give one number to follow branches, two for a boundary",
+                more.len()
+            )
+            .into()),
+        }
     }
 
-    fn one(&self, job: &Job) -> Result<Done, Refusal> {
-        let request = TraceRequest {
+    fn along(&self, job: &Job, vary: &Vary) -> Result<TraceRequest, Refusal> {
+        Ok(TraceRequest {
             base: job.base()?,
-            vary: self.vary.clone(),
+            vary: vary.clone(),
             switch: self.switch,
             keep_unstable: self.keep_unstable,
             segments: self.segments,
             tolerance: self.request.tolerance,
             most_points: self.points,
             cross_section: self.cross_section,
+        })
+    }
+
+    fn boundary(&self, job: &Job, along: &Vary, across: &Vary) -> Result<Done, Refusal> {
+        let request = BoundaryRequest {
+            trace: self.along(job, along)?,
+            across: across.clone(),
         };
+        let mut line = job.progress();
+        let boundary = study::boundary(&request, &mut |curve, points, [first, second]| {
+            line.say(|elapsed| {
+                let what = curve.map_or("trace".into(), |curve| format!("curve {}", curve + 1));
+                format!(
+                    "{what}, {points} points, at {}, {}, {:.0} s",
+                    along.keys.text(first),
+                    across.keys.text(second),
+                    elapsed.as_secs_f64()
+                )
+            });
+        })
+        .map_err(name_option)?;
+        drop(line);
+        job.remark(boundary.remark.as_ref());
+        job.deliver(&boundary, boundary.complete, |files| {
+            report::boundary_report(&boundary, files)
+        })
+    }
+
+    fn one(&self, job: &Job, vary: &Vary) -> Result<Done, Refusal> {
+        let request = self.along(job, vary)?;
         let mut line = job.progress();
         let trace = study::trace(&request, &mut |branch, points, value| {
             line.say(|elapsed| {

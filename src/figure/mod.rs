@@ -11,6 +11,7 @@
 mod all;
 mod axes;
 mod axis;
+mod boundary;
 mod chart;
 mod chart_panel;
 mod check;
@@ -39,6 +40,7 @@ pub mod view;
 use std::io::{self, Write};
 
 pub use all::draw as all;
+pub use boundary::draw as boundary;
 pub use chart::{draw_chart as chart, draw_scaling as scaling};
 pub use check::draw as check;
 pub use energy::draw as energy;

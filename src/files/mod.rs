@@ -26,7 +26,7 @@ use crate::report::table::Table;
 use crate::report::{self, FileError, Format, json};
 pub use crate::report::{Document, Kind, Written};
 use crate::simulate::Record;
-use crate::study::{All, Chart, Check, Fit, Map, Scaling, Trace};
+use crate::study::{All, Boundary, Chart, Check, Fit, Map, Scaling, Trace};
 
 impl Written for Equilibrium {
     const JSON: Option<&'static str> = Some("summary.json");
@@ -100,6 +100,15 @@ impl Written for Trace {
         &Picture::png("trace.png", figure::trace),
         &Page("trace.html"),
         &Series("trace.pvd", view::points),
+    ];
+}
+
+impl Written for Boundary {
+    const JSON: Option<&'static str> = Some("boundary.json");
+    const FORMATS: &'static [&'static dyn Format<Self>] = &[
+        &Table("boundary.csv", report::boundary_table),
+        &Picture::svg("boundary.svg", figure::boundary),
+        &Picture::png("boundary.png", figure::boundary),
     ];
 }
 

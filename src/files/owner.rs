@@ -8,15 +8,16 @@ use std::path::{Component, Path, PathBuf, absolute};
 use crate::relax::Equilibrium;
 use crate::report::{FileError, Written};
 use crate::simulate::Record;
-use crate::study::{All, Chart, Check, Map, Trace};
+use crate::study::{All, Boundary, Chart, Check, Map, Trace};
 
 /// The JSON files of all verbs.
-const FILES: [Option<&str>; 7] = [
+const FILES: [Option<&str>; 8] = [
     Equilibrium::JSON,
     All::JSON,
     Check::JSON,
     Record::JSON,
     Trace::JSON,
+    Boundary::JSON,
     Map::JSON,
     Chart::JSON,
 ];

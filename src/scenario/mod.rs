@@ -29,7 +29,7 @@ pub(crate) use excerpt::printable;
 pub(crate) use key::Form;
 pub use key::Key;
 pub use part::Part;
-pub(crate) use part::{resolve, value_at, with_overrides};
+pub(crate) use part::{number_at, resolve, value_at, with_overrides};
 pub use profile::Profile;
 pub use read::text;
 #[cfg(feature = "cli")]

@@ -188,6 +188,14 @@ pub(crate) fn value_at(text: &str, overrides: &[String], part: Part) -> Option<V
     Some(place.clone())
 }
 
+/// The number that a part of the scenario has, if it is one; a factor is 1.
+pub(crate) fn number_at(text: &str, overrides: &[String], part: Part) -> Option<f64> {
+    match part.scale {
+        true => Some(1.0),
+        false => number(&value_at(text, overrides, part)?),
+    }
+}
+
 /// The scenario in `text` as TOML, with entries overridden.
 pub(crate) fn with_overrides(text: &str, overrides: &[String]) -> Option<String> {
     let toml = super::form::from_json(text, "").and_then(Result::ok);

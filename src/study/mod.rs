@@ -1,6 +1,7 @@
 //! What is built on the solvers.
 
 mod all;
+mod boundary;
 mod chart;
 mod check;
 mod fit;
@@ -12,6 +13,9 @@ mod vary;
 mod words;
 
 pub use all::{All, Found, all};
+pub use boundary::{
+    Boundary, BoundaryCurve, BoundaryPoint, BoundaryRequest, CurveEnd, MOST_CURVES, boundary,
+};
 pub use chart::{
     Chart, ChartError, ChartOptions, Contender, Decade, Ending, Peer, PeerRow, Reference, Row,
     Scaling, ScalingRow, Setting, Spread, Turn, chart, scaling,

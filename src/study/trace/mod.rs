@@ -6,6 +6,7 @@ mod run;
 
 pub use law::Law;
 pub use result::{PointKind, Trace, TraceBranch, TracePoint};
+pub(super) use run::trace_seen;
 pub use run::trace;
 
 use super::vary::{Base, Vary};

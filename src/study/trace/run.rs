@@ -29,6 +29,18 @@ pub fn trace(
     request: &TraceRequest,
     progress: &mut dyn FnMut(usize, usize, f64),
 ) -> Result<Trace, TraceError> {
+    trace_seen(request, progress, &mut |_| {})
+}
+
+/// The same; `seen` is shown every branch as it was followed.
+///
+/// # Errors
+/// As above.
+pub fn trace_seen(
+    request: &TraceRequest,
+    progress: &mut dyn FnMut(usize, usize, f64),
+    seen: &mut dyn FnMut(&Followed),
+) -> Result<Trace, TraceError> {
     request.check()?;
     let clock = Instant::now();
     let (keys, vary) = (&request.vary.keys, &request.vary);
@@ -90,6 +102,7 @@ pub fn trace(
                     tolerance,
                     crossings: Vec::new(),
                     progress,
+                    seen,
                 };
                 run.follow_all(first, &mut trace);
                 None
@@ -142,6 +155,7 @@ struct Run<'r, 'p> {
     /// Points where branches cross, found so far.
     crossings: Vec<Refined>,
     progress: &'p mut dyn FnMut(usize, usize, f64),
+    seen: &'p mut dyn FnMut(&Followed),
 }
 
 impl Run<'_, '_> {
@@ -169,6 +183,7 @@ impl Run<'_, '_> {
             let segments = last.map_or(0, |point| point.state.segments());
             trace.segments = trace.segments.max(segments);
             trace.branches.push(self.in_units(&followed, from));
+            (self.seen)(&followed);
             if self.request.switch {
                 self.enter_crossing(&followed, number, &mut entrances);
             }

@@ -5,7 +5,9 @@ use std::path::Path;
 use toml::Value;
 
 use super::{Keys, Knob, Knobs, Target, VaryError};
-use crate::scenario::{self, Form, Key, Scenario, resolve, value_at, with_overrides};
+use crate::scenario::{
+    self, Form, Key, Scenario, number_at, resolve, value_at, with_overrides,
+};
 
 /// A scenario as text, with some entries replaced: what numbers are put into.
 #[derive(Clone, Debug)]
@@ -80,6 +82,35 @@ impl Base {
     /// The entries replaced, without the settings of methods.
     pub fn overrides(&self) -> &[String] {
         &self.overrides
+    }
+
+    /// The number that the scenario has there, if it has one and the same for all of the
+    /// keys.
+    pub fn number(&self, keys: &Keys) -> Option<f64> {
+        let mut numbers = keys.targets().iter().map(|target| match target {
+            Target::Entry(part) => number_at(&self.text, &self.overrides, *part),
+            Target::Knob(_) => None,
+        });
+        let first = numbers.next()??;
+        numbers.all(|other| other == Some(first)).then_some(first)
+    }
+
+    /// The same with a value put in for good.
+    ///
+    /// # Errors
+    /// If it is refused, or has no such entry.
+    pub fn with(&self, keys: &Keys, value: f64) -> Result<Base, VaryError> {
+        let Varied { scenario, knobs } = self.at(&[(keys, value)])?;
+        let entries = keys.targets().iter().filter_map(|target| match target {
+            Target::Entry(part) => Some(format!("{part}={}", target.text(value))),
+            Target::Knob(_) => None,
+        });
+        Ok(Base {
+            overrides: self.overrides.iter().cloned().chain(entries).collect(),
+            knobs,
+            scenario,
+            ..self.clone()
+        })
     }
 
     /// The scenario with these values.

@@ -1,0 +1,434 @@
+//! Following a boundary through the plane of two numbers.
+
+use rayon::prelude::*;
+
+use super::place::{Lost, Place, Search};
+use super::refine::{Step, Verified, on_finer, refine};
+use super::sheet::{Plane, Sheet};
+use super::special::{Special, locate, onto};
+use crate::branch::critical::{Critical, Kind};
+use crate::branch::equations::Stuck;
+use crate::branch::refine::Doubt;
+use crate::leaf::Grid;
+
+/// First step as a part of the longest, and the shortest.
+const FIRST: f64 = 0.25;
+const SHORTEST: f64 = 1e-4;
+
+/// Growth of the step where the boundary turns little.
+const GROWTH: f64 = 1.5;
+const STRAIGHT: f64 = 0.97;
+
+/// A boundary, or the sheet across it, that turns by more than this (cosine) in a step is
+/// not trusted to be the same.
+const BENT: f64 = 0.85;
+
+/// A point may lie off the prediction by this part of the step.
+const DRIFT: f64 = 0.3;
+
+/// Accuracy of points on the way, and of those that are given a number.
+const ACCURACY: f64 = 1e-9;
+const EXACT: f64 = 1e-12;
+
+/// Points that are made before they are verified, side by side.
+const AHEAD: usize = 8;
+
+/// The finest grid to follow a boundary on, in segments.
+const FINEST: usize = 256;
+
+/// The start of the boundary again: numbers and shapes are the same within these.
+const SAME: [f64; 2] = [1e-6, 1e-4];
+
+/// How to follow a boundary.
+#[derive(Clone, Copy, Debug)]
+pub struct Stride {
+    /// The longest step; each number's range is one, and so is a turn of all nodes by ten
+    /// radians or a shift by one length.
+    pub longest: f64,
+    /// Most points.
+    pub most: usize,
+    /// Wanted accuracy of tips, and of numbers as parts of their ranges.
+    pub accuracy: f64,
+}
+
+/// How a boundary ended, on one of its sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Halt {
+    /// At an end of one of the ranges.
+    Reached,
+    /// Where it began.
+    Closed,
+    /// After as many points as were allowed.
+    MostPoints,
+    /// The second number breaks the symmetry by which branches cross.
+    Unfolded,
+    /// Modes that become neutral together do so no longer.
+    Parted,
+    /// No leaf is there.
+    OutOfRange,
+    /// No step however short could be made.
+    Stuck,
+    /// What comes next could not be verified.
+    Unverified(Doubt),
+}
+
+impl Halt {
+    /// Whether the boundary is known as far as was asked.
+    pub fn complete(self) -> bool {
+        matches!(self, Halt::Reached | Halt::Closed)
+    }
+}
+
+/// A boundary on both sides of where it began.
+#[derive(Clone, Debug)]
+pub struct Boundary {
+    /// What becomes of the branch along the first number, and in how many directions.
+    pub kind: Kind,
+    pub neutral: usize,
+    /// Its points, verified.
+    pub points: Vec<Verified>,
+    /// How it ended, at its first point and at its last.
+    pub ends: [Halt; 2],
+}
+
+/// Follows the boundary on which a critical point of a branch lies both ways, from a
+/// fraction of the second number's range. `progress` is told of each point: how many
+/// there are, and where.
+pub fn follow(
+    plane: Plane,
+    grid: &Grid,
+    critical: &Critical,
+    second: f64,
+    how: &Stride,
+    progress: &mut dyn FnMut(usize, [f64; 2]),
+) -> Boundary {
+    let mut boundary = Boundary {
+        kind: critical.kind,
+        neutral: critical.modes.len(),
+        points: Vec::new(),
+        ends: [Halt::Stuck; 2],
+    };
+    let begun = Sheet::new(plane, grid.clone()).map_err(Lost::from);
+    let begun = begun.and_then(|mut sheet| Place::begin(&mut sheet, critical, second));
+    let first = match begun {
+        Ok(first) => first,
+        Err(lost) => {
+            boundary.ends = [halt(lost); 2];
+            return boundary;
+        }
+    };
+    for (side, way) in [(1, first.clone()), (0, first.turned())] {
+        let mut walk = Walk {
+            plane,
+            how,
+            second,
+            first: way.clone(),
+            step: FIRST * how.longest,
+            steps: vec![Step {
+                place: way,
+                special: None,
+                given: Some(1),
+            }],
+            verified: Vec::new(),
+            end: None,
+        };
+        let known = boundary.points.len();
+        boundary.ends[side] = walk.run(grid.clone(), &mut |points, place| {
+            progress(known + points, place);
+        });
+        boundary.points.reverse();
+        // The first point is that of the other side.
+        let skip = usize::from(!boundary.points.is_empty());
+        boundary.points.extend(walk.verified.into_iter().skip(skip));
+        if boundary.ends[side] == Halt::Closed {
+            boundary.ends[0] = Halt::Closed;
+            return boundary;
+        }
+    }
+    boundary.points.reverse();
+    boundary
+}
+
+fn halt(lost: Lost) -> Halt {
+    match lost {
+        Lost::Parted => Halt::Parted,
+        Lost::Unfolded => Halt::Unfolded,
+        Lost::Stuck(Stuck::OutOfRange(_)) => Halt::OutOfRange,
+        Lost::Stuck(_) => Halt::Stuck,
+    }
+}
+
+/// A boundary followed one way.
+struct Walk<'a, 'h> {
+    plane: Plane<'a>,
+    how: &'h Stride,
+    /// The second number where it began.
+    second: f64,
+    first: Place,
+    /// Length of the next step.
+    step: f64,
+    steps: Vec<Step>,
+    verified: Vec<Verified>,
+    end: Option<Halt>,
+}
+
+impl<'a> Walk<'a, '_> {
+    /// Goes on to its end; every point is verified, on finer grids where it must.
+    fn run(&mut self, grid: Grid, progress: &mut dyn FnMut(usize, [f64; 2])) -> Halt {
+        let mut sheet = match Sheet::new(self.plane, grid) {
+            Ok(sheet) => sheet,
+            Err(_) => return Halt::OutOfRange,
+        };
+        loop {
+            while self.end.is_none() && self.steps.len() < self.verified.len() + AHEAD {
+                if self.steps.len() >= self.how.most {
+                    self.end = Some(Halt::MostPoints);
+                    break;
+                }
+                self.try_step(&mut sheet);
+                let last = &self.steps[self.steps.len() - 1];
+                progress(self.steps.len(), last.place.spot.place);
+            }
+            let doubt = self.verify(sheet.grid());
+            let end = match (doubt, self.end) {
+                (None, None) => continue,
+                (None, Some(end @ (Halt::Stuck | Halt::Unfolded | Halt::Parted))) => end,
+                (None, Some(end)) => return end,
+                (Some(doubt), _) => Halt::Unverified(doubt),
+            };
+            // Perhaps a finer grid knows better.
+            if !self.refine(&mut sheet) {
+                return end;
+            }
+        }
+    }
+
+    /// Verifies what is not yet, side by side; forgets what cannot be.
+    fn verify(&mut self, grid: &Grid) -> Option<Doubt> {
+        let new = &self.steps[self.verified.len()..];
+        let (plane, accuracy) = (self.plane, self.how.accuracy);
+        let found: Vec<Result<Verified, Doubt>> = (new.par_iter())
+            .map(|step| refine(plane, grid, step, accuracy))
+            .collect();
+        for point in found {
+            match point {
+                Ok(point) => self.verified.push(point),
+                Err(doubt) => {
+                    self.steps.truncate(self.verified.len().max(1));
+                    self.end = None;
+                    return Some(doubt);
+                }
+            }
+        }
+        None
+    }
+
+    /// Takes the last point to the grid with all segments halved; false where that is too
+    /// fine, or has no such point.
+    fn refine(&mut self, sheet: &mut Sheet<'a>) -> bool {
+        if 2 * sheet.grid().segments() > FINEST {
+            return false;
+        }
+        let mut on_finer = |place: &Place, given| {
+            let (mut finer, near) = on_finer(sheet, place).ok()?;
+            let place = match given {
+                Some(which) => land(&mut finer, &near, 0.0, which, near.spot.place[which]),
+                None => onto(&mut finer, &near, 0.0, ACCURACY, 1.0).map(|(place, _)| place),
+            };
+            Some((finer, place.ok()?))
+        };
+        let Some(last) = self.steps.last_mut() else {
+            return false;
+        };
+        let (Some((_, first)), Some((finer, place))) = (
+            on_finer(&self.first, Some(1)),
+            on_finer(&last.place, last.given),
+        ) else {
+            return false;
+        };
+        (self.first, last.place) = (first, place);
+        self.step *= 0.5;
+        self.end = None;
+        *sheet = finer;
+        true
+    }
+
+    /// Makes a step from the last point, or shortens the next try; ends where that is too
+    /// short.
+    fn try_step(&mut self, sheet: &mut Sheet) {
+        let now = self.steps[self.steps.len() - 1].place.clone();
+        match self.advance(sheet, &now) {
+            Ok((next, end)) => {
+                self.steps.extend(next);
+                self.end = end;
+            }
+            Err(_) if 0.5 * self.step >= SHORTEST * self.how.longest => self.step *= 0.5,
+            Err(lost) => self.end = Some(halt(lost)),
+        }
+    }
+
+    /// The next points: special ones between, and that of the step itself.
+    fn advance(
+        &mut self,
+        sheet: &mut Sheet,
+        now: &Place,
+    ) -> Result<(Vec<Step>, Option<Halt>), Lost> {
+        let not_converged = || Lost::Stuck(Stuck::NotConverged);
+        if leaves(now) {
+            return Ok((Vec::new(), Some(Halt::Reached)));
+        }
+        let mut step = self.step;
+        let mut given = self.edge(now, step, |which| {
+            now.spot.place[which] + step * now.tangent.place[which]
+        });
+        if given.is_none() {
+            let (next, off) = onto(sheet, now, step, ACCURACY, DRIFT * step)?;
+            given = self.edge(now, step, |which| next.spot.place[which]);
+            if given.is_none() {
+                let turn = self.accepts(sheet, [now, &next], off, step)?;
+                if turn > STRAIGHT {
+                    self.step = (GROWTH * step).min(self.how.longest);
+                }
+                let mut steps = between(sheet, [now, &next], step)?;
+                steps.push(Step {
+                    place: next,
+                    special: None,
+                    given: None,
+                });
+                return Ok((steps, None));
+            }
+        }
+        let Some((which, value, part)) = given else {
+            return Err(not_converged());
+        };
+        step = part;
+        let next = land(sheet, now, step, which, value)?;
+        let off = sheet.way(&now.spot, &next.spot);
+        let along = sheet.along(&off, &now.tangent);
+        let off = (sheet.along(&off, &off) - along * along).max(0.0).sqrt();
+        self.accepts(sheet, [now, &next], off, step)?;
+        let edge = value == 0.0 || value == 1.0;
+        let mut steps = between(sheet, [now, &next], step)?;
+        let end = match () {
+            () if edge => Some(Halt::Reached),
+            () if self.is_first(sheet, &next) => Some(Halt::Closed),
+            () => None,
+        };
+        steps.push(Step {
+            place: next,
+            special: None,
+            given: Some(which),
+        });
+        Ok((steps, end))
+    }
+
+    /// The number, its value and the part of the step where this first leaves a range, or
+    /// passes the second number's value at the start.
+    fn edge(
+        &self,
+        now: &Place,
+        step: f64,
+        next: impl Fn(usize) -> f64,
+    ) -> Option<(usize, f64, f64)> {
+        let marks = [(0, 0.0), (0, 1.0), (1, 0.0), (1, 1.0), (1, self.second)];
+        let passed = marks.into_iter().filter_map(|(which, value)| {
+            let (before, after) = (now.spot.place[which], next(which));
+            let part = (value - before) / (after - before);
+            let inside = value == self.second && which == 1;
+            let passed = match inside {
+                true => (before - value).abs() > EXACT && (before < value) != (after < value),
+                false => (value == 0.0 && after < value) || (value == 1.0 && after > value),
+            };
+            passed.then_some((which, value, part.clamp(0.0, 1.0) * step))
+        });
+        passed.min_by(|a, b| a.2.total_cmp(&b.2))
+    }
+
+    /// Whether a step may be believed to have stayed on the boundary; by how much this
+    /// turned.
+    fn accepts(
+        &self,
+        sheet: &Sheet,
+        [now, next]: [&Place; 2],
+        off: f64,
+        step: f64,
+    ) -> Result<f64, Lost> {
+        let turn = sheet.along(&now.tangent, &next.tangent);
+        let tilt = sheet.along(&now.normal, &next.normal);
+        match off <= DRIFT * step && turn > BENT && tilt > BENT {
+            true => Ok(turn),
+            false => Err(Lost::Stuck(Stuck::NotConverged)),
+        }
+    }
+
+    fn is_first(&self, sheet: &Sheet, place: &Place) -> bool {
+        let first = &self.first;
+        (first.spot.place[0] - place.spot.place[0]).abs() < SAME[0]
+            && first.spot.state.shift_to(&place.spot.state) < SAME[1]
+            && sheet.along(&first.tangent, &place.tangent) > BENT
+    }
+}
+
+/// Whether a point is at an end of a range, and the boundary goes on beyond.
+fn leaves(now: &Place) -> bool {
+    (0..2).any(|k| {
+        let (at, way) = (now.spot.place[k], now.tangent.place[k]);
+        at <= EXACT && way < 0.0 || at >= 1.0 - EXACT && way > 0.0
+    })
+}
+
+/// The point of the boundary at a value of one of the numbers, about so far along the
+/// tangent.
+fn land(
+    sheet: &mut Sheet,
+    now: &Place,
+    step: f64,
+    which: usize,
+    value: f64,
+) -> Result<Place, Lost> {
+    let mut spot = sheet.moved(&now.spot, &now.tangent, step)?;
+    spot.place[which] = value;
+    let (across, slope) = now.across_at(sheet, which);
+    let along = sheet.number(which);
+    let search = Search {
+        spot: &spot,
+        across: &across,
+        slope,
+        along: &along,
+        like: now,
+        accuracy: EXACT,
+        furthest: 0.5,
+    };
+    let found = search.run(sheet)?;
+    let mut place = now.at(sheet, found)?;
+    place.spot.place[which] = value;
+    Ok(place)
+}
+
+/// Special points between two of a boundary.
+fn between(
+    sheet: &mut Sheet,
+    [now, next]: [&Place; 2],
+    step: f64,
+) -> Result<Vec<Step>, Lost> {
+    let mut special = Vec::new();
+    if now.kind == Kind::Fold && now.speed * next.speed < 0.0 {
+        special.push(Special::Cusp);
+    }
+    match now.index.abs_diff(next.index) {
+        0 => {}
+        1 => special.push(Special::Crossing),
+        _ => return Err(Lost::Stuck(Stuck::NotConverged)),
+    }
+    if special.len() > 1 {
+        return Err(Lost::Stuck(Stuck::NotConverged));
+    }
+    let located = special.into_iter().map(|special| {
+        Ok(Step {
+            place: locate(sheet, [now, next], step, special)?,
+            special: Some(special),
+            given: None,
+        })
+    });
+    located.collect()
+}

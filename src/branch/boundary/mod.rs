@@ -1,0 +1,39 @@
+//! The boundary of stability as a curve: a critical point of a branch along one number,
+//! followed through a second one.
+//!
+//! Equilibria of leaves that differ in two numbers l = (l1, l2) are a sheet g(z, l) = 0.
+//! On it, the matrix K is singular along curves. With K bordered by soft modes, as in
+//! [`crate::branch`], an eigenvalue h of H is zero there: minimally augmented, the
+//! equations of such a curve are
+//!
+//! ```text
+//! g(z, l) = 0,   h(z, l) = 0
+//! ```
+//!
+//! with the state and both numbers as unknowns (Govaerts, Numerical Methods for
+//! Bifurcations of Dynamical Equilibria, 2000, chapters 3 to 5). The curve is followed by
+//! arclength. At every point the sheet is spanned by two directions, one along the curve,
+//! one across it, in which h changes: a step goes along the first, and a secant method
+//! along the second, with Newton's method back to the sheet, finds the zero of h. Folds of
+//! the curve in either number are no obstacle.
+//!
+//! Where branches cross for reasons of symmetry, K has a kernel along which the sheet is
+//! not followed: it is that of the symmetric branch. Several modes that become neutral
+//! together are followed by the mean of their eigenvalues, as long as these are the same.
+//!
+//! A curve of folds turns back at a cusp; where a further eigenvalue is zero, two curves
+//! cross. Both are located along the curve, and verified as every point is: on finer and
+//! finer grids, at the same value of the second number (of the first, where the curve goes
+//! along that; in the same plane across the curve, where it goes along neither), and
+//! extrapolated.
+
+mod follow;
+mod place;
+mod refine;
+mod sheet;
+mod special;
+
+pub use follow::{Boundary, Halt, Stride, follow};
+pub use refine::Verified;
+pub use sheet::Plane;
+pub use special::Special;

@@ -1,0 +1,426 @@
+//! A point of a boundary: an equilibrium on the sheet at which the matrix is singular.
+
+use nalgebra::DMatrix;
+
+use super::sheet::{Direction, Sample, Sheet, Spot};
+use crate::branch::critical::{Critical, Kind};
+use crate::branch::equations::Stuck;
+use crate::branch::field::{add, combined, dot, plus, times};
+use crate::leaf::Field;
+
+/// Evaluations in the search for a zero.
+const EVALUATIONS: usize = 30;
+
+/// A slope from points nearer than this is rounding.
+const LOCAL: f64 = 1e-6;
+
+/// The distance over which the change of a singular value is differenced.
+const DIFFERENCE: f64 = 3e-4;
+
+/// Below this part of what a mode could feel of a number, it feels nothing but rounding.
+const DRIVEN: f64 = 1e-5;
+
+/// Eigenvalues that differ by more than this, relative to their change with a step of
+/// length one, do not vanish together.
+const TOGETHER: f64 = 1e-5;
+
+/// An eigenvalue that is smaller than this is that of a neutral mode.
+const NEUTRAL: f64 = 1e-7;
+
+/// A point of a boundary on one grid.
+#[derive(Clone, Debug)]
+pub struct Place {
+    /// Where it is.
+    pub spot: Spot,
+    /// What becomes neutral there, and whether the branch along the first number turns.
+    pub kind: Kind,
+    /// How many modes become neutral together.
+    pub neutral: usize,
+    /// The modes of the border: first the neutral ones.
+    pub held: Vec<Field>,
+    /// The way along the boundary and the way across it on the sheet: this goes to where
+    /// there are more negative eigenvalues.
+    pub tangent: Direction,
+    pub normal: Direction,
+    /// Change of the eigenvalue of H along the latter.
+    pub slope: f64,
+    /// Morse index across the boundary, and before it.
+    pub index: usize,
+    /// Eigenvalues of H but for those that are zero.
+    pub others: Vec<f64>,
+    /// Along a fold: the change of the numbers with the way along the boundary, which
+    /// changes its sign at a cusp.
+    pub speed: f64,
+    /// The direction in the plane of the numbers in which a fold goes.
+    pub heading: [f64; 2],
+}
+
+/// What one evaluation says of the modes that become neutral.
+struct Eigen {
+    /// The mean of their eigenvalues, and how far these are apart.
+    value: f64,
+    spread: f64,
+    /// Eigenvectors of H: first theirs, then the others with their eigenvalues.
+    vectors: Vec<Vec<f64>>,
+    others: Vec<f64>,
+}
+
+/// Why no point of a boundary is there.
+#[derive(Clone, Debug)]
+pub enum Lost {
+    /// No solution was found.
+    Stuck(Stuck),
+    /// The modes do not become neutral together.
+    Parted,
+    /// The mode feels the number, so that branches do not cross.
+    Unfolded,
+}
+
+impl<E: Into<Stuck>> From<E> for Lost {
+    fn from(stuck: E) -> Self {
+        Lost::Stuck(stuck.into())
+    }
+}
+
+/// How a point of a boundary is sought from a spot.
+pub struct Search<'s> {
+    /// From here,
+    pub spot: &'s Spot,
+    /// this way, along which the eigenvalue changes so much,
+    pub across: &'s Direction,
+    pub slope: f64,
+    /// in the plane normal to this,
+    pub along: &'s Direction,
+    /// with the modes of this point,
+    pub like: &'s Place,
+    /// to this accuracy, and not further.
+    pub accuracy: f64,
+    pub furthest: f64,
+}
+
+/// A point without directions.
+pub struct Found {
+    sample: Sample,
+    eigen: Eigen,
+    /// How far from the start of the search.
+    pub distance: f64,
+}
+
+impl Found {
+    /// Where it is.
+    pub fn spot(&self) -> &Spot {
+        &self.sample.spot
+    }
+}
+
+fn eigen(sample: &Sample, neutral: usize) -> Eigen {
+    let all = sample.solved.h.clone().symmetric_eigen();
+    let count = all.eigenvalues.len();
+    // The neutral modes are the first of the border.
+    let weight = |k: usize| -> f64 {
+        let own = (0..neutral).map(|i| all.eigenvectors[(i, k)].powi(2));
+        own.sum()
+    };
+    let mut order: Vec<usize> = (0..count).collect();
+    order.sort_by(|&a, &b| weight(b).total_cmp(&weight(a)));
+    let values: Vec<f64> = order.iter().map(|&k| all.eigenvalues[k]).collect();
+    let (own, others) = values.split_at(neutral.min(count));
+    let most = own.iter().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
+    let least = own.iter().fold(f64::INFINITY, |m, v| m.min(*v));
+    let vector = |&k: &usize| all.eigenvectors.column(k).iter().copied().collect();
+    Eigen {
+        value: own.iter().sum::<f64>() / neutral as f64,
+        spread: most - least,
+        vectors: order.iter().map(vector).collect(),
+        others: others.to_vec(),
+    }
+}
+
+impl Search<'_> {
+    /// The zero of the eigenvalue by the secant method.
+    pub fn run(&self, sheet: &mut Sheet) -> Result<Found, Lost> {
+        let border: Vec<Field> = (self.like.held.iter())
+            .map(|mode| sheet.equations.momentum(mode))
+            .collect();
+        let mut at = |distance: f64| -> Result<Found, Lost> {
+            let spot = sheet.moved(self.spot, self.across, distance)?;
+            let sample = sheet.settle(&spot, [self.along, self.across], &border)?;
+            let eigen = eigen(&sample, self.like.neutral);
+            Ok(Found {
+                sample,
+                eigen,
+                distance,
+            })
+        };
+        let (mut distance, mut slope) = (0.0, self.slope);
+        let mut best = at(distance)?;
+        let mut value = best.eigen.value;
+        let mut worse = 0;
+        for _ in 0..EVALUATIONS {
+            let step = -value / slope;
+            if !step.is_finite() || (distance + step).abs() > self.furthest {
+                return Err(Lost::Stuck(Stuck::NotConverged));
+            }
+            if step.abs() < self.accuracy {
+                return Ok(best);
+            }
+            let next = at(distance + step)?;
+            let after = next.eigen.value;
+            if step.abs() > LOCAL {
+                slope = (after - value) / step;
+            }
+            (distance, value) = (distance + step, after);
+            match after.abs() < best.eigen.value.abs() {
+                true => best = next,
+                false => worse += 1,
+            }
+            if worse > 1 {
+                return Ok(best);
+            }
+        }
+        Err(Lost::Stuck(Stuck::NotConverged))
+    }
+}
+
+impl Place {
+    /// The critical point of a branch along the first number, as a point of the sheet at
+    /// a fraction of the second number's range; `onward`: the boundary goes to where the
+    /// second number grows.
+    pub fn begin(sheet: &mut Sheet, critical: &Critical, second: f64) -> Result<Place, Lost> {
+        let modes = critical.modes.iter().chain(&critical.held);
+        let held = independent(sheet, modes, critical.held.len());
+        let spot = Spot {
+            state: critical.state.clone(),
+            place: [critical.fraction, second],
+        };
+        let across = Direction {
+            increments: critical.tangent.increments.clone(),
+            place: [critical.tangent.fraction, 0.0],
+        };
+        let along = sheet.number(1);
+        let like = Place {
+            spot,
+            kind: critical.kind,
+            neutral: critical.modes.len(),
+            held,
+            tangent: along.clone(),
+            normal: across.clone(),
+            slope: critical.slope,
+            index: 0,
+            others: Vec::new(),
+            speed: 0.0,
+            heading: [0.0; 2],
+        };
+        let found = Search {
+            spot: &like.spot,
+            across: &across,
+            slope: critical.slope,
+            along: &along,
+            like: &like,
+            accuracy: 1e-11,
+            furthest: 0.1,
+        };
+        let found = found.run(sheet)?;
+        like.at(sheet, found)
+    }
+
+    /// The point that was found from this one, with its directions: the way along the
+    /// boundary as here.
+    pub fn at(&self, sheet: &mut Sheet, found: Found) -> Result<Place, Lost> {
+        let Found { sample, eigen, .. } = found;
+        let basis = self.basis(sheet, &sample, &eigen)?;
+        let modes: Vec<Field> = (eigen.vectors.iter())
+            .map(|vector| combined(vector, &sample.solved.modes))
+            .collect();
+        let held = independent(sheet, modes.iter(), modes.len());
+        let border: Vec<Field> = held.iter().map(|it| sheet.equations.momentum(it)).collect();
+        let mut change = [0.0; 2];
+        for (change, direction) in change.iter_mut().zip(&basis) {
+            let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
+                let spot = sheet.moved(&sample.spot, direction, step)?;
+                let sample = sheet.settle(&spot, [&basis[0], &basis[1]], &border)?;
+                Ok::<f64, Stuck>(self::eigen(&sample, self.neutral).value)
+            });
+            *change = (after? - before?) / (2.0 * DIFFERENCE);
+        }
+        let slope = change[0].hypot(change[1]);
+        if !(slope.is_finite() && slope > NEUTRAL) {
+            return Err(Lost::Stuck(Stuck::NotConverged));
+        }
+        if eigen.spread > TOGETHER * slope {
+            return Err(Lost::Parted);
+        }
+        let [a, b] = change.map(|part| part / slope);
+        let normal = Direction::mixed([a, b], &basis);
+        let mut tangent = Direction::mixed([-b, a], &basis);
+        if sheet.along(&tangent, &self.tangent) < 0.0 {
+            tangent = tangent.reversed();
+        }
+        let drive = self.drive(&sample, &eigen, slope);
+        if self.kind == Kind::Branching && drive.felt > DRIVEN {
+            return Err(Lost::Unfolded);
+        }
+        // A fold moves in the direction in which the mode feels nothing.
+        let mut heading = drive.free;
+        if heading[0] * self.heading[0] + heading[1] * self.heading[1] < 0.0 {
+            heading = heading.map(|part| -part);
+        }
+        let negative = |h: f64| h < NEUTRAL;
+        let held_negative = eigen.others.iter().filter(|&&h| negative(h)).count();
+        Ok(Place {
+            kind: self.kind,
+            neutral: self.neutral,
+            held,
+            speed: heading[0] * tangent.place[0] + heading[1] * tangent.place[1],
+            heading,
+            tangent,
+            normal,
+            slope,
+            index: sample.solved.negative.saturating_sub(held_negative),
+            others: eigen.others,
+            spot: sample.spot,
+        })
+    }
+
+    /// Two directions of length one, normal to each other, that span the sheet.
+    fn basis(
+        &self,
+        sheet: &Sheet,
+        sample: &Sample,
+        eigen: &Eigen,
+    ) -> Result<[Direction; 2], Lost> {
+        let solved = &sample.solved;
+        let p = solved.modes.len();
+        let others = eigen.others.iter().zip(&eigen.vectors[self.neutral..]);
+        let left = others.filter(|(value, _)| value.abs() < NEUTRAL);
+        let mut frozen: Vec<&Vec<f64>> = left.map(|(_, vector)| vector).collect();
+        if self.kind == Kind::Branching {
+            // Along a neutral mode another branch may leave: the sheet is this one's.
+            frozen.extend(&eigen.vectors[..self.neutral]);
+        }
+        let rows = (p + frozen.len()).max(p + 2);
+        let mut matrix = DMatrix::<f64>::zeros(rows, p + 2);
+        for r in 0..p {
+            for c in 0..p {
+                matrix[(r, c)] = solved.h[(r, c)];
+            }
+            for i in 0..2 {
+                matrix[(r, p + i)] = solved.rates[i].multipliers[r];
+            }
+        }
+        for (k, vector) in frozen.iter().enumerate() {
+            for c in 0..p {
+                matrix[(p + k, c)] = vector[c];
+            }
+        }
+        let svd = matrix.svd(false, true);
+        let right = svd.v_t.ok_or(Stuck::NotConverged)?;
+        let mut order: Vec<usize> = (0..p + 2).collect();
+        order.sort_by(|&a, &b| svd.singular_values[a].total_cmp(&svd.singular_values[b]));
+        let direction = |row: usize| {
+            let part = |c: usize| right[(row, c)];
+            let parts: Vec<f64> = (0..p).map(part).collect();
+            let mut increments = combined(&parts, &solved.modes);
+            for i in 0..2 {
+                add(&mut increments, part(p + i), &solved.rates[i].increments);
+            }
+            Direction {
+                increments,
+                place: [part(p), part(p + 1)],
+            }
+        };
+        let first = sheet.normalised(direction(order[0]));
+        let second = direction(order[1]);
+        let part = sheet.along(&first, &second);
+        let second = Direction {
+            increments: plus(&second.increments, -part, &first.increments),
+            place: [0, 1].map(|i| second.place[i] - part * first.place[i]),
+        };
+        Ok([first, sheet.normalised(second)])
+    }
+
+    fn drive(&self, sample: &Sample, eigen: &Eigen, slope: f64) -> Drive {
+        let (solved, rates) = (&sample.solved, &sample.rates);
+        let mut felt = 0.0_f64;
+        let mut free = [0.0; 2];
+        for vector in &eigen.vectors[..self.neutral] {
+            let mode = combined(vector, &solved.modes);
+            let drive = [0, 1].map(|i| {
+                let multipliers = &solved.rates[i].multipliers;
+                vector.iter().zip(multipliers).map(|(v, d)| v * d).sum::<f64>()
+            });
+            for i in 0..2 {
+                let most = (dot(&rates[i], &rates[i]) * dot(&mode, &mode)).sqrt();
+                felt = felt.max(drive[i].abs() / most.max(slope));
+            }
+            let size = drive[0].hypot(drive[1]);
+            free = [-drive[1] / size, drive[0] / size];
+        }
+        Drive { felt, free }
+    }
+
+    /// The direction on the sheet, across the boundary, in which one of the numbers
+    /// stays, and the change of the eigenvalue along it.
+    pub fn across_at(&self, sheet: &Sheet, which: usize) -> (Direction, f64) {
+        let parts = [self.tangent.place[which], -self.normal.place[which]];
+        let both = [self.normal.clone(), self.tangent.clone()];
+        let across = sheet.normalised(Direction::mixed(parts, &both));
+        let slope = self.slope * sheet.along(&across, &self.normal);
+        (across, slope)
+    }
+
+    /// Change of the eigenvalue with the first number at a value of the second; infinite
+    /// at a fold.
+    pub fn steepness(&self, sheet: &Sheet) -> f64 {
+        match self.kind {
+            Kind::Fold => f64::INFINITY,
+            Kind::Branching => {
+                let (across, slope) = self.across_at(sheet, 1);
+                (slope / across.place[0]).abs()
+            }
+        }
+    }
+
+    /// Going along the boundary the other way.
+    pub fn turned(&self) -> Place {
+        Place {
+            tangent: self.tangent.reversed(),
+            speed: -self.speed,
+            ..self.clone()
+        }
+    }
+}
+
+/// What the neutral modes feel of the numbers.
+struct Drive {
+    /// The largest part of what they could feel.
+    felt: f64,
+    /// The direction in the plane of the numbers in which they feel nothing.
+    free: [f64; 2],
+}
+
+/// As many of these modes as are wanted, of mass one and normal to each other over the
+/// masses; those that depend on the ones before are left out.
+fn independent<'m>(
+    sheet: &Sheet,
+    modes: impl Iterator<Item = &'m Field>,
+    count: usize,
+) -> Vec<Field> {
+    let equations = &sheet.equations;
+    let mut kept: Vec<Field> = Vec::new();
+    for mode in modes {
+        let size = equations.product(mode, mode).sqrt();
+        let mut mode = times(mode, 1.0 / size);
+        for _ in 0..2 {
+            for other in &kept {
+                let part = equations.product(other, &mode);
+                add(&mut mode, -part, other);
+            }
+        }
+        let size = equations.product(&mode, &mode).sqrt();
+        if size > 1e-6 && kept.len() < count {
+            kept.push(times(&mode, 1.0 / size));
+        }
+    }
+    kept
+}

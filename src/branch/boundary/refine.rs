@@ -1,0 +1,330 @@
+//! Points of a boundary on finer and finer grids: extrapolated, and thereby verified.
+
+use super::place::{Lost, Place, Search};
+use super::sheet::{Direction, Plane, Sheet, Spot};
+use super::special::{Special, locate_near};
+use crate::branch::critical::Kind;
+use crate::branch::field::prolong as prolong_field;
+use crate::branch::refine_critical::{NEARLY_RIGID, SOFTENING};
+use crate::branch::refined::Doubt;
+use crate::leaf::{Grid, State};
+use crate::relax::prolong::prolong;
+use crate::relax::richardson::Richardson;
+
+/// Grids of a point at least and at most, those of a nearly rigid leaf, and segments of
+/// the finest.
+const FEWEST: usize = 3;
+const GRIDS: usize = 6;
+const RIGID: usize = 4;
+const FINEST: usize = 4096;
+
+/// From grid to grid a point moves by less and less, if by more than this (lengths).
+const STILL: f64 = 1e-4;
+
+/// Largest error of the tips (lengths) of a point that is known by its numbers.
+const NEUTRAL_TIPS: f64 = 1e-3;
+
+/// Numbers are to be so many times as exact as tips: of the part of their ranges.
+const EXACTER: f64 = 1e-3;
+
+/// Numbers within this part of their ranges are exact.
+const EXACT: f64 = 1e-12;
+
+/// Accuracy of a point on its grid, as a part of the ranges, and how far it may lie from
+/// where it is on the grid before.
+const ACCURACY: f64 = 1e-13;
+const NEAR: f64 = 0.5;
+
+/// The line across the boundary leaves it at an angle of at least this (its sine), and one
+/// of the numbers changes along the boundary by at least this part of the other.
+const SINE: f64 = 0.3;
+const PART: f64 = 0.1;
+
+/// A point to be verified.
+#[derive(Clone, Debug)]
+pub struct Step {
+    /// Where it is on a grid.
+    pub place: Place,
+    /// What it is besides.
+    pub special: Option<Special>,
+    /// The number that is given: at the end of a range.
+    pub given: Option<usize>,
+}
+
+/// A point of a boundary without the error of its grid.
+#[derive(Clone, Debug)]
+pub struct Verified {
+    /// Both numbers, as fractions of their ranges, and bounds on their errors.
+    pub place: [f64; 2],
+    pub errors: [f64; 2],
+    /// Tips of all rods, in the family's units, and a bound on their error.
+    pub tips: Vec<[f64; 3]>,
+    pub error: f64,
+    /// The state on the finest grid.
+    pub state: State,
+    /// What it is.
+    pub kind: Kind,
+    pub special: Option<Special>,
+    /// Morse indices where the first number is smaller and where it is larger; of a fold,
+    /// of both branches that meet there.
+    pub indices: [usize; 2],
+}
+
+/// A point of the same kind on the grid with all segments halved: where it would be, with
+/// its directions.
+pub fn on_finer<'a>(
+    sheet: &mut Sheet<'a>,
+    place: &Place,
+) -> Result<(Sheet<'a>, Place), Lost> {
+    let state = prolong(sheet.leaf(place.spot.place)?, &place.spot.state);
+    let finer = sheet.refined()?;
+    let direction = |it: &Direction| {
+        finer.normalised(Direction {
+            increments: prolong_field(&it.increments),
+            place: it.place,
+        })
+    };
+    let place = Place {
+        spot: Spot {
+            state,
+            ..place.spot
+        },
+        held: place.held.iter().map(prolong_field).collect(),
+        tangent: direction(&place.tangent),
+        normal: direction(&place.normal),
+        ..place.clone()
+    };
+    Ok((finer, place))
+}
+
+/// A point on as many grids as it takes; on all of them it must be the same.
+pub fn refine(
+    plane: Plane,
+    grid: &Grid,
+    step: &Step,
+    accuracy: f64,
+) -> Result<Verified, Doubt> {
+    let mut sheet = Sheet::new(plane, grid.clone())?;
+    let mut near = step.place.clone();
+    let given = step.given.or_else(|| given_at(&sheet, &near));
+    let given = given.filter(|_| step.special.is_none());
+    let mut table = Table {
+        given: given.map(|which| (which, near.spot.place[which])),
+        ..Table::default()
+    };
+    let mut moved = f64::INFINITY;
+    for level in 0..GRIDS {
+        if level > 0 {
+            (sheet, near) = on_finer(&mut sheet, &near)?;
+        }
+        let rigid = sheet.leaf(near.spot.place)?.stiffest() * NEARLY_RIGID < 1.0;
+        let place = again(&mut sheet, &near, step.special, given)?;
+        let way = near.spot.state.shift_to(&place.spot.state);
+        if way > moved.max(STILL) {
+            return Err(Doubt::OtherBranch);
+        }
+        if place.index != step.place.index {
+            return Err(Doubt::OtherIndex);
+        }
+        if level > 0 {
+            moved = way;
+        }
+        near = place;
+        let numbers = match rigid {
+            false => near.spot.place,
+            true => unsoftened(&mut sheet, &near, given)?,
+        };
+        table.push(&mut sheet, &near, numbers, rigid)?;
+        if level + 1 < FEWEST {
+            continue;
+        }
+        let enough = (EXACTER * accuracy).max(table.rounding).max(EXACT);
+        let exact = table.errors().iter().all(|error| *error <= enough);
+        let last = level + 1 == if rigid { RIGID } else { GRIDS }
+            || 2 * sheet.grid().segments() > FINEST;
+        let tips = if last { NEUTRAL_TIPS } else { accuracy };
+        let tips = table.tips.best().is_some_and(|best| best.error <= tips);
+        let numbers = table.errors().iter().all(|error| *error <= accuracy);
+        if tips && (exact || last && numbers) {
+            return Ok(table.verified(&sheet, &near, step.special));
+        }
+        if last {
+            break;
+        }
+    }
+    Err(Doubt::Inaccurate)
+}
+
+/// The number that may be given while a point is sought across the boundary, if there is
+/// one: the second, unless the boundary goes along the first alone.
+fn given_at(sheet: &Sheet, place: &Place) -> Option<usize> {
+    let [first, second] = place.tangent.place.map(f64::abs);
+    let sine = |which: usize| {
+        let (across, _) = place.across_at(sheet, which);
+        sheet.along(&across, &place.normal).abs()
+    };
+    let order = if second >= PART * first { [1, 0] } else { [0, 1] };
+    let changes = place.tangent.place.map(|part| part.abs() > PART * SINE);
+    order.into_iter().find(|&k| changes[k] && sine(k) > SINE)
+}
+
+/// The point on this grid, to rounding.
+fn again(
+    sheet: &mut Sheet,
+    near: &Place,
+    special: Option<Special>,
+    given: Option<usize>,
+) -> Result<Place, Lost> {
+    if let Some(special) = special {
+        return locate_near(sheet, near, special);
+    }
+    let found = sought(sheet, near, given).run(sheet)?;
+    near.at(sheet, found)
+}
+
+/// How the point is sought, from where it is on the grid before.
+fn sought(sheet: &Sheet, near: &Place, given: Option<usize>) -> Owned {
+    let (across, slope, along) = match given {
+        Some(which) => {
+            let (across, slope) = near.across_at(sheet, which);
+            (across, slope, sheet.number(which))
+        }
+        None => (near.normal.clone(), near.slope, near.tangent.clone()),
+    };
+    Owned {
+        near: near.clone(),
+        across,
+        slope,
+        along,
+    }
+}
+
+/// A search that owns its directions.
+struct Owned {
+    near: Place,
+    across: Direction,
+    slope: f64,
+    along: Direction,
+}
+
+impl Owned {
+    fn run(&self, sheet: &mut Sheet) -> Result<super::place::Found, Lost> {
+        let search = Search {
+            spot: &self.near.spot,
+            across: &self.across,
+            slope: self.slope,
+            along: &self.along,
+            like: &self.near,
+            accuracy: ACCURACY,
+            furthest: NEAR,
+        };
+        search.run(sheet)
+    }
+}
+
+/// The numbers at a point of a nearly rigid leaf: by softened matrices, extrapolated to
+/// none.
+fn unsoftened(sheet: &mut Sheet, near: &Place, given: Option<usize>) -> Result<[f64; 2], Lost> {
+    let grid = sheet.grid().clone();
+    let mut places = [[0.0; 2]; 4];
+    let mut owned = sought(sheet, near, given);
+    for (k, place) in places.iter_mut().enumerate().rev() {
+        let mut soft = Sheet::new(sheet.plane, grid.clone())?;
+        soft.soften(SOFTENING * (k + 1) as f64);
+        let found = owned.run(&mut soft)?;
+        *place = found.spot().place;
+        owned.near.spot = found.spot().clone();
+    }
+    // The cubic through values at 1, 2, 3, 4 at zero.
+    let [a, b, c, d] = places;
+    Ok([0, 1].map(|i| 4.0 * a[i] - 6.0 * b[i] + 4.0 * c[i] - d[i]))
+}
+
+/// What is extrapolated.
+#[derive(Default)]
+struct Table {
+    tips: Richardson,
+    numbers: [Richardson; 2],
+    /// The number that is the same on every grid, if there is one.
+    given: Option<(usize, f64)>,
+    /// What rounding of the matrix may have done to the numbers.
+    rounding: f64,
+}
+
+impl Table {
+    fn push(
+        &mut self,
+        sheet: &mut Sheet,
+        place: &Place,
+        numbers: [f64; 2],
+        rigid: bool,
+    ) -> Result<(), Lost> {
+        let steepness = place.steepness(sheet);
+        let leaf = sheet.leaf(place.spot.place)?;
+        let limit = if rigid { 1.0 / SOFTENING } else { f64::INFINITY };
+        let condensing = leaf.sections.iter().map(|it| it.condensing.max_element());
+        let stiffest = condensing.fold(0.0_f64, |most, it| most.max(it.min(limit)));
+        let state = &place.spot.state;
+        let segments = state.segments() as f64;
+        let rounding = f64::EPSILON * stiffest * segments * segments / steepness;
+        self.rounding = self.rounding.max(rounding);
+        let tips = (0..state.rods()).flat_map(|j| state.tip(j).to_array());
+        self.tips.push(state.segments(), tips.collect());
+        for (table, number) in self.numbers.iter_mut().zip(numbers) {
+            table.push(state.segments(), vec![number]);
+        }
+        Ok(())
+    }
+
+    fn errors(&self) -> [f64; 2] {
+        let error = |i: usize| self.numbers[i].best().map_or(f64::INFINITY, |best| best.error);
+        [0, 1].map(|i| match self.given {
+            Some((which, _)) if which == i => 0.0,
+            _ => error(i),
+        })
+    }
+
+    fn verified(&self, sheet: &Sheet, place: &Place, special: Option<Special>) -> Verified {
+        let columns = |table: &Richardson| table.best().map_or(0, |best| best.columns);
+        let tips = self.tips.column(columns(&self.tips));
+        let errors = self.errors();
+        let number = |i: usize| match self.given {
+            Some((which, value)) if which == i => value,
+            _ => self.numbers[i].column(columns(&self.numbers[i]))[0],
+        };
+        let free = |i: usize| self.given.is_none_or(|(which, _)| which != i);
+        let (beyond, below) = (place.index, place.index.saturating_sub(place.neutral));
+        let forward = match place.kind {
+            Kind::Branching => {
+                let (across, slope) = place.across_at(sheet, 1);
+                slope * across.place[0] > 0.0
+            }
+            Kind::Fold => true,
+        };
+        Verified {
+            place: [number(0), number(1)],
+            errors: [0, 1].map(|i| match free(i) {
+                true => errors[i] + self.rounding,
+                false => 0.0,
+            }),
+            tips: tips.chunks(3).map(|tip| [tip[0], tip[1], tip[2]]).collect(),
+            error: self.tips.best().map_or(f64::INFINITY, |best| best.error),
+            state: place.spot.state.clone(),
+            kind: place.kind,
+            special,
+            indices: match forward {
+                true => [below, beyond],
+                false => [beyond, below],
+            },
+        }
+    }
+}
+
+impl From<Lost> for Doubt {
+    fn from(lost: Lost) -> Self {
+        match lost {
+            Lost::Stuck(stuck) => stuck.into(),
+            Lost::Parted | Lost::Unfolded => Doubt::OtherBranch,
+        }
+    }
+}

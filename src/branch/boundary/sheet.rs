@@ -1,0 +1,331 @@
+//! The equilibria of leaves that differ in two numbers, a sheet, on one grid.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use crate::branch::deflation::Solved;
+use crate::branch::equations::{
+    Equations, ITERATIONS, LARGEST, Stuck, assembled, at_rest, forces_on, rate,
+};
+use crate::branch::family::{Family, OutOfRange, clamp};
+use crate::branch::field::{between, is_finite, largest, plus, times};
+use crate::leaf::{DiscreteLeaf, Field, Grid, Leaf, State, System};
+use crate::scenario::Scenario;
+
+/// Leaves that differ in two numbers: a family along the first for every value of the
+/// second.
+#[derive(Clone, Copy)]
+pub struct Plane<'a> {
+    /// Along the first number, at some value of the second: range and units.
+    pub family: &'a Family<'a>,
+    /// The scenario at values of both.
+    pub make: &'a (dyn Fn([f64; 2]) -> Result<Scenario, String> + Sync),
+    /// The second number at the ends of its range.
+    pub range: [f64; 2],
+    /// Whether equal steps of its fraction are equal quotients of its value.
+    pub log: bool,
+}
+
+impl Plane<'_> {
+    /// Both numbers at fractions of their ranges.
+    pub fn values(&self, place: [f64; 2]) -> [f64; 2] {
+        let [from, to] = self.range;
+        let second = match place[1] {
+            0.0 => from,
+            1.0 => to,
+            part if self.log => from * (to / from).powf(part),
+            part => from + (to - from) * part,
+        };
+        [self.family.value(place[0]), second]
+    }
+
+    /// The fraction of the second number's range at which it has a value.
+    pub fn fraction(&self, value: f64) -> f64 {
+        let [from, to] = self.range;
+        match self.log {
+            true => (value / from).ln() / (to / from).ln(),
+            false => (value - from) / (to - from),
+        }
+    }
+
+    /// The scenario at fractions of both ranges.
+    pub fn scenario(&self, place: [f64; 2]) -> Result<Scenario, OutOfRange> {
+        (self.make)(self.values(place)).map_err(OutOfRange)
+    }
+}
+
+/// The last few leaves of a plane, as in [`crate::branch::family::Leaves`].
+#[derive(Default)]
+struct Kept(VecDeque<([f64; 2], DiscreteLeaf)>);
+
+/// Of differences over both numbers, and one more.
+const KEPT: usize = 6;
+
+impl Kept {
+    fn at(
+        &mut self,
+        plane: &Plane,
+        family: &Family,
+        grid: &Grid,
+        place: [f64; 2],
+    ) -> Result<&DiscreteLeaf, OutOfRange> {
+        let known = self.0.iter().position(|(at, _)| *at == place);
+        let leaf = match known.and_then(|index| self.0.remove(index)) {
+            Some((_, leaf)) => leaf,
+            None => {
+                let scenario = Arc::new(plane.scenario(place)?);
+                family.discretised(&Leaf::in_units(scenario, family.scale()), grid)
+            }
+        };
+        self.0.truncate(KEPT - 1);
+        self.0.push_front((place, leaf));
+        Ok(&self.0[0].1)
+    }
+}
+
+/// An equilibrium, or what comes near one.
+#[derive(Clone, Debug)]
+pub struct Spot {
+    /// The state of the leaf.
+    pub state: State,
+    /// Both numbers, as fractions of their ranges.
+    pub place: [f64; 2],
+}
+
+/// A direction on the sheet.
+#[derive(Clone, Debug)]
+pub struct Direction {
+    /// Increments of the nodes.
+    pub increments: Field,
+    /// Changes of the numbers.
+    pub place: [f64; 2],
+}
+
+impl Direction {
+    /// The sum of two directions, each times its part.
+    pub fn mixed(parts: [f64; 2], [a, b]: &[Direction; 2]) -> Direction {
+        let scaled = times(&a.increments, parts[0]);
+        Direction {
+            increments: plus(&scaled, parts[1], &b.increments),
+            place: [0, 1].map(|i| parts[0] * a.place[i] + parts[1] * b.place[i]),
+        }
+    }
+
+    /// The same direction, backwards.
+    pub fn reversed(&self) -> Direction {
+        Direction {
+            increments: times(&self.increments, -1.0),
+            place: self.place.map(|part| -part),
+        }
+    }
+}
+
+/// A spot with what the bordered equations say there.
+pub struct Sample {
+    pub spot: Spot,
+    pub solved: Solved,
+    /// How the forces change with both numbers.
+    pub rates: Vec<Field>,
+}
+
+/// The equations of a plane on a grid.
+pub struct Sheet<'a> {
+    pub plane: Plane<'a>,
+    pub equations: Equations<'a>,
+    kept: Kept,
+    /// The family whose matrices decide what is singular, if that is another.
+    softened: Option<(Family<'a>, Kept)>,
+}
+
+impl<'a> Sheet<'a> {
+    /// Room for the equations of a plane on `grid`.
+    pub fn new(plane: Plane<'a>, grid: Grid) -> Result<Self, OutOfRange> {
+        let equations = Equations::new(plane.family, grid)?;
+        Sheet::of(plane, equations)
+    }
+
+    fn of(plane: Plane<'a>, mut equations: Equations<'a>) -> Result<Self, OutOfRange> {
+        let mut kept = Kept::default();
+        // Veins may be coupled at one end of the second range only.
+        for end in [0.0, 1.0] {
+            let grid = equations.leaves.grid.clone();
+            let leaf = kept.at(&plane, plane.family, &grid, [0.0, end])?;
+            if leaf.coupled() && !equations.leaves.at(0.0)?.coupled() {
+                equations.system = System::new(leaf);
+            }
+        }
+        Ok(Sheet {
+            plane,
+            equations,
+            kept,
+            softened: None,
+        })
+    }
+
+    /// The same on the grid with all segments halved.
+    pub fn refined(&self) -> Result<Self, OutOfRange> {
+        Sheet::of(self.plane, self.equations.refined()?)
+    }
+
+    /// Lets matrices of leaves with so much more compliance decide what is singular:
+    /// see [`Family::softened`].
+    pub fn soften(&mut self, softening: f64) {
+        let family = self.plane.family.softened(softening);
+        self.softened = Some((family, Kept::default()));
+    }
+
+    /// The grid.
+    pub fn grid(&self) -> &Grid {
+        self.equations.grid()
+    }
+
+    /// The leaf at fractions of both ranges.
+    pub fn leaf(&mut self, place: [f64; 2]) -> Result<&DiscreteLeaf, OutOfRange> {
+        let grid = &self.equations.leaves.grid;
+        self.kept.at(&self.plane, self.plane.family, grid, place)
+    }
+
+    /// Product of two directions.
+    pub fn along(&self, a: &Direction, b: &Direction) -> f64 {
+        let numbers = a.place[0] * b.place[0] + a.place[1] * b.place[1];
+        self.equations.product(&a.increments, &b.increments) + numbers
+    }
+
+    /// A direction of length one.
+    pub fn normalised(&self, direction: Direction) -> Direction {
+        let length = self.along(&direction, &direction).sqrt();
+        Direction {
+            increments: times(&direction.increments, 1.0 / length),
+            place: direction.place.map(|part| part / length),
+        }
+    }
+
+    /// The direction in which one of the numbers changes alone.
+    pub fn number(&self, which: usize) -> Direction {
+        let segments = self.grid().segments();
+        let mut place = [0.0; 2];
+        place[which] = 1.0;
+        Direction {
+            increments: vec![vec![[0.0; 6]; segments]; self.equations.rods()],
+            place,
+        }
+    }
+
+    /// The straight way from a spot to another.
+    pub fn way(&self, a: &Spot, b: &Spot) -> Direction {
+        Direction {
+            increments: between(&a.state, &b.state),
+            place: [0, 1].map(|i| b.place[i] - a.place[i]),
+        }
+    }
+
+    /// What lies `step` further along a direction.
+    pub fn moved(&mut self, spot: &Spot, to: &Direction, step: f64) -> Result<Spot, OutOfRange> {
+        let place = [0, 1].map(|i| spot.place[i] + step * to.place[i]);
+        let state = self.advanced(spot, &to.increments, step)?;
+        Ok(Spot { state, place })
+    }
+
+    fn advanced(
+        &mut self,
+        spot: &Spot,
+        increments: &Field,
+        step: f64,
+    ) -> Result<State, OutOfRange> {
+        self.equations.system.set_solution(increments);
+        let grid = &self.equations.leaves.grid;
+        let family = self.plane.family;
+        let leaf = self.kept.at(&self.plane, family, grid, spot.place)?;
+        let mut next = spot.state.clone();
+        leaf.advance(&spot.state, &self.equations.system, step, &mut next);
+        Ok(next)
+    }
+
+    /// What the bordered equations say at a spot, at rest or not, with the rates of both
+    /// numbers.
+    fn sample(
+        &mut self,
+        mut spot: Spot,
+        border: &[Field],
+        rates: Vec<Field>,
+        soft: bool,
+    ) -> Result<(Sample, f64), Stuck> {
+        let Sheet {
+            plane,
+            equations,
+            kept,
+            softened,
+        } = self;
+        let grid = equations.leaves.grid.clone();
+        let leaf = match softened {
+            Some((family, kept)) if soft => kept.at(plane, family, &grid, spot.place)?,
+            _ => kept.at(plane, plane.family, &grid, spot.place)?,
+        };
+        let (forces, noise) = assembled(leaf, &mut equations.system, &mut spot.state)?;
+        let each: Vec<&Field> = rates.iter().collect();
+        let solved = equations.solve_bordered(border, &forces, &each)?;
+        let sample = Sample {
+            spot,
+            solved,
+            rates,
+        };
+        Ok((sample, noise))
+    }
+
+    /// How the forces change with both numbers.
+    fn rates(&mut self, spot: &Spot) -> Result<Vec<Field>, Stuck> {
+        let Sheet {
+            plane,
+            equations,
+            kept,
+            ..
+        } = self;
+        let grid = equations.leaves.grid.clone();
+        let mut rates = Vec::new();
+        for which in [0, 1] {
+            rates.push(rate(|step| {
+                let mut place = spot.place;
+                place[which] += step;
+                let leaf = kept.at(plane, plane.family, &grid, place)?;
+                Ok(forces_on(leaf, &spot.state, &mut equations.system))
+            })?);
+        }
+        Ok(rates)
+    }
+
+    /// Newton's method to the sheet within the plane normal to two directions through a
+    /// spot; the matrix may be singular: it is bordered by `border`, and what this cannot
+    /// decide is left as it is.
+    pub fn settle(
+        &mut self,
+        spot: &Spot,
+        normals: [&Direction; 2],
+        border: &[Field],
+    ) -> Result<Sample, Stuck> {
+        let duals = normals.map(|normal| self.equations.momentum(&normal.increments));
+        let normals = [0, 1].map(|k| (&duals[k], normals[k].place.as_slice()));
+        let mut spot = spot.clone();
+        let mut previous = f64::INFINITY;
+        let mut finished = false;
+        for _ in 0..=ITERATIONS {
+            let leaf = self.leaf(spot.place)?;
+            clamp(leaf, &mut spot.state);
+            let rates = self.rates(&spot)?;
+            let (sample, noise) = self.sample(spot, border, rates, finished)?;
+            if finished {
+                return Ok(sample);
+            }
+            let (increments, changes) = sample.solved.step(&normals, noise)?;
+            let size = largest(&increments).max(changes[0].abs()).max(changes[1].abs());
+            if !is_finite(&increments) || !size.is_finite() || size > LARGEST {
+                return Err(Stuck::NotConverged);
+            }
+            let state = self.advanced(&sample.spot, &increments, 1.0)?;
+            let place = [0, 1].map(|i| sample.spot.place[i] + changes[i]);
+            spot = Spot { state, place };
+            finished = at_rest(size, previous);
+            previous = size;
+        }
+        Err(Stuck::NotConverged)
+    }
+}

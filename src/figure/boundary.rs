@@ -1,0 +1,189 @@
+//! The boundary of stability: curves in the plane of two numbers, with the index on both
+//! sides, and the leaf at some of their points.
+
+use glam::{DVec2, DVec3};
+
+use super::axes::Axes;
+use super::axis::Axis;
+use super::drawing::{Anchor, CURVES, Drawing, INK, NOTE, Stroke};
+use super::markers::Marker;
+use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, new_page, title};
+use super::small::SmallPanels;
+use super::veins::Veins;
+use crate::report::numbers::{power_of_ten, short};
+use crate::report::{is_special, sides};
+use crate::study::{Boundary, BoundaryCurve, BoundaryPoint};
+
+const DIAGRAM: f64 = 400.0;
+/// Right of the panel, for the key.
+const KEY: f64 = 210.0;
+/// Leaves drawn, and curves named.
+const MOST_LEAVES: usize = 8;
+const MOST_NAMED: usize = 7;
+/// From a curve to the index beside it.
+const BESIDE: f64 = 11.0;
+
+pub fn draw(boundary: &Boundary) -> Drawing {
+    let shown = shown(boundary);
+    let longest = shown.iter().flat_map(|(_, point)| &point.curves);
+    let longest = longest.map(|curve| length(curve)).fold(0.0, f64::max);
+    let shapes: Vec<Veins> = (shown.iter())
+        .map(|(_, point)| Veins::through(&point.curves, &point.tips, longest))
+        .collect();
+    let diagram = Cell::beside_key(HEADER + PANEL_TITLE, DIAGRAM, KEY);
+    let below = diagram.end().y + PANEL_AXIS;
+    let panels = SmallPanels::holding(shapes.iter(), shown.len()).below(below);
+    let name = format!("{}: where the index changes", boundary.scenario);
+    let mut drawing = new_page(LEFT, &name, &notes(boundary), None);
+    drawing.height = panels.end();
+    drawing.group("curves", |page| draw_curves(page, boundary, &shown, diagram));
+    drawing.group("leaves", |page| {
+        for (index, (veins, (_, point))) in shapes.iter().zip(&shown).enumerate() {
+            let [first, second] = point.values.map(short);
+            let text = format!("{}, ({first}, {second})", point.kind.replace('-', " "));
+            let number = (index + 1).to_string();
+            panels.draw(page, index, veins, (&number, &text, NOTE), |_, _, _| ());
+        }
+    });
+    drawing
+}
+
+fn length(curve: &[DVec3]) -> f64 {
+    curve.windows(2).map(|w| w[0].distance(w[1])).sum()
+}
+
+fn notes(boundary: &Boundary) -> Vec<String> {
+    let points: usize = boundary.curves.iter().map(|curve| curve.points.len()).sum();
+    let mut notes = vec![
+        match boundary.rods {
+            1 => "1 vein".into(),
+            rods => format!("{rods} veins"),
+        },
+        match boundary.curves.len() {
+            1 => format!("{points} points on 1 curve"),
+            curves => format!("{points} points on {curves} curves"),
+        },
+    ];
+    let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
+    let worst = points().map(|point| point.error).fold(0.0, f64::max);
+    if worst > 0.0 {
+        notes.push(format!("tips within {}", power_of_ten(worst)));
+    }
+    notes
+}
+
+/// The points whose leaves are drawn: first special ones, then ends.
+fn shown(boundary: &Boundary) -> Vec<(usize, &BoundaryPoint)> {
+    let curves = || boundary.curves.iter().enumerate();
+    let special = curves().flat_map(|(c, curve)| {
+        let special = curve.points.iter().filter(|point| is_special(point));
+        special.map(move |point| (c, point))
+    });
+    let ends = curves().flat_map(|(c, curve)| {
+        let ends = [curve.points.first(), curve.points.last()];
+        let count = curve.points.len().min(2);
+        ends.into_iter().flatten().take(count).map(move |point| (c, point))
+    });
+    let mut shown: Vec<_> = special.chain(ends).take(MOST_LEAVES).collect();
+    shown.sort_by_key(|(c, point)| (*c, point.point));
+    shown
+}
+
+fn draw_curves(
+    page: &mut Drawing,
+    boundary: &Boundary,
+    shown: &[(usize, &BoundaryPoint)],
+    cell: Cell,
+) {
+    let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
+    let axes = Axes {
+        cell,
+        across: axis(boundary, 0, points().map(|point| point.values[0])),
+        up: axis(boundary, 1, points().map(|point| point.values[1])),
+    };
+    title(page, cell.corner, "", "curves, and the index on both sides");
+    axes.draw(page);
+    let at = |point: &BoundaryPoint| (point.values[0], point.values[1]);
+    for (c, curve) in boundary.curves.iter().enumerate() {
+        let color = CURVES[c % CURVES.len()];
+        let line: Vec<(f64, f64)> = curve.points.iter().map(at).collect();
+        let stable = |point: &BoundaryPoint| point.index_before.min(point.index_behind) == 0;
+        let solid = curve.points.iter().any(stable);
+        let width = if solid { 2.0 } else { 1.2 };
+        axes.curve(page, &line, Stroke::new(color, width).dashed(!solid));
+        label(page, &axes, curve);
+    }
+    for (kind, marker) in [("cusp", Marker::Diamond), ("crossing", Marker::Ring)] {
+        let special = points().filter(|point| point.kind == kind);
+        axes.markers(page, special.map(at), marker, INK);
+    }
+    for (index, (_, point)) in shown.iter().enumerate() {
+        if let Some(place) = axes.at(at(point)) {
+            let beside = place + DVec2::new(6.0, -6.0);
+            page.label(beside, &(index + 1).to_string(), TICK_SIZE, Anchor::Start, INK);
+        }
+    }
+    draw_key(page, boundary, cell);
+}
+
+/// The index on both sides of a curve, in its middle: of a fold, where there are
+/// equilibria, of both that meet.
+fn label(page: &mut Drawing, axes: &Axes, curve: &BoundaryCurve) {
+    let middle = curve.points.len() / 2;
+    let Some(point) = curve.points.get(middle) else {
+        return;
+    };
+    let Some(place) = axes.at((point.values[0], point.values[1])) else {
+        return;
+    };
+    let (before, behind) = (point.index_before, point.index_behind);
+    if curve.multiplicity == 1 && matches!(point.kind, "fold" | "cusp") {
+        let beside = place + DVec2::new(BESIDE, 0.35 * TICK_SIZE);
+        let text = format!("{before} and {behind} meet");
+        page.label(beside, &text, TICK_SIZE, Anchor::Start, NOTE);
+        return;
+    }
+    // Along the first number: to the right, unless its axis falls.
+    let rises = axes.across.part(point.values[0] + 1e-6 * point.values[0].abs().max(1e-9));
+    let rises = rises >= axes.across.part(point.values[0]);
+    let (left, right) = if rises { (before, behind) } else { (behind, before) };
+    let level = DVec2::new(BESIDE, 0.35 * TICK_SIZE);
+    let left_end = place + level * DVec2::new(-1.0, 1.0);
+    page.label(left_end, &left.to_string(), TICK_SIZE, Anchor::End, NOTE);
+    page.label(place + level, &right.to_string(), TICK_SIZE, Anchor::Start, NOTE);
+}
+
+/// An axis over the whole range, logarithmic if the number's logarithm varies evenly;
+/// from small to large.
+fn axis(boundary: &Boundary, which: usize, values: impl Iterator<Item = f64>) -> Axis {
+    let name = boundary.keys[which].to_string();
+    let ends = boundary.ranges[which];
+    let values = values.chain(ends);
+    if !boundary.log[which] {
+        return Axis::holding(&name, values);
+    }
+    let sign = ends[0].signum();
+    Axis {
+        sign: Some(sign),
+        ..Axis::logarithmic(&name, values.map(|value| sign * value), 1.0)
+    }
+}
+
+fn draw_key(page: &mut Drawing, boundary: &Boundary, cell: Cell) {
+    let mut key = Key::beside(cell);
+    for (c, curve) in boundary.curves.iter().enumerate().take(MOST_NAMED) {
+        let stroke = Stroke::new(CURVES[c % CURVES.len()], 1.8);
+        let what = sides(curve).unwrap_or_else(|| "not verified".into());
+        key.line(page, &format!("curve {}", c + 1), &what, stroke);
+    }
+    if boundary.curves.len() > MOST_NAMED {
+        let more = format!("and {} more", boundary.curves.len() - MOST_NAMED);
+        key.entry(page, "", &more, |_, _| ());
+    }
+    let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
+    for (kind, marker) in [("cusp", Marker::Diamond), ("crossing", Marker::Ring)] {
+        if points().any(|point| point.kind == kind) {
+            key.marker(page, kind, "", (marker, INK));
+        }
+    }
+}

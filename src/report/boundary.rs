@@ -1,0 +1,112 @@
+//! The summary of a boundary that people read, and its rows in CSV.
+
+use std::io::{self, Write};
+
+use crate::study::{Boundary, BoundaryCurve, BoundaryPoint};
+
+use super::numbers::{power_of_ten, seconds, veins_of};
+use super::table::{Lines, lay_out, under};
+
+/// The curves, their ends and their special points.
+pub fn report(boundary: &Boundary, files: Option<String>) -> String {
+    let veins = veins_of(boundary.rods, boundary.joined);
+    let heading = format!("{}: {veins}, the boundary", boundary.scenario);
+    lay_out(&heading, &lines(boundary, files))
+}
+
+/// The lines of it.
+pub fn lines(boundary: &Boundary, files: Option<String>) -> Lines {
+    let vary = (0..2).map(|i| {
+        let (keys, [from, to]) = (&boundary.keys[i], boundary.ranges[i]);
+        format!("{keys} from {} to {}", keys.text(from), keys.text(to))
+    });
+    let mut lines = under("vary", vary.collect());
+    let second = &boundary.keys[1];
+    let start = format!("at {second} = {}", second.text(boundary.start));
+    lines.push(("begun", start));
+    let curves = boundary.curves.iter().enumerate();
+    let curves = curves.flat_map(|(number, curve)| curve_lines(boundary, number, curve));
+    lines.extend(under("curve", curves.collect()));
+    let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
+    lines.extend(points().map(|point| point.error).reduce(f64::max).map(|worst| {
+        ("error", format!("tips within {}", power_of_ten(worst)))
+    }));
+    lines.push(("work", format!("{} in all", seconds(boundary.wall_seconds))));
+    lines.extend(files.map(|files| ("written", files)));
+    lines.extend((boundary.remark.iter()).map(|remark| ("remark", remark.clone())));
+    lines
+}
+
+/// What a curve is, where it begins and ends, and what is special between.
+fn curve_lines(boundary: &Boundary, number: usize, curve: &BoundaryCurve) -> Vec<String> {
+    let what = sides(curve).unwrap_or_else(|| "no point verified".into());
+    let (number, points) = (number + 1, curve.points.len());
+    let mut lines = vec![format!("{number}: {points} points, {what}")];
+    let end = |way: &str, point: Option<&BoundaryPoint>, end: usize| {
+        let phrase = curve.ends[end].phrase();
+        let at = point.map_or(String::new(), |point| place(boundary, point));
+        format!("  {way} {at}: {phrase}")
+    };
+    lines.push(end("from", curve.points.first(), 0));
+    let special = curve.points.iter().filter(|point| is_special(point));
+    lines.extend(special.map(|point| format!("  {} at {}", point.kind, place(boundary, point))));
+    lines.push(end("to", curve.points.last(), 1));
+    lines
+}
+
+/// What becomes of the index on a curve.
+pub fn sides(curve: &BoundaryCurve) -> Option<String> {
+    let point = curve.points.first()?;
+    let what = match (point.kind, curve.multiplicity) {
+        ("fold" | "cusp", _) => "fold".into(),
+        (_, 1) => "branches cross".into(),
+        (_, modes) => format!("branches cross in {modes} directions"),
+    };
+    let (before, behind) = (point.index_before, point.index_behind);
+    Some(format!("{what}: index {before} to {behind}"))
+}
+
+/// Whether a point is more than one of a curve.
+pub fn is_special(point: &BoundaryPoint) -> bool {
+    matches!(point.kind, "cusp" | "crossing")
+}
+
+fn place(boundary: &Boundary, point: &BoundaryPoint) -> String {
+    let number = |i: usize| {
+        let value = boundary.keys[i].text(point.values[i]);
+        match point.errors[i] {
+            0.0 => value,
+            error => format!("{value} within {}", power_of_ten(error)),
+        }
+    };
+    format!("({}, {})", number(0), number(1))
+}
+
+/// `boundary.csv`: one row per curve and point, with columns named by the keys.
+pub fn boundary_table(boundary: &Boundary, out: &mut dyn Write) -> io::Result<()> {
+    let mut table = csv::WriterBuilder::new()
+        .has_headers(false)
+        .from_writer(out);
+    let keys = boundary.keys.each_ref().map(ToString::to_string);
+    table.serialize((
+        ["curve", "point", "kind"],
+        keys,
+        ["error_1", "error_2", "tip_x", "tip_y", "tip_z", "error"],
+        ["index_before", "index_behind"],
+    ))?;
+    for (number, curve) in boundary.curves.iter().enumerate() {
+        for point in &curve.points {
+            // The joint tip, or the first rod's; adding zero turns -0 into 0.
+            let tip = point.tips.first().map_or([f64::NAN; 3], |tip| tip.to_array());
+            table.serialize((
+                (number + 1, point.point, point.kind),
+                point.values,
+                point.errors,
+                tip.map(|x| x + 0.0),
+                point.error,
+                (point.index_before, point.index_behind),
+            ))?;
+        }
+    }
+    table.flush()
+}

@@ -1,0 +1,48 @@
+//! `trace` over two numbers: the boundary of stability as curves in their plane.
+
+mod result;
+mod run;
+
+pub use result::{Boundary, BoundaryCurve, BoundaryPoint, CurveEnd};
+pub use run::boundary;
+
+use super::trace::{TraceError, TraceRequest};
+use super::vary::Vary;
+
+/// Most curves of a boundary.
+pub const MOST_CURVES: usize = 24;
+
+/// What is asked of a boundary.
+#[derive(Clone, Debug)]
+pub struct BoundaryRequest {
+    /// The trace along the first number whose critical points are followed; it is made
+    /// at the scenario's value of the second number or, where that has none within the
+    /// range, at its start.
+    pub trace: TraceRequest,
+    /// The second number, and over which range; no step is longer than the distance of its
+    /// values.
+    pub across: Vary,
+}
+
+impl BoundaryRequest {
+    /// Whether it can be met, as far as can be told before.
+    fn check(&self) -> Result<(), TraceError> {
+        self.trace.check()?;
+        let second = TraceRequest {
+            vary: self.across.clone(),
+            ..self.trace.clone()
+        };
+        second.check()?;
+        let (first, second) = (&self.trace.vary.keys, &self.across.keys);
+        let shared = first.targets().iter().find(|it| second.targets().contains(it));
+        if let Some(target) = shared {
+            let why = format!("{target}: varies twice; give two numbers that differ");
+            return Err(TraceError::Vary(why));
+        }
+        if self.trace.cross_section.is_some() {
+            let why = "cross-section: Young's modulus is that of a branch; give one --vary";
+            return Err(TraceError::Option(why.into()));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,154 @@
+//! What a boundary is, as found.
+
+use glam::DVec3;
+use serde::ser::{Serialize, Serializer};
+
+use crate::branch::boundary::{Halt, Special};
+use crate::branch::{Doubt, Kind};
+use crate::scenario::Units;
+use crate::shape::serialize_tips;
+use crate::study::Keys;
+
+/// The boundary of stability in the plane of two numbers of a scenario: the curves on
+/// which the Morse index of a leaf changes. As JSON it is `boundary.json`.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Boundary {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// The numbers.
+    #[serde(rename = "vary", serialize_with = "serialize_keys")]
+    pub keys: [Keys; 2],
+    /// Their values at the ends of their ranges.
+    pub ranges: [[f64; 2]; 2],
+    /// Whether their logarithms vary evenly.
+    #[serde(skip)]
+    pub log: [bool; 2],
+    /// The second number where curves begin: at the critical points along the first.
+    pub start: f64,
+    /// Names of the units, if the scenario gives any.
+    #[serde(skip)]
+    pub units: Units,
+    /// Number of rods.
+    pub rods: usize,
+    /// Whether the tips share one point.
+    #[serde(skip)]
+    pub joined: bool,
+    /// Wanted accuracy of the tips, relative to the longest rod.
+    pub tolerance: f64,
+    /// Whether there are curves, and all are known as far as was asked.
+    pub complete: bool,
+    /// Why there is no curve, or fewer than there may be.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remark: Option<String>,
+    /// The curves.
+    pub curves: Vec<BoundaryCurve>,
+    /// Time of all, in seconds.
+    pub wall_seconds: f64,
+}
+
+/// One curve.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct BoundaryCurve {
+    /// What becomes of a branch along the first number: a fold, or a crossing.
+    #[serde(serialize_with = "serialize_kind")]
+    pub kind: Kind,
+    /// How many modes become neutral.
+    pub multiplicity: usize,
+    /// How it ended: before its first point, and behind its last.
+    pub ends: [CurveEnd; 2],
+    /// Its points in order: the second number grows from the first point or, where that
+    /// is also the last, has grown.
+    pub points: Vec<BoundaryPoint>,
+}
+
+/// A point of a curve, in the scenario's units.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct BoundaryPoint {
+    /// Its number on the curve, from 1.
+    pub point: usize,
+    /// `fold`, `branch-point`, `cusp` or `crossing`.
+    pub kind: &'static str,
+    /// Both numbers.
+    pub values: [f64; 2],
+    /// Bounds on their errors; zero of one that was given.
+    pub errors: [f64; 2],
+    /// The joint tip alone, or every tip.
+    #[serde(flatten, serialize_with = "serialize_tips")]
+    pub tips: Vec<DVec3>,
+    /// Bound on the error of the tips.
+    pub error: f64,
+    /// Morse index before the point and behind it, along the first number; of a fold,
+    /// the lower one and the higher one of the two branches that meet there.
+    pub index_before: usize,
+    /// See above.
+    pub index_behind: usize,
+    /// Centerlines on the finest grid, one per rod.
+    #[serde(skip)]
+    pub curves: Vec<Vec<DVec3>>,
+}
+
+/// How a curve ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CurveEnd(pub(super) Halt);
+
+impl CurveEnd {
+    /// The word in files.
+    pub fn word(self) -> &'static str {
+        match self.0 {
+            Halt::Reached => "reached",
+            Halt::Closed => "closed",
+            Halt::MostPoints => "most-points",
+            Halt::Unfolded => "unfolds",
+            Halt::Parted => "parts",
+            Halt::OutOfRange => "out-of-range",
+            Halt::Stuck => "stuck",
+            Halt::Unverified(_) => "unverified",
+        }
+    }
+
+    /// Whether the curve is known as far as was asked.
+    pub fn complete(self) -> bool {
+        self.0.complete()
+    }
+
+    /// The same in a phrase, for people.
+    pub fn phrase(self) -> &'static str {
+        match self.0 {
+            Halt::Reached => "the end of a range",
+            Halt::Closed => "closed",
+            Halt::MostPoints => "goes on: allow more points",
+            Halt::Unfolded => "the second number breaks the symmetry by which branches cross",
+            Halt::Parted => "modes that become neutral together part",
+            Halt::OutOfRange => "no leaf is there",
+            Halt::Stuck => "lost",
+            Halt::Unverified(Doubt::Unsolved) => "not verified: finer grids have none",
+            Halt::Unverified(Doubt::OtherIndex) => "not verified: finer grids have another index",
+            Halt::Unverified(Doubt::Inaccurate) => "not verified: the tolerance is not reached",
+            Halt::Unverified(_) => "not verified: finer grids have another curve",
+        }
+    }
+}
+
+impl Serialize for CurveEnd {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.word())
+    }
+}
+
+/// The word for what a point is.
+pub(super) fn word(kind: Kind, special: Option<Special>) -> &'static str {
+    match (special, kind) {
+        (Some(Special::Cusp), _) => "cusp",
+        (Some(Special::Crossing), _) => "crossing",
+        (None, Kind::Fold) => "fold",
+        (None, Kind::Branching) => "branch-point",
+    }
+}
+
+fn serialize_keys<S: Serializer>(keys: &[Keys; 2], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(keys.iter().map(Keys::to_string))
+}
+
+fn serialize_kind<S: Serializer>(kind: &Kind, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(word(*kind, None))
+}
