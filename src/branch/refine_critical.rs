@@ -18,7 +18,7 @@ const EXACT: f64 = 1e-12;
 
 /// Compliance by which matrices of nearly rigid leaves are softened, in units
 /// of L^2/A, times one to four; and the stiffness from which on they are.
-pub(super) const SOFTENING: f64 = 1e-4;
+const SOFTENING: f64 = 1e-4;
 pub(super) const NEARLY_RIGID: f64 = 1.01e5;
 
 /// Distances from a crossing (as of arclength) between which the branch is

@@ -142,9 +142,10 @@ impl Search<'_> {
         let border: Vec<Field> = (self.like.held.iter())
             .map(|mode| sheet.equations.momentum(mode))
             .collect();
+        let rates = sheet.rates(self.spot)?;
         let mut at = |distance: f64| -> Result<Found, Lost> {
             let spot = sheet.moved(self.spot, self.across, distance)?;
-            let sample = sheet.settle(&spot, [self.along, self.across], &border)?;
+            let sample = sheet.settle(&spot, [self.along, self.across], &border, &rates)?;
             let eigen = eigen(&sample, self.like.neutral);
             Ok(Found {
                 sample,
@@ -224,21 +225,32 @@ impl Place {
         like.at(sheet, found)
     }
 
-    /// The point that was found from this one, with its directions: the way along the
-    /// boundary as here.
-    pub fn at(&self, sheet: &mut Sheet, found: Found) -> Result<Place, Lost> {
+    /// The point that was found from this one, with the directions of this one.
+    pub fn moved(&self, sheet: &Sheet, found: Found) -> Place {
         let Found { sample, eigen, .. } = found;
+        Place {
+            held: held(sheet, &sample, &eigen),
+            index: index(&sample, &eigen),
+            others: eigen.others,
+            spot: sample.spot,
+            ..self.clone()
+        }
+    }
+
+    /// The same with its own directions: the way along the boundary as here.
+    pub fn at(&self, sheet: &mut Sheet, found: Found) -> Result<Place, Lost> {
+        let border = self.held.iter().map(|mode| sheet.equations.momentum(mode));
+        let border: Vec<Field> = border.collect();
+        let sample = sheet.look(found.sample.spot, &border)?;
+        let eigen = self::eigen(&sample, self.neutral);
         let basis = self.basis(sheet, &sample, &eigen)?;
-        let modes: Vec<Field> = (eigen.vectors.iter())
-            .map(|vector| combined(vector, &sample.solved.modes))
-            .collect();
-        let held = independent(sheet, modes.iter(), modes.len());
+        let held = held(sheet, &sample, &eigen);
         let border: Vec<Field> = held.iter().map(|it| sheet.equations.momentum(it)).collect();
         let mut change = [0.0; 2];
         for (change, direction) in change.iter_mut().zip(&basis) {
             let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
                 let spot = sheet.moved(&sample.spot, direction, step)?;
-                let sample = sheet.settle(&spot, [&basis[0], &basis[1]], &border)?;
+                let sample = sheet.settle(&spot, [&basis[0], &basis[1]], &border, &sample.rates)?;
                 Ok::<f64, Stuck>(self::eigen(&sample, self.neutral).value)
             });
             *change = (after? - before?) / (2.0 * DIFFERENCE);
@@ -265,8 +277,6 @@ impl Place {
         if heading[0] * self.heading[0] + heading[1] * self.heading[1] < 0.0 {
             heading = heading.map(|part| -part);
         }
-        let negative = |h: f64| h < NEUTRAL;
-        let held_negative = eigen.others.iter().filter(|&&h| negative(h)).count();
         Ok(Place {
             kind: self.kind,
             neutral: self.neutral,
@@ -276,7 +286,7 @@ impl Place {
             tangent,
             normal,
             slope,
-            index: sample.solved.negative.saturating_sub(held_negative),
+            index: index(&sample, &eigen),
             others: eigen.others,
             spot: sample.spot,
         })
@@ -389,6 +399,20 @@ impl Place {
             ..self.clone()
         }
     }
+}
+
+/// The modes for the next border: those of the eigenvectors of H.
+fn held(sheet: &Sheet, sample: &Sample, eigen: &Eigen) -> Vec<Field> {
+    let modes = eigen.vectors.iter();
+    let modes: Vec<Field> = modes.map(|it| combined(it, &sample.solved.modes)).collect();
+    independent(sheet, modes.iter(), modes.len())
+}
+
+/// Morse index across the boundary: by the inertia of the bordered matrix, which is that of
+/// the matrix alone and of H together. Neutral modes do not count, but for the boundary's.
+fn index(sample: &Sample, eigen: &Eigen) -> usize {
+    let held_negative = eigen.others.iter().filter(|&&h| h < NEUTRAL).count();
+    sample.solved.negative.saturating_sub(held_negative)
 }
 
 /// What the neutral modes feel of the numbers.

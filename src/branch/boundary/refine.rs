@@ -5,9 +5,9 @@ use super::sheet::{Direction, Plane, Sheet, Spot};
 use super::special::{Special, locate_near};
 use crate::branch::critical::Kind;
 use crate::branch::field::prolong as prolong_field;
-use crate::branch::refine_critical::{NEARLY_RIGID, SOFTENING};
+use crate::branch::refine_critical::NEARLY_RIGID;
 use crate::branch::refined::Doubt;
-use crate::leaf::{Grid, State};
+use crate::leaf::{Field, Grid, State};
 use crate::relax::prolong::prolong;
 use crate::relax::richardson::Richardson;
 
@@ -18,6 +18,9 @@ const GRIDS: usize = 6;
 const RIGID: usize = 4;
 const FINEST: usize = 4096;
 
+/// Segments of the coarsest.
+const COARSEST: usize = 8;
+
 /// From grid to grid a point moves by less and less, if by more than this (lengths).
 const STILL: f64 = 1e-4;
 
@@ -26,6 +29,10 @@ const NEUTRAL_TIPS: f64 = 1e-3;
 
 /// Numbers are to be so many times as exact as tips: of the part of their ranges.
 const EXACTER: f64 = 1e-3;
+
+/// Compliance by which matrices of nearly rigid leaves are softened, in units of L^2/A,
+/// times one to four: the more, the less rounding; a part of third order is left.
+const SOFTENING: f64 = 1e-3;
 
 /// Numbers within this part of their ranges are exact.
 const EXACT: f64 = 1e-12;
@@ -97,8 +104,66 @@ pub fn on_finer<'a>(
     Ok((finer, place))
 }
 
-/// A point on as many grids as it takes; on all of them it must be the same.
+/// The point on the grid with every second node: where it would be.
+fn on_coarser(plane: Plane, grid: &Grid, place: &Place) -> Option<(Grid, Place)> {
+    let stations: Vec<f64> = grid.sigma().iter().copied().step_by(2).collect();
+    let coarse = Grid::through(&stations, plane.family.first().kinks());
+    let state = &place.spot.state;
+    let (n, rods) = (state.segments(), state.rods());
+    if n % 2 != 0 || n / 2 < COARSEST || coarse.refined() != *grid {
+        return None;
+    }
+    let nodes = (0..rods).flat_map(|j| (0..=n).step_by(2).map(move |i| state.base(j) + i));
+    let (x, q) = nodes.map(|k| (state.x[k], state.q[k])).unzip();
+    let mut fewer = State::new(n / 2, x, q);
+    fewer.n = state.n.chunks(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+    let every_second = |field: &Field| -> Field {
+        let rods = field.iter();
+        rods.map(|rod| rod.iter().copied().skip(1).step_by(2).collect()).collect()
+    };
+    let direction = |it: &Direction| Direction {
+        increments: every_second(&it.increments),
+        place: it.place,
+    };
+    let place = Place {
+        spot: Spot {
+            state: fewer,
+            ..place.spot
+        },
+        held: place.held.iter().map(every_second).collect(),
+        tangent: direction(&place.tangent),
+        normal: direction(&place.normal),
+        ..place.clone()
+    };
+    Some((coarse, place))
+}
+
+/// A point on as many grids as it takes; on all of them it must be the same. Of a nearly
+/// rigid leaf, of which fine grids know the matrix worse, beginning with coarser ones if
+/// that can be.
 pub fn refine(
+    plane: Plane,
+    grid: &Grid,
+    step: &Step,
+    accuracy: f64,
+) -> Result<Verified, Doubt> {
+    let rigid = Sheet::new(plane, grid.clone())?.leaf(step.place.spot.place)?.stiffest();
+    if rigid * NEARLY_RIGID < 1.0
+        && let Some((grid, place)) = on_coarser(plane, grid, &step.place)
+    {
+        let step = Step {
+            place,
+            ..step.clone()
+        };
+        if let Ok(verified) = refine(plane, &grid, &step, accuracy) {
+            return Ok(verified);
+        }
+    }
+    refine_from(plane, grid, step, accuracy)
+}
+
+/// The same from this grid on.
+fn refine_from(
     plane: Plane,
     grid: &Grid,
     step: &Step,
@@ -179,7 +244,7 @@ fn again(
         return locate_near(sheet, near, special);
     }
     let found = sought(sheet, near, given).run(sheet)?;
-    near.at(sheet, found)
+    Ok(near.moved(sheet, found))
 }
 
 /// How the point is sought, from where it is on the grid before.

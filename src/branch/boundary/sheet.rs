@@ -7,7 +7,7 @@ use crate::branch::deflation::Solved;
 use crate::branch::equations::{
     Equations, ITERATIONS, LARGEST, Stuck, assembled, at_rest, forces_on, rate,
 };
-use crate::branch::family::{Family, OutOfRange, clamp};
+use crate::branch::family::{Family, OutOfRange};
 use crate::branch::field::{between, is_finite, largest, plus, times};
 use crate::leaf::{DiscreteLeaf, Field, Grid, Leaf, State, System};
 use crate::scenario::Scenario;
@@ -272,8 +272,14 @@ impl<'a> Sheet<'a> {
         Ok((sample, noise))
     }
 
+    /// The same at a spot at rest, with its own rates.
+    pub fn look(&mut self, spot: Spot, border: &[Field]) -> Result<Sample, Stuck> {
+        let rates = self.rates(&spot)?;
+        Ok(self.sample(spot, border, rates, false)?.0)
+    }
+
     /// How the forces change with both numbers.
-    fn rates(&mut self, spot: &Spot) -> Result<Vec<Field>, Stuck> {
+    pub fn rates(&mut self, spot: &Spot) -> Result<Vec<Field>, Stuck> {
         let Sheet {
             plane,
             equations,
@@ -295,12 +301,14 @@ impl<'a> Sheet<'a> {
 
     /// Newton's method to the sheet within the plane normal to two directions through a
     /// spot; the matrix may be singular: it is bordered by `border`, and what this cannot
-    /// decide is left as it is.
+    /// decide is left as it is. The rates may be those of a spot nearby: they only decide
+    /// how fast the method goes, and leaves at other numbers cost more than an iteration.
     pub fn settle(
         &mut self,
         spot: &Spot,
         normals: [&Direction; 2],
         border: &[Field],
+        rates: &[Field],
     ) -> Result<Sample, Stuck> {
         let duals = normals.map(|normal| self.equations.momentum(&normal.increments));
         let normals = [0, 1].map(|k| (&duals[k], normals[k].place.as_slice()));
@@ -308,10 +316,7 @@ impl<'a> Sheet<'a> {
         let mut previous = f64::INFINITY;
         let mut finished = false;
         for _ in 0..=ITERATIONS {
-            let leaf = self.leaf(spot.place)?;
-            clamp(leaf, &mut spot.state);
-            let rates = self.rates(&spot)?;
-            let (sample, noise) = self.sample(spot, border, rates, finished)?;
+            let (sample, noise) = self.sample(spot, border, rates.to_vec(), finished)?;
             if finished {
                 return Ok(sample);
             }

@@ -40,8 +40,8 @@ pub fn boundary(
     let ends = [vary, across].map(|it| [it.values[0], it.values[it.values.len() - 1]]);
     let base = &request.trace.base;
     let make = |[first, second]: [f64; 2]| -> Result<Scenario, String> {
-        let at = base.at(&[(&vary.keys, first), (&across.keys, second)]);
-        Ok(at.map_err(|refused| refused.to_string())?.scenario)
+        let again = base.again(&[(&vary.keys, first), (&across.keys, second)]);
+        again.map_err(|refused| refused.to_string())
     };
     for second in ends[1] {
         base.at(&[(&vary.keys, ends[0][0]), (&across.keys, second)])?;
@@ -106,7 +106,10 @@ pub fn boundary(
             boundary.remark = Some(format!("there are more than {MOST_CURVES} curves"));
             break;
         }
-        let grid = Grid::new(it.critical.state.segments(), family.first().kinks());
+        let finest = it.refined.grid.sigma();
+        let stride = (finest.len() - 1) / it.critical.state.segments();
+        let stations: Vec<f64> = finest.iter().copied().step_by(stride).collect();
+        let grid = Grid::through(&stations, family.first().kinks());
         let mut tell = |points, place| progress(Some(number), points, plane.values(place));
         found.push(curves::follow(
             plane,

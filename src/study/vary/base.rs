@@ -113,6 +113,21 @@ impl Base {
         })
     }
 
+    /// The scenario with values of which some were put in by [`Base::at`] before: that
+    /// the entries are there is not looked at again.
+    ///
+    /// # Errors
+    /// If it is refused.
+    pub(in crate::study) fn again(&self, values: &[(&Keys, f64)]) -> Result<Scenario, VaryError> {
+        let mut overrides = self.overrides.clone();
+        for (keys, value) in values {
+            for &target in keys.targets() {
+                overrides.push(format!("{target}={}", target.text(*value)));
+            }
+        }
+        Ok(Scenario::from_toml_with(&self.text, &self.file, &overrides)?)
+    }
+
     /// The scenario with these values.
     ///
     /// # Errors

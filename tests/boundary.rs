@@ -1,0 +1,272 @@
+//! The boundary of stability over two numbers: curves known in closed form or by
+//! collocation, all along, and requests that cannot be met.
+
+mod common;
+mod workplace;
+
+use std::f64::consts::PI;
+
+use common::branch::text;
+use common::{RIGID, ROD, entries};
+use leafdyn::study::{
+    Base, Boundary, BoundaryCurve, BoundaryRequest, TraceRequest, boundary,
+};
+use workplace::{Workplace, contains};
+
+/// The boundary of the scenario of a text with entries replaced, along the first number
+/// and across it.
+fn follow(text: &str, overrides: &str, along: &str, across: &str) -> Boundary {
+    let base = Base::of_text(text.into(), "test.toml".into(), &entries(overrides));
+    let request = BoundaryRequest {
+        trace: TraceRequest {
+            base: base.unwrap(),
+            vary: along.parse().unwrap(),
+            switch: false,
+            keep_unstable: true,
+            segments: None,
+            tolerance: Some(1e-7),
+            most_points: 200,
+            cross_section: None,
+        },
+        across: across.parse().unwrap(),
+    };
+    boundary(&request, &mut |_, _, _| {}).unwrap()
+}
+
+/// The only curve, which goes from one end of the second range to the other.
+#[track_caller]
+fn only(found: &Boundary) -> &BoundaryCurve {
+    assert!(found.complete, "{:?}", found.remark);
+    assert_eq!(found.curves.len(), 1);
+    let curve = &found.curves[0];
+    for (end, point) in [curve.points.first(), curve.points.last()].iter().enumerate() {
+        let point = point.unwrap();
+        assert_eq!(point.values[1], found.ranges[1][end], "{:?}", curve.ends);
+        assert_eq!(point.errors[1], 0.0);
+    }
+    curve
+}
+
+/// That along the curve the first number is what it must be at the second, within this part
+/// and within what is stated; and the index changes from 0 to 1.
+#[track_caller]
+fn is(what: &str, curve: &BoundaryCurve, wanted: impl Fn(f64) -> f64, within: f64) {
+    assert!(curve.points.len() > 5, "{what}: {}", curve.points.len());
+    let mut worst = 0.0_f64;
+    for point in &curve.points {
+        let wanted = wanted(point.values[1]);
+        let off = (point.values[0] - wanted).abs();
+        worst = worst.max(off / wanted.abs());
+        let stated = point.errors[0] + 1e-11 * wanted.abs();
+        assert!(off <= stated, "{what}: off by {off:.1e}, {stated:.1e} stated: {point:?}");
+        assert_eq!([point.index_before, point.index_behind], [0, 1], "{what}");
+        assert_eq!(point.kind, "branch-point");
+    }
+    println!("{what}: {} points, off by {worst:.1e}", curve.points.len());
+    assert!(worst < within, "{what}: off by {worst:.1e}");
+}
+
+/// P = pi^2/4 EI of an inextensible column.
+#[test]
+fn euler_over_the_bending_stiffness() {
+    let strip = format!("{RIGID}; stiffness.bending_2=1000.0");
+    let (load, stiffness) = ("load.tip_force[0]=0..-5.5", "stiffness.bending_3=0.5..2");
+    let found = follow(ROD, &strip, load, stiffness);
+    is("Euler", only(&found), |ei| -0.25 * PI * PI * ei, 1e-8);
+}
+
+/// P (1 + P/GA - P/EA) = pi^2/4 EI, over EA and over its logarithm.
+#[test]
+fn reissner_over_the_axial_stiffness() {
+    let strip = "stiffness.bending_2=1000.0; stiffness.axial=1000.0; \
+                 stiffness.shear_2=400.0; stiffness.shear_3=400.0";
+    let load = |axial: f64| {
+        let (a, euler) = (1.0 / 400.0 - 1.0 / axial, 0.25 * PI * PI);
+        // The root that is Euler's where a is zero.
+        -2.0 * euler / (1.0 + (1.0 + 4.0 * a * euler).sqrt())
+    };
+    for range in ["50..2000", "50..5000:11log"] {
+        let across = format!("stiffness.axial={range}");
+        let found = follow(ROD, strip, "load.tip_force[0]=0..-5", &across);
+        is(range, only(&found), load, 1e-8);
+    }
+}
+
+/// Two directions at once, as long as a column is round: sideways and up and down together.
+#[test]
+fn a_round_column_buckles_in_two_directions_all_along() {
+    let round = "stiffness.axial=1000; stiffness.shear_2=1000; stiffness.shear_3=1000";
+    let both = "stiffness.bending_2+stiffness.bending_3=0.5..2";
+    let found = follow(ROD, round, "load.tip_force[0]=0..-5.5", both);
+    let curve = only(&found);
+    assert_eq!(curve.multiplicity, 2);
+    for point in &curve.points {
+        let wanted = -0.25 * PI * PI * point.values[1];
+        assert!((point.values[0] / wanted - 1.0).abs() < 1e-8, "{point:?}");
+        assert_eq!([point.index_before, point.index_behind], [0, 2]);
+    }
+    // Not if one of the stiffnesses changes alone.
+    let found = follow(ROD, round, "load.tip_force[0]=0..-5.5", "stiffness.bending_3=0.5..2");
+    assert!(!found.complete);
+    assert_eq!(found.curves[0].ends.map(|end| end.word()), ["parts"; 2]);
+}
+
+/// Lateral buckling under a tip load at P/sqrt(EI GJ), prebuckling bend included.
+#[test]
+fn lateral_buckling_over_the_strong_stiffness() {
+    let strip = format!("{RIGID}; stiffness.torsion=0.8; stiffness.bending_2=100");
+    let across = "stiffness.bending_2=10..1000:20log";
+    let found = follow(ROD, &strip, "load.tip_force[2]=0..-5", across);
+    let curve = only(&found);
+    let ends = [curve.points.first(), curve.points.last()].map(|point| point.unwrap());
+    for (point, wanted) in ends.into_iter().zip([4.536899035739, 4.016676901240]) {
+        let off = -point.values[0] / 0.8_f64.sqrt() / wanted - 1.0;
+        println!("strong {}: {off:.1e}", point.values[1]);
+        assert!(off.abs() < 1e-8, "{off}");
+    }
+    let begun = curve.points.iter().find(|point| point.values[1] == 100.0);
+    let off = -begun.unwrap().values[0] / 0.8_f64.sqrt() / 4.054222577948 - 1.0;
+    assert!(off.abs() < 1e-8, "{off}");
+}
+
+/// Nearly rigid against bending up and down, P = 4.0126 sqrt(EI GJ) over GJ.
+#[test]
+fn lateral_buckling_over_the_torsional_stiffness() {
+    let strip = format!("{RIGID}; stiffness.bending_2=1e6");
+    let across = "stiffness.torsion=0.5..1.2";
+    let found = follow(ROD, &strip, "load.tip_force[2]=0..-6", across);
+    // What is left of the bend is of the order of EI/EI_strong.
+    let wanted = |torsion: f64| -4.012599343578901 * torsion.sqrt();
+    for point in &only(&found).points {
+        let off = point.values[0] / wanted(point.values[1]) - 1.0;
+        assert!(off.abs() < 3e-6, "{off}");
+    }
+}
+
+/// A lens whose midrib is too long leaves its plane; both stiffnesses of canonical lenses lie
+/// on the curve, the second one scaled from the first.
+#[test]
+fn a_lens_with_a_midrib_over_its_stiffness() {
+    let short = "leaf.length=[1.0, 0.9, 1.0]; stiffness.axial=2500; \
+                 stiffness.shear_2=1000; stiffness.shear_3=1000";
+    let (along, across) = ("leaf.length[1]=0.9..0.942", "stiffness.axial=2500..3500");
+    let found = follow(&text("classic/lens_midrib"), short, along, across);
+    let curve = only(&found);
+    let off = curve.points[0].values[0] / 0.93780575743 - 1.0;
+    assert!(off.abs() < 1e-9, "{off}");
+}
+
+/// A hanging rod leaves its plane between two weights, if it is curved enough: the curve
+/// turns back where they meet.
+#[test]
+fn a_hanging_curved_rod_over_its_curvature() {
+    let across = format!("rest.bend_3=5.0..{:?}", 2.0 * PI);
+    let found = follow(
+        &text("classic/hanging_curved"),
+        "rest.bend_3=6.0",
+        "load.gravity[0]=8..20",
+        &across,
+    );
+    assert!(found.complete, "{:?}", found.remark);
+    let curve = &found.curves[0];
+    let at = |curvature: f64| {
+        let mut points = curve.points.iter();
+        points.find(|point| (point.values[1] - curvature).abs() < 1e-9).unwrap().values[0]
+    };
+    for (curvature, wanted) in [(6.0, 11.868750740620), (2.0 * PI, 12.187078750000)] {
+        let off = at(curvature) / wanted - 1.0;
+        println!("{curvature}: {off:.1e}");
+        assert!(off.abs() < 1e-8, "{curvature}: {off}");
+    }
+    let least = curve.points.iter().map(|point| point.values[1]).fold(f64::INFINITY, f64::min);
+    assert!((5.55..5.56).contains(&least), "{least}");
+    // On the upper part a larger weight makes it stable again.
+    let ends = [curve.points.first(), curve.points.last()].map(|point| point.unwrap());
+    let upper = ends.into_iter().find(|point| point.values[0] == 20.0).unwrap();
+    assert_eq!([upper.index_before, upper.index_behind], [1, 0]);
+}
+
+/// A column that is pushed askew folds instead of branching; the folds meet in a cusp where
+/// it is straight, and go on at its other side.
+#[test]
+fn folds_of_a_column_pushed_askew_meet_in_a_cusp() {
+    let strip = "stiffness.bending_2=1000; stiffness.axial=1000; stiffness.shear_2=1000; \
+                 stiffness.shear_3=1000; load.tip_force=[-3.2, 0, 0]";
+    let found = follow(
+        ROD,
+        strip,
+        "load.tip_force[1]=0.3..-0.3",
+        "load.tip_force[0]=-4..-2",
+    );
+    assert!(found.complete, "{:?}", found.remark);
+    assert_eq!(found.curves.len(), 1, "the other fold is on the same curve");
+    let points = &found.curves[0].points;
+    assert!(points.iter().all(|point| matches!(point.kind, "fold" | "cusp")));
+    let cusps: Vec<_> = points.iter().filter(|point| point.kind == "cusp").collect();
+    assert_eq!(cusps.len(), 1);
+    let [across, along] = cusps[0].values;
+    println!("cusp at {along} {across:e}, {:?}", cusps[0].errors);
+    assert!(across.abs() < 1e-8, "{across}");
+    assert!((along / (-0.25 * PI * PI) - 1.0).abs() < 1e-8, "{along}");
+}
+
+const COLUMNS: &str = "curve,point,kind,load.tip_force[0],stiffness.bending_3,error_1,error_2,\
+    tip_x,tip_y,tip_z,error,index_before,index_behind";
+
+const COLUMN: &str = "--set leaf.rods=1 --set leaf.fan=[0] --set load.gravity=[0,0,0] \
+    --set stiffness.bending_2=1000 --vary load.tip_force[0]=0..-6";
+
+#[test]
+fn a_boundary_is_a_table_a_summary_and_a_figure() {
+    let place = Workplace::new();
+    let run = place.run(&format!("trace leaf.toml {COLUMN} --vary stiffness.bending_3=0.5..2"));
+    run.ends(0).says(&[
+        "load.tip_force[0] from 0.0 to -6.0",
+        "stiffness.bending_3 from 0.5 to 2.0",
+        "at stiffness.bending_3 = 1.0",
+        "branches cross: index 0 to 1",
+        "the end of a range",
+        "written",
+    ]);
+    let files = ["boundary.csv", "boundary.json", "boundary.png", "boundary.svg"];
+    assert_eq!(place.names("out/small"), files);
+    let picture = place.picture("out/small/boundary");
+    contains(&picture, &["load.tip_force[0]", "stiffness.bending_3", "curve 1"]);
+    let rows = place.table("out/small/boundary.csv", COLUMNS);
+    assert_eq!(rows[0][..3], ["1", "1", "branch-point"]);
+    assert_eq!(rows[0][4], "0.5");
+    assert_eq!(rows.last().unwrap()[4], "2.0");
+    let json = place.json("out/small/boundary.json");
+    assert_eq!(json["complete"], true);
+    assert_eq!(json["curves"][0]["ends"][1], "reached");
+    assert_eq!(json["curves"][0]["points"].as_array().unwrap().len(), rows.len());
+}
+
+/// What ends early is said, with what was found until then.
+#[test]
+fn a_curve_that_goes_on_is_an_outcome() {
+    let place = Workplace::new();
+    let more = "--vary stiffness.bending_3=0.5..2:100 --points 20 --json";
+    let json = place.run(&format!("trace leaf.toml {COLUMN} {more}")).ends(1).json();
+    assert_eq!(json["complete"], false);
+    assert_eq!(json["curves"][0]["ends"][1], "most-points");
+    let none = "--vary stiffness.bending_3=0.5..2 --json";
+    let short = COLUMN.replace("0..-6", "0..-1");
+    let json = place.run(&format!("trace leaf.toml {short} {none}")).ends(1).json();
+    contains(json["remark"].as_str().unwrap(), &["changes nowhere"]);
+}
+
+#[test]
+fn what_cannot_be_followed_is_refused() {
+    workplace::all_refused(
+        "trace leaf.toml --vary load.gravity[2]=0..-1 --vary",
+        "load.gravity[2]=0..-3 => varies twice
+        load.gravity[1]+load.gravity[2]=0..-3 => varies twice
+        leaf.rods=3..9 => a whole number has nothing between
+        dynamics.density=1..2 => no equilibrium
+        load.gravity[1]=1..1 => the same
+        stiffness.axial=100..-5 => greater than 0
+        load.gravity[1]=0..1 --vary load.gravity[0]=0..1 => 3 times
+        load.gravity[1]=0..1 --cross-section 1 => one --vary",
+    );
+}
