@@ -55,8 +55,9 @@ impl Trace {
         };
         match self.vary.as_slice() {
             [along] => (self.request).each::<Traced>(how, |job| self.one(job, along)),
-            [along, across] => (self.request)
-                .each::<Boundary>(how, |job| self.boundary(job, along, across)),
+            [along, across] => {
+                (self.request).each::<Boundary>(how, |job| self.boundary(job, along, across))
+            }
             more => Err(format!(
                 "--vary is given {} times: give one number to follow branches, two for a boundary",
                 more.len()

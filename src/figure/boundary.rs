@@ -36,7 +36,9 @@ pub fn draw(boundary: &Boundary) -> Drawing {
     let name = format!("{}: where the index changes", boundary.scenario);
     let mut drawing = new_page(LEFT, &name, &notes(boundary), None);
     drawing.height = panels.end();
-    drawing.group("curves", |page| draw_curves(page, boundary, &shown, diagram));
+    drawing.group("curves", |page| {
+        draw_curves(page, boundary, &shown, diagram)
+    });
     drawing.group("leaves", |page| {
         for (index, (veins, (_, point))) in shapes.iter().zip(&shown).enumerate() {
             let [first, second] = point.values.map(short);
@@ -82,7 +84,10 @@ fn shown(boundary: &Boundary) -> Vec<(usize, &BoundaryPoint)> {
     let ends = curves().flat_map(|(c, curve)| {
         let ends = [curve.points.first(), curve.points.last()];
         let count = curve.points.len().min(2);
-        ends.into_iter().flatten().take(count).map(move |point| (c, point))
+        ends.into_iter()
+            .flatten()
+            .take(count)
+            .map(move |point| (c, point))
     });
     let mut shown: Vec<_> = special.chain(ends).take(MOST_LEAVES).collect();
     shown.sort_by_key(|(c, point)| (*c, point.point));
@@ -120,7 +125,13 @@ fn draw_curves(
     for (index, (_, point)) in shown.iter().enumerate() {
         if let Some(place) = axes.at(at(point)) {
             let beside = place + DVec2::new(6.0, -6.0);
-            page.label(beside, &(index + 1).to_string(), TICK_SIZE, Anchor::Start, INK);
+            page.label(
+                beside,
+                &(index + 1).to_string(),
+                TICK_SIZE,
+                Anchor::Start,
+                INK,
+            );
         }
     }
     draw_key(page, boundary, cell);
@@ -144,13 +155,25 @@ fn label(page: &mut Drawing, axes: &Axes, curve: &BoundaryCurve) {
         return;
     }
     // Along the first number: to the right, unless its axis falls.
-    let rises = axes.across.part(point.values[0] + 1e-6 * point.values[0].abs().max(1e-9));
+    let rises = axes
+        .across
+        .part(point.values[0] + 1e-6 * point.values[0].abs().max(1e-9));
     let rises = rises >= axes.across.part(point.values[0]);
-    let (left, right) = if rises { (before, behind) } else { (behind, before) };
+    let (left, right) = if rises {
+        (before, behind)
+    } else {
+        (behind, before)
+    };
     let level = DVec2::new(BESIDE, 0.35 * TICK_SIZE);
     let left_end = place + level * DVec2::new(-1.0, 1.0);
     page.label(left_end, &left.to_string(), TICK_SIZE, Anchor::End, NOTE);
-    page.label(place + level, &right.to_string(), TICK_SIZE, Anchor::Start, NOTE);
+    page.label(
+        place + level,
+        &right.to_string(),
+        TICK_SIZE,
+        Anchor::Start,
+        NOTE,
+    );
 }
 
 /// An axis over the whole range, logarithmic if the number's logarithm varies evenly;

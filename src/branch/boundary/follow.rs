@@ -406,11 +406,7 @@ fn land(
 }
 
 /// Special points between two of a boundary.
-fn between(
-    sheet: &mut Sheet,
-    [now, next]: [&Place; 2],
-    step: f64,
-) -> Result<Vec<Step>, Lost> {
+fn between(sheet: &mut Sheet, [now, next]: [&Place; 2], step: f64) -> Result<Vec<Step>, Lost> {
     let mut special = Vec::new();
     if now.kind == Kind::Fold && now.speed * next.speed < 0.0 {
         special.push(Special::Cusp);

@@ -293,12 +293,7 @@ impl Place {
     }
 
     /// Two directions of length one, normal to each other, that span the sheet.
-    fn basis(
-        &self,
-        sheet: &Sheet,
-        sample: &Sample,
-        eigen: &Eigen,
-    ) -> Result<[Direction; 2], Lost> {
+    fn basis(&self, sheet: &Sheet, sample: &Sample, eigen: &Eigen) -> Result<[Direction; 2], Lost> {
         let solved = &sample.solved;
         let p = solved.modes.len();
         let others = eigen.others.iter().zip(&eigen.vectors[self.neutral..]);
@@ -357,7 +352,11 @@ impl Place {
             let mode = combined(vector, &solved.modes);
             let drive = [0, 1].map(|i| {
                 let multipliers = &solved.rates[i].multipliers;
-                vector.iter().zip(multipliers).map(|(v, d)| v * d).sum::<f64>()
+                vector
+                    .iter()
+                    .zip(multipliers)
+                    .map(|(v, d)| v * d)
+                    .sum::<f64>()
             });
             for i in 0..2 {
                 let most = (dot(&rates[i], &rates[i]) * dot(&mode, &mode)).sqrt();
@@ -377,18 +376,6 @@ impl Place {
         let across = sheet.normalised(Direction::mixed(parts, &both));
         let slope = self.slope * sheet.along(&across, &self.normal);
         (across, slope)
-    }
-
-    /// Change of the eigenvalue with the first number at a value of the second; infinite
-    /// at a fold.
-    pub fn steepness(&self, sheet: &Sheet) -> f64 {
-        match self.kind {
-            Kind::Fold => f64::INFINITY,
-            Kind::Branching => {
-                let (across, slope) = self.across_at(sheet, 1);
-                (slope / across.place[0]).abs()
-            }
-        }
     }
 
     /// Going along the boundary the other way.

@@ -34,6 +34,10 @@ const EXACTER: f64 = 1e-3;
 /// times one to four: the more, the less rounding; a part of third order is left.
 const SOFTENING: f64 = 1e-3;
 
+/// What extrapolation to none makes of rounding: the root of the sum of the squares of its
+/// weights.
+const AMPLIFIED: f64 = 8.3;
+
 /// Numbers within this part of their ranges are exact.
 const EXACT: f64 = 1e-12;
 
@@ -79,10 +83,7 @@ pub struct Verified {
 
 /// A point of the same kind on the grid with all segments halved: where it would be, with
 /// its directions.
-pub fn on_finer<'a>(
-    sheet: &mut Sheet<'a>,
-    place: &Place,
-) -> Result<(Sheet<'a>, Place), Lost> {
+pub fn on_finer<'a>(sheet: &mut Sheet<'a>, place: &Place) -> Result<(Sheet<'a>, Place), Lost> {
     let state = prolong(sheet.leaf(place.spot.place)?, &place.spot.state);
     let finer = sheet.refined()?;
     let direction = |it: &Direction| {
@@ -116,10 +117,15 @@ fn on_coarser(plane: Plane, grid: &Grid, place: &Place) -> Option<(Grid, Place)>
     let nodes = (0..rods).flat_map(|j| (0..=n).step_by(2).map(move |i| state.base(j) + i));
     let (x, q) = nodes.map(|k| (state.x[k], state.q[k])).unzip();
     let mut fewer = State::new(n / 2, x, q);
-    fewer.n = state.n.chunks(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+    fewer.n = state
+        .n
+        .chunks(2)
+        .map(|pair| 0.5 * (pair[0] + pair[1]))
+        .collect();
     let every_second = |field: &Field| -> Field {
         let rods = field.iter();
-        rods.map(|rod| rod.iter().copied().skip(1).step_by(2).collect()).collect()
+        rods.map(|rod| rod.iter().copied().skip(1).step_by(2).collect())
+            .collect()
     };
     let direction = |it: &Direction| Direction {
         increments: every_second(&it.increments),
@@ -141,13 +147,10 @@ fn on_coarser(plane: Plane, grid: &Grid, place: &Place) -> Option<(Grid, Place)>
 /// A point on as many grids as it takes; on all of them it must be the same. Of a nearly
 /// rigid leaf, of which fine grids know the matrix worse, beginning with coarser ones if
 /// that can be.
-pub fn refine(
-    plane: Plane,
-    grid: &Grid,
-    step: &Step,
-    accuracy: f64,
-) -> Result<Verified, Doubt> {
-    let rigid = Sheet::new(plane, grid.clone())?.leaf(step.place.spot.place)?.stiffest();
+pub fn refine(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<Verified, Doubt> {
+    let rigid = Sheet::new(plane, grid.clone())?
+        .leaf(step.place.spot.place)?
+        .stiffest();
     if rigid * NEARLY_RIGID < 1.0
         && let Some((grid, place)) = on_coarser(plane, grid, &step.place)
     {
@@ -163,18 +166,14 @@ pub fn refine(
 }
 
 /// The same from this grid on.
-fn refine_from(
-    plane: Plane,
-    grid: &Grid,
-    step: &Step,
-    accuracy: f64,
-) -> Result<Verified, Doubt> {
+fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<Verified, Doubt> {
     let mut sheet = Sheet::new(plane, grid.clone())?;
     let mut near = step.place.clone();
     let given = step.given.or_else(|| given_at(&sheet, &near));
     let given = given.filter(|_| step.special.is_none());
     let mut table = Table {
         given: given.map(|which| (which, near.spot.place[which])),
+        amplified: 1.0,
         ..Table::default()
     };
     let mut moved = f64::INFINITY;
@@ -203,10 +202,13 @@ fn refine_from(
         if level + 1 < FEWEST {
             continue;
         }
-        let enough = (EXACTER * accuracy).max(table.rounding).max(EXACT);
-        let exact = table.errors().iter().all(|error| *error <= enough);
-        let last = level + 1 == if rigid { RIGID } else { GRIDS }
-            || 2 * sheet.grid().segments() > FINEST;
+        let enough = (EXACTER * accuracy).max(EXACT);
+        let errors = table.errors().into_iter().zip(table.rounding);
+        let exact = errors
+            .into_iter()
+            .all(|(error, rounding)| error <= enough.max(rounding));
+        let last =
+            level + 1 == if rigid { RIGID } else { GRIDS } || 2 * sheet.grid().segments() > FINEST;
         let tips = if last { NEUTRAL_TIPS } else { accuracy };
         let tips = table.tips.best().is_some_and(|best| best.error <= tips);
         let numbers = table.errors().iter().all(|error| *error <= accuracy);
@@ -228,7 +230,11 @@ fn given_at(sheet: &Sheet, place: &Place) -> Option<usize> {
         let (across, _) = place.across_at(sheet, which);
         sheet.along(&across, &place.normal).abs()
     };
-    let order = if second >= PART * first { [1, 0] } else { [0, 1] };
+    let order = if second >= PART * first {
+        [1, 0]
+    } else {
+        [0, 1]
+    };
     let changes = place.tangent.place.map(|part| part.abs() > PART * SINE);
     order.into_iter().find(|&k| changes[k] && sine(k) > SINE)
 }
@@ -312,8 +318,10 @@ struct Table {
     numbers: [Richardson; 2],
     /// The number that is the same on every grid, if there is one.
     given: Option<(usize, f64)>,
-    /// What rounding of the matrix may have done to the numbers.
-    rounding: f64,
+    /// What rounding of the matrix may have done to the numbers on a grid, and how many
+    /// times as much to those of no softening.
+    rounding: [f64; 2],
+    amplified: f64,
 }
 
 impl Table {
@@ -324,15 +332,27 @@ impl Table {
         numbers: [f64; 2],
         rigid: bool,
     ) -> Result<(), Lost> {
-        let steepness = place.steepness(sheet);
+        if rigid {
+            self.amplified = AMPLIFIED;
+        }
+        let (across, slope) = match self.given {
+            Some((which, _)) => place.across_at(sheet, which),
+            None => (place.normal.clone(), place.slope),
+        };
         let leaf = sheet.leaf(place.spot.place)?;
-        let limit = if rigid { 1.0 / SOFTENING } else { f64::INFINITY };
+        let limit = if rigid {
+            1.0 / SOFTENING
+        } else {
+            f64::INFINITY
+        };
         let condensing = leaf.sections.iter().map(|it| it.condensing.max_element());
         let stiffest = condensing.fold(0.0_f64, |most, it| most.max(it.min(limit)));
         let state = &place.spot.state;
         let segments = state.segments() as f64;
-        let rounding = f64::EPSILON * stiffest * segments * segments / steepness;
-        self.rounding = self.rounding.max(rounding);
+        let rounding = (f64::EPSILON * stiffest * segments * segments / slope).abs();
+        for i in 0..2 {
+            self.rounding[i] = self.rounding[i].max(rounding * across.place[i].abs());
+        }
         let tips = (0..state.rods()).flat_map(|j| state.tip(j).to_array());
         self.tips.push(state.segments(), tips.collect());
         for (table, number) in self.numbers.iter_mut().zip(numbers) {
@@ -342,7 +362,11 @@ impl Table {
     }
 
     fn errors(&self) -> [f64; 2] {
-        let error = |i: usize| self.numbers[i].best().map_or(f64::INFINITY, |best| best.error);
+        let error = |i: usize| {
+            self.numbers[i]
+                .best()
+                .map_or(f64::INFINITY, |best| best.error)
+        };
         [0, 1].map(|i| match self.given {
             Some((which, _)) if which == i => 0.0,
             _ => error(i),
@@ -369,7 +393,7 @@ impl Table {
         Verified {
             place: [number(0), number(1)],
             errors: [0, 1].map(|i| match free(i) {
-                true => errors[i] + self.rounding,
+                true => errors[i] + self.amplified * self.rounding[i],
                 false => 0.0,
             }),
             tips: tips.chunks(3).map(|tip| [tip[0], tip[1], tip[2]]).collect(),

@@ -321,7 +321,9 @@ impl<'a> Sheet<'a> {
                 return Ok(sample);
             }
             let (increments, changes) = sample.solved.step(&normals, noise)?;
-            let size = largest(&increments).max(changes[0].abs()).max(changes[1].abs());
+            let size = largest(&increments)
+                .max(changes[0].abs())
+                .max(changes[1].abs());
             if !is_finite(&increments) || !size.is_finite() || size > LARGEST {
                 return Err(Stuck::NotConverged);
             }

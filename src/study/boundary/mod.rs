@@ -34,7 +34,10 @@ impl BoundaryRequest {
         };
         second.check()?;
         let (first, second) = (&self.trace.vary.keys, &self.across.keys);
-        let shared = first.targets().iter().find(|it| second.targets().contains(it));
+        let shared = first
+            .targets()
+            .iter()
+            .find(|it| second.targets().contains(it));
         if let Some(target) = shared {
             let why = format!("{target}: varies twice; give two numbers that differ");
             return Err(TraceError::Vary(why));

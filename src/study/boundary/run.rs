@@ -120,7 +120,10 @@ pub fn boundary(
             &mut tell,
         ));
     }
-    let whole = found.iter().flat_map(|curve| curve.ends).all(Halt::complete);
+    let whole = found
+        .iter()
+        .flat_map(|curve| curve.ends)
+        .all(Halt::complete);
     if found.is_empty() && boundary.remark.is_none() {
         let at = across.keys.text(start);
         let (vary, across) = (&vary.keys, &across.keys);
@@ -129,8 +132,11 @@ pub fn boundary(
     }
     boundary.complete = whole && trace.complete && boundary.remark.is_none();
     if !trace.complete && boundary.remark.is_none() {
-        boundary.remark = Some("not all branches along the first number are followed to \
-                               their ends: see a trace of it alone".into());
+        boundary.remark = Some(
+            "not all branches along the first number are followed to \
+                               their ends: see a trace of it alone"
+                .into(),
+        );
     }
     let units = |curve: &curves::Boundary| BoundaryCurve {
         kind: curve.kind,

@@ -6,8 +6,8 @@ mod run;
 
 pub use law::Law;
 pub use result::{PointKind, Trace, TraceBranch, TracePoint};
-pub(super) use run::trace_seen;
 pub use run::trace;
+pub(super) use run::trace_seen;
 
 use super::vary::{Base, Vary};
 use crate::relax::RelaxError;

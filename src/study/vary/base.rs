@@ -125,7 +125,9 @@ impl Base {
                 overrides.push(format!("{target}={}", target.text(*value)));
             }
         }
-        Ok(Scenario::from_toml_with(&self.text, &self.file, &overrides)?)
+        Ok(Scenario::from_toml_with(
+            &self.text, &self.file, &overrides,
+        )?)
     }
 
     /// The scenario with these values.
