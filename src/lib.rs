@@ -159,6 +159,7 @@
 //! its Morse index changes the matrix is singular; bordered by the modes that
 //! become neutral it is not, and the place is found to rounding on each grid, and
 //! extrapolated. Branches that cross there can be followed as well.
+//! [`study::boundary()`] follows such places through a second number.
 //! [`study::all()`] looks for equilibria by many starts instead.
 //!
 //! **Where methods fail** ([`study::map()`]). Numbers of a scenario vary

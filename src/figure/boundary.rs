@@ -166,10 +166,16 @@ fn label(page: &mut Drawing, axes: &Axes, curve: &BoundaryCurve) {
     };
     let level = DVec2::new(BESIDE, 0.35 * TICK_SIZE);
     let left_end = place + level * DVec2::new(-1.0, 1.0);
-    page.label(left_end, &left.to_string(), TICK_SIZE, Anchor::End, NOTE);
+    page.label(
+        left_end,
+        &format!("index {left}"),
+        TICK_SIZE,
+        Anchor::End,
+        NOTE,
+    );
     page.label(
         place + level,
-        &right.to_string(),
+        &format!("index {right}"),
         TICK_SIZE,
         Anchor::Start,
         NOTE,

@@ -8,7 +8,7 @@ use super::sheet::{Plane, Sheet};
 use super::special::{Special, locate, onto};
 use crate::branch::critical::{Critical, Kind};
 use crate::branch::equations::Stuck;
-use crate::branch::refine::Doubt;
+use crate::branch::refined::Doubt;
 use crate::leaf::Grid;
 
 /// First step as a part of the longest, and the shortest.

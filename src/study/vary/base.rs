@@ -5,9 +5,7 @@ use std::path::Path;
 use toml::Value;
 
 use super::{Keys, Knob, Knobs, Target, VaryError};
-use crate::scenario::{
-    self, Form, Key, Scenario, number_at, resolve, value_at, with_overrides,
-};
+use crate::scenario::{self, Form, Key, Scenario, number_at, resolve, value_at, with_overrides};
 
 /// A scenario as text, with some entries replaced: what numbers are put into.
 #[derive(Clone, Debug)]
@@ -143,7 +141,7 @@ impl Base {
                 }
             }
         }
-        let overrides = self.with(values);
+        let overrides = self.overriding(values);
         // A part that is not there is not there at any value, unless rods are added.
         let mut targets = values.iter().flat_map(|(keys, _)| keys.targets());
         let adds = |target: &Target| matches!(target, Target::Entry(part) if part.key == Key::Rods);
@@ -157,7 +155,7 @@ impl Base {
     }
 
     /// All overrides, those that make these values among them.
-    fn with(&self, values: &[(&Keys, f64)]) -> Vec<String> {
+    fn overriding(&self, values: &[(&Keys, f64)]) -> Vec<String> {
         let mut overrides = self.overrides.clone();
         for (keys, value) in values {
             for &target in keys.targets() {
@@ -227,7 +225,7 @@ impl Base {
 
     /// The scenario with these values, as TOML.
     pub(crate) fn toml(&self, values: &[(&Keys, f64)]) -> Option<String> {
-        with_overrides(&self.text, &self.with(values))
+        with_overrides(&self.text, &self.overriding(values))
     }
 }
 
