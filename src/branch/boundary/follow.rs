@@ -2,10 +2,12 @@
 
 use rayon::prelude::*;
 
-use super::place::{Lost, Place, Search};
-use super::refine::{Step, Verified, on_finer, refine};
+use super::grids::on_finer;
+use super::place::Place;
+use super::refine::{Step, Verified, refine};
+use super::search::Lost;
 use super::sheet::{Plane, Sheet};
-use super::special::{Special, locate, onto};
+use super::special::{land, onto, special_between};
 use crate::branch::critical::{Critical, Kind};
 use crate::branch::equations::Stuck;
 use crate::branch::refined::Doubt;
@@ -289,7 +291,7 @@ impl<'a> Walk<'a, '_> {
                 if turn > STRAIGHT {
                     self.step = (GROWTH * step).min(self.how.longest);
                 }
-                let mut steps = between(sheet, [now, &next], step)?;
+                let mut steps = self.between(sheet, [now, &next], step)?;
                 steps.push(Step {
                     place: next,
                     special: None,
@@ -308,7 +310,7 @@ impl<'a> Walk<'a, '_> {
         let off = (sheet.along(&off, &off) - along * along).max(0.0).sqrt();
         self.accepts(sheet, [now, &next], off, step)?;
         let edge = value == 0.0 || value == 1.0;
-        let mut steps = between(sheet, [now, &next], step)?;
+        let mut steps = self.between(sheet, [now, &next], step)?;
         let end = match () {
             () if edge => Some(Halt::Reached),
             () if self.is_first(sheet, &next) => Some(Halt::Closed),
@@ -361,6 +363,17 @@ impl<'a> Walk<'a, '_> {
         }
     }
 
+    /// Special points between two of a boundary.
+    fn between(&self, sheet: &mut Sheet, pair: [&Place; 2], step: f64) -> Result<Vec<Step>, Lost> {
+        let special = special_between(sheet, pair, step)?;
+        let step = |(special, place)| Step {
+            place,
+            special: Some(special),
+            given: None,
+        };
+        Ok(special.into_iter().map(step).collect())
+    }
+
     fn is_first(&self, sheet: &Sheet, place: &Place) -> bool {
         let first = &self.first;
         (first.spot.place[0] - place.spot.place[0]).abs() < SAME[0]
@@ -375,56 +388,4 @@ fn leaves(now: &Place) -> bool {
         let (at, way) = (now.spot.place[k], now.tangent.place[k]);
         at <= EXACT && way < 0.0 || at >= 1.0 - EXACT && way > 0.0
     })
-}
-
-/// The point of the boundary at a value of one of the numbers, about so far along the
-/// tangent.
-fn land(
-    sheet: &mut Sheet,
-    now: &Place,
-    step: f64,
-    which: usize,
-    value: f64,
-) -> Result<Place, Lost> {
-    let mut spot = sheet.moved(&now.spot, &now.tangent, step)?;
-    spot.place[which] = value;
-    let (across, slope) = now.across_at(sheet, which);
-    let along = sheet.number(which);
-    let search = Search {
-        spot: &spot,
-        across: &across,
-        slope,
-        along: &along,
-        like: now,
-        accuracy: EXACT,
-        furthest: 0.5,
-    };
-    let found = search.run(sheet)?;
-    let mut place = now.at(sheet, found)?;
-    place.spot.place[which] = value;
-    Ok(place)
-}
-
-/// Special points between two of a boundary.
-fn between(sheet: &mut Sheet, [now, next]: [&Place; 2], step: f64) -> Result<Vec<Step>, Lost> {
-    let mut special = Vec::new();
-    if now.kind == Kind::Fold && now.speed * next.speed < 0.0 {
-        special.push(Special::Cusp);
-    }
-    match now.index.abs_diff(next.index) {
-        0 => {}
-        1 => special.push(Special::Crossing),
-        _ => return Err(Lost::Stuck(Stuck::NotConverged)),
-    }
-    if special.len() > 1 {
-        return Err(Lost::Stuck(Stuck::NotConverged));
-    }
-    let located = special.into_iter().map(|special| {
-        Ok(Step {
-            place: locate(sheet, [now, next], step, special)?,
-            special: Some(special),
-            given: None,
-        })
-    });
-    located.collect()
 }

@@ -28,8 +28,10 @@
 //! extrapolated.
 
 mod follow;
+mod grids;
 mod place;
 mod refine;
+mod search;
 mod sheet;
 mod special;
 

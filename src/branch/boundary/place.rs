@@ -2,17 +2,12 @@
 
 use nalgebra::DMatrix;
 
+use super::search::{self, Eigen, Found, Lost, Search};
 use super::sheet::{Direction, Sample, Sheet, Spot};
 use crate::branch::critical::{Critical, Kind};
 use crate::branch::equations::Stuck;
 use crate::branch::field::{add, combined, dot, plus, times};
 use crate::leaf::Field;
-
-/// Evaluations in the search for a zero.
-const EVALUATIONS: usize = 30;
-
-/// A slope from points nearer than this is rounding.
-const LOCAL: f64 = 1e-6;
 
 /// The distance over which the change of a singular value is differenced.
 const DIFFERENCE: f64 = 3e-4;
@@ -55,134 +50,6 @@ pub struct Place {
     pub heading: [f64; 2],
 }
 
-/// What one evaluation says of the modes that become neutral.
-struct Eigen {
-    /// The mean of their eigenvalues, and how far these are apart.
-    value: f64,
-    spread: f64,
-    /// Eigenvectors of H: first theirs, then the others with their eigenvalues.
-    vectors: Vec<Vec<f64>>,
-    others: Vec<f64>,
-}
-
-/// Why no point of a boundary is there.
-#[derive(Clone, Debug)]
-pub enum Lost {
-    /// No solution was found.
-    Stuck(Stuck),
-    /// The modes do not become neutral together.
-    Parted,
-    /// The mode feels the number, so that branches do not cross.
-    Unfolded,
-}
-
-impl<E: Into<Stuck>> From<E> for Lost {
-    fn from(stuck: E) -> Self {
-        Lost::Stuck(stuck.into())
-    }
-}
-
-/// How a point of a boundary is sought from a spot.
-pub struct Search<'s> {
-    /// From here,
-    pub spot: &'s Spot,
-    /// this way, along which the eigenvalue changes so much,
-    pub across: &'s Direction,
-    pub slope: f64,
-    /// in the plane normal to this,
-    pub along: &'s Direction,
-    /// with the modes of this point,
-    pub like: &'s Place,
-    /// to this accuracy, and not further.
-    pub accuracy: f64,
-    pub furthest: f64,
-}
-
-/// A point without directions.
-pub struct Found {
-    sample: Sample,
-    eigen: Eigen,
-    /// How far from the start of the search.
-    pub distance: f64,
-}
-
-impl Found {
-    /// Where it is.
-    pub fn spot(&self) -> &Spot {
-        &self.sample.spot
-    }
-}
-
-fn eigen(sample: &Sample, neutral: usize) -> Eigen {
-    let all = sample.solved.h.clone().symmetric_eigen();
-    let count = all.eigenvalues.len();
-    // The neutral modes are the first of the border.
-    let weight = |k: usize| -> f64 {
-        let own = (0..neutral).map(|i| all.eigenvectors[(i, k)].powi(2));
-        own.sum()
-    };
-    let mut order: Vec<usize> = (0..count).collect();
-    order.sort_by(|&a, &b| weight(b).total_cmp(&weight(a)));
-    let values: Vec<f64> = order.iter().map(|&k| all.eigenvalues[k]).collect();
-    let (own, others) = values.split_at(neutral.min(count));
-    let most = own.iter().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
-    let least = own.iter().fold(f64::INFINITY, |m, v| m.min(*v));
-    let vector = |&k: &usize| all.eigenvectors.column(k).iter().copied().collect();
-    Eigen {
-        value: own.iter().sum::<f64>() / neutral as f64,
-        spread: most - least,
-        vectors: order.iter().map(vector).collect(),
-        others: others.to_vec(),
-    }
-}
-
-impl Search<'_> {
-    /// The zero of the eigenvalue by the secant method.
-    pub fn run(&self, sheet: &mut Sheet) -> Result<Found, Lost> {
-        let border: Vec<Field> = (self.like.held.iter())
-            .map(|mode| sheet.equations.momentum(mode))
-            .collect();
-        let rates = sheet.rates(self.spot)?;
-        let mut at = |distance: f64| -> Result<Found, Lost> {
-            let spot = sheet.moved(self.spot, self.across, distance)?;
-            let sample = sheet.settle(&spot, [self.along, self.across], &border, &rates)?;
-            let eigen = eigen(&sample, self.like.neutral);
-            Ok(Found {
-                sample,
-                eigen,
-                distance,
-            })
-        };
-        let (mut distance, mut slope) = (0.0, self.slope);
-        let mut best = at(distance)?;
-        let mut value = best.eigen.value;
-        let mut worse = 0;
-        for _ in 0..EVALUATIONS {
-            let step = -value / slope;
-            if !step.is_finite() || (distance + step).abs() > self.furthest {
-                return Err(Lost::Stuck(Stuck::NotConverged));
-            }
-            if step.abs() < self.accuracy {
-                return Ok(best);
-            }
-            let next = at(distance + step)?;
-            let after = next.eigen.value;
-            if step.abs() > LOCAL {
-                slope = (after - value) / step;
-            }
-            (distance, value) = (distance + step, after);
-            match after.abs() < best.eigen.value.abs() {
-                true => best = next,
-                false => worse += 1,
-            }
-            if worse > 1 {
-                return Ok(best);
-            }
-        }
-        Err(Lost::Stuck(Stuck::NotConverged))
-    }
-}
-
 impl Place {
     /// The critical point of a branch along the first number, as a point of the sheet at
     /// a fraction of the second number's range; `onward`: the boundary goes to where the
@@ -217,7 +84,8 @@ impl Place {
             across: &across,
             slope: critical.slope,
             along: &along,
-            like: &like,
+            held: &like.held,
+            neutral: like.neutral,
             accuracy: 1e-11,
             furthest: 0.1,
         };
@@ -242,7 +110,7 @@ impl Place {
         let border = self.held.iter().map(|mode| sheet.equations.momentum(mode));
         let border: Vec<Field> = border.collect();
         let sample = sheet.look(found.sample.spot, &border)?;
-        let eigen = self::eigen(&sample, self.neutral);
+        let eigen = search::eigen(&sample, self.neutral);
         let basis = self.basis(sheet, &sample, &eigen)?;
         let held = held(sheet, &sample, &eigen);
         let border: Vec<Field> = held.iter().map(|it| sheet.equations.momentum(it)).collect();
@@ -251,7 +119,7 @@ impl Place {
             let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
                 let spot = sheet.moved(&sample.spot, direction, step)?;
                 let sample = sheet.settle(&spot, [&basis[0], &basis[1]], &border, &sample.rates)?;
-                Ok::<f64, Stuck>(self::eigen(&sample, self.neutral).value)
+                Ok::<f64, Stuck>(search::eigen(&sample, self.neutral).value)
             });
             *change = (after? - before?) / (2.0 * DIFFERENCE);
         }

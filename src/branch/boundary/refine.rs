@@ -1,14 +1,14 @@
 //! Points of a boundary on finer and finer grids: extrapolated, and thereby verified.
 
-use super::place::{Lost, Place, Search};
-use super::sheet::{Direction, Plane, Sheet, Spot};
+use super::grids::{on_coarser, on_finer};
+use super::place::Place;
+use super::search::{Found, Lost, Search};
+use super::sheet::{Direction, Plane, Sheet};
 use super::special::{Special, locate_near};
 use crate::branch::critical::Kind;
-use crate::branch::field::prolong as prolong_field;
 use crate::branch::refine_critical::NEARLY_RIGID;
 use crate::branch::refined::Doubt;
-use crate::leaf::{Field, Grid, State};
-use crate::relax::prolong::prolong;
+use crate::leaf::{Grid, State};
 use crate::relax::richardson::Richardson;
 
 /// Grids of a point at least and at most, those of a nearly rigid leaf, and segments of
@@ -17,9 +17,6 @@ const FEWEST: usize = 3;
 const GRIDS: usize = 6;
 const RIGID: usize = 4;
 const FINEST: usize = 4096;
-
-/// Segments of the coarsest.
-const COARSEST: usize = 8;
 
 /// From grid to grid a point moves by less and less, if by more than this (lengths).
 const STILL: f64 = 1e-4;
@@ -79,69 +76,6 @@ pub struct Verified {
     /// Morse indices where the first number is smaller and where it is larger; of a fold,
     /// of both branches that meet there.
     pub indices: [usize; 2],
-}
-
-/// A point of the same kind on the grid with all segments halved: where it would be, with
-/// its directions.
-pub fn on_finer<'a>(sheet: &mut Sheet<'a>, place: &Place) -> Result<(Sheet<'a>, Place), Lost> {
-    let state = prolong(sheet.leaf(place.spot.place)?, &place.spot.state);
-    let finer = sheet.refined()?;
-    let direction = |it: &Direction| {
-        finer.normalised(Direction {
-            increments: prolong_field(&it.increments),
-            place: it.place,
-        })
-    };
-    let place = Place {
-        spot: Spot {
-            state,
-            ..place.spot
-        },
-        held: place.held.iter().map(prolong_field).collect(),
-        tangent: direction(&place.tangent),
-        normal: direction(&place.normal),
-        ..place.clone()
-    };
-    Ok((finer, place))
-}
-
-/// The point on the grid with every second node: where it would be.
-fn on_coarser(plane: Plane, grid: &Grid, place: &Place) -> Option<(Grid, Place)> {
-    let stations: Vec<f64> = grid.sigma().iter().copied().step_by(2).collect();
-    let coarse = Grid::through(&stations, plane.family.first().kinks());
-    let state = &place.spot.state;
-    let (n, rods) = (state.segments(), state.rods());
-    if n % 2 != 0 || n / 2 < COARSEST || coarse.refined() != *grid {
-        return None;
-    }
-    let nodes = (0..rods).flat_map(|j| (0..=n).step_by(2).map(move |i| state.base(j) + i));
-    let (x, q) = nodes.map(|k| (state.x[k], state.q[k])).unzip();
-    let mut fewer = State::new(n / 2, x, q);
-    fewer.n = state
-        .n
-        .chunks(2)
-        .map(|pair| 0.5 * (pair[0] + pair[1]))
-        .collect();
-    let every_second = |field: &Field| -> Field {
-        let rods = field.iter();
-        rods.map(|rod| rod.iter().copied().skip(1).step_by(2).collect())
-            .collect()
-    };
-    let direction = |it: &Direction| Direction {
-        increments: every_second(&it.increments),
-        place: it.place,
-    };
-    let place = Place {
-        spot: Spot {
-            state: fewer,
-            ..place.spot
-        },
-        held: place.held.iter().map(every_second).collect(),
-        tangent: direction(&place.tangent),
-        normal: direction(&place.normal),
-        ..place.clone()
-    };
-    Some((coarse, place))
 }
 
 /// A point on as many grids as it takes; on all of them it must be the same. Of a nearly
@@ -279,13 +213,14 @@ struct Owned {
 }
 
 impl Owned {
-    fn run(&self, sheet: &mut Sheet) -> Result<super::place::Found, Lost> {
+    fn run(&self, sheet: &mut Sheet) -> Result<Found, Lost> {
         let search = Search {
             spot: &self.near.spot,
             across: &self.across,
             slope: self.slope,
             along: &self.along,
-            like: &self.near,
+            held: &self.near.held,
+            neutral: self.near.neutral,
             accuracy: ACCURACY,
             furthest: NEAR,
         };

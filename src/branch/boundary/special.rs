@@ -1,7 +1,9 @@
 //! Points of a boundary that are more than that: cusps, and crossings with another one.
 
-use super::place::{Lost, Place, Search};
+use super::place::Place;
+use super::search::{Lost, Search};
 use super::sheet::Sheet;
+use crate::branch::critical::Kind;
 use crate::branch::equations::Stuck;
 
 /// Evaluations in the search along the boundary.
@@ -19,6 +21,9 @@ const REACH: f64 = 0.3;
 
 /// Accuracy of points on the way to it.
 const EXACT: f64 = 1e-13;
+
+/// Accuracy of points that are given a number.
+const GIVEN: f64 = 1e-12;
 
 /// What a point of a boundary is besides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +62,8 @@ pub fn onto(
         across: &now.normal,
         slope: now.slope,
         along: &now.tangent,
-        like: now,
+        held: &now.held,
+        neutral: now.neutral,
         accuracy,
         furthest,
     };
@@ -68,7 +74,7 @@ pub fn onto(
 
 /// The special point between two of a boundary, the second so far along the tangent of
 /// the first.
-pub fn locate(
+fn locate(
     sheet: &mut Sheet,
     [now, next]: [&Place; 2],
     step: f64,
@@ -119,4 +125,51 @@ fn zero(
         }
     }
     Err(Lost::Stuck(Stuck::NotConverged))
+}
+
+/// The point of the boundary at a value of one of the numbers, about so far along the
+/// tangent.
+pub fn land(
+    sheet: &mut Sheet,
+    now: &Place,
+    step: f64,
+    which: usize,
+    value: f64,
+) -> Result<Place, Lost> {
+    let mut spot = sheet.moved(&now.spot, &now.tangent, step)?;
+    spot.place[which] = value;
+    let (across, slope) = now.across_at(sheet, which);
+    let along = sheet.number(which);
+    let search = Search {
+        spot: &spot,
+        across: &across,
+        slope,
+        along: &along,
+        held: &now.held,
+        neutral: now.neutral,
+        accuracy: GIVEN,
+        furthest: 0.5,
+    };
+    let found = search.run(sheet)?;
+    let mut place = now.at(sheet, found)?;
+    place.spot.place[which] = value;
+    Ok(place)
+}
+
+/// Special points between two of a boundary, the second so far along the tangent of the
+/// first; more than one are not told apart.
+pub fn special_between(
+    sheet: &mut Sheet,
+    [now, next]: [&Place; 2],
+    step: f64,
+) -> Result<Option<(Special, Place)>, Lost> {
+    let cusp = now.kind == Kind::Fold && now.speed * next.speed < 0.0;
+    let special = match (cusp, now.index.abs_diff(next.index)) {
+        (false, 0) => return Ok(None),
+        (true, 0) => Special::Cusp,
+        (false, 1) => Special::Crossing,
+        _ => return Err(Lost::Stuck(Stuck::NotConverged)),
+    };
+    let place = locate(sheet, [now, next], step, special)?;
+    Ok(Some((special, place)))
 }

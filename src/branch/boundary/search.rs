@@ -1,0 +1,141 @@
+//! The search for a point of a boundary: the zero of an eigenvalue across it.
+
+use super::sheet::{Direction, Sample, Sheet, Spot};
+use crate::branch::equations::Stuck;
+use crate::leaf::Field;
+
+/// Evaluations in the search for a zero.
+const EVALUATIONS: usize = 30;
+
+/// A slope from points nearer than this is rounding.
+const LOCAL: f64 = 1e-6;
+
+/// What one evaluation says of the modes that become neutral.
+pub struct Eigen {
+    /// The mean of their eigenvalues, and how far these are apart.
+    pub value: f64,
+    pub spread: f64,
+    /// Eigenvectors of H: first theirs, then the others with their eigenvalues.
+    pub vectors: Vec<Vec<f64>>,
+    pub others: Vec<f64>,
+}
+
+/// Why no point of a boundary is there.
+#[derive(Clone, Debug)]
+pub enum Lost {
+    /// No solution was found.
+    Stuck(Stuck),
+    /// The modes do not become neutral together.
+    Parted,
+    /// The mode feels the number, so that branches do not cross.
+    Unfolded,
+}
+
+impl<E: Into<Stuck>> From<E> for Lost {
+    fn from(stuck: E) -> Self {
+        Lost::Stuck(stuck.into())
+    }
+}
+
+/// How a point of a boundary is sought from a spot.
+pub struct Search<'s> {
+    /// From here,
+    pub spot: &'s Spot,
+    /// this way, along which the eigenvalue changes so much,
+    pub across: &'s Direction,
+    pub slope: f64,
+    /// in the plane normal to this,
+    pub along: &'s Direction,
+    /// with these modes in the border, of which so many, the first, become neutral,
+    pub held: &'s [Field],
+    pub neutral: usize,
+    /// to this accuracy, and not further.
+    pub accuracy: f64,
+    pub furthest: f64,
+}
+
+/// A point without directions.
+pub struct Found {
+    pub sample: Sample,
+    pub eigen: Eigen,
+    /// How far from the start of the search.
+    pub distance: f64,
+}
+
+impl Found {
+    /// Where it is.
+    pub fn spot(&self) -> &Spot {
+        &self.sample.spot
+    }
+}
+
+/// The eigenvalues of H, of which so many modes of the border, its first, become neutral.
+pub fn eigen(sample: &Sample, neutral: usize) -> Eigen {
+    let all = sample.solved.h.clone().symmetric_eigen();
+    let count = all.eigenvalues.len();
+    // The neutral modes are the first of the border.
+    let weight = |k: usize| -> f64 {
+        let own = (0..neutral).map(|i| all.eigenvectors[(i, k)].powi(2));
+        own.sum()
+    };
+    let mut order: Vec<usize> = (0..count).collect();
+    order.sort_by(|&a, &b| weight(b).total_cmp(&weight(a)));
+    let values: Vec<f64> = order.iter().map(|&k| all.eigenvalues[k]).collect();
+    let (own, others) = values.split_at(neutral.min(count));
+    let most = own.iter().fold(f64::NEG_INFINITY, |m, v| m.max(*v));
+    let least = own.iter().fold(f64::INFINITY, |m, v| m.min(*v));
+    let vector = |&k: &usize| all.eigenvectors.column(k).iter().copied().collect();
+    Eigen {
+        value: own.iter().sum::<f64>() / neutral as f64,
+        spread: most - least,
+        vectors: order.iter().map(vector).collect(),
+        others: others.to_vec(),
+    }
+}
+
+impl Search<'_> {
+    /// The zero of the eigenvalue by the secant method.
+    pub fn run(&self, sheet: &mut Sheet) -> Result<Found, Lost> {
+        let border: Vec<Field> = (self.held.iter())
+            .map(|mode| sheet.equations.momentum(mode))
+            .collect();
+        let rates = sheet.rates(self.spot)?;
+        let mut at = |distance: f64| -> Result<Found, Lost> {
+            let spot = sheet.moved(self.spot, self.across, distance)?;
+            let sample = sheet.settle(&spot, [self.along, self.across], &border, &rates)?;
+            let eigen = eigen(&sample, self.neutral);
+            Ok(Found {
+                sample,
+                eigen,
+                distance,
+            })
+        };
+        let (mut distance, mut slope) = (0.0, self.slope);
+        let mut best = at(distance)?;
+        let mut value = best.eigen.value;
+        let mut worse = 0;
+        for _ in 0..EVALUATIONS {
+            let step = -value / slope;
+            if !step.is_finite() || (distance + step).abs() > self.furthest {
+                return Err(Lost::Stuck(Stuck::NotConverged));
+            }
+            if step.abs() < self.accuracy {
+                return Ok(best);
+            }
+            let next = at(distance + step)?;
+            let after = next.eigen.value;
+            if step.abs() > LOCAL {
+                slope = (after - value) / step;
+            }
+            (distance, value) = (distance + step, after);
+            match after.abs() < best.eigen.value.abs() {
+                true => best = next,
+                false => worse += 1,
+            }
+            if worse > 1 {
+                return Ok(best);
+            }
+        }
+        Err(Lost::Stuck(Stuck::NotConverged))
+    }
+}
