@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use leafdyn::files::{self, Document, Written};
-use leafdyn::relax::{Equilibrium, Mode};
+use leafdyn::relax::{Equilibrium, Mode, Sensitivity};
 use leafdyn::scenario::Scenario;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
@@ -66,6 +66,9 @@ impl Files {
         read(py, &*self.result, &self.input, name)
     }
 }
+
+/// See [`Leaf::position_changes`].
+type PositionChange<'py> = (String, Bound<'py, PyAny>, Bound<'py, PyAny>, Option<f64>);
 
 /// A leaf at rest, or as far as it came.
 #[pyclass(frozen, module = "leafdyn._leafdyn")]
@@ -261,5 +264,16 @@ impl Leaf {
             array(py, flat(vectors), &[modes.len(), rods, nodes, 3])
         };
         Ok([of(|mode| &mode.displacement)?, of(|mode| &mode.rotation)?])
+    }
+    /// Changes of the positions with each number that was asked for: by its key, where they are
+    /// given, the changes, and a bound on their error.
+    fn position_changes<'py>(&self, py: Python<'py>) -> PyResult<Vec<PositionChange<'py>>> {
+        let found = self.found.sensitivities.as_deref().unwrap_or_default();
+        let of = |one: &Sensitivity| {
+            let stations = array(py, one.stations.clone(), &[one.stations.len()])?;
+            let positions = curves(py, &one.positions)?;
+            Ok((one.key.clone(), stations, positions, one.positions_error))
+        };
+        found.iter().map(of).collect()
     }
 }

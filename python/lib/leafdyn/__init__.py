@@ -15,9 +15,10 @@ from ._errors import LeafWarning, ScenarioError
 from ._leaf import Equilibrium
 from ._leafdyn import __version__, set_threads, threads
 from ._motion import Frame, Motion
-from ._relax import modes, relax, relax_many
+from ._relax import modes, relax, relax_many, sensitivities
 from ._result import Result, Table
 from ._scenario import Scenario, Source
+from ._sensitivity import Sensitivity
 from ._study import Branch, Chart, Check, Map, Shapes, Trace
 from ._verbs import all_shapes, chart, check, frames, map, simulate, trace
 
@@ -33,6 +34,7 @@ __all__ = [
     "Result",
     "Scenario",
     "ScenarioError",
+    "Sensitivity",
     "Shapes",
     "Source",
     "Table",
@@ -46,6 +48,7 @@ __all__ = [
     "modes",
     "relax",
     "relax_many",
+    "sensitivities",
     "set_threads",
     "simulate",
     "threads",

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from . import _leafdyn
 from ._result import Kept, Result, keep
+from ._sensitivity import Sensitivity
 
 if TYPE_CHECKING:
     from ._scenario import Scenario
@@ -197,6 +198,17 @@ class Equilibrium(Result):
         """Rotation vectors of these nodes along the lab axes, radians, shape (modes, N, M + 1, 3)."""
         return self._mode_shapes[1]
 
+    @cached_property
+    def sensitivities(self) -> dict[str, Sensitivity]:
+        """How its results change with the numbers that were asked for, by their keys: see `leafdyn.sensitivities`.
+
+        There are none of a leaf that is not at rest, and of a number in which the leaf is not smooth."""
+        if self._request is None or not self._request[1]["sensitivity"]:
+            return {}
+        places = {found[0]: found[1:] for found in self._core.position_changes()}
+        entries = self.to_dict()["sensitivities"]
+        return {entry["key"]: Sensitivity(entry, *places[entry["key"]]) for entry in entries}
+
     def plot(self, ax: Any = None, **style: Any) -> Any:
         """Draw the veins with matplotlib: in space, or from the side in axes without a third axis.
 
@@ -308,4 +320,5 @@ _LATER = (
     "_reaction",
     "_modes",
     "_mode_shapes",
+    "sensitivities",
 )
