@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use leafdyn::files::{self, Document, Written};
+use leafdyn::files::{self, Document, Kind, Written};
 use leafdyn::relax::{Equilibrium, Mode, Sensitivity};
 use leafdyn::scenario::Scenario;
 use pyo3::exceptions::PyKeyError;
@@ -37,6 +37,12 @@ fn read<'py>(
     let found = py.detach(|| result.contents(input, name));
     let bytes = found.ok_or_else(|| PyKeyError::new_err(name.to_string()))?;
     Ok(PyBytes::new(py, &bytes))
+}
+
+/// The kind of a file, by its name: a word that `--write` knows.
+#[pyfunction]
+pub fn kind(file: &str) -> &'static str {
+    Kind::of(file).word()
 }
 
 /// The files of a result.

@@ -12,6 +12,7 @@ in. Every verb of the program ``leafdyn`` is a function here; it returns what th
 """
 
 from ._errors import LeafWarning, ScenarioError
+from ._fit import Candidate, Fit, Parameter, fit
 from ._leaf import Equilibrium
 from ._leafdyn import __version__, set_threads, threads
 from ._motion import Frame, Motion
@@ -24,13 +25,16 @@ from ._verbs import all_shapes, chart, check, frames, map, simulate, trace
 
 __all__ = [
     "Branch",
+    "Candidate",
     "Chart",
     "Check",
     "Equilibrium",
+    "Fit",
     "Frame",
     "LeafWarning",
     "Map",
     "Motion",
+    "Parameter",
     "Result",
     "Scenario",
     "ScenarioError",
@@ -43,6 +47,7 @@ __all__ = [
     "all_shapes",
     "chart",
     "check",
+    "fit",
     "frames",
     "map",
     "modes",

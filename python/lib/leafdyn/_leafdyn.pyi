@@ -18,6 +18,8 @@ __all__ = [
     "all_shapes",
     "chart",
     "check",
+    "fit",
+    "kind",
     "library_seconds",
     "main",
     "map",
@@ -40,6 +42,7 @@ def threads() -> int:
 
 def panic_on_purpose() -> None: ...
 def library_seconds(text: str, runs: int) -> float: ...
+def kind(file: str) -> str: ...
 def overrides(entries: Mapping[str, Any]) -> list[str]: ...
 def main(arguments: Sequence[str]) -> int: ...
 @final
@@ -174,3 +177,12 @@ def chart(
     leaves: Sequence[Scenario],
     progress: _Heard,
 ) -> tuple[Files, Files | None, bool, list[str]]: ...
+def fit(
+    scenario: Scenario,
+    data: Sequence[tuple[str, str] | str | PathLike[str]],
+    free: Sequence[str],
+    robust: bool,
+    candidates: tuple[str, str] | str | PathLike[str] | None,
+    tolerance: float | None,
+    progress: _Heard,
+) -> Files: ...
