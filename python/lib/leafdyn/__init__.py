@@ -22,6 +22,7 @@ from ._scenario import Scenario, Source
 from ._sensitivity import Sensitivity
 from ._study import Branch, Chart, Check, Map, Shapes, Trace
 from ._verbs import all_shapes, chart, check, frames, map, simulate, trace
+from ._view import Page
 
 __all__ = [
     "Branch",
@@ -34,6 +35,7 @@ __all__ = [
     "LeafWarning",
     "Map",
     "Motion",
+    "Page",
     "Parameter",
     "Result",
     "Scenario",

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _leafdyn
-from ._result import Kept, Result, keep
+from ._result import Kept, keep
 from ._sensitivity import Sensitivity
+from ._view import Viewed
 
 if TYPE_CHECKING:
     from ._scenario import Scenario
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class Equilibrium(Result):
+class Equilibrium(Viewed):
     """A leaf at rest, or as far as it came, with N rods at K + 1 stations, in the units of its scenario.
 
     Arrays are made when they are first asked for, of float64, and equal the numbers of the files to the last bit.
