@@ -105,6 +105,14 @@ impl Leaf {
         }
     }
 
+    /// How it ended: at stations that were asked for the tolerance may not be kept.
+    fn ended(&self, py: Python) -> &Equilibrium {
+        match self.stations {
+            Some(_) => self.shown(py),
+            None => &self.found,
+        }
+    }
+
     fn shown(&self, py: Python) -> &Equilibrium {
         self.shown.get().unwrap_or_else(|| {
             py.detach(|| {
@@ -138,18 +146,18 @@ impl Leaf {
     }
 
     #[getter]
-    fn outcome(&self) -> &'static str {
-        self.found.outcome.word()
+    fn outcome(&self, py: Python) -> &'static str {
+        self.ended(py).outcome.word()
     }
 
     #[getter]
-    fn success(&self) -> bool {
-        self.found.outcome.is_success()
+    fn success(&self, py: Python) -> bool {
+        self.ended(py).outcome.is_success()
     }
 
     #[getter]
-    fn remark(&self) -> Option<&str> {
-        self.found.remark.as_deref()
+    fn remark(&self, py: Python) -> Option<&str> {
+        self.ended(py).remark.as_deref()
     }
 
     #[getter]
