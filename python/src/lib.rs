@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 
 mod arrays;
 mod errors;
+mod fit;
 mod motion;
 mod relax;
 mod result;
@@ -17,11 +18,13 @@ mod verbs;
 #[pymodule]
 mod _leafdyn {
     #[pymodule_export]
+    use super::fit::fit;
+    #[pymodule_export]
     use super::motion::Motion;
     #[pymodule_export]
     use super::relax::{library_seconds, relax_many, relax_one};
     #[pymodule_export]
-    use super::result::{Files, Leaf};
+    use super::result::{Files, Leaf, kind};
     #[pymodule_export]
     use super::run::{panic_on_purpose, set_threads, threads};
     #[pymodule_export]

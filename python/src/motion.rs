@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use leafdyn::files::{Document, Recording, Selection};
+use leafdyn::files::{Document, Kind, Recording, Selection};
 use leafdyn::scenario;
 use leafdyn::simulate::{
-    Frame, Moment, Options, Record, Scheme, Simulation, Still, Stopped, stills,
+    Frame, Moment, Options, Record, Scheme, Simulation, Still, Stopped, film, stills,
 };
+use leafdyn::view;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -47,7 +48,7 @@ impl Motion {
         self.scenario.joined
     }
 
-    fn record(&self, state: &State) -> Record {
+    fn record(&self, state: &State, with_film: bool) -> Record {
         let moments: Vec<Moment> = (state.frames.iter())
             .map(|frame| Moment::of(frame, self.joined()))
             .collect();
@@ -62,7 +63,14 @@ impl Motion {
             }
         };
         let shapes = chosen.into_iter().map(still).collect();
-        Record::new(&state.simulation, state.stopped, moments, shapes)
+        let mut record = Record::new(&state.simulation, state.stopped, moments, shapes);
+        if with_film {
+            let nodes = state.frames.first();
+            let nodes = nodes.map_or(0, |frame| frame.positions.len());
+            let film = film(state.frames.len(), nodes).into_iter();
+            record.film = film.map(still).collect();
+        }
+        record
     }
 }
 
@@ -187,16 +195,26 @@ impl Motion {
 
     /// The summary and the pictures of the outputs that were kept.
     fn files(&self) -> Files {
-        Files::of(self.record(&self.state()), self.scenario.clone())
+        let record = self.record(&self.state(), false);
+        Files::of(record, self.scenario.clone())
     }
 
-    /// Writes the files of the program into a folder.
-    fn save(&self, py: Python, folder: PathBuf) -> PyResult<Vec<PathBuf>> {
+    /// The page that plays them in space.
+    fn page(&self, py: Python) -> String {
+        py.detach(|| view::page(&self.record(&self.state(), true), &self.scenario))
+    }
+
+    /// Writes the files of the program of these kinds into a folder.
+    fn save(&self, py: Python, folder: PathBuf, kinds: Vec<String>) -> PyResult<Vec<PathBuf>> {
+        let wanted = |kind: &Kind| kinds.iter().any(|word| word == kind.word());
+        let selection = Selection {
+            kinds: Kind::ALL.into_iter().filter(wanted).collect(),
+            ..Selection::default()
+        };
         let written = py.detach(|| {
             let state = self.state();
             let mut again = Simulation::new(&self.scenario, &self.options)?;
-            let all = Selection::default();
-            let mut recording = Recording::begin(&folder, &mut again, &all)?;
+            let mut recording = Recording::begin(&folder, &mut again, &selection)?;
             for frame in state.frames.iter().skip(1) {
                 recording.add(&again, frame)?;
             }

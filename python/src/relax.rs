@@ -6,11 +6,12 @@ use std::time::Instant;
 
 use leafdyn::relax::{self, Equilibrium, Method, Options, Progress, RelaxError, Settings};
 use leafdyn::scenario;
+use leafdyn::study::{self, Keys, SensitivityError};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use crate::errors::cannot;
+use crate::errors::{cannot, cannot_vary};
 use crate::result::Leaf;
 use crate::run::{Monitor, elapsed, run};
 use crate::scenario::Scenario;
@@ -31,6 +32,8 @@ pub struct Asked {
     modes: usize,
     mode_shapes: bool,
     stations: Option<usize>,
+    /// Numbers by which derivatives are found; only of one leaf.
+    sensitivity: Vec<String>,
 }
 
 /// Refuses what cannot be asked.
@@ -109,13 +112,29 @@ pub fn relax_one(
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Leaf> {
     let mut options = asked.options()?;
-    let scenario = scenario.checked.clone();
-    let input = scenario.clone();
-    let found = run(py, progress, move |monitor| {
-        options.limit = monitor.limit();
-        relax::relax(&scenario, &options, &mut heard(monitor, &scenario.name))
-    })?;
-    Ok(Leaf::new(found.map_err(cannot)?, input, asked.stations))
+    let input = scenario.checked.clone();
+    let found = if asked.sensitivity.is_empty() {
+        let scenario = input.clone();
+        let found = run(py, progress, move |monitor| {
+            options.limit = monitor.limit();
+            relax::relax(&scenario, &options, &mut heard(monitor, &scenario.name))
+        })?;
+        found.map_err(cannot)?
+    } else {
+        let keys: Result<Vec<Keys>, _> = asked.sensitivity.iter().map(|key| key.parse()).collect();
+        let keys = keys.map_err(|error| cannot_vary(py, error))?;
+        let base = scenario.base(py)?;
+        let found = run(py, progress, move |monitor| {
+            options.limit = monitor.limit();
+            let name = base.scenario().name.clone();
+            study::relax_with_sensitivities(&base, &keys, &options, &mut heard(monitor, &name))
+        })?;
+        found.map_err(|error| match error {
+            SensitivityError::Vary(error) => cannot_vary(py, error),
+            error => cannot(error),
+        })?
+    };
+    Ok(Leaf::new(found, input, asked.stations))
 }
 
 /// Lets many leaves come to rest, side by side.
@@ -152,16 +171,17 @@ pub fn relax_many(
 }
 
 /// The shortest of so many times in which the library alone reads a scenario's text and lets the leaf
-/// come to rest: for the tests.
+/// come to rest, with the same request as [`relax_one`]: for the tests.
 #[pyfunction]
 pub fn library_seconds(py: Python, text: &str, runs: usize) -> f64 {
     py.detach(|| {
         let times = (0..runs).map(|_| {
             let clock = Instant::now();
-            let leaf = scenario::Scenario::from_toml(text).map(|scenario| scenario.relax());
-            let time = clock.elapsed().as_secs_f64();
+            let leaf = scenario::Scenario::from_toml(text)
+                .map(|scenario| scenario.relaxation().every_node().run());
+            // As Python does, whose clock runs until the result is gone.
             drop(leaf);
-            time
+            clock.elapsed().as_secs_f64()
         });
         times.fold(f64::INFINITY, f64::min)
     })

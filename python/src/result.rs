@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use leafdyn::files::{self, Document, Written};
-use leafdyn::relax::{Equilibrium, Mode};
+use leafdyn::files::{self, Document, Kind, Written};
+use leafdyn::relax::{Equilibrium, Mode, Sensitivity};
 use leafdyn::scenario::Scenario;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
@@ -39,6 +39,12 @@ fn read<'py>(
     Ok(PyBytes::new(py, &bytes))
 }
 
+/// The kind of a file, by its name: a word that `--write` knows.
+#[pyfunction]
+pub fn kind(file: &str) -> &'static str {
+    Kind::of(file).word()
+}
+
 /// The files of a result.
 #[pyclass(frozen, module = "leafdyn._leafdyn")]
 pub struct Files {
@@ -67,6 +73,9 @@ impl Files {
     }
 }
 
+/// See [`Leaf::position_changes`].
+type PositionChange<'py> = (String, Bound<'py, PyAny>, Bound<'py, PyAny>, Option<f64>);
+
 /// A leaf at rest, or as far as it came.
 #[pyclass(frozen, module = "leafdyn._leafdyn")]
 pub struct Leaf {
@@ -93,6 +102,14 @@ impl Leaf {
         Leaf {
             shown: found.clone().into(),
             ..Leaf::new(found, input, None)
+        }
+    }
+
+    /// How it ended: at stations that were asked for the tolerance may not be kept.
+    fn ended(&self, py: Python) -> &Equilibrium {
+        match self.stations {
+            Some(_) => self.shown(py),
+            None => &self.found,
         }
     }
 
@@ -129,18 +146,18 @@ impl Leaf {
     }
 
     #[getter]
-    fn outcome(&self) -> &'static str {
-        self.found.outcome.word()
+    fn outcome(&self, py: Python) -> &'static str {
+        self.ended(py).outcome.word()
     }
 
     #[getter]
-    fn success(&self) -> bool {
-        self.found.outcome.is_success()
+    fn success(&self, py: Python) -> bool {
+        self.ended(py).outcome.is_success()
     }
 
     #[getter]
-    fn remark(&self) -> Option<&str> {
-        self.found.remark.as_deref()
+    fn remark(&self, py: Python) -> Option<&str> {
+        self.ended(py).remark.as_deref()
     }
 
     #[getter]
@@ -261,5 +278,16 @@ impl Leaf {
             array(py, flat(vectors), &[modes.len(), rods, nodes, 3])
         };
         Ok([of(|mode| &mode.displacement)?, of(|mode| &mode.rotation)?])
+    }
+    /// Changes of the positions with each number that was asked for: by its key, where they are
+    /// given, the changes, and a bound on their error.
+    fn position_changes<'py>(&self, py: Python<'py>) -> PyResult<Vec<PositionChange<'py>>> {
+        let found = self.found.sensitivities.as_deref().unwrap_or_default();
+        let of = |one: &Sensitivity| {
+            let stations = array(py, one.stations.clone(), &[one.stations.len()])?;
+            let positions = curves(py, &one.positions)?;
+            Ok((one.key.clone(), stations, positions, one.positions_error))
+        };
+        found.iter().map(of).collect()
     }
 }

@@ -10,17 +10,18 @@ use crate::errors::refuse_entry;
 /// How deep lists and tables may stand in each other: none of a scenario stands deeper.
 const DEEPEST: usize = 8;
 
+/// A key and its value.
+type Entry<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
+
 /// A scenario's text: tables after what stands outside of them, an entry a line.
 pub fn document(scenario: &Bound<PyMapping>) -> PyResult<String> {
     let (mut text, mut tables) = (String::new(), String::new());
-    for entry in scenario.items()?.iter() {
-        let (key, value): (Bound<PyAny>, Bound<PyAny>) = entry.extract()?;
+    for (key, value) in entries(scenario)? {
         let key = name(&key, "")?;
         match value.cast::<PyMapping>() {
             Ok(table) => {
                 let _ = writeln!(tables, "[{}]", quoted_key(&key));
-                for entry in table.items()?.iter() {
-                    let (inner, value): (Bound<PyAny>, Bound<PyAny>) = entry.extract()?;
+                for (inner, value) in entries(table)? {
                     let inner = name(&inner, &key)?;
                     line(&mut tables, &inner, &value, &format!("{key}.{inner}"))?;
                 }
@@ -36,14 +37,25 @@ pub fn document(scenario: &Bound<PyMapping>) -> PyResult<String> {
 #[pyfunction]
 pub fn overrides(entries: &Bound<PyMapping>) -> PyResult<Vec<String>> {
     let mut texts = Vec::new();
-    for entry in entries.items()?.iter() {
-        let (key, new): (Bound<PyAny>, Bound<PyAny>) = entry.extract()?;
+    for (key, new) in self::entries(entries)? {
         let key = name(&key, "")?;
         let mut text = format!("{key}=");
         value(&mut text, &new, &key, 0)?;
         texts.push(text);
     }
     Ok(texts)
+}
+
+/// Keys and values.
+fn entries<'py>(mapping: &Bound<'py, PyMapping>) -> PyResult<Vec<Entry<'py>>> {
+    match mapping.cast::<PyDict>() {
+        Ok(dict) => Ok(dict.iter().collect()),
+        Err(_) => mapping
+            .items()?
+            .iter()
+            .map(|entry| entry.extract())
+            .collect(),
+    }
 }
 
 fn line(text: &mut String, key: &str, entry: &Bound<PyAny>, path: &str) -> PyResult<()> {

@@ -31,6 +31,10 @@ LONG: dict[str, Callable[[], Any]] = {
     "simulate": lambda: leafdyn.simulate(fan(20), set={"dynamics.duration": 1e5, "dynamics.output_interval": 1.0}),
     "map": lambda: leafdyn.map(fan(9), ["load.gravity[2]=-1..-9:40", "stiffness.torsion=0.01..1:40"]),
     "chart": lambda: leafdyn.chart(fan(21), seconds=60.0),
+    "sensitivities": lambda: leafdyn.sensitivities(fan(3000), "stiffness.axial", tolerance=1e-9, modes=0),
+    "fit": lambda: leafdyn.fit(
+        "scenarios/measured/pull.toml", ["scenarios/measured/pull.csv"] * 40, "stiffness.axial", set={"leaf.rods": 41}
+    ),
 }
 
 

@@ -169,6 +169,17 @@ def test_a_run_that_ends_otherwise_is_a_result_and_a_warning() -> None:
     assert leaf.outcome in repr(leaf)
 
 
+def test_stations_that_do_not_keep_the_tolerance_are_no_success() -> None:
+    file = "scenarios/classic/cantilever_heavy.toml"
+    with pytest.warns(leafdyn.LeafWarning, match="ask for a smaller tolerance, or for other stations"):
+        leaf = leafdyn.relax(file, tolerance=1e-9, stations=7)
+    assert leaf.outcome == leaf.to_dict()["outcome"] == "tolerance-not-reached"
+    assert not leaf.success
+    assert leaf.error_estimate is not None
+    assert leaf.error_estimate > 1e-9
+    assert leafdyn.relax(file, tolerance=1e-9).success
+
+
 def test_repr_says_what_matters() -> None:
     leaf = leafdyn.relax(fan(5))
     assert leaf.tip is not None

@@ -43,10 +43,13 @@ pub fn fields(
     let leaf = &first.leaf.leaf;
     let used = &levels[levels.len() - 1 - columns..];
     let rods = 0..first.leaf.rods();
-    let signs: Vec<_> = rods.clone().map(|j| rotations(finest, j)).collect();
-    let on = |grid: &Level| -> Vec<Vec<Node>> {
-        let extrapolated = |j| extrapolated(used, j, grid.leaf.segments(), &signs[j]);
-        rods.clone().map(extrapolated).collect()
+    let mut known_nodes: Vec<_> = (rods.clone())
+        .map(|j| RodNodes::new(used, finest, j))
+        .collect();
+    let mut on = |grid: &Level| -> Vec<Vec<Node>> {
+        let rods = known_nodes.iter_mut();
+        rods.map(|rod| rod.extrapolated(grid.leaf.segments()))
+            .collect()
     };
     let (mut reported, mut nodes, mut between) = (first, on(first), 0.0);
     let known_error = error.unwrap_or(0.0);
@@ -61,10 +64,15 @@ pub fn fields(
         }
         let stride = finer.leaf.segments() / coarse;
         let known = reported.leaf.grid.sigma();
-        let place = |&at| Place::new(known, leaf.kinks(), at);
-        let weights = |at| place(at).lagrange();
-        let weights: Vec<_> = finer.leaf.grid.sigma().iter().map(weights).collect();
-        let others: Vec<_> = known.iter().map(|at| place(at).others()).collect();
+        let place = |at: f64| Place::new(known, leaf.kinks(), at);
+        let weights = |(k, at): (usize, &f64)| match k.is_multiple_of(stride) {
+            // That node is known.
+            true => Values::new(),
+            false => place(*at).lagrange(),
+        };
+        let weights = finer.leaf.grid.sigma().iter().enumerate().map(weights);
+        let weights: Vec<_> = weights.collect();
+        let others: Vec<_> = known.iter().map(|at| place(*at).others()).collect();
         let mut added = on(finer);
         let mut error = 0.0_f64;
         for (added, nodes) in added.iter_mut().zip(&nodes) {
@@ -123,21 +131,47 @@ fn hidden(levels: &[&Level]) -> f64 {
     }
 }
 
-/// The nodal fields of rod `j` at the ends of `n` parts, from those grids that have
-/// them.
-fn extrapolated(levels: &[&Level], j: usize, n: usize, signs: &[DQuat]) -> Vec<Node> {
-    let mut table = Richardson::default();
-    let has = |level: &&&Level| level.leaf.segments().is_multiple_of(n);
-    let mut count = 0;
-    for level in levels.iter().filter(has) {
-        let stride = level.leaf.segments() / n;
-        let node = |i: usize| shape::node(&level.leaf, &level.state, j, i * stride);
-        let sign = |i: usize| signs[i * ((signs.len() - 1) / n)];
-        let values = (0..=n).flat_map(|i| pack(&node(i), sign(i)));
-        table.push(level.leaf.segments(), values.collect());
-        count += 1;
+/// The nodes of a rod on several grids, each computed when it is first asked for: those
+/// that grids have in common are asked for again and again.
+struct RodNodes<'l> {
+    rod: usize,
+    /// Rotations on the finest grid, of a continuous sign.
+    signs: Vec<DQuat>,
+    levels: Vec<(&'l Level, Vec<Option<Node>>)>,
+}
+
+impl<'l> RodNodes<'l> {
+    fn new(levels: &[&'l Level], finest: &Level, rod: usize) -> Self {
+        let none = |level: &&'l Level| (*level, vec![None; level.leaf.segments() + 1]);
+        RodNodes {
+            rod,
+            signs: rotations(finest, rod),
+            levels: levels.iter().map(none).collect(),
+        }
     }
-    table.column(count - 1).as_chunks().0.to_vec()
+
+    /// The fields at the ends of `n` parts, from those grids that have them.
+    fn extrapolated(&mut self, n: usize) -> Vec<Node> {
+        let (rod, signs) = (self.rod, &self.signs);
+        let mut table = Richardson::default();
+        let mut count = 0;
+        for (level, known) in &mut self.levels {
+            let segments = level.leaf.segments();
+            if !segments.is_multiple_of(n) {
+                continue;
+            }
+            let stride = segments / n;
+            let values = (0..=n).flat_map(|i| {
+                *known[i * stride].get_or_insert_with(|| {
+                    let node = shape::node(&level.leaf, &level.state, rod, i * stride);
+                    pack(&node, signs[i * ((signs.len() - 1) / n)])
+                })
+            });
+            table.push(segments, values.collect());
+            count += 1;
+        }
+        table.column(count - 1).as_chunks().0.to_vec()
+    }
 }
 
 /// Puts `known` at every `stride`th node of a finer grid, and between these the

@@ -29,7 +29,7 @@ pub use crate::motion::Stopped;
 pub use error::{MOST_SECONDS, Refused};
 pub use frame::Frame;
 pub use record::{Moment, Record, Still};
-pub use stills::stills;
+pub use stills::{film, stills};
 
 use std::time::{Duration, Instant};
 

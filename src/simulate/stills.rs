@@ -48,6 +48,22 @@ fn nearest(numbers: &[f64], wanted: f64) -> usize {
     }
 }
 
+/// Shapes of a film, and nodes of all of them, at most.
+const FILM: usize = 401;
+const FILM_NODES: usize = 4_000_000;
+
+/// Which of so many outputs, each of so many nodes, a film shows: evenly many, the last
+/// among them.
+pub fn film(outputs: usize, nodes: usize) -> Vec<usize> {
+    let most = FILM.min(FILM_NODES / nodes.max(1)).max(2);
+    let stride = outputs.div_ceil(most - 1).max(1);
+    let last = outputs.checked_sub(1);
+    let evenly = (0..outputs).step_by(stride);
+    let mut chosen: Vec<usize> = evenly.filter(|output| Some(*output) != last).collect();
+    chosen.extend(last);
+    chosen
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -62,6 +78,16 @@ mod tests {
             tip: DVec3::X * tip(i as f64),
         };
         (0..count).map(moment).collect()
+    }
+
+    #[test]
+    fn a_film_is_even_and_ends_with_the_last_output() {
+        assert_eq!(film(0, 10), []);
+        assert_eq!(film(1, 10), [0]);
+        assert_eq!(film(400, 10).len(), 400);
+        let long = film(10_002, 10);
+        assert!(long.len() <= 401 && *long.last().unwrap() == 10_001);
+        assert_eq!(film(50, 4_000_000), [0, 49]);
     }
 
     #[test]

@@ -12,27 +12,35 @@ in. Every verb of the program ``leafdyn`` is a function here; it returns what th
 """
 
 from ._errors import LeafWarning, ScenarioError
+from ._fit import Candidate, Fit, Parameter, fit
 from ._leaf import Equilibrium
 from ._leafdyn import __version__, set_threads, threads
 from ._motion import Frame, Motion
-from ._relax import modes, relax, relax_many
+from ._relax import modes, relax, relax_many, sensitivities
 from ._result import Result, Table
 from ._scenario import Scenario, Source
+from ._sensitivity import Sensitivity
 from ._study import Branch, Chart, Check, Map, Shapes, Trace
 from ._verbs import all_shapes, chart, check, frames, map, simulate, trace
+from ._view import Page
 
 __all__ = [
     "Branch",
+    "Candidate",
     "Chart",
     "Check",
     "Equilibrium",
+    "Fit",
     "Frame",
     "LeafWarning",
     "Map",
     "Motion",
+    "Page",
+    "Parameter",
     "Result",
     "Scenario",
     "ScenarioError",
+    "Sensitivity",
     "Shapes",
     "Source",
     "Table",
@@ -41,11 +49,13 @@ __all__ = [
     "all_shapes",
     "chart",
     "check",
+    "fit",
     "frames",
     "map",
     "modes",
     "relax",
     "relax_many",
+    "sensitivities",
     "set_threads",
     "simulate",
     "threads",

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _leafdyn
-from ._result import Kept, Result, keep
+from ._result import Kept, keep
+from ._sensitivity import Sensitivity
+from ._view import Viewed
 
 if TYPE_CHECKING:
     from ._scenario import Scenario
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class Equilibrium(Result):
+class Equilibrium(Viewed):
     """A leaf at rest, or as far as it came, with N rods at K + 1 stations, in the units of its scenario.
 
     Arrays are made when they are first asked for, of float64, and equal the numbers of the files to the last bit.
@@ -197,6 +199,17 @@ class Equilibrium(Result):
         """Rotation vectors of these nodes along the lab axes, radians, shape (modes, N, M + 1, 3)."""
         return self._mode_shapes[1]
 
+    @cached_property
+    def sensitivities(self) -> dict[str, Sensitivity]:
+        """How its results change with the numbers that were asked for, by their keys: see `leafdyn.sensitivities`.
+
+        There are none of a leaf that is not at rest, and of a number in which the leaf is not smooth."""
+        if self._request is None or not self._request[1]["sensitivity"]:
+            return {}
+        places = {found[0]: found[1:] for found in self._core.position_changes()}
+        entries = self.to_dict()["sensitivities"]
+        return {entry["key"]: Sensitivity(entry, *places[entry["key"]]) for entry in entries}
+
     def plot(self, ax: Any = None, **style: Any) -> Any:
         """Draw the veins with matplotlib: in space, or from the side in axes without a third axis.
 
@@ -308,4 +321,5 @@ _LATER = (
     "_reaction",
     "_modes",
     "_mode_shapes",
+    "sensitivities",
 )

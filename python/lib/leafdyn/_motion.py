@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-import shutil
-import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from . import _leafdyn
 from ._leaf import Array
-from ._result import Result, chosen, kind
+from ._result import chosen
+from ._view import Viewed
 
 ENERGIES = ("kinetic", "elastic", "coupling", "potential", "dissipated", "work")
 
@@ -33,10 +32,11 @@ class Frame(NamedTuple):
     """Energies: kinetic, elastic, of the coupling, potential of the loads; dissipated and put in until then."""
 
 
-class Motion(Result):
+class Motion(Viewed):
     """A leaf followed in time: T outputs of N rods with M + 1 nodes, in the units of its scenario.
 
-    What has been pickled has its arrays, summary and pictures, but no longer writes ``motion.csv`` and ``energy.csv``.
+    What has been pickled has its arrays, summary and pictures, but no longer writes ``motion.csv``,
+    ``energy.csv`` and what shows it as a film.
     """
 
     outcome: str
@@ -79,16 +79,12 @@ class Motion(Result):
     def save(self, folder: str | os.PathLike[str], write: str | Iterable[str] | None = None) -> list[Path]:
         """As `Result.save`; among the files are ``motion.csv`` (or ``.npy``) and ``energy.csv``."""
         kinds = chosen(write, self._files.names())
-        if self._core is None or not kinds & {"csv"}:
+        if self._core is None:
             return super().save(folder, write)
-        place = Path(folder)
-        if write is None:
-            return self._core.save(place)
-        place.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=place) as drafts:
-            # An array is what a long table is written as.
-            files = [file for file in self._core.save(Path(drafts)) if kind(file.name) in kinds | {"npy"}]
-            return [Path(shutil.move(file, place / file.name)) for file in files]
+        return self._core.save(Path(folder), sorted(kinds))
+
+    def _page(self) -> str:
+        return super()._page() if self._core is None else self._core.page()
 
     def plot(self, ax: Any = None, **style: Any) -> Any:
         """Draw the height of the tip in time with matplotlib."""

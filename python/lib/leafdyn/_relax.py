@@ -23,8 +23,9 @@ def _asked(
     modes: int = 0,
     mode_shapes: bool = False,
     stations: int | None = None,
+    sensitivity: Iterable[str] = (),
 ) -> dict[str, Any]:
-    return locals()
+    return {**locals(), "sensitivity": list(sensitivity)}
 
 
 def warn(name: str, remark: str | None) -> None:
@@ -178,6 +179,57 @@ def modes(
     ((2,), True)
     """
     asked = _asked("semi-implicit", tolerance, segments, None, keep_unstable, full_model, count, True, stations)
+    leaf = checked(scenario, set)
+    with reporter(progress) as heard:
+        found = Equilibrium(_leafdyn.relax(leaf._core, asked, heard), (leaf, asked))
+    warn(found.name, found.remark)
+    return found
+
+
+def sensitivities(
+    scenario: Source,
+    keys: str | Iterable[str],
+    *,
+    set: Mapping[str, Any] | None = None,
+    tolerance: float | None = None,
+    method: str = "semi-implicit",
+    segments: int | None = None,
+    keep_unstable: bool = False,
+    full_model: bool = False,
+    modes: int = 3,
+    stations: int | None = None,
+    progress: Progress = None,
+) -> Equilibrium:
+    """Find how a leaf comes to rest, and how that changes with numbers of its scenario: derivatives, with errors.
+
+    Parameters
+    ----------
+    keys
+        One or more numbers: ``"stiffness.axial"``, ``"load.gravity[2]"``, ``"stiffness.bending_2[5]"``, or
+        ``"scale:stiffness.bending_2"``, all numbers of that key times a factor.
+    modes
+        How many frequencies to differentiate; none, and no lowest eigenvalue either, is faster.
+
+    The others are those of `relax`.
+
+    Returns
+    -------
+    Equilibrium
+        With ``sensitivities``: a `Sensitivity` for each key.
+
+    Examples
+    --------
+    >>> import leafdyn
+    >>> keys = ["stiffness.bending_2", "load.gravity[2]"]
+    >>> leaf = leafdyn.sensitivities("scenarios/paper/fig04.toml", keys, set={"leaf.rods": 5})
+    >>> by_weight = leaf.sensitivities["load.gravity[2]"]
+    >>> by_weight.value, by_weight.tip.round(4)
+    (-1.0, array([0.0222, 0.0047, 0.1413]))
+    >>> by_weight.tip_error < 1e-5
+    True
+    """
+    words = [keys] if isinstance(keys, str) else list(keys)
+    asked = _asked(method, tolerance, segments, None, keep_unstable, full_model, modes, False, stations, words)
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
         found = Equilibrium(_leafdyn.relax(leaf._core, asked, heard), (leaf, asked))

@@ -13,6 +13,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _leafdyn
+
 KINDS = ("json", "csv", "svg", "png")
 
 
@@ -43,8 +45,8 @@ def keep(files: Contents) -> Kept:
 
 
 def kind(name: str) -> str:
-    """That of a file."""
-    return Path(name).suffix[1:]
+    """That of a file, a word that `Result.save` knows."""
+    return _leafdyn.kind(name)
 
 
 class Result:

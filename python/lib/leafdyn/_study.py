@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ._leaf import Array, Equilibrium
 from ._result import Contents, Result, Table
+from ._view import Viewed
 
 
 class Check(Result):
@@ -51,7 +52,7 @@ class Check(Result):
         return f"<Check {self.leaf.name}: {self.verdict}{apart}>"
 
 
-class Shapes(Result, Sequence[Equilibrium]):
+class Shapes(Viewed, Sequence[Equilibrium]):
     """The equilibria of a leaf that were found, lowest energy first: a sequence of `Equilibrium`."""
 
     starts: NDArray[np.int64]
@@ -138,7 +139,7 @@ class Branch:
         return f"<Branch: {len(self.values)} points, {len(self.critical)} critical, {self.end}>"
 
 
-class Trace(Table):
+class Trace(Table, Viewed):
     """An equilibrium followed through a number of its scenario."""
 
     complete: bool

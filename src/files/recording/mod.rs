@@ -25,7 +25,7 @@ use crate::report::table::header;
 use crate::report::{Document, FileError, Kind};
 use crate::scenario;
 use crate::shape::equally_spaced;
-use crate::simulate::{Frame, Moment, Record, Simulation, Still, Stopped, stills};
+use crate::simulate::{Frame, Moment, Record, Simulation, Still, Stopped, film, stills};
 use checkpoint::{Checkpoint, Identity, damaged};
 use checkpointer::Latest;
 use growing::{GrowingFile, kept_path};
@@ -33,10 +33,6 @@ use motion::{Form, Size};
 
 /// Shapes that a film strip shows.
 const STILLS: usize = 8;
-
-/// Shapes of a film, and nodes of all of them, at most.
-const FILM: usize = 401;
-const FILM_NODES: usize = 4_000_000;
 
 /// The files of a simulation that is under way.
 ///
@@ -249,7 +245,7 @@ impl Recording {
         Ok(record)
     }
 
-    /// Evenly many of so many outputs, if a film is wanted; the last is among them.
+    /// The shapes of a film of so many outputs, if one is wanted.
     fn film(&self, outputs: usize) -> Result<Vec<Still>, FileError> {
         let wanted = |kind: &Kind| Kind::FILMS.contains(kind);
         let (Some([motion, _]), true) = (&self.growing, self.selection.kinds.iter().any(wanted))
@@ -257,12 +253,7 @@ impl Recording {
             return Ok(Vec::new());
         };
         let (form, size) = (self.form, self.size);
-        let most = FILM.min(FILM_NODES / size.rows()).max(2);
-        let stride = outputs.div_ceil(most - 1).max(1);
-        let mut chosen: Vec<usize> = (0..outputs).step_by(stride).collect();
-        if chosen.last() != Some(&(outputs - 1)) {
-            chosen.push(outputs - 1);
-        }
+        let chosen = film(outputs, size.rows());
         let shapes = motion.read(|file| form.positions(size, &chosen, file))?;
         let still = |(moment, shape): (usize, &[DVec3])| Still {
             moment,

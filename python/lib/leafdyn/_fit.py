@@ -1,0 +1,223 @@
+"""From measurements to the numbers of a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from . import _leafdyn
+from ._leaf import Array
+from ._measured import Measured, measurements
+from ._progress import Progress, reporter
+from ._relax import warn
+from ._result import Contents, Table
+from ._scenario import Scenario, Source, checked
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A free number as a fit found it."""
+
+    key: str
+    """Its key."""
+    value: float
+    """Its value at the minimum; of one that is not determined, one of many."""
+    low: float | None
+    """Lower end of its 95 % interval; none where the data give no end."""
+    high: float | None
+    """Upper end."""
+    determined: bool
+    """Whether the data determine it."""
+    profiled: bool
+    """Whether the interval is that of the profile likelihood, because the curvature is not to be trusted."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An experiment that could be made, and what it would say."""
+
+    experiment: str
+    """Its name."""
+    bits: float
+    """By how many halvings it shrinks what is open between the numbers."""
+    shrinks: float
+    """The least known combination with it, as a part of what it is without."""
+    remark: str | None = None
+    """Why it cannot be judged."""
+
+
+class Fit(Table):
+    """What measurements say of P numbers of a scenario, and what they do not.
+
+    Its table, `columns`, has a row for each of the D data, as ``fit.csv``: ``experiment``, ``what``, ``rod``,
+    ``sigma``, ``data``, ``model``, ``band``, ``sd`` and ``residual``.
+    """
+
+    name: str
+    """The name of the scenario."""
+    outcome: str
+    """``"converged"``, ``"undetermined"`` or ``"not-converged"``."""
+    success: bool
+    """Whether it ended at a minimum, and the data determine every number."""
+    remarks: list[str]
+    """Why it did not converge, and what else is to be known."""
+    parameters: dict[str, Parameter]
+    """The free numbers by their keys: values and 95 % intervals."""
+    correlations: Array
+    """Correlations of the numbers (of their logarithms where they are positive), shape (P, P), in the order of
+    `parameters`; not a number where one is not determined."""
+    undetermined: list[dict[str, float]]
+    """Combinations of which the data say nothing, or little: by their keys, exponents of positive numbers and
+    coefficients of others."""
+    says: list[str]
+    """What the data say, in words: the undetermined combinations, too."""
+    chi_squared: float
+    """The sum of the squares of residuals in standard deviations."""
+    degrees_of_freedom: int
+    """The number of data less that of the determined combinations."""
+    standard_deviation: float | None
+    """That of the data as the residuals tell it, where none was given."""
+    candidates: list[Candidate]
+    """Experiments that could be made, the one that says most first."""
+    wall_seconds: float
+    """The time of it all."""
+
+    def __init__(self, files: Contents) -> None:
+        super().__init__(files)
+        said = self.to_dict()
+        self.name = said["scenario"]
+        self.outcome = said["outcome"]
+        self.success = self.outcome == "converged"
+        self.parameters = {entry["key"]: Parameter(**entry) for entry in said["parameters"]}
+        count = len(self.parameters)
+        self.correlations = np.array(said["correlations"], dtype=np.float64).reshape(count, count)
+        for name in ("remarks", "undetermined", "says", "chi_squared", "degrees_of_freedom", "wall_seconds"):
+            setattr(self, name, said[name])
+        self.standard_deviation = said.get("standard_deviation")
+        self.candidates = [Candidate(**entry) for entry in said.get("candidates", [])]
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The values of the free numbers by their keys."""
+        return {key: parameter.value for key, parameter in self.parameters.items()}
+
+    @property
+    def residuals(self) -> Array:
+        """Data less model, in standard deviations, shape (D,)."""
+        return self.columns["residual"]
+
+    @cached_property
+    def scenario(self) -> Scenario:
+        """The scenario with the values in place, as ``fitted.toml``."""
+        return Scenario(self._files.contents("fitted.toml").decode())
+
+    def __repr__(self) -> str:
+        known = [
+            f"{one.key} = {one.value:.4g} ({one.low:.4g} to {one.high:.4g})"
+            for one in self.parameters.values()
+            if one.determined and one.low is not None and one.high is not None
+        ]
+        open_ = sum(not one.determined for one in self.parameters.values())
+        words = [self.outcome, *known[:TOLD]]
+        if len(known) > TOLD:
+            words.append(f"{len(known) - TOLD} more")
+        if open_:
+            words.append(f"{open_} not determined")
+        return f"<Fit {self.name}: {', '.join(words)}>"
+
+
+TOLD = 4
+"""Numbers that a fit shows."""
+
+
+def fit(
+    scenario: Source,
+    data: Measured | Iterable[Measured],
+    free: str | Iterable[str] | Mapping[str, tuple[float, float] | None],
+    *,
+    set: Mapping[str, Any] | None = None,
+    robust: bool = False,
+    candidates: Measured | None = None,
+    tolerance: float | None = None,
+    progress: Progress = None,
+) -> Fit:
+    """Fit numbers of a scenario to measurements, and say what these determine and what they do not.
+
+    Parameters
+    ----------
+    scenario
+        Its numbers are where the fit starts.
+    data
+        Tables of measurements, one or a list: each the path of a CSV file, a dict of columns, or a
+        ``pandas.DataFrame``. Either experiments, a row each: columns are keys of the scenario
+        (``"load.tip_force[0]"``), results (``"tip_x"``, ``"reaction_z"``, ``"frequency_1"``), and ``"sd_"`` before a
+        result, its standard deviation. Or points on veins: ``"rod"``, counted from 1, ``"x"``, ``"y"``, ``"z"``, and
+        if they are known ``"sigma"``, ``"sd"`` and ``"experiment"``. One number is a column of it; none, and what is
+        not a number, is what was not measured.
+    free
+        Keys of the numbers that are free; of a list or a profile every entry. With bounds: ``"KEY=LOW..HIGH"``, or a
+        dict of a pair of them, or none, for each key.
+    robust
+        Whether data far off the others count less.
+    candidates
+        Experiments that could be made, as a table like the data: which would say most?
+
+    The others are those of `relax`.
+
+    Returns
+    -------
+    Fit
+        Whatever came out; its ``outcome`` says whether the data determine every number.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario is refused.
+    ValueError
+        If the data or the free numbers cannot be used: it says what to change. The first row of columns is line 2.
+
+    Warns
+    -----
+    LeafWarning
+        If it is not at a minimum, or something else is to be known.
+
+    Examples
+    --------
+    >>> import leafdyn
+    >>> pull = {
+    ...     "load.tip_force[0]": [4, 8, 12, 16, 20],
+    ...     "tip_x": [0.9707, 0.9898, 1.0090, 1.0239, 1.0399],
+    ...     "sd_tip_x": 0.0005,
+    ... }
+    >>> known = {"stiffness.shear_2": 40, "stiffness.shear_3": 50}
+    >>> found = leafdyn.fit(
+    ...     "scenarios/measured/pull.toml", pull, ["stiffness.axial", "stiffness.bending_2"], set=known
+    ... )
+    >>> found.outcome
+    'converged'
+    >>> axial = found.parameters["stiffness.axial"]
+    >>> print(f"{axial.value:.1f}, with 95 % from {axial.low:.1f} to {axial.high:.1f}")
+    58.1, with 95 % from 57.3 to 58.9
+    >>> leafdyn.relax(found.scenario).stable
+    True
+    """
+    leaf = checked(scenario, set)
+    keys = [free] if isinstance(free, str) else [_free(key, free) for key in free]
+    tables = measurements(data, "data")
+    others = None if candidates is None else measurements(candidates, "candidates")[0]
+    with reporter(progress) as heard:
+        found = Fit(_leafdyn.fit(leaf._core, tables, keys, robust, others, tolerance, heard))
+    warn(found.name, next(iter(found.remarks), None))
+    return found
+
+
+def _free(key: str, free: Iterable[str] | Mapping[str, tuple[float, float] | None]) -> str:
+    bounds = free[key] if isinstance(free, Mapping) else None
+    if bounds is None:
+        return key
+    low, high = bounds
+    return f"{key}={float(low)!r}..{float(high)!r}"

@@ -1,0 +1,78 @@
+"""Tables of measurements: files, or columns by their names."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from numbers import Integral, Real
+from typing import Any, Protocol, TypeAlias, Union
+
+import numpy as np
+
+
+class Columns(Protocol):
+    """What has columns by their names, as a ``pandas.DataFrame``."""
+
+    def items(self) -> Iterable[tuple[Any, Any]]: ...
+
+
+Measured: TypeAlias = Union[str, "os.PathLike[str]", Mapping[str, Any], Columns]
+"""What a table of measurements can be given as."""
+
+
+def measurements(data: Measured | Iterable[Measured], name: str) -> list[tuple[str, str] | str]:
+    """Tables as the program reads them: paths, and texts with what messages call them."""
+    one: Any = data
+    if isinstance(one, (str, os.PathLike)) or hasattr(one, "items"):
+        return [_table(one, name)]
+    return [_table(table, f"{name}[{number}]") for number, table in enumerate(one)]
+
+
+def _table(table: Any, name: str) -> tuple[str, str] | str:
+    if isinstance(table, (str, os.PathLike)):
+        return os.fspath(table)
+    if not hasattr(table, "items"):
+        found = type(table).__name__
+        raise TypeError(f"{name}: allowed are a path, a dict of columns and a pandas.DataFrame, not {found}")
+    return name, _text(table, name)
+
+
+def _text(table: Columns, name: str) -> str:
+    """It as CSV."""
+    columns = {str(key): _column(column, f"{name}: {key}") for key, column in table.items()}
+    rows = max((len(column) for column in columns.values() if len(column) != 1), default=1)
+    for key, column in columns.items():
+        if len(column) not in (1, rows):
+            raise ValueError(f"{name}: {key} has {len(column)} rows, and others have {rows}: give all columns as many")
+    filled = [column * rows if len(column) == 1 else column for column in columns.values()]
+    lines = [list(columns), *map(list, zip(*filled))]
+    return "".join(",".join(line) + "\n" for line in lines)
+
+
+def _column(column: Any, place: str) -> list[str]:
+    """Its cells; of one number, that one."""
+    try:
+        values = np.asarray(column, dtype=object)
+    except ValueError:
+        values = np.empty((0, 0))
+    if values.ndim > 1:
+        raise ValueError(f"{place}: a column is a list of numbers, and not of lists")
+    return [_cell(value, place) for value in np.atleast_1d(values)]
+
+
+def _cell(value: Any, place: str) -> str:
+    """What was not measured is empty."""
+    if isinstance(value, str):
+        if set(value) & set(',"\n\r'):
+            raise ValueError(f"{place} = {value!r}: a name has no commas, quotes and line breaks")
+        return value
+    if value is None or type(value).__name__ in ("NAType", "NaTType"):
+        return ""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
+        raise ValueError(f"{place} = {value!r}: must be a number, or none where nothing was measured")
+    number = float(value)
+    if np.isnan(number):
+        return ""
+    # A name of an experiment that is a number may have become one with a fraction.
+    whole = isinstance(value, Integral) or (place.endswith(": experiment") and number.is_integer())
+    return str(int(number)) if whole else repr(number)

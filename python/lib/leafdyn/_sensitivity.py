@@ -1,0 +1,83 @@
+"""How a leaf at rest changes with a number of its scenario."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Sensitivity:
+    """Changes of the results of a leaf with N rods at rest: by one unit of the number, in the units of the scenario.
+
+    Numbers are those of ``summary.json``. What is not known is none, or not a number in an array. See
+    `leafdyn.sensitivities`.
+    """
+
+    key: str
+    """The key of the number."""
+    value: float
+    """Its value."""
+    tips: Array
+    """Change of the joint tip alone, shape (1, 3), or of every tip, shape (N, 3)."""
+    tip_error: float | None
+    """Bound on its error; none on a single grid, as of the others."""
+    energy: float | None
+    """Change of the energy."""
+    energy_error: float | None
+    """Bound on its error."""
+    lowest_eigenvalue: float | None
+    """Change of the lowest eigenvalue: of the squared angular frequency."""
+    lowest_eigenvalue_error: float | None
+    """Bound on its error."""
+    frequencies: Array
+    """Changes of the frequencies, cycles per time, shape (modes,)."""
+    tip_reaction: Array | None
+    """Change of the force that the holder of the tip feels, shape (3,); none if the tip is free."""
+    tip_reaction_moments: Array | None
+    """Change of the moments that the holder of a clamped tip feels, shape (N, 3); none of another."""
+    tip_reaction_error: float | None
+    """Bound on the error of the force."""
+    stations: Array
+    """Fractions of the length at which `positions` are, shape (K + 1,): nodes that all grids have."""
+    positions: Array
+    """Changes of the centerlines, shape (N, K + 1, 3); with more than 100 numbers there may be none, shape (0, 0, 3)."""
+    positions_error: float | None
+    """Bound on their error."""
+
+    def __init__(self, entry: dict[str, Any], stations: Array, positions: Array, positions_error: float | None) -> None:
+        self.__dict__.update({name: entry.get(name) for name in _NUMBERS})
+        self.tips = np.array(entry.get("tips") or [entry["tip"]], dtype=np.float64)
+        self.frequencies = np.array(entry.get("frequencies", []), dtype=np.float64)
+        self.tip_reaction = _vectors(entry.get("tip_reaction"))
+        self.tip_reaction_moments = _vectors(entry.get("tip_reaction_moments"))
+        self.stations, self.positions, self.positions_error = stations, positions, positions_error
+
+    @property
+    def tip(self) -> Array | None:
+        """Change of the joint tip, or of the only rod's, shape (3,); none if there are several."""
+        return self.tips[0] if len(self.tips) == 1 else None
+
+    def __repr__(self) -> str:
+        tip = "" if self.tip is None else f", tip ({', '.join(f'{x:.5g}' for x in self.tip)})"
+        within = "" if self.tip_error is None else f" within {self.tip_error:.1e}"
+        return f"<Sensitivity by {self.key} = {self.value:.6g}{tip}{within}>"
+
+
+_NUMBERS = (
+    "key",
+    "value",
+    "tip_error",
+    "energy",
+    "energy_error",
+    "lowest_eigenvalue",
+    "lowest_eigenvalue_error",
+    "tip_reaction_error",
+)
+
+
+def _vectors(numbers: list[Any] | None) -> Array | None:
+    return None if numbers is None else np.array(numbers, dtype=np.float64)

@@ -1,0 +1,93 @@
+//! From measurements to the numbers of a scenario.
+
+use std::path::PathBuf;
+
+use leafdyn::scenario;
+use leafdyn::study::{self, Data, Experiment, FitError, FitRequest, Free};
+use pyo3::prelude::*;
+
+use crate::errors::{cannot, cannot_vary};
+use crate::result::Files;
+use crate::run::run;
+use crate::scenario::Scenario;
+
+/// A table of measurements.
+#[derive(FromPyObject)]
+pub enum Measurements {
+    /// Its text, after what messages call it.
+    Text(String, String),
+    /// A file.
+    File(PathBuf),
+}
+
+impl Measurements {
+    /// Its name and its text.
+    fn read(self) -> PyResult<(String, String)> {
+        match self {
+            Measurements::Text(name, text) => Ok((name, text)),
+            Measurements::File(path) => {
+                let text = scenario::text(&path).map_err(cannot)?;
+                Ok((path.display().to_string(), text))
+            }
+        }
+    }
+}
+
+/// A fit that cannot be.
+fn refused(py: Python, error: FitError) -> PyErr {
+    match error {
+        FitError::Vary(error) => cannot_vary(py, error),
+        error => cannot(error),
+    }
+}
+
+/// Fits free numbers of a scenario to measurements.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "they are those of the verb")]
+pub fn fit(
+    py: Python,
+    scenario: &Scenario,
+    data: Vec<Measurements>,
+    free: Vec<String>,
+    robust: bool,
+    candidates: Option<Measurements>,
+    tolerance: Option<f64>,
+    progress: Option<&Bound<PyAny>>,
+) -> PyResult<Files> {
+    let rods = scenario.checked.rods.len();
+    let mut measured = Data::default();
+    for table in data {
+        let (name, text) = table.read()?;
+        measured
+            .read(&text, &name, rods)
+            .map_err(|error| refused(py, error))?;
+    }
+    let free: Result<Vec<Free>, FitError> = free.iter().map(|number| number.parse()).collect();
+    let candidates: Option<Vec<Experiment>> = match candidates {
+        None => None,
+        Some(table) => {
+            let (name, text) = table.read()?;
+            let candidates = FitRequest::read_candidates(&text, &name);
+            Some(candidates.map_err(|error| refused(py, error))?)
+        }
+    };
+    let mut request = FitRequest {
+        base: scenario.base(py)?,
+        data: measured,
+        free: free.map_err(|error| refused(py, error))?,
+        robust,
+        candidates: candidates.unwrap_or_default(),
+        tolerance,
+        limit: Default::default(),
+    };
+    let found = run(py, progress, move |monitor| {
+        request.limit = monitor.limit();
+        study::fit(&request, &mut |step, sum| {
+            monitor.say_or_end(step as f64, None, || {
+                format!("step {step}, sum of squares {sum:.6e}")
+            });
+        })
+    })?;
+    let fit = found.map_err(|error| refused(py, error))?;
+    Ok(Files::of(fit, scenario.checked.clone()))
+}

@@ -1,0 +1,137 @@
+"""A fit is that of the program, whatever the data come as."""
+
+import json
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from leaves import program
+
+import leafdyn
+from leafdyn._result import columns
+
+MEASURED = Path(__file__).parents[2] / "scenarios" / "measured"
+PULL = MEASURED / "pull.toml"
+AXIAL = "stiffness.axial"
+# As the made-up data were made.
+KNOWN = {"torsion": 0.8, "bending_2": 1.4, "bending_3": 0.7, "shear_2": 40, "shear_3": 50}
+REST = {f"stiffness.{key}": value for key, value in KNOWN.items()}
+TIMES = {"wall_seconds", "source"}
+
+
+def measured(name: str) -> dict[str, Any]:
+    lines = (MEASURED / name).read_text().splitlines()
+    return dict(columns("\n".join(line for line in lines if not line.startswith("#")).encode()))
+
+
+def numbers(fit: leafdyn.Fit) -> dict[str, Any]:
+    return {key: value for key, value in fit.to_dict().items() if key not in TIMES}
+
+
+def test_by_both_roads(tmp_path: Path) -> None:
+    free = ["stiffness.bending_2", "stiffness.bending_3", AXIAL]
+    files = [MEASURED / "pull.csv", MEASURED / "photograph.csv"]
+    asked = [part for number in free for part in ("--free", number)]
+    asked += [part for file in files for part in ("--data", str(file))]
+    known = {key: REST[key] for key in ("stiffness.torsion", "stiffness.shear_2", "stiffness.shear_3")}
+    asked += [part for key, value in known.items() for part in ("--set", f"{key}={value}")]
+    told = program("fit", PULL, *asked, "--candidates", MEASURED / "candidates.csv", "--out", tmp_path / "program")
+    assert told.returncode == 0, told.stderr
+    wanted = json.loads((tmp_path / "program" / "fit.json").read_text())
+    found = leafdyn.fit(PULL, files, free, set=known, candidates=MEASURED / "candidates.csv")
+    assert numbers(found) == {key: value for key, value in wanted.items() if key not in TIMES}
+    assert found.success
+    assert list(found.parameters) == free
+    for entry in wanted["parameters"]:
+        one = found.parameters[entry["key"]]
+        assert (one.value, one.low, one.high) == (entry["value"], entry["low"], entry["high"])
+        assert found.values[entry["key"]] == entry["value"]
+    assert found.correlations.tolist() == wanted["correlations"]
+    assert found.residuals.tolist() == [row["residual"] for row in wanted["residuals"]]
+    assert [candidate.experiment for candidate in found.candidates] == [row["experiment"] for row in wanted["candidates"]]
+    written = found.save(tmp_path / "package")
+    assert {path.name for path in written} == {"fit.json", "fitted.toml", "fit.csv", "fit.svg", "fit.png"}
+    for path in written:
+        if path.suffix != ".json":
+            assert path.read_bytes() == (tmp_path / "program" / path.name).read_bytes(), path.name
+    assert found.scenario.text == (tmp_path / "program" / "fitted.toml").read_text()
+    again = pickle.loads(pickle.dumps(found))
+    assert repr(again) == repr(found)
+    assert again.scenario == found.scenario
+    assert again.figure() == found.figure()
+    assert again.parameters == found.parameters
+    assert repr(found).startswith("<Fit pull: converged, stiffness.bending_2 = ")
+
+
+def test_columns_are_as_good_as_files() -> None:
+    pandas = pytest.importorskip("pandas")
+    wanted = numbers(leafdyn.fit(PULL, MEASURED / "pull.csv", AXIAL, set=REST))
+    table = measured("pull.csv")
+    frame = pandas.read_csv(MEASURED / "pull.csv", comment="#")
+    lists = {key: column.tolist() for key, column in table.items()}
+    for data in (table, lists, frame, [frame], {**table, "sd_tip_x": 0.0005}):
+        assert numbers(leafdyn.fit(str(PULL), data, [AXIAL], set=REST)) == wanted
+
+
+def test_what_was_not_measured_is_empty() -> None:
+    pandas = pytest.importorskip("pandas")
+    table = measured("photograph.csv")
+    bending = "stiffness.bending_2"
+    known = {**REST, bending: 1.2}
+    wanted = numbers(leafdyn.fit(PULL, MEASURED / "photograph.csv", bending, set=known))
+    for nothing in (np.nan, None, pandas.NA):
+        height = [nothing] * len(table["rod"])
+        assert numbers(leafdyn.fit(PULL, {**table, "y": height}, bending, set=known)) == wanted
+    named = {"experiment": [1, 2, None], "load.tip_force[0]": [2, 8, 14], "tip_x": [0.9602, 0.9898, 1.0173]}
+    found = leafdyn.fit(PULL, pandas.DataFrame(named), AXIAL, set=REST)
+    assert list(found.columns["experiment"]) == [1, 2, 3]
+    assert found.standard_deviation is not None
+
+
+@pytest.mark.filterwarnings("ignore::leafdyn.LeafWarning")
+def test_what_the_data_do_not_say() -> None:
+    free = {AXIAL: (10, 1000), "stiffness.torsion": None, "stiffness.shear_3": None}
+    found = leafdyn.fit(PULL, MEASURED / "pull.csv", free)
+    assert found.outcome == "undetermined"
+    assert not found.success
+    assert found.undetermined
+    assert {key for open_ in found.undetermined for key in open_} <= set(free)
+    assert len(found.says) >= len(found.undetermined)
+    assert "not determined" in repr(found)
+    assert np.isnan(found.correlations).any()
+
+
+@pytest.mark.parametrize(
+    "data, free, part",
+    [
+        ({"tip_x": [1.0, np.inf]}, AXIAL, "data:3: tip_x = inf: must be a finite number"),
+        ({"tip_w": [1.0]}, AXIAL, "unknown column tip_w"),
+        ([{"tip_x": [1.0]}, {"rod": [9], "x": 1.0, "y": 1.0}], AXIAL, "data\\[1\\]:2: rod: must be a whole number from 1 to 5"),
+        ({"tip_x": [1.0, 2.0], "tip_y": [1.0, 2.0, 3.0]}, AXIAL, "tip_x has 2 rows, and others have 3"),
+        ({"tip_x": [[1.0, 2.0]]}, AXIAL, "data: tip_x: a column is a list of numbers"),
+        ({"tip_x": [True]}, AXIAL, "data: tip_x = True: must be a number"),
+        ({"tip_x": [1.0], "experiment": "a,b"}, AXIAL, "no commas"),
+        ({"tip_x": [0.95]}, [], "no number is free"),
+        ({"tip_x": [0.95]}, "stiffness.nonsense", "stiffness.nonsense"),
+        ({"tip_x": [0.95]}, {AXIAL: (10, 20)}, "which is not between the bounds"),
+        ("no/such/file.csv", AXIAL, "no/such/file.csv: cannot be read"),
+    ],
+)
+def test_refusals(data: Any, free: Any, part: str) -> None:
+    with pytest.raises(ValueError, match=part) as refused:
+        leafdyn.fit(PULL, data, free)
+    assert "--" not in str(refused.value)
+
+
+def test_what_is_no_table() -> None:
+    with pytest.raises(TypeError, match="data\\[0\\]: allowed are a path, a dict of columns"):
+        leafdyn.fit(PULL, [1.0, 2.0], AXIAL)  # type: ignore[list-item]
+
+
+@pytest.mark.filterwarnings("ignore::leafdyn.LeafWarning")
+def test_progress_is_told() -> None:
+    told: list[str] = []
+    leafdyn.fit(PULL, [MEASURED / "pull.csv"] * 10, AXIAL, progress=lambda done, total, text: told.append(text))
+    assert "sum of squares" in told[-1]

@@ -1,0 +1,81 @@
+"""Derivatives are those of the program, and of the leaf."""
+
+import json
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from leaves import fan, program
+
+import leafdyn
+
+KEYS = ["stiffness.bending_2", "load.gravity[2]", "scale:stiffness.axial"]
+
+
+def test_by_both_roads(tmp_path: Path) -> None:
+    file = tmp_path / "fan.toml"
+    file.write_text(leafdyn.Scenario(fan(3)).text)
+    told = program("relax", file, "--sensitivity", ",".join(KEYS), "--json", "--write", "none")
+    assert told.returncode == 0, told.stderr
+    wanted = json.loads(told.stdout)["sensitivities"]
+    leaf = leafdyn.sensitivities(file, KEYS)
+    assert leaf.to_dict()["sensitivities"] == wanted
+    assert list(leaf.sensitivities) == KEYS
+    for entry, found in zip(wanted, leaf.sensitivities.values()):
+        assert found.tips.tolist() == [entry["tip"]]
+        assert found.tips.dtype == found.frequencies.dtype == np.float64
+        for name in ("value", "energy", "lowest_eigenvalue", "tip_error", "energy_error", "lowest_eigenvalue_error"):
+            assert getattr(found, name) == entry[name]
+        assert found.tip_reaction is None
+        # The ends of all rods are the tip.
+        assert found.positions.shape == (3, len(found.stations), 3)
+        assert np.abs(found.positions[:, -1] - found.tip).max() < 1e-6
+        assert not found.positions[:, 0].any()
+
+
+def test_they_are_those_of_differences() -> None:
+    leaf = leafdyn.sensitivities(fan(2), "load.gravity[2]", tolerance=1e-9, modes=0)
+    found = leaf.sensitivities["load.gravity[2]"]
+    step = 1e-3
+    more, less = (leafdyn.relax(fan(2, gravity=1.0 - by), tolerance=1e-9) for by in (step, -step))
+    assert more.tip is not None
+    assert less.tip is not None
+    assert found.tip is not None
+    assert np.abs((more.tip - less.tip) / (2 * step) - found.tip).max() < 1e-6
+    assert found.lowest_eigenvalue is None
+    assert repr(found).startswith("<Sensitivity by load.gravity[2] = -1, tip (")
+
+
+def test_several_tips_and_held_ones() -> None:
+    loose = fan(3)
+    loose["leaf"]["joined"] = False
+    found = leafdyn.sensitivities(loose, "stiffness.bending_2", modes=1).sensitivities["stiffness.bending_2"]
+    assert found.tips.shape == (3, 3)
+    assert found.tip is None
+    assert found.frequencies.shape == (1,)
+    held = {**fan(2), "tip": {"held": "clamped", "position": [0.9, 0.0, 0.0]}}
+    found = leafdyn.sensitivities(held, "tip.position[0]").sensitivities["tip.position[0]"]
+    assert found.tip_reaction is not None
+    assert found.tip_reaction_moments is not None
+    assert found.tip_reaction.shape == (3,)
+    assert found.tip_reaction_moments.shape == (2, 3)
+
+
+def test_they_travel() -> None:
+    leaf = leafdyn.sensitivities(fan(2), KEYS)
+    again = pickle.loads(pickle.dumps(leaf))
+    assert again.to_dict() == leaf.to_dict()
+    assert "sensitivity.svg" in again._files.names()
+    assert again.figure("sensitivity.svg") == leaf.figure("sensitivity.svg")
+    for key in KEYS:
+        assert np.array_equal(again.sensitivities[key].positions, leaf.sensitivities[key].positions)
+        assert repr(again.sensitivities[key]) == repr(leaf.sensitivities[key])
+    assert leafdyn.relax(fan(2)).sensitivities == {}
+
+
+def test_refusals() -> None:
+    with pytest.raises(ValueError, match="stiffness.nonsense"):
+        leafdyn.sensitivities(fan(2), "stiffness.nonsense")
+    with pytest.raises(ValueError, match="semi-implicit"):
+        leafdyn.sensitivities(fan(2), "stiffness.axial", method="shooting")
