@@ -6,7 +6,6 @@ use std::sync::Arc;
 use leafdyn::scenario;
 use leafdyn::study::Base;
 use pyo3::prelude::*;
-use pyo3::types::PyMapping;
 
 use crate::errors::{TEXT, cannot_vary, refused};
 use crate::toml_text;
@@ -64,7 +63,7 @@ impl Scenario {
 
     /// A scenario from a dictionary of the form of the file.
     #[staticmethod]
-    fn from_dict(py: Python, entries: &Bound<PyMapping>, overrides: Vec<String>) -> PyResult<Self> {
+    fn from_dict(py: Python, entries: &Bound<PyAny>, overrides: Vec<String>) -> PyResult<Self> {
         Scenario::new(py, toml_text::document(entries)?, overrides, None)
     }
 

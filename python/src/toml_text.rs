@@ -3,9 +3,12 @@
 use std::fmt::Write;
 
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyMapping, PyString, PyTuple};
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple, PyType};
 
 use crate::errors::refuse_entry;
+
+static MAPPING: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 
 /// How deep lists and tables may stand in each other: none of a scenario stands deeper.
 const DEEPEST: usize = 8;
@@ -14,19 +17,19 @@ const DEEPEST: usize = 8;
 type Entry<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
 
 /// A scenario's text: tables after what stands outside of them, an entry a line.
-pub fn document(scenario: &Bound<PyMapping>) -> PyResult<String> {
+pub fn document(scenario: &Bound<PyAny>) -> PyResult<String> {
     let (mut text, mut tables) = (String::new(), String::new());
     for (key, value) in entries(scenario)? {
         let key = name(&key, "")?;
-        match value.cast::<PyMapping>() {
-            Ok(table) => {
+        match is_mapping(&value)? {
+            true => {
                 let _ = writeln!(tables, "[{}]", quoted_key(&key));
-                for (inner, value) in entries(table)? {
+                for (inner, value) in entries(&value)? {
                     let inner = name(&inner, &key)?;
                     line(&mut tables, &inner, &value, &format!("{key}.{inner}"))?;
                 }
             }
-            Err(_) => line(&mut text, &key, &value, &key)?,
+            false => line(&mut text, &key, &value, &key)?,
         }
     }
     text.push_str(&tables);
@@ -35,7 +38,7 @@ pub fn document(scenario: &Bound<PyMapping>) -> PyResult<String> {
 
 /// Replaced entries as the program takes them: `KEY=VALUE`.
 #[pyfunction]
-pub fn overrides(entries: &Bound<PyMapping>) -> PyResult<Vec<String>> {
+pub fn overrides(entries: &Bound<PyAny>) -> PyResult<Vec<String>> {
     let mut texts = Vec::new();
     for (key, new) in self::entries(entries)? {
         let key = name(&key, "")?;
@@ -47,15 +50,30 @@ pub fn overrides(entries: &Bound<PyMapping>) -> PyResult<Vec<String>> {
 }
 
 /// Keys and values.
-fn entries<'py>(mapping: &Bound<'py, PyMapping>) -> PyResult<Vec<Entry<'py>>> {
+fn entries<'py>(mapping: &Bound<'py, PyAny>) -> PyResult<Vec<Entry<'py>>> {
     match mapping.cast::<PyDict>() {
         Ok(dict) => Ok(dict.iter().collect()),
-        Err(_) => mapping
-            .items()?
-            .iter()
-            .map(|entry| entry.extract())
-            .collect(),
+        Err(_) => {
+            let items = mapping.call_method0("items")?;
+            items.try_iter()?.map(|entry| entry?.extract()).collect()
+        }
     }
+}
+
+/// Whether something is a mapping. An exception while it is asked, Ctrl-C above all, is not
+/// an answer, as it is where PyO3 asks.
+fn is_mapping(found: &Bound<PyAny>) -> PyResult<bool> {
+    if found.is_instance_of::<PyDict>() {
+        return Ok(true);
+    }
+    let simple = found.is_instance_of::<PyString>()
+        || found.is_instance_of::<PyFloat>()
+        || found.is_instance_of::<PyInt>()
+        || found.is_instance_of::<PyList>();
+    if simple {
+        return Ok(false);
+    }
+    found.is_instance(MAPPING.import(found.py(), "collections.abc", "Mapping")?)
 }
 
 fn line(text: &mut String, key: &str, entry: &Bound<PyAny>, path: &str) -> PyResult<()> {
