@@ -31,7 +31,7 @@ use std::time::Instant;
 
 use super::{Base, VaryError};
 use crate::limit::Limit;
-use crate::relax::{Options, RelaxError, check_tolerance};
+use crate::relax::{Lost, Options, RelaxError, check_tolerance};
 use free::Coordinate;
 use judge::{Evaluations, Judge};
 use least_squares::{ASSUMED, End, Iteration, Weighing};
@@ -39,6 +39,9 @@ use model::Model;
 
 /// Minima that are left for better ones.
 const MOST_MINIMA: usize = 4;
+
+/// Jumps of leaves to other equilibria, where a fit cannot go on without.
+const MOST_JUMPS: usize = 3;
 
 /// Where the standard deviation of the data comes from the residuals, that of the
 /// search may be larger by this factor: else coarse grids are seen in it.
@@ -150,9 +153,10 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result
         assumed: ASSUMED * unit(&first, base.scenario().scale().length),
         robust: request.robust,
     };
-    let (rough, mut point) = model.rough(&first, weighing)?;
+    let (mut rough, mut point) = model.rough(&first, weighing)?;
     let mut evaluations = Evaluations::default();
     let mut attempts = 0;
+    let mut jumps = 0;
     let mut found = loop {
         // The search on coarse grids, and the last steps on all.
         let (near, searched, more) = Iteration::new(&rough, weighing, progress).run(point);
@@ -162,8 +166,20 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result
             let found = model.find(&near.theta);
             found.map(|(there, _)| there)
         })?;
-        let (least, end, more) = Iteration::new(&model, weighing, progress).run(there);
+        let mut last = Iteration::new(&model, weighing, progress);
+        let (least, end, more) = last.run(there);
         evaluations.accurate += 1 + more;
+        let beyond = last
+            .jump
+            .filter(|_| end == End::Stuck(Some(Lost::Elsewhere)));
+        if let Some(theta) = beyond.filter(|_| jumps < MOST_JUMPS)
+            && let Some(there) = model.beyond(&theta, &least, weighing)
+        {
+            jumps += 1;
+            attempts -= 1;
+            (rough, point) = model.rough(&there, weighing)?;
+            continue;
+        }
         let judge = Judge::new(&model, weighing, known, &least, evaluations);
         let of_search = Judge::new(&rough, weighing, known, &near, evaluations);
         let same = searched == End::Converged && of_search.spread < SAME_SPREAD * judge.spread;
@@ -181,6 +197,13 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result
             }
         }
     };
+    if jumps > 0 {
+        found.remarks.push(
+            "on the way a leaf jumped to another equilibrium, that to which it relaxes from the start: \
+             compare with a fit that starts from the values found"
+                .into(),
+        );
+    }
     found.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(found)
 }

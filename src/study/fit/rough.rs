@@ -64,6 +64,22 @@ impl<'a> Model<'a> {
         Ok((model, Point { theta, cases }))
     }
 
+    /// The leaves at rest from where relaxations start, beyond the place where one of
+    /// `before` would have to jump; or there, if it can be in another equilibrium. `None`
+    /// where the data are no nearer.
+    pub fn beyond(&self, theta: &[f64], before: &Point, weighing: Weighing) -> Option<Point> {
+        let residuals = weighing.residuals(before);
+        let bound = weighing.bound(&residuals);
+        let sum = weighing.sum(&residuals, bound);
+        [theta, before.theta.as_slice()]
+            .into_iter()
+            .find_map(|theta| {
+                let (there, _) = self.find(theta).ok()?;
+                let nearer = weighing.sum(&weighing.residuals(&there), bound) < sum;
+                nearer.then_some(there)
+            })
+    }
+
     /// The leaves of a point of another model, as accurate as this one wants them.
     pub fn refined(&self, point: &Point) -> Result<Point, Lost> {
         self.follow(point, &point.theta)
