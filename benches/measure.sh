@@ -40,6 +40,8 @@ for figure in 05 06 08 09 10 13; do
   python benches/peers/exudyn.py "scenarios/paper/fig$figure.toml" --set leaf.rods=5 --segments 20 --compare "out/fig$figure-5" || true
 done
 
+python benches/peers/least_squares.py scenarios/measured/pull.toml --data scenarios/measured/turned.csv --set stiffness.torsion=0.8 --set stiffness.shear_2=40 --set stiffness.shear_3=50 --free stiffness.bending_2=1.0 --free stiffness.bending_3=1.0 --free stiffness.axial=100.0
+
 # The charts: three runs of every other program, then all methods.
 rm -f out/peers.csv
 python benches/peers/solve_bvp.py scenarios/paper/fig04.toml --set leaf.rods=5 --tol 1e-6 --compare out/fig04-5 --csv out/peers.csv

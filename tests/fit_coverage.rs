@@ -93,7 +93,6 @@ fn three_numbers() {
 /// Some of them are felt little: intervals are long, and the sum of squares is not
 /// that of its curvature.
 #[test]
-#[ignore = "takes minutes"]
 fn six_numbers() {
     let names = [
         ("stiffness.torsion", 1.0),

@@ -36,7 +36,7 @@ impl Draw {
 fn random(number: usize) -> (String, Vec<&'static str>) {
     let mut draw = Draw(101 * number);
     let rods = 1 + number % 4;
-    let joined = number % 3 != 0;
+    let joined = !number.is_multiple_of(3);
     let mut keys = vec![
         "rest.twist[0]",
         "rest.bend_2[0]",
@@ -97,7 +97,7 @@ fn random(number: usize) -> (String, Vec<&'static str>) {
             keys.push("load.tip_moment[1]");
             format!(
                 "load.tip_moment = [0.0, {:?}, 0.0]\n",
-                if number % 8 == 0 { 0.3 } else { 0.0 }
+                if number.is_multiple_of(8) { 0.3 } else { 0.0 }
             )
         }
         // Coupling may be zero, and not below.

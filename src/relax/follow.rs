@@ -4,16 +4,13 @@
 use crate::leaf::{DiscreteLeaf, Leaf, Response, State};
 use crate::newton::{Stop, Work};
 use crate::relax::options::{Options, Progress, RelaxError};
-use crate::relax::prolong::lagrange;
 use crate::relax::richardson::Richardson;
 use crate::relax::run::{Level, Run, positions};
 use crate::relax::solve::relax_on_grids;
+use crate::relax::stencil::Stencil;
 use crate::relax::{Equilibrium, Outcome};
 use crate::scenario::Scenario;
 use glam::DVec3;
-
-/// Nodes between which a position along a vein is interpolated.
-const STENCIL: usize = 7;
 
 /// How far from where it was expected an equilibrium may be: of the way that was
 /// expected, and in lengths of the leaf. Farther away it may be another one.
@@ -21,12 +18,22 @@ const OFF_THE_WAY: f64 = 0.5;
 const NEARBY: f64 = 0.02;
 
 /// A stable leaf at rest on nested grids.
+#[derive(Clone)]
 pub(crate) struct AtRest {
     /// The grids that are extrapolated, from coarse to fine.
     pub levels: Vec<Level>,
     /// What each contributes to the best values.
     pub weights: Vec<f64>,
     pub work: Work,
+}
+
+/// The grids on which an equilibrium is followed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Grids {
+    /// Finer ones too, where the tolerance needs them.
+    AsNeeded,
+    /// The same.
+    These,
 }
 
 /// Why there is no equilibrium to go on with.
@@ -70,6 +77,15 @@ impl AtRest {
         }
     }
 
+    /// The same on the coarsest `count` grids alone; `None` if these are not halved
+    /// from one to the next.
+    pub fn coarsest(&self, count: usize) -> Option<AtRest> {
+        let levels = self.levels.get(..count)?;
+        let halved = |pair: &[Level]| pair[1].leaf.segments() == 2 * pair[0].leaf.segments();
+        let nested = levels.windows(2).all(halved);
+        nested.then(|| AtRest::on(levels.to_vec(), self.work))
+    }
+
     /// The equilibrium of a scenario that differs a little: from this one, moved along
     /// these responses times these steps.
     pub fn follow(
@@ -77,7 +93,7 @@ impl AtRest {
         scenario: &Scenario,
         responses: &[Vec<Response>],
         steps: &[f64],
-        options: &Options,
+        (options, grids): (&Options, Grids),
     ) -> Result<AtRest, Lost> {
         let leaf = Leaf::new(scenario);
         // The grid between two others is found again if it is needed.
@@ -105,8 +121,12 @@ impl AtRest {
         let mut run = Run::new(&leaf, options, tolerance, ignored);
         // As of a reduced leaf: it gives up where the leaf would have to move far.
         run.whole = Some(&leaf);
-        match run.follow(guesses) {
-            Ok(_) => {}
+        let followed = match grids {
+            Grids::AsNeeded => run.follow(guesses).map(|_| ()),
+            Grids::These => run.follow_on_these(guesses),
+        };
+        match followed {
+            Ok(()) => {}
             Err(Stop::StepLimit) if run.late() => {
                 return Err(Lost::NotAtRest("the time allowed was over".into()));
             }
@@ -203,65 +223,4 @@ fn moved<'r>(
     let forces = start.state.n.iter_mut().zip(carried);
     forces.for_each(|(force, change)| *force += change);
     rescaled(&start, leaf)
-}
-
-/// Nodes of a grid and their weights in a value between them.
-pub(crate) struct Stencil {
-    first: usize,
-    weights: Vec<f64>,
-    /// Derivatives of the weights with sigma.
-    slopes: Vec<f64>,
-}
-
-impl Stencil {
-    fn new(level: &Level, sigma: f64) -> Stencil {
-        let (beyond, sigma) = (sigma - sigma.clamp(0.0, 1.0), sigma.clamp(0.0, 1.0));
-        let nodes = level.leaf.grid.sigma();
-        // A polynomial does not reach across a kink.
-        let kinks = level.leaf.leaf.kinks();
-        let panel = kinks.partition_point(|&kink| kink < sigma);
-        let low = panel.checked_sub(1).map_or(0.0, |k| kinks[k]);
-        let high = kinks.get(panel).copied().unwrap_or(1.0);
-        let low = nodes.partition_point(|&node| node < low);
-        let high = nodes.partition_point(|&node| node < high);
-        let count = STENCIL.min(high - low + 1);
-        let right = nodes.partition_point(|&node| node < sigma);
-        let first = (right.saturating_sub(count / 2)).clamp(low, high + 1 - count);
-        // Nodes of a panel are equally spaced.
-        let width = nodes[first + 1] - nodes[first];
-        let t = (sigma - nodes[first]) / width;
-        let weight = |a: usize| lagrange(count, a, t);
-        let slope = |a: usize| {
-            let others = (0..count).filter(move |&b| b != a);
-            let term = |b: usize| {
-                let rest = (0..count).filter(|&c| c != a && c != b);
-                let product: f64 = rest
-                    .map(|c| (t - c as f64) / (a as f64 - c as f64))
-                    .product();
-                product / (a as f64 - b as f64)
-            };
-            others.map(term).sum::<f64>() / width
-        };
-        let slopes: Vec<f64> = (0..count).map(slope).collect();
-        let weight = |a: usize| weight(a) + beyond * slopes[a];
-        Stencil {
-            first,
-            weights: (0..count).map(weight).collect(),
-            slopes,
-        }
-    }
-
-    /// Of values at nodes from 0 on.
-    pub fn value(&self, at: impl Fn(usize) -> DVec3) -> DVec3 {
-        let weights = self.weights.iter().enumerate();
-        weights
-            .map(|(a, weight)| *weight * at(self.first + a))
-            .sum()
-    }
-
-    /// The derivative of that with sigma.
-    pub fn slope(&self, at: impl Fn(usize) -> DVec3) -> DVec3 {
-        let slopes = self.slopes.iter().enumerate();
-        slopes.map(|(a, slope)| *slope * at(self.first + a)).sum()
-    }
 }

@@ -34,12 +34,19 @@ impl Run<'_, '_> {
 
     /// The same from guesses on nested grids, near which the leaf is at rest.
     pub fn follow(&mut self, guesses: Vec<(Grid, State)>) -> Result<bool, Stop> {
+        self.follow_on_these(guesses)?;
+        self.refine()
+    }
+
+    /// The same on these grids alone, however accurate they are; the leaf is at rest
+    /// where its energy has a minimum for all that the iteration sees.
+    pub fn follow_on_these(&mut self, guesses: Vec<(Grid, State)>) -> Result<(), Stop> {
         for (grid, state) in guesses {
             let Settled { level, rest, .. } = self.settle(grid, InitialGuess::Coarser(state));
             self.push(level);
             rest?;
         }
-        self.refine()
+        Ok(())
     }
 
     /// Refines until the tolerance is reached.

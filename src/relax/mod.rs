@@ -27,6 +27,7 @@ mod solve;
 mod stability;
 pub(crate) mod start;
 mod stations;
+mod stencil;
 
 pub use crate::limit::Limit;
 pub use crate::newton::Work;
@@ -35,7 +36,7 @@ pub(crate) use equilibrium::serialize_index;
 pub use equilibrium::{
     Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Saddle, Sensitivity, Shape, Stability,
 };
-pub(crate) use follow::{AtRest, Lost, extrapolation};
+pub(crate) use follow::{AtRest, Grids, Lost, extrapolation};
 pub(crate) use index::{index_near, project};
 pub use method::{Method, SemiImplicit, Settings, Unfit, UnknownMethod};
 pub(crate) use methods::shooting::{START as SHOOTING_START, check_intervals};

@@ -29,6 +29,7 @@ const ROUNDING: f64 = 4e-15;
 pub const BUDGET: usize = 3_000_000;
 
 /// A leaf settled on one grid.
+#[derive(Clone)]
 pub struct Level {
     pub leaf: DiscreteLeaf,
     pub state: State,

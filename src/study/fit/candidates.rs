@@ -25,7 +25,7 @@ pub(super) fn judge(judge: &Judge, wanted: &[Experiment]) -> Result<Vec<FitCandi
             traced: Vec::new(),
         };
         let of = judge.model;
-        let model = Model::new(of.base, of.coordinates, of.options, data)?;
+        let model = Model::new(of.base, of.coordinates, &of.options, data)?;
         let mut candidate = FitCandidate {
             experiment: experiment.name.clone(),
             bits: 0.0,

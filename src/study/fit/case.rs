@@ -1,6 +1,8 @@
 //! A leaf at rest under the conditions of one experiment, what it predicts for the
 //! data, and how that changes.
 
+use std::sync::{Arc, OnceLock};
+
 use glam::DVec3;
 
 use super::data::{Measured, Origin, Traced};
@@ -10,6 +12,7 @@ use crate::leaf::{LeafRate, Response, shift};
 use crate::modes;
 use crate::motion::Physics;
 use crate::relax::{AtRest, Level, Lost, Number, eigenvalue_rate, extrapolation};
+use crate::scenario::Scenario;
 use crate::study::Keys;
 
 /// Unknowns of the finest grid on which modes are looked for, but for the first.
@@ -22,7 +25,13 @@ pub(super) struct Case {
     pub measured: Vec<Measured>,
     pub traced: Vec<Traced>,
     pub origin: Option<Origin>,
+    /// How its scenario changes with each free number, where that is the same
+    /// wherever these are.
+    pub changes: OnceLock<Option<Vec<Change>>>,
 }
+
+/// The change of a scenario with a number: scenarios with weights.
+pub(super) type Change = Arc<Vec<(f64, Scenario)>>;
 
 /// One number that is compared.
 #[derive(Clone, Debug)]

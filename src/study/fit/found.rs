@@ -77,7 +77,8 @@ pub(super) fn fit(
         residuals: compared(judge),
         candidates,
         work: FitWork {
-            evaluations: judge.evaluations,
+            evaluations: judge.evaluations.rough + judge.evaluations.accurate,
+            accurate: judge.evaluations.accurate,
             last: Model::work(judge.point),
         },
         wall_seconds: 0.0,

@@ -39,16 +39,20 @@ enum Side {
     Lost,
 }
 
-/// The free numbers with their intervals.
+/// The free numbers with their intervals. The shape of the sum of squares away from
+/// the minimum is that of `shape`, which may be a minimum on coarser grids.
 ///
 /// # Errors
 /// With a point from which there is a better minimum.
 pub(super) fn intervals(
     judge: &Judge,
+    shape: &Judge,
     progress: &mut dyn FnMut(usize, f64),
 ) -> Result<Vec<FitParameter>, Point> {
     let numbers = 0..judge.values.len();
-    numbers.map(|k| parameter(judge, k, progress)).collect()
+    numbers
+        .map(|k| parameter(judge, shape, k, progress))
+        .collect()
 }
 
 /// The free numbers where there is no minimum, and nothing is known of them but the
@@ -73,6 +77,7 @@ fn unknown(judge: &Judge, k: usize) -> FitParameter {
 
 fn parameter(
     judge: &Judge,
+    shape: &Judge,
     k: usize,
     progress: &mut dyn FnMut(usize, f64),
 ) -> Result<FitParameter, Point> {
@@ -83,14 +88,14 @@ fn parameter(
         return Ok(parameter);
     }
     let (low, high) = (parameter.low, parameter.high);
-    let (deviation, along) = judge.deviation(k);
-    let half = judge.quantile * deviation;
+    let half = judge.quantile * judge.deviation(k).0;
     let mut sides = [Side::At(half), Side::At(half)];
-    if half > OPEN || !straight(judge, &along, half) {
+    let (deviation, along) = shape.deviation(k);
+    if half > OPEN || !straight(shape, &along, shape.quantile * deviation) {
         parameter.profiled = true;
-        let along = judge.conditional(k, OPEN);
+        let along = shape.conditional(k, OPEN);
         for (side, sign) in sides.iter_mut().zip([-1.0, 1.0]) {
-            *side = profile(judge, k, (sign * half, &along), progress)?;
+            *side = profile(shape, k, (sign * half, &along), progress)?;
         }
     }
     let end = |side: &Side, sign: f64, bound: f64, given: Option<f64>| match side {

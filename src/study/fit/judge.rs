@@ -12,6 +12,15 @@ use super::quantity::Kind;
 /// not determined.
 const TAKES_PART: f64 = 1e-3;
 
+/// How often the leaves of all experiments were brought to rest.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Evaluations {
+    /// As accurately as a search needs.
+    pub rough: usize,
+    /// As accurately as is wanted.
+    pub accurate: usize,
+}
+
 /// The minimum and what surrounds it.
 pub(super) struct Judge<'m, 'a> {
     pub model: &'m Model<'a>,
@@ -19,7 +28,7 @@ pub(super) struct Judge<'m, 'a> {
     /// Whether the standard deviations of the data are known.
     pub known: bool,
     pub point: &'m Point,
-    pub evaluations: usize,
+    pub evaluations: Evaluations,
     pub residuals: DVector<f64>,
     pub jacobian: DMatrix<f64>,
     /// Directions of the coordinates, ascending in what the data say about them, and
@@ -42,7 +51,7 @@ impl<'m, 'a> Judge<'m, 'a> {
         weighing: Weighing,
         known: bool,
         point: &'m Point,
-        evaluations: usize,
+        evaluations: Evaluations,
     ) -> Self {
         let residuals = weighing.residuals(point);
         let roots = weighing.roots(&residuals);

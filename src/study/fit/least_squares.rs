@@ -125,6 +125,8 @@ pub(super) struct Iteration<'m, 'a> {
     pub most_steps: usize,
     /// What the longest step may be expected to gain at the end, of a datum's variance.
     pub enough: f64,
+    /// Where a leaf would have had to jump, as near as that was tried.
+    pub jump: Option<Vec<f64>>,
     /// Told the number of the step and the sum.
     pub progress: &'m mut dyn FnMut(usize, f64),
 }
@@ -141,6 +143,7 @@ impl<'m, 'a> Iteration<'m, 'a> {
             held: vec![false; model.coordinates.len()],
             most_steps: MOST_STEPS,
             enough: GAIN,
+            jump: None,
             progress,
         }
     }
@@ -202,7 +205,12 @@ impl<'m, 'a> Iteration<'m, 'a> {
                         }
                         lost = None;
                     }
-                    Err(why) => lost = Some(why),
+                    Err(why) => {
+                        if why == Lost::Elsewhere {
+                            self.jump = Some(theta);
+                        }
+                        lost = Some(why);
+                    }
                 }
                 radius = 0.25 * size;
             }

@@ -8,6 +8,7 @@
 mod candidates;
 mod case;
 mod data;
+mod derivatives;
 mod directions;
 mod found;
 mod free;
@@ -17,6 +18,7 @@ mod least_squares;
 mod model;
 mod quantity;
 mod result;
+mod rough;
 mod vein;
 mod words;
 
@@ -29,14 +31,21 @@ use std::time::Instant;
 
 use super::{Base, VaryError};
 use crate::limit::Limit;
-use crate::relax::{Options, RelaxError, check_tolerance};
+use crate::relax::{Lost, Options, RelaxError, check_tolerance};
 use free::Coordinate;
-use judge::Judge;
+use judge::{Evaluations, Judge};
 use least_squares::{ASSUMED, End, Iteration, Weighing};
 use model::Model;
 
 /// Minima that are left for better ones.
 const MOST_MINIMA: usize = 4;
+
+/// Jumps of leaves to other equilibria, where a fit cannot go on without.
+const MOST_JUMPS: usize = 3;
+
+/// Where the standard deviation of the data comes from the residuals, that of the
+/// search may be larger by this factor: else coarse grids are seen in it.
+const SAME_SPREAD: f64 = 1.05;
 
 /// Why nothing can be fitted.
 #[derive(Debug, thiserror::Error)]
@@ -144,16 +153,39 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result
         assumed: ASSUMED * unit(&first, base.scenario().scale().length),
         robust: request.robust,
     };
-    let mut point = first;
-    let mut evaluations = 0;
+    let (mut rough, mut point) = model.rough(&first, weighing)?;
+    let mut evaluations = Evaluations::default();
     let mut attempts = 0;
+    let mut jumps = 0;
     let mut found = loop {
-        let (least, end, more) = Iteration::new(&model, weighing, progress).run(point);
-        evaluations += more;
+        // The search on coarse grids, and the last steps on all.
+        let (near, searched, more) = Iteration::new(&rough, weighing, progress).run(point);
+        evaluations.rough += more;
         attempts += 1;
+        let there = model.refined(&near).or_else(|_| {
+            let found = model.find(&near.theta);
+            found.map(|(there, _)| there)
+        })?;
+        let mut last = Iteration::new(&model, weighing, progress);
+        let (least, end, more) = last.run(there);
+        evaluations.accurate += 1 + more;
+        let beyond = last
+            .jump
+            .filter(|_| end == End::Stuck(Some(Lost::Elsewhere)));
+        if let Some(theta) = beyond.filter(|_| jumps < MOST_JUMPS)
+            && let Some(there) = model.beyond(&theta, &least, weighing)
+        {
+            jumps += 1;
+            attempts -= 1;
+            (rough, point) = model.rough(&there, weighing)?;
+            continue;
+        }
         let judge = Judge::new(&model, weighing, known, &least, evaluations);
+        let of_search = Judge::new(&rough, weighing, known, &near, evaluations);
+        let same = searched == End::Converged && of_search.spread < SAME_SPREAD * judge.spread;
+        let shape = if same { &of_search } else { &judge };
         let parameters = match end {
-            End::Converged => interval::intervals(&judge, progress),
+            End::Converged => interval::intervals(&judge, shape, progress),
             _ => Ok(interval::without_intervals(&judge)),
         };
         match parameters {
@@ -165,6 +197,13 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result
             }
         }
     };
+    if jumps > 0 {
+        found.remarks.push(
+            "on the way a leaf jumped to another equilibrium, that to which it relaxes from the start: \
+             compare with a fit that starts from the values found"
+                .into(),
+        );
+    }
     found.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(found)
 }

@@ -1,16 +1,17 @@
 //! What the leaf of a scenario predicts for the data, and how that changes with the
 //! free numbers.
 
+use std::sync::{Arc, OnceLock};
+
 use rayon::prelude::*;
 
 use super::FitError;
-use super::case::{Case, CaseAt, Component, What};
+use super::case::{Case, CaseAt, Component};
 use super::data::{Data, Experiment, Measured, Origin};
 use super::free::Coordinate;
 use super::quantity::Kind;
-use crate::leaf::{Forces, LeafRate, Response};
 use crate::newton::Work;
-use crate::relax::{AtRest, Equilibrium, Lost, Number, Options, responses};
+use crate::relax::{AtRest, Equilibrium, Grids, Lost, Options};
 use crate::scenario::Scenario;
 use crate::study::{Base, Keys};
 
@@ -18,8 +19,10 @@ use crate::study::{Base, Keys};
 pub(super) struct Model<'a> {
     pub base: &'a Base,
     pub coordinates: &'a [Coordinate],
-    pub options: &'a Options,
-    pub cases: Vec<Case>,
+    pub options: Options,
+    pub cases: Arc<Vec<Case>>,
+    /// On which grids leaves are followed.
+    pub grids: Grids,
 }
 
 /// The leaves of all experiments.
@@ -42,7 +45,7 @@ impl<'a> Model<'a> {
     pub fn new(
         base: &'a Base,
         coordinates: &'a [Coordinate],
-        options: &'a Options,
+        options: &Options,
         data: Data,
     ) -> Result<Self, FitError> {
         let rods = base.scenario().rods.len();
@@ -52,6 +55,7 @@ impl<'a> Model<'a> {
             measured: experiment.measured,
             traced: Vec::new(),
             origin: experiment.origin,
+            changes: OnceLock::new(),
         };
         let mut cases: Vec<Case> = data.experiments.into_iter().map(case).collect();
         let mut plain = None;
@@ -74,6 +78,7 @@ impl<'a> Model<'a> {
                         measured: Vec::new(),
                         traced: Vec::new(),
                         origin: None,
+                        changes: OnceLock::new(),
                     });
                     cases.len() - 1
                 }),
@@ -117,12 +122,13 @@ impl<'a> Model<'a> {
         Ok(Model {
             base,
             coordinates,
-            options,
-            cases,
+            options: options.clone(),
+            cases: Arc::new(cases),
+            grids: Grids::AsNeeded,
         })
     }
 
-    fn values<'s>(&'s self, case: &'s Case, theta: &[f64]) -> Vec<(&'s Keys, f64)> {
+    pub(super) fn values<'s>(&'s self, case: &'s Case, theta: &[f64]) -> Vec<(&'s Keys, f64)> {
         let settings = case.settings.iter().map(|(keys, value)| (keys, *value));
         let free = self.coordinates.iter().zip(theta);
         settings
@@ -130,7 +136,7 @@ impl<'a> Model<'a> {
             .collect()
     }
 
-    fn scenario(&self, case: &Case, theta: &[f64]) -> Result<Scenario, FitError> {
+    pub(super) fn scenario(&self, case: &Case, theta: &[f64]) -> Result<Scenario, FitError> {
         let varied = self.base.at(&self.values(case, theta));
         varied.map(|varied| varied.scenario).map_err(|refused| {
             let place = case.origin.as_ref().map(|origin| format!("{origin}: "));
@@ -142,7 +148,7 @@ impl<'a> Model<'a> {
     pub fn find(&self, theta: &[f64]) -> Result<(Point, Vec<Equilibrium>), FitError> {
         let find = |case: usize| -> Result<(CaseAt, Equilibrium), FitError> {
             let scenario = self.scenario(&self.cases[case], theta)?;
-            let found = AtRest::find(&scenario, self.options)?;
+            let found = AtRest::find(&scenario, &self.options)?;
             let (at, leaf) = found.map_err(|lost| self.no_equilibrium(case, &lost))?;
             let case_at = CaseAt::new(&self.cases[case], case, at);
             Ok((
@@ -157,7 +163,7 @@ impl<'a> Model<'a> {
         Ok((Point { theta, cases }, leaves))
     }
 
-    fn no_equilibrium(&self, case: usize, lost: &Lost) -> FitError {
+    pub(super) fn no_equilibrium(&self, case: usize, lost: &Lost) -> FitError {
         let case = &self.cases[case];
         let place = case.origin.as_ref().map(|origin| format!("{origin}: "));
         let why = match lost {
@@ -182,9 +188,8 @@ impl<'a> Model<'a> {
             let scenario = self.scenario(&self.cases[case], theta);
             let scenario = scenario.map_err(|refused| Lost::NotAtRest(refused.to_string()))?;
             let from = &from.cases[case];
-            let at = from
-                .at
-                .follow(&scenario, &from.responses, &steps, self.options)?;
+            let how = (&self.options, self.grids);
+            let at = from.at.follow(&scenario, &from.responses, &steps, how)?;
             CaseAt::new(&self.cases[case], case, at)
         };
         let cases = (0..self.cases.len()).into_par_iter().map(follow);
@@ -192,98 +197,6 @@ impl<'a> Model<'a> {
             theta: theta.to_vec(),
             cases: cases.collect::<Result<_, _>>()?,
         })
-    }
-
-    /// Finds how the components of a point change with the coordinates.
-    pub fn differentiate(&self, point: &mut Point) -> Result<(), Lost> {
-        let theta = point.theta.clone();
-        let each = |(case, at): (usize, &mut CaseAt)| self.differentiate_case(case, at, &theta);
-        let cases = point.cases.par_iter_mut().enumerate();
-        cases.map(each).collect()
-    }
-
-    fn differentiate_case(
-        &self,
-        case: usize,
-        found: &mut CaseAt,
-        theta: &[f64],
-    ) -> Result<(), Lost> {
-        if !found.gradients.is_empty() {
-            return Ok(());
-        }
-        let of = &self.cases[case];
-        let fixed = self.values(of, theta);
-        let first = fixed.len() - theta.len();
-        let made: Vec<_> = (0..theta.len())
-            .map(|k| {
-                let fixed = &fixed;
-                move |value: f64| -> Option<Scenario> {
-                    let mut values = fixed.clone();
-                    values[first + k].1 = value;
-                    Some(self.base.at(&values).ok()?.scenario)
-                }
-            })
-            .collect();
-        let numbers: Vec<Number> = (self.coordinates.iter().zip(theta).zip(&made))
-            .map(|((free, theta), make)| Number {
-                make,
-                value: free.value(*theta),
-                unit: free.unit,
-                linear: free.keys.is_linear(),
-            })
-            .collect();
-        let terms: Option<Vec<_>> = numbers.iter().map(Number::rate).collect();
-        let at_limit = || Lost::NotAtRest("a number is at the limit of what it can be".into());
-        let terms = terms.ok_or_else(at_limit)?;
-        let leaf = &found.at.levels[0].leaf.leaf;
-        let rates: Vec<LeafRate> = terms
-            .iter()
-            .map(|terms| LeafRate::new(leaf, terms))
-            .collect();
-        let mut all: Vec<Vec<Response>> = vec![Vec::new(); numbers.len()];
-        let tolerance = self.tolerance();
-        for level in &found.at.levels {
-            let forces = rates.iter().map(|rate| level.leaf.rate(&level.state, rate));
-            let forces: Vec<Forces> = forces.collect();
-            let answers = responses(level, &forces, tolerance);
-            let answers =
-                answers.ok_or(Lost::NotAtRest("the leaf is at a singular point".into()))?;
-            for (all, answer) in all.iter_mut().zip(answers) {
-                all.push(answer);
-            }
-        }
-        found.responses = all;
-        let slopes = self.coordinates.iter().zip(theta);
-        let slopes: Vec<f64> = slopes.map(|(free, theta)| free.slope(*theta)).collect();
-        let mut gradients = Vec::new();
-        let mut index = 0;
-        while index < found.components.len() {
-            let component = &found.components[index];
-            match component.what {
-                What::Result(quantity) => {
-                    let by = |k: usize| {
-                        let of = (&numbers[k], &rates[k], found.responses[k].as_slice());
-                        slopes[k] * found.result_rate(quantity, of)
-                    };
-                    gradients.push((0..numbers.len()).map(by).collect());
-                    index += 1;
-                }
-                What::Vein { rod, sigma, .. } => {
-                    // All coordinates of the point.
-                    let same = |other: &&Component| match other.what {
-                        What::Vein { .. } => other.origin == component.origin,
-                        What::Result(_) => false,
-                    };
-                    let point: Vec<&Component> =
-                        found.components[index..].iter().take_while(same).collect();
-                    let rows = found.vein_rates(rod, sigma, &point, &slopes);
-                    index += point.len();
-                    gradients.extend(rows);
-                }
-            }
-        }
-        found.gradients = gradients;
-        Ok(())
     }
 
     pub fn tolerance(&self) -> f64 {

@@ -92,6 +92,9 @@ pub struct FitCandidate {
 pub struct FitWork {
     /// Times the leaves of all experiments were brought to rest.
     pub evaluations: usize,
+    /// How many of these were as accurate as is wanted; the others were those of the
+    /// search, on the coarsest grids of which the data notice nothing.
+    pub accurate: usize,
     /// Of the leaves at the minimum.
     #[serde(flatten)]
     pub last: Work,

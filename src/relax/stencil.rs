@@ -1,0 +1,121 @@
+//! Values between the nodes of a grid.
+
+use crate::relax::run::Level;
+use glam::DVec3;
+
+/// Nodes between which a position along a vein is interpolated.
+const NODES: usize = 7;
+
+/// Nodes of a grid and their weights in a value between them.
+pub(crate) struct Stencil {
+    first: usize,
+    count: usize,
+    weights: [f64; NODES],
+    /// Derivatives of the weights with sigma.
+    slopes: [f64; NODES],
+}
+
+impl Stencil {
+    /// Of the polynomial through the nodes around a fraction of the length; beyond the
+    /// ends of the rod it goes on linearly.
+    pub fn new(level: &Level, sigma: f64) -> Stencil {
+        let (beyond, sigma) = (sigma - sigma.clamp(0.0, 1.0), sigma.clamp(0.0, 1.0));
+        let nodes = level.leaf.grid.sigma();
+        // A polynomial does not reach across a kink.
+        let kinks = level.leaf.leaf.kinks();
+        let panel = kinks.partition_point(|&kink| kink < sigma);
+        let low = panel.checked_sub(1).map_or(0.0, |k| kinks[k]);
+        let high = kinks.get(panel).copied().unwrap_or(1.0);
+        let low = nodes.partition_point(|&node| node < low);
+        let high = nodes.partition_point(|&node| node < high);
+        let count = NODES.min(high - low + 1);
+        let right = nodes.partition_point(|&node| node < sigma);
+        let first = (right.saturating_sub(count / 2)).clamp(low, high + 1 - count);
+        // Nodes of a panel are equally spaced.
+        let width = nodes[first + 1] - nodes[first];
+        let (mut weights, mut slopes) = lagrange(count, (sigma - nodes[first]) / width);
+        for (weight, slope) in weights.iter_mut().zip(&mut slopes) {
+            *slope /= width;
+            *weight += beyond * *slope;
+        }
+        Stencil {
+            first,
+            count,
+            weights,
+            slopes,
+        }
+    }
+
+    /// Of values at nodes from 0 on.
+    pub fn value(&self, at: impl Fn(usize) -> DVec3) -> DVec3 {
+        self.sum(&self.weights, at)
+    }
+
+    /// The derivative of that with sigma.
+    pub fn slope(&self, at: impl Fn(usize) -> DVec3) -> DVec3 {
+        self.sum(&self.slopes, at)
+    }
+
+    fn sum(&self, weights: &[f64; NODES], at: impl Fn(usize) -> DVec3) -> DVec3 {
+        let weights = weights[..self.count].iter().enumerate();
+        weights
+            .map(|(a, weight)| *weight * at(self.first + a))
+            .sum()
+    }
+}
+
+/// Weights of the polynomial through values at 0, 1, ..., `count` - 1 in its value at
+/// `t`, and their derivatives: products from both ends, each with its derivative.
+fn lagrange(count: usize, t: f64) -> ([f64; NODES], [f64; NODES]) {
+    let (mut weights, mut slopes) = ([0.0; NODES], [0.0; NODES]);
+    let mut left = (1.0, 0.0);
+    let mut below = 1.0;
+    for a in 0..count {
+        (weights[a], slopes[a]) = left;
+        // a! (-1)^(count - 1 - a) (count - 1 - a)! is what divides.
+        let factorial: f64 = (1..count - a).map(|k| -(k as f64)).product();
+        below *= if a > 0 { a as f64 } else { 1.0 };
+        weights[a] /= below * factorial;
+        slopes[a] /= below * factorial;
+        let step = t - a as f64;
+        left = (left.0 * step, left.1 * step + left.0);
+    }
+    let mut right = (1.0, 0.0);
+    for a in (0..count).rev() {
+        let (weight, slope) = (weights[a], slopes[a]);
+        weights[a] = weight * right.0;
+        slopes[a] = slope * right.0 + weight * right.1;
+        let step = t - a as f64;
+        right = (right.0 * step, right.1 * step + right.0);
+    }
+    (weights, slopes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of polynomials up to the degree the weights give value and derivative.
+    #[test]
+    fn polynomials_are_met() {
+        for count in 2..=NODES {
+            let t = 0.37 * count as f64;
+            let (weights, slopes) = lagrange(count, t);
+            for degree in 0..count as i32 {
+                let sum = |weights: &[f64; NODES]| -> f64 {
+                    let terms = weights[..count].iter().enumerate();
+                    terms
+                        .map(|(a, weight)| weight * (a as f64).powi(degree))
+                        .sum()
+                };
+                let slope = match degree {
+                    0 => 0.0,
+                    _ => f64::from(degree) * t.powi(degree - 1),
+                };
+                let size = (count as f64).powi(degree);
+                assert!((sum(&weights) - t.powi(degree)).abs() < 1e-13 * size);
+                assert!((sum(&slopes) - slope).abs() < 1e-12 * size);
+            }
+        }
+    }
+}
