@@ -20,7 +20,7 @@ const AGAIN: usize = 5;
 const SHARP: f64 = 1e-11;
 
 /// Traces, unless the environment asks for more.
-const TRACES: usize = 80;
+const TRACES: usize = 200;
 
 /// A leaf of which one thing changes from what it is.
 fn varied(leaf: &Scenario, what: usize, part: f64) -> Scenario {
