@@ -30,7 +30,14 @@ impl Equilibrium {
             let allowed = leaf.accuracy.tolerance * leaf.shape.longest();
             (leaf.accuracy.error_estimate).is_none_or(|error| error <= allowed)
         };
-        let mut there = self.clone().interpolated(scenario, parts);
+        let to = match parts {
+            Some(parts) => equally_spaced(parts),
+            None => finest(&self.shape),
+        };
+        if to == self.shape.stations {
+            return self;
+        }
+        let mut there = self.clone().interpolated(scenario, to);
         if within(&there) || !within(&self) {
             return there;
         }
@@ -44,14 +51,7 @@ impl Equilibrium {
         there
     }
 
-    fn interpolated(mut self, scenario: &Scenario, parts: Option<usize>) -> Self {
-        let to = match parts {
-            Some(parts) => equally_spaced(parts),
-            None => finest(&self.shape),
-        };
-        if to == self.shape.stations {
-            return self;
-        }
+    fn interpolated(mut self, scenario: &Scenario, to: Vec<f64>) -> Self {
         let at_rest = !matches!(
             self.outcome,
             Outcome::NotAtRest | Outcome::Singular | Outcome::Diverged
