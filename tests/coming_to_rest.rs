@@ -8,19 +8,16 @@ mod common;
 use std::fmt::{Display, Write};
 use std::time::Instant;
 
+use common::random::splitmix64;
 use common::{parse, relaxed, scenario, settled};
 use leafdyn::relax::Options;
 
-/// A generator of random numbers (splitmix64), the same everywhere.
+/// A generator of random numbers, the same everywhere.
 struct Draw(u64);
 
 impl Draw {
     fn uniform(&mut self, low: f64, high: f64) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        let unit = ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64;
+        let unit = splitmix64(&mut self.0);
         low + (high - low) * unit
     }
 

@@ -1,5 +1,6 @@
 //! Made-up measurements.
 
+use crate::common::random::splitmix64;
 use leafdyn::study::{Base, Data, Fit, FitRequest, fit};
 
 /// Normal numbers, always the same: by Box's and Muller's formula.
@@ -8,12 +9,7 @@ pub struct Noise(pub u64);
 impl Noise {
     /// An even number between 0 and 1.
     pub fn even(&mut self) -> f64 {
-        // splitmix64
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((bits ^ (bits >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+        splitmix64(&mut self.0)
     }
 
     /// A normal number.
