@@ -70,6 +70,9 @@ struct Kind {
     couple: [f64; 2],
     /// Stretch and shear stiffness, over the mean of that.
     force: [f64; 2],
+    /// Of the loads, they are at least this part: a vein is then stretched and sheared
+    /// by about the inverse of it at most.
+    force_per_load: f64,
     lengths: [f64; 2],
     rest_curvature: f64,
     stretch: f64,
@@ -86,6 +89,7 @@ const WILD: Kind = Kind {
     name: "wild",
     couple: [0.1, 10.0],
     force: [3.0, 1e5],
+    force_per_load: 0.0,
     lengths: [0.7, 1.3],
     rest_curvature: 10.0,
     stretch: 1.0,
@@ -99,6 +103,7 @@ const EDGE: Kind = Kind {
     name: "edge",
     couple: [0.03, 30.0],
     force: [3.0, 1e5],
+    force_per_load: 1.0,
     lengths: [0.5, 1.5],
     rest_curvature: 20.0,
     stretch: 2.0,
@@ -107,6 +112,20 @@ const EDGE: Kind = Kind {
     decades: 4,
     of_the_softest: true,
 };
+
+/// Weight and tip force, if there are any.
+fn loads(draw: &mut Draw, kind: &Kind, rods: usize, softest: f64) -> [Option<Vec<f64>>; 2] {
+    let (unit, veins) = match kind.of_the_softest {
+        true => (softest, 1),
+        false => (1.0, rods),
+    };
+    let gravity = draw.vector(kind.weight * unit, kind.decades);
+    let tip_force = draw.vector(kind.tip_force * unit * veins as f64, kind.decades);
+    [
+        draw.chance(0.8).then_some(gravity),
+        draw.chance(0.6).then_some(tip_force),
+    ]
+}
 
 /// A random leaf.
 fn leaf(draw: &mut Draw, kind: &Kind, name: &str) -> String {
@@ -144,9 +163,14 @@ fn leaf(draw: &mut Draw, kind: &Kind, name: &str) -> String {
         softest = seen.get();
         writeln!(text, "{key} = {value}").unwrap();
     }
+    let loads = loads(draw, kind, rods, softest);
+    let size = |v: &Vec<f64>| v.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let load: f64 = loads.iter().flatten().map(size).sum();
     let all_rigid = draw.chance(0.1);
     for key in ["axial", "shear_2", "shear_3"] {
         let [low, high] = kind.force;
+        let low = low.max(kind.force_per_load * load);
+        let high = high.max(10.0 * low);
         let value = draw.quantity(rods, |draw| match all_rigid || draw.chance(0.25) {
             true => f64::INFINITY,
             false => draw.log(low, high),
@@ -172,16 +196,11 @@ fn leaf(draw: &mut Draw, kind: &Kind, name: &str) -> String {
             writeln!(text, "{key} = {}", draw.uniform(0.0, most)).unwrap();
         }
     }
-    let unit = if kind.of_the_softest { softest } else { 1.0 };
-    let gravity = draw.vector(kind.weight * unit, kind.decades);
-    let veins = if kind.of_the_softest { 1 } else { rods };
-    let tip_force = draw.vector(kind.tip_force * unit * veins as f64, kind.decades);
     text += "[load]\n";
-    if draw.chance(0.8) {
-        writeln!(text, "gravity = {}", list(gravity)).unwrap();
-    }
-    if draw.chance(0.6) {
-        writeln!(text, "tip_force = {}", list(tip_force)).unwrap();
+    for (key, load) in ["gravity", "tip_force"].into_iter().zip(loads) {
+        if let Some(load) = load {
+            writeln!(text, "{key} = {}", list(load)).unwrap();
+        }
     }
     text
 }
