@@ -3,6 +3,7 @@
 
 mod common;
 
+use common::random::splitmix64;
 use common::{entries, scenario};
 use glam::DVec3;
 use leafdyn::scenario::Scenario;
@@ -21,6 +22,8 @@ fn they_are_closed_and_their_energy_is_kept() {
         "leaf.rods=3; leaf.length=[1.0, 0.8, 1.1]",
         "leaf.rods=2; leaf.length=[1.0, 0.6]; leaf.fan=[0.9, -0.2]",
         "leaf.rods=5; leaf.fan=[-1.2, -0.3, 0.1, 0.5, 1.4]; rest.bend_2=2.0",
+        // The midrib is straight, and has to give way to one side.
+        "leaf.rods=3; leaf.fan=\"symmetric\"",
     ] {
         let leaf = leaf(overrides);
         let mut simulation = Simulation::new(&leaf, &Options::default()).unwrap();
@@ -51,5 +54,32 @@ fn they_are_closed_and_their_energy_is_kept() {
         }
         println!("{overrides}: {begin} kept, {largest} moved");
         assert!(largest > 1e-4, "{overrides}: it moves");
+    }
+}
+
+/// Fans of all kinds move, those too in which a rod has to bend far to reach the others.
+#[test]
+fn fans_of_all_kinds_move() {
+    let mut state = 5;
+    let mut uniform = |low: f64, high: f64| low + (high - low) * splitmix64(&mut state);
+    for case in 0..30 {
+        let rods = uniform(2.0, 9.0) as usize;
+        let mut each = |low, high| -> Vec<f64> { (0..rods).map(|_| uniform(low, high)).collect() };
+        let (fan, length) = (each(-1.6, 1.6), each(0.7, 1.4));
+        let fan = match case % 3 {
+            0 => format!("{fan:?}"),
+            1 => "\"symmetric\"".into(),
+            _ => "\"paper\"".into(),
+        };
+        let overrides = format!(
+            "leaf.rods={rods}; leaf.fan={fan}; leaf.length={length:?}; dynamics.duration=1e-3; dynamics.output_interval=1e-3"
+        );
+        let mut simulation = Simulation::new(&leaf(&overrides), &Options::default()).unwrap();
+        while !simulation.done() {
+            simulation.next_frame().unwrap_or_else(|stopped| {
+                panic!("{overrides}: {stopped}");
+            });
+        }
+        assert!(simulation.frame().energy.kinetic > 0.0, "{overrides}");
     }
 }

@@ -26,7 +26,7 @@ const ROUNDING: f64 = 4e-15;
 
 /// Nodes times force evaluations after which a leaf that has not come to rest
 /// is given up: some seconds.
-pub const BUDGET: usize = 3_000_000;
+pub const BUDGET: usize = 4_000_000;
 
 /// A leaf settled on one grid.
 #[derive(Clone)]

@@ -1,6 +1,7 @@
 //! A start whose rigid segments are strained, as arcs of different chords are.
 
 use super::SemiImplicit;
+use super::curves::meeting;
 use crate::leaf::{DiscreteLeaf, State};
 use crate::newton::{Definite, Equations, Newton, Work};
 
@@ -22,12 +23,16 @@ const CLOSED: f64 = 1e-13;
 impl SemiImplicit {
     /// Moves the nodes to where rigid segments are not strained, by little: the
     /// leaf is made rigid by steps, without loads, while springs in proportion to
-    /// the masses hold its nodes. Leaves them where they are if that fails.
+    /// the masses hold its nodes. Where that fails, as straight rods do not know to
+    /// which side to give way, the rods become curves that meet. Leaves the nodes
+    /// where they are if there are none.
     pub(super) fn close(&mut self) {
         let mut leaf = self.leaf.clone();
         leaf.sections.clone_from(&self.sections);
         leaf.load_factor = 0.0;
         let closed = HOLDS.iter().find_map(|&rate| self.closed(&leaf, rate));
+        let held = leaf.leaf.held.is_some();
+        let closed = closed.or_else(|| meeting(&leaf).filter(|_| !held));
         if let Some(state) = closed {
             self.state = state;
         }

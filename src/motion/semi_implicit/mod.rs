@@ -17,6 +17,7 @@
 //! ```
 
 mod closing;
+mod curves;
 mod exchange;
 mod initial;
 mod step;

@@ -1,0 +1,182 @@
+//! Rigid rods that meet: curves of two parameters in the plane of the fan, neither
+//! stretched nor sheared, from the base to a common tip.
+
+use crate::leaf::{DiscreteLeaf, State};
+use crate::rotation;
+use glam::{DMat2, DQuat, DVec2, DVec3};
+
+/// The tip lies at the mean of what the arcs reach, but within these parts of the
+/// length of the shortest rod; nearer by this factor, as often as it takes, where
+/// a rod does not get there.
+const REACH: [f64; 2] = [0.2, 0.97];
+const NEARER: f64 = 0.96;
+
+/// Where the searches for a curve begin: the second parameter. The first is that of
+/// the arc, less a third of this, which keeps the direction of the chord. A straight
+/// rod that must give way has no side, and gets one.
+const BENDS: [f64; 9] = [0.0, 2.0, -2.0, 4.0, -4.0, 7.0, -7.0, 10.0, -10.0];
+
+/// Iterations of a search, their longest step, and the gap that is none.
+const ITERATIONS: usize = 30;
+const LONGEST: f64 = 0.7;
+const CLOSED: f64 = 1e-14;
+
+/// Largest turn of a segment.
+const LARGEST_TURN: f64 = 1.0;
+
+/// The state of a joined leaf, if there is one; the rods carry no forces.
+pub(super) fn meeting(leaf: &DiscreteLeaf) -> Option<State> {
+    let rods: Vec<Rod> = (0..leaf.rods()).map(|j| Rod::new(leaf, j)).collect();
+    let towards: DVec2 = rods.iter().map(|rod| DVec2::from_angle(rod.angle)).sum();
+    let towards = towards.try_normalize().unwrap_or(DVec2::X);
+    let openings: Vec<f64> = rods.iter().map(|rod| rod.opening(towards)).collect();
+    let chords = rods.iter().zip(&openings).map(|(rod, turn)| {
+        let [tip, _, _] = rod.end([-2.0 * turn, 0.0]);
+        tip.dot(towards)
+    });
+    let mean = chords.sum::<f64>() / rods.len() as f64;
+    let shortest = rods
+        .iter()
+        .map(|rod| rod.length)
+        .fold(f64::INFINITY, f64::min);
+    let nearest = REACH[0] * shortest;
+    let first = mean.clamp(nearest, REACH[1] * shortest);
+    let distances = std::iter::successors(Some(first), |far| Some(NEARER * far));
+    let (tip, found) = distances
+        .take_while(|distance| *distance >= nearest)
+        .find_map(|distance| {
+            let tip = distance * towards;
+            let found = rods.iter().zip(&openings);
+            let found = found.map(|(rod, turn)| rod.reaching(tip, -2.0 * turn));
+            Some((tip, found.collect::<Option<Vec<_>>>()?))
+        })?;
+    let (mut x, mut q) = (Vec::new(), Vec::new());
+    for (rod, parameters) in rods.iter().zip(found) {
+        rod.place(parameters, &mut x, &mut q);
+        *x.last_mut()? = tip.extend(0.0);
+    }
+    Some(State::new(leaf.segments(), x, q))
+}
+
+/// A rod whose direction turns by a p + b p (1 - p) up to the part p of its length.
+struct Rod {
+    angle: f64,
+    length: f64,
+    /// Ends of the segments as parts of the length.
+    parts: Vec<f64>,
+    /// Segments in their own directions.
+    segments: Vec<DVec3>,
+}
+
+impl Rod {
+    fn new(leaf: &DiscreteLeaf, j: usize) -> Self {
+        let segments: Vec<DVec3> = (0..leaf.segments())
+            .map(|i| {
+                let section = leaf.section(j, i);
+                section.ds * section.rest_strain
+            })
+            .collect();
+        let length = segments.iter().map(|segment| segment.length()).sum();
+        let mut parts = vec![0.0];
+        for segment in &segments {
+            parts.push(parts[parts.len() - 1] + segment.length() / length);
+        }
+        let base = leaf.leaf.base(j) * DVec3::X;
+        Rod {
+            angle: base.y.atan2(base.x),
+            length,
+            parts,
+            segments,
+        }
+    }
+
+    /// Angle from `towards` to its direction at the base, at most half a turn.
+    fn opening(&self, towards: DVec2) -> f64 {
+        towards.angle_to(DVec2::from_angle(self.angle))
+    }
+
+    /// What a node at `part` turns by, for a unit of each parameter.
+    fn turns(part: f64) -> [f64; 2] {
+        [part, part * (1.0 - part)]
+    }
+
+    fn direction(&self, [a, b]: [f64; 2], part: f64) -> f64 {
+        let [of_a, of_b] = Rod::turns(part);
+        self.angle + a * of_a + b * of_b
+    }
+
+    /// Where the rod ends, and the derivatives of that.
+    fn end(&self, parameters: [f64; 2]) -> [DVec2; 3] {
+        let mut sums = [DVec2::ZERO; 3];
+        for (ends, segment) in self.parts.windows(2).zip(&self.segments) {
+            let [from, to] = [ends[0], ends[1]].map(|part| self.direction(parameters, part));
+            let [t0, t1] = [ends[0], ends[1]].map(Rod::turns);
+            let placed = DVec2::from_angle(0.5 * (from + to)).rotate(segment.truncate());
+            sums[0] += placed;
+            for k in 0..2 {
+                sums[1 + k] += 0.5 * (t0[k] + t1[k]) * placed.perp();
+            }
+        }
+        sums
+    }
+
+    /// The parameters with which the rod ends at `tip`, bent as little as the searches
+    /// find, by Newton's method.
+    fn reaching(&self, tip: DVec2, arc: f64) -> Option<[f64; 2]> {
+        let searches = BENDS.iter().filter_map(|&bend| {
+            let mut at = DVec2::new(arc - bend / 3.0, bend);
+            for _ in 0..ITERATIONS {
+                let [end, of_a, of_b] = self.end(at.to_array());
+                let gap = tip - end;
+                if gap.length() < CLOSED * self.length {
+                    return Some(at.to_array());
+                }
+                let step = DMat2::from_cols(of_a, of_b).inverse() * gap;
+                if !step.is_finite() {
+                    return None;
+                }
+                at += step.clamp_length_max(LONGEST);
+            }
+            let [end, ..] = self.end(at.to_array());
+            // To rounding.
+            ((tip - end).length() < 10.0 * CLOSED * self.length).then_some(at.to_array())
+        });
+        searches
+            .map(|found| (self.bending(found), found))
+            .filter(|(_, found)| self.largest_turn(*found) < LARGEST_TURN)
+            .min_by(|(a, _), (b, _)| a.total_cmp(b))
+            .map(|(_, found)| found)
+    }
+
+    fn segment_turns(&self, parameters: [f64; 2]) -> impl Iterator<Item = (f64, f64)> {
+        self.parts.windows(2).map(move |ends| {
+            let [from, to] = [ends[0], ends[1]].map(|part| self.direction(parameters, part));
+            (to - from, ends[1] - ends[0])
+        })
+    }
+
+    /// Square of the curvature over the length.
+    fn bending(&self, parameters: [f64; 2]) -> f64 {
+        let turns = self.segment_turns(parameters);
+        turns.map(|(turn, part)| turn * turn / part).sum()
+    }
+
+    fn largest_turn(&self, parameters: [f64; 2]) -> f64 {
+        let turns = self.segment_turns(parameters);
+        turns.fold(0.0, |largest, (turn, _)| largest.max(turn.abs()))
+    }
+
+    /// Appends the nodes.
+    fn place(&self, parameters: [f64; 2], x: &mut Vec<DVec3>, q: &mut Vec<DQuat>) {
+        let frame = |part| rotation::exp(self.direction(parameters, part) * DVec3::Z);
+        let mut node = DVec3::ZERO;
+        x.push(node);
+        q.push(frame(0.0));
+        for (ends, segment) in self.parts.windows(2).zip(&self.segments) {
+            let next = frame(ends[1]);
+            node += rotation::midpoint(frame(ends[0]), next) * *segment;
+            x.push(node);
+            q.push(next);
+        }
+    }
+}
