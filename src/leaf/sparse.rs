@@ -11,7 +11,7 @@ use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky, supernodal,
 };
-use faer::sparse::{SparseColMat, Triplet};
+use faer::sparse::{Argsort, Pair, SparseColMat, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
 
 /// Blocks of the grid of rods and nodes no larger than this are not dissected.
@@ -20,6 +20,9 @@ const DISSECTION_LEAF: usize = 4;
 /// The pattern of a leaf's matrix: ordering and symbolic factorisation.
 pub struct SparsePattern {
     symbolic: SymbolicCholesky<usize>,
+    /// Of the lower triangle, where its [`entries`] stand, and how many there are.
+    lower: (SymbolicSparseColMat<usize>, Argsort<usize>),
+    entries: usize,
     unknowns: Unknowns,
     /// First of the rows that border the matrix, behind all others.
     border: usize,
@@ -78,14 +81,26 @@ impl SparsePattern {
             segments: n,
         };
         let ones = vec![vec![vec![[1.0; 6]; n]; rods]; rows];
+        let mut pairs = Vec::new();
+        entries(system, &unknowns, &ones, border, 0.0, |a, b, _| {
+            let (row, col) = (a.max(b), a.min(b));
+            pairs.push(Pair { row, col });
+        });
+        let placed = |pairs: &[Pair<usize, usize>]| {
+            SymbolicSparseColMat::try_new_from_indices(size, size, pairs).map_err(|_| SparseError)
+        };
+        let lower = placed(&pairs)?;
+        for pair in &mut pairs {
+            std::mem::swap(&mut pair.row, &mut pair.col);
+        }
         // With its ordering given, faer reads the pattern of the upper triangle.
-        let matrix = triangle(system, &unknowns, &ones, border, 0.0, Side::Upper)?;
+        let (upper, _) = placed(&pairs)?;
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
         let symbolic = factorize_symbolic_cholesky(
-            matrix.symbolic(),
+            upper.as_ref(),
             Side::Upper,
             SymmetricOrdering::Identity,
             params,
@@ -93,6 +108,8 @@ impl SparsePattern {
         .map_err(|_| SparseError)?;
         Ok(SparsePattern {
             symbolic,
+            lower,
+            entries: pairs.len(),
             unknowns,
             border,
             size,
@@ -126,14 +143,21 @@ impl SparsePattern {
         let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
             return Err(SparseError);
         };
-        let matrix = triangle(
+        let (pattern, order) = &self.lower;
+        let mut values = Vec::with_capacity(self.entries);
+        let (unknowns, first_border) = (&self.unknowns, self.border);
+        entries(
             system,
-            &self.unknowns,
+            unknowns,
             border,
-            self.border,
+            first_border,
             shift,
-            Side::Lower,
-        )?;
+            |_, _, value| {
+                values.push(value);
+            },
+        );
+        let matrix = SparseColMat::new_from_argsort(pattern.clone(), order, &values);
+        let matrix = matrix.map_err(|_| SparseError)?;
         let scratch =
             supernodal::factorize_supernodal_numeric_intranode_lblt_scratch::<usize, f64>(
                 symbolic,
@@ -317,25 +341,17 @@ fn dissect(rods: (usize, usize), nodes: (usize, usize), order: &mut Vec<(usize, 
     }
 }
 
-/// One triangle of K and its border.
-fn triangle(
+/// Tells where one triangle of K and its border has entries, some in several parts, and
+/// how large they are: the same places in the same order for all systems of a pattern.
+fn entries(
     system: &System,
     unknowns: &Unknowns,
     border: &[Field],
     first_border: usize,
     shift: f64,
-    side: Side,
-) -> Result<SparseColMat<usize, f64>, SparseError> {
+    mut add: impl FnMut(usize, usize, f64),
+) {
     let n = system.segments;
-    let mut entries = Vec::new();
-    let size = first_border + border.len();
-    let mut add = |a: usize, b: usize, value: f64| {
-        let (low, high) = (a.min(b), a.max(b));
-        entries.push(match side {
-            Side::Lower => Triplet::new(high, low, value),
-            Side::Upper => Triplet::new(low, high, value),
-        });
-    };
     for j in 0..system.rods() {
         let at = |i: usize, c: usize| unknowns.at(j, i, c);
         let (group, lane) = place(j);
@@ -371,5 +387,4 @@ fn triangle(
     for k in 0..border.len() {
         add(first_border + k, first_border + k, 0.0);
     }
-    SparseColMat::try_new_from_triplets(size, size, &entries).map_err(|_| SparseError)
 }
