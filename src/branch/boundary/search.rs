@@ -100,8 +100,9 @@ impl Search<'_> {
             .map(|mode| sheet.equations.momentum(mode))
             .collect();
         let rates = sheet.rates(self.spot)?;
-        let mut at = |distance: f64| -> Result<Found, Lost> {
-            let spot = sheet.moved(self.spot, self.across, distance)?;
+        // From the last spot, which the next is near.
+        let mut at = |from: &Spot, step: f64, distance: f64| -> Result<Found, Lost> {
+            let spot = sheet.moved(from, self.across, step)?;
             let sample = sheet.settle(&spot, [self.along, self.across], &border, &rates)?;
             let eigen = eigen(&sample, self.neutral);
             Ok(Found {
@@ -111,8 +112,8 @@ impl Search<'_> {
             })
         };
         let (mut distance, mut slope) = (0.0, self.slope);
-        let mut best = at(distance)?;
-        let mut value = best.eigen.value;
+        let mut best = at(self.spot, 0.0, distance)?;
+        let (mut value, mut last) = (best.eigen.value, best.spot().clone());
         let mut worse = 0;
         for _ in 0..EVALUATIONS {
             let step = -value / slope;
@@ -122,8 +123,9 @@ impl Search<'_> {
             if step.abs() < self.accuracy {
                 return Ok(best);
             }
-            let next = at(distance + step)?;
+            let next = at(&last, step, distance + step)?;
             let after = next.eigen.value;
+            last.clone_from(next.spot());
             if step.abs() > LOCAL {
                 slope = (after - value) / step;
             }
