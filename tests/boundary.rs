@@ -8,7 +8,9 @@ use std::f64::consts::PI;
 
 use common::branch::text;
 use common::{RIGID, ROD, entries};
-use leafdyn::study::{Base, Boundary, BoundaryCurve, BoundaryRequest, TraceRequest, boundary};
+use leafdyn::study::{
+    Base, Boundary, BoundaryCurve, BoundaryPoint, BoundaryRequest, TraceRequest, boundary,
+};
 use workplace::{Workplace, contains};
 
 /// The boundary of the scenario of a text with entries replaced, along the first number
@@ -96,6 +98,36 @@ fn reissner_over_the_axial_stiffness() {
     }
 }
 
+/// Greenhill's column of weight q with a load P on its tip, both pushing: theta'' + (P + q t)
+/// theta = 0 from the tip, where theta' = 0, to the base, where theta = 0; by power series.
+#[test]
+fn greenhill_over_the_tip_load() {
+    let at_the_base = |q: f64, p: f64| {
+        let mut a = vec![1.0, 0.0, -0.5 * p];
+        for n in 1..60 {
+            a.push(-(p * a[n] + q * a[n - 1]) / ((n + 2) * (n + 1)) as f64);
+        }
+        a.iter().sum::<f64>()
+    };
+    let weight = |p: f64| {
+        let (mut low, mut high) = (0.0, 20.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            match at_the_base(middle, p) > 0.0 {
+                true => low = middle,
+                false => high = middle,
+            }
+        }
+        low
+    };
+    // 9/4 of the square of the first zero of J_{-1/3}, without a tip load.
+    assert!((weight(0.0) - 7.837347438943484).abs() < 1e-13);
+    let strip = format!("{RIGID}; stiffness.bending_2=1000.0");
+    let (along, across) = ("load.gravity[0]=0..-12", "load.tip_force[0]=-1..1");
+    let found = follow(ROD, &strip, along, across);
+    is("Greenhill", only(&found), |force| -weight(-force), 1e-8);
+}
+
 /// Two directions at once, as long as a column is round: sideways and up and down together.
 #[test]
 fn a_round_column_buckles_in_two_directions_all_along() {
@@ -163,6 +195,34 @@ fn a_lens_with_a_midrib_over_its_stiffness() {
     let curve = only(&found);
     let off = curve.points[0].values[0] / 0.93780575743 - 1.0;
     assert!(off.abs() < 1e-9, "{off}");
+}
+
+/// The same over the angle of the fan; traces of leaves of other angles find it where it is.
+#[test]
+fn a_lens_with_a_midrib_over_the_fan() {
+    let short = "leaf.length=[1.0, 0.9, 1.0]; stiffness.axial=2500; \
+                 stiffness.shear_2=1000; stiffness.shear_3=1000";
+    let (along, across) = ("leaf.length[1]=0.9..0.98", "scale:leaf.fan=0.7..1");
+    let found = follow(&text("classic/lens_midrib"), short, along, across);
+    assert!(found.complete, "{:?}", found.remark);
+    let curve = &found.curves[0];
+    let at = |point: &BoundaryPoint| (point.values[0] / 0.93780575743 - 1.0).abs();
+    let known = curve.points.iter().find(|point| point.values[1] == 1.0);
+    assert!(at(known.unwrap()) < 1e-9);
+    for point in curve.points.iter().step_by(4) {
+        let [length, scale] = point.values;
+        let angle = PI / 3.0 * scale;
+        let bent = format!("{short}; leaf.fan=[{:?}, 0.0, {angle:?}]", -angle);
+        let around = format!("leaf.length[1]={:?}..{:?}", length - 0.01, length + 0.003);
+        let traced = common::branch::follow(&text("classic/lens_midrib"), &bent, &around, false);
+        let (_, first) = traced.branches[0].critical().next().unwrap();
+        let off = (first.value - length).abs();
+        let stated = point.errors[0] + first.value_error.unwrap() + 1e-12;
+        assert!(
+            off <= stated,
+            "{scale}: off by {off:.1e}, {stated:.1e} stated"
+        );
+    }
 }
 
 /// A hanging rod leaves its plane between two weights, if it is curved enough: the curve
