@@ -74,7 +74,7 @@ pub fn contender(contender: Contender) -> &'static str {
 pub fn branch_end(end: &End) -> &'static str {
     match end {
         End::Reached => "to the end of the range",
-        End::Returned => "back to its start",
+        End::Returned => "back to the start of the range",
         End::Closed => "closed",
         End::MostPoints => "goes on",
         End::Stuck(Stuck::OutOfRange(_)) => "ends where no leaf is",
