@@ -13,6 +13,7 @@ use crate::study::{self, Chart as Charted, ChartOptions, Contender, Turn};
 
 use crate::report;
 
+use super::progress::part_of;
 use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status};
 
@@ -87,15 +88,14 @@ impl Chart {
         }
         let mut line = job.progress();
         let mut progress = |turn: &Turn| {
-            line.say(|elapsed| {
+            line.tell(part_of(turn.round - 1, turn.rounds), || {
                 format!(
-                    "{} veins, {}, {}, round {} of {}, {:.0} s",
+                    "{} veins, {}, {}, round {} of {}",
                     turn.rods,
                     contender(turn.contender),
                     turn.knob,
                     turn.round,
                     turn.rounds,
-                    elapsed.as_secs_f64(),
                 )
             });
         };

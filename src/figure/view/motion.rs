@@ -5,6 +5,7 @@ use super::data::{Chart, Curve, Leaf, View};
 use crate::figure::drawing::Drawing;
 use crate::report::numbers::short;
 use crate::report::simulate_lines;
+use crate::scenario::Scenario;
 use crate::simulate::{Moment, Record};
 
 /// Nodes of a vein that are drawn, but for the first.
@@ -32,15 +33,21 @@ impl Viewed for Record {
             let time = Some(time);
             Leaf {
                 time,
-                ..Leaf::coarse(label, &still.curves, &view.drawn, MOST_NODES)
+                ..Leaf::coarse(
+                    label,
+                    &self.stations,
+                    &still.curves,
+                    &view.drawn,
+                    MOST_NODES,
+                )
             }
         });
         view.leaves = shapes.collect();
         view.chart = Some(chart(&self.moments));
     }
 
-    fn still(&self) -> Drawing {
-        crate::figure::filmstrip(self)
+    fn still(&self, scenario: &Scenario) -> Drawing {
+        crate::figure::filmstrip(self, scenario)
     }
 }
 

@@ -6,6 +6,7 @@ use crate::figure::drawing::Drawing;
 use crate::report::numbers::{brief, significant};
 use crate::report::trace_lines;
 use crate::report::words::equilibrium_of_index;
+use crate::scenario::Scenario;
 use crate::study::{PointKind, Trace, TraceBranch, TracePoint};
 
 /// Nodes of a vein that are drawn, but for the first.
@@ -27,8 +28,8 @@ impl Viewed for Trace {
         view.chart = Some(chart(self));
     }
 
-    fn still(&self) -> Drawing {
-        crate::figure::trace(self)
+    fn still(&self, scenario: &Scenario) -> Drawing {
+        crate::figure::trace(self, scenario)
     }
 }
 
@@ -43,7 +44,13 @@ fn leaf(trace: &Trace, point: &TracePoint, drawn: &[usize]) -> Leaf {
     };
     Leaf {
         summary: vec![("energy", significant(point.energy))],
-        ..Leaf::coarse(format!("{at}: {kind}"), &point.curves, drawn, MOST_NODES)
+        ..Leaf::coarse(
+            format!("{at}: {kind}"),
+            &point.stations,
+            &point.curves,
+            drawn,
+            MOST_NODES,
+        )
     }
 }
 
