@@ -29,9 +29,9 @@ const SIZE: DVec2 = DVec2::new(320.0, 240.0);
 const TITLE: f64 = 26.0;
 
 const ROOM: Room = Room {
-    left: 34.0,
-    right: 30.0,
-    below: 30.0,
+    left: 46.0,
+    right: 42.0,
+    below: 42.0,
 };
 
 /// Stands for a pixel that is as before.
@@ -126,7 +126,7 @@ fn picture(veins: &Veins, bounds: [DVec3; 2], setting: &Setting, text: &str) -> 
     let scene = Scene::new(bounds, setting, View::Oblique, cell, ROOM, None);
     scene.draw_box(&mut page);
     scene.draw_labels(&mut page);
-    scene.draw_names(&mut page, 26.0, true);
+    scene.draw_names(&mut page, 36.0, true);
     scene.draw_gravity(&mut page);
     scene.draw_leaf(&mut page, veins, 0.75 * veins.line_width());
     let corner = DVec2::new(10.0, 17.0);

@@ -48,6 +48,9 @@ pub struct Room {
 /// Distance between the ticks of an axis at least.
 const TICK_DISTANCE: f64 = 30.0;
 
+/// From the top of an upright edge to its name.
+const ABOVE: DVec2 = DVec2::new(0.0, 12.0);
+
 /// The leaf with air around it, no side too short to see.
 pub fn surrounding_box(low: DVec3, high: DVec3) -> [DVec3; 2] {
     let extent = (high - low).max_element();
@@ -258,11 +261,12 @@ impl Scene {
             let middle = self.place(edge.point(0.5 * (edge.low + edge.high)));
             let at = middle + away(self.outward(edge), distance);
             let name = self.setting.brief_axis(edge.axis, values);
-            // A long name reaches away from its edge.
-            let anchor = match edge.axis {
-                _ if name.chars().count() < 3 => Anchor::Middle,
-                1 => Anchor::Start,
-                _ => Anchor::End,
+            // A long name reaches away from its edge, or stands on top of it.
+            let (at, anchor) = match edge.axis {
+                _ if name.chars().count() < 3 => (at, Anchor::Middle),
+                0 => (at, Anchor::End),
+                1 => (at, Anchor::Start),
+                _ => (self.place(edge.point(edge.high)) - ABOVE, Anchor::Middle),
             };
             page.beside(at, &name, TEXT_SIZE + 1.0, anchor, INK);
         }
