@@ -87,8 +87,15 @@ impl Chart {
             options.peers.extend(files::read_peers(file)?);
         }
         let mut line = job.progress();
+        let (mut rounds, mut first) = (0, 1);
         let mut progress = |turn: &Turn| {
-            line.tell(part_of(turn.round - 1, turn.rounds), || {
+            // The rounds that all take part in come first, as long as they take.
+            if turn.rounds != rounds {
+                (rounds, first) = (turn.rounds, turn.round);
+                line.next();
+            }
+            let part = part_of(turn.round - first, rounds - first + 1);
+            line.tell(part, || {
                 format!(
                     "{} veins, {}, {}, round {} of {}",
                     turn.rods,

@@ -23,6 +23,8 @@ pub struct ProgressLine {
     terminal: bool,
     bar: Option<ProgressBar>,
     grids: Grids,
+    /// Since when parts of the run are told: before that it did something else.
+    since: Duration,
 }
 
 impl ProgressLine {
@@ -34,6 +36,7 @@ impl ProgressLine {
             terminal,
             bar: None,
             grids: Grids::default(),
+            since: Duration::ZERO,
         }
     }
 
@@ -45,6 +48,7 @@ impl ProgressLine {
             terminal: false,
             bar: None,
             grids: Grids::default(),
+            since: Duration::ZERO,
         }
     }
 
@@ -62,7 +66,16 @@ impl ProgressLine {
     /// Shows a message with the time taken and, where it is known which part of the
     /// run is done, the time left.
     pub fn tell(&mut self, part: Option<f64>, message: impl FnOnce() -> String) {
-        self.say(|elapsed| format!("{}, {}", message(), time_left(elapsed, part)));
+        let since = self.since;
+        self.say(|elapsed| {
+            let left = left(elapsed.saturating_sub(since), part);
+            format!("{}, {:.0} s{left}", message(), elapsed.as_secs_f64())
+        });
+    }
+
+    /// From now on the part that is told is that of what comes next.
+    pub fn next(&mut self) {
+        self.since = self.start.elapsed();
     }
 
     /// Shows a message, which is told how long the run has taken.
@@ -85,14 +98,14 @@ impl ProgressLine {
 /// How long a run has taken, and about how long it will still take if this part of it,
 /// from 0 to 1, is done.
 pub fn time_left(elapsed: Duration, part: Option<f64>) -> String {
-    let taken = elapsed.as_secs_f64();
-    match part.filter(|part| (LEAST_PART..=1.0).contains(part)) {
-        Some(part) => format!(
-            "{taken:.0} s, {} left",
-            duration(taken * (1.0 / part - 1.0))
-        ),
-        None => format!("{taken:.0} s"),
-    }
+    format!("{:.0} s{}", elapsed.as_secs_f64(), left(elapsed, part))
+}
+
+/// What is to be added to the time taken: nothing where nothing is known.
+fn left(elapsed: Duration, part: Option<f64>) -> String {
+    let known = part.filter(|part| (LEAST_PART..=1.0).contains(part));
+    let left = |part: f64| duration(elapsed.as_secs_f64() * (1.0 / part - 1.0));
+    known.map_or(String::new(), |part| format!(", {} left", left(part)))
 }
 
 /// The part of so many equal ones that is done.
@@ -165,20 +178,20 @@ impl Drop for ProgressLine {
 mod tests {
     use super::*;
 
-    fn left(part: Option<f64>) -> String {
+    fn told(part: Option<f64>) -> String {
         time_left(Duration::from_secs(10), part)
     }
 
     #[test]
     fn the_time_left_is_told_where_it_is_known() {
-        assert_eq!(left(Some(0.25)), "10 s, 30 s left");
-        assert_eq!(left(Some(1.0)), "10 s, 0 s left");
-        assert_eq!(left(Some(0.001)), "10 s, 3 h left");
+        assert_eq!(told(Some(0.25)), "10 s, 30 s left");
+        assert_eq!(told(Some(1.0)), "10 s, 0 s left");
+        assert_eq!(told(Some(0.001)), "10 s, 3 h left");
         for unknown in [None, Some(0.0), Some(-0.1), Some(1.5), Some(f64::NAN)] {
-            assert_eq!(left(unknown), "10 s");
+            assert_eq!(told(unknown), "10 s");
         }
-        assert_eq!(left(part_of(3, 4)), "10 s, 4 s left");
-        assert_eq!(left(part_of(0, 0)), "10 s");
+        assert_eq!(told(part_of(3, 4)), "10 s, 4 s left");
+        assert_eq!(told(part_of(0, 0)), "10 s");
     }
 
     #[test]

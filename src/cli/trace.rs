@@ -7,7 +7,7 @@ use crate::study::{
     TraceShow, Vary,
 };
 
-use crate::report;
+use crate::report::{self, numbers::brief};
 
 use super::progress::part_of_way;
 use super::request::{Done, How, Job, Request};
@@ -102,6 +102,7 @@ impl Trace {
                 Some(number) => {
                     if number != seen.0 {
                         seen = (number, [second; 2]);
+                        line.next();
                     }
                     seen.1 = [seen.1[0].min(second), seen.1[1].max(second)];
                     let [from, to] = ends(across);
@@ -111,7 +112,7 @@ impl Trace {
             };
             line.tell(part, || {
                 let what = curve.map_or("trace".into(), |curve| format!("curve {}", curve + 1));
-                let [first, second] = [along.keys.text(first), across.keys.text(second)];
+                let [first, second] = [first, second].map(brief);
                 format!("{what}, {points} points, at {first}, {second}")
             });
         })
@@ -126,15 +127,21 @@ impl Trace {
     fn one(&self, job: &Job, vary: &Vary) -> Result<Done, Refusal> {
         let request = self.along(job, vary)?;
         let mut line = job.progress();
+        let mut seen = (0, ends(vary)[0]);
         let mut trace = study::trace(&request, &mut |branch, points, value| {
-            // How many branches there will be, nobody knows.
+            if branch != seen.0 {
+                seen = (branch, value);
+                line.next();
+            }
+            // To the end it goes to; how many branches there will be, nobody knows.
             let [from, to] = ends(vary);
-            let part = match branch {
-                0 => part_of_way(from, value, to, vary.log),
-                _ => None,
+            let to = if (value - seen.1) * (to - from) < 0.0 {
+                from
+            } else {
+                to
             };
-            line.tell(part, || {
-                let at = request.vary.keys.text(value);
+            line.tell(part_of_way(seen.1, value, to, vary.log), || {
+                let at = brief(value);
                 format!("branch {}, {points} points, at {at}", branch + 1)
             });
         })

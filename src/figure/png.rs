@@ -234,9 +234,12 @@ mod tests {
         reader.next_frame(&mut pixels).unwrap();
         let whole = paint(&page);
         assert_eq!(4 * pixels.len(), 3 * whole.data().len());
-        // But for rounding where edges are smoothed.
-        for (a, b) in pixels.chunks_exact(3).zip(whole.data().chunks_exact(4)) {
-            assert!((0..3).all(|c| a[c].abs_diff(b[c]) <= 24), "{a:?} {b:?}");
-        }
+        // But for rounding where edges are smoothed, in four parts of a pixel each way.
+        let pairs = pixels.chunks_exact(3).zip(whole.data().chunks_exact(4));
+        let off = |(a, b): (&[u8], &[u8])| (0..3).map(|c| a[c].abs_diff(b[c])).max();
+        let off: Vec<u8> = pairs.filter_map(off).collect();
+        assert!(off.iter().all(|&off| off <= 64), "{:?}", off.iter().max());
+        let seen = off.iter().filter(|&&off| off > 2).count();
+        assert!(seen < off.len() / 1000, "{seen} pixels of {}", off.len());
     }
 }

@@ -4,9 +4,11 @@
 use glam::DVec3;
 use serde::Serialize;
 
+use crate::figure::setting::with_unit;
 use crate::figure::veins::is_near;
 use crate::relax::RodShape;
 use crate::report::base64::encode as base64;
+use crate::scenario::Units;
 
 /// Numbers of a [`Leaf`]'s state per node: rotation w, x, y, z, then v, u, n, m.
 const STATE: usize = 16;
@@ -108,6 +110,19 @@ pub struct Curve {
     pub unstable: Vec<bool>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub special: Vec<(usize, &'static str)>,
+}
+
+impl View {
+    /// A quantity's name with the unit of its values, if that is known: of a length or,
+    /// otherwise, of an energy.
+    pub fn with_unit(&self, name: &str, is_length: bool) -> String {
+        let [length, force] = self.units.clone();
+        let unit = match is_length {
+            true => length,
+            false => Units { length, force }.energy(),
+        };
+        with_unit(name, unit.as_deref())
+    }
 }
 
 impl Leaf {

@@ -267,6 +267,9 @@ mod tests {
         let names: Vec<&str> = curves.iter().filter_map(|c| c["name"].as_str()).collect();
         assert!(names.contains(&"kinetic") && names.contains(&"tip z"));
         assert!(!names.contains(&"work put in"), "{names:?}");
+        // In the unit of lengths; that of forces has no name.
+        let choices = &data["chart"]["choices"];
+        assert_eq!(*choices, serde_json::json!(["energy", "tip / cm"]));
     }
 
     #[test]

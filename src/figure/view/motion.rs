@@ -43,7 +43,7 @@ impl Viewed for Record {
             }
         });
         view.leaves = shapes.collect();
-        view.chart = Some(chart(&self.moments));
+        view.chart = Some(chart(&self.moments, view));
     }
 
     fn still(&self, scenario: &Scenario) -> Drawing {
@@ -52,7 +52,7 @@ impl Viewed for Record {
 }
 
 /// Energies and the tip in time.
-fn chart(moments: &[Moment]) -> Chart {
+fn chart(moments: &[Moment], view: &View) -> Chart {
     let stride = moments.len().div_ceil(MOST_POINTS).max(1);
     let shown = || moments.iter().step_by(stride);
     let curve = |choice, color, name: &str, of: &dyn Fn(&Moment) -> f64| Curve {
@@ -89,7 +89,7 @@ fn chart(moments: &[Moment]) -> Chart {
     Chart {
         across: "time".into(),
         log: false,
-        choices: ["energy", "tip"].map(String::from).into(),
+        choices: vec![view.with_unit("energy", false), view.with_unit("tip", true)],
         curves,
     }
 }

@@ -25,7 +25,7 @@ impl Viewed for Trace {
         view.summary = trace_lines(self, None);
         let points = self.branches.iter().flat_map(|branch| &branch.points);
         view.leaves = points.map(|point| leaf(self, point, &view.drawn)).collect();
-        view.chart = Some(chart(self));
+        view.chart = Some(chart(self, view));
     }
 
     fn still(&self, scenario: &Scenario) -> Drawing {
@@ -55,7 +55,7 @@ fn leaf(trace: &Trace, point: &TracePoint, drawn: &[usize]) -> Leaf {
 }
 
 /// Coordinates of the tip and the energy against what varies.
-fn chart(trace: &Trace) -> Chart {
+fn chart(trace: &Trace, view: &View) -> Chart {
     type Of = fn(&TracePoint) -> f64;
     // Of free tips the first speaks for all.
     fn tip(point: &TracePoint, axis: usize) -> f64 {
@@ -78,7 +78,9 @@ fn chart(trace: &Trace) -> Chart {
     Chart {
         across: trace.keys.to_string(),
         log: trace.log,
-        choices: choices.map(|(name, _)| name.into()).into(),
+        choices: choices
+            .map(|(name, _)| view.with_unit(name, name != "energy"))
+            .into(),
         curves,
     }
 }
