@@ -104,7 +104,7 @@ impl Axis {
     /// The same axis, of at least this extent: what varies less is rounding.
     pub fn at_least(self, extent: f64) -> Self {
         let lacking = extent - (self.end - self.start);
-        if !(lacking > 0.0) {
+        if lacking.is_nan() || lacking <= 0.0 {
             return self;
         }
         Axis {

@@ -49,7 +49,7 @@ pub struct Room {
 const TICK_DISTANCE: f64 = 30.0;
 
 /// From the top of an upright edge to its name.
-const ABOVE: DVec2 = DVec2::new(0.0, 12.0);
+const ABOVE: DVec2 = DVec2::new(6.0, -12.0);
 
 /// The leaf with air around it, no side too short to see.
 pub fn surrounding_box(low: DVec3, high: DVec3) -> [DVec3; 2] {
@@ -266,7 +266,7 @@ impl Scene {
                 _ if name.chars().count() < 3 => (at, Anchor::Middle),
                 0 => (at, Anchor::End),
                 1 => (at, Anchor::Start),
-                _ => (self.place(edge.point(edge.high)) - ABOVE, Anchor::Middle),
+                _ => (self.place(edge.point(edge.high)) + ABOVE, Anchor::End),
             };
             page.beside(at, &name, TEXT_SIZE + 1.0, anchor, INK);
         }

@@ -27,8 +27,12 @@ const BETWEEN: f64 = 26.0;
 /// Leaves drawn, and branches named.
 const MOST_LEAVES: usize = 8;
 const MOST_NAMED: usize = 7;
-/// Smaller differences are not seen in small panels, in lengths.
+/// Smaller differences are not seen in small panels: in lengths, and as a part of the
+/// largest.
 const SEEN: f64 = 0.04;
+const PART_SEEN: f64 = 0.25;
+/// Parts of a vein between the places at which leaves are compared.
+const PARTS: usize = 8;
 /// Smaller twists, in radians, and ways of tips, in lengths, are rounding.
 const ROUNDING: f64 = 1e-7;
 
@@ -121,9 +125,13 @@ fn shown(trace: &Trace) -> Vec<[usize; 2]> {
     }
     wanted.sort_by_key(|&(rank, _)| rank);
     let point = |[b, p]: [usize; 2]| &trace.branches[b].points[p];
+    let first = wanted.first().map(|&(_, at)| at);
+    let away = |at: [usize; 2]| first.map_or(0.0, |first| apart(point(at), point(first)));
+    let farthest = wanted.iter().map(|&(_, at)| away(at)).fold(0.0, f64::max);
+    let seen = SEEN.min(PART_SEEN * farthest);
     let mut shown: Vec<[usize; 2]> = Vec::new();
     for (_, at) in wanted {
-        let alike = |&other: &[usize; 2]| look_alike(point(at), point(other));
+        let alike = |&other: &[usize; 2]| apart(point(at), point(other)) <= seen;
         if shown.len() < MOST_LEAVES && !shown.iter().any(alike) {
             shown.push(at);
         }
@@ -132,16 +140,17 @@ fn shown(trace: &Trace) -> Vec<[usize; 2]> {
     shown
 }
 
-/// Whether two leaves are everywhere closer than can be seen in small panels.
-fn look_alike(one: &TracePoint, other: &TracePoint) -> bool {
-    let size = one
-        .curves
-        .iter()
-        .map(|curve| length(curve))
-        .fold(0.0, f64::max);
-    let pairs = one.curves.iter().zip(&other.curves);
-    let mut points = pairs.flat_map(|(a, b)| a.iter().zip(b));
-    points.all(|(a, b)| a.distance(*b) < SEEN * size)
+/// How far two leaves are apart at most, in lengths; their grids may differ.
+fn apart(one: &TracePoint, other: &TracePoint) -> f64 {
+    let at = |curve: &[DVec3], part: usize| {
+        let last = curve.len().saturating_sub(1);
+        curve.get((part * last + PARTS / 2) / PARTS).copied()
+    };
+    let pairs = || one.curves.iter().zip(&other.curves);
+    let points = pairs().flat_map(|(a, b)| (0..=PARTS).map(move |k| at(a, k).zip(at(b, k))));
+    let far = points.flatten().map(|(a, b)| a.distance(b));
+    let size = pairs().map(|(a, b)| length(a).max(length(b)));
+    far.fold(0.0, f64::max) / size.fold(f64::MIN_POSITIVE, f64::max)
 }
 
 fn what(point: &TracePoint) -> String {
