@@ -30,6 +30,33 @@ fn every_example_does_what_its_last_line_says() {
     }
 }
 
+/// From a clone to a leaf that turns in a browser, as the README says it.
+#[test]
+fn the_way_of_a_newcomer_is_short_and_leads_to_a_page() {
+    let readme = concat!(env!("CARGO_MANIFEST_DIR"), "/README.md");
+    let readme = fs::read_to_string(readme).unwrap();
+    let (_, way) = readme.split_once("## A leaf of your own").unwrap();
+    let (way, _) = way.split_once("`my-leaf.toml`").unwrap();
+    let blocks = way.split("```sh\n").skip(1);
+    let commands: Vec<&str> = (blocks.flat_map(|block| block.split("```").next()))
+        .flat_map(str::lines)
+        .collect();
+    // With those that clone the repository and enter it.
+    assert!(2 + commands.len() <= 5, "{commands:?}");
+    let (install, own) = commands.split_first().unwrap();
+    assert_eq!(*install, "cargo install --path .");
+    let folder = TempDir::new().unwrap();
+    for command in own {
+        let mut words = command.split(' ');
+        assert_eq!(words.next(), Some("leafdyn"));
+        leafdyn(&folder, &words.collect::<Vec<_>>()).success();
+    }
+    let page = "out/leaf/view.html";
+    assert!(way.contains(&format!("Open `{page}` in a browser")));
+    let page = fs::read_to_string(folder.path().join(page)).unwrap();
+    assert!(page.contains("<canvas id=\"space\"") && page.ends_with("</html>\n"));
+}
+
 #[test]
 fn what_is_there_is_not_replaced() {
     let folder = TempDir::new().unwrap();

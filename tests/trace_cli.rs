@@ -114,7 +114,7 @@ fn a_leaf_that_is_pulled_obeys_hookes_law() {
         assert!(number("slope") < straight && number("slope") > 0.7 * straight);
         let young = number("slope") * number("length") / 0.05;
         assert!((number("young") / young - 1.0).abs() < 1e-12);
-        let parts = ["displacement along x (cm)", "force (N)", "slope", "N/cm"];
+        let parts = ["displacement along x / cm", "force / N", "slope", "N/cm"];
         contains(&place.picture("h/trace"), &parts);
     }
 }

@@ -13,6 +13,7 @@ use crate::study::{self, Chart as Charted, ChartOptions, Contender, Turn};
 
 use crate::report;
 
+use super::progress::part_of;
 use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status};
 
@@ -86,16 +87,22 @@ impl Chart {
             options.peers.extend(files::read_peers(file)?);
         }
         let mut line = job.progress();
+        let (mut rounds, mut first) = (0, 1);
         let mut progress = |turn: &Turn| {
-            line.say(|elapsed| {
+            // The rounds that all take part in come first, as long as they take.
+            if turn.rounds != rounds {
+                (rounds, first) = (turn.rounds, turn.round);
+                line.next();
+            }
+            let part = part_of(turn.round - first, rounds - first + 1);
+            line.tell(part, || {
                 format!(
-                    "{} veins, {}, {}, round {} of {}, {:.0} s",
+                    "{} veins, {}, {}, round {} of {}",
                     turn.rods,
                     contender(turn.contender),
                     turn.knob,
                     turn.round,
                     turn.rounds,
-                    elapsed.as_secs_f64(),
                 )
             });
         };

@@ -45,8 +45,9 @@ impl Check {
             ..CheckOptions::default()
         };
         let mut line = job.progress();
+        let tolerance = self.request.tolerance.unwrap_or(job.scenario.tolerance);
         let check = study::check(&job.scenario, &options, &mut |progress| {
-            line.update(progress)
+            line.relaxing(progress, tolerance)
         })?;
         drop(line);
         if let Verdict::NotCompared(reason) = &check.verdict {

@@ -16,7 +16,7 @@ use crate::study::{
 
 use crate::report;
 
-use super::progress::time_left;
+use super::progress::{part_of, time_left};
 use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status};
 
@@ -202,7 +202,7 @@ impl Map {
             finished += 1;
             let cells = todo.len();
             line.say(|time| {
-                let time = time_left(time, finished, cells);
+                let time = time_left(time, part_of(finished, cells));
                 format!("{finished} of {cells} cells, {time}")
             });
             failed.is_none()

@@ -13,12 +13,18 @@ const LONG_RUN: Duration = Duration::from_millis(500);
 /// Redraws of the line per second at most.
 const REDRAWS_PER_SECOND: u8 = 10;
 
+/// Of less nothing can be said.
+const LEAST_PART: f64 = 1e-3;
+
 /// The progress line; it vanishes when dropped.
 pub struct ProgressLine {
     scenario: String,
     start: Instant,
     terminal: bool,
     bar: Option<ProgressBar>,
+    grids: Grids,
+    /// Since when parts of the run are told: before that it did something else.
+    since: Duration,
 }
 
 impl ProgressLine {
@@ -29,6 +35,8 @@ impl ProgressLine {
             start: Instant::now(),
             terminal,
             bar: None,
+            grids: Grids::default(),
+            since: Duration::ZERO,
         }
     }
 
@@ -39,20 +47,35 @@ impl ProgressLine {
             start: Instant::now(),
             terminal: false,
             bar: None,
+            grids: Grids::default(),
+            since: Duration::ZERO,
         }
     }
 
-    /// How far a relaxation has come.
-    pub fn update(&mut self, progress: &Progress) {
-        self.say(|elapsed| {
+    /// How far a relaxation to this tolerance has come.
+    pub fn relaxing(&mut self, progress: &Progress, tolerance: f64) {
+        let part = self.grids.part(progress, tolerance);
+        self.tell(part, || {
             format!(
-                "{} segments a vein, step {}, residual {:.1e}, {:.0} s",
-                progress.grid,
-                progress.step,
-                progress.residual,
-                elapsed.as_secs_f64(),
+                "{} segments a vein, step {}, residual {:.1e}",
+                progress.grid, progress.step, progress.residual,
             )
         });
+    }
+
+    /// Shows a message with the time taken and, where it is known which part of the
+    /// run is done, the time left.
+    pub fn tell(&mut self, part: Option<f64>, message: impl FnOnce() -> String) {
+        let since = self.since;
+        self.say(|elapsed| {
+            let left = left(elapsed.saturating_sub(since), part);
+            format!("{}, {:.0} s{left}", message(), elapsed.as_secs_f64())
+        });
+    }
+
+    /// From now on the part that is told is that of what comes next.
+    pub fn next(&mut self) {
+        self.since = self.start.elapsed();
     }
 
     /// Shows a message, which is told how long the run has taken.
@@ -72,12 +95,64 @@ impl ProgressLine {
     }
 }
 
-/// How long a run has taken after `done` of `all` equal parts, and about how long it
-/// will still take.
-pub fn time_left(elapsed: Duration, done: usize, all: usize) -> String {
-    let taken = elapsed.as_secs_f64();
-    let left = taken * (all as f64 / done.max(1) as f64 - 1.0);
-    format!("{taken:.0} s, {} left", duration(left))
+/// How long a run has taken, and about how long it will still take if this part of it,
+/// from 0 to 1, is done.
+pub fn time_left(elapsed: Duration, part: Option<f64>) -> String {
+    format!("{:.0} s{}", elapsed.as_secs_f64(), left(elapsed, part))
+}
+
+/// What is to be added to the time taken: nothing where nothing is known.
+fn left(elapsed: Duration, part: Option<f64>) -> String {
+    let known = part.filter(|part| (LEAST_PART..=1.0).contains(part));
+    let left = |part: f64| duration(elapsed.as_secs_f64() * (1.0 / part - 1.0));
+    known.map_or(String::new(), |part| format!(", {} left", left(part)))
+}
+
+/// The part of so many equal ones that is done.
+pub fn part_of(done: usize, all: usize) -> Option<f64> {
+    Some(done as f64 / all.max(1) as f64)
+}
+
+/// The part of the way from one number to another, or of that of their logarithms.
+pub fn part_of_way(from: f64, at: f64, to: f64, log: bool) -> Option<f64> {
+    let place = |value: f64| if log { value.abs().ln() } else { value };
+    let part = (place(at) - place(from)) / (place(to) - place(from));
+    part.is_finite().then_some(part)
+}
+
+/// The grids of a relaxation, each twice as fine as the one before.
+#[derive(Default)]
+struct Grids {
+    /// The first, and the present one.
+    seen: Vec<usize>,
+}
+
+impl Grids {
+    /// About which part of the work is done: that of the first grid, on which the leaf
+    /// moves, as of six Newton steps there; of the others two each. Every grid removes
+    /// some three digits of the error.
+    fn part(&mut self, progress: &Progress, tolerance: f64) -> Option<f64> {
+        const FIRST: f64 = 6.0;
+        const LATER: f64 = 2.0;
+        const DIGITS: f64 = 3.0;
+        /// Of the residual, on the way to rest.
+        const REST: f64 = 12.0;
+        if self.seen.last() != Some(&progress.grid) {
+            self.seen.push(progress.grid);
+        }
+        let present = self.seen.len() - 1;
+        let wanted = (-tolerance.log10() / DIGITS).ceil().clamp(0.0, 16.0) as usize;
+        let last = present.max(wanted);
+        let size = |grid: usize| (1_u64 << grid.min(32)) as f64;
+        let work = |grid: usize| if grid == 0 { FIRST } else { LATER * size(grid) };
+        let here = match present {
+            0 => (-progress.residual.log10() / REST).clamp(0.0, 1.0),
+            _ => (progress.step as f64 / LATER).min(1.0),
+        };
+        let before: f64 = (0..present).map(work).sum();
+        let all: f64 = (0..=last).map(work).sum();
+        Some((before + here * work(present)) / all)
+    }
 }
 
 /// A time for people.
@@ -96,5 +171,59 @@ impl Drop for ProgressLine {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(part: Option<f64>) -> String {
+        time_left(Duration::from_secs(10), part)
+    }
+
+    #[test]
+    fn the_time_left_is_told_where_it_is_known() {
+        assert_eq!(told(Some(0.25)), "10 s, 30 s left");
+        assert_eq!(told(Some(1.0)), "10 s, 0 s left");
+        assert_eq!(told(Some(0.001)), "10 s, 3 h left");
+        for unknown in [None, Some(0.0), Some(-0.1), Some(1.5), Some(f64::NAN)] {
+            assert_eq!(told(unknown), "10 s");
+        }
+        assert_eq!(told(part_of(3, 4)), "10 s, 4 s left");
+        assert_eq!(told(part_of(0, 0)), "10 s");
+    }
+
+    #[test]
+    fn ways_may_fall_and_be_logarithmic() {
+        let close = |part: Option<f64>, wanted: f64| (part.unwrap() - wanted).abs() < 1e-12;
+        assert!(close(part_of_way(2.0, 1.0, -2.0, false), 0.25));
+        assert!(close(part_of_way(-0.1, -1.0, -100.0, true), 1.0 / 3.0));
+        assert_eq!(part_of_way(1.0, 1.0, 1.0, false), None);
+    }
+
+    #[test]
+    fn a_relaxation_goes_on_from_grid_to_grid() {
+        let mut grids = Grids::default();
+        let mut part = |grid: usize, step: usize, residual: f64| {
+            let progress = Progress {
+                grid,
+                step,
+                residual,
+            };
+            grids.part(&progress, 1e-6).unwrap()
+        };
+        let parts = [
+            part(8, 1, 1.0),
+            part(8, 7, 1e-6),
+            part(8, 9, 1e-13),
+            part(16, 1, 1e-4),
+            part(32, 1, 1e-6),
+            part(32, 2, 1e-13),
+        ];
+        assert!(parts.windows(2).all(|pair| pair[0] < pair[1]), "{parts:?}");
+        assert_eq!((parts[0], parts[5]), (0.0, 1.0));
+        // One more grid than was thought needed.
+        assert!((0.3..0.9).contains(&part(64, 1, 1e-6)));
     }
 }

@@ -7,6 +7,7 @@ use crate::relax::{self, Equilibrium, Method, Options, Settings};
 use crate::report;
 use crate::study::{self, All, Keys, SensitivityError};
 
+use super::progress::part_of;
 use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status};
 
@@ -121,10 +122,11 @@ impl Relax {
             ..Options::default()
         };
         let mut line = job.progress();
+        let tolerance = self.request.tolerance.unwrap_or(job.scenario.tolerance);
         if !self.sensitivity.is_empty() {
             let (base, keys) = (job.base()?, &self.sensitivity);
             let found = study::relax_with_sensitivities(&base, keys, &options, &mut |progress| {
-                line.update(progress);
+                line.relaxing(progress, tolerance);
             });
             return found.map_err(|error| match error {
                 SensitivityError::Relax(error) => error.into(),
@@ -132,7 +134,7 @@ impl Relax {
             });
         }
         Ok(relax::relax(&job.scenario, &options, &mut |progress| {
-            line.update(progress)
+            line.relaxing(progress, tolerance)
         })?)
     }
 
@@ -141,16 +143,19 @@ impl Relax {
             return Err("--all: only with the method semi-implicit".into());
         };
         let mut line = job.progress();
+        let (mut known, mut last_new) = (0, 0);
         let mut all = study::all(
             &job.scenario,
             how,
             self.request.tolerance,
             &relax::Limit::default(),
             &mut |starts, found| {
-                line.say(|elapsed| {
-                    let seconds = elapsed.as_secs_f64();
-                    format!("{starts} starts, {found} equilibria, {seconds:.0} s")
-                });
+                if found > known {
+                    (known, last_new) = (found, starts);
+                }
+                // Unless more is found.
+                let part = part_of(starts, last_new + study::IN_VAIN);
+                line.tell(part, || format!("{starts} starts, {found} equilibria"));
             },
         )?;
         drop(line);

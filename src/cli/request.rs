@@ -17,7 +17,7 @@ use crate::scenario::Scenario;
 use crate::study::Base;
 
 pub use super::job::{Done, Job};
-use super::progress::{ProgressLine, time_left};
+use super::progress::{ProgressLine, part_of, time_left};
 use super::{Refusal, Status, as_typed, fail, note, show, show_report};
 
 /// What every verb is asked.
@@ -132,7 +132,9 @@ impl Request {
             let count = 1 + finished.fetch_add(1, Ordering::Relaxed);
             if let (true, Ok(mut line)) = (how.side_by_side, line.lock()) {
                 let all = self.scenarios.len();
-                line.say(|time| format!("{count} of {all}, {}", time_left(time, count, all)));
+                line.say(|time| {
+                    format!("{count} of {all}, {}", time_left(time, part_of(count, all)))
+                });
             }
             done
         };

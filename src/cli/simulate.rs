@@ -9,7 +9,7 @@ use crate::files::Recording;
 use crate::report::{self, FileError, numbers::brief};
 use crate::simulate::{Options, Record, Scheme, Simulation, Stopped};
 
-use super::progress::{self, ProgressLine};
+use super::progress::{self, ProgressLine, part_of_way};
 use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status, checkpoint_on_interrupt, note, show_checkpoint};
 
@@ -136,40 +136,12 @@ fn record(
             Err(stopped) => return Ok(Some(stopped)),
         };
         recording.add(simulation, &frame)?;
-        line.say(|_| {
+        let part = part_of_way(begin, frame.time, duration, false);
+        line.tell(part, || {
             let speed = (frame.time - begin) / clock.elapsed().as_secs_f64();
-            progress(frame.time, duration, speed)
+            let [time, duration, speed] = [frame.time, duration, speed].map(brief);
+            format!("t = {time} of {duration}, {speed} a second")
         });
     }
     Ok(None)
-}
-
-/// How far a simulation has come, at so many units of time per second.
-fn progress(time: f64, duration: f64, speed: f64) -> String {
-    let left = progress::duration((duration - time) / speed);
-    format!(
-        "t = {} of {}, {} a second, {left} left",
-        brief(time),
-        brief(duration),
-        brief(speed)
-    )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn times_left_are_readable() {
-        for (speed, left) in [
-            (1.0, "10 s left"),
-            (0.01, "17 min left"),
-            (1e-4, "28 h left"),
-            (0.0, "? left"),
-        ] {
-            let said = progress(2.0, 12.0, speed);
-            assert!(said.starts_with("t = 2 of 12, "), "{said}");
-            assert!(said.ends_with(left), "{said}");
-        }
-    }
 }

@@ -3,11 +3,13 @@
 use clap::Args;
 
 use crate::study::{
-    self, Boundary, BoundaryRequest, MOST_POINTS, Trace as Traced, TraceError, TraceRequest, Vary,
+    self, Boundary, BoundaryRequest, MOST_POINTS, Trace as Traced, TraceError, TraceRequest,
+    TraceShow, Vary,
 };
 
-use crate::report;
+use crate::report::{self, numbers::brief};
 
+use super::progress::part_of_way;
 use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status};
 
@@ -41,6 +43,10 @@ pub struct Trace {
     #[arg(long, value_name = "N", default_value_t = MOST_POINTS)]
     points: usize,
 
+    /// What the figure shows against that number, a panel each: x, y, z of the tip, energy, twist; left out: the coordinate of the tip that varies most
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    show: Vec<TraceShow>,
+
     /// Area of the leaf's cross-section: gives Young's modulus where a tip force varies
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     cross_section: Option<f64>,
@@ -55,6 +61,9 @@ impl Trace {
         };
         match self.vary.as_slice() {
             [along] => (self.request).each::<Traced>(how, |job| self.one(job, along)),
+            [_, _] if !self.show.is_empty() => {
+                Err("--show: a boundary is drawn over both numbers; give one --vary".into())
+            }
             [along, across] => {
                 (self.request).each::<Boundary>(how, |job| self.boundary(job, along, across))
             }
@@ -85,15 +94,26 @@ impl Trace {
             across: across.clone(),
         };
         let mut line = job.progress();
+        let mut seen = (usize::MAX, [0.0; 2]);
         let boundary = study::boundary(&request, &mut |curve, points, [first, second]| {
-            line.say(|elapsed| {
+            // A curve is followed to both ends of the second number's range.
+            let part = match curve {
+                None => part_of_way(ends(along)[0], first, ends(along)[1], along.log),
+                Some(number) => {
+                    if number != seen.0 {
+                        seen = (number, [second; 2]);
+                        line.next();
+                    }
+                    seen.1 = [seen.1[0].min(second), seen.1[1].max(second)];
+                    let [from, to] = ends(across);
+                    let [low, high] = seen.1.map(|at| part_of_way(from, at, to, across.log));
+                    low.zip(high).map(|(low, high)| (high - low).abs())
+                }
+            };
+            line.tell(part, || {
                 let what = curve.map_or("trace".into(), |curve| format!("curve {}", curve + 1));
-                format!(
-                    "{what}, {points} points, at {}, {}, {:.0} s",
-                    along.keys.text(first),
-                    across.keys.text(second),
-                    elapsed.as_secs_f64()
-                )
+                let [first, second] = [first, second].map(brief);
+                format!("{what}, {points} points, at {first}, {second}")
             });
         })
         .map_err(name_option)?;
@@ -107,23 +127,38 @@ impl Trace {
     fn one(&self, job: &Job, vary: &Vary) -> Result<Done, Refusal> {
         let request = self.along(job, vary)?;
         let mut line = job.progress();
-        let trace = study::trace(&request, &mut |branch, points, value| {
-            line.say(|elapsed| {
-                format!(
-                    "branch {}, {points} points, at {}, {:.0} s",
-                    branch + 1,
-                    request.vary.keys.text(value),
-                    elapsed.as_secs_f64()
-                )
+        let mut seen = (0, ends(vary)[0]);
+        let mut trace = study::trace(&request, &mut |branch, points, value| {
+            if branch != seen.0 {
+                seen = (branch, value);
+                line.next();
+            }
+            // To the end it goes to; how many branches there will be, nobody knows.
+            let [from, to] = ends(vary);
+            let to = if (value - seen.1) * (to - from) < 0.0 {
+                from
+            } else {
+                to
+            };
+            line.tell(part_of_way(seen.1, value, to, vary.log), || {
+                let at = brief(value);
+                format!("branch {}, {points} points, at {at}", branch + 1)
             });
         })
         .map_err(name_option)?;
         drop(line);
+        trace.show.clone_from(&self.show);
         job.remark(trace.remark.as_ref());
         job.deliver(&trace, trace.complete, |files| {
             report::trace_report(&trace, files)
         })
     }
+}
+
+/// The first and the last value.
+fn ends(vary: &Vary) -> [f64; 2] {
+    let ends = [vary.values.first(), vary.values.last()];
+    ends.map(|end| end.copied().unwrap_or_default())
 }
 
 /// An error with the option that it is about.

@@ -2,17 +2,20 @@
 
 use super::drawing::{Drawing, NOTE};
 use super::page::new_page;
+use super::setting::Setting;
 use super::small::{SIDE, SmallPanels};
 use super::veins::Veins;
+use crate::scenario::Scenario;
 use crate::study::All;
 
 const MOST: usize = 24;
 
-pub fn draw(all: &All) -> Drawing {
+pub fn draw(all: &All, scenario: &Scenario) -> Drawing {
+    let setting = Setting::of(scenario);
     let shown = &all.found[..all.found.len().min(MOST)];
     let shapes = shown.iter().map(|found| Veins::of(&found.equilibrium));
     let shapes: Vec<Veins> = shapes.collect();
-    let panels = SmallPanels::holding(shapes.iter(), shown.len());
+    let panels = SmallPanels::holding(shapes.iter(), shown.len(), &setting);
     let name = format!("{}: equilibria, lowest energy first", all.scenario);
     let count = all.found.len();
     let mut notes = vec![format!("{count} found from {} starts", all.starts)];

@@ -101,6 +101,19 @@ impl Axis {
         }
     }
 
+    /// The same axis, of at least this extent: what varies less is rounding.
+    pub fn at_least(self, extent: f64) -> Self {
+        let lacking = extent - (self.end - self.start);
+        if lacking.is_nan() || lacking <= 0.0 {
+            return self;
+        }
+        Axis {
+            start: self.start - 0.5 * lacking,
+            end: self.end + 0.5 * lacking,
+            ..self
+        }
+    }
+
     /// A logarithmic axis of at least so many decades that holds those of
     /// these values that are positive, with some air.
     pub fn logarithmic(name: &str, values: impl Iterator<Item = f64>, fewest: f64) -> Self {

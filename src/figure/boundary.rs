@@ -8,10 +8,12 @@ use super::axis::Axis;
 use super::drawing::{Anchor, CURVES, Drawing, INK, NOTE, Stroke};
 use super::markers::Marker;
 use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, new_page, title};
+use super::setting::Setting;
 use super::small::SmallPanels;
 use super::veins::Veins;
 use crate::report::numbers::{power_of_ten, short};
 use crate::report::{is_special, sides};
+use crate::scenario::Scenario;
 use crate::study::{Boundary, BoundaryCurve, BoundaryPoint};
 
 const DIAGRAM: f64 = 400.0;
@@ -23,7 +25,8 @@ const MOST_NAMED: usize = 7;
 /// From a curve to the index beside it.
 const BESIDE: f64 = 11.0;
 
-pub fn draw(boundary: &Boundary) -> Drawing {
+pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
+    let setting = Setting::of(scenario);
     let shown = shown(boundary);
     let longest = shown.iter().flat_map(|(_, point)| &point.curves);
     let longest = longest.map(|curve| length(curve)).fold(0.0, f64::max);
@@ -32,7 +35,7 @@ pub fn draw(boundary: &Boundary) -> Drawing {
         .collect();
     let diagram = Cell::beside_key(HEADER + PANEL_TITLE, DIAGRAM, KEY);
     let below = diagram.end().y + PANEL_AXIS;
-    let panels = SmallPanels::holding(shapes.iter(), shown.len()).below(below);
+    let panels = SmallPanels::holding(shapes.iter(), shown.len(), &setting).below(below);
     let name = format!("{}: where the index changes", boundary.scenario);
     let mut drawing = new_page(LEFT, &name, &notes(boundary), None);
     drawing.height = panels.end();

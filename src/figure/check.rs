@@ -9,13 +9,16 @@ use super::font::Font;
 use super::markers::dot;
 use super::page::{HEADER, KeyRows, LEFT, NOTE_BASE, RIGHT, TEXT_SIZE, WIDTH, header};
 use super::panels::Panels;
+use super::setting::Setting;
 use super::veins::Veins;
 use crate::report::words::{equilibrium_of_index, headline, verdict};
+use crate::scenario::Scenario;
 use crate::study::{Check, Verdict};
 
 const LINE: f64 = 19.0;
 
-pub fn draw(check: &Check) -> Drawing {
+pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
+    let setting = Setting::of(scenario);
     let mut veins = Veins::of(&check.relaxed);
     if let Some(solution) = check.solution() {
         veins.dot(&solution.rods);
@@ -33,12 +36,18 @@ pub fn draw(check: &Check) -> Drawing {
     let mut drawing = Drawing::new(WIDTH, &title);
     drawing.height = (panels.end() + below).ceil();
     drawing.group("header", |page| {
-        header(page, LEFT, &title, &notes(check, &veins), Some(&veins));
+        header(
+            page,
+            LEFT,
+            &title,
+            &notes(check, &veins, &setting),
+            Some(&veins),
+        );
         for (line, text) in reason.iter().enumerate() {
             let base = DVec2::new(LEFT, NOTE_BASE + LINE * (line + 1) as f64);
             page.label(base, text, TEXT_SIZE, Anchor::Start, INK);
         }
-        let mut key = KeyRows::at(key_line, 26.0);
+        let mut key = KeyRows::at(LEFT, key_line, 26.0);
         let stroke = Stroke::new(vein_color(0.3), veins.line_width());
         key.entry(page, "relaxed", |page, cell| cell.line(page, stroke));
         if check.solution().is_some() {
@@ -47,7 +56,7 @@ pub fn draw(check: &Check) -> Drawing {
             });
         }
     });
-    panels.draw(&mut drawing, &veins);
+    panels.draw(&mut drawing, &veins, &setting);
     if compared {
         drawing.group("differences", |page| {
             differences::draw(page, check, veins.unit, panels.end());
@@ -56,7 +65,7 @@ pub fn draw(check: &Check) -> Drawing {
     drawing
 }
 
-fn notes(check: &Check, veins: &Veins) -> Vec<String> {
+fn notes(check: &Check, veins: &Veins, setting: &Setting) -> Vec<String> {
     let mut notes = vec![format!("N = {}", veins.count)];
     let relaxed = verdict(&check.relaxed);
     match &check.shot {
@@ -71,7 +80,7 @@ fn notes(check: &Check, veins: &Veins) -> Vec<String> {
         }
         _ => notes.push(format!("relaxed: {relaxed}")),
     }
-    notes.extend(veins.notes());
+    notes.extend(veins.notes(setting));
     notes
 }
 
@@ -82,7 +91,7 @@ mod tests {
     use crate::report::sample;
 
     fn svg(check: &Check) -> String {
-        text(&draw(check))
+        text(&draw(check, &sample::scenario("fan", 5)))
     }
 
     #[test]

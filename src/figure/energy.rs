@@ -4,8 +4,10 @@ use super::axes::{Axes, Curve};
 use super::axis::Axis;
 use super::drawing::{CURVES, Drawing, INK, Stroke};
 use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, new_page, title};
+use super::setting::with_unit;
 use crate::motion::Energy;
 use crate::report::numbers::short;
+use crate::scenario::{Scenario, Units};
 use crate::simulate::Record;
 
 const ENERGIES: f64 = 300.0;
@@ -29,7 +31,7 @@ pub fn notes(record: &Record) -> Vec<String> {
     notes
 }
 
-pub fn draw(record: &Record) -> Drawing {
+pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
     let name = format!("{}: energy in time", record.scenario);
     let upper = HEADER + PANEL_TITLE;
     let lower = upper + ENERGIES + BETWEEN + PANEL_TITLE;
@@ -43,10 +45,12 @@ pub fn draw(record: &Record) -> Drawing {
     let curves = curves(record);
     let balance = &curves[curves.len() - 1];
     let values = curves.iter().flat_map(Curve::values);
+    let unit = scenario.units.energy();
+    let energy = with_unit("energy", unit.as_deref());
     let axes = Axes {
         cell: Cell::beside_key(upper, ENERGIES, KEY),
         across: Axis::linear("", 0.0, end),
-        up: Axis::holding("energy", values.chain([0.0])),
+        up: Axis::holding(&energy, values.chain([0.0])),
     };
     drawing.group("energies", |page| {
         title(page, axes.cell.corner, "(a)", "where the energy is");
@@ -65,7 +69,10 @@ pub fn draw(record: &Record) -> Drawing {
     let axes = Axes {
         cell: Cell::beside_key(lower, BALANCE, KEY),
         across: Axis::linear("", 0.0, end),
-        up: Axis::holding("balance", balance.values().chain([0.0])),
+        up: Axis::holding(
+            &with_unit("balance", unit.as_deref()),
+            balance.values().chain([0.0]),
+        ),
     };
     drawing.group("balance", |page| {
         let what =
@@ -75,12 +82,14 @@ pub fn draw(record: &Record) -> Drawing {
         axes.curve(page, &balance.points, Stroke::new(INK, 1.3));
     });
     let cell = Cell::beside_key(lowest, TIP, KEY);
-    drawing.group("tip", |page| draw_tip(page, record, cell, end));
+    drawing.group("tip", |page| {
+        draw_tip(page, record, &scenario.units, cell, end)
+    });
     drawing
 }
 
 /// The coordinates of the joint tip, or the means of free ones.
-fn draw_tip(page: &mut Drawing, record: &Record, cell: Cell, end: f64) {
+fn draw_tip(page: &mut Drawing, record: &Record, units: &Units, cell: Cell, end: f64) {
     let coordinate = |axis: usize| Curve {
         name: ["x", "y", "z"][axis],
         color: CURVES[axis],
@@ -92,7 +101,10 @@ fn draw_tip(page: &mut Drawing, record: &Record, cell: Cell, end: f64) {
     let axes = Axes {
         cell,
         across: Axis::linear("time, in the scenario's unit", 0.0, end),
-        up: Axis::holding("tip", curves.iter().flat_map(Curve::values).chain([0.0])),
+        up: Axis::holding(
+            &with_unit("tip", units.length.as_deref()),
+            curves.iter().flat_map(Curve::values).chain([0.0]),
+        ),
     };
     let what = match record.joined {
         true => "where the tip is",

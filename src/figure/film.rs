@@ -10,39 +10,53 @@ use tiny_skia::Pixmap;
 use super::drawing::{Anchor, Color, DOT, Drawing, INK, NOTE, WHITE, vein_color};
 use super::page::{Cell, TEXT_SIZE};
 use super::png::paint;
-use super::space::{Room, Scene, surrounding_box};
+use super::setting::Setting;
+use super::space::{Room, Scene, View, surrounding_box};
 use super::veins::Veins;
 use crate::report::numbers::short;
+use crate::report::{Document, Format};
 use crate::simulate::{Record, Still};
 
 /// How long the film lasts, in hundredths of a second, and of how many pictures.
-const DURATION: usize = 1000;
+const DURATION: f64 = 1000.0;
 const MOST_PICTURES: usize = 140;
+/// Browsers show shorter pictures for longer.
+const SHORTEST: usize = 2;
+const LONGEST: usize = 100;
 
 /// Half its pixels.
 const SIZE: DVec2 = DVec2::new(320.0, 240.0);
 const TITLE: f64 = 26.0;
 
 const ROOM: Room = Room {
-    left: 34.0,
-    right: 30.0,
-    below: 30.0,
+    left: 46.0,
+    right: 42.0,
+    below: 42.0,
 };
 
 /// Stands for a pixel that is as before.
 const SAME: u8 = 255;
 
-/// The film; nothing but one picture where nothing is known to move.
-///
-/// # Errors
-/// Those of `out`.
-pub fn write(record: &Record, out: &mut dyn Write) -> io::Result<()> {
+/// The film in a file of this name; nothing but one picture where nothing is known to
+/// move.
+pub struct Film(pub &'static str);
+
+impl Format<Record> for Film {
+    fn file_name(&self) -> &'static str {
+        self.0
+    }
+
+    fn write(&self, document: &Document<Record>, out: &mut dyn Write) -> io::Result<()> {
+        write(document.result, &Setting::of(document.input), out)
+    }
+}
+
+fn write(record: &Record, setting: &Setting, out: &mut dyn Write) -> io::Result<()> {
     let film = match record.film.as_slice() {
         [] => &record.stills,
         film => film,
     };
-    let stride = film.len().div_ceil(MOST_PICTURES).max(1);
-    let shown: Vec<&Still> = film.iter().step_by(stride).collect();
+    let shown = chosen(film);
     let shapes: Vec<Veins> = shown.iter().map(|still| veins(record, still)).collect();
     let boxes = shapes.iter().map(|veins| (veins.low, veins.high));
     let all = boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
@@ -52,11 +66,47 @@ pub fn write(record: &Record, out: &mut dyn Write) -> io::Result<()> {
         .map_init(Palette::new, |palette, (veins, still)| {
             let time = record.moments.get(still.moment).map_or(0.0, |m| m.time);
             let text = format!("{}, t = {}", record.scenario, short(time));
-            palette.indices(&paint(&picture(veins, bounds, &text)))
+            palette.indices(&paint(&picture(veins, bounds, setting, &text)))
         })
         .collect();
-    let delay = (DURATION / pictures.len().max(1)).clamp(4, 100) as u16;
-    encode(&pictures, delay, out).map_err(io::Error::other)
+    let times: Vec<f64> = (shown.iter())
+        .map(|still| record.moments.get(still.moment).map_or(0.0, |m| m.time))
+        .collect();
+    encode(&pictures, &delays(&times), out).map_err(io::Error::other)
+}
+
+/// As many of the shapes as make a film, the first and the last among them.
+fn chosen(film: &[Still]) -> Vec<&Still> {
+    let count = film.len().min(MOST_PICTURES);
+    let last = film.len().saturating_sub(1);
+    let place = |k: usize| k * last / (count - 1).max(1);
+    (0..count).map(|k| &film[place(k)]).collect()
+}
+
+/// How long each picture is seen, in hundredths of a second: as its time is a part of
+/// the whole, the last as long as one is on average.
+fn delays(times: &[f64]) -> Vec<u16> {
+    let [Some(from), Some(to)] = [times.first(), times.last()] else {
+        return Vec::new();
+    };
+    let count = times.len() as f64;
+    let moving = DURATION * (count - 1.0) / count;
+    let mut seen = 0;
+    let ends = times[1..]
+        .iter()
+        .map(|time| moving * (time - from) / (to - from));
+    (ends.chain([DURATION]))
+        .map(|end| {
+            let end = if end.is_finite() {
+                end.round() as usize
+            } else {
+                0
+            };
+            let delay = end.saturating_sub(seen).clamp(SHORTEST, LONGEST);
+            seen += delay;
+            delay as u16
+        })
+        .collect()
 }
 
 fn veins(record: &Record, still: &Still) -> Veins {
@@ -66,17 +116,18 @@ fn veins(record: &Record, still: &Still) -> Veins {
     Veins::through(&still.curves, &tips, record.length)
 }
 
-fn picture(veins: &Veins, bounds: [DVec3; 2], text: &str) -> Drawing {
+fn picture(veins: &Veins, bounds: [DVec3; 2], setting: &Setting, text: &str) -> Drawing {
     let mut page = Drawing::new(SIZE.x, text);
     page.height = SIZE.y;
     let cell = Cell {
         corner: DVec2::new(0.0, TITLE),
         size: SIZE - DVec2::new(0.0, TITLE),
     };
-    let scene = Scene::new(bounds, cell, ROOM, None);
+    let scene = Scene::new(bounds, setting, View::Oblique, cell, ROOM, None);
     scene.draw_box(&mut page);
     scene.draw_labels(&mut page);
-    scene.draw_names(&mut page, 26.0);
+    scene.draw_names(&mut page, 36.0, true);
+    scene.draw_gravity(&mut page);
     scene.draw_leaf(&mut page, veins, 0.75 * veins.line_width());
     let corner = DVec2::new(10.0, 17.0);
     page.label(corner, text, TEXT_SIZE, Anchor::Start, INK);
@@ -133,7 +184,11 @@ impl Palette {
 }
 
 /// Of each picture only what differs from the one before.
-fn encode(pictures: &[Vec<u8>], delay: u16, out: &mut dyn Write) -> Result<(), gif::EncodingError> {
+fn encode(
+    pictures: &[Vec<u8>],
+    delays: &[u16],
+    out: &mut dyn Write,
+) -> Result<(), gif::EncodingError> {
     let [width, height] = (2.0 * SIZE).to_array().map(|pixels| pixels as u16);
     let palette = Palette::new().colors;
     let mut table: Vec<u8> = palette
@@ -144,7 +199,7 @@ fn encode(pictures: &[Vec<u8>], delay: u16, out: &mut dyn Write) -> Result<(), g
     let mut encoder = gif::Encoder::new(out, width, height, &table)?;
     encoder.set_repeat(gif::Repeat::Infinite)?;
     let mut before: Option<&Vec<u8>> = None;
-    for picture in pictures {
+    for (picture, &delay) in pictures.iter().zip(delays) {
         let (rows, pixels) = changed(before, picture, usize::from(width));
         encoder.write_frame(&gif::Frame {
             delay,
@@ -182,4 +237,116 @@ fn changed(
         first..last + 1,
         pixels[first * width..(last + 1) * width].to_vec(),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+    use std::collections::HashSet;
+
+    /// A film of the swinging leaf, decoded: delays and whole pictures as RGBA.
+    fn decoded(bytes: &[u8]) -> (gif::Repeat, Vec<u16>, Vec<Vec<u8>>) {
+        let mut options = gif::DecodeOptions::new();
+        options.set_color_output(gif::ColorOutput::RGBA);
+        let mut decoder = options.read_info(bytes).unwrap();
+        let width = 2 * SIZE.x as usize;
+        let mut canvas = vec![0; 4 * width * 2 * SIZE.y as usize];
+        let (mut delays, mut pictures) = (Vec::new(), Vec::new());
+        while let Some(frame) = decoder.read_next_frame().unwrap() {
+            assert_eq!((frame.left, usize::from(frame.width)), (0, width));
+            let start = 4 * width * usize::from(frame.top);
+            for (to, from) in canvas[start..]
+                .chunks_exact_mut(4)
+                .zip(frame.buffer.chunks_exact(4))
+            {
+                if from[3] > 0 {
+                    to.copy_from_slice(from);
+                }
+            }
+            delays.push(frame.delay);
+            pictures.push(canvas.clone());
+        }
+        (decoder.repeat(), delays, pictures)
+    }
+
+    #[test]
+    fn a_film_lasts_ten_seconds_loops_and_shows_the_leaf() {
+        let mut record = sample::record(5, 8);
+        let (_, frames) = sample::swing(5, 8);
+        let still = |(moment, frame): (usize, &crate::simulate::Frame)| Still {
+            moment,
+            curves: (0..5).map(|rod| frame.centerline(rod).to_vec()).collect(),
+        };
+        record.film = frames.iter().enumerate().map(still).collect();
+        let setting = Setting::of(&sample::scenario("swing", 5));
+        let mut bytes = Vec::new();
+        write(&record, &setting, &mut bytes).unwrap();
+        assert!(bytes.len() < 5_000_000, "{}", bytes.len());
+        let (repeat, delays, pictures) = decoded(&bytes);
+        assert_eq!(repeat, gif::Repeat::Infinite);
+        assert_eq!(pictures.len(), 101);
+        assert_eq!(
+            delays.iter().map(|&delay| u32::from(delay)).sum::<u32>(),
+            1000
+        );
+        // Every picture is that of its instant, in colours that are close enough.
+        let bounds = {
+            let shapes: Vec<Veins> = record
+                .film
+                .iter()
+                .map(|still| veins(&record, still))
+                .collect();
+            let low = shapes
+                .iter()
+                .fold(DVec3::ZERO, |low, veins| low.min(veins.low));
+            let high = shapes
+                .iter()
+                .fold(DVec3::ZERO, |high, veins| high.max(veins.high));
+            surrounding_box(low, high)
+        };
+        for k in [0, 50, 100] {
+            let time = short(record.moments[k].time);
+            let shape = veins(&record, &record.film[k]);
+            let text = format!("{}, t = {time}", record.scenario);
+            let painted = paint(&picture(&shape, bounds, &setting, &text));
+            let pairs = pictures[k]
+                .chunks_exact(4)
+                .zip(painted.data().chunks_exact(4));
+            let far =
+                |(a, b): (&[u8], &[u8])| (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap_or(0);
+            let off: Vec<u8> = pairs.map(far).collect();
+            let worst = off.iter().filter(|&&off| off > 48).count();
+            assert!(
+                worst < off.len() / 2000,
+                "picture {k}: {worst} pixels are off"
+            );
+        }
+        // Five veins, five colours.
+        let seen: HashSet<[u8; 3]> = pictures[0]
+            .chunks_exact(4)
+            .map(|c| [c[0], c[1], c[2]])
+            .collect();
+        for vein in 0..5 {
+            let Color(r, g, b) = vein_color(f64::from(vein) / 4.0);
+            let near =
+                |c: &[u8; 3]| c[0].abs_diff(r).max(c[1].abs_diff(g)).max(c[2].abs_diff(b)) < 14;
+            assert!(seen.iter().any(near), "vein {vein}");
+        }
+    }
+
+    #[test]
+    fn pictures_are_seen_as_long_as_their_times_last() {
+        assert_eq!(delays(&[0.0, 1.0, 2.0, 4.0]), [100, 100, 100, 100]);
+        let even: Vec<f64> = (0..140).map(f64::from).collect();
+        let delays = delays(&even);
+        assert_eq!(
+            delays.iter().map(|&delay| u32::from(delay)).sum::<u32>(),
+            1000
+        );
+        assert!(delays.iter().all(|delay| (7..=8).contains(delay)));
+        assert_eq!(super::delays(&[0.0]), [100]);
+        assert!(super::delays(&[]).is_empty());
+        assert_eq!(super::delays(&[1.0, 1.0]), [2, 100]);
+    }
 }

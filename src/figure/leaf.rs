@@ -3,22 +3,26 @@
 use super::drawing::Drawing;
 use super::page::{HEADER, LEFT, new_page};
 use super::panels::Panels;
+use super::setting::Setting;
 use super::veins::Veins;
 use crate::relax::Equilibrium;
 use crate::report::numbers::power_of_ten;
 use crate::report::words::{shooting, verdict};
+use crate::scenario::Scenario;
 
-pub fn draw(leaf: &Equilibrium) -> Drawing {
+pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
+    let setting = Setting::of(scenario);
     let veins = Veins::of(leaf);
     let panels = Panels::below(HEADER, &veins);
-    let mut drawing = new_page(LEFT, &leaf.scenario, &notes(leaf, &veins), Some(&veins));
+    let notes = notes(leaf, &veins, &setting);
+    let mut drawing = new_page(LEFT, &leaf.scenario, &notes, Some(&veins));
     drawing.description = format!("{}: {}", leaf.scenario, verdict(leaf));
     drawing.height = panels.end().ceil();
-    panels.draw(&mut drawing, &veins);
+    panels.draw(&mut drawing, &veins, &setting);
     drawing
 }
 
-fn notes(equilibrium: &Equilibrium, veins: &Veins) -> Vec<String> {
+fn notes(equilibrium: &Equilibrium, veins: &Veins, setting: &Setting) -> Vec<String> {
     let mut notes = vec![format!("N = {}", veins.count), verdict(equilibrium)];
     match equilibrium.accuracy.intervals {
         Some(count) => notes.push(format!("by {}", shooting(count))),
@@ -28,9 +32,12 @@ fn notes(equilibrium: &Equilibrium, veins: &Veins) -> Vec<String> {
         None => (),
     }
     if let Some(error) = equilibrium.accuracy.error_estimate {
-        let bound = power_of_ten(error / veins.unit);
-        notes.push(format!("error of positions ≤ {bound} L"));
+        let (error, unit) = setting.in_unit(error / veins.unit);
+        notes.push(format!(
+            "error of positions ≤ {} {unit}",
+            power_of_ten(error)
+        ));
     }
-    notes.extend(veins.notes());
+    notes.extend(veins.notes(setting));
     notes
 }

@@ -22,6 +22,8 @@ mod film;
 mod filmstrip;
 mod fit;
 mod font;
+mod gravity;
+mod labels;
 mod leaf;
 mod map;
 mod markers;
@@ -30,6 +32,7 @@ mod page;
 mod panels;
 mod png;
 mod sensitivity;
+mod setting;
 mod small;
 mod space;
 mod svg;
@@ -44,7 +47,7 @@ pub use boundary::draw as boundary;
 pub use chart::{draw_chart as chart, draw_scaling as scaling};
 pub use check::draw as check;
 pub use energy::draw as energy;
-pub use film::write as film;
+pub use film::Film;
 pub use filmstrip::draw as filmstrip;
 pub use fit::draw as fit;
 pub use leaf::draw as leaf;
@@ -54,23 +57,24 @@ pub use sensitivity::draw as sensitivity;
 pub use trace::draw as trace;
 
 use crate::report::{Document, Format};
+use crate::scenario::Scenario;
 use drawing::Drawing;
 
 pub struct Picture<R> {
     file: &'static str,
-    draw: fn(&R) -> Drawing,
+    draw: fn(&R, &Scenario) -> Drawing,
     write: fn(&Drawing, &mut dyn Write) -> io::Result<()>,
 }
 
 impl<R> Picture<R> {
     /// As text that any browser or editor opens.
-    pub const fn svg(file: &'static str, draw: fn(&R) -> Drawing) -> Self {
+    pub const fn svg(file: &'static str, draw: fn(&R, &Scenario) -> Drawing) -> Self {
         let write = svg::write;
         Picture { file, draw, write }
     }
 
     /// As pixels.
-    pub const fn png(file: &'static str, draw: fn(&R) -> Drawing) -> Self {
+    pub const fn png(file: &'static str, draw: fn(&R, &Scenario) -> Drawing) -> Self {
         let write = png::write;
         Picture { file, draw, write }
     }
@@ -82,7 +86,7 @@ impl<R> Format<R> for Picture<R> {
     }
 
     fn write(&self, document: &Document<R>, out: &mut dyn Write) -> io::Result<()> {
-        (self.write)(&(self.draw)(document.result), out)
+        (self.write)(&(self.draw)(document.result, document.input), out)
     }
 }
 
@@ -96,16 +100,20 @@ mod tests {
     use crate::simulate::{Record, Stopped};
     use glam::DVec3;
 
+    fn scenario() -> Scenario {
+        sample::scenario("fan", 5)
+    }
+
     #[test]
     fn every_picture_is_wide_enough_to_print() {
         for drawing in [
-            leaf(&sample::fan(21, 32)),
-            check(&sample::check(21, 32, 0.1)),
+            leaf(&sample::fan(21, 32), &scenario()),
+            check(&sample::check(21, 32, 0.1), &scenario()),
             chart(&sample::chart()),
             scaling(&sample::scaling()),
             map(&sample::map()),
-            energy(&sample::record(5, 16)),
-            filmstrip(&sample::record(5, 16)),
+            energy(&sample::record(5, 16), &scenario()),
+            filmstrip(&sample::record(5, 16), &scenario()),
         ] {
             svg::text(&drawing);
             let mut bytes = Vec::new();
@@ -117,16 +125,85 @@ mod tests {
         }
     }
 
+    /// A scenario with units and a gravity across its plane.
+    fn in_cm() -> Scenario {
+        let mut scenario = scenario();
+        scenario.units.length = Some("cm".into());
+        scenario.units.force = Some("N".into());
+        scenario
+    }
+
+    #[test]
+    fn axes_are_in_the_units_of_the_scenario() {
+        let fan = sample::fan(5, 8);
+        let record = sample::record(5, 8);
+        let drawn = |scenario: &Scenario| {
+            [
+                leaf(&fan, scenario),
+                check(&sample::check(5, 8, 0.0), scenario),
+                filmstrip(&record, scenario),
+                energy(&record, scenario),
+            ]
+            .map(|drawing| svg::text(&drawing))
+        };
+        let [rest, checked, strip, energies] = drawn(&in_cm());
+        for svg in [&rest, &checked] {
+            // From above and from the side, and in space.
+            assert_eq!(svg.matches(">x / cm<").count(), 3);
+            assert!(!svg.contains('ξ'));
+        }
+        assert!(rest.contains("L = 1 cm") && rest.contains("cm</text>"));
+        assert!(strip.contains(" cm wide") && strip.contains(">x<"));
+        assert!(energies.contains(">tip / cm<") && energies.contains(">energy / N cm<"));
+        let [rest, _, strip, energies] = drawn(&scenario());
+        assert_eq!(rest.matches(">ξ = x/L<").count(), 2);
+        assert_eq!(rest.matches(">ξ<").count(), 1);
+        assert!(strip.contains(" L wide") && strip.contains(">ξ<"));
+        assert!(energies.contains(">tip<") && energies.contains(">energy<"));
+    }
+
+    #[test]
+    fn values_on_axes_are_those_of_the_scenario() {
+        // Ten times as long: the leaf is the same in lengths, its axes are not.
+        let mut fan = sample::fan(5, 8);
+        let mut large = in_cm();
+        for rod in &mut large.rods {
+            rod.length *= 10.0;
+        }
+        for rod in &mut fan.shape.rods {
+            rod.length *= 10.0;
+        }
+        for point in fan.shape.curves.iter_mut().flatten().chain(&mut fan.tips) {
+            *point *= 10.0;
+        }
+        let svg = svg::text(&leaf(&fan, &large));
+        assert!(svg.contains(">8</text>") && !svg.contains(">0.8</text>"));
+    }
+
+    #[test]
+    fn gravity_is_drawn_where_there_is_any() {
+        let (fan, record) = (sample::fan(5, 8), sample::record(5, 8));
+        let count = |scenario: &Scenario| {
+            [leaf(&fan, scenario), filmstrip(&record, scenario)]
+                .map(|drawing| svg::text(&drawing).matches(">gravity<").count())
+        };
+        assert_eq!(count(&scenario()), [4, 1]);
+        let mut without = scenario();
+        without.gravity = [0.0; 3];
+        assert_eq!(count(&without), [0, 0]);
+    }
+
     #[test]
     fn names_are_escaped() {
         let mut fan = sample::fan(5, 8);
         fan.scenario = "a < b & \"c\"\u{1}".into();
-        let svg = svg::text(&leaf(&fan));
+        let svg = svg::text(&leaf(&fan, &scenario()));
         assert!(svg.contains(">a &lt; b &amp; \"c\"</text>"));
     }
 
     fn motion(record: &Record) -> [String; 2] {
-        [energy(record), filmstrip(record)].map(|drawing| svg::text(&drawing))
+        [energy(record, &scenario()), filmstrip(record, &scenario())]
+            .map(|drawing| svg::text(&drawing))
     }
 
     #[test]
@@ -171,20 +248,20 @@ mod tests {
             displacement: shape.clone(),
             rotation: shape,
         }]);
-        svg::text(&modes(&fan));
+        svg::text(&modes(&fan, &scenario()));
         fan.shape
             .curves
             .iter_mut()
             .for_each(|curve| curve[4].z = wild);
         fan.tips[0].x = wild;
-        leaf(&fan);
+        leaf(&fan, &scenario());
         fan.shape
             .curves
             .iter_mut()
             .for_each(|curve| curve.fill(DVec3::splat(wild)));
-        leaf(&fan);
+        leaf(&fan, &scenario());
         fan.shape.curves.clear();
-        leaf(&fan);
+        leaf(&fan, &scenario());
     }
 
     fn draw_wild_check(wild: f64) {
@@ -197,11 +274,11 @@ mod tests {
         if let Some(Ok(solution)) = found.shot.as_mut().map(|shot| shot.found.as_mut()) {
             solution.rods[1].nodes[4].position = DVec3::splat(wild);
         }
-        svg::text(&check(&found));
+        svg::text(&check(&found, &scenario()));
         let wildest = found.along[0];
         found.along.fill(wildest);
         found.tolerance = wild;
-        svg::text(&check(&found));
+        svg::text(&check(&found, &scenario()));
     }
 
     fn draw_wild_chart(wild: f64) {

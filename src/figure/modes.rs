@@ -4,17 +4,23 @@ use glam::DVec3;
 
 use super::drawing::{Color, DOT, Drawing, FRAME, NOTE, Stroke};
 use super::page::new_page;
+use super::setting::Setting;
 use super::small::{SIDE, SmallPanels};
+use super::space::{Scene, View};
 use super::veins::Veins;
 use crate::relax::{Equilibrium, Mode};
 use crate::report::numbers::short;
 use crate::report::words::verdict;
+use crate::scenario::Scenario;
 
 const MOST: usize = 12;
+/// What moves towards one viewer moves across the other's sight.
+const VIEWS: [View; 2] = [View::Oblique, View::Front];
 /// Largest displacement drawn, as a part of the leaf's extent.
 const AMPLITUDE: f64 = 0.2;
 
-pub fn draw(equilibrium: &Equilibrium) -> Drawing {
+pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
+    let setting = Setting::of(scenario);
     let name = format!("{}: modes", equilibrium.scenario);
     let rest = Veins::of(equilibrium);
     let modes = equilibrium.stability.modes.as_deref().unwrap_or_default();
@@ -23,31 +29,38 @@ pub fn draw(equilibrium: &Equilibrium) -> Drawing {
         .iter()
         .map(|mode| displaced(equilibrium, &rest, mode))
         .collect();
-    let panels = SmallPanels::holding(shapes.iter().chain([&rest]), drawn.len());
+    // Every mode from two sides.
+    let count = VIEWS.len() * drawn.len();
+    let panels = SmallPanels::holding(shapes.iter().chain([&rest]), count, &setting);
     let mut notes = vec![format!("N = {}", rest.count), verdict(equilibrium)];
     notes.push(match modes.len() {
         count if count > MOST => format!("the lowest {MOST} of {count}"),
         count => format!("the lowest {count}"),
     });
     notes.push("grey: at rest".into());
-    notes.extend(rest.notes());
+    notes.extend(rest.notes(&setting));
     let mut drawing = new_page(SIDE, &name, &notes, Some(&rest));
     drawing.height = panels.end();
     for (index, (mode, veins)) in drawn.iter().zip(&shapes).enumerate() {
         drawing.group("mode", |page| {
             let (number, (text, color)) = ((index + 1).to_string(), caption(mode));
-            panels.draw(
-                page,
-                index,
-                veins,
-                (&number, &text, color),
-                |page, scene, width| {
+            let front = "from the front".to_string();
+            for (k, (view, caption)) in VIEWS
+                .into_iter()
+                .zip([(number, text), (String::new(), front)])
+                .enumerate()
+            {
+                let at_rest = |page: &mut Drawing, scene: &Scene, width: f64| {
                     for vein in &rest.veins {
                         let path = vein.path(|point| scene.place(point));
                         page.stroke(path, Stroke::new(FRAME, 0.6 * width));
                     }
-                },
-            );
+                };
+                let place = VIEWS.len() * index + k;
+                let color = if k == 0 { color } else { NOTE };
+                let caption = (caption.0.as_str(), caption.1.as_str(), color);
+                panels.draw_from(view, page, place, veins, caption, at_rest);
+            }
         });
     }
     drawing
@@ -106,9 +119,11 @@ mod tests {
                 rotation: shape,
             };
             leaf.stability.modes = Some(vec![mode; 14]);
-            let svg = text(&draw(&leaf));
+            let svg = text(&draw(&leaf, &sample::scenario("fan", 3)));
             assert_eq!(svg.matches(told).count(), MOST, "{told}");
             assert!(svg.contains("the lowest 12 of 14"));
+            // Every mode from a second side.
+            assert_eq!(svg.matches(">from the front<").count(), MOST);
         }
     }
 }

@@ -40,6 +40,21 @@ impl Cell {
         self.corner + self.size
     }
 
+    /// Of the four places this far from its sides the one farthest from all of these.
+    pub fn free_corner(&self, inset: DVec2, taken: impl Iterator<Item = DVec2>) -> DVec2 {
+        let (low, high) = (self.corner + inset, self.end() - inset);
+        let places = [low.with_x(high.x), low, high, high.with_x(low.x)];
+        let mut free = [f64::INFINITY; 4];
+        for point in taken {
+            for (free, place) in free.iter_mut().zip(places) {
+                *free = free.min(place.distance_squared(point));
+            }
+        }
+        // The first of equally free ones.
+        let best = (0..4).fold(0, |best, k| if free[k] > free[best] { k } else { best });
+        places[best]
+    }
+
     pub fn middle(&self) -> DVec2 {
         self.corner + 0.5 * self.size
     }
@@ -198,15 +213,18 @@ impl Key {
 
 /// Samples with their names, one after the other in rows above the panels.
 pub struct KeyRows {
+    left: f64,
     at: DVec2,
     sample: f64,
 }
 
 impl KeyRows {
-    /// Rows whose first has its base line at `base`, with samples of this width.
-    pub fn at(base: f64, sample: f64) -> Self {
+    /// Rows from `left` on whose first has its base line at `base`, with samples of this
+    /// width.
+    pub fn at(left: f64, base: f64, sample: f64) -> Self {
         KeyRows {
-            at: DVec2::new(LEFT, base - 0.36 * TEXT_SIZE),
+            left,
+            at: DVec2::new(left, base - 0.36 * TEXT_SIZE),
             sample,
         }
     }
@@ -218,8 +236,8 @@ impl KeyRows {
         sample: impl FnOnce(&mut Drawing, Cell),
     ) {
         let width = self.sample + GAP + Font::embedded().width(name, TEXT_SIZE);
-        if self.at.x > LEFT && self.at.x + width > page.width - RIGHT {
-            self.at = DVec2::new(LEFT, self.at.y + ROW);
+        if self.at.x > self.left && self.at.x + width > page.width - RIGHT {
+            self.at = DVec2::new(self.left, self.at.y + ROW);
         }
         sample(page, sample_cell(self.at, self.sample));
         let text = self.at + DVec2::new(self.sample + GAP, 0.0);

@@ -9,9 +9,11 @@ use glam::{DVec2, DVec3};
 use super::axes::Axes;
 use super::axis::Axis;
 use super::drawing::{Drawing, Stroke};
+use super::gravity;
 use super::markers::leaf_markers;
 use super::page::{Cell, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, title};
-use super::space::{Room, Scene, surrounding_box};
+use super::setting::Setting;
+use super::space::{Room, Scene, View, surrounding_box};
 use super::veins::{Vein, Veins};
 
 const BOTTOM: f64 = 4.0;
@@ -36,21 +38,24 @@ const ROOM: Room = Room {
     below: 36.0,
 };
 
-/// An axis of a leaf, and what it is called.
-type Way = (&'static str, DVec3);
-const XI: Way = ("ξ = x/L", DVec3::X);
-const ETA: Way = ("η = y/L", DVec3::Y);
-const ZETA: Way = ("ζ = z/L", DVec3::Z);
-
-/// Draws a flat panel with `scale` pixels per length, the leaf in its middle.
-fn draw_flat(page: &mut Drawing, veins: &Veins, cell: Cell, scale: f64, [across, up]: [Way; 2]) {
-    let flatten = |point: DVec3| DVec2::new(across.1.dot(point), up.1.dot(point));
+/// Draws a flat panel with `scale` pixels per length, the leaf in its middle, over two
+/// of its axes.
+fn draw_flat(
+    page: &mut Drawing,
+    veins: &Veins,
+    setting: &Setting,
+    cell: Cell,
+    scale: f64,
+    [across, up]: [usize; 2],
+) {
+    let flatten = |point: DVec3| DVec2::new(point[across], point[up]);
     let middle = flatten(0.5 * (veins.low + veins.high));
     let half = 0.5 * cell.size / scale;
     let (low, high) = (middle - half, middle + half);
-    let axis = |way: Way, low: f64, high: f64| Axis {
+    let shown = setting.scale();
+    let axis = |which: usize, low: f64, high: f64| Axis {
         apart: Some(TICK_DISTANCE),
-        ..Axis::linear(way.0, low, high)
+        ..Axis::linear(&setting.axis(which), shown * low, shown * high)
     };
     let axes = Axes {
         cell,
@@ -63,7 +68,7 @@ fn draw_flat(page: &mut Drawing, veins: &Veins, cell: Cell, scale: f64, [across,
         DVec2::new(cell.corner.x + from_low.x, cell.end().y - from_low.y)
     };
     // Veins farther from the viewer first.
-    let toward = across.1.cross(up.1);
+    let toward = DVec3::AXES[across].cross(DVec3::AXES[up]);
     let nearness = |vein: &Vein| {
         let ends = vein.pieces.iter().map(|piece| toward.dot(piece[3]));
         ends.sum::<f64>() / vein.pieces.len().max(1) as f64
@@ -77,6 +82,16 @@ fn draw_flat(page: &mut Drawing, veins: &Veins, cell: Cell, scale: f64, [across,
         );
     }
     leaf_markers(page, veins, place);
+    if let Some(gravity) = setting.gravity {
+        let way = DVec2::new(gravity[across], -gravity[up]);
+        gravity::draw(
+            page,
+            cell,
+            veins.points().map(place),
+            way,
+            toward.dot(gravity) > 0.0,
+        );
+    }
 }
 
 /// Starts and lengths of columns and rows, and the pixels per length of the
@@ -123,7 +138,7 @@ impl Panels {
         self.rows[1].0 + self.rows[1].1 + PANEL_AXIS + BOTTOM
     }
 
-    pub fn draw(&self, drawing: &mut Drawing, veins: &Veins) {
+    pub fn draw(&self, drawing: &mut Drawing, veins: &Veins, setting: &Setting) {
         let [left, right] = self.columns;
         let [top, bottom] = self.rows;
         let cell = |column: (f64, f64), row: (f64, f64)| Cell {
@@ -131,25 +146,19 @@ impl Panels {
             size: DVec2::new(column.1, row.1),
         };
         for (name, letter, text, cell, ways) in [
-            ("top", "(a)", "from above", cell(left, top), [XI, ETA]),
-            (
-                "side",
-                "(b)",
-                "from the side",
-                cell(left, bottom),
-                [XI, ZETA],
-            ),
+            ("top", "(a)", "from above", cell(left, top), [0, 1]),
+            ("side", "(b)", "from the side", cell(left, bottom), [0, 2]),
             (
                 "front",
                 "(c)",
                 "from the front",
                 cell(right, bottom),
-                [ETA, ZETA],
+                [1, 2],
             ),
         ] {
             drawing.group(name, |page| {
                 title(page, cell.corner, letter, text);
-                draw_flat(page, veins, cell, self.scale, ways);
+                draw_flat(page, veins, setting, cell, self.scale, ways);
             });
         }
         // Nothing stands left of the panel in space: it takes half of the gap.
@@ -159,11 +168,13 @@ impl Panels {
             (top.0, top.1 + PANEL_AXIS - TICK_SIZE),
         );
         drawing.group("space", |page| {
-            let scene = Scene::new(surrounding_box(veins.low, veins.high), cell, ROOM, None);
+            let bounds = surrounding_box(veins.low, veins.high);
+            let scene = Scene::new(bounds, setting, View::Oblique, cell, ROOM, None);
             title(page, cell.corner, "(d)", "in space");
             scene.draw_box(page);
             scene.draw_labels(page);
-            scene.draw_names(page, 38.0);
+            scene.draw_names(page, 38.0, true);
+            scene.draw_gravity(page);
             scene.draw_leaf(page, veins, veins.line_width());
         });
     }

@@ -1,6 +1,9 @@
 //! The drawing painted, twice as fine as a screen of 96 dots per inch.
 
 use std::io::{self, Write};
+use std::ops::Range;
+use std::sync::mpsc;
+use std::thread;
 
 use tiny_skia::{
     FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Stroke as Pen, StrokeDash, Transform,
@@ -15,33 +18,89 @@ const CHUNK: usize = 1 << 16;
 /// 192 dots per inch, as the file says them: dots per metre.
 const DOTS_PER_METRE: u32 = 7559;
 
+/// Rows that are painted together, while those before them are written.
+const BAND: u32 = 512;
+
 pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
-    encode(&paint(drawing), out)
+    let [width, height] = size(drawing);
+    thread::scope(|scope| {
+        let (send, bands) = mpsc::sync_channel(1);
+        scope.spawn(move || {
+            let starts = (0..height).step_by(BAND as usize);
+            let bands = starts.map(|start| start..(start + BAND).min(height));
+            // Nobody takes what comes after an error.
+            let _ = bands
+                .map(|rows| send.send(paint_rows(drawing, rows)))
+                .find(Result::is_err);
+        });
+        encode([width, height], bands.into_iter(), out)
+    })
+}
+
+/// Pixels of a drawing, across and down.
+fn size(drawing: &Drawing) -> [u32; 2] {
+    [drawing.width, drawing.height].map(|length| (length * SCALE).ceil() as u32)
 }
 
 /// The drawing as pixels.
 pub fn paint(drawing: &Drawing) -> Pixmap {
-    let pixels = |length: f64| (length * SCALE).ceil() as u32;
-    let mut canvas = Pixmap::new(pixels(drawing.width), pixels(drawing.height))
+    paint_rows(drawing, 0..size(drawing)[1])
+}
+
+/// Some rows of it.
+fn paint_rows(drawing: &Drawing, rows: Range<u32>) -> Pixmap {
+    let mut canvas = Pixmap::new(size(drawing)[0], rows.end - rows.start)
         .expect("a page has a width and a height");
     canvas.fill(tiny_skia::Color::WHITE);
     let font = Font::embedded();
+    let place = Transform::from_translate(0.0, -(rows.start as f32)).pre_concat(page_to_pixels());
+    let [top, bottom] = [rows.start, rows.end].map(|row| f64::from(row) / SCALE);
     for mark in &drawing.marks {
         match mark {
             Mark::Group(_) | Mark::EndGroup => (),
             Mark::Shape { path, fill, stroke } => {
+                let rim = stroke.map_or(1.0, |stroke| 1.0 + stroke.width);
+                let outside = |above: bool| {
+                    let mut heights = path.iter().flat_map(|step| heights(*step));
+                    heights.all(|y| {
+                        if above {
+                            y + rim < top
+                        } else {
+                            y - rim > bottom
+                        }
+                    })
+                };
+                if outside(true) || outside(false) {
+                    continue;
+                }
                 let Some(path) = outline(path) else { continue };
                 if let Some(fill) = fill {
-                    fill_path(&mut canvas, &path, *fill, page_to_pixels());
+                    fill_path(&mut canvas, &path, *fill, place);
                 }
                 if let Some(stroke) = stroke {
-                    stroke_path(&mut canvas, &path, stroke);
+                    stroke_path(&mut canvas, &path, stroke, place);
                 }
             }
-            Mark::Label(label) => paint_label(&mut canvas, label, &font),
+            Mark::Label(label) => {
+                let far = 2.0 * label.size;
+                let outside = label.at.y + far < top || label.at.y - far > bottom;
+                if label.upright || !outside {
+                    paint_label(&mut canvas, label, &font, place);
+                }
+            }
         }
     }
     canvas
+}
+
+/// Heights between which a step stays.
+fn heights(step: Step) -> impl Iterator<Item = f64> {
+    let heights = match step {
+        Step::Move(to) | Step::Line(to) => [Some(to.y), None, None],
+        Step::Cubic(a, b, to) => [a, b, to].map(|point| Some(point.y)),
+        Step::Close => [None; 3],
+    };
+    heights.into_iter().flatten()
 }
 
 fn page_to_pixels() -> Transform {
@@ -75,7 +134,7 @@ fn fill_path(canvas: &mut Pixmap, path: &tiny_skia::Path, color: Color, transfor
     canvas.fill_path(path, &ink(color), FillRule::Winding, transform, None);
 }
 
-fn stroke_path(canvas: &mut Pixmap, path: &tiny_skia::Path, stroke: &Stroke) {
+fn stroke_path(canvas: &mut Pixmap, path: &tiny_skia::Path, stroke: &Stroke, transform: Transform) {
     let dash = stroke.dashed.then(|| DASHES.map(|length| length as f32));
     let pen = Pen {
         width: stroke.width as f32,
@@ -84,10 +143,10 @@ fn stroke_path(canvas: &mut Pixmap, path: &tiny_skia::Path, stroke: &Stroke) {
         dash: dash.and_then(|dash| StrokeDash::new(dash.to_vec(), 0.0)),
         ..Pen::default()
     };
-    canvas.stroke_path(path, &ink(stroke.color), &pen, page_to_pixels(), None);
+    canvas.stroke_path(path, &ink(stroke.color), &pen, transform, None);
 }
 
-fn paint_label(canvas: &mut Pixmap, label: &Label, font: &Font) {
+fn paint_label(canvas: &mut Pixmap, label: &Label, font: &Font, page: Transform) {
     let Some(path) = outline(&font.outline(&label.text, label.size)) else {
         return;
     };
@@ -97,15 +156,20 @@ fn paint_label(canvas: &mut Pixmap, label: &Label, font: &Font) {
         Anchor::End => 1.0,
     } * font.width(&label.text, label.size);
     let turn = if label.upright { -90.0 } else { 0.0 };
-    let place = page_to_pixels()
+    let place = page
         .pre_translate(label.at.x as f32, label.at.y as f32)
         .pre_rotate(turn)
         .pre_translate(-before as f32, 0.0);
     fill_path(canvas, &path, label.color, place);
 }
 
-fn encode(canvas: &Pixmap, out: &mut dyn Write) -> io::Result<()> {
-    let mut encoder = png::Encoder::new(out, canvas.width(), canvas.height());
+/// Writes rows from the first on as they come.
+fn encode(
+    [width, height]: [u32; 2],
+    bands: impl Iterator<Item = Pixmap>,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let mut encoder = png::Encoder::new(out, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     // Lines and text on white: a simple filter is four times as fast as
@@ -120,14 +184,62 @@ fn encode(canvas: &Pixmap, out: &mut dyn Write) -> io::Result<()> {
     // Row by row: buffers of the whole page cost more than what is done with them.
     let mut writer = encoder.write_header()?;
     let mut rows = writer.stream_writer_with_size(CHUNK)?;
-    let mut rgb = vec![0; 3 * canvas.width() as usize];
-    for row in canvas.data().chunks_exact(4 * canvas.width() as usize) {
-        // The page is opaque: its transparency need not be stored.
-        for (to, from) in rgb.chunks_exact_mut(3).zip(row.chunks_exact(4)) {
-            to.copy_from_slice(&from[..3]);
+    let mut rgb = vec![0; 3 * width as usize];
+    for band in bands {
+        for row in band.data().chunks_exact(4 * width as usize) {
+            // The page is opaque: its transparency need not be stored.
+            for (to, from) in rgb.chunks_exact_mut(3).zip(row.chunks_exact(4)) {
+                to.copy_from_slice(&from[..3]);
+            }
+            rows.write_all(&rgb)?;
         }
-        rows.write_all(&rgb)?;
     }
     rows.finish()?;
     Ok(writer.finish()?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::figure::drawing::{DOT, INK, circle, rectangle};
+    use glam::DVec2;
+    use std::io::Cursor;
+
+    #[test]
+    fn bands_are_one_picture() {
+        let mut page = Drawing::new(300.0, "");
+        page.height = 700.0;
+        page.shape(
+            rectangle(DVec2::new(20.0, 20.0), DVec2::new(200.0, 600.0)),
+            DOT,
+            None,
+        );
+        for k in 0..14 {
+            let at = DVec2::new(30.0 + 10.0 * f64::from(k), 50.0 * f64::from(k));
+            page.stroke(circle(at, 45.0), Stroke::new(INK, 3.0));
+            page.label(at, "name", 20.0, Anchor::Start, INK);
+            page.upright_label(at, "a long name of an axis", 20.0, INK);
+        }
+        page.line(
+            DVec2::new(0.0, 10.0),
+            DVec2::new(300.0, 690.0),
+            Stroke::new(INK, 4.0),
+        );
+        let mut bytes = Vec::new();
+        write(&page, &mut bytes).unwrap();
+        let mut reader = ::png::Decoder::new(Cursor::new(&bytes))
+            .read_info()
+            .unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut pixels).unwrap();
+        let whole = paint(&page);
+        assert_eq!(4 * pixels.len(), 3 * whole.data().len());
+        // But for rounding where edges are smoothed, in four parts of a pixel each way.
+        let pairs = pixels.chunks_exact(3).zip(whole.data().chunks_exact(4));
+        let off = |(a, b): (&[u8], &[u8])| (0..3).map(|c| a[c].abs_diff(b[c])).max();
+        let off: Vec<u8> = pairs.filter_map(off).collect();
+        assert!(off.iter().all(|&off| off <= 64), "{:?}", off.iter().max());
+        let seen = off.iter().filter(|&&off| off > 2).count();
+        assert!(seen < off.len() / 1000, "{seen} pixels of {}", off.len());
+    }
 }

@@ -5,7 +5,8 @@ use glam::{DVec2, DVec3};
 use super::axis::round_step;
 use super::drawing::{Color, Drawing};
 use super::page::{Cell, HEADER, PANEL_TITLE, WIDTH, title_in};
-use super::space::{Camera, Room, Scene, surrounding_box};
+use super::setting::Setting;
+use super::space::{Camera, Room, Scene, View, surrounding_box};
 use super::veins::Veins;
 
 const COLUMNS: usize = 4;
@@ -29,8 +30,9 @@ const ROOM: Room = Room {
 /// Where the panels are, and the box that all of them show.
 pub struct SmallPanels {
     bounds: [DVec3; 2],
-    /// Width of a square of the grid, in lengths.
-    pub step: f64,
+    setting: Setting,
+    /// Width of a square of the grid, as it is shown.
+    step: f64,
     size: DVec2,
     top: f64,
     count: usize,
@@ -38,7 +40,11 @@ pub struct SmallPanels {
 
 impl SmallPanels {
     /// So many panels that hold all of these shapes.
-    pub fn holding<'a>(shapes: impl Iterator<Item = &'a Veins>, count: usize) -> Self {
+    pub fn holding<'a>(
+        shapes: impl Iterator<Item = &'a Veins>,
+        count: usize,
+        setting: &Setting,
+    ) -> Self {
         let boxes = shapes.map(|veins| (veins.low, veins.high));
         let all = boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         let (low, high) = all.unwrap_or_default();
@@ -49,13 +55,20 @@ impl SmallPanels {
             corner: DVec2::ZERO,
             size,
         };
+        let scale = Camera::facing(bounds, View::Oblique, any, ROOM).scale;
         SmallPanels {
             bounds,
-            step: round_step(GRID / Camera::facing(bounds, any, ROOM).scale),
+            step: round_step(setting.scale() * GRID / scale),
+            setting: setting.clone(),
             size,
             top: HEADER,
             count,
         }
+    }
+
+    /// How wide a square of the grid is.
+    pub fn square(&self) -> String {
+        self.setting.told(self.step / self.setting.scale())
     }
 
     pub fn below(self, top: f64) -> Self {
@@ -78,7 +91,8 @@ impl SmallPanels {
     }
 
     /// Draws a leaf with its letter and title into its panel, over what `under`
-    /// draws there with lines of this width. The first panel's axes are named.
+    /// draws there with lines of this width. The first panel's axes are named, and
+    /// gravity is drawn in it.
     pub fn draw(
         &self,
         page: &mut Drawing,
@@ -87,12 +101,40 @@ impl SmallPanels {
         (letter, text, color): (&str, &str, Color),
         under: impl FnOnce(&mut Drawing, &Scene, f64),
     ) {
+        self.draw_from(
+            View::Oblique,
+            page,
+            index,
+            veins,
+            (letter, text, color),
+            under,
+        );
+    }
+
+    /// The same, seen from elsewhere.
+    pub fn draw_from(
+        &self,
+        view: View,
+        page: &mut Drawing,
+        index: usize,
+        veins: &Veins,
+        (letter, text, color): (&str, &str, Color),
+        under: impl FnOnce(&mut Drawing, &Scene, f64),
+    ) {
         let cell = self.cell(index);
         title_in(page, cell.corner, letter, text, color);
-        let scene = Scene::new(self.bounds, cell, ROOM, Some(self.step));
+        let scene = Scene::new(
+            self.bounds,
+            &self.setting,
+            view,
+            cell,
+            ROOM,
+            Some(self.step),
+        );
         scene.draw_box(page);
         if index == 0 {
-            scene.draw_names(page, 9.0);
+            scene.draw_names(page, 9.0, false);
+            scene.draw_gravity(page);
         }
         let width = THINNER * veins.line_width();
         under(page, &scene, width);
@@ -106,7 +148,7 @@ fn height(bounds: [DVec3; 2], width: f64) -> f64 {
         corner: DVec2::ZERO,
         size: DVec2::ONE * (ROOM.left + ROOM.right + 1.0),
     };
-    let (first, last) = Camera::facing(bounds, any, ROOM).outline(bounds);
+    let (first, last) = Camera::facing(bounds, View::Oblique, any, ROOM).outline(bounds);
     let needed = (last - first).y / (last - first).x * (width - ROOM.left - ROOM.right);
     (needed + ROOM.below).clamp(LOWEST, HIGHEST)
 }

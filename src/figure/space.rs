@@ -7,13 +7,31 @@ use super::axis::{multiples, round_step};
 use super::drawing::{
     Anchor, Drawing, FLOOR, FRAME, GRID, INK, NOTE, SHADOW, Step, Stroke, polygon, polyline,
 };
+use super::gravity;
 use super::markers::leaf_markers;
 use super::page::{Cell, TEXT_SIZE, TICK_SIZE};
+use super::setting::Setting;
 use super::veins::{Piece, Vein, Veins};
 
-/// Where the viewer stands: degrees from the xi axis, and above the floor.
-const AZIMUTH: f64 = -55.0;
-const ELEVATION: f64 = 28.0;
+/// From where the box is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum View {
+    /// From above one of its edges.
+    Oblique,
+    /// Along the xi axis, from a little above.
+    Front,
+}
+
+impl View {
+    /// Degrees from the xi axis, and above the floor.
+    fn angles(self) -> [f64; 2] {
+        match self {
+            View::Oblique => [-55.0, 28.0],
+            View::Front => [-8.0, 12.0],
+        }
+    }
+}
+
 /// No side of the box is shorter than this part of its longest.
 const SHORTEST_SIDE: f64 = 0.4;
 /// Air around the leaf, as a fraction of its largest extent.
@@ -29,6 +47,9 @@ pub struct Room {
 
 /// Distance between the ticks of an axis at least.
 const TICK_DISTANCE: f64 = 30.0;
+
+/// From the top of an upright edge to its name.
+const ABOVE: DVec2 = DVec2::new(6.0, -12.0);
 
 /// The leaf with air around it, no side too short to see.
 pub fn surrounding_box(low: DVec3, high: DVec3) -> [DVec3; 2] {
@@ -54,9 +75,9 @@ pub struct Camera {
 
 impl Camera {
     /// Sees the whole box in a cell that also has room for labels.
-    pub fn facing([low, high]: [DVec3; 2], cell: Cell, room: Room) -> Self {
-        let (sin_a, cos_a) = AZIMUTH.to_radians().sin_cos();
-        let (sin_e, cos_e) = ELEVATION.to_radians().sin_cos();
+    pub fn facing([low, high]: [DVec3; 2], view: View, cell: Cell, room: Room) -> Self {
+        let [(sin_a, cos_a), (sin_e, cos_e)] =
+            view.angles().map(|angle| angle.to_radians().sin_cos());
         let mut camera = Camera {
             right: DVec3::new(-sin_a, cos_a, 0.0),
             up: DVec3::new(-sin_e * cos_a, -sin_e * sin_a, cos_e),
@@ -91,7 +112,7 @@ impl Camera {
 
 /// One axis along an edge of the box.
 struct Edge {
-    name: &'static str,
+    axis: usize,
     direction: DVec3,
     at: DVec3,
     low: f64,
@@ -100,7 +121,9 @@ struct Edge {
     outward: DVec3,
     /// Where the two walls on which its grid lines run end.
     walls: [DVec3; 2],
+    /// Between ticks, as they are shown, and what is shown for a length of 1.
     step: f64,
+    shown: f64,
 }
 
 impl Edge {
@@ -110,16 +133,20 @@ impl Edge {
 
     fn ticks(&self) -> Vec<(f64, String)> {
         let room = 0.02 * (self.high - self.low);
-        multiples(self.low + room, self.high - room, self.step)
+        let ends = [self.low + room, self.high - room].map(|end| self.shown * end);
+        let found = multiples(ends[0], ends[1], self.step).into_iter();
+        found
+            .map(|(value, text)| (value / self.shown, text))
+            .collect()
     }
 }
 
 /// Edges along the three axes, each with ticks this far apart or, without a
 /// step, as fine as can be read.
-fn edges(camera: &Camera, low: DVec3, high: DVec3, step: Option<f64>) -> [Edge; 3] {
+fn edges(camera: &Camera, low: DVec3, high: DVec3, shown: f64, step: Option<f64>) -> [Edge; 3] {
     let sides = high - low;
-    let edge = |name, direction: DVec3, at, outward, walls| Edge {
-        name,
+    let edge = |axis, direction: DVec3, at, outward, walls| Edge {
+        axis,
         direction,
         at,
         low: direction.dot(low),
@@ -128,8 +155,9 @@ fn edges(camera: &Camera, low: DVec3, high: DVec3, step: Option<f64>) -> [Edge; 
         walls,
         step: step.unwrap_or_else(|| {
             let seen = camera.place(direction).distance(camera.place(DVec3::ZERO));
-            round_step(TICK_DISTANCE / seen)
+            round_step(shown * TICK_DISTANCE / seen)
         }),
+        shown,
     };
     let side = |axis: DVec3| sides * axis;
     let (behind, up, left) = (side(DVec3::Y), side(DVec3::Z), side(DVec3::NEG_X));
@@ -139,9 +167,9 @@ fn edges(camera: &Camera, low: DVec3, high: DVec3, step: Option<f64>) -> [Edge; 
         [behind, behind - left],
     ];
     [
-        edge("ξ", DVec3::X, low, DVec3::NEG_Y, walls[0]),
-        edge("η", DVec3::Y, low.with_x(high.x), DVec3::X, walls[1]),
-        edge("ζ", DVec3::Z, low, -camera.right, walls[2]),
+        edge(0, DVec3::X, low, DVec3::NEG_Y, walls[0]),
+        edge(1, DVec3::Y, low.with_x(high.x), DVec3::X, walls[1]),
+        edge(2, DVec3::Z, low, -camera.right, walls[2]),
     ]
 }
 
@@ -150,19 +178,30 @@ pub struct Scene {
     high: DVec3,
     camera: Camera,
     edges: [Edge; 3],
+    setting: Setting,
+    cell: Cell,
 }
 
 impl Scene {
     /// The box in a cell with room for labels; its grid is so wide or, without
     /// a step, as fine as can be read.
-    pub fn new([low, high]: [DVec3; 2], cell: Cell, room: Room, step: Option<f64>) -> Self {
-        let camera = Camera::facing([low, high], cell, room);
-        let edges = edges(&camera, low, high, step);
+    pub fn new(
+        [low, high]: [DVec3; 2],
+        setting: &Setting,
+        view: View,
+        cell: Cell,
+        room: Room,
+        step: Option<f64>,
+    ) -> Self {
+        let camera = Camera::facing([low, high], view, cell, room);
+        let edges = edges(&camera, low, high, setting.scale(), step);
         Scene {
             low,
             high,
             camera,
             edges,
+            setting: setting.clone(),
+            cell,
         }
     }
 
@@ -216,13 +255,46 @@ impl Scene {
         }
     }
 
-    /// Names all axes, so far from their edges.
-    pub fn draw_names(&self, page: &mut Drawing, distance: f64) {
+    /// Names all axes, so far from their edges; with units if values stand there.
+    pub fn draw_names(&self, page: &mut Drawing, distance: f64, values: bool) {
         for edge in &self.edges {
             let middle = self.place(edge.point(0.5 * (edge.low + edge.high)));
             let at = middle + away(self.outward(edge), distance);
-            page.beside(at, edge.name, TEXT_SIZE + 1.0, Anchor::Middle, INK);
+            let name = self.setting.brief_axis(edge.axis, values);
+            // A long name reaches away from its edge, or stands on top of it.
+            let (at, anchor) = match edge.axis {
+                _ if name.chars().count() < 3 => (at, Anchor::Middle),
+                0 => (at, Anchor::End),
+                1 => (at, Anchor::Start),
+                _ => (self.place(edge.point(edge.high)) + ABOVE, Anchor::End),
+            };
+            page.beside(at, &name, TEXT_SIZE + 1.0, anchor, INK);
         }
+    }
+
+    /// Draws the direction of gravity, if there is any, beside the box.
+    pub fn draw_gravity(&self, page: &mut Drawing) {
+        let Some(gravity) = self.setting.gravity else {
+            return;
+        };
+        let Camera {
+            right, up, toward, ..
+        } = self.camera;
+        let way = DVec2::new(right.dot(gravity), -up.dot(gravity));
+        let ends = [self.low, self.high];
+        let corner = |k: usize| DVec3::new(ends[k & 1].x, ends[k >> 1 & 1].y, ends[k >> 2].z);
+        let corners = (0..8).map(|k| self.place(corner(k)));
+        let named = self
+            .edges
+            .iter()
+            .map(|edge| self.place(edge.point(0.5 * (edge.low + edge.high))));
+        gravity::draw(
+            page,
+            self.cell,
+            corners.chain(named),
+            way,
+            toward.dot(gravity) > 0.0,
+        );
     }
 
     /// Away from the box, on the page.

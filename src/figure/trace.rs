@@ -1,20 +1,25 @@
 //! Branches of equilibria: a coordinate of the tip against the number that
 //! varies, and the leaf at some of the points.
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
 use super::axes::Axes;
 use super::axis::Axis;
-use super::drawing::{Anchor, CURVES, Drawing, INK, NOTE, Stroke};
+use super::drawing::{CURVES, Drawing, INK, NOTE, Stroke};
+use super::labels::Labels;
 use super::markers::Marker;
-use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, new_page, title};
+use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, new_page, title};
+use super::setting::{Setting, with_unit};
 use super::small::SmallPanels;
 use super::veins::Veins;
 use crate::report::numbers::{power_of_ten, short};
 use crate::report::words::branch_end;
-use crate::study::{Law, PointKind, Trace, TraceBranch, TracePoint};
+use crate::scenario::{Scenario, Units};
+use crate::study::{Law, PointKind, Trace, TraceBranch, TracePoint, TraceShow};
 
 const DIAGRAM: f64 = 380.0;
+/// Height of the further panels.
+const MORE: f64 = 220.0;
 /// Right of the panel, for the key.
 const KEY: f64 = 190.0;
 const LAW: f64 = 240.0;
@@ -22,11 +27,17 @@ const BETWEEN: f64 = 26.0;
 /// Leaves drawn, and branches named.
 const MOST_LEAVES: usize = 8;
 const MOST_NAMED: usize = 7;
-/// Points closer than this on the page have one label.
-const CLOSE: f64 = 14.0;
-const AXES: [&str; 3] = ["x", "y", "z"];
+/// Smaller differences are not seen in small panels: in lengths, and as a part of the
+/// largest.
+const SEEN: f64 = 0.04;
+const PART_SEEN: f64 = 0.25;
+/// Parts of a vein between the places at which leaves are compared.
+const PARTS: usize = 8;
+/// Smaller twists, in radians, and ways of tips, in lengths, are rounding.
+const ROUNDING: f64 = 1e-7;
 
-pub fn draw(trace: &Trace) -> Drawing {
+pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
+    let setting = Setting::of(scenario);
     let shown = shown(trace);
     let point = |&[b, p]: &[usize; 2]| &trace.branches[b].points[p];
     let longest = shown.iter().map(point).flat_map(|point| &point.curves);
@@ -34,23 +45,35 @@ pub fn draw(trace: &Trace) -> Drawing {
     let shapes: Vec<Veins> = (shown.iter().map(point))
         .map(|point| Veins::through(&point.curves, &point.tips, longest))
         .collect();
-    let law = match trace.law {
-        Some(_) => BETWEEN + PANEL_TITLE + LAW + PANEL_AXIS,
-        None => 0.0,
+    let quantities = match trace.show.as_slice() {
+        [] => vec![farthest(trace)],
+        asked => asked.to_vec(),
     };
-    let diagram = Cell::beside_key(HEADER + PANEL_TITLE, DIAGRAM, KEY);
-    let below = diagram.end().y + PANEL_AXIS;
-    let panels = SmallPanels::holding(shapes.iter(), shown.len()).below(below + law);
     let name = format!("{}: equilibria along {}", trace.scenario, trace.keys);
     let mut drawing = new_page(LEFT, &name, &notes(trace), None);
-    drawing.height = panels.end();
-    drawing.group("branches", |page| {
-        draw_branches(page, trace, &shown, diagram)
-    });
+    let mut letters = (b'a'..=b'z').map(|letter| format!("({})", char::from(letter)));
+    let mut letter = || letters.next().unwrap_or_default();
+    let mut below = HEADER;
+    for (place, &quantity) in quantities.iter().enumerate() {
+        let height = if place == 0 { DIAGRAM } else { MORE };
+        let cell = Cell::beside_key(below + PANEL_TITLE, height, KEY);
+        drawing.group("branches", |page| {
+            draw_branches(page, trace, quantity, &shown, (cell, &letter()));
+            if place == 0 {
+                draw_key(page, trace, cell);
+            }
+        });
+        below = cell.end().y + PANEL_AXIS;
+    }
     if let (Some(law), Some(branch)) = (&trace.law, trace.branches.first()) {
         let cell = Cell::beside_key(below + BETWEEN + PANEL_TITLE, LAW, KEY);
-        drawing.group("law", |page| draw_law(page, trace, law, branch, cell));
+        drawing.group("law", |page| {
+            draw_law(page, trace, law, branch, (cell, &letter()))
+        });
+        below = cell.end().y + PANEL_AXIS;
     }
+    let panels = SmallPanels::holding(shapes.iter(), shown.len(), &setting).below(below);
+    drawing.height = panels.end();
     drawing.group("leaves", |page| {
         for (index, (veins, at)) in shapes.iter().zip(&shown).enumerate() {
             let (number, text) = ((index + 1).to_string(), format!("at {}", what(point(at))));
@@ -85,8 +108,8 @@ fn notes(trace: &Trace) -> Vec<String> {
     notes
 }
 
-/// The points whose leaves are drawn: where branches begin and end, and where
-/// the index changes.
+/// The points whose leaves are drawn: where branches begin and end, where the index
+/// changes, and in the middle of branches; of leaves that look the same the first.
 fn shown(trace: &Trace) -> Vec<[usize; 2]> {
     let mut wanted: Vec<(usize, [usize; 2])> = Vec::new();
     for (b, branch) in trace.branches.iter().enumerate() {
@@ -98,16 +121,36 @@ fn shown(trace: &Trace) -> Vec<[usize; 2]> {
         }
         wanted.push((1 + b.min(1), [b, last]));
         wanted.extend(branch.critical().map(|(p, _)| (3, [b, p])));
+        wanted.push((4, [b, last / 2]));
     }
     wanted.sort_by_key(|&(rank, _)| rank);
+    let point = |[b, p]: [usize; 2]| &trace.branches[b].points[p];
+    let first = wanted.first().map(|&(_, at)| at);
+    let away = |at: [usize; 2]| first.map_or(0.0, |first| apart(point(at), point(first)));
+    let farthest = wanted.iter().map(|&(_, at)| away(at)).fold(0.0, f64::max);
+    let seen = SEEN.min(PART_SEEN * farthest);
     let mut shown: Vec<[usize; 2]> = Vec::new();
     for (_, at) in wanted {
-        if shown.len() < MOST_LEAVES && !shown.contains(&at) {
+        let alike = |&other: &[usize; 2]| apart(point(at), point(other)) <= seen;
+        if shown.len() < MOST_LEAVES && !shown.iter().any(alike) {
             shown.push(at);
         }
     }
     shown.sort_unstable();
     shown
+}
+
+/// How far two leaves are apart at most, in lengths; their grids may differ.
+fn apart(one: &TracePoint, other: &TracePoint) -> f64 {
+    let at = |curve: &[DVec3], part: usize| {
+        let last = curve.len().saturating_sub(1);
+        curve.get((part * last + PARTS / 2) / PARTS).copied()
+    };
+    let pairs = || one.curves.iter().zip(&other.curves);
+    let points = pairs().flat_map(|(a, b)| (0..=PARTS).map(move |k| at(a, k).zip(at(b, k))));
+    let far = points.flatten().map(|(a, b)| a.distance(b));
+    let size = pairs().map(|(a, b)| length(a).max(length(b)));
+    far.fold(0.0, f64::max) / size.fold(f64::MIN_POSITIVE, f64::max)
 }
 
 fn what(point: &TracePoint) -> String {
@@ -119,47 +162,75 @@ fn what(point: &TracePoint) -> String {
     format!("{}, {kind}", short(point.value))
 }
 
-/// The axis along which the tip goes furthest.
-fn axis(trace: &Trace) -> usize {
+/// The coordinate along which the tip goes farthest.
+fn farthest(trace: &Trace) -> TraceShow {
     let points = trace.branches.iter().flat_map(|branch| &branch.points);
     let tips = points.filter_map(|point| point.tips.first().map(|&tip| (tip, tip)));
     let extent = tips.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
     let (low, high) = extent.unwrap_or_default();
     let way = high - low;
     let longest = (0..3).max_by(|&a, &b| way[a].total_cmp(&way[b]));
-    longest.unwrap_or(2)
+    TraceShow::ALL[longest.unwrap_or(2)]
 }
 
-/// A name with its unit, if that is known.
-fn with_unit(name: &str, unit: &Option<String>) -> String {
-    match unit {
-        Some(unit) => format!("{name} ({unit})"),
-        None => name.into(),
+/// A quantity with its unit.
+fn name(quantity: TraceShow, units: &Units) -> String {
+    match quantity {
+        TraceShow::Energy => with_unit("energy", units.energy().as_deref()),
+        TraceShow::Twist => with_unit("mean twist", Some("rad")),
+        tip => with_unit(&format!("{tip} of the tip"), units.length.as_deref()),
     }
 }
 
-fn tip(point: &TracePoint, axis: usize) -> f64 {
-    point.tips.first().map_or(f64::NAN, |tip| tip[axis])
+/// Its axis, wide enough that rounding is none of it.
+fn axis_of(trace: &Trace, quantity: TraceShow) -> Axis {
+    let points = || trace.branches.iter().flat_map(|branch| &branch.points);
+    let values = points().map(|point| quantity.of(point));
+    let least = match quantity {
+        TraceShow::Twist => ROUNDING,
+        TraceShow::Energy => 0.0,
+        _ => {
+            let curves = points().take(1).flat_map(|point| &point.curves);
+            ROUNDING * curves.map(|curve| length(curve)).fold(0.0, f64::max)
+        }
+    };
+    Axis::holding(&name(quantity, &trace.units), values).at_least(least)
 }
 
-fn draw_branches(page: &mut Drawing, trace: &Trace, shown: &[[usize; 2]], cell: Cell) {
-    let axis = axis(trace);
-    let at = |point: &TracePoint| (point.value, tip(point, axis));
+fn tip(point: &TracePoint, axis: usize) -> f64 {
+    TraceShow::ALL[axis].of(point)
+}
+
+fn draw_branches(
+    page: &mut Drawing,
+    trace: &Trace,
+    quantity: TraceShow,
+    shown: &[[usize; 2]],
+    (cell, letter): (Cell, &str),
+) {
+    let at = |point: &TracePoint| (point.value, quantity.of(point));
     let all = || trace.branches.iter().flat_map(|branch| &branch.points);
-    let up = format!("{} of the tip", AXES[axis]);
     let across = match trace.keys.to_string() {
-        force if force.starts_with("load.tip_force") => with_unit(&force, &trace.units.force),
+        force if force.starts_with("load.tip_force") => {
+            with_unit(&force, trace.units.force.as_deref())
+        }
         other => other,
     };
-    let up = with_unit(&up, &trace.units.length);
     let axes = Axes {
         cell,
         across: across_axis(trace, &across, all().map(|point| at(point).0)),
-        up: Axis::holding(&up, all().map(|point| at(point).1)),
+        up: axis_of(trace, quantity),
     };
-    let what = "equilibria: stable drawn solid, unstable dashed";
-    title(page, cell.corner, "(a)", what);
+    // Only what there is.
+    let indices = [true, false].map(|stable| all().any(|point| (point.index == 0) == stable));
+    let what = match indices {
+        [true, true] => "equilibria: stable drawn solid, unstable dashed",
+        [false, true] => "unstable equilibria",
+        _ => "stable equilibria",
+    };
+    title(page, cell.corner, letter, what);
     axes.draw(page);
+    let mut labels = Labels::within(cell);
     for (b, branch) in trace.branches.iter().enumerate() {
         let entrance = branch.from.map(|[b, p]| &trace.branches[b].points[p]);
         for (points, stable) in pieces(entrance, branch) {
@@ -167,6 +238,7 @@ fn draw_branches(page: &mut Drawing, trace: &Trace, shown: &[[usize; 2]], cell: 
             let width = if stable { 2.0 } else { 1.2 };
             let stroke = Stroke::new(CURVES[b % CURVES.len()], width).dashed(!stable);
             axes.curve(page, &line, stroke);
+            labels.avoid(&axes, &line);
         }
     }
     for (kind, marker) in [(true, Marker::Ring), (false, Marker::Diamond)] {
@@ -174,9 +246,12 @@ fn draw_branches(page: &mut Drawing, trace: &Trace, shown: &[[usize; 2]], cell: 
         let of_kind = critical.filter(|(_, point)| (point.kind == PointKind::Fold) == kind);
         axes.markers(page, of_kind.map(|(_, point)| at(point)), marker, INK);
     }
-    let shown = shown.iter().map(|&[b, p]| &trace.branches[b].points[p]);
-    number(page, shown.map(|point| axes.at(at(point))));
-    draw_key(page, trace, cell);
+    for (index, &[b, p]) in shown.iter().enumerate() {
+        if let Some(place) = axes.at(at(&trace.branches[b].points[p])) {
+            labels.add(place, &(index + 1).to_string());
+        }
+    }
+    labels.draw(page);
 }
 
 /// The axis of what varies: logarithmic if its logarithm varies evenly, and from small
@@ -189,22 +264,6 @@ fn across_axis(trace: &Trace, name: &str, values: impl Iterator<Item = f64>) -> 
     Axis {
         sign: Some(sign),
         ..Axis::logarithmic(name, values.map(|value| sign * value), 1.0)
-    }
-}
-
-/// Numbers the leaves that are drawn beside their points.
-fn number(page: &mut Drawing, places: impl Iterator<Item = Option<DVec2>>) {
-    let mut labels: Vec<(DVec2, String)> = Vec::new();
-    for (index, place) in places.enumerate() {
-        let Some(place) = place else { continue };
-        match labels.iter_mut().find(|(at, _)| at.distance(place) < CLOSE) {
-            Some((_, text)) => *text += &format!(", {}", index + 1),
-            None => labels.push((place, (index + 1).to_string())),
-        }
-    }
-    for (place, text) in labels {
-        let beside = place + DVec2::new(7.0, -6.0);
-        page.label(beside, &text, TICK_SIZE, Anchor::Start, INK);
     }
 }
 
@@ -255,23 +314,21 @@ fn pieces<'t>(
 }
 
 /// Force against displacement of the tip, and the line through it.
-fn draw_law(page: &mut Drawing, trace: &Trace, law: &Law, branch: &TraceBranch, cell: Cell) {
+fn draw_law(
+    page: &mut Drawing,
+    trace: &Trace,
+    law: &Law,
+    branch: &TraceBranch,
+    (cell, letter): (Cell, &str),
+) {
     let start = branch.points.first().map_or(0.0, |p| tip(p, law.axis));
     let points: Vec<(f64, f64)> = (branch.points.iter())
         .map(|point| (tip(point, law.axis) - start, point.value))
         .collect();
     let units = &trace.units;
-    let across = format!("displacement along {}", AXES[law.axis]);
-    let across = with_unit(&across, &units.length);
-    let up = with_unit("force", &units.force);
-    let axes = Axes {
-        cell,
-        across: Axis::holding(&across, points.iter().map(|p| p.0)),
-        up: Axis::holding(&up, points.iter().map(|p| p.1)),
-    };
-    let what = "force against displacement of the tip";
-    title(page, cell.corner, "(b)", what);
-    axes.draw(page);
+    let across = format!("displacement along {}", TraceShow::ALL[law.axis]);
+    let across = with_unit(&across, units.length.as_deref());
+    let up = with_unit("force", units.force.as_deref());
     let count = points.len() as f64;
     let x = points.iter().map(|p| p.0).sum::<f64>() / count;
     let y = points.iter().map(|p| p.1).sum::<f64>() / count;
@@ -279,6 +336,16 @@ fn draw_law(page: &mut Drawing, trace: &Trace, law: &Law, branch: &TraceBranch, 
         let across = end.map_or(0.0, |p| p.0);
         (across, y + law.slope * (across - x))
     });
+    // The line leaves the range of the points.
+    let drawn = || points.iter().chain(&ends);
+    let axes = Axes {
+        cell,
+        across: Axis::holding(&across, drawn().map(|p| p.0)),
+        up: Axis::holding(&up, drawn().map(|p| p.1)),
+    };
+    let what = "force against displacement of the tip";
+    title(page, cell.corner, letter, what);
+    axes.draw(page);
     let line = Stroke::new(CURVES[2], 1.4);
     axes.curve(page, &ends, line);
     axes.markers(page, points, Marker::Dot, CURVES[0]);

@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::drawing::{Color, Path, Step, vein_color};
+use super::setting::Setting;
 use crate::relax::{Equilibrium, RodShape};
 
 /// Of a wider leaf, only some veins are drawn: more would not be told apart.
@@ -122,12 +123,18 @@ impl Veins {
         }
     }
 
-    pub fn notes(&self) -> Vec<String> {
-        let mut notes = vec![format!("L = {}", self.unit)];
+    pub fn notes(&self, setting: &Setting) -> Vec<String> {
+        let mut notes = vec![format!("L = {}", setting.length())];
         if self.every > 1 {
             notes.push(format!("1 vein in {} drawn", self.every));
         }
         notes
+    }
+
+    /// The ends of all pieces.
+    pub fn points(&self) -> impl Iterator<Item = DVec3> {
+        let pieces = self.veins.iter().flat_map(|vein| &vein.pieces);
+        pieces.flat_map(|piece| [piece[0], piece[3]])
     }
 
     /// The largest side of the box, or 1 if it is a point.

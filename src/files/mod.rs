@@ -20,7 +20,7 @@ pub use peers::read_peers;
 pub use recording::{Checkpointer, Recording};
 
 use crate::figure::view::{self, Page, Series, glb, vtk};
-use crate::figure::{self, Picture};
+use crate::figure::{self, Film, Picture};
 use crate::relax::Equilibrium;
 use crate::report::table::Table;
 use crate::report::{self, FileError, Format, json};
@@ -35,7 +35,7 @@ impl Written for Equilibrium {
         &Picture::svg("figure.svg", figure::leaf),
         &Picture::png("figure.png", figure::leaf),
         &Page("view.html"),
-        &Table("leaf.vtp", vtk::leaf),
+        &vtk::Lines("leaf.vtp"),
         &Table("leaf.glb", glb::leaf),
     ];
 
@@ -43,8 +43,8 @@ impl Written for Equilibrium {
         &Table("modes.csv", report::modes_table),
         &Picture::svg("modes.svg", figure::modes),
         &Picture::png("modes.png", figure::modes),
-        &Picture::svg("sensitivity.svg", figure::sensitivity),
-        &Picture::png("sensitivity.png", figure::sensitivity),
+        &Picture::svg("sensitivity.svg", |it, _| figure::sensitivity(it)),
+        &Picture::png("sensitivity.png", |it, _| figure::sensitivity(it)),
     ];
 
     fn has_more(&self, file: &str) -> bool {
@@ -69,8 +69,8 @@ impl Written for Fit {
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
         &Table("fitted.toml", report::fitted),
         &Table("fit.csv", report::fit_table),
-        &Picture::svg("fit.svg", figure::fit),
-        &Picture::png("fit.png", figure::fit),
+        &Picture::svg("fit.svg", |it, _| figure::fit(it)),
+        &Picture::png("fit.png", |it, _| figure::fit(it)),
     ];
 }
 
@@ -78,8 +78,8 @@ impl Written for Map {
     const JSON: Option<&'static str> = Some("map.json");
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
         &Table("map.csv", report::map_table),
-        &Picture::svg("map.svg", figure::map),
-        &Picture::png("map.png", figure::map),
+        &Picture::svg("map.svg", |it, _| figure::map(it)),
+        &Picture::png("map.png", |it, _| figure::map(it)),
     ];
 }
 
@@ -123,7 +123,7 @@ impl Written for Record {
         &Page("motion.html"),
         &Series("motion.pvd", view::instants),
         &Table("motion.glb", glb::motion),
-        &Table("motion.gif", figure::film),
+        &Film("motion.gif"),
     ];
 }
 
@@ -131,8 +131,8 @@ impl Written for Chart {
     const JSON: Option<&'static str> = Some("chart.json");
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
         &Table("chart.csv", report::chart_table),
-        &Picture::svg("chart.svg", figure::chart),
-        &Picture::png("chart.png", figure::chart),
+        &Picture::svg("chart.svg", |it, _| figure::chart(it)),
+        &Picture::png("chart.png", |it, _| figure::chart(it)),
     ];
 }
 
@@ -141,8 +141,8 @@ impl Written for Scaling {
     const JSON: Option<&'static str> = None;
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
         &Table("chart_rods.csv", report::scaling_table),
-        &Picture::svg("chart_rods.svg", figure::scaling),
-        &Picture::png("chart_rods.png", figure::scaling),
+        &Picture::svg("chart_rods.svg", |it, _| figure::scaling(it)),
+        &Picture::png("chart_rods.png", |it, _| figure::scaling(it)),
     ];
 }
 

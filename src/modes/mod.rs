@@ -137,16 +137,21 @@ impl Vibration<'_> {
         self.pattern.factorize(&self.system, 0.0).ok()
     }
 
-    /// A shift below all eigenvalues, no farther than it must be.
-    fn below_all(&mut self) -> Option<f64> {
+    /// The first search, from a shift below all eigenvalues, no farther than it must be,
+    /// which is returned.
+    fn first_search(&mut self, wanted: usize, found: &mut Vec<Mode>) -> Option<(f64, Option<f64>)> {
         let mut shift = -self.leaf.neutral_shift();
-        while self.factorize(shift)?.negative() > 0 {
+        loop {
+            let sought = (wanted, f64::INFINITY);
+            let searched = self.search((shift, Some(0)), sought, 0, found).ok()?;
+            if let Some(bound) = searched {
+                return Some((shift, bound));
+            }
             shift = (NEXT_SHIFT * shift).min(-FIRST_SHIFT);
             if !shift.is_finite() {
                 return None;
             }
         }
-        Some(shift)
     }
 
     /// Eigenvectors of unit mass, eigenvalues ascending.
@@ -155,12 +160,15 @@ impl Vibration<'_> {
         if count == 0 {
             return Some(Vec::new());
         }
-        let lowest = self.below_all()?;
-        let (mut shift, mut limit) = (lowest, f64::INFINITY);
         let mut found: Vec<Mode> = Vec::new();
+        let (lowest, mut bound) = self.first_search(count, &mut found)?;
+        let (mut shift, mut limit) = (lowest, f64::INFINITY);
         let mut wanted = count;
         for search in 0..SEARCHES + count {
-            let bound = (self.search(shift, (wanted, limit), search, &mut found)).ok()?;
+            if search > 0 {
+                let sought = (wanted, limit);
+                bound = (self.search((shift, None), sought, search, &mut found)).ok()??;
+            }
             if found.len() < count {
                 wanted = count - found.len();
                 if let Some(bound) = bound {
@@ -210,18 +218,22 @@ impl Vibration<'_> {
     }
 
     /// Adds to the eigenvalues found `wanted` more of those next above the
-    /// shift, fewer if there are no more below a limit; see [`Lanczos::run`].
+    /// shift, fewer if there are no more below a limit; see [`Lanczos::run`]. `None` if
+    /// more eigenvalues than so many are below the shift.
     fn search(
         &mut self,
-        shift: f64,
+        (shift, most_below): (f64, Option<usize>),
         (wanted, limit): (usize, f64),
         search: usize,
         found: &mut Vec<Mode>,
-    ) -> Result<Option<f64>, SparseError> {
+    ) -> Result<Option<Option<f64>>, SparseError> {
         let start = self.start(search);
         self.leaf.assemble(self.state, &mut self.system);
         self.masses.add(&mut self.system, -shift);
         let mut factor = self.pattern.factorize(&self.system, 0.0)?;
+        if most_below.is_some_and(|most| factor.negative() > most) {
+            return Ok(None);
+        }
         let mut lanczos = Lanczos {
             masses: &self.masses,
             shift,
@@ -231,7 +243,7 @@ impl Vibration<'_> {
         let (more, bound) = lanczos.run(start, wanted, limit);
         found.extend(more);
         found.sort_by(|a, b| a.eigenvalue.total_cmp(&b.eigenvalue));
-        Ok(bound)
+        Ok(Some(bound))
     }
 
     /// A load without any symmetry, another one in every search.

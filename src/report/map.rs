@@ -6,6 +6,7 @@ use crate::study::{Map, MapOutcome};
 
 use super::numbers::seconds;
 use super::table::{lay_out, under};
+use super::words;
 
 /// What was done for it.
 #[derive(Clone, Copy)]
@@ -48,7 +49,11 @@ pub fn report(map: &Map, told: Told, files: Option<String>) -> String {
     lines.extend(under("found", counts(map)));
     lines.extend(files.map(|files| ("written", files)));
     lay_out(
-        &format!("{}: where methods fail", request.base.scenario().name),
+        &format!(
+            "{}: {}",
+            request.base.scenario().name,
+            words::map_shows(map.show)
+        ),
         &lines,
     )
 }

@@ -13,7 +13,8 @@ use crate::study::{
     Reference, Row, Scaling, ScalingRow, Setting, Shot, Spread,
 };
 
-fn scenario(name: &str, rods: usize) -> Scenario {
+/// The scenario of all of these.
+pub fn scenario(name: &str, rods: usize) -> Scenario {
     let text = format!(
         r#"
         name = "{name}"

@@ -2,7 +2,7 @@
 
 use crate::branch::{End, Stuck};
 use crate::relax::{Equilibrium, Method, Outcome};
-use crate::study::{Contender, Verdict};
+use crate::study::{Contender, MapShow, Verdict};
 
 /// How the run ended and what was found, in one phrase.
 pub fn verdict(equilibrium: &Equilibrium) -> String {
@@ -29,6 +29,14 @@ pub fn verdict(equilibrium: &Equilibrium) -> String {
 
 fn at_rest(equilibrium: &Equilibrium) -> String {
     equilibrium_of_index(equilibrium.stability.negative_eigenvalues)
+}
+
+/// What a map shows.
+pub fn map_shows(show: MapShow) -> &'static str {
+    match show {
+        MapShow::Outcomes => "where methods fail",
+        MapShow::Waves => "waves along the margins",
+    }
 }
 
 /// What kind of equilibrium has so many negative eigenvalues.

@@ -51,6 +51,9 @@ pub(super) fn check(raw: &Raw) -> Result<Scenario> {
         name,
         units,
         rods,
+        radii: sections
+            .map(|sections| sections.radii())
+            .unwrap_or_default(),
         joined,
         coupling,
         gravity,

@@ -7,6 +7,7 @@ use toml::de::DeValue;
 use super::Profile;
 use super::error::ScenarioError;
 use super::key::Key;
+use super::radii::Radii;
 use super::raw::{Item, Raw};
 use super::section::{Outline, Property, Section};
 use super::value::MAGNITUDES;
@@ -109,6 +110,11 @@ impl Sections {
             },
         };
         self.sections.iter().map(profile).collect()
+    }
+
+    /// How thick they are.
+    pub(super) fn radii(&self) -> Radii {
+        Radii::of(&self.sections)
     }
 
     /// A1, A2, A3 of all rods.

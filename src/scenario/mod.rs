@@ -13,6 +13,7 @@ mod limits;
 mod material;
 mod part;
 mod profile;
+mod radii;
 mod raw;
 mod read;
 mod scale;
@@ -31,6 +32,7 @@ pub use key::Key;
 pub use part::Part;
 pub(crate) use part::{number_at, resolve, value_at, with_overrides};
 pub use profile::Profile;
+pub use radii::Radii;
 pub use read::text;
 #[cfg(feature = "cli")]
 pub(crate) use read::{MOST_BYTES, utf8};
@@ -51,6 +53,8 @@ pub struct Scenario {
     pub units: Units,
     /// The veins, from one edge of the leaf to the other; at least one.
     pub rods: Vec<Rod>,
+    /// How thick they are, where sections are given: for pictures.
+    pub radii: Radii,
     /// Whether all tips share one point.
     pub joined: bool,
     /// Coupling stiffness of each gap between neighbouring rods along the lab
@@ -97,6 +101,14 @@ pub struct Units {
     pub length: Option<String>,
     /// Of forces.
     pub force: Option<String>,
+}
+
+impl Units {
+    /// Of energies and moments, if those of forces and lengths are named.
+    pub fn energy(&self) -> Option<String> {
+        let (force, length) = (self.force.as_ref()?, self.length.as_ref()?);
+        Some(format!("{force} {length}"))
+    }
 }
 
 /// One vein as a special Cosserat rod. Index 0 of every triple belongs to the

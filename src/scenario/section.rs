@@ -103,14 +103,24 @@ impl Section {
         &self.kinks
     }
 
+    /// Its area at a fraction of the length.
+    pub fn area(&self, sigma: f64) -> f64 {
+        let (w, t) = (self.width.at(sigma), self.thickness.at(sigma));
+        match self.outline {
+            Outline::Ellipse => PI / 4.0 * w * t,
+            Outline::Rectangle => w * t,
+        }
+    }
+
     /// A property at a fraction of the length.
     pub fn at(&self, property: Property, sigma: f64) -> f64 {
         let (w, t) = (self.width.at(sigma), self.thickness.at(sigma));
         let (young, poisson) = (self.young.at(sigma), self.poisson.at(sigma));
         let shear = young / (2.0 * (1.0 + poisson));
-        let (area, second) = match self.outline {
-            Outline::Ellipse => (PI / 4.0 * w * t, PI / 64.0),
-            Outline::Rectangle => (w * t, 1.0 / 12.0),
+        let area = self.area(sigma);
+        let second = match self.outline {
+            Outline::Ellipse => PI / 64.0,
+            Outline::Rectangle => 1.0 / 12.0,
         };
         let second = [second * w * t * t * t, second * t * w * w * w];
         match property {

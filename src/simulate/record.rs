@@ -83,6 +83,9 @@ pub struct Record {
     /// The joint tip at the last output, or the tips of all rods.
     #[serde(flatten, serialize_with = "serialize_tips")]
     pub tips: Vec<DVec3>,
+    /// Fractions of the length at which these shapes have nodes.
+    #[serde(skip)]
+    pub stations: Vec<f64>,
     /// Shapes at some of the outputs, the last among them.
     #[serde(skip)]
     pub stills: Vec<Still>,
@@ -123,6 +126,7 @@ impl Record {
                 true => tips.take(1).collect(),
                 false => tips.collect(),
             },
+            stations: simulation.stations().to_vec(),
             stills,
             film: Vec::new(),
             wall_seconds: simulation.wall_time().as_secs_f64(),

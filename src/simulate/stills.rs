@@ -5,26 +5,26 @@ use super::Moment;
 /// A tip that moves by less than this part of the longest rod hardly moves.
 const HARDLY: f64 = 1e-3;
 
+/// Moments among which those shown are chosen.
+const CANDIDATES: usize = 400;
+
 /// The numbers of `count` moments that show a motion, or of all if there are
-/// no more: the first, the last, and others between which the tip goes equal
-/// ways, so that fast motion is shown by as many as slow. If the tip hardly
+/// no more: the first, the last, and others at which the tip is far from where the
+/// one before shows it, the turning points of a swing. If the tip hardly
 /// moves (`length`: the longest rod), equal times are between them.
 pub fn stills(moments: &[Moment], count: usize, length: f64) -> Vec<usize> {
     if moments.len() <= count {
         return (0..moments.len()).collect();
     }
-    let mut way = 0.0;
-    let mut ways = vec![0.0];
-    for pair in moments.windows(2) {
-        way += pair[0].tip.distance(pair[1].tip);
-        ways.push(way);
+    let pairs = moments.windows(2);
+    let way: f64 = pairs.map(|pair| pair[0].tip.distance(pair[1].tip)).sum();
+    if way.is_finite() && way > HARDLY * length {
+        return far_apart(moments, count);
     }
-    if !(way.is_finite() && way > HARDLY * length) {
-        ways = moments.iter().map(|moment| moment.time).collect();
-    }
-    let (first, last) = (ways[0], ways[moments.len() - 1]);
+    let times: Vec<f64> = moments.iter().map(|moment| moment.time).collect();
+    let (first, last) = (times[0], times[moments.len() - 1]);
     let wanted = |k: usize| first + (last - first) * k as f64 / (count - 1) as f64;
-    let mut chosen: Vec<usize> = (0..count).map(|k| nearest(&ways, wanted(k))).collect();
+    let mut chosen: Vec<usize> = (0..count).map(|k| nearest(&times, wanted(k))).collect();
     chosen[0] = 0;
     chosen[count - 1] = moments.len() - 1;
     // Each only once: a jump from one output to the next spans several ways.
@@ -35,6 +35,46 @@ pub fn stills(moments: &[Moment], count: usize, length: f64) -> Vec<usize> {
         chosen[k] = chosen[k].min(moments.len() - count + k);
     }
     chosen
+}
+
+/// The first, the last, and others between, so that the roots of the distances from
+/// each tip to the next have the largest sum: turning points, and on the way from one
+/// to the next equal distances, as the root is concave. By dynamic programming.
+fn far_apart(moments: &[Moment], count: usize) -> Vec<usize> {
+    let last = moments.len() - 1;
+    let most = CANDIDATES.max(count);
+    let candidates: Vec<usize> = match last < most {
+        true => (0..=last).collect(),
+        false => (0..most).map(|k| k * last / (most - 1)).collect(),
+    };
+    let n = candidates.len();
+    let gain = |i: usize, j: usize| {
+        let [from, to] = [i, j].map(|k| moments[candidates[k]].tip);
+        from.distance(to).sqrt()
+    };
+    // The best sum with k more chosen after the first, the last of them j, and whence.
+    let mut best = vec![f64::NEG_INFINITY; n];
+    best[0] = 0.0;
+    let mut whence = vec![vec![0; n]; count];
+    for k in 1..count {
+        let mut next = vec![f64::NEG_INFINITY; n];
+        for j in k..n {
+            for i in k - 1..j {
+                let sum = best[i] + gain(i, j);
+                if sum > next[j] {
+                    (next[j], whence[k][j]) = (sum, i);
+                }
+            }
+        }
+        best = next;
+    }
+    let mut chosen = vec![n - 1];
+    for k in (1..count).rev() {
+        let before = whence[k][chosen[chosen.len() - 1]];
+        chosen.push(before);
+    }
+    chosen.reverse();
+    chosen.into_iter().map(|k| candidates[k]).collect()
 }
 
 /// Of rising numbers, the index of the one nearest to `wanted`.
@@ -56,7 +96,7 @@ const FILM_NODES: usize = 4_000_000;
 /// among them.
 pub fn film(outputs: usize, nodes: usize) -> Vec<usize> {
     let most = FILM.min(FILM_NODES / nodes.max(1)).max(2);
-    let stride = outputs.div_ceil(most - 1).max(1);
+    let stride = outputs.saturating_sub(1).div_ceil(most - 1).max(1);
     let last = outputs.checked_sub(1);
     let evenly = (0..outputs).step_by(stride);
     let mut chosen: Vec<usize> = evenly.filter(|output| Some(*output) != last).collect();
@@ -85,6 +125,8 @@ mod tests {
         assert!(film(0, 10).is_empty());
         assert_eq!(film(1, 10), [0]);
         assert_eq!(film(400, 10).len(), 400);
+        assert_eq!(film(401, 10).len(), 401);
+        assert_eq!(film(402, 10).len(), 202);
         let long = film(10_002, 10);
         assert!(long.len() <= 401 && *long.last().unwrap() == 10_001);
         assert_eq!(film(50, 4_000_000), [0, 49]);
@@ -95,6 +137,18 @@ mod tests {
         let chosen = stills(&moments(101, |t| (-t / 5.0).exp()), 8, 1.0);
         assert_eq!((chosen[0], chosen[7]), (0, 100));
         assert!(chosen[6] < 15, "{chosen:?}");
+    }
+
+    #[test]
+    fn a_swing_is_shown_at_its_turning_points() {
+        // Turns every 5 outputs, slower and slower.
+        let swing = |t: f64| (0.1 * std::f64::consts::TAU * t).cos() * (-t / 40.0).exp();
+        let chosen = stills(&moments(1001, swing), 8, 1.0);
+        assert_eq!((chosen[0], chosen[7]), (0, 1000));
+        let tips: Vec<f64> = chosen.iter().map(|&k| swing(k as f64)).collect();
+        for pair in tips[..7].windows(2) {
+            assert!(pair[0] * pair[1] < 0.0, "{chosen:?}: {tips:?}");
+        }
     }
 
     #[test]

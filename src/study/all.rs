@@ -15,7 +15,7 @@ const BATCH: usize = 16;
 
 /// The search ends when so many starts in a row have found nothing new, or all
 /// have been made.
-const IN_VAIN: usize = 32;
+pub const IN_VAIN: usize = 32;
 const MOST: usize = 160;
 
 /// Equilibria nearer to each other than this part of the longest rod, or than

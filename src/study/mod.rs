@@ -12,7 +12,7 @@ mod trace;
 mod vary;
 mod words;
 
-pub use all::{All, Found, all};
+pub use all::{All, Found, IN_VAIN, all};
 pub use boundary::{
     Boundary, BoundaryCurve, BoundaryPoint, BoundaryRequest, CurveEnd, MOST_CURVES, boundary,
 };
@@ -32,7 +32,7 @@ pub use map::{
 pub use sensitivity::{SensitivityError, relax_with_sensitivities};
 pub use trace::{
     Law, MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceError, TracePoint,
-    TraceRequest, trace,
+    TraceRequest, TraceShow, trace,
 };
 pub use vary::{Base, Keys, Knob, Knobs, Target, Varied, Vary, VaryError};
 pub use words::UnknownWord;

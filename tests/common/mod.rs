@@ -17,7 +17,7 @@ pub use branch::{NEUTRAL, critical, critical_of_rigid};
 use glam::DVec3;
 use leafdyn::internals::leaf::{Leaf, Scale};
 use leafdyn::relax::{Equilibrium, Method, NodeState, Options, RodShape, SemiImplicit, relax};
-use leafdyn::scenario::{Dynamics, Profile, Rod, Scenario, Units};
+use leafdyn::scenario::{Dynamics, Profile, Radii, Rod, Scenario, Units};
 use leafdyn::shape::Difference;
 pub use shot::*;
 
@@ -303,6 +303,7 @@ pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -
         units: Units::default(),
         dynamics: Dynamics::default_for(&veins).with_loads(gravity, [0.0; 3], [0.0; 3]),
         rods: veins,
+        radii: Radii::default(),
         joined: true,
         coupling: vec![[0.0, 1.0, 1.0]; rods - 1],
         gravity,

@@ -1,14 +1,17 @@
 //! A map: one panel a method, one colour an outcome or, of stable leaves if
 //! that is asked for, a number of waves.
 
+mod curves;
 mod panel;
 
 use glam::DVec2;
 
 use super::drawing::{Anchor, Drawing, INK, NOTE};
+use super::font::Font;
 use super::page::{
     Cell, KeyRows, LEFT, NOTE_BASE, PANEL_TITLE, RIGHT, TEXT_SIZE, TICK_SIZE, WIDTH, header,
 };
+use crate::report::words::map_shows;
 use crate::study::{Confidence, Knob, Map, MapMethod, MapOutcome, MapRow, MapShow};
 use panel::{Panel, Tile, Varied};
 
@@ -20,8 +23,13 @@ const NAME: f64 = 26.0;
 const GAP: f64 = 44.0;
 const MOST_COLUMNS: usize = 3;
 const WIDEST: f64 = 470.0;
+/// What a map of waves shows.
+const MEANING: &str = "Colours and numbers: how often the margins of a stable leaf wave out of its surface, \
+    of both the margin that waves more. Two half-waves, between changes of the side to which it bends, are one wave.";
 /// Width of a page with one panel.
 const NARROW: f64 = 600.0;
+/// Between the strip of one method and its curves.
+const ALONE: f64 = 12.0;
 /// Height over width of a panel.
 const SHAPE: f64 = 0.86;
 /// With one axis: height of a method's strip, and room for its name and count.
@@ -32,10 +40,7 @@ const COUNT: f64 = 100.0;
 
 pub fn draw(map: &Map) -> Drawing {
     let name = &map.request.base.scenario().name;
-    let title = match map.show {
-        MapShow::Outcomes => format!("{name}: where methods fail"),
-        MapShow::Waves => format!("{name}: waves along the margins"),
-    };
+    let title = format!("{name}: {}", map_shows(map.show));
     let width = match (map.request.axes.len(), map.request.methods.len()) {
         (2, 1) => NARROW,
         _ => WIDTH,
@@ -45,6 +50,9 @@ pub fn draw(map: &Map) -> Drawing {
     drawing.group("header", |page| {
         header(page, LEFT, &title, &notes(map), None);
         end = draw_key(page, map, NOTE_BASE + 20.0);
+        if map.show == MapShow::Waves {
+            end = draw_meaning(page, end);
+        }
     });
     let axes: Vec<Varied> = map.request.axes.iter().map(Varied::of).collect();
     drawing.height = match axes.split_first() {
@@ -75,7 +83,7 @@ fn notes(map: &Map) -> Vec<String> {
 
 /// The outcomes and marks that occur; returns where it ends.
 fn draw_key(page: &mut Drawing, map: &Map, base: f64) -> f64 {
-    let mut key = KeyRows::at(base, SWATCH);
+    let mut key = KeyRows::at(LEFT, base, SWATCH);
     for outcome in MapOutcome::ALL {
         let shown = |row: &MapRow| row.outcome == outcome && waves(map, row).is_none();
         if map.rows.iter().any(shown) {
@@ -113,6 +121,17 @@ fn draw_key(page: &mut Drawing, map: &Map, base: f64) -> f64 {
         });
     }
     key.end()
+}
+
+/// What colours and numbers of waves mean; returns where that ends.
+fn draw_meaning(page: &mut Drawing, mut top: f64) -> f64 {
+    let room = page.width - LEFT - RIGHT;
+    for line in Font::embedded().wrapped(MEANING, TICK_SIZE, room) {
+        let base = DVec2::new(LEFT, top + TICK_SIZE);
+        page.label(base, &line, TICK_SIZE, Anchor::Start, NOTE);
+        top += 1.4 * TICK_SIZE;
+    }
+    top + 6.0
 }
 
 /// Whether explicit motion is shown over an axis of time steps.
@@ -183,7 +202,8 @@ fn draw_panels(
             corner: corner + place * pitch,
             size,
         };
-        let labelled = y.is_some() || i + 1 == methods.len();
+        // One strip has its axis below the curves.
+        let labelled = y.is_some() || (i + 1 == methods.len() && i > 0);
         drawing.group(method.word(), |page| {
             draw_method(page, map, method, cell, y.is_some());
             let panel = Panel::new(cell, x, y, labelled);
@@ -193,6 +213,9 @@ fn draw_panels(
             }
         });
         last = cell;
+    }
+    if let (None, [_]) = (y, methods.as_slice()) {
+        return curves::draw(drawing, map, x, last, last.end().y + ALONE);
     }
     let end = last.end().y + TICKS;
     let across = columns as f64 * (size.x + GAP) - GAP;
@@ -252,10 +275,47 @@ mod tests {
         assert!(!svg(&map).contains("waves"));
         map.show = MapShow::Waves;
         let svg = svg(&map);
-        for text in ["waves along the margins", ">1.5 waves<", "stable, no waves"] {
+        for text in [
+            "waves along the margins",
+            "Two half-waves",
+            ">1.5 waves<",
+            "stable, no waves",
+        ] {
             assert!(svg.contains(text), "{text}");
         }
         assert!(!svg.contains("other equilibrium") && svg.contains("saddle"));
+    }
+
+    #[test]
+    fn one_method_along_one_axis_is_drawn_as_curves() {
+        let mut map = sample::map();
+        map.request.axes.remove(0);
+        map.request.methods.truncate(1);
+        map.rows
+            .retain(|row| row.cell < 4 && row.method == MapMethod::default());
+        let curves = |svg: &str| -> Vec<usize> {
+            let groups = svg.split("<g id=\"curves\">").skip(1);
+            groups
+                .map(|group| {
+                    group
+                        .split("</g>")
+                        .next()
+                        .unwrap()
+                        .matches("stroke-width=\"1.6\"")
+                        .count()
+                })
+                .collect()
+        };
+        // The lines of the panels and those of their keys.
+        let svg = svg(&map);
+        assert_eq!(curves(&svg), [6, 2]);
+        assert!(svg.contains("where the tip is") && svg.contains(">energy<"));
+        // Not of several methods, nor over two axes.
+        assert!(curves(&super::tests::svg(&sample::map())).is_empty());
+        map.show = MapShow::Waves;
+        let svg = super::tests::svg(&map);
+        assert_eq!(curves(&svg), [2, 2, 2]);
+        assert!(svg.contains("mean twist"));
     }
 
     #[test]

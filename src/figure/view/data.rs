@@ -4,9 +4,11 @@
 use glam::DVec3;
 use serde::Serialize;
 
+use crate::figure::setting::with_unit;
 use crate::figure::veins::is_near;
 use crate::relax::RodShape;
 use crate::report::base64::encode as base64;
+use crate::scenario::Units;
 
 /// Numbers of a [`Leaf`]'s state per node: rotation w, x, y, z, then v, u, n, m.
 const STATE: usize = 16;
@@ -110,6 +112,19 @@ pub struct Curve {
     pub special: Vec<(usize, &'static str)>,
 }
 
+impl View {
+    /// A quantity's name with the unit of its values, if that is known: of a length or,
+    /// otherwise, of an energy.
+    pub fn with_unit(&self, name: &str, is_length: bool) -> String {
+        let [length, force] = self.units.clone();
+        let unit = match is_length {
+            true => length,
+            false => Units { length, force }.energy(),
+        };
+        with_unit(name, unit.as_deref())
+    }
+}
+
 impl Leaf {
     /// Of veins in full, with strains and forces; `drawn` are the numbers of those
     /// that are shown.
@@ -137,7 +152,13 @@ impl Leaf {
     }
 
     /// Of centrelines, for one of many.
-    pub fn coarse(label: String, curves: &[Vec<DVec3>], drawn: &[usize], most: usize) -> Self {
+    pub fn coarse(
+        label: String,
+        stations: &[f64],
+        curves: &[Vec<DVec3>],
+        drawn: &[usize],
+        most: usize,
+    ) -> Self {
         let nodes = curves.first().map_or(0, Vec::len);
         let stride = nodes.saturating_sub(1).div_ceil(most).max(1);
         // The tip is among them.
@@ -159,6 +180,7 @@ impl Leaf {
             .flat_map(|x| (x as u16).to_le_bytes());
         Leaf {
             nodes: nodes.saturating_sub(1) / stride + 1,
+            stations: uneven(stations).then(|| stations.iter().step_by(stride).copied().collect()),
             points: Points::Coarse {
                 u16: base64(steps),
                 low,
@@ -179,6 +201,13 @@ impl Leaf {
             state: None,
         }
     }
+}
+
+/// Whether these are not equally far apart, as the page takes them to be unless told.
+fn uneven(stations: &[f64]) -> bool {
+    let last = stations.len().saturating_sub(1).max(1) as f64;
+    let mut stations = stations.iter().enumerate();
+    stations.any(|(k, station)| (station - k as f64 / last).abs() > 1e-9)
 }
 
 /// Vectors as 32-bit numbers.
@@ -202,7 +231,7 @@ mod tests {
     fn a_thinned_vein_keeps_its_tip() {
         for (nodes, kept) in [(65, 33), (33, 33), (61, 31), (2, 2), (1, 1), (0, 1)] {
             let curve = (0..nodes).map(|i| DVec3::X * f64::from(i)).collect();
-            let leaf = Leaf::coarse(String::new(), &[curve], &[1], 32);
+            let leaf = Leaf::coarse(String::new(), &[], &[curve], &[1], 32);
             assert_eq!(leaf.nodes, kept);
             let Points::Coarse { u16, size, .. } = leaf.points else {
                 panic!()

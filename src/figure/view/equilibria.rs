@@ -6,6 +6,7 @@ use crate::figure::drawing::Drawing;
 use crate::report::numbers::short;
 use crate::report::words::equilibrium_of_index;
 use crate::report::{all_lines, relax_lines};
+use crate::scenario::Scenario;
 use crate::study::{All, Found};
 
 /// More would not be told apart side by side.
@@ -30,8 +31,8 @@ impl Viewed for All {
             .collect();
     }
 
-    fn still(&self) -> Drawing {
-        crate::figure::all(self)
+    fn still(&self, scenario: &Scenario) -> Drawing {
+        crate::figure::all(self, scenario)
     }
 }
 

@@ -9,6 +9,7 @@ use crate::relax::{Equilibrium, Mode};
 use crate::report::numbers::short;
 use crate::report::relax_lines;
 use crate::report::words::verdict;
+use crate::scenario::Scenario;
 
 impl Viewed for Equilibrium {
     fn fill(&self, view: &mut View) {
@@ -26,8 +27,8 @@ impl Viewed for Equilibrium {
         }
     }
 
-    fn still(&self) -> Drawing {
-        crate::figure::leaf(self)
+    fn still(&self, scenario: &Scenario) -> Drawing {
+        crate::figure::leaf(self, scenario)
     }
 }
 

@@ -60,7 +60,7 @@ pub trait Viewed {
 
     /// The figure that stands in its place where a browser draws nothing in space.
     #[doc(hidden)]
-    fn still(&self) -> Drawing;
+    fn still(&self, scenario: &Scenario) -> Drawing;
 }
 
 /// The page of a result as a file of this name.
@@ -76,11 +76,11 @@ impl<R: Viewed> Format<R> for Page {
     }
 }
 
-/// Shapes one after the other: their times, or numbers, and centrelines.
-type Shapes<'r> = Vec<(f64, &'r [Vec<DVec3>])>;
+/// One of several: its time, or number, its stations and its centrelines.
+pub(crate) struct Shape<'r>(f64, &'r [f64], &'r [Vec<DVec3>]);
 
 /// Shapes for ParaView: a list of this name, and a folder of them beside it.
-pub(crate) struct Series<R>(pub &'static str, pub fn(&R) -> Shapes<'_>);
+pub(crate) struct Series<R>(pub &'static str, pub fn(&R) -> Vec<Shape<'_>>);
 
 impl<R> Series<R> {
     /// The name of a shape's file.
@@ -98,14 +98,17 @@ impl<R> Format<R> for Series<R> {
     fn write(&self, document: &Document<R>, out: &mut dyn Write) -> io::Result<()> {
         let shapes = (self.1)(document.result);
         let files = shapes.iter().enumerate();
-        let files: Vec<_> = files.map(|(k, (time, _))| (*time, self.part(k))).collect();
+        let files: Vec<_> = files
+            .map(|(k, Shape(time, ..))| (*time, self.part(k)))
+            .collect();
         vtk::series(&files, out)
     }
 
     fn parts<'d>(&self, document: &'d Document<R>) -> Vec<Part<'d>> {
         let shapes = (self.1)(document.result).into_iter().enumerate();
-        let part = |(k, (_, curves)): (usize, (f64, &'d [Vec<DVec3>]))| -> Part<'d> {
-            let fill = move |out: &mut dyn Write| vtk::curves(curves, out);
+        let radii = &document.input.radii;
+        let part = |(k, Shape(_, stations, curves)): (usize, Shape<'d>)| -> Part<'d> {
+            let fill = move |out: &mut dyn Write| vtk::curves(curves, stations, radii, out);
             (self.part(k), Box::new(fill))
         };
         shapes.map(part).collect()
@@ -113,17 +116,20 @@ impl<R> Format<R> for Series<R> {
 }
 
 /// The instants of a motion.
-pub(crate) fn instants(record: &Record) -> Shapes<'_> {
+pub(crate) fn instants(record: &Record) -> Vec<Shape<'_>> {
     let film = record.film.iter();
-    film.map(|still| (record.moments[still.moment].time, &still.curves[..]))
-        .collect()
+    film.map(|still| {
+        let time = record.moments[still.moment].time;
+        Shape(time, &record.stations, &still.curves)
+    })
+    .collect()
 }
 
 /// All points of a trace, numbered branch after branch.
-pub(crate) fn points(trace: &Trace) -> Shapes<'_> {
+pub(crate) fn points(trace: &Trace) -> Vec<Shape<'_>> {
     let points = trace.branches.iter().flat_map(|branch| &branch.points);
     (points.enumerate())
-        .map(|(number, point)| (number as f64, &point.curves[..]))
+        .map(|(number, point)| Shape(number as f64, &point.stations, &point.curves))
         .collect()
 }
 
@@ -156,7 +162,7 @@ pub fn page(result: &impl Viewed, scenario: &Scenario) -> String {
         chart: None,
     };
     result.fill(&mut view);
-    assemble(&view, &result.still())
+    assemble(&view, &result.still(scenario))
 }
 
 fn assemble(view: &View, still: &Drawing) -> String {
@@ -261,6 +267,9 @@ mod tests {
         let names: Vec<&str> = curves.iter().filter_map(|c| c["name"].as_str()).collect();
         assert!(names.contains(&"kinetic") && names.contains(&"tip z"));
         assert!(!names.contains(&"work put in"), "{names:?}");
+        // In the unit of lengths; that of forces has no name.
+        let choices = &data["chart"]["choices"];
+        assert_eq!(*choices, serde_json::json!(["energy", "tip / cm"]));
     }
 
     #[test]

@@ -5,6 +5,7 @@ use super::data::{Chart, Curve, Leaf, View};
 use crate::figure::drawing::Drawing;
 use crate::report::numbers::short;
 use crate::report::simulate_lines;
+use crate::scenario::Scenario;
 use crate::simulate::{Moment, Record};
 
 /// Nodes of a vein that are drawn, but for the first.
@@ -32,20 +33,26 @@ impl Viewed for Record {
             let time = Some(time);
             Leaf {
                 time,
-                ..Leaf::coarse(label, &still.curves, &view.drawn, MOST_NODES)
+                ..Leaf::coarse(
+                    label,
+                    &self.stations,
+                    &still.curves,
+                    &view.drawn,
+                    MOST_NODES,
+                )
             }
         });
         view.leaves = shapes.collect();
-        view.chart = Some(chart(&self.moments));
+        view.chart = Some(chart(&self.moments, view));
     }
 
-    fn still(&self) -> Drawing {
-        crate::figure::filmstrip(self)
+    fn still(&self, scenario: &Scenario) -> Drawing {
+        crate::figure::filmstrip(self, scenario)
     }
 }
 
 /// Energies and the tip in time.
-fn chart(moments: &[Moment]) -> Chart {
+fn chart(moments: &[Moment], view: &View) -> Chart {
     let stride = moments.len().div_ceil(MOST_POINTS).max(1);
     let shown = || moments.iter().step_by(stride);
     let curve = |choice, color, name: &str, of: &dyn Fn(&Moment) -> f64| Curve {
@@ -82,7 +89,7 @@ fn chart(moments: &[Moment]) -> Chart {
     Chart {
         across: "time".into(),
         log: false,
-        choices: ["energy", "tip"].map(String::from).into(),
+        choices: vec![view.with_unit("energy", false), view.with_unit("tip", true)],
         curves,
     }
 }

@@ -7,6 +7,8 @@ const css = (name) => {
   return themed.get(name);
 };
 const [under, canvas, over] = ["under", "space", "over"].map(find);
+// Drawn once in a while, and put under the leaf by the browser in every picture.
+under.getContext("2d", { willReadFrequently: true });
 const several = view.kind === "equilibria" && view.leaves.length > 1;
 const sequence = view.kind === "motion" || view.kind === "trace";
 
@@ -52,16 +54,9 @@ function setTheme(name) {
   if (space) space.meshes.forEach((mesh) => mesh.theme(css));
 }
 
-/// Whether there is no graphics processor, so that smooth edges would take most of the time.
-function drawnBySoftware() {
-  const probe = document.createElement("canvas").getContext("webgl2");
-  const known = probe && probe.getExtension("WEBGL_debug_renderer_info");
-  return known ? /swiftshader|llvmpipe|software/i.test(probe.getParameter(known.UNMASKED_RENDERER_WEBGL)) : false;
-}
-
 /// Everything that is drawn in space; throws where that cannot be.
 function openSpace() {
-  const renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawnBySoftware(), alpha: true });
+  const renderer = new THREE.WebGLRenderer({ canvas, antialias: !SOFTWARE, alpha: true });
   const scene = new THREE.Scene();
   const sun = new THREE.DirectionalLight(0xffffff, 2.2);
   scene.add(new THREE.AmbientLight(0xffffff, 1.5), sun);
@@ -192,8 +187,10 @@ function tellFrame() {
     return;
   }
   const one = view.leaves[index];
-  if (shown.told === index && shown.playing) return;
-  shown.told = index;
+  // Texts that nobody can read so fast cost more than the leaf.
+  const now = performance.now();
+  if (shown.playing && (shown.told === index || now - shown.toldAt < 80)) return;
+  [shown.told, shown.toldAt] = [index, now];
   find("now").textContent = `${one.label}   (${index + 1} of ${view.leaves.length})`;
   find("frame").value = index;
   if (diagram) {
@@ -284,11 +281,19 @@ function frustum(width, height) {
   camera.updateProjectionMatrix();
 }
 
+/// Asked for only when it may have changed: that lays the page out anew.
+function stageSize() {
+  if (!space.stage) {
+    const stage = find("stage").getBoundingClientRect();
+    space.stage = [Math.round(stage.width), Math.round(stage.height)];
+  }
+  return space.stage;
+}
+
 function render() {
   if (!space) return;
   const { renderer, scene, sun, camera, controls } = space;
-  const stage = find("stage").getBoundingClientRect();
-  const [width, height] = [Math.round(stage.width), Math.round(stage.height)];
+  const [width, height] = stageSize();
   const ratio = Math.min(2, window.devicePixelRatio || 1);
   const size = `${width} ${height} ${ratio}`;
   if (size !== space.size) {
@@ -306,6 +311,7 @@ function render() {
   // Light from over the reader's left shoulder.
   sun.position.copy(camera.position).sub(controls.target).applyAxisAngle(camera.up, -0.5).add(new THREE.Vector3(0, 0, 4 * space.box.extent));
   space.meshes.forEach((mesh) => (mesh.group.visible = false));
+  const toward = camera.position.clone().sub(controls.target).normalize().toArray();
   space.panels.forEach((panel) => {
     const [left, top, w, h] = panel.rect;
     frustum(w, h);
@@ -313,6 +319,7 @@ function render() {
     renderer.setViewport(left, bottom, w, h);
     renderer.setScissor(left, bottom, w, h);
     panel.mesh.group.visible = true;
+    panel.mesh.face(toward);
     renderer.render(scene, camera);
     panel.mesh.group.visible = false;
   });
@@ -388,7 +395,7 @@ function hover(event) {
   const pen = over.getContext("2d");
   pen.setTransform(1, 0, 0, 1, 0, 0);
   pen.clearRect(0, 0, over.width, over.height);
-  hint.style.display = found ? "block" : "none";
+  hint.style.display = over.style.display = found ? "block" : "none";
   if (!found) return;
   hint.textContent = told(found.leaf, found.node).map(([name, text]) => `${name}: ${text}`).join("\n");
   hint.style.left = `${Math.min(x + 16, stage.width - hint.offsetWidth - 8)}px`;
@@ -416,6 +423,7 @@ function play(on) {
   shown.playing = on;
   find("play").textContent = on ? "❚❚" : "▶";
   find("play").setAttribute("aria-label", on ? "pause (space)" : "play (space)");
+  if (!on && sequence) tellFrame();
   if (on && sequence && shown.at >= view.leaves.length - 1) shown.at = 0;
 }
 
@@ -575,6 +583,7 @@ function listen() {
   find("settings").addEventListener("submit", (event) => event.preventDefault());
   document.addEventListener("keydown", key);
   new ResizeObserver(() => {
+    if (space) space.stage = null;
     redraw();
     if (diagram) {
       diagram.draw(diagram.choice);

@@ -1,10 +1,34 @@
 // The leaf in space: veins as tubes, the surface between them, the clamp and the tip.
-const SIDES = 8;
+/// Of a tube only the half that faces the reader is drawn, in so many strips: fewer where no graphics processor helps, and
+/// a flat one of thin veins.
+const SOFTWARE = drawnBySoftware();
+const STRIPS = !SOFTWARE ? 6 : veins > 12 ? 1 : 2;
+const RING = STRIPS + 1;
+/// Their corners and what is normal there, as parts of the direction to the reader and of that across it.
+const CORNERS = Array.from({ length: RING }, (_, k) => Math.PI * (k / STRIPS - 0.5)).map((angle) => [Math.cos(angle), Math.sin(angle)]);
+const NORMALS = STRIPS > 1 ? CORNERS : CORNERS.map(() => [1, 0]);
 /// Pieces of a tube, at least.
 const PIECES = 48;
 
 /// Half the width of a vein, so that neighbours stay apart.
 const radius = view.longest * (veins <= 3 ? 0.0075 : veins <= 8 ? 0.006 : veins <= 30 ? 0.0034 : veins <= 70 ? 0.0024 : 0.002);
+
+/// Whether there is no graphics processor, so that every triangle takes its time.
+function drawnBySoftware() {
+  const probe = document.createElement("canvas").getContext("webgl2");
+  const known = probe && probe.getExtension("WEBGL_debug_renderer_info");
+  const software = known ? /swiftshader|llvmpipe|software/i.test(probe.getParameter(known.UNMASKED_RENDERER_WEBGL)) : false;
+  const lost = probe && probe.getExtension("WEBGL_lose_context");
+  if (lost) lost.loseContext();
+  return software;
+}
+
+/// Parts of one colour are drawn with the shader of the veins, which is compiled once.
+function plain(geometry) {
+  const white = new Float32Array(geometry.attributes.position.array.length).fill(1);
+  geometry.setAttribute("color", new THREE.BufferAttribute(white, 3));
+  return (material = new THREE.MeshLambertMaterial({ vertexColors: true })) => new THREE.Mesh(geometry, material);
+}
 
 /// A leaf in the scene, whose shape and colours can be set again without new buffers.
 class LeafMesh {
@@ -13,12 +37,13 @@ class LeafMesh {
     this.sub = leaf.nodes > 1 ? Math.max(1, Math.ceil(PIECES / (leaf.nodes - 1))) : 1;
     this.fine = Math.max(1, (leaf.nodes - 1) * this.sub + 1);
     this.points = new Float32Array(3 * veins * this.fine);
-    const vertices = veins * this.fine * SIDES;
+    const vertices = veins * this.fine * RING;
     const attribute = (size) => new THREE.BufferAttribute(new Float32Array(vertices * size), size).setUsage(THREE.DynamicDrawUsage);
     const geometry = new THREE.BufferGeometry();
     for (const [name, size] of [["position", 3], ["normal", 3], ["color", 3]]) geometry.setAttribute(name, attribute(size));
     geometry.setIndex(new THREE.BufferAttribute(this.tubeIndices(), 1));
-    this.tubes = new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({ vertexColors: true, side: THREE.DoubleSide }));
+    this.tubes = new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({ vertexColors: true }));
+    this.toward = [0, 0, 0];
     const membrane = new THREE.BufferGeometry();
     membrane.setAttribute("position", new THREE.BufferAttribute(this.points, 3).setUsage(THREE.DynamicDrawUsage));
     const flat = new THREE.BufferAttribute(new Float32Array(3 * veins * this.fine), 3).setUsage(THREE.DynamicDrawUsage);
@@ -26,25 +51,25 @@ class LeafMesh {
     membrane.setIndex(new THREE.BufferAttribute(this.surfaceIndices(), 1));
     const material = new THREE.MeshLambertMaterial({ side: THREE.DoubleSide, transparent: true, opacity: 0.55, depthWrite: false });
     this.surface = new THREE.Mesh(membrane, material);
-    const ball = new THREE.SphereGeometry(1.9 * radius, 16, 12);
-    this.tips = Array.from({ length: view.joined ? 1 : veins }, () => new THREE.Mesh(ball, new THREE.MeshLambertMaterial()));
+    const ball = plain(new THREE.SphereGeometry(1.9 * radius, 16, 12));
+    const accent = new THREE.MeshLambertMaterial({ vertexColors: true });
+    this.tips = Array.from({ length: view.joined ? 1 : veins }, () => ball(accent));
     const block = new THREE.CylinderGeometry(3 * radius, 3 * radius, 3 * radius, 24);
     block.rotateX(Math.PI / 2);
-    this.clamp = new THREE.Mesh(block, new THREE.MeshLambertMaterial());
+    this.clamp = plain(block)();
     this.group = new THREE.Group();
     this.group.add(this.tubes, this.surface, this.clamp, ...this.tips);
     for (const part of [this.tubes, this.surface]) part.frustumCulled = false;
   }
 
   tubeIndices() {
-    const indices = new Uint32Array(veins * Math.max(0, this.fine - 1) * SIDES * 6);
+    const indices = new Uint32Array(veins * Math.max(0, this.fine - 1) * STRIPS * 6);
     let at = 0;
     for (let j = 0; j < veins; j++)
       for (let i = 0; i + 1 < this.fine; i++)
-        for (let k = 0; k < SIDES; k++) {
-          const a = (j * this.fine + i) * SIDES;
-          const [p, q] = [a + k, a + ((k + 1) % SIDES)];
-          indices.set([p, q, p + SIDES, q, q + SIDES, p + SIDES], at);
+        for (let k = 0; k < STRIPS; k++) {
+          const p = (j * this.fine + i) * RING + k;
+          indices.set([p, p + 1, p + RING, p + 1, p + 1 + RING, p + RING], at);
           at += 6;
         }
     return indices;
@@ -65,7 +90,7 @@ class LeafMesh {
   /// Takes over the shape of a leaf with as many nodes.
   shape(leaf) {
     this.smooth(leaf);
-    this.tube();
+    this.moved = true;
     const last = (j) => 3 * (j * this.fine + this.fine - 1);
     this.tips.forEach((tip, j) => tip.position.fromArray(this.points, last(j)));
     const membrane = this.surface.geometry;
@@ -99,35 +124,32 @@ class LeafMesh {
       }
   }
 
-  /// Rings around the points, carried along without twist.
-  tube() {
+  /// Turns the tubes to the reader, who looks from this direction, if that is not done yet.
+  face(toward) {
+    if (!this.moved && toward.every((x, k) => x === this.toward[k])) return;
+    [this.moved, this.toward] = [false, toward];
     const { fine, points } = this;
     const { position, normal } = this.tubes.geometry.attributes;
     const [ring, out] = [position.array, normal.array];
-    const [cos, sin] = [Math.cos, Math.sin].map((f) => Float32Array.from({ length: SIDES }, (_, k) => f((2 * Math.PI * k) / SIDES)));
+    const [vx, vy, vz] = toward;
+    let to = 0;
     for (let j = 0; j < veins; j++) {
-      let [nx, ny, nz] = [0, 0, 1];
+      let [sx, sy, sz] = [0, 1, 0];
       for (let i = 0; i < fine; i++) {
         const at = 3 * (j * fine + i);
         const [before, after] = [i > 0 ? at - 3 : at, i + 1 < fine ? at + 3 : at];
-        let [tx, ty, tz] = [points[after] - points[before], points[after + 1] - points[before + 1], points[after + 2] - points[before + 2]];
+        const [tx, ty, tz] = [points[after] - points[before], points[after + 1] - points[before + 1], points[after + 2] - points[before + 2]];
+        // Across vein and line of sight; where these are one, as before.
+        const [cx, cy, cz] = [ty * vz - tz * vy, tz * vx - tx * vz, tx * vy - ty * vx];
+        const size = Math.sqrt(cx * cx + cy * cy + cz * cz);
+        if (size > 1e-12 * view.longest) [sx, sy, sz] = [cx / size, cy / size, cz / size];
         const length = Math.sqrt(tx * tx + ty * ty + tz * tz) || 1;
-        tx /= length; ty /= length; tz /= length;
-        let along = nx * tx + ny * ty + nz * tz;
-        if (Math.abs(along) > 0.98) {
-          // At a start straight up, or a sharp kink: any direction across will do.
-          [nx, ny, nz] = Math.abs(tx) < 0.8 ? [1, 0, 0] : [0, 1, 0];
-          along = nx * tx + ny * ty + nz * tz;
-        }
-        nx -= along * tx; ny -= along * ty; nz -= along * tz;
-        const size = Math.sqrt(nx * nx + ny * ny + nz * nz) || 1;
-        nx /= size; ny /= size; nz /= size;
-        const [bx, by, bz] = [ty * nz - tz * ny, tz * nx - tx * nz, tx * ny - ty * nx];
-        let to = at * SIDES;
-        for (let k = 0; k < SIDES; k++, to += 3) {
-          const [x, y, z] = [cos[k] * nx + sin[k] * bx, cos[k] * ny + sin[k] * by, cos[k] * nz + sin[k] * bz];
-          out[to] = x; out[to + 1] = y; out[to + 2] = z;
-          ring[to] = points[at] + radius * x; ring[to + 1] = points[at + 1] + radius * y; ring[to + 2] = points[at + 2] + radius * z;
+        const [fx, fy, fz] = [(sy * tz - sz * ty) / length, (sz * tx - sx * tz) / length, (sx * ty - sy * tx) / length];
+        for (let k = 0; k < RING; k++, to += 3) {
+          const [c, s] = [radius * CORNERS[k][0], radius * CORNERS[k][1]];
+          const [nc, ns] = NORMALS[k];
+          ring[to] = points[at] + c * fx + s * sx; ring[to + 1] = points[at + 1] + c * fy + s * sy; ring[to + 2] = points[at + 2] + c * fz + s * sz;
+          out[to] = nc * fx + ns * sx; out[to + 1] = nc * fy + ns * sy; out[to + 2] = nc * fz + ns * sz;
         }
       }
     }
@@ -149,7 +171,7 @@ class LeafMesh {
           const value = part > 0 ? values[at] + part * (values[at + 1] - values[at]) : values[at];
           c = linear(colorOf(map, (value - limits[0]) / (limits[1] - limits[0])));
         }
-        for (let k = 0; k < SIDES; k++) color.array.set(c, 3 * ((j * fine + i) * SIDES + k));
+        for (let k = 0; k < RING; k++) color.array.set(c, 3 * ((j * fine + i) * RING + k));
       }
     }
     color.needsUpdate = true;

@@ -6,6 +6,7 @@ use crate::figure::drawing::Drawing;
 use crate::report::numbers::{brief, significant};
 use crate::report::trace_lines;
 use crate::report::words::equilibrium_of_index;
+use crate::scenario::Scenario;
 use crate::study::{PointKind, Trace, TraceBranch, TracePoint};
 
 /// Nodes of a vein that are drawn, but for the first.
@@ -24,11 +25,11 @@ impl Viewed for Trace {
         view.summary = trace_lines(self, None);
         let points = self.branches.iter().flat_map(|branch| &branch.points);
         view.leaves = points.map(|point| leaf(self, point, &view.drawn)).collect();
-        view.chart = Some(chart(self));
+        view.chart = Some(chart(self, view));
     }
 
-    fn still(&self) -> Drawing {
-        crate::figure::trace(self)
+    fn still(&self, scenario: &Scenario) -> Drawing {
+        crate::figure::trace(self, scenario)
     }
 }
 
@@ -43,12 +44,18 @@ fn leaf(trace: &Trace, point: &TracePoint, drawn: &[usize]) -> Leaf {
     };
     Leaf {
         summary: vec![("energy", significant(point.energy))],
-        ..Leaf::coarse(format!("{at}: {kind}"), &point.curves, drawn, MOST_NODES)
+        ..Leaf::coarse(
+            format!("{at}: {kind}"),
+            &point.stations,
+            &point.curves,
+            drawn,
+            MOST_NODES,
+        )
     }
 }
 
 /// Coordinates of the tip and the energy against what varies.
-fn chart(trace: &Trace) -> Chart {
+fn chart(trace: &Trace, view: &View) -> Chart {
     type Of = fn(&TracePoint) -> f64;
     // Of free tips the first speaks for all.
     fn tip(point: &TracePoint, axis: usize) -> f64 {
@@ -71,7 +78,9 @@ fn chart(trace: &Trace) -> Chart {
     Chart {
         across: trace.keys.to_string(),
         log: trace.log,
-        choices: choices.map(|(name, _)| name.into()).into(),
+        choices: choices
+            .map(|(name, _)| view.with_unit(name, name != "energy"))
+            .into(),
         curves,
     }
 }

@@ -9,24 +9,39 @@ use glam::DVec3;
 
 use crate::figure::svg::escaped;
 use crate::relax::Equilibrium;
-use crate::report::base64;
+use crate::report::{Document, Format, base64};
+use crate::scenario::Radii;
 use crate::shape::NodeState;
 
 /// Numbers at all nodes, vein by vein: name, numbers a node, all of them.
 struct Array<'a>(&'a str, usize, Vec<f64>);
 
-/// A leaf at rest: per node its vein, place along it, directors, strains, forces
-/// and moments.
+/// A leaf at rest in a file of this name: per node its vein, place along it, directors,
+/// strains, forces and moments, and the radius where sections are given.
+pub(crate) struct Lines(pub &'static str);
+
+impl Format<Equilibrium> for Lines {
+    fn file_name(&self) -> &'static str {
+        self.0
+    }
+
+    fn write(&self, document: &Document<Equilibrium>, out: &mut dyn Write) -> io::Result<()> {
+        leaf(document.result, &document.input.radii, out)
+    }
+}
+
+/// A leaf at rest: per node its vein, place along it, directors, strains, forces and
+/// moments, and the radius where sections are given.
 ///
 /// # Errors
 /// Those of `out`.
-pub fn leaf(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
+pub fn leaf(equilibrium: &Equilibrium, radii: &Radii, out: &mut dyn Write) -> io::Result<()> {
     let shape = &equilibrium.shape;
     let nodes = || shape.rods.iter().flat_map(|rod| &rod.nodes);
     let along = |of: &dyn Fn(&NodeState) -> DVec3| vectors(nodes().map(of));
     let lengths = shape.rods.iter().map(|rod| rod.length);
     let s = lengths.flat_map(|length| shape.stations.iter().map(move |sigma| sigma * length));
-    let arrays = [
+    let mut arrays = vec![
         Array("s", 1, s.collect()),
         Array("d1", 3, along(&|node| node.rotation * DVec3::X)),
         Array("d2", 3, along(&|node| node.rotation * DVec3::Y)),
@@ -36,21 +51,32 @@ pub fn leaf(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
         Array("n", 3, along(&|node| node.n)),
         Array("m", 3, along(&|node| node.m)),
     ];
+    arrays.extend(radius(shape.rods.len(), &shape.stations, radii));
     let points: Vec<Vec<DVec3>> = (shape.rods.iter())
         .map(|rod| rod.nodes.iter().map(|node| node.position).collect())
         .collect();
     write(&points, &shape.stations, &arrays, out)
 }
 
-/// Centrelines alone, with the vein and the place along it.
+/// Centrelines alone, with the vein, the place along it and the radius where sections
+/// are given.
 ///
 /// # Errors
 /// Those of `out`.
-pub fn curves(curves: &[Vec<DVec3>], out: &mut dyn Write) -> io::Result<()> {
-    let nodes = curves.first().map_or(0, Vec::len);
-    let last = nodes.saturating_sub(1).max(1) as f64;
-    let stations: Vec<f64> = (0..nodes).map(|i| i as f64 / last).collect();
-    write(curves, &stations, &[], out)
+pub fn curves(
+    curves: &[Vec<DVec3>],
+    stations: &[f64],
+    radii: &Radii,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let radius = radius(curves.len(), stations, radii);
+    write(curves, stations, radius.as_slice(), out)
+}
+
+fn radius(rods: usize, stations: &[f64], radii: &Radii) -> Option<Array<'static>> {
+    let nodes = (0..rods).flat_map(|rod| stations.iter().map(move |&sigma| (rod, sigma)));
+    let radius: Option<Vec<f64>> = nodes.map(|(rod, sigma)| radii.at(rod, sigma)).collect();
+    radius.map(|radius| Array("radius", 1, radius))
 }
 
 /// Files that belong to values of time, or of what varies in its place.

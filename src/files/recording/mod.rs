@@ -240,6 +240,9 @@ impl Recording {
         let moments = mem::take(&mut self.moments);
         let stills = stills.map(still).collect();
         let mut record = Record::new(simulation, stopped, moments, stills);
+        if self.growing.is_some() {
+            record.stations.clone_from(&self.stations);
+        }
         record.film = self.film(record.moments.len())?;
         record.wall_seconds += self.wall.as_secs_f64();
         Ok(record)

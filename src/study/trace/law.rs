@@ -3,6 +3,9 @@
 use glam::DVec3;
 use serde::{Serialize, Serializer};
 
+/// Smaller displacements are rounding, in lengths.
+const ROUNDING: f64 = 1e-11;
+
 /// The straight line through the forces on a tip against its displacements
 /// along them: Hooke's law, and how well it holds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -24,7 +27,7 @@ pub struct Law {
 
 impl Law {
     /// Of forces along an axis and the tips under them; `None` with fewer than
-    /// three.
+    /// three, or if the tip does not move by more than rounding.
     pub(super) fn of(
         axis: usize,
         points: &[(f64, DVec3)],
@@ -43,12 +46,15 @@ impl Law {
         let xx = mean(&|p| (p.0 - x) * (p.0 - x));
         let xy = mean(&|p| (p.0 - x) * (p.1 - y));
         let yy = mean(&|p| (p.1 - y) * (p.1 - y));
+        let length = tip.length();
+        if xx.sqrt() <= ROUNDING * length {
+            return None;
+        }
         let slope = xy / xx;
         let off = |p: &(f64, f64)| (p.1 - y - slope * (p.0 - x)).abs();
         let forces = points.iter().map(|p| p.1);
         let range =
             forces.clone().fold(f64::NEG_INFINITY, f64::max) - forces.fold(f64::INFINITY, f64::min);
-        let length = tip.length();
         Some(Law {
             axis,
             slope,
@@ -81,6 +87,13 @@ mod tests {
         assert!((law.slope - 3.0).abs() < 1e-12 && (law.r_squared - 1.0).abs() < 1e-12);
         assert!(law.deviation < 1e-12);
         assert!((law.young.unwrap() - 12.0).abs() < 1e-10);
+    }
+
+    #[test]
+    fn of_a_tip_that_does_not_move_there_is_none() {
+        let rounding = |k: i32| DVec3::new(2.0 + 1e-15 * f64::from(k % 3), 0.0, 0.0);
+        let points: Vec<_> = (0..=10).map(|k| (f64::from(k), rounding(k))).collect();
+        assert_eq!(Law::of(0, &points, None), None);
     }
 
     #[test]

@@ -5,7 +5,7 @@ mod result;
 mod run;
 
 pub use law::Law;
-pub use result::{PointKind, Trace, TraceBranch, TracePoint};
+pub use result::{PointKind, Trace, TraceBranch, TracePoint, TraceShow};
 pub use run::trace;
 pub(super) use run::trace_seen;
 

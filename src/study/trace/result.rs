@@ -8,6 +8,7 @@ use crate::branch::{Doubt, End, Stuck};
 use crate::scenario::Units;
 use crate::shape::serialize_tips;
 use crate::study::Keys;
+use crate::study::words::words;
 use crate::undulation::Undulation;
 
 /// An equilibrium followed through a number of its scenario. As JSON it is
@@ -24,6 +25,9 @@ pub struct Trace {
     /// Whether its logarithm varies evenly.
     #[serde(skip)]
     pub log: bool,
+    /// What the figure shows, a panel each; none: the coordinate of the tip that varies most.
+    #[serde(skip)]
+    pub show: Vec<TraceShow>,
     /// Names of the units, if the scenario gives any.
     #[serde(skip)]
     pub units: Units,
@@ -89,9 +93,51 @@ pub struct TracePoint {
     /// Waves and twist of the veins.
     #[serde(skip)]
     pub undulation: Undulation,
+    /// Fractions of the length of the nodes of the finest grid.
+    #[serde(skip)]
+    pub stations: Vec<f64>,
     /// Centerlines on the finest grid, one per rod.
     #[serde(skip)]
     pub curves: Vec<Vec<DVec3>>,
+}
+
+/// What the figure of a trace shows against the number that varies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TraceShow {
+    /// A coordinate of the tip; of free ones that of the first.
+    TipX,
+    /// Its y.
+    TipY,
+    /// Its z.
+    TipZ,
+    /// The potential energy.
+    Energy,
+    /// The mean twist of the veins, in radians.
+    Twist,
+}
+
+words! {
+    TraceShow {
+        TipX = "x",
+        TipY = "y",
+        TipZ = "z",
+        Energy = "energy",
+        Twist = "twist",
+    }
+}
+
+impl TraceShow {
+    /// Of a point.
+    pub fn of(self, point: &TracePoint) -> f64 {
+        let tip = |axis: usize| point.tips.first().map_or(f64::NAN, |tip| tip[axis]);
+        match self {
+            TraceShow::TipX => tip(0),
+            TraceShow::TipY => tip(1),
+            TraceShow::TipZ => tip(2),
+            TraceShow::Energy => point.energy,
+            TraceShow::Twist => point.undulation.twist(),
+        }
+    }
 }
 
 /// What a point is.

