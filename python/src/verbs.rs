@@ -230,8 +230,9 @@ pub fn map(
         tolerance,
         cell_seconds.unwrap_or(CELL_SECONDS),
     );
-    let request = request.map_err(cannot)?;
+    let mut request = request.map_err(cannot)?;
     let mut map = run(py, progress, move |monitor| {
+        request.limit = monitor.limit();
         let todo: Vec<_> = (0..request.cells())
             .map(|cell| (cell, request.methods.clone()))
             .collect();

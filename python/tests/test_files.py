@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from leaves import fan, program
+from leaves import column, fan, program
 
 import leafdyn
 
@@ -22,7 +22,7 @@ def without_times(found: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in found.items() if key not in TIMES}
 
 
-def column(rows: list[dict[str, str]], names: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+def numbers(rows: list[dict[str, str]], names: str) -> np.ndarray[Any, np.dtype[np.float64]]:
     return np.array([[float(row[name]) for name in names.split()] for row in rows])
 
 
@@ -49,7 +49,7 @@ def test_every_scenario_by_both_roads(file: Path, tmp_path: Path) -> None:
         ("moments", "m1 m2 m3"),
     ]:
         array = getattr(leaf, name)
-        wanted = column(rows, columns).reshape(array.shape)
+        wanted = numbers(rows, columns).reshape(array.shape)
         # To the bit: zeros have their signs.
         assert array.tobytes() == wanted.tobytes(), name
     assert np.array_equal(np.array(summary["positions"]), leaf.positions)
@@ -144,10 +144,10 @@ def test_a_motion_by_both_roads(tmp_path: Path) -> None:
         (motion.velocities, "vx vy vz"),
         (motion.angular_velocities, "wx wy wz"),
     ]:
-        assert array.tobytes() == column(rows, columns).tobytes()
+        assert array.tobytes() == numbers(rows, columns).tobytes()
     energies = list(csv.DictReader((tmp_path / "program" / "energy.csv").read_text().splitlines()))
-    assert np.array_equal(motion.energies["kinetic"], column(energies, "kinetic")[:, 0])
-    assert np.array_equal(motion.times, column(energies, "time")[:, 0])
+    assert np.array_equal(motion.energies["kinetic"], numbers(energies, "kinetic")[:, 0])
+    assert np.array_equal(motion.times, numbers(energies, "time")[:, 0])
     one_by_one = list(leafdyn.frames(file, set={"dynamics.duration": 1}))
     assert np.array_equal([frame.positions for frame in one_by_one], motion.positions)
     assert {path.suffix for path in motion.save(tmp_path / "c", write="csv")} == {".csv"}
@@ -184,24 +184,12 @@ def test_a_check_a_trace_and_all_shapes_by_both_roads(tmp_path: Path) -> None:
     assert shapes.starts.sum() + shapes.failed == shapes.to_dict()["starts"]
 
 
-COLUMN = {
-    "name": "column",
-    "leaf": {"rods": 1, "length": 1.0, "fan": [0.0]},
-    "stiffness": {
-        "torsion": 1.0,
-        "bending_2": 1.0,
-        "bending_3": 9.0,
-        "axial": float("inf"),
-        "shear_2": float("inf"),
-        "shear_3": float("inf"),
-    },
-}
 TWO = ["load.tip_force[0]=-1..-6", "stiffness.bending_2=0.5..2:3"]
 
 
 def test_a_boundary_by_both_roads(tmp_path: Path) -> None:
     file = tmp_path / "column.toml"
-    file.write_text(leafdyn.Scenario(COLUMN).text)
+    file.write_text(leafdyn.Scenario(column()).text)
     vary = [word for number in TWO for word in ("--vary", number)]
     assert program("trace", file, *vary, "--out", tmp_path / "program").returncode == 0
     found = leafdyn.trace(file, TWO)
@@ -220,7 +208,7 @@ def test_a_boundary_by_both_roads(tmp_path: Path) -> None:
         (curve.tips, "tip_x tip_y tip_z"),
         (curve.indices, "index_before index_behind"),
     ]:
-        assert np.array_equal(array, column(rows, columns))
+        assert np.array_equal(array, numbers(rows, columns))
     assert curve.kinds.tolist() == [row["kind"] for row in rows]
     assert (curve.kind, curve.multiplicity, curve.ends) == ("branch-point", 1, ("reached", "reached"))
     assert curve.values.dtype == curve.tips.dtype == np.float64
@@ -232,11 +220,11 @@ def test_a_boundary_by_both_roads(tmp_path: Path) -> None:
     assert repr(found) == "<Boundary column over load.tip_force[0] and stiffness.bending_2: 1 curve, complete>"
     assert found.figure().startswith("<svg")
     with pytest.raises(ValueError, match="vary has 3 numbers: give one as a text, or a list of two"):
-        leafdyn.trace(COLUMN, [*TWO, TWO[0]])
+        leafdyn.trace(column(), [*TWO, TWO[0]])
     with pytest.raises(ValueError, match="varies twice"):
-        leafdyn.trace(COLUMN, [TWO[0], TWO[0]])
+        leafdyn.trace(column(), [TWO[0], TWO[0]])
     with pytest.warns(leafdyn.LeafWarning, match="the index changes nowhere"):
-        assert leafdyn.trace(COLUMN, ["load.tip_force[0]=-0.1..-0.2", TWO[1]]).curves == []
+        assert leafdyn.trace(column(), ["load.tip_force[0]=-0.1..-0.2", TWO[1]]).curves == []
 
 
 def test_a_map_and_a_chart() -> None:

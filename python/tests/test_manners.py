@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from leaves import fan
+from leaves import column, fan
 
 import leafdyn
 
@@ -136,7 +136,7 @@ WITH_PROGRESS: dict[str, Callable[[Any], Any]] = {
     "all_shapes": lambda heard: leafdyn.all_shapes(fan(2), tolerance=1e-3, progress=heard),
     "trace": lambda heard: leafdyn.trace(fan(2), "load.gravity[2]=-1..-2:3", progress=heard),
     "boundary": lambda heard: leafdyn.trace(
-        "scenarios/classic/hanging_curved.toml", ["load.gravity[0]=8..20", "rest.bend_3=5..5.2"], progress=heard
+        column(), ["load.tip_force[0]=-1..-6", "stiffness.bending_2=0.9..1.1:2"], progress=heard
     ),
     "simulate": lambda heard: leafdyn.simulate(fan(2), set={"dynamics.duration": 0.5}, progress=heard),
     "map": lambda heard: leafdyn.map(fan(2), "load.gravity[2]=-1..-2:2", methods=["semi-implicit"], progress=heard),
@@ -177,7 +177,9 @@ def test_every_verb_tells_how_far_it_is(verb: str, capfd: pytest.CaptureFixture[
         lambda: leafdyn.trace(fan(2), "load.gravity[2]=-1..-60", points=3),
         lambda: leafdyn.trace(fan(2), ["load.gravity[2]=-1..-1.1", "stiffness.torsion=1..2"]),
         lambda: leafdyn.fit(
-            "scenarios/measured/pull.toml", {"tip_x": [1.0], "sd_tip_x": 0.1}, ["stiffness.axial", "stiffness.torsion"]
+            "scenarios/measured/pull.toml",
+            {"load.tip_force[0]": [4, 8, 12], "tip_x": [0.9707, 0.9898, 1.009], "sd_tip_x": 0.0005},
+            ["stiffness.axial", "stiffness.torsion"],
         ),
     ],
     ids=["relax", "relax_many", "trace", "boundary", "fit"],

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from leaves import fan
+from leaves import column, fan
 
 import leafdyn
 
@@ -51,8 +51,7 @@ def test_every_other_result(tmp_path: Path) -> None:
     trace = leafdyn.trace(fan(2), "load.gravity[2]=-1..-2:3")
     motion = leafdyn.simulate(fan(2), set={"dynamics.duration": 0.2})
     found = leafdyn.map(fan(2), "load.gravity[2]=-1..-2:2", methods=["semi-implicit"])
-    two = ["load.gravity[0]=8..20", "rest.bend_3=5..5.2"]
-    boundary = leafdyn.trace("scenarios/classic/hanging_curved.toml", two)
+    boundary = leafdyn.trace(column(), ["load.tip_force[0]=-1..-6", "stiffness.bending_2=0.9..1.1:2"])
     chart = leafdyn.chart(fan(2), seconds=0.1, methods=["semi-implicit"])
     for number, result in enumerate([check, shapes, trace, motion, found, boundary, chart]):
         again = travelled(result)

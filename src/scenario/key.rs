@@ -262,7 +262,8 @@ impl Key {
         FORMAT.iter().map(|row| row.key)
     }
 
-    pub(crate) fn from_path(path: &str) -> Option<Key> {
+    /// That of a path, if it is one's.
+    pub fn from_path(path: &str) -> Option<Key> {
         Key::all().find(|key| key.path() == path)
     }
 

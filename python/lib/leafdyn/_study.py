@@ -99,6 +99,8 @@ class Branch:
     """Its columns of ``trace.csv``."""
     curves: list[Array]
     """Centerlines at each point, shape (N, M + 1, 3)."""
+    remark: str | None = None
+    """Why it is not known as far as was asked."""
 
     @property
     def values(self) -> Array:
@@ -159,7 +161,10 @@ class Trace(Table, Viewed):
         for number, (branch, lines) in enumerate(zip(said["branches"], curves), start=1):
             here = table["branch"] == number
             rows = {name: column[here] for name, column in table.items()}
-            self.branches.append(Branch(branch["end"], rows, lines))
+            self.branches.append(Branch(branch["end"], rows, lines, branch.get("remark")))
+        if remark is None:
+            remarks = (f"branch {k}: {branch.remark}" for k, branch in enumerate(self.branches, 1) if branch.remark)
+            self.remark = next(remarks, None)
 
     def plot(self, ax: Any = None, **style: Any) -> Any:
         """Draw the height of the tip with matplotlib: solid where the leaf is stable, dashed where not, dots where
@@ -258,6 +263,9 @@ class Boundary(Table):
             rows = {name: column[here] for name, column in table.items()}
             ends = (curve["ends"][0], curve["ends"][1])
             self.curves.append(Curve(curve["kind"], curve["multiplicity"], ends, rows, places, self.vary))
+        if remark is None and not complete:
+            others = (f"curve {k} ends with {' and '.join(curve.ends)}" for k, curve in enumerate(self.curves, 1))
+            self.remark = f"not all is known: {'; '.join(others)}"
 
     def plot(self, ax: Any = None, **style: Any) -> Any:
         """Draw the curves with matplotlib, the first number to the right and the second upwards; dots where they are
