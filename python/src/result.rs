@@ -7,8 +7,9 @@ use leafdyn::files::{self, Document, FileError, Kind, Written};
 use leafdyn::relax::{Equilibrium, Mode, Sensitivity};
 use leafdyn::scenario::Scenario;
 use pyo3::exceptions::{PyKeyError, PyOSError};
+use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyDict};
 
 use crate::arrays::{Array, array, curves, flat, nodes, vectors};
 use crate::run::on_pool;
@@ -180,73 +181,29 @@ impl Leaf {
     }
 
     #[getter]
-    fn name(&self) -> &str {
-        &self.found.scenario
-    }
-
-    #[getter]
-    fn method(&self) -> &'static str {
-        self.found.method.word()
-    }
-
-    #[getter]
-    fn outcome(&self, py: Python) -> &'static str {
-        self.ended(py).outcome.word()
-    }
-
-    #[getter]
-    fn success(&self, py: Python) -> bool {
-        self.ended(py).outcome.is_success()
-    }
-
-    #[getter]
-    fn remark(&self, py: Python) -> Option<&str> {
-        self.ended(py).remark.as_deref()
-    }
-
-    #[getter]
-    fn rods(&self) -> usize {
-        self.found.rod_count
-    }
-
-    #[getter]
-    fn segments(&self) -> Vec<usize> {
-        self.found.accuracy.segments.clone()
-    }
-
-    #[getter]
-    fn tolerance(&self) -> f64 {
-        self.found.accuracy.tolerance
-    }
-
-    #[getter]
-    fn residual(&self) -> Option<f64> {
-        self.found.accuracy.residual
-    }
-
-    #[getter]
     fn error_estimate(&self, py: Python) -> Option<f64> {
         self.shown(py).accuracy.error_estimate
     }
 
-    #[getter]
-    fn energy(&self) -> Option<f64> {
-        self.found.energy
-    }
-
-    #[getter]
-    fn negative_eigenvalues(&self) -> Option<usize> {
-        self.found.stability.negative_eigenvalues
-    }
-
-    #[getter]
-    fn wall_seconds(&self) -> f64 {
-        self.found.wall_seconds
-    }
-
-    #[getter]
-    fn joined(&self) -> bool {
-        self.found.shape.joined
+    /// What is known without any array, by the names of attributes.
+    fn scalars<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (found, ended) = (&self.found, self.ended(py));
+        let all = PyDict::new(py);
+        all.set_item(intern!(py, "name"), &found.scenario)?;
+        all.set_item(intern!(py, "method"), found.method.word())?;
+        all.set_item(intern!(py, "outcome"), ended.outcome.word())?;
+        all.set_item(intern!(py, "success"), ended.outcome.is_success())?;
+        all.set_item(intern!(py, "remark"), ended.remark.as_deref())?;
+        all.set_item(intern!(py, "rods"), found.rod_count)?;
+        all.set_item(intern!(py, "joined"), found.shape.joined)?;
+        all.set_item(intern!(py, "segments"), &found.accuracy.segments)?;
+        all.set_item(intern!(py, "tolerance"), found.accuracy.tolerance)?;
+        all.set_item(intern!(py, "residual"), found.accuracy.residual)?;
+        all.set_item(intern!(py, "energy"), found.energy)?;
+        let negative = found.stability.negative_eigenvalues;
+        all.set_item(intern!(py, "negative_eigenvalues"), negative)?;
+        all.set_item(intern!(py, "wall_seconds"), found.wall_seconds)?;
+        Ok(all)
     }
 
     /// The joint tip alone, or the tips of all rods.
