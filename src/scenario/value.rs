@@ -107,7 +107,7 @@ impl<'e> Item<'e> {
         let at = at.rising(true)?;
         let needed = format!("a list of numbers, or a list of {rods} such lists (one per rod)");
         let mut list = value.array(&needed)?;
-        if !(list.next()).is_some_and(|first| first.node().length().is_some()) {
+        if (list.next()).is_none_or(|first| first.node().length().is_none()) {
             return Ok(vec![value.linear(&at)?; rods]);
         }
         let lists = value.list_of(rods, ONE_PER_ROD, &needed)?;

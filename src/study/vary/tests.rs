@@ -299,7 +299,11 @@ fn a_number_put_into_the_entries_is_that_of_the_text() {
         {
             for value in values {
                 let given = format!("{keys}={}", keys.text(value));
-                let text = Scenario::from_toml_with(base.text(), "test.toml", &[given.clone()]);
+                let text = Scenario::from_toml_with(
+                    base.text(),
+                    "test.toml",
+                    std::slice::from_ref(&given),
+                );
                 let direct = base.changed(&[(&keys, value)]);
                 equal += usize::from(direct.is_some());
                 assert_eq!(direct, text.ok(), "{given} in {}", base.scenario().name);
