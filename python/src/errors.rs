@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use leafdyn::scenario::{Place, ScenarioError};
+use leafdyn::scenario::{Key, Place, ScenarioError};
 use leafdyn::study::VaryError;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -55,7 +55,7 @@ pub fn refuse_entry(found: &Bound<PyAny>, key: &str, allowed: &str) -> PyErr {
     };
     let error = ScenarioError {
         place,
-        key: None,
+        key: Key::from_path(key),
         problem,
     };
     refused(found.py(), &error)

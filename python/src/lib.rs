@@ -4,6 +4,7 @@
 use pyo3::prelude::*;
 
 mod arrays;
+mod dictionary;
 mod errors;
 mod fit;
 mod motion;
@@ -11,12 +12,15 @@ mod relax;
 mod result;
 mod run;
 mod scenario;
-mod toml_text;
 mod verbs;
 
 /// What `leafdyn` for Python computes with.
 #[pymodule]
 mod _leafdyn {
+    use super::{Bound, PyModule, PyResult};
+
+    #[pymodule_export]
+    use super::dictionary::overrides;
     #[pymodule_export]
     use super::fit::fit;
     #[pymodule_export]
@@ -30,11 +34,15 @@ mod _leafdyn {
     #[pymodule_export]
     use super::scenario::Scenario;
     #[pymodule_export]
-    use super::toml_text::overrides;
-    #[pymodule_export]
-    use super::verbs::{all_shapes, chart, check, map, program, trace};
+    use super::verbs::{all_shapes, boundary, chart, check, map, program, trace};
 
     #[expect(non_upper_case_globals, reason = "it is the name that Python knows")]
     #[pymodule_export]
     const __version__: &str = env!("CARGO_PKG_VERSION");
+
+    #[pymodule_init]
+    fn init(_module: &Bound<PyModule>) -> PyResult<()> {
+        super::run::remember_first_thread();
+        Ok(())
+    }
 }

@@ -5,20 +5,20 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use leafdyn::files::{Document, Kind, Recording, Selection};
+use leafdyn::files::{Document, Recording, Selection};
 use leafdyn::scenario;
 use leafdyn::simulate::{
     Frame, Moment, Options, Record, Scheme, Simulation, Still, Stopped, film, stills,
 };
 use leafdyn::view;
-use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{Array, array, flat};
 use crate::errors::cannot;
-use crate::result::Files;
-use crate::run::{elapsed, run};
+use crate::result::{Files, cannot_write, chosen};
+use crate::run::{elapsed, on_pool, run};
 use crate::scenario::Scenario;
 
 /// Shapes that a film strip shows.
@@ -206,12 +206,11 @@ impl Motion {
 
     /// Writes the files of the program of these kinds into a folder.
     fn save(&self, py: Python, folder: PathBuf, kinds: Vec<String>) -> PyResult<Vec<PathBuf>> {
-        let wanted = |kind: &Kind| kinds.iter().any(|word| word == kind.word());
         let selection = Selection {
-            kinds: Kind::ALL.into_iter().filter(wanted).collect(),
+            kinds: chosen(&kinds),
             ..Selection::default()
         };
-        let written = py.detach(|| {
+        let written = on_pool(py, || {
             let state = self.state();
             let mut again = Simulation::new(&self.scenario, &self.options)?;
             let mut recording = Recording::begin(&folder, &mut again, &selection)?;
@@ -220,8 +219,8 @@ impl Motion {
             }
             let record = recording.record(&state.simulation, state.stopped)?;
             Ok(recording.finish(&Document::new(&record, &self.scenario, None))?)
-        });
-        written.map_err(|error: Box<dyn Error + Send + Sync>| PyOSError::new_err(error.to_string()))
+        })?;
+        written.map_err(|error: Box<dyn Error + Send + Sync>| cannot_write(error))
     }
 }
 

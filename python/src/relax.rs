@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::errors::{cannot, cannot_vary};
 use crate::result::Leaf;
-use crate::run::{Monitor, elapsed, run};
+use crate::run::{Monitor, elapsed, run, run_here};
 use crate::scenario::Scenario;
 
 /// Most parts that stations can cut a vein into.
@@ -102,6 +102,44 @@ pub fn heard<'a>(monitor: &'a Monitor, name: &'a str) -> impl FnMut(&Progress) +
     }
 }
 
+/// Most rods of a leaf that may be solved by the thread that asks, and most nodes of its grid
+/// there: a step on it takes milliseconds.
+const FEW_RODS: usize = 8;
+const FEW_NODES: usize = 4096;
+
+/// Solves a leaf on this thread, if all of it is short steps.
+fn solve_here(
+    py: Python,
+    scenario: &scenario::Scenario,
+    asked: &Asked,
+    options: &Options,
+    progress: Option<&Bound<PyAny>>,
+) -> PyResult<Option<Result<Equilibrium, RelaxError>>> {
+    let rods = scenario.rods.len();
+    let few = |segments: usize| rods.saturating_mul(segments) <= FEW_NODES;
+    let steps = matches!(options.method, Method::SemiImplicit(_)) && options.modes == 0;
+    if !steps || rods > FEW_RODS || !few(asked.segments.unwrap_or(0)) {
+        return Ok(None);
+    }
+    let mut options = options.clone();
+    let found = run_here(py, progress, |monitor, step| {
+        options.limit = monitor.limit();
+        let mut large = false;
+        let mut say = heard(monitor, &scenario.name);
+        let found = relax::relax(scenario, &options, &mut |progress| {
+            say(progress);
+            step(monitor);
+            if !few(progress.grid) {
+                // It begins anew elsewhere, which costs little beside what is to come.
+                large = true;
+                monitor.cancel();
+            }
+        });
+        (!large).then_some(found)
+    })?;
+    Ok(found.flatten())
+}
+
 /// Lets a leaf come to rest.
 #[pyfunction]
 #[pyo3(name = "relax")]
@@ -114,6 +152,9 @@ pub fn relax_one(
     let mut options = asked.options()?;
     let input = scenario.checked.clone();
     let found = if asked.sensitivity.is_empty() {
+        if let Some(found) = solve_here(py, &input, &asked, &options, progress)? {
+            return Ok(Leaf::new(found.map_err(cannot)?, input, asked.stations));
+        }
         let scenario = input.clone();
         let found = run(py, progress, move |monitor| {
             options.limit = monitor.limit();
@@ -170,15 +211,15 @@ pub fn relax_many(
     Ok(leaves.map(leaf).collect())
 }
 
-/// The shortest of so many times in which the library alone reads a scenario's text and lets the leaf
-/// come to rest, with the same request as [`relax_one`]: for the tests.
+/// The shortest of so many times in which the library alone lets the leaf of a scenario come to rest,
+/// with the same request as [`relax_one`]: for the tests.
 #[pyfunction]
-pub fn library_seconds(py: Python, text: &str, runs: usize) -> f64 {
+pub fn library_seconds(py: Python, scenario: &Scenario, runs: usize) -> f64 {
+    let scenario = scenario.checked.clone();
     py.detach(|| {
         let times = (0..runs).map(|_| {
             let clock = Instant::now();
-            let leaf = scenario::Scenario::from_toml(text)
-                .map(|scenario| scenario.relaxation().every_node().run());
+            let leaf = scenario.relaxation().every_node().run();
             // As Python does, whose clock runs until the result is gone.
             drop(leaf);
             clock.elapsed().as_secs_f64()

@@ -1,21 +1,28 @@
 //! Results: a leaf at rest, and what stands in the files of any result.
 
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use leafdyn::files::{self, Document, Kind, Written};
+use leafdyn::files::{self, Document, FileError, Kind, Written};
 use leafdyn::relax::{Equilibrium, Mode, Sensitivity};
 use leafdyn::scenario::Scenario;
-use pyo3::exceptions::PyKeyError;
+use pyo3::exceptions::{PyKeyError, PyOSError};
+use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyDict};
 
 use crate::arrays::{Array, array, curves, flat, nodes, vectors};
+use crate::run::on_pool;
 
 /// A result that files are written of, whatever it is.
 trait Contents: Send + Sync {
     fn names(&self) -> Vec<&'static str>;
     fn contents(&self, input: &Scenario, name: &str) -> Option<Vec<u8>>;
+    fn save(&self, input: &Scenario, folder: &Path, kinds: &[Kind]) -> Saved;
 }
+
+/// The paths of the files, or why one cannot be written.
+type Saved = Result<Vec<PathBuf>, FileError>;
 
 impl<R: Written + Send> Contents for R {
     fn names(&self) -> Vec<&'static str> {
@@ -25,6 +32,34 @@ impl<R: Written + Send> Contents for R {
     fn contents(&self, input: &Scenario, name: &str) -> Option<Vec<u8>> {
         files::contents(&Document::new(self, input, None), name)
     }
+
+    fn save(&self, input: &Scenario, folder: &Path, kinds: &[Kind]) -> Saved {
+        files::write_all(folder, &Document::new(self, input, None), kinds)
+    }
+}
+
+/// Writes the files of these kinds into a folder, as the program does.
+fn save(
+    py: Python,
+    result: &(impl Contents + ?Sized),
+    input: &Scenario,
+    folder: &Path,
+    kinds: &[String],
+) -> PyResult<Vec<PathBuf>> {
+    let kinds = chosen(kinds);
+    let saved = on_pool(py, || result.save(input, folder, &kinds))?;
+    saved.map_err(cannot_write)
+}
+
+/// A file that cannot be written. Options are the program's.
+pub fn cannot_write(error: impl ToString) -> PyErr {
+    PyOSError::new_err(error.to_string().replace(" with --out DIR", ""))
+}
+
+/// Kinds by their words.
+pub fn chosen(words: &[String]) -> Vec<Kind> {
+    let wanted = |kind: &Kind| words.iter().any(|word| word == kind.word());
+    Kind::ALL.into_iter().filter(wanted).collect()
 }
 
 /// What the interpreter need not wait for: a picture takes its time.
@@ -70,6 +105,11 @@ impl Files {
     /// What stands in the file of this name.
     fn contents<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyBytes>> {
         read(py, &*self.result, &self.input, name)
+    }
+
+    /// Writes those of these kinds into a folder, and returns their paths.
+    fn save(&self, py: Python, folder: PathBuf, kinds: Vec<String>) -> PyResult<Vec<PathBuf>> {
+        save(py, &*self.result, &self.input, &folder, &kinds)
     }
 }
 
@@ -135,49 +175,9 @@ impl Leaf {
         read(py, self.shown(py), &self.input, name)
     }
 
-    #[getter]
-    fn name(&self) -> &str {
-        &self.found.scenario
-    }
-
-    #[getter]
-    fn method(&self) -> &'static str {
-        self.found.method.word()
-    }
-
-    #[getter]
-    fn outcome(&self, py: Python) -> &'static str {
-        self.ended(py).outcome.word()
-    }
-
-    #[getter]
-    fn success(&self, py: Python) -> bool {
-        self.ended(py).outcome.is_success()
-    }
-
-    #[getter]
-    fn remark(&self, py: Python) -> Option<&str> {
-        self.ended(py).remark.as_deref()
-    }
-
-    #[getter]
-    fn rods(&self) -> usize {
-        self.found.rod_count
-    }
-
-    #[getter]
-    fn segments(&self) -> Vec<usize> {
-        self.found.accuracy.segments.clone()
-    }
-
-    #[getter]
-    fn tolerance(&self) -> f64 {
-        self.found.accuracy.tolerance
-    }
-
-    #[getter]
-    fn residual(&self) -> Option<f64> {
-        self.found.accuracy.residual
+    /// Writes the files of these kinds into a folder, and returns their paths.
+    fn save(&self, py: Python, folder: PathBuf, kinds: Vec<String>) -> PyResult<Vec<PathBuf>> {
+        save(py, self.shown(py), &self.input, &folder, &kinds)
     }
 
     #[getter]
@@ -185,24 +185,25 @@ impl Leaf {
         self.shown(py).accuracy.error_estimate
     }
 
-    #[getter]
-    fn energy(&self) -> Option<f64> {
-        self.found.energy
-    }
-
-    #[getter]
-    fn negative_eigenvalues(&self) -> Option<usize> {
-        self.found.stability.negative_eigenvalues
-    }
-
-    #[getter]
-    fn wall_seconds(&self) -> f64 {
-        self.found.wall_seconds
-    }
-
-    #[getter]
-    fn joined(&self) -> bool {
-        self.found.shape.joined
+    /// What is known without any array, by the names of attributes.
+    fn scalars<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (found, ended) = (&self.found, self.ended(py));
+        let all = PyDict::new(py);
+        all.set_item(intern!(py, "name"), &found.scenario)?;
+        all.set_item(intern!(py, "method"), found.method.word())?;
+        all.set_item(intern!(py, "outcome"), ended.outcome.word())?;
+        all.set_item(intern!(py, "success"), ended.outcome.is_success())?;
+        all.set_item(intern!(py, "remark"), ended.remark.as_deref())?;
+        all.set_item(intern!(py, "rods"), found.rod_count)?;
+        all.set_item(intern!(py, "joined"), found.shape.joined)?;
+        all.set_item(intern!(py, "segments"), &found.accuracy.segments)?;
+        all.set_item(intern!(py, "tolerance"), found.accuracy.tolerance)?;
+        all.set_item(intern!(py, "residual"), found.accuracy.residual)?;
+        all.set_item(intern!(py, "energy"), found.energy)?;
+        let negative = found.stability.negative_eigenvalues;
+        all.set_item(intern!(py, "negative_eigenvalues"), negative)?;
+        all.set_item(intern!(py, "wall_seconds"), found.wall_seconds)?;
+        Ok(all)
     }
 
     /// The joint tip alone, or the tips of all rods.
@@ -279,6 +280,7 @@ impl Leaf {
         };
         Ok([of(|mode| &mode.displacement)?, of(|mode| &mode.rotation)?])
     }
+
     /// Changes of the positions with each number that was asked for: by its key, where they are
     /// given, the changes, and a bound on their error.
     fn position_changes<'py>(&self, py: Python<'py>) -> PyResult<Vec<PositionChange<'py>>> {

@@ -1,11 +1,15 @@
 //! Computations outside the interpreter: on a pool of threads of their own, while the thread that
-//! asked waits without the interpreter's lock and looks for Ctrl-C.
+//! asked waits without the interpreter's lock and looks for Ctrl-C. To wake up another thread, and
+//! then this one again, takes as long as a part of a small leaf: what is made of short steps is
+//! done by the thread that asked, which looks for Ctrl-C between them.
 
 use std::any::Any;
+use std::cell::OnceCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
 use std::{mem, process};
 
@@ -101,6 +105,11 @@ impl Monitor {
         }
     }
 
+    /// Ends the run.
+    pub fn cancel(&self) {
+        self.cancel.store(true, Ordering::Relaxed);
+    }
+
     pub fn cancelled(&self) -> bool {
         self.cancel.load(Ordering::Relaxed)
     }
@@ -134,6 +143,85 @@ impl Monitor {
     }
 }
 
+static FIRST: OnceLock<ThreadId> = OnceLock::new();
+
+thread_local! {
+    static ALONE: OnceCell<bool> = const { OnceCell::new() };
+}
+
+/// Remembers the thread that is here when the interpreter loads the package: that which hears
+/// Ctrl-C, as a rule.
+pub fn remember_first_thread() {
+    let _ = FIRST.set(thread::current().id());
+}
+
+/// Whether this thread may compute: the first may. It is then a pool of its own, so that what is
+/// computed here wakes up no other threads, whose number others set and a fork has none of.
+fn computes_here() -> bool {
+    if FIRST.get() != Some(&thread::current().id()) {
+        return false;
+    }
+    let build = || {
+        let alone = ThreadPoolBuilder::new().num_threads(1).use_current_thread();
+        // It lasts as long as the thread.
+        alone.build().map(mem::forget).is_ok()
+    };
+    ALONE.with(|alone| *alone.get_or_init(build))
+}
+
+/// Does what is of the program alone, which counts threads: on the pool.
+pub fn on_pool<T: Send>(py: Python, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let pool = pool(None)?;
+    Ok(py.detach(|| pool.install(work)))
+}
+
+/// What a run on this thread says at each of its steps.
+pub type Step<'a> = &'a mut dyn FnMut(&Monitor);
+
+/// Does `work` on this thread, if it may: work that calls its `Step` often, several times in
+/// [`LOOK`], and ends when its monitor is cancelled. Ctrl-C, and an exception of `progress`,
+/// cancel it.
+pub fn run_here<T: Send>(
+    py: Python,
+    progress: Option<&Bound<PyAny>>,
+    work: impl FnOnce(&Monitor, Step) -> T + Send,
+) -> PyResult<Option<T>> {
+    if !computes_here() {
+        return Ok(None);
+    }
+    let monitor = Monitor {
+        heard: progress.is_some(),
+        ..Monitor::default()
+    };
+    let listener = progress.map(|progress| progress.clone().unbind());
+    let (found, stop) = py.detach(|| {
+        let (mut looked, mut stop) = (Instant::now(), None);
+        let mut step = |monitor: &Monitor| {
+            if looked.elapsed() < LOOK || stop.is_some() {
+                return;
+            }
+            let look = Python::attach(|py| {
+                py.check_signals()?;
+                monitor.tell(listener.as_ref().map(|it| it.bind(py)))
+            });
+            if let Err(why) = look {
+                stop = Some(why);
+                monitor.cancel();
+            }
+            looked = Instant::now();
+        };
+        let found = catch_unwind(AssertUnwindSafe(|| work(&monitor, &mut step)));
+        (found.map_err(|panic| panicked(&*panic)), stop)
+    });
+    match stop {
+        Some(stop) => Err(stop),
+        None => {
+            monitor.tell(progress)?;
+            found.map(Some)
+        }
+    }
+}
+
 /// Does `work` on the pool. Ctrl-C, and an exception of `progress`, cancel it.
 pub fn run<T: Send + 'static>(
     py: Python,
@@ -164,7 +252,7 @@ pub fn run<T: Send + 'static>(
             Err(RecvTimeoutError::Disconnected) => return Err(panicked(&"a thread ended")),
         }
         if let Err(stop) = py.check_signals().and_then(|()| monitor.tell(progress)) {
-            monitor.cancel.store(true, Ordering::Relaxed);
+            monitor.cancel();
             py.detach(move || {
                 let _ = result.recv_timeout(FAREWELL);
             });

@@ -1,25 +1,89 @@
-//! Scenarios: a text, what is replaced in it, and the checked leaf.
+//! Scenarios: a text or a dictionary, what is replaced in it, and the checked leaf.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-use leafdyn::scenario;
+use leafdyn::scenario::{self, Entries};
 use leafdyn::study::Base;
 use pyo3::prelude::*;
 
+use crate::dictionary::Document;
 use crate::errors::{TEXT, cannot_vary, refused};
-use crate::toml_text;
 
-/// A checked scenario, with the text it is from.
+/// A checked scenario, with what it is from.
 #[pyclass(frozen, module = "leafdyn._leafdyn")]
 pub struct Scenario {
-    #[pyo3(get)]
-    text: String,
-    #[pyo3(get)]
-    file: String,
+    source: Arc<Source>,
     #[pyo3(get)]
     overrides: Vec<String>,
     pub checked: Arc<scenario::Scenario>,
+}
+
+/// What a scenario is from, before entries are replaced.
+struct Source {
+    /// The dictionary, if it is one.
+    document: Option<Document>,
+    /// The text; of a dictionary as soon as somebody looks at it.
+    text: OnceLock<String>,
+    file: String,
+    /// Its entries, as soon as some are replaced: none if they cannot be read.
+    entries: OnceLock<Option<Entries>>,
+}
+
+impl Source {
+    fn of_text(text: String, file: String) -> Self {
+        Source {
+            document: None,
+            text: text.into(),
+            file,
+            entries: OnceLock::new(),
+        }
+    }
+
+    fn text(&self) -> &str {
+        self.text.get_or_init(|| {
+            let text = self.document.as_ref().map(Document::text);
+            text.unwrap_or_default()
+        })
+    }
+
+    fn entries(&self) -> Option<&Entries> {
+        let read = || match &self.document {
+            Some(document) => document.entries(),
+            None => Entries::of_text(self.text()),
+        };
+        self.entries.get_or_init(read).as_ref()
+    }
+
+    /// The leaf, without its text being read if that can be: where it is refused the text
+    /// says why. Every key of one that is `known` has been looked at.
+    fn checked(
+        &self,
+        py: Python,
+        overrides: &[String],
+        known: bool,
+    ) -> PyResult<scenario::Scenario> {
+        let at_once = match (overrides, &self.document) {
+            ([], Some(document)) => document.entries().and_then(|all| all.scenario()),
+            ([_, ..], document) if known || document.is_some() => {
+                let replaced = self.entries().and_then(|all| all.replaced(overrides));
+                replaced.and_then(|all| all.scenario())
+            }
+            _ => None,
+        };
+        if let Some(found) = at_once {
+            return Ok(found);
+        }
+        // Settings of methods are no entries of the leaf, but are kept with it.
+        let of_method = |entry: &String| entry.trim_start().starts_with("method.");
+        if overrides.iter().any(of_method) {
+            let base = Base::of_text(self.text().into(), self.file.clone(), overrides);
+            let base = base.map_err(|error| cannot_vary(py, error))?;
+            return Ok(base.scenario().clone());
+        }
+        let found = scenario::Scenario::from_toml_with(self.text(), &self.file, overrides);
+        found.map_err(|error| refused(py, &error))
+    }
 }
 
 #[pymethods]
@@ -34,24 +98,7 @@ impl Scenario {
         file: Option<String>,
     ) -> PyResult<Self> {
         let file = file.unwrap_or_else(|| TEXT.into());
-        // Settings of methods are no entries of the leaf, but are kept with it.
-        let of_method = |entry: &&String| entry.trim_start().starts_with("method.");
-        let checked = match overrides.iter().any(|entry| of_method(&entry)) {
-            true => {
-                let base = Base::of_text(text.clone(), file.clone(), &overrides);
-                base.map_err(|error| cannot_vary(py, error))?
-                    .scenario()
-                    .clone()
-            }
-            false => scenario::Scenario::from_toml_with(&text, &file, &overrides)
-                .map_err(|error| refused(py, &error))?,
-        };
-        Ok(Scenario {
-            text,
-            file,
-            overrides,
-            checked: Arc::new(checked),
-        })
+        Scenario::of(py, Source::of_text(text, file).into(), overrides, false)
     }
 
     /// A scenario from a file.
@@ -64,7 +111,29 @@ impl Scenario {
     /// A scenario from a dictionary of the form of the file.
     #[staticmethod]
     fn from_dict(py: Python, entries: &Bound<PyAny>, overrides: Vec<String>) -> PyResult<Self> {
-        Scenario::new(py, toml_text::document(entries)?, overrides, None)
+        let source = Source {
+            document: Some(Document::read(entries)?),
+            text: OnceLock::new(),
+            file: TEXT.into(),
+            entries: OnceLock::new(),
+        };
+        Scenario::of(py, source.into(), overrides, false)
+    }
+
+    /// The same with more entries replaced.
+    fn replaced(&self, py: Python, overrides: Vec<String>) -> PyResult<Self> {
+        let overrides = [self.overrides.clone(), overrides].concat();
+        Scenario::of(py, self.source.clone(), overrides, true)
+    }
+
+    #[getter]
+    fn text(&self) -> &str {
+        self.source.text()
+    }
+
+    #[getter]
+    fn file(&self) -> &str {
+        &self.source.file
     }
 
     #[getter]
@@ -100,9 +169,19 @@ impl Scenario {
 }
 
 impl Scenario {
+    fn of(py: Python, source: Arc<Source>, overrides: Vec<String>, known: bool) -> PyResult<Self> {
+        let checked = source.checked(py, &overrides, known)?;
+        Ok(Scenario {
+            source,
+            overrides,
+            checked: checked.into(),
+        })
+    }
+
     /// The same, for numbers that vary.
     pub fn base(&self, py: Python) -> PyResult<Base> {
-        let base = Base::of_text(self.text.clone(), self.file.clone(), &self.overrides);
+        let (text, file) = (self.source.text().to_string(), self.source.file.clone());
+        let base = Base::of_text(text, file, &self.overrides);
         base.map_err(|error| cannot_vary(py, error))
     }
 }

@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use leafdyn::relax::SemiImplicit;
 use leafdyn::study::{
-    self, CELL_SECONDS, ChartError, ChartOptions, CheckOptions, Contender, MOST_POINTS, Map,
-    MapMethod, MapRequest, MapShow, TraceError, TraceRequest, Turn, Vary,
+    self, BoundaryRequest, CELL_SECONDS, ChartError, ChartOptions, CheckOptions, Contender,
+    MOST_POINTS, Map, MapMethod, MapRequest, MapShow, TraceError, TraceRequest, Turn, Vary,
 };
 use leafdyn::{cli, scenario};
 use pyo3::prelude::*;
@@ -15,7 +15,7 @@ use crate::arrays::{array, curves, nodes};
 use crate::errors::{cannot, cannot_vary};
 use crate::relax::{check_stations, heard, refuse};
 use crate::result::{Files, Leaf};
-use crate::run::{elapsed, run};
+use crate::run::{elapsed, on_pool, run};
 use crate::scenario::Scenario;
 
 /// A check: its files, the relaxed leaf, and if there is one the boundary-value solution: its
@@ -97,36 +97,55 @@ pub fn all_shapes(
     Ok((Files::of(all, input), leaves))
 }
 
-/// A trace: its files, whether it is complete, its remark, and the centerlines of the points of
-/// each branch.
+/// A trace, or a boundary: its files, whether it is complete, its remark, and the centerlines of the
+/// points of each branch, or curve.
 type Traced<'py> = (Files, bool, Option<String>, Vec<Vec<Bound<'py, PyAny>>>);
 
-/// Follows an equilibrium through a number of its scenario.
-#[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "they are those of the verb")]
-pub fn trace<'py>(
-    py: Python<'py>,
-    scenario: &Scenario,
-    vary: &str,
+/// What is asked of a trace besides its scenario and what varies.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Asked {
     switch: bool,
     keep_unstable: bool,
     segments: Option<usize>,
     tolerance: Option<f64>,
-    most_points: Option<usize>,
+    points: Option<usize>,
     cross_section: Option<f64>,
+}
+
+impl Asked {
+    fn request(&self, py: Python, scenario: &Scenario, vary: &str) -> PyResult<TraceRequest> {
+        let vary: Vary = vary.parse().map_err(|error| cannot_vary(py, error))?;
+        Ok(TraceRequest {
+            base: scenario.base(py)?,
+            vary,
+            switch: self.switch,
+            keep_unstable: self.keep_unstable,
+            segments: self.segments,
+            tolerance: self.tolerance,
+            most_points: self.points.unwrap_or(MOST_POINTS),
+            cross_section: self.cross_section,
+        })
+    }
+}
+
+fn cannot_trace(py: Python, error: TraceError) -> PyErr {
+    match error {
+        TraceError::Scenario(error) => cannot_vary(py, error),
+        error => cannot(error),
+    }
+}
+
+/// Follows an equilibrium through a number of its scenario.
+#[pyfunction]
+pub fn trace<'py>(
+    py: Python<'py>,
+    scenario: &Scenario,
+    vary: &str,
+    asked: Asked,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Traced<'py>> {
-    let vary: Vary = vary.parse().map_err(|error| cannot_vary(py, error))?;
-    let request = TraceRequest {
-        base: scenario.base(py)?,
-        vary,
-        switch,
-        keep_unstable,
-        segments,
-        tolerance,
-        most_points: most_points.unwrap_or(MOST_POINTS),
-        cross_section,
-    };
+    let request = asked.request(py, scenario, vary)?;
     let found = run(py, progress, move |monitor| {
         let mut heard = |branch: usize, points: usize, value: f64| {
             monitor.say_or_end(points as f64, None, || {
@@ -135,22 +154,51 @@ pub fn trace<'py>(
         };
         study::trace(&request, &mut heard)
     })?;
-    let trace = found.map_err(|error| match error {
-        TraceError::Scenario(error) => cannot_vary(py, error),
-        error => cannot(error),
-    })?;
+    let trace = found.map_err(|error| cannot_trace(py, error))?;
     let branches = trace.branches.iter();
     let lines: PyResult<Vec<Vec<_>>> = branches
         .map(|branch| {
-            branch
-                .points
-                .iter()
-                .map(|point| curves(py, &point.curves))
-                .collect()
+            let points = branch.points.iter();
+            points.map(|point| curves(py, &point.curves)).collect()
         })
         .collect();
     let (complete, remark) = (trace.complete, trace.remark.clone());
     let files = Files::of(trace, scenario.checked.clone());
+    Ok((files, complete, remark, lines?))
+}
+
+/// Follows the points at which the index of a leaf changes through two numbers of its scenario.
+#[pyfunction]
+pub fn boundary<'py>(
+    py: Python<'py>,
+    scenario: &Scenario,
+    along: &str,
+    across: &str,
+    asked: Asked,
+    progress: Option<&Bound<PyAny>>,
+) -> PyResult<Traced<'py>> {
+    let request = BoundaryRequest {
+        trace: asked.request(py, scenario, along)?,
+        across: across.parse().map_err(|error| cannot_vary(py, error))?,
+    };
+    let found = run(py, progress, move |monitor| {
+        let mut heard = |curve: Option<usize>, points: usize, [first, second]: [f64; 2]| {
+            monitor.say_or_end(points as f64, None, || {
+                let what = curve.map_or("trace".into(), |curve| format!("curve {}", curve + 1));
+                format!("{what}, {points} points, at {first:.6}, {second:.6}")
+            });
+        };
+        study::boundary(&request, &mut heard)
+    })?;
+    let boundary = found.map_err(|error| cannot_trace(py, error))?;
+    let lines: PyResult<Vec<Vec<_>>> = (boundary.curves.iter())
+        .map(|curve| {
+            let points = curve.points.iter();
+            points.map(|point| curves(py, &point.curves)).collect()
+        })
+        .collect();
+    let (complete, remark) = (boundary.complete, boundary.remark.clone());
+    let files = Files::of(boundary, scenario.checked.clone());
     Ok((files, complete, remark, lines?))
 }
 
@@ -182,8 +230,9 @@ pub fn map(
         tolerance,
         cell_seconds.unwrap_or(CELL_SECONDS),
     );
-    let request = request.map_err(cannot)?;
+    let mut request = request.map_err(cannot)?;
     let mut map = run(py, progress, move |monitor| {
+        request.limit = monitor.limit();
         let todo: Vec<_> = (0..request.cells())
             .map(|cell| (cell, request.methods.clone()))
             .collect();
@@ -259,6 +308,6 @@ pub fn chart(
 /// exit status.
 #[pyfunction]
 #[pyo3(name = "main")]
-pub fn program(py: Python, arguments: Vec<OsString>) -> u8 {
-    py.detach(|| cli::main_with(arguments))
+pub fn program(py: Python, arguments: Vec<OsString>) -> PyResult<u8> {
+    on_pool(py, || cli::main_with(arguments))
 }

@@ -33,3 +33,14 @@ def fan(rods: int = 5, gravity: float = 1.0, bending: float = 1.0) -> dict[str, 
         "coupling": {"y": 1.0, "z": 1.0} if rods > 1 else {},
         "load": {"gravity": [0.0, 0.0, -gravity]},
     }
+
+
+def column() -> dict[str, Any]:
+    """Euler's: clamped below, free above, softest about d2."""
+    stiffness = {"torsion": 1.0, "bending_2": 1.0, "bending_3": 9.0}
+    rigid = dict.fromkeys(["axial", "shear_2", "shear_3"], float("inf"))
+    return {
+        "name": "column",
+        "leaf": {"rods": 1, "length": 1.0, "fan": [0.0]},
+        "stiffness": {**stiffness, **rigid},
+    }

@@ -50,6 +50,43 @@ def test_every_hostile_line(line: str, parts: list[str], tmp_path: Path, monkeyp
     assert isinstance(refused.value, ValueError)
 
 
+@pytest.mark.parametrize("line, parts", ROWS, ids=[line[:40] for line, _ in ROWS])
+def test_every_hostile_line_in_a_dict(line: str, parts: list[str]) -> None:
+    """What is refused as a text is refused as a dict, for the same reason, and as a replaced entry."""
+    tomllib = pytest.importorskip("tomllib")
+    key = line.split("=")[0]
+    before = next(text for text in VALID.splitlines() if text.startswith(key))
+    try:
+        numbers = tomllib.loads(VALID.replace(before, line, 1))
+    except (tomllib.TOMLDecodeError, OverflowError):
+        return  # No such dict.
+    if "1e999" in line:
+        return  # Of which Python makes an infinity itself.
+    with pytest.raises(leafdyn.ScenarioError) as refused:
+        leafdyn.relax(numbers)
+    with pytest.raises(leafdyn.ScenarioError) as as_text:
+        leafdyn.relax(VALID.replace(before, line, 1))
+    assert refused.value.key == as_text.value.key
+    assert refused.value.remedy
+    if "2020" not in line:  # Python has dates of its own.
+        assert refused.value.remedy == as_text.value.remedy
+
+
+def test_a_dict_with_what_is_no_key() -> None:
+    for slip, part in [
+        ({"stifness": {}}, "did you mean stiffness"),
+        ({"stiffness": {**fan(3)["stiffness"], "torsoin": 1.0}}, "did you mean stiffness.torsion"),
+        ({"leaf.rods": 3}, "unknown key"),
+        ({"leaf": 3}, "must be a table"),
+        ({"name": {"first": "a"}}, "unknown key|must be"),
+    ]:
+        for set_ in (None, {"load.gravity": [0, 0, -2]}):
+            with pytest.raises(leafdyn.ScenarioError, match=part):
+                leafdyn.relax({**fan(3), **slip}, set=set_)
+    with pytest.raises(leafdyn.ScenarioError, match="torsoin"):
+        leafdyn.relax(leafdyn.Scenario(fan(3)).text + "[dynamics]\ntorsoin = 1\n", set={"leaf.rods": 4})
+
+
 def test_key_line_and_remedy() -> None:
     leaf = fan(3)
     leaf["stiffness"]["torsion"] = -1.0

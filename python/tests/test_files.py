@@ -2,25 +2,27 @@
 
 import csv
 import json
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from leaves import fan, program
+from leaves import column, fan, program
 
 import leafdyn
 
 SCENARIOS = sorted(Path(__file__).parents[2].glob("scenarios/*/*.toml"))
 # And the way to the scenario, which only the program knows.
 TIMES = {"wall_seconds", "source"}
+VARY = "load.gravity[2]=-1..-2:3"
 
 
 def without_times(found: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in found.items() if key not in TIMES}
 
 
-def column(rows: list[dict[str, str]], names: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+def numbers(rows: list[dict[str, str]], names: str) -> np.ndarray[Any, np.dtype[np.float64]]:
     return np.array([[float(row[name]) for name in names.split()] for row in rows])
 
 
@@ -47,10 +49,24 @@ def test_every_scenario_by_both_roads(file: Path, tmp_path: Path) -> None:
         ("moments", "m1 m2 m3"),
     ]:
         array = getattr(leaf, name)
-        wanted = column(rows, columns).reshape(array.shape)
+        wanted = numbers(rows, columns).reshape(array.shape)
         # To the bit: zeros have their signs.
         assert array.tobytes() == wanted.tobytes(), name
     assert np.array_equal(np.array(summary["positions"]), leaf.positions)
+
+
+@pytest.mark.filterwarnings("ignore::leafdyn.LeafWarning")
+@pytest.mark.parametrize("file", SCENARIOS, ids=lambda file: file.stem)
+def test_every_scenario_as_a_dict(file: Path) -> None:
+    """The numbers of the file put into a dict, a text, and over the scenario: one scenario."""
+    tomllib = pytest.importorskip("tomllib")
+    numbers = tomllib.loads(file.read_text())
+    again = leafdyn.Scenario(leafdyn.Scenario(numbers).text)
+    name = {"name": "other"}
+    wanted = leafdyn.relax(file, tolerance=1e-2, set=name).to_dict()
+    for source in (numbers, again, leafdyn.Scenario(numbers), leafdyn.Scenario(file)):
+        assert without_times(leafdyn.relax(source, tolerance=1e-2, set=name).to_dict()) == without_times(wanted)
+    assert leafdyn.relax(numbers, tolerance=1e-2).to_dict()["input"] == {**wanted["input"], "name": numbers["name"]}
 
 
 def test_saved_files_are_those_of_the_program(tmp_path: Path) -> None:
@@ -77,6 +93,41 @@ def test_only_what_is_asked_for_is_written(tmp_path: Path) -> None:
         leaf.save(tmp_path / "d", write="json,gif")
 
 
+def files_in(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_files_that_list_others_are_written_with_them(tmp_path: Path) -> None:
+    file = tmp_path / "fan.toml"
+    file.write_text(leafdyn.Scenario(fan(2)).text)
+    short = "dynamics.duration=0.5"
+    assert program("trace", file, "--vary", VARY, "--write", "vtk", "--out", tmp_path / "trace").returncode == 0
+    assert program("simulate", file, "--set", short, "--write", "vtk", "--out", tmp_path / "motion").returncode == 0
+    assert program("relax", file, "--modes", "0", "--write", "vtk", "--out", tmp_path / "leaf").returncode == 0
+    results = {
+        "trace": leafdyn.trace(file, VARY),
+        "motion": leafdyn.simulate(file, set={"dynamics.duration": 0.5}),
+        "leaf": leafdyn.relax(file),
+    }
+    for name, result in results.items():
+        folder = tmp_path / f"{name}_package"
+        (listing,) = result.save(folder, write="vtk")
+        assert files_in(folder) == files_in(tmp_path / name)
+        if listing.suffix == ".pvd":
+            parts = [part.attrib["file"] for part in ElementTree.parse(listing).iter("DataSet")]
+            assert len(parts) > 2
+            assert {listing.name, *parts} == files_in(folder).keys()
+            for part in parts:
+                assert ElementTree.parse(folder / part).getroot().tag == "VTKFile"
+
+
+def test_a_file_that_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OSError, match="file") as refused:
+        leafdyn.relax(fan(2)).save(tmp_path / "file" / "folder")
+    assert "--" not in str(refused.value)
+
+
 def test_a_motion_by_both_roads(tmp_path: Path) -> None:
     file = Path("scenarios/motion/swing.toml")
     assert program("simulate", file, "--set", "dynamics.duration=1", "--out", tmp_path / "program").returncode == 0
@@ -93,10 +144,10 @@ def test_a_motion_by_both_roads(tmp_path: Path) -> None:
         (motion.velocities, "vx vy vz"),
         (motion.angular_velocities, "wx wy wz"),
     ]:
-        assert array.tobytes() == column(rows, columns).tobytes()
+        assert array.tobytes() == numbers(rows, columns).tobytes()
     energies = list(csv.DictReader((tmp_path / "program" / "energy.csv").read_text().splitlines()))
-    assert np.array_equal(motion.energies["kinetic"], column(energies, "kinetic")[:, 0])
-    assert np.array_equal(motion.times, column(energies, "time")[:, 0])
+    assert np.array_equal(motion.energies["kinetic"], numbers(energies, "kinetic")[:, 0])
+    assert np.array_equal(motion.times, numbers(energies, "time")[:, 0])
     one_by_one = list(leafdyn.frames(file, set={"dynamics.duration": 1}))
     assert np.array_equal([frame.positions for frame in one_by_one], motion.positions)
     assert {path.suffix for path in motion.save(tmp_path / "c", write="csv")} == {".csv"}
@@ -131,6 +182,49 @@ def test_a_check_a_trace_and_all_shapes_by_both_roads(tmp_path: Path) -> None:
     shapes = leafdyn.all_shapes(file, tolerance=1e-4)
     alike(shapes.to_dict(), told("relax", "--all", "--tolerance", "1e-4"))
     assert shapes.starts.sum() + shapes.failed == shapes.to_dict()["starts"]
+
+
+TWO = ["load.tip_force[0]=-1..-6", "stiffness.bending_2=0.5..2:3"]
+
+
+def test_a_boundary_by_both_roads(tmp_path: Path) -> None:
+    file = tmp_path / "column.toml"
+    file.write_text(leafdyn.Scenario(column()).text)
+    vary = [word for number in TWO for word in ("--vary", number)]
+    assert program("trace", file, *vary, "--out", tmp_path / "program").returncode == 0
+    found = leafdyn.trace(file, TWO)
+    assert (found.name, found.complete, found.remark) == ("column", True, None)
+    assert found.vary == ("load.tip_force[0]", "stiffness.bending_2")
+    summary = json.loads((tmp_path / "program" / "boundary.json").read_text())
+    assert without_times(found.to_dict()) == without_times(summary)
+    for written in found.save(tmp_path / "package"):
+        if written.suffix != ".json":
+            assert written.read_bytes() == (tmp_path / "program" / written.name).read_bytes()
+    rows = list(csv.DictReader((tmp_path / "program" / "boundary.csv").read_text().splitlines()))
+    (curve,) = found.curves
+    for array, columns in [
+        (curve.values, " ".join(found.vary)),
+        (curve.errors, "error_1 error_2"),
+        (curve.tips, "tip_x tip_y tip_z"),
+        (curve.indices, "index_before index_behind"),
+    ]:
+        assert np.array_equal(array, numbers(rows, columns))
+    assert curve.kinds.tolist() == [row["kind"] for row in rows]
+    assert (curve.kind, curve.multiplicity, curve.ends) == ("branch-point", 1, ("reached", "reached"))
+    assert curve.values.dtype == curve.tips.dtype == np.float64
+    # Euler: a clamped column with a free end, along which bending about d2 is softest.
+    force, bending = curve.values.T
+    assert np.abs(-force / (np.pi**2 / 4 * bending) - 1).max() < 1e-5
+    assert len(curve.lines) == len(rows)
+    assert all(np.abs(line[0, -1] - tip).max() < 1e-6 for line, tip in zip(curve.lines, curve.tips))
+    assert repr(found) == "<Boundary column over load.tip_force[0] and stiffness.bending_2: 1 curve, complete>"
+    assert found.figure().startswith("<svg")
+    with pytest.raises(ValueError, match="vary has 3 numbers: give one as a text, or a list of two"):
+        leafdyn.trace(column(), [*TWO, TWO[0]])
+    with pytest.raises(ValueError, match="varies twice"):
+        leafdyn.trace(column(), [TWO[0], TWO[0]])
+    with pytest.warns(leafdyn.LeafWarning, match="the index changes nowhere"):
+        assert leafdyn.trace(column(), ["load.tip_force[0]=-0.1..-0.2", TWO[1]]).curves == []
 
 
 def test_a_map_and_a_chart() -> None:

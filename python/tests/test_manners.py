@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from leaves import fan
+from leaves import column, fan
 
 import leafdyn
 
@@ -24,10 +24,20 @@ LONG: dict[str, Callable[[], Any]] = {
     "relax": lambda: leafdyn.relax(fan(3000), tolerance=1e-9),
     "explicit": lambda: leafdyn.relax(fan(50), tolerance=1e-10, method="explicit"),
     "shooting": lambda: leafdyn.relax(fan(60), tolerance=1e-10, method="shooting"),
+    "small": lambda: [leafdyn.relax(fan(5), tolerance=1e-8) for _ in range(100_000)],
+    "small but fine": lambda: leafdyn.relax(fan(8), segments=16_000, tolerance=1e-12),
+    "dicts": lambda: [leafdyn.Scenario(fan(5)) for _ in range(1_000_000)],
+    "modes": lambda: leafdyn.modes(fan(1500), 20, tolerance=1e-8),
     "relax_many": lambda: leafdyn.relax_many([fan(5)] * 20_000),
     "check": lambda: leafdyn.check(fan(60), tolerance=1e-10),
     "all_shapes": lambda: leafdyn.all_shapes(FIG10, tolerance=1e-7),
     "trace": lambda: leafdyn.trace(FIG10, "load.gravity[2]=-0.01..-3", set={"leaf.rods": 9}, switch=True),
+    "boundary": lambda: leafdyn.trace(
+        FIG10, ["load.gravity[2]=-0.01..-3", "stiffness.bending_3=0.5..2"], set={"leaf.rods": 9}
+    ),
+    "frames": lambda: sum(
+        1 for _ in leafdyn.frames(fan(20), set={"dynamics.duration": 1e5, "dynamics.output_interval": 1.0})
+    ),
     "simulate": lambda: leafdyn.simulate(fan(20), set={"dynamics.duration": 1e5, "dynamics.output_interval": 1.0}),
     "map": lambda: leafdyn.map(fan(9), ["load.gravity[2]=-1..-9:40", "stiffness.torsion=0.01..1:40"]),
     "chart": lambda: leafdyn.chart(fan(21), seconds=60.0),
@@ -114,6 +124,88 @@ def test_progress_is_told() -> None:
     told.clear()
     leafdyn.relax(fan(300), tolerance=1e-9, progress=lambda *said: told.append(said))
     assert "segments a vein" in told[-1][2]
+
+
+WITH_PROGRESS: dict[str, Callable[[Any], Any]] = {
+    "relax": lambda heard: leafdyn.relax(fan(5), progress=heard),
+    "relax on the pool": lambda heard: leafdyn.relax(fan(40), progress=heard),
+    "relax_many": lambda heard: leafdyn.relax_many([fan(5)] * 3, progress=heard),
+    "modes": lambda heard: leafdyn.modes(fan(3), progress=heard),
+    "sensitivities": lambda heard: leafdyn.sensitivities(fan(3), "stiffness.axial", progress=heard),
+    "check": lambda heard: leafdyn.check(fan(3), progress=heard),
+    "all_shapes": lambda heard: leafdyn.all_shapes(fan(2), tolerance=1e-3, progress=heard),
+    "trace": lambda heard: leafdyn.trace(fan(2), "load.gravity[2]=-1..-2:3", progress=heard),
+    "boundary": lambda heard: leafdyn.trace(
+        column(), ["load.tip_force[0]=-1..-6", "stiffness.bending_2=0.9..1.1:2"], progress=heard
+    ),
+    "simulate": lambda heard: leafdyn.simulate(fan(2), set={"dynamics.duration": 0.5}, progress=heard),
+    "map": lambda heard: leafdyn.map(fan(2), "load.gravity[2]=-1..-2:2", methods=["semi-implicit"], progress=heard),
+    "chart": lambda heard: leafdyn.chart(fan(2), seconds=0.1, methods=["semi-implicit"], progress=heard),
+    "fit": lambda heard: leafdyn.fit(
+        "scenarios/measured/pull.toml", "scenarios/measured/pull.csv", "stiffness.axial", progress=heard
+    ),
+}
+
+
+@pytest.mark.filterwarnings("ignore::leafdyn.LeafWarning")
+@pytest.mark.parametrize("verb", WITH_PROGRESS)
+def test_every_verb_tells_how_far_it_is(verb: str, capfd: pytest.CaptureFixture[str]) -> None:
+    told: list[tuple[float, float | None, str]] = []
+    WITH_PROGRESS[verb](lambda *said: told.append(said))
+    assert told
+    for done, total, text in told:
+        assert isinstance(done, float)
+        assert total is None or done <= total
+        assert text
+
+    def refuse(*said: object) -> None:
+        raise LookupError("heard enough")
+
+    with pytest.raises(LookupError, match="heard enough"):
+        WITH_PROGRESS[verb](refuse)
+    pytest.importorskip("tqdm")
+    capfd.readouterr()
+    WITH_PROGRESS[verb](True)
+    assert "it" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "ends",
+    [
+        lambda: leafdyn.relax(fan(3), tolerance=1e-12, set={"load.gravity": [0, 0, -1000.0]}),
+        lambda: leafdyn.relax_many([fan(3)], tolerance=1e-12, set={"load.gravity": [0, 0, -1000.0]}),
+        lambda: leafdyn.trace(fan(2), "load.gravity[2]=-1..-60", points=3),
+        lambda: leafdyn.trace(fan(2), ["load.gravity[2]=-1..-1.1", "stiffness.torsion=1..2"]),
+        lambda: leafdyn.fit(
+            "scenarios/measured/pull.toml",
+            {"load.tip_force[0]": [4, 8, 12], "tip_x": [0.9707, 0.9898, 1.009], "sd_tip_x": 0.0005},
+            ["stiffness.axial", "stiffness.torsion"],
+        ),
+    ],
+    ids=["relax", "relax_many", "trace", "boundary", "fit"],
+)
+def test_what_is_said_beside_a_result_is_a_warning(ends: Callable[[], Any]) -> None:
+    with pytest.warns(leafdyn.LeafWarning) as said:
+        ends()
+    # It points at the line that asked.
+    assert {warning.filename for warning in said} == {__file__}
+
+
+def test_a_small_leaf_is_solved_by_the_thread_that_asks() -> None:
+    """And the numbers are those of any other."""
+    wanted = leafdyn.relax(fan(5), tolerance=1e-9)
+    found: list[Any] = []
+    thread = threading.Thread(target=lambda: found.append(leafdyn.relax(fan(5), tolerance=1e-9)))
+    thread.start()
+    thread.join()
+    (many,) = leafdyn.relax_many([fan(5)], tolerance=1e-9)
+    for other in (found[0], many):
+        assert np.array_equal(other.positions, wanted.positions)
+        assert other.segments == wanted.segments
+    # One that needs a fine grid begins there, and ends on the pool.
+    fine = leafdyn.relax(fan(5), segments=512)
+    coarse = leafdyn.relax(fan(5), segments=1024)
+    assert np.abs(fine.tips - coarse.tips).max() < 1e-5
 
 
 def test_an_exception_of_the_listener_ends_the_run() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from leaves import fan
+from leaves import column, fan
 
 import leafdyn
 
@@ -51,7 +51,9 @@ def test_every_other_result(tmp_path: Path) -> None:
     trace = leafdyn.trace(fan(2), "load.gravity[2]=-1..-2:3")
     motion = leafdyn.simulate(fan(2), set={"dynamics.duration": 0.2})
     found = leafdyn.map(fan(2), "load.gravity[2]=-1..-2:2", methods=["semi-implicit"])
-    for number, result in enumerate([check, shapes, trace, motion, found]):
+    boundary = leafdyn.trace(column(), ["load.tip_force[0]=-1..-6", "stiffness.bending_2=0.9..1.1:2"])
+    chart = leafdyn.chart(fan(2), seconds=0.1, methods=["semi-implicit"])
+    for number, result in enumerate([check, shapes, trace, motion, found, boundary, chart]):
         again = travelled(result)
         assert repr(again) == repr(result)
         assert again.to_dict() == result.to_dict()
@@ -60,4 +62,5 @@ def test_every_other_result(tmp_path: Path) -> None:
         assert {file.suffix for file in written} >= {".json", ".svg", ".png"}
     same(shapes[0], travelled(shapes)[0])
     assert np.array_equal(travelled(motion).positions, motion.positions)
+    assert np.array_equal(travelled(boundary).curves[0].values, boundary.curves[0].values)
     assert np.array_equal(travelled(trace).branches[0].tips, trace.branches[0].tips)

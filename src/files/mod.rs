@@ -23,8 +23,8 @@ use crate::figure::view::{self, Page, Series, glb, vtk};
 use crate::figure::{self, Film, Picture};
 use crate::relax::Equilibrium;
 use crate::report::table::Table;
-use crate::report::{self, FileError, Format, json};
-pub use crate::report::{Document, Kind, Written};
+use crate::report::{self, Format, json};
+pub use crate::report::{Document, FileError, Kind, Written};
 use crate::simulate::Record;
 use crate::study::{All, Boundary, Chart, Check, Fit, Map, Scaling, Trace};
 

@@ -4,8 +4,6 @@
 
 use std::f64::consts::PI;
 
-use toml::de::DeValue;
-
 use super::dynamics::{OUTPUTS, round_inertia};
 use super::error::ScenarioError;
 use super::key::Key;
@@ -126,10 +124,10 @@ fn angles(item: Item, rods: usize) -> Result<Vec<f64>> {
             .map(|n| step * (2.0 * n as f64 - odd - rods as f64))
             .collect()
     };
-    match item.value() {
-        DeValue::String(text) if text == "paper" => Ok(fan(0.0)),
-        DeValue::String(text) if text == "symmetric" => Ok(fan(1.0)),
-        DeValue::Array(_) => item.one_each(rods),
+    match item.node().text() {
+        Some("paper") => Ok(fan(0.0)),
+        Some("symmetric") => Ok(fan(1.0)),
+        None if item.node().length().is_some() => item.one_each(rods),
         _ => Err(item.refuse(format_args!(
             "must be \"paper\" or \"symmetric\", or a list of {rods} angles in radians, one per rod"
         ))),
@@ -283,10 +281,10 @@ fn clamped(item: Item, rods: usize) -> Result<bool> {
 }
 
 fn start(item: Item, clamped: bool) -> Result<Start> {
-    match item.value() {
-        DeValue::String(text) if text == "released" => Ok(Start::Released),
-        DeValue::String(text) if text == "at-rest" && clamped => Ok(Start::AtRest),
-        DeValue::String(text) if text == "at-rest" => Err(item
+    match item.node().text() {
+        Some("released") => Ok(Start::Released),
+        Some("at-rest") if clamped => Ok(Start::AtRest),
+        Some("at-rest") => Err(item
             .refuse("a rod with a free base has no equilibrium to start from: use \"released\"")),
         _ => Err(item.refuse(
             "must be \"released\" (from the shape where a relaxation starts) or \"at-rest\" \

@@ -66,10 +66,21 @@ impl Form {
 struct Row {
     key: Key,
     path: &'static str,
+    /// Where the name begins in the path, behind the table's name and a dot.
+    name: usize,
     description: &'static str,
     form: Form,
     dimension: [i32; 3],
     left_out: LeftOut,
+}
+
+const fn name(path: &str) -> usize {
+    let bytes = path.as_bytes();
+    let mut at = bytes.len();
+    while at > 0 && bytes[at - 1] != b'.' {
+        at -= 1;
+    }
+    at
 }
 
 /// Rows of `Key "path": form, [exponents of length, force, time], left out;`
@@ -85,6 +96,7 @@ macro_rules! keys {
         const FORMAT: &[Row] = &[$(Row {
             key: Key::$key,
             path: $path,
+            name: name($path),
             description: concat!($($doc),+),
             form: $form,
             dimension: $dimension,
@@ -242,15 +254,31 @@ impl Key {
 
     /// The table it stands in, empty at the top, and its name within that.
     pub(super) fn parts(self) -> (&'static str, &'static str) {
-        self.path().split_once('.').unwrap_or(("", self.path()))
+        let Row { path, name, .. } = self.row();
+        (&path[..name.saturating_sub(1)], &path[*name..])
     }
 
     pub(crate) fn all() -> impl Iterator<Item = Key> {
         FORMAT.iter().map(|row| row.key)
     }
 
-    pub(crate) fn from_path(path: &str) -> Option<Key> {
+    /// That of a path, if it is one's.
+    pub fn from_path(path: &str) -> Option<Key> {
         Key::all().find(|key| key.path() == path)
+    }
+
+    /// By its table, empty at the top, and its name within that.
+    pub(super) fn from_parts(table: &str, name: &str) -> Option<Key> {
+        let length = name.len() + if table.is_empty() { 0 } else { table.len() + 1 };
+        let mut long = FORMAT.iter().filter(|row| row.path.len() == length);
+        let row = long.find(|row| row.key.parts() == (table, name))?;
+        Some(row.key)
+    }
+
+    /// A table of this name.
+    pub(super) fn table(name: &str) -> Option<&'static str> {
+        let mut tables = Key::all().map(|key| key.parts().0);
+        tables.find(|table| *table == name && !name.is_empty())
     }
 
     /// The tables of the format, in its order.
@@ -319,6 +347,9 @@ mod tests {
     fn every_key_is_found_by_its_path() {
         for key in Key::all() {
             assert_eq!(Key::from_path(key.path()), Some(key));
+            let (table, name) = key.parts();
+            assert_eq!(Key::from_parts(table, name), Some(key));
+            assert_eq!([table, name].join(".").trim_start_matches('.'), key.path());
             assert_eq!(key.row().key, key);
         }
         assert_eq!(Key::tables().len(), 10);

@@ -186,7 +186,8 @@ fn rods(raw: &Raw, rods: &[Rod]) -> Result {
     let stiffnesses = rods.iter().flat_map(|rod| &rod.couple_stiffness);
     let stiffest = stiffnesses.fold(0.0, |most: f64, stiffness| most.max(stiffness.max_abs()));
     for (index, rod) in rods.iter().enumerate() {
-        let natural = |key, value| value * per(key, softest(rod), 1.0);
+        let scale = softest(rod);
+        let natural = |key, value| value * per(key, scale, 1.0);
         for (key, stiffness) in Key::COUPLE.into_iter().zip(&rod.couple_stiffness) {
             check(key, index, &STIFFNESSES, stiffest / stiffness.min())?;
         }

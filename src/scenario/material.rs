@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use toml::de::DeValue;
-
 use super::Profile;
 use super::error::ScenarioError;
 use super::key::Key;
@@ -142,16 +140,10 @@ impl Sections {
 fn outline(raw: &Raw) -> Result<(Outline, [Key; 2])> {
     let item = raw.item(Key::SectionShape)?;
     let sides = [Key::Width, Key::Thickness];
-    let (outline, sides, others) = match item.value() {
-        DeValue::String(word) if word == "circle" => {
-            (Outline::Ellipse, [Key::Diameter; 2], &sides[..])
-        }
-        DeValue::String(word) if word == "ellipse" => {
-            (Outline::Ellipse, sides, &[Key::Diameter][..])
-        }
-        DeValue::String(word) if word == "rectangle" => {
-            (Outline::Rectangle, sides, &[Key::Diameter][..])
-        }
+    let (outline, sides, others) = match item.node().text() {
+        Some("circle") => (Outline::Ellipse, [Key::Diameter; 2], &sides[..]),
+        Some("ellipse") => (Outline::Ellipse, sides, &[Key::Diameter][..]),
+        Some("rectangle") => (Outline::Rectangle, sides, &[Key::Diameter][..]),
         _ => return Err(item.refuse("must be \"circle\", \"ellipse\" or \"rectangle\"")),
     };
     match others.iter().find_map(|&key| raw.given(key)) {

@@ -5,12 +5,14 @@
 
 mod check;
 mod dynamics;
+mod entries;
 mod error;
 mod excerpt;
 mod form;
 mod key;
 mod limits;
 mod material;
+mod node;
 mod part;
 mod profile;
 mod radii;
@@ -24,13 +26,14 @@ mod tip;
 mod value;
 
 pub use dynamics::{Dynamics, Start};
+pub use entries::Entries;
+pub(crate) use entries::{resolve, with_overrides};
 pub use error::{Place, ScenarioError};
 #[cfg(feature = "cli")]
 pub(crate) use excerpt::printable;
 pub(crate) use key::Form;
 pub use key::Key;
 pub use part::Part;
-pub(crate) use part::{number_at, resolve, value_at, with_overrides};
 pub use profile::Profile;
 pub use radii::Radii;
 pub use read::text;
@@ -42,6 +45,8 @@ pub use schedule::Schedule;
 pub use schema::schema;
 pub use section::{Property, Section};
 pub use tip::{Clamp, HeldTip};
+/// A value as it can be written.
+pub use toml::Value;
 
 /// A checked scenario. All quantities are in the units the file was written
 /// in, which only have to be consistent with each other.

@@ -97,12 +97,12 @@ impl Profile {
 
     /// The largest absolute value along the rod.
     pub fn max_abs(&self) -> f64 {
-        self.values().fold(0.0, |m, v| m.max(v.abs()))
+        self.fold(0.0, |m, v| m.max(v.abs()))
     }
 
     /// The smallest value along the rod.
     pub fn min(&self) -> f64 {
-        self.values().fold(f64::INFINITY, f64::min)
+        self.fold(f64::INFINITY, f64::min)
     }
 
     /// The same profile times a factor.
@@ -125,16 +125,19 @@ impl Profile {
         }
     }
 
-    /// Its values where they may be extreme.
-    fn values(&self) -> Box<dyn Iterator<Item = f64> + '_> {
+    /// Folds values among which the extremes are.
+    fn fold(&self, start: f64, with: impl Fn(f64, f64) -> f64) -> f64 {
         match self {
-            Profile::Constant(value) => Box::new(std::iter::once(*value)),
-            Profile::Linear { value, .. } => Box::new(value.iter().copied()),
+            Profile::Constant(value) => with(start, *value),
+            Profile::Linear { value, .. } => value.iter().copied().fold(start, with),
             Profile::Section {
                 section,
                 property,
                 factor,
-            } => Box::new(section.samples(*property).map(move |value| factor * value)),
+            } => {
+                let values = section.samples(*property).map(|value| factor * value);
+                values.fold(start, with)
+            }
         }
     }
 }

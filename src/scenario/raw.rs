@@ -3,13 +3,14 @@
 
 use std::fmt::Display;
 
-use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+use toml::{Spanned, Value};
 
+use super::entries::{Entries, Override, left_out};
 use super::error::{Place, ScenarioError};
 use super::excerpt::{line_of, shorten, snippet};
 use super::key::{Form, Key, LeftOut, nearest};
-use super::part::Override;
+use super::node::Node;
 
 /// All entries of a scenario, those of `--set` in place of the file's.
 pub(super) struct Raw<'a> {
@@ -20,8 +21,13 @@ pub(super) struct Raw<'a> {
 }
 
 struct Entry<'a> {
-    value: Spanned<DeValue<'a>>,
+    value: Held<'a>,
     source: Source<'a>,
+}
+
+enum Held<'a> {
+    Read(Spanned<DeValue<'a>>),
+    Alone(&'a Value),
 }
 
 /// The text an entry was read from; spans count in `text`.
@@ -55,10 +61,6 @@ impl<'a> Source<'a> {
                 line: None,
             },
         }
-    }
-
-    fn found(&self, value: &Spanned<DeValue>) -> String {
-        shorten(self.text.get(value.span()).unwrap_or(""))
     }
 
     /// The line around `span`, where the text has lines.
@@ -113,15 +115,6 @@ impl<'a> Raw<'a> {
             entries: [const { None }; Key::COUNT],
             tables: Vec::new(),
         };
-        for key in Key::all() {
-            let LeftOut::Means(text) = key.left_out() else {
-                continue;
-            };
-            let origin = Origin::LeftOut;
-            let source = Source { text, origin };
-            let value = source.parse(DeValue::parse(text))?;
-            raw.entries[key as usize] = Some(Entry { value, source });
-        }
         let origin = Origin::File(file);
         let source = Source { text, origin };
         let document = source.parse(DeTable::parse(text))?;
@@ -129,7 +122,42 @@ impl<'a> Raw<'a> {
         for given in overrides {
             raw.set(given)?;
         }
+        raw.fill();
         Ok(raw)
+    }
+
+    /// The same of values that are in no text: where one is refused nobody can be told.
+    pub(super) fn of(entries: &'a Entries) -> Raw<'a> {
+        let mut raw = Raw {
+            file: "",
+            entries: [const { None }; Key::COUNT],
+            tables: Vec::new(),
+        };
+        let source = Source {
+            text: "",
+            origin: Origin::File(""),
+        };
+        for (key, value) in entries.given() {
+            let value = Held::Alone(value);
+            raw.entries[key as usize] = Some(Entry { value, source });
+        }
+        raw.fill();
+        raw
+    }
+
+    /// What holds where nothing is written.
+    fn fill(&mut self) {
+        for key in Key::all() {
+            let entry = &mut self.entries[key as usize];
+            if let (None, Some(value)) = (&entry, left_out(key)) {
+                let source = Source {
+                    text: "",
+                    origin: Origin::LeftOut,
+                };
+                let value = Held::Alone(value);
+                *entry = Some(Entry { value, source });
+            }
+        }
     }
 
     fn read_table(
@@ -140,11 +168,12 @@ impl<'a> Raw<'a> {
     ) -> Result<(), ScenarioError> {
         for (key, value) in table {
             let here = (name, key.get_ref().as_ref());
-            if let Some(known) = Key::all().find(|known| known.parts() == here) {
+            if let Some(known) = Key::from_parts(here.0, here.1) {
+                let value = Held::Read(value);
                 self.entries[known as usize] = Some(Entry { value, source });
                 continue;
             }
-            let inner = Key::tables().into_iter().find(|table| here == ("", table));
+            let inner = Key::table(here.1).filter(|_| name.is_empty());
             let Some(inner) = inner else {
                 let path = match here {
                     ("", key) => key.to_string(),
@@ -152,8 +181,9 @@ impl<'a> Raw<'a> {
                 };
                 return Err(source.unknown_key(&path, key.span(), Key::allowed_in(name)));
             };
-            let found = source.found(&value);
+            let span = value.span();
             let DeValue::Table(table) = value.into_inner() else {
+                let found = shorten(source.text.get(span).unwrap_or(""));
                 let allowed = Key::allowed_in(inner).join(", ");
                 let problem = format!(
                     "{inner} = {found}: must be a table: write [{inner}] on a line of its own, below it {allowed}"
@@ -177,6 +207,7 @@ impl<'a> Raw<'a> {
             }
             parsed => source.parse(parsed)?,
         };
+        let value = Held::Read(value);
         self.entries[given.key as usize] = Some(Entry { value, source });
         Ok(())
     }
@@ -239,7 +270,10 @@ impl<'a> Raw<'a> {
             key,
             list: "",
             indices: [None; 2],
-            value: &entry.value,
+            node: match &entry.value {
+                Held::Read(value) => Node::Read(value),
+                Held::Alone(value) => Node::Alone(value),
+            },
             source: entry.source,
         })
     }
@@ -253,7 +287,7 @@ pub(super) struct Item<'e> {
     list: &'static str,
     /// Which entry of the list, and which of that, counted from 0.
     indices: [Option<usize>; 2],
-    value: &'e Spanned<DeValue<'e>>,
+    node: Node<'e>,
     source: Source<'e>,
 }
 
@@ -262,23 +296,23 @@ impl<'e> Item<'e> {
         self.key
     }
 
-    pub(super) fn value(&self) -> &'e DeValue<'e> {
-        self.value.get_ref()
+    pub(super) fn node(&self) -> Node<'e> {
+        self.node
     }
 
     /// One of the lists of a table, if this is a table that has it.
     pub(super) fn list(&self, list: &'static str) -> Option<Item<'e>> {
-        let value = self.value().get(list)?;
+        let node = self.node.named(list)?;
         Some(Item {
             list,
-            value,
+            node,
             ..*self
         })
     }
 
     /// An entry of a list; of what is no list, or too short, the whole.
     pub(super) fn entry(&self, index: usize) -> Item<'e> {
-        let Some(value) = self.value().get(index) else {
+        let Some(node) = self.node.entry(index) else {
             return *self;
         };
         let indices = match self.indices {
@@ -287,7 +321,7 @@ impl<'e> Item<'e> {
         };
         Item {
             indices,
-            value,
+            node,
             ..*self
         }
     }
@@ -299,11 +333,11 @@ impl<'e> Item<'e> {
         other: &'static str,
         form: &str,
     ) -> Result<[Item<'e>; 2], ScenarioError> {
-        let DeValue::Table(table) = self.value() else {
+        let Some(names) = self.node.names() else {
             return Err(self.refuse(format_args!("must be a table: {form}")));
         };
-        let mut keys = table.keys().map(|key| key.get_ref());
-        if let Some(key) = keys.find(|key| *key != "at" && *key != other) {
+        let mut names = names.into_iter();
+        if let Some(key) = names.find(|key| *key != "at" && *key != other) {
             let key = shorten(key);
             return Err(self.refuse(format_args!("unknown key {key}: {form}")));
         }
@@ -335,9 +369,9 @@ impl<'e> Item<'e> {
             }
             [i, j] => format!(", list {i}, entry {j}"),
         };
-        let (path, found) = (self.key.path(), self.source.found(self.value));
+        let (path, found) = (self.key.path(), self.node.shown(self.source.text));
         ScenarioError {
-            place: self.source.place(self.value.span().start),
+            place: self.source.place(self.node.span().start),
             key: Some(self.key),
             problem: format!("{path}{part} = {found}: {problem}"),
         }

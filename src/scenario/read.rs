@@ -4,10 +4,10 @@ use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
+use super::entries::{Entries, resolve};
 use super::error::{Place, ScenarioError};
 use super::excerpt::line_of;
 use super::form::from_json;
-use super::part::resolve;
 use super::raw::Raw;
 use super::{Scenario, check};
 use crate::memory::Request;
@@ -63,6 +63,14 @@ impl Scenario {
     /// As [`Scenario::read`], with the entries `overrides` replaced.
     pub fn read_with(path: &Path, overrides: &[String]) -> Result<Scenario, ScenarioError> {
         Scenario::from_toml_with(&text(path)?, &path.display().to_string(), overrides)
+    }
+}
+
+impl Entries {
+    /// Checks these entries; none if they are refused, which [`Scenario::from_toml`] of
+    /// them as a text explains.
+    pub fn scenario(&self) -> Option<Scenario> {
+        check::check(&Raw::of(self)).ok()
     }
 }
 

@@ -1,7 +1,5 @@
 //! From a value as written to numbers: every form that a key can take.
 
-use toml::de::DeValue;
-
 use super::error::ScenarioError;
 use super::key::{Form, Range};
 use super::raw::Item;
@@ -26,30 +24,22 @@ const FACTOR_IN_TIME: &str = "a factor in time is { at = [0.0, 1.0], factor = [1
 
 impl<'e> Item<'e> {
     pub(super) fn text(&self) -> Result<&'e str> {
-        match self.value() {
-            DeValue::String(text) => Ok(text),
-            _ => Err(self.refuse("must be text in quotes")),
-        }
+        (self.node().text()).ok_or_else(|| self.refuse("must be text in quotes"))
     }
 
     pub(super) fn switch(&self) -> Result<bool> {
-        match self.value() {
-            DeValue::Boolean(value) => Ok(*value),
-            _ => Err(self.refuse("must be true or false")),
-        }
+        (self.node().switch()).ok_or_else(|| self.refuse("must be true or false"))
     }
 
     /// A whole number from 1 to `most`.
     pub(super) fn whole(&self, most: usize) -> Result<usize> {
-        if let DeValue::Integer(integer) = self.value()
-            && let Ok(whole) = usize::from_str_radix(integer.as_str(), integer.radix())
-            && (1..=most).contains(&whole)
-        {
-            return Ok(whole);
-        }
-        Err(self.refuse(format_args!(
-            "must be a whole number from 1 to {most}, without a decimal point"
-        )))
+        let whole = self.node().whole();
+        let whole = whole.filter(|whole| (1..=most).contains(whole));
+        whole.ok_or_else(|| {
+            self.refuse(format_args!(
+                "must be a whole number from 1 to {most}, without a decimal point"
+            ))
+        })
     }
 
     /// A number in the range of its key.
@@ -58,18 +48,8 @@ impl<'e> Item<'e> {
     }
 
     fn number_in(&self, range: Range) -> Result<f64> {
-        let value = match self.value() {
-            DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str().parse().ok(),
-            DeValue::Integer(integer) => u128::from_str_radix(integer.as_str(), integer.radix())
-                .ok()
-                .map(|value| value as f64),
-            DeValue::Float(float) => float.as_str().parse().ok(),
-            _ => return Err(self.refuse("must be a number")),
-        };
-        // 1e999 parses to infinity, which nobody wrote.
-        let says_infinite =
-            matches!(self.value(), DeValue::Float(float) if float.as_str().contains("inf"));
-        let value = value.filter(|value| says_infinite || !f64::is_infinite(*value));
+        let value = self.node().number();
+        let value = value.ok_or_else(|| self.refuse("must be a number"))?;
         let too_large = "is not a number a computer can hold (the largest is 1.8e308)";
         let value = value.ok_or_else(|| self.refuse(too_large))?;
         let positive = matches!(range, Range::Positive | Range::PositiveOrInfinite);
@@ -101,7 +81,7 @@ impl<'e> Item<'e> {
 
     /// A number for each of `count` rods or gaps: one for all, or a list.
     pub(super) fn one_each(&self, count: usize) -> Result<Vec<f64>> {
-        if let DeValue::Integer(_) | DeValue::Float(_) = self.value() {
+        if self.node().number().is_some() {
             return Ok(vec![self.number()?; count]);
         }
         let (each, counted) = match self.key().form() {
@@ -119,15 +99,15 @@ impl<'e> Item<'e> {
 
     /// A profile for each of `rods` rods.
     pub(super) fn quantity(&self, rods: usize) -> Result<Vec<Profile>> {
-        let DeValue::Table(_) = self.value() else {
+        if self.node().names().is_none() {
             let numbers = self.one_each(rods)?;
             return Ok(numbers.into_iter().map(Profile::Constant).collect());
-        };
+        }
         let [at, value] = self.pair("value", PROFILE_IS)?;
         let at = at.rising(true)?;
         let needed = format!("a list of numbers, or a list of {rods} such lists (one per rod)");
         let mut list = value.array(&needed)?;
-        if !list.next().is_some_and(|first| first.value().is_array()) {
+        if (list.next()).is_none_or(|first| first.node().length().is_none()) {
             return Ok(vec![value.linear(&at)?; rods]);
         }
         let lists = value.list_of(rods, ONE_PER_ROD, &needed)?;
@@ -204,11 +184,11 @@ impl<'e> Item<'e> {
 
     /// The entries of a list; `needed` says what is refused for being none.
     fn array(&self, needed: &str) -> Result<impl ExactSizeIterator<Item = Item<'e>> + use<'e>> {
-        let DeValue::Array(array) = self.value() else {
+        let Some(length) = self.node().length() else {
             return Err(self.refuse(format_args!("must be {needed}")));
         };
         let whole = *self;
-        Ok((0..array.len()).map(move |index| whole.entry(index)))
+        Ok((0..length).map(move |index| whole.entry(index)))
     }
 
     /// The same of a list that must have `count` entries.

@@ -4,8 +4,8 @@
 //! a list by an index that counts from 0 (`load.gravity[2]`), all numbers of a key
 //! multiplied (`scale:stiffness.bending_2`), or a setting of a method
 //! (`method.step`). Several keys joined by `+` take the same value. The
-//! values go into a scenario through the same text as `--set`, so that every
-//! limit of the format holds for them ([`Base::at`]).
+//! values go into a scenario as those of `--set` do, so that every limit of the
+//! format holds for them ([`Base::at`]); its text is read once only.
 //!
 //! ```
 //! use leafdyn::study::{Base, Vary};
@@ -32,7 +32,7 @@ use std::fmt;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-use crate::scenario::{Form, Key, Part, Scenario, ScenarioError};
+use crate::scenario::{Form, Key, Part, Scenario, ScenarioError, Value};
 
 /// Values where no count is given.
 const COUNT: usize = 11;
@@ -132,6 +132,16 @@ impl Target {
         match self.is_whole() {
             true => format!("{value:.0}"),
             false => format!("{value:?}"),
+        }
+    }
+
+    /// What that text means; none of a number too large to be a whole one.
+    fn value(self, value: f64) -> Option<Value> {
+        match self.is_whole() {
+            true => {
+                (value.fract() == 0.0 && value.abs() < 1e15).then_some(Value::Integer(value as i64))
+            }
+            false => Some(Value::Float(value)),
         }
     }
 }

@@ -20,15 +20,17 @@ from ._relax import modes, relax, relax_many, sensitivities
 from ._result import Result, Table
 from ._scenario import Scenario, Source
 from ._sensitivity import Sensitivity
-from ._study import Branch, Chart, Check, Map, Shapes, Trace
+from ._study import Boundary, Branch, Chart, Check, Curve, Map, Shapes, Trace
 from ._verbs import all_shapes, chart, check, frames, map, simulate, trace
 from ._view import Page
 
 __all__ = [
+    "Boundary",
     "Branch",
     "Candidate",
     "Chart",
     "Check",
+    "Curve",
     "Equilibrium",
     "Fit",
     "Frame",

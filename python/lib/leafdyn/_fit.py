@@ -183,7 +183,7 @@ def fit(
     Warns
     -----
     LeafWarning
-        If it is not at a minimum, or something else is to be known.
+        If it is not at a minimum, the data do not determine every number, or something else is to be known.
 
     Examples
     --------
@@ -211,7 +211,11 @@ def fit(
     others = None if candidates is None else measurements(candidates, "candidates")[0]
     with reporter(progress) as heard:
         found = Fit(_leafdyn.fit(leaf._core, tables, keys, robust, others, tolerance, heard))
-    warn(found.name, next(iter(found.remarks), None))
+    for remark in found.remarks:
+        warn(found.name, remark)
+    if found.undetermined:
+        open_ = (" and ".join(combination) for combination in found.undetermined)
+        warn(found.name, f"the data do not determine {'; '.join(open_)}: see says, free fewer numbers or measure more")
     return found
 
 

@@ -65,8 +65,7 @@ class Equilibrium(Viewed):
         self._files = core
         self._request = request
         self.scenario = request[0] if request else None
-        for name in _SCALARS:
-            setattr(self, name, getattr(core, name))
+        self.__dict__.update(core.scalars())
 
     @property
     def _core(self) -> _leafdyn.Leaf:
@@ -287,22 +286,6 @@ class Drawn(Kept):
             raise RuntimeError("this version of leafdyn finds other numbers than the pickled leaf has: solve it again")
         return again
 
-
-_SCALARS = (
-    "name",
-    "method",
-    "outcome",
-    "success",
-    "remark",
-    "rods",
-    "joined",
-    "segments",
-    "tolerance",
-    "residual",
-    "energy",
-    "negative_eigenvalues",
-    "wall_seconds",
-)
 
 _LATER = (
     "error_estimate",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any, TypeAlias, Union
 
 Heard: TypeAlias = Callable[[float, Union[float, None], str], object]
@@ -12,12 +12,18 @@ Heard: TypeAlias = Callable[[float, Union[float, None], str], object]
 Progress: TypeAlias = Union[None, bool, Heard]
 
 
-@contextmanager
-def reporter(progress: Progress) -> Iterator[Heard | None]:
+def reporter(progress: Progress) -> AbstractContextManager[Heard | None]:
     """What to call."""
-    if progress is not True:
-        yield progress or None
-        return
+    if not progress:
+        return _NOBODY
+    return _bar() if progress is True else nullcontext(progress)
+
+
+_NOBODY: AbstractContextManager[None] = nullcontext()
+
+
+@contextmanager
+def _bar() -> Iterator[Heard]:
     try:
         from tqdm.auto import tqdm
     except ImportError as missing:

@@ -8,7 +8,7 @@ import json
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,12 @@ class Contents(Protocol):
     def names(self) -> list[str]: ...
 
     def contents(self, name: str) -> bytes: ...
+
+
+class Saving(Contents, Protocol):
+    """Files that the program writes by itself."""
+
+    def save(self, folder: str | os.PathLike[str], kinds: list[str]) -> list[Path]: ...
 
 
 class Kept:
@@ -60,7 +66,8 @@ class Result:
         return found
 
     def save(self, folder: str | os.PathLike[str], write: str | Iterable[str] | None = None) -> list[Path]:
-        """Write the files of the program into a folder, which is made if it is not there.
+        """Write the files of the program into a folder, which is made if it is not there. What a file lists, as
+        ``trace.pvd`` does, is written beside it.
 
         Parameters
         ----------
@@ -78,6 +85,9 @@ class Result:
         names = self._files.names()
         kinds = chosen(write, names)
         place = Path(folder)
+        if not isinstance(self._files, Kept):
+            files = cast(Saving, self._files)
+            return files.save(place, sorted(kinds))
         place.mkdir(parents=True, exist_ok=True)
         written = []
         for name in names:

@@ -46,8 +46,7 @@ class Scenario:
     def __init__(self, source: Source, set: Mapping[str, Any] | None = None) -> None:
         entries = _leafdyn.overrides(set) if set else []
         if isinstance(source, Scenario):
-            known = source._core
-            self._core = _leafdyn.Scenario(known.text, known.overrides + entries, known.file) if entries else known
+            self._core = source._core.replaced(entries) if entries else source._core
         elif isinstance(source, Mapping):
             self._core = _leafdyn.Scenario.from_dict(source, entries)
         elif isinstance(source, str) and _is_text(source):

@@ -99,6 +99,8 @@ class Branch:
     """Its columns of ``trace.csv``."""
     curves: list[Array]
     """Centerlines at each point, shape (N, M + 1, 3)."""
+    remark: str | None = None
+    """Why it is not known as far as was asked."""
 
     @property
     def values(self) -> Array:
@@ -159,7 +161,10 @@ class Trace(Table, Viewed):
         for number, (branch, lines) in enumerate(zip(said["branches"], curves), start=1):
             here = table["branch"] == number
             rows = {name: column[here] for name, column in table.items()}
-            self.branches.append(Branch(branch["end"], rows, lines))
+            self.branches.append(Branch(branch["end"], rows, lines, branch.get("remark")))
+        if remark is None:
+            remarks = (f"branch {k}: {branch.remark}" for k, branch in enumerate(self.branches, 1) if branch.remark)
+            self.remark = next(remarks, None)
 
     def plot(self, ax: Any = None, **style: Any) -> Any:
         """Draw the height of the tip with matplotlib: solid where the leaf is stable, dashed where not, dots where
@@ -184,6 +189,103 @@ class Trace(Table, Viewed):
         count = len(self.branches)
         ends = "complete" if self.complete else "not complete"
         return f"<Trace {self.name} over {self.vary}: {count} branch{'es' * (count != 1)}, {ends}>"
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A curve in the plane of two numbers on which the stability of a leaf changes, with P points."""
+
+    kind: str
+    """``"fold"`` or ``"branch-point"``: what becomes of a branch along the first number."""
+    multiplicity: int
+    """How many modes become neutral."""
+    ends: tuple[str, str]
+    """How it ended before its first point and behind its last: ``"reached"``, ``"closed"`` and so on."""
+    columns: dict[str, NDArray[Any]]
+    """Its columns of ``boundary.csv``."""
+    lines: list[Array]
+    """Centerlines at each point, shape (N, M + 1, 3)."""
+    keys: tuple[str, str]
+    """The two numbers."""
+
+    @property
+    def values(self) -> Array:
+        """Both numbers, shape (P, 2)."""
+        return np.stack([self.columns[key] for key in self.keys], axis=1)
+
+    @property
+    def errors(self) -> Array:
+        """Bounds on their errors, shape (P, 2); zero of one that was given."""
+        return np.stack([self.columns["error_1"], self.columns["error_2"]], axis=1)
+
+    @property
+    def tips(self) -> Array:
+        """The joint tip or the first rod's, shape (P, 3)."""
+        return np.stack([self.columns[name] for name in ("tip_x", "tip_y", "tip_z")], axis=1)
+
+    @property
+    def kinds(self) -> NDArray[np.str_]:
+        """``"fold"``, ``"branch-point"``, ``"cusp"`` or ``"crossing"``, shape (P,)."""
+        return self.columns["kind"]
+
+    @property
+    def indices(self) -> NDArray[np.int64]:
+        """The Morse index before and behind each point along the first number, shape (P, 2)."""
+        return np.stack([self.columns["index_before"], self.columns["index_behind"]], axis=1)
+
+    def __repr__(self) -> str:
+        return f"<Curve: {self.kind}, {len(self.kinds)} points, {self.ends[0]} and {self.ends[1]}>"
+
+
+class Boundary(Table):
+    """The points at which the stability of a leaf changes, followed through two numbers of its scenario as curves."""
+
+    name: str
+    """The name of the scenario."""
+    vary: tuple[str, str]
+    """The two numbers."""
+    complete: bool
+    """Whether there are curves, and all are known as far as was asked."""
+    remark: str | None
+    """Why not, if they are not."""
+    curves: list[Curve]
+    """The curves."""
+
+    def __init__(self, files: Contents, complete: bool, remark: str | None, lines: list[list[Array]]) -> None:
+        self._files = files
+        self.complete, self.remark = complete, remark
+        said = self.to_dict()
+        self.name, self.vary = said["scenario"], (said["vary"][0], said["vary"][1])
+        table = self.columns
+        self.curves = []
+        for number, (curve, places) in enumerate(zip(said["curves"], lines), start=1):
+            here = table["curve"] == number
+            rows = {name: column[here] for name, column in table.items()}
+            ends = (curve["ends"][0], curve["ends"][1])
+            self.curves.append(Curve(curve["kind"], curve["multiplicity"], ends, rows, places, self.vary))
+        if remark is None and not complete:
+            others = (f"curve {k} ends with {' and '.join(curve.ends)}" for k, curve in enumerate(self.curves, 1))
+            self.remark = f"not all is known: {'; '.join(others)}"
+
+    def plot(self, ax: Any = None, **style: Any) -> Any:
+        """Draw the curves with matplotlib, the first number to the right and the second upwards; dots where they are
+        cusps or cross."""
+        if ax is None:
+            from matplotlib import pyplot
+
+            ax = pyplot.figure().add_subplot()
+        for curve in self.curves:
+            first, second = curve.values.T
+            (line,) = ax.plot(first, second, **style)
+            special = np.isin(curve.kinds, ["cusp", "crossing"])
+            ax.plot(first[special], second[special], "o", color=line.get_color())
+        ax.set(xlabel=self.vary[0], ylabel=self.vary[1])
+        return ax
+
+    def __repr__(self) -> str:
+        count = len(self.curves)
+        ends = "complete" if self.complete else "not complete"
+        return f"<Boundary {self.name} over {self.vary[0]} and {self.vary[1]}: {count} curve{'s' * (count != 1)}, {ends}>"
 
 
 class Map(Table):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from typing import Any, overload
 
 from . import _leafdyn
 from ._leaf import Equilibrium
@@ -11,7 +11,7 @@ from ._motion import Frame, Motion, frame
 from ._progress import Progress, reporter
 from ._relax import warn
 from ._scenario import Scenario, Source, checked
-from ._study import Chart, Check, Map, Shapes, Trace
+from ._study import Boundary, Chart, Check, Map, Shapes, Trace
 
 
 def check(
@@ -26,6 +26,23 @@ def check(
     """Have a leaf confirmed by an independent method: its boundary-value problem is solved by shooting, and compared.
 
     Parameters are those of `relax`.
+
+    Returns
+    -------
+    Check
+        The verdict, and the positions of both solutions in the units of the scenario, shape (N, K + 1, 3).
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario is refused.
+    ValueError
+        If the request cannot be met.
+
+    Warns
+    -----
+    LeafWarning
+        Why there was nothing to compare.
 
     Examples
     --------
@@ -55,6 +72,18 @@ def all_shapes(
 
     Parameters are those of `relax`.
 
+    Returns
+    -------
+    Shapes
+        A sequence of `Equilibrium`, lowest energy first, and how many starts ended in each.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario is refused.
+    ValueError
+        If the request cannot be met.
+
     Examples
     --------
     >>> import leafdyn
@@ -69,6 +98,7 @@ def all_shapes(
     return Shapes(files, leaves, [starts for _, starts, _ in found], [plain for _, _, plain in found])
 
 
+@overload
 def trace(
     scenario: Source,
     vary: str,
@@ -81,36 +111,110 @@ def trace(
     points: int | None = None,
     cross_section: float | None = None,
     progress: Progress = None,
-) -> Trace:
-    """Follow an equilibrium through one number of its scenario: through folds, with its stability along the way.
+) -> Trace: ...
+
+
+@overload
+def trace(
+    scenario: Source,
+    vary: tuple[str, str] | list[str],
+    *,
+    set: Mapping[str, Any] | None = None,
+    switch: bool = False,
+    keep_unstable: bool = False,
+    segments: int | None = None,
+    tolerance: float | None = None,
+    points: int | None = None,
+    cross_section: float | None = None,
+    progress: Progress = None,
+) -> Boundary: ...
+
+
+def trace(
+    scenario: Source,
+    vary: str | tuple[str, str] | list[str],
+    *,
+    set: Mapping[str, Any] | None = None,
+    switch: bool = False,
+    keep_unstable: bool = False,
+    segments: int | None = None,
+    tolerance: float | None = None,
+    points: int | None = None,
+    cross_section: float | None = None,
+    progress: Progress = None,
+) -> Trace | Boundary:
+    """Follow an equilibrium through one number of its scenario: through folds, with its stability along the way. With
+    two numbers: follow the points at which its stability changes through both, as curves.
 
     Parameters
     ----------
     vary
-        ``"KEY=FROM..TO[:COUNT][log]"``, as in ``"load.gravity[2]=0..-4"``.
+        ``"KEY=FROM..TO[:COUNT][log]"``, as in ``"load.gravity[2]=0..-4"``; or a list of two.
     switch
         Also follow the branches that cross.
     points
-        Most points of a branch.
+        Most points of a branch, or of a curve to either side.
     cross_section
         Area of the leaf's cross-section: gives Young's modulus where a tip force varies.
 
     The others are those of `relax`.
 
+    Returns
+    -------
+    Trace
+        Of one number: the branches.
+    Boundary
+        Of two numbers: the curves.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario is refused.
+    ValueError
+        If the number cannot be followed, or the request cannot be met.
+
+    Warns
+    -----
+    LeafWarning
+        If not all is known as far as was asked: why.
+
     Examples
     --------
     >>> import leafdyn
+    >>> import numpy as np
     >>> trace = leafdyn.trace("scenarios/classic/cantilever_tip.toml", "load.tip_force[2]=0..-2")
     >>> trace.complete, bool(trace.branches[0].stable.all())
     (True, True)
+
+    Euler's column, at which bending stiffness does which force buckle it?
+
+    >>> column = {
+    ...     "name": "column",
+    ...     "leaf": {"rods": 1, "length": 1.0, "fan": [0.0]},
+    ...     "stiffness": {"torsion": 1.0, "bending_2": 1.0, "bending_3": 9.0, "axial": "inf", "shear_2": "inf", "shear_3": "inf"},
+    ... }
+    >>> found = leafdyn.trace(column, ["load.tip_force[0]=-1..-6", "stiffness.bending_2=0.5..2:3"])
+    >>> curve = found.curves[0]
+    >>> bool(abs(curve.values[:, 0] / curve.values[:, 1] / (-np.pi**2 / 4) - 1).max() < 1e-5)
+    True
     """
     leaf = checked(scenario, set)
+    asked = {
+        "switch": switch,
+        "keep_unstable": keep_unstable,
+        "segments": segments,
+        "tolerance": tolerance,
+        "points": points,
+        "cross_section": cross_section,
+    }
+    found: Trace | Boundary
     with reporter(progress) as heard:
-        found = Trace(
-            *_leafdyn.trace(
-                leaf._core, vary, switch, keep_unstable, segments, tolerance, points, cross_section, heard
-            )
-        )
+        if isinstance(vary, str):
+            found = Trace(*_leafdyn.trace(leaf._core, vary, asked, heard))
+        else:
+            if len(vary) != 2:
+                raise ValueError(f"vary has {len(vary)} numbers: give one as a text, or a list of two")
+            found = Boundary(*_leafdyn.boundary(leaf._core, vary[0], vary[1], asked, heard))
     warn(found.name, found.remark)
     return found
 
@@ -140,6 +244,19 @@ def map(
         What the figure shows: ``"outcomes"`` or ``"waves"``.
 
     The others are those of `relax`. A map shared among machines: ``leafdyn map --shard``.
+
+    Returns
+    -------
+    Map
+        Its ``columns``, by their names, have a row for each cell and method, as ``map.csv``: values in the units of the
+        scenario, ``outcome``, ``seconds``, ``tip_x`` and so on.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario is refused.
+    ValueError
+        If the request cannot be met.
 
     Examples
     --------
@@ -178,6 +295,33 @@ def chart(
         Also measure time against the number of rods, at the tolerance: ``[5, 15, 35]``.
 
     The others are those of `relax`.
+
+    Returns
+    -------
+    Chart
+        Its ``columns``, by their names, have a row for each method and setting, as ``chart.csv``: seconds, and errors
+        in the units of the scenario.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario is refused.
+    ValueError
+        If the request cannot be met.
+
+    Warns
+    -----
+    LeafWarning
+        What is to be said of the measurement.
+
+    Examples
+    --------
+    >>> import leafdyn
+    >>> found = leafdyn.chart(
+    ...     "scenarios/classic/fan_2.toml", seconds=0.1, methods=["semi-implicit"]
+    ... )
+    >>> found.confirmed, bool((found.columns["seconds"] > 0).any())
+    (True, True)
     """
     leaf = checked(scenario, set)
     words = None if methods is None else list(methods)
@@ -214,6 +358,23 @@ def simulate(
 
     The others are those of `relax`.
 
+    Returns
+    -------
+    Motion
+        Arrays whose first axis is time, in the units of the scenario: ``positions`` of shape (T, N, M + 1, 3).
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario is refused.
+    ValueError
+        If the request cannot be met.
+
+    Warns
+    -----
+    LeafWarning
+        Why it ended early.
+
     Examples
     --------
     >>> import leafdyn
@@ -240,6 +401,23 @@ def frames(
     tolerance: float | None = None,
 ) -> Iterator[Frame]:
     """Follow a leaf as it moves, an output at a time, so that memory does not grow. Parameters are those of `simulate`.
+
+    Returns
+    -------
+    iterator of Frame
+        The outputs, that of time 0 first: ``positions`` of shape (N, M + 1, 3), in the units of the scenario.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario is refused.
+    ValueError
+        If the request cannot be met.
+
+    Warns
+    -----
+    LeafWarning
+        Behind the last output: why it ended early.
 
     Examples
     --------

@@ -40,8 +40,8 @@ pub fn boundary(
     let ends = [vary, across].map(|it| [it.values[0], it.values[it.values.len() - 1]]);
     let base = &request.trace.base;
     let make = |[first, second]: [f64; 2]| -> Result<Scenario, String> {
-        let again = base.again(&[(&vary.keys, first), (&across.keys, second)]);
-        again.map_err(|refused| refused.to_string())
+        let at = base.at(&[(&vary.keys, first), (&across.keys, second)]);
+        Ok(at.map_err(|refused| refused.to_string())?.scenario)
     };
     for second in ends[1] {
         base.at(&[(&vary.keys, ends[0][0]), (&across.keys, second)])?;

@@ -29,6 +29,8 @@ pub struct Cell<'a> {
     knobs: Knobs,
     tolerance: f64,
     limit: Duration,
+    /// When all cells give up.
+    all: &'a Limit,
     /// The default's answer and its seconds: the start of shooting from rest.
     relaxed: (Found, f64),
     reference: Option<Answer>,
@@ -38,10 +40,15 @@ pub struct Cell<'a> {
 impl<'a> Cell<'a> {
     /// Finds the reference: the relaxed leaf, and the solution of the
     /// boundary-value problem near it.
-    pub fn new(varied: &'a Varied, tolerance: Option<f64>, limit: Duration) -> Self {
+    pub fn new(
+        varied: &'a Varied,
+        tolerance: Option<f64>,
+        limit: Duration,
+        all: &'a Limit,
+    ) -> Self {
         let scenario = &varied.scenario;
         let tolerance = tolerance.unwrap_or(scenario.tolerance);
-        let relaxed = within(limit, |limit| {
+        let relaxed = within(limit, all, |limit| {
             relaxed(scenario, Method::default(), tolerance, limit)
         });
         let mut cell = Cell {
@@ -49,12 +56,13 @@ impl<'a> Cell<'a> {
             knobs: varied.knobs,
             tolerance,
             limit,
+            all,
             relaxed,
             reference: None,
             confidence: Confidence::None,
         };
         let sharp = (SHARPER * tolerance).max(SHARPEST);
-        let (shot, _) = within(limit, |limit| cell.shoot_from_rest(sharp, limit));
+        let (shot, _) = within(limit, all, |limit| cell.shoot_from_rest(sharp, limit));
         if let Ok(relaxed) = &cell.relaxed.0 {
             let (confidence, reference) = confirm(relaxed, shot.ok());
             (cell.confidence, cell.reference) = (confidence, Some(reference));
@@ -123,7 +131,7 @@ impl<'a> Cell<'a> {
             );
             return (Err((MapOutcome::OutOfTime, why)), 0.0);
         }
-        within(self.limit, |limit| match method {
+        within(self.limit, self.all, |limit| match method {
             MapMethod::ExplicitMotion => motion::answer(scenario, self.knobs, tolerance, limit),
             MapMethod::ToRest(method) => match method {
                 Method::SingleShooting => self.shoot(Start::Arcs, tolerance, Some(1), limit),
@@ -228,7 +236,7 @@ impl<'a> Cell<'a> {
 
     /// Whether the equilibrium near an answer is not the reference.
     fn is_elsewhere(&self, answer: &Answer, reference: &Answer, distance: f64) -> bool {
-        let (near, _) = within(self.limit, |limit| {
+        let (near, _) = within(self.limit, self.all, |limit| {
             self.shoot(answer.as_start(), self.tolerance, None, limit)
         });
         match near {
@@ -242,8 +250,12 @@ impl<'a> Cell<'a> {
 
 /// Lets a method run, told when to give up; returns also the seconds it took.
 /// What takes longer than it may is out of time, whatever it found.
-fn within(limit: Duration, run: impl FnOnce(&Limit) -> Found) -> (Found, f64) {
-    let (found, seconds) = timed(|| run(&Limit::at(Instant::now() + limit)));
+fn within(limit: Duration, all: &Limit, run: impl FnOnce(&Limit) -> Found) -> (Found, f64) {
+    let until = Limit {
+        deadline: Some(Instant::now() + limit),
+        ..all.clone()
+    };
+    let (found, seconds) = timed(|| run(&until));
     let limit = limit.as_secs_f64();
     match seconds > limit {
         true => {

@@ -7,6 +7,7 @@ use serde::{Serialize, Serializer};
 use super::cell::{Cell, one_line};
 use super::motion;
 use super::row::{MapMethod, MapRow};
+use crate::limit::Limit;
 use crate::memory::Request;
 use crate::relax::check_tolerance;
 use crate::study::vary::{Base, Keys, Knob, Vary, VaryError};
@@ -30,6 +31,8 @@ pub struct MapRequest {
     pub tolerance: Option<f64>,
     /// Seconds allowed for each method in each cell.
     pub cell_seconds: f64,
+    /// When a cell that is not finished gives up, if somebody says so.
+    pub limit: Limit,
 }
 
 /// A map that cannot be made: why, in a sentence.
@@ -101,6 +104,7 @@ impl MapRequest {
             methods,
             tolerance,
             cell_seconds,
+            limit: Limit::default(),
         };
         request.check_entries()?;
         Ok(request)
@@ -170,7 +174,7 @@ impl MapRequest {
             }
         };
         let limit = Duration::from_secs_f64(self.cell_seconds);
-        let solved = Cell::new(&varied, self.tolerance, limit);
+        let solved = Cell::new(&varied, self.tolerance, limit, &self.limit);
         (methods.iter().map(|&method| solved.row(cell, method))).collect()
     }
 }

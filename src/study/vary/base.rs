@@ -2,10 +2,8 @@
 
 use std::path::Path;
 
-use toml::Value;
-
 use super::{Keys, Knob, Knobs, Target, VaryError};
-use crate::scenario::{self, Form, Key, Scenario, number_at, resolve, value_at, with_overrides};
+use crate::scenario::{self, Entries, Form, Key, Part, Scenario, Value, resolve, with_overrides};
 
 /// A scenario as text, with some entries replaced: what numbers are put into.
 #[derive(Clone, Debug)]
@@ -15,6 +13,8 @@ pub struct Base {
     overrides: Vec<String>,
     knobs: Knobs,
     scenario: Scenario,
+    /// What text and overrides say; none where numbers are larger than values can be.
+    entries: Option<Entries>,
 }
 
 /// A scenario and the settings of methods at one point.
@@ -54,6 +54,7 @@ impl Base {
         }
         let scenario = Scenario::from_toml_with(&text, &file, &of_scenario)?;
         Ok(Base {
+            entries: Entries::of_text(&text).and_then(|all| all.replaced(&of_scenario)),
             text,
             file,
             overrides: of_scenario,
@@ -86,7 +87,7 @@ impl Base {
     /// keys.
     pub fn number(&self, keys: &Keys) -> Option<f64> {
         let mut numbers = keys.targets().iter().map(|target| match target {
-            Target::Entry(part) => number_at(&self.text, &self.overrides, *part),
+            Target::Entry(part) => self.entries.as_ref()?.number_at(*part),
             Target::Knob(_) => None,
         });
         let first = numbers.next()??;
@@ -103,29 +104,15 @@ impl Base {
             Target::Entry(part) => Some(format!("{part}={}", target.text(value))),
             Target::Knob(_) => None,
         });
+        let entries: Vec<String> = entries.collect();
+        let overrides = self.overrides.iter().chain(&entries).cloned().collect();
         Ok(Base {
-            overrides: self.overrides.iter().cloned().chain(entries).collect(),
+            entries: (self.entries.as_ref()).and_then(|all| all.replaced(&entries)),
+            overrides,
             knobs,
             scenario,
             ..self.clone()
         })
-    }
-
-    /// The scenario with values of which some were put in by [`Base::at`] before: that
-    /// the entries are there is not looked at again.
-    ///
-    /// # Errors
-    /// If it is refused.
-    pub(in crate::study) fn again(&self, values: &[(&Keys, f64)]) -> Result<Scenario, VaryError> {
-        let mut overrides = self.overrides.clone();
-        for (keys, value) in values {
-            for &target in keys.targets() {
-                overrides.push(format!("{target}={}", target.text(*value)));
-            }
-        }
-        Ok(Scenario::from_toml_with(
-            &self.text, &self.file, &overrides,
-        )?)
     }
 
     /// The scenario with these values.
@@ -141,6 +128,9 @@ impl Base {
                 }
             }
         }
+        if let Some(scenario) = self.changed(values) {
+            return Ok(Varied { scenario, knobs });
+        }
         let overrides = self.overriding(values);
         // A part that is not there is not there at any value, unless rods are added.
         let mut targets = values.iter().flat_map(|(keys, _)| keys.targets());
@@ -152,6 +142,20 @@ impl Base {
             scenario: Scenario::from_toml_with(&self.text, &self.file, &overrides)?,
             knobs,
         })
+    }
+
+    /// The scenario with these values, made of the entries without reading the text again;
+    /// none where it is refused, which the text explains.
+    pub(super) fn changed(&self, values: &[(&Keys, f64)]) -> Option<Scenario> {
+        let mut entries = self.entries.clone()?;
+        for (keys, value) in values {
+            for &target in keys.targets() {
+                if let Target::Entry(part) = target {
+                    entries.set(part, target.value(*value)?)?;
+                }
+            }
+        }
+        entries.scenario()
     }
 
     /// All overrides, those that make these values among them.
@@ -187,15 +191,15 @@ impl Base {
                     "where knots are cannot change by a little: the grids have nodes there",
                 );
             }
-            let Some(entry) = value_at(&self.text, &self.overrides, part) else {
+            let Some(entry) = self.entry(part) else {
                 return refuse(
                     "is not in the scenario: write it there first; indices count from 0",
                 );
             };
             let value = match entry {
                 _ if part.scale => Some(1.0),
-                Value::Float(value) => Some(value),
-                Value::Integer(value) => Some(value as f64),
+                Value::Float(value) => Some(*value),
+                Value::Integer(value) => Some(*value as f64),
                 _ => None,
             };
             match value {
@@ -210,13 +214,17 @@ impl Base {
         found.ok_or_else(|| VaryError::Key(format!("{keys}: no number")))
     }
 
+    fn entry(&self, part: Part) -> Option<&Value> {
+        self.entries.as_ref()?.value_at(part)
+    }
+
     /// The same keys, or one of each entry if they are a list or a profile.
     pub(crate) fn entries_of(&self, keys: &Keys) -> Vec<Keys> {
         let [Target::Entry(part)] = keys.targets() else {
             return vec![keys.clone()];
         };
-        match value_at(&self.text, &self.overrides, *part) {
-            Some(value) => (part.numbers(&value).into_iter())
+        match self.entry(*part) {
+            Some(value) => (part.numbers(value).into_iter())
                 .map(|part| Keys(vec![Target::Entry(part)]))
                 .collect(),
             None => vec![keys.clone()],

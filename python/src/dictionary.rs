@@ -1,0 +1,258 @@
+//! Dictionaries as scenarios: their entries, and the text that these would be.
+
+use std::fmt::{self, Write};
+
+use leafdyn::scenario::{Entries, Value};
+use pyo3::exceptions::PyOverflowError;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple, PyType};
+
+use crate::errors::refuse_entry;
+
+static MAPPING: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+
+/// How deep lists and tables may stand in each other: none of a scenario stands deeper.
+const DEEPEST: usize = 8;
+
+/// A key and its value.
+type Entry<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
+
+/// Entries of a table, in the order of the dictionary.
+type Table = Vec<(String, Value)>;
+
+/// A dictionary: what stands outside of tables, and the tables.
+pub struct Document {
+    top: Table,
+    tables: Vec<(String, Table)>,
+}
+
+impl Document {
+    /// Reads it. What no scenario can hold is refused.
+    pub fn read(scenario: &Bound<PyAny>) -> PyResult<Document> {
+        let (mut top, mut tables) = (Table::new(), Vec::new());
+        for (key, entry) in entries(scenario)? {
+            let key = name(&key, "")?;
+            if is_mapping(&entry)? {
+                let mut table = Table::new();
+                for (inner, entry) in entries(&entry)? {
+                    let inner = name(&inner, &key)?;
+                    let value = value(&entry, Path(&key, &inner), 0)?;
+                    table.push((inner, value));
+                }
+                tables.push((key, table));
+            } else {
+                let value = value(&entry, Path("", &key), 0)?;
+                top.push((key, value));
+            }
+        }
+        Ok(Document { top, tables })
+    }
+
+    /// Its entries; none if one has no key, which the text of it all explains.
+    pub fn entries(&self) -> Option<Entries> {
+        let mut entries = Entries::default();
+        let top = self.top.iter().map(|entry| ("", entry));
+        let tables = self.tables.iter();
+        let inner =
+            tables.flat_map(|(table, entries)| entries.iter().map(|it| (table.as_str(), it)));
+        for (table, (name, value)) in top.chain(inner) {
+            if !entries.insert(table, name, value.clone()) {
+                return None;
+            }
+        }
+        let mut tables = self.tables.iter();
+        tables
+            .all(|(table, _)| Entries::has_table(table))
+            .then_some(entries)
+    }
+
+    /// Its text: tables after what stands outside of them, an entry a line.
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        let lines = |text: &mut String, table: &Table| {
+            for (key, value) in table {
+                let _ = writeln!(text, "{} = {}", quoted_key(key), Written(value));
+            }
+        };
+        lines(&mut text, &self.top);
+        for (key, table) in &self.tables {
+            let _ = writeln!(text, "[{}]", quoted_key(key));
+            lines(&mut text, table);
+        }
+        text
+    }
+}
+
+/// Replaced entries as the program takes them: `KEY=VALUE`.
+#[pyfunction]
+pub fn overrides(entries: &Bound<PyAny>) -> PyResult<Vec<String>> {
+    let mut texts = Vec::new();
+    for (key, new) in self::entries(entries)? {
+        let key = name(&key, "")?;
+        let new = value(&new, Path("", &key), 0)?;
+        texts.push(format!("{key}={}", Written(&new)));
+    }
+    Ok(texts)
+}
+
+/// Keys and values.
+fn entries<'py>(mapping: &Bound<'py, PyAny>) -> PyResult<Vec<Entry<'py>>> {
+    match mapping.cast::<PyDict>() {
+        Ok(dict) => Ok(dict.iter().collect()),
+        Err(_) => {
+            let items = mapping.call_method0("items")?;
+            items.try_iter()?.map(|entry| entry?.extract()).collect()
+        }
+    }
+}
+
+/// Whether something is a mapping. An exception while it is asked, Ctrl-C above all, is not
+/// an answer, as it is where PyO3 asks.
+fn is_mapping(found: &Bound<PyAny>) -> PyResult<bool> {
+    if found.is_instance_of::<PyDict>() {
+        return Ok(true);
+    }
+    let simple = found.is_instance_of::<PyString>()
+        || found.is_instance_of::<PyFloat>()
+        || found.is_instance_of::<PyInt>()
+        || found.is_instance_of::<PyList>();
+    if simple {
+        return Ok(false);
+    }
+    found.is_instance(MAPPING.import(found.py(), "collections.abc", "Mapping")?)
+}
+
+fn name(key: &Bound<PyAny>, table: &str) -> PyResult<String> {
+    match key.cast::<PyString>() {
+        Ok(key) => Ok(key.to_cow()?.into_owned()),
+        Err(_) => Err(refuse_entry(key, table, "keys are texts")),
+    }
+}
+
+/// Where an entry stands: its table, empty at the top, and its key.
+#[derive(Clone, Copy)]
+struct Path<'a>(&'a str, &'a str);
+
+impl Path<'_> {
+    fn refuse(self, entry: &Bound<PyAny>, allowed: &str) -> PyErr {
+        refuse_entry(entry, &self.to_string(), allowed)
+    }
+
+    fn is_stiffness(self) -> bool {
+        self.0 == "stiffness" || self.1.starts_with("stiffness.")
+    }
+}
+
+impl fmt::Display for Path<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Path("", key) => f.write_str(key),
+            Path(table, key) => write!(f, "{table}.{key}"),
+        }
+    }
+}
+
+/// Numbers keep every digit. What has `tolist`, as arrays and numbers of numpy do, is that list.
+fn value(entry: &Bound<PyAny>, path: Path, depth: usize) -> PyResult<Value> {
+    if depth > DEEPEST {
+        return Err(path.refuse(entry, "lists stand too deep in each other"));
+    }
+    if let Ok(number) = entry.cast::<PyFloat>() {
+        Ok(Value::Float(number.extract()?))
+    } else if let Ok(yes) = entry.cast::<PyBool>() {
+        Ok(Value::Boolean(yes.is_true()))
+    } else if entry.is_instance_of::<PyInt>() {
+        whole(entry, path)
+    } else if let Ok(words) = entry.cast::<PyString>() {
+        Ok(match &*words.to_cow()? {
+            // As results have it in JSON, which knows no infinity.
+            "inf" if path.is_stiffness() => Value::Float(f64::INFINITY),
+            words => Value::String(words.into()),
+        })
+    } else if entry.is_instance_of::<PyList>() || entry.is_instance_of::<PyTuple>() {
+        let items = entry.try_iter()?;
+        let values = items.map(|item| value(&item?, path, depth + 1));
+        Ok(Value::Array(values.collect::<PyResult<_>>()?))
+    } else if let Ok(table) = entry.cast::<PyDict>() {
+        let values = table.iter().map(|(key, item)| {
+            let key = name(&key, &path.to_string())?;
+            let value = value(&item, path, depth + 1)?;
+            Ok((key, value))
+        });
+        Ok(Value::Table(values.collect::<PyResult<_>>()?))
+    } else if entry.hasattr("tolist")? {
+        value(&entry.call_method0("tolist")?, path, depth + 1)
+    } else {
+        let allowed = "allowed are numbers, texts, true or false, lists, arrays and dicts";
+        Err(path.refuse(entry, allowed))
+    }
+}
+
+/// A whole number, or one that is so large that only its first digits count.
+fn whole(entry: &Bound<PyAny>, path: Path) -> PyResult<Value> {
+    if let Ok(number) = entry.extract::<i64>() {
+        return Ok(Value::Integer(number));
+    }
+    match entry.extract::<f64>() {
+        Ok(number) => Ok(Value::Float(number)),
+        Err(error) if error.is_instance_of::<PyOverflowError>(entry.py()) => {
+            let why = "is not a number a computer can hold (the largest is 1.8e308)";
+            Err(path.refuse(entry, why))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// A value as TOML. Numbers keep every digit, and are as short as they can be.
+struct Written<'a>(&'a Value);
+
+impl fmt::Display for Written<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self.0 {
+            Value::Float(number) if number.is_nan() => f.write_str("nan"),
+            Value::Float(number) => write!(f, "{number:?}"),
+            Value::String(words) => f.write_str(&quoted(words)),
+            Value::Array(list) => {
+                f.write_char('[')?;
+                for (at, item) in list.iter().enumerate() {
+                    let comma = if at > 0 { ", " } else { "" };
+                    write!(f, "{comma}{}", Written(item))?;
+                }
+                f.write_char(']')
+            }
+            Value::Table(table) => {
+                f.write_char('{')?;
+                for (at, (key, item)) in table.iter().enumerate() {
+                    let comma = if at > 0 { "," } else { "" };
+                    write!(f, "{comma} {} = {}", quoted_key(key), Written(item))?;
+                }
+                f.write_str(" }")
+            }
+            value => value.fmt(f),
+        }
+    }
+}
+
+fn quoted_key(key: &str) -> String {
+    let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    match !key.is_empty() && key.chars().all(bare) {
+        true => key.into(),
+        false => quoted(key),
+    }
+}
+
+fn quoted(text: &str) -> String {
+    let mut quoted = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => quoted.extend(['\\', c]),
+            c if c.is_control() => {
+                let _ = write!(quoted, "\\u{:04X}", c as u32);
+            }
+            c => quoted.push(c),
+        }
+    }
+    quoted.push('"');
+    quoted
+}
