@@ -129,6 +129,14 @@ pub fn eigenvalue(
     quotient / masses::mass(leaf, physics, state, shape) * physics.time.powi(-2)
 }
 
+/// What a search has come to.
+enum Searched {
+    /// More eigenvalues than were allowed are below the shift.
+    BelowMany,
+    /// The bound on those that may be left, as of [`Lanczos::run`].
+    UpTo(Option<f64>),
+}
+
 impl Vibration<'_> {
     /// K - shift M.
     fn factorize(&mut self, shift: f64) -> Option<SparseFactor<'_>> {
@@ -144,7 +152,7 @@ impl Vibration<'_> {
         loop {
             let sought = (wanted, f64::INFINITY);
             let searched = self.search((shift, Some(0)), sought, 0, found).ok()?;
-            if let Some(bound) = searched {
+            if let Searched::UpTo(bound) = searched {
                 return Some((shift, bound));
             }
             shift = (NEXT_SHIFT * shift).min(-FIRST_SHIFT);
@@ -167,7 +175,10 @@ impl Vibration<'_> {
         for search in 0..SEARCHES + count {
             if search > 0 {
                 let sought = (wanted, limit);
-                bound = (self.search((shift, None), sought, search, &mut found)).ok()??;
+                let searched = self.search((shift, None), sought, search, &mut found);
+                if let Searched::UpTo(next) = searched.ok()? {
+                    bound = next;
+                }
             }
             if found.len() < count {
                 wanted = count - found.len();
@@ -218,21 +229,21 @@ impl Vibration<'_> {
     }
 
     /// Adds to the eigenvalues found `wanted` more of those next above the
-    /// shift, fewer if there are no more below a limit; see [`Lanczos::run`]. `None` if
-    /// more eigenvalues than so many are below the shift.
+    /// shift, fewer if there are no more below a limit; see [`Lanczos::run`]. Nothing is
+    /// searched if more eigenvalues than so many are below the shift.
     fn search(
         &mut self,
         (shift, most_below): (f64, Option<usize>),
         (wanted, limit): (usize, f64),
         search: usize,
         found: &mut Vec<Mode>,
-    ) -> Result<Option<Option<f64>>, SparseError> {
+    ) -> Result<Searched, SparseError> {
         let start = self.start(search);
         self.leaf.assemble(self.state, &mut self.system);
         self.masses.add(&mut self.system, -shift);
         let mut factor = self.pattern.factorize(&self.system, 0.0)?;
         if most_below.is_some_and(|most| factor.negative() > most) {
-            return Ok(None);
+            return Ok(Searched::BelowMany);
         }
         let mut lanczos = Lanczos {
             masses: &self.masses,
@@ -243,7 +254,7 @@ impl Vibration<'_> {
         let (more, bound) = lanczos.run(start, wanted, limit);
         found.extend(more);
         found.sort_by(|a, b| a.eigenvalue.total_cmp(&b.eigenvalue));
-        Ok(Some(bound))
+        Ok(Searched::UpTo(bound))
     }
 
     /// A load without any symmetry, another one in every search.
