@@ -8,7 +8,7 @@ mod series;
 
 use self::nearby::clamp_moment_rates;
 pub(crate) use self::nearby::eigenvalue_rate;
-pub(crate) use self::response::responses;
+pub(crate) use self::response::Linearized;
 use self::series::Series;
 use crate::leaf::{DiscreteLeaf, Forces, LeafRate, Response, shift, turn};
 use crate::modes;
@@ -181,7 +181,8 @@ impl Grid<'_> {
     /// The squared frequencies, and the changes with each number.
     fn changes(&self, known: &[Known], rates: &[LeafRate]) -> Option<(Vec<f64>, Vec<Changes>)> {
         let (leaf, state) = (&self.level.leaf, &self.level.state);
-        let forces: Vec<Forces> = rates.iter().map(|rate| leaf.rate(state, rate)).collect();
+        let mut linear = Linearized::new(self.level, self.tolerance);
+        let forces = linear.forces(self.level, rates);
         let moment = leaf.tip_moment();
         // A dead moment has no potential, and the matrix no real modes.
         let physics = Physics::new(&leaf.leaf);
@@ -195,9 +196,9 @@ impl Grid<'_> {
         let eigenvalues = modes.iter().map(squared).collect();
         let held = leaf.leaf.held.is_some();
         if forces.len() > EACH && modes.is_empty() && moment == DVec3::ZERO && !held {
-            return Some((eigenvalues, self.of_tips(&forces)?));
+            return Some((eigenvalues, self.of_tips(&mut linear, &forces)?));
         }
-        let responses = responses(self.level, &forces, self.tolerance)?;
+        let responses = linear.answers(self.level, &forces)?;
         let each = known.iter().zip(rates).zip(forces.iter().zip(&responses));
         let changes = each.map(|(((_, number, _), rate), (forces, response))| {
             let change = (rate, response);
@@ -253,11 +254,11 @@ impl Grid<'_> {
 
     /// Changes of the tips and of the energy alone, by one solution for each component
     /// of a tip.
-    fn of_tips(&self, forces: &[Forces]) -> Option<Vec<Changes>> {
-        let (leaf, state) = (&self.level.leaf, &self.level.state);
-        let units = unit_forces(leaf, self.tips().len());
-        let adjoint = responses(self.level, &units, self.tolerance)?;
-        let component = |forces: &Forces, k: usize| leaf.work(state, forces, &adjoint[k]);
+    fn of_tips(&self, linear: &mut Linearized, forces: &[Forces]) -> Option<Vec<Changes>> {
+        let units = unit_forces(&self.level.leaf, self.tips().len());
+        let adjoint = linear.answers(self.level, &units)?;
+        let linear = &*linear;
+        let component = |forces: &Forces, k: usize| linear.work(self.level, forces, &adjoint[k]);
         let tip = |forces: &Forces, tip: usize| {
             DVec3::from_array([0, 1, 2].map(|axis| component(forces, 3 * tip + axis)))
         };
@@ -273,17 +274,12 @@ impl Grid<'_> {
 }
 
 /// A unit force on every tip along every axis.
-fn unit_forces(leaf: &DiscreteLeaf, tips: usize) -> Vec<Forces> {
+pub(crate) fn unit_forces(leaf: &DiscreteLeaf, tips: usize) -> Vec<Forces> {
     let n = leaf.segments();
     let force = |(tip, axis): (usize, usize)| {
-        let mut nodes = vec![vec![[0.0; 6]; n]; leaf.rods()];
-        nodes[tip][n - 1][3 + axis] = 1.0;
-        Forces {
-            nodes,
-            gaps: vec![DVec3::ZERO; leaf.rods() * n],
-            energy: 0.0,
-            tips: Vec::new(),
-        }
+        let mut unit = Forces::none(leaf.rods());
+        unit.on_nodes(tip, n)[n - 1][3 + axis] = 1.0;
+        unit
     };
     let all = (0..tips).flat_map(|tip| (0..3).map(move |axis| (tip, axis)));
     all.map(force).collect()
