@@ -13,7 +13,7 @@ use super::vein::Vein;
 use crate::leaf::{LeafRate, Response, shift};
 use crate::modes;
 use crate::motion::Physics;
-use crate::relax::{AtRest, Level, Lost, Number, eigenvalue_rate, extrapolation, unit_forces};
+use crate::relax::{AtRest, Level, Lost, Nearby, Number, extrapolation, unit_forces};
 use crate::scenario::Scenario;
 use crate::study::Keys;
 
@@ -294,10 +294,13 @@ impl CaseAt {
                 self.at.best(force)[axis] * self.force()
             }
             Quantity::Frequency(mode) => {
+                let scenarios = number.nearby().unwrap_or_default();
                 let of = |k: usize| {
                     let shape = &self.modes[k][mode - 1].shape;
                     let (level, answer) = (&self.at.levels[k], &answers[k]);
-                    eigenvalue_rate(level, number, (rate, answer), shape).unwrap_or(0.0)
+                    let forces = modes::mode_forces(&level.leaf, &level.state, shape);
+                    let near = Nearby::new(level, &scenarios, (rate, answer));
+                    near.eigenvalue_rate(shape, &forces)
                 };
                 // omega^2 = (2 pi f)^2.
                 let frequency = self.result(quantity);
