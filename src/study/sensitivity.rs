@@ -41,10 +41,14 @@ pub fn relax_with_sensitivities(
     check_tolerance(tolerance)?;
     let values = keys.iter().map(|keys| base.value(keys));
     let values = values.collect::<Result<Vec<f64>, _>>()?;
-    let made: Vec<_> = keys
-        .iter()
-        .map(|keys| {
-            move |value: f64| -> Option<Scenario> { Some(base.at(&[(keys, value)]).ok()?.scenario) }
+    let made: Vec<_> = (keys.iter().zip(&values))
+        .map(|(keys, &own)| {
+            move |value: f64| -> Option<Scenario> {
+                match value == own {
+                    true => Some(scenario.clone()),
+                    false => base.again(&[(keys, value)]).ok(),
+                }
+            }
         })
         .collect();
     let numbers: Vec<(String, Number)> = (keys.iter().zip(&values).zip(&made))

@@ -168,3 +168,26 @@ pub(crate) fn moved(level: &Level, rate: &LeafRate, response: &Response, step: f
     debug_assert_eq!(state.segments(), leaf.segments());
     state
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::relax::{Options, relax_on_grids};
+    use crate::scenario::Scenario;
+
+    /// A derivative costs one solution on a grid, and none a factorisation of its own.
+    #[test]
+    fn a_number_costs_one_solution_on_a_grid() {
+        let text = include_str!("../../../scenarios/paper/fig04.toml");
+        let scenario = Scenario::from_toml(text).unwrap();
+        let (_, levels) =
+            relax_on_grids(&scenario, &Options::default(), 1e-6, &mut |_| {}).unwrap();
+        for level in &levels {
+            let mut linear = Linearized::new(level, 1e-6);
+            let units = super::super::unit_forces(&level.leaf, 1);
+            let loads: Vec<Forces> = units.iter().cycle().take(10).cloned().collect();
+            assert_eq!(linear.answers(level, &loads).unwrap().len(), 10);
+            assert_eq!((linear.solves, linear.factorizations), (10, 1));
+        }
+    }
+}
