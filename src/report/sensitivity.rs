@@ -26,7 +26,7 @@ struct Row<'s> {
 /// for these.
 pub fn table(leaf: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
     let all = leaf.sensitivities.iter().flatten();
-    write_csv(&all.flat_map(rows).collect::<Vec<_>>(), out)
+    write_csv(all.flat_map(rows), out)
 }
 
 fn rows(of: &Sensitivity) -> Vec<Row<'_>> {

@@ -110,20 +110,7 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result
     if let Some(tolerance) = request.tolerance {
         check_tolerance(tolerance)?;
     }
-    let free = expanded(request)?;
-    let coordinates = free.iter().map(|free| Coordinate::new(base, free));
-    let coordinates = coordinates.collect::<Result<Vec<_>, _>>()?;
-    for (k, one) in coordinates.iter().enumerate() {
-        if coordinates[..k]
-            .iter()
-            .any(|other| other.keys.overlaps(&one.keys))
-        {
-            let keys = &one.keys;
-            return Err(FitError::Free(format!(
-                "{keys}: is free twice: leave one out"
-            )));
-        }
-    }
+    let coordinates = coordinates(request)?;
     let options = Options {
         tolerance: request.tolerance,
         limit: request.limit.clone(),
@@ -138,21 +125,7 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result
         .components()
         .filter(|component| !component.free)
         .count();
-    if coordinates.is_empty() || coordinates.len() > count {
-        let free = coordinates.len();
-        return Err(FitError::Free(match free {
-            0 => "no number is free: name at least one".into(),
-            _ => format!(
-                "{free} numbers are free, and there are {count} data: free fewer, or measure more"
-            ),
-        }));
-    }
-    if !known && coordinates.len() == count {
-        return Err(FitError::Free(format!(
-            "{count} numbers are free, and there are as many data, whose standard deviations are not \
-             known: nothing is left to tell them: add columns sd_tip_x, ..., free fewer, or measure more"
-        )));
-    }
+    check_count(coordinates.len(), count, known)?;
     let weighing = Weighing {
         assumed,
         robust: request.robust,
@@ -217,6 +190,45 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result
     }
     found.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(found)
+}
+
+/// The coordinates of the free numbers, none of which is another's.
+fn coordinates(request: &FitRequest) -> Result<Vec<Coordinate>, FitError> {
+    let base = &request.base;
+    let free = expanded(request)?;
+    let coordinates = free.iter().map(|free| Coordinate::new(base, free));
+    let coordinates = coordinates.collect::<Result<Vec<_>, _>>()?;
+    for (k, one) in coordinates.iter().enumerate() {
+        if coordinates[..k]
+            .iter()
+            .any(|other| other.keys.overlaps(&one.keys))
+        {
+            let keys = &one.keys;
+            return Err(FitError::Free(format!(
+                "{keys}: is free twice: leave one out"
+            )));
+        }
+    }
+    Ok(coordinates)
+}
+
+/// Whether there are data enough.
+fn check_count(free: usize, count: usize, known: bool) -> Result<(), FitError> {
+    if free == 0 || free > count {
+        return Err(FitError::Free(match free {
+            0 => "no number is free: name at least one".into(),
+            _ => format!(
+                "{free} numbers are free, and there are {count} data: free fewer, or measure more"
+            ),
+        }));
+    }
+    if !known && free == count {
+        return Err(FitError::Free(format!(
+            "{count} numbers are free, and there are as many data, whose standard deviations are not \
+             known: nothing is left to tell them: add columns sd_tip_x, ..., free fewer, or measure more"
+        )));
+    }
+    Ok(())
 }
 
 /// The free numbers, with every entry of a list or a profile in its place.

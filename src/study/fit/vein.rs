@@ -86,7 +86,7 @@ impl<'a> Vein<'a> {
             if step.abs() < EXACT {
                 return (sigma, x);
             }
-            if !inside && !(base || tip) || !step.is_finite() {
+            if !(inside || base || tip) || !step.is_finite() {
                 break;
             }
             if base || tip {
