@@ -154,9 +154,8 @@ fn along(a: f64, b: f64) -> Built {
 /// One vein says nothing of another that it neither meets nor is coupled to.
 fn other_vein(a: f64, b: f64) -> Built {
     Built {
-        text: format!(
-            "name = \"two\"\nleaf = {{ rods = 2, length = 1.0, fan = [-0.3, 0.3], joined = false }}\nstiffness = {{ torsion = 1.0, bending_2 = [1.0, 1.0], bending_3 = 1.0, axial = 40.0, shear_2 = 30.0, shear_3 = 30.0 }}\nload = {{ gravity = [0.0, 0.0, -2.0] }}\n"
-        ),
+        text: "name = \"two\"\nleaf = { rods = 2, length = 1.0, fan = [-0.3, 0.3], joined = false }\nstiffness = { torsion = 1.0, bending_2 = [1.0, 1.0], bending_3 = 1.0, axial = 40.0, shear_2 = 30.0, shear_3 = 30.0 }\nload = { gravity = [0.0, 0.0, -2.0] }\n"
+            .into(),
         truth: vec![format!("stiffness.bending_2=[{a:?}, {b:?}]")],
         traced: (1, everywhere()),
         free: vec!["stiffness.bending_2"],
