@@ -91,6 +91,9 @@ impl Relax {
         let equilibrium = self.solve(job)?;
         let equilibrium = equilibrium.at_stations(&job.scenario, job.selection.stations);
         job.remark(equilibrium.remark.as_ref());
+        for doubt in &equilibrium.doubts {
+            job.remark(Some(doubt));
+        }
         let success = equilibrium.outcome.is_success();
         job.deliver(&equilibrium, success, |files| {
             report::relax_report(&equilibrium, files)

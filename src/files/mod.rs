@@ -43,6 +43,7 @@ impl Written for Equilibrium {
         &Table("modes.csv", report::modes_table),
         &Picture::svg("modes.svg", figure::modes),
         &Picture::png("modes.png", figure::modes),
+        &Table("sensitivity.csv", report::sensitivity_table),
         &Picture::svg("sensitivity.svg", |it, _| figure::sensitivity(it)),
         &Picture::png("sensitivity.png", |it, _| figure::sensitivity(it)),
     ];

@@ -1,5 +1,6 @@
 //! A scenario in dimensionless form.
 
+use super::state::State;
 use crate::rod::Section;
 use crate::rotation;
 use crate::scenario::{Clamp, Dynamics, Profile, Rod, Scale, Scenario};
@@ -150,6 +151,20 @@ impl Leaf {
     /// Fractions of the length where some profile has a kink, ascending.
     pub fn kinks(&self) -> &[f64] {
         &self.kinks
+    }
+
+    /// Puts the tips where they are held, if they are.
+    pub fn hold_tips(&self, state: &mut State) {
+        let Some(held) = &self.held else {
+            return;
+        };
+        for j in 0..self.rods() {
+            let tip = state.base(j) + state.segments();
+            state.x[tip] = held.position;
+            if let Some(rotation) = held.rotation(j) {
+                state.q[tip] = rotation;
+            }
+        }
     }
 
     /// Length of rod `j`.

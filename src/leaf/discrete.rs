@@ -184,16 +184,7 @@ impl DiscreteLeaf {
 
     /// Puts the tips where they are held, if they are.
     pub fn hold_tips(&self, state: &mut State) {
-        let Some(held) = &self.leaf.held else {
-            return;
-        };
-        for j in 0..self.rods() {
-            let tip = state.base(j) + self.segments();
-            state.x[tip] = held.position;
-            if let Some(rotation) = held.rotation(j) {
-                state.q[tip] = rotation;
-            }
-        }
+        self.leaf.hold_tips(state);
     }
 
     /// The force that the holder of a held tip feels, and the moments of the rods

@@ -302,6 +302,10 @@ pub struct Equilibrium {
     /// What would help, when the run did not succeed: one sentence for the user.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,
+    /// What about it can hardly be meant: a leaf that is stretched far, turned through
+    /// itself, or longer than any can be by its own numbers.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<String>,
     /// Number of rods.
     #[serde(rename = "rods")]
     pub rod_count: usize,

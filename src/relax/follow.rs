@@ -1,7 +1,7 @@
 //! An equilibrium followed as its scenario changes a little, on the same grids, and
 //! never into another valley.
 
-use crate::leaf::{DiscreteLeaf, Leaf, Response, State};
+use crate::leaf::{Leaf, Response, State};
 use crate::newton::{Stop, Work};
 use crate::relax::options::{Options, Progress, RelaxError};
 use crate::relax::richardson::Richardson;
@@ -11,6 +11,7 @@ use crate::relax::stencil::Stencil;
 use crate::relax::{Equilibrium, Outcome};
 use crate::scenario::Scenario;
 use glam::DVec3;
+use std::sync::Arc;
 
 /// How far from where it was expected an equilibrium may be: of the way that was
 /// expected, and in lengths of the leaf. Farther away it may be another one.
@@ -86,16 +87,17 @@ impl AtRest {
         nested.then(|| AtRest::on(levels.to_vec(), self.work))
     }
 
-    /// The equilibrium of a scenario that differs a little: from this one, moved along
-    /// these responses times these steps.
+    /// The equilibrium of a scenario that differs a little: from this one, moved as it
+    /// answers the difference on each grid.
     pub fn follow(
         &self,
-        scenario: &Scenario,
-        responses: &[Vec<Response>],
-        steps: &[f64],
+        scenario: Arc<Scenario>,
+        answer: &[Response],
         (options, grids): (&Options, Grids),
     ) -> Result<AtRest, Lost> {
-        let leaf = Leaf::new(scenario);
+        let scale = scenario.scale();
+        let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
+        let leaf = Leaf::in_units(scenario, scale);
         // The grid between two others is found again if it is needed.
         let nested = |level: &&Level| {
             let first = self.levels[0].leaf.segments();
@@ -105,18 +107,12 @@ impl AtRest {
         let guesses: Vec<_> = (self.levels.iter().enumerate())
             .filter(|(_, level)| nested(level))
             .map(|(k, level)| {
-                let moves = responses
-                    .iter()
-                    .zip(steps)
-                    .map(|(on, step)| (&on[k], *step));
-                let grid = level.leaf.grid.clone();
-                let mut state = moved(level, &leaf, moves);
-                DiscreteLeaf::new(&leaf, grid.clone()).hold_tips(&mut state);
-                (grid, state)
+                let mut state = moved(level, &leaf, &answer[k]);
+                leaf.hold_tips(&mut state);
+                (level.leaf.grid.clone(), state)
             })
             .collect();
         let expected: Vec<State> = guesses.iter().map(|(_, state)| state.clone()).collect();
-        let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
         let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
         let mut run = Run::new(&leaf, options, tolerance, ignored);
         // As of a reduced leaf: it gives up where the leaf would have to move far.
@@ -133,7 +129,7 @@ impl AtRest {
             Err(_) => return Err(Lost::Elsewhere),
         }
         for ((level, expected), before) in run.levels.iter().zip(&expected).zip(&self.levels) {
-            let way = rescaled(before, &leaf).shift_to(expected);
+            let way = rescaled(before, before.state.clone(), &leaf).shift_to(expected);
             if level.state.shift_to(expected) > OFF_THE_WAY * way + NEARBY {
                 return Err(Lost::Elsewhere);
             }
@@ -179,11 +175,10 @@ pub(crate) fn extrapolation(segments: &[usize], columns: usize) -> Vec<f64> {
     (0..segments.len()).map(weight).collect()
 }
 
-/// The state of a level in the units of another leaf, whose bases hold it.
-fn rescaled(level: &Level, leaf: &Leaf) -> State {
+/// A state of a level in the units of another leaf, whose bases hold it.
+fn rescaled(level: &Level, mut state: State, leaf: &Leaf) -> State {
     let (from, to) = (level.leaf.leaf.scale, leaf.scale);
     let (length, force) = (from.length / to.length, from.force() / to.force());
-    let mut state = level.state.clone();
     state.x.iter_mut().for_each(|x| *x *= length);
     state.n.iter_mut().for_each(|n| *n *= force);
     for j in 0..leaf.rods() {
@@ -193,34 +188,16 @@ fn rescaled(level: &Level, leaf: &Leaf) -> State {
     state
 }
 
-fn moved<'r>(
-    level: &Level,
-    leaf: &Leaf,
-    moves: impl Iterator<Item = (&'r Response, f64)>,
-) -> State {
-    let mut sum: Vec<Vec<[f64; 6]>> =
-        vec![vec![[0.0; 6]; level.leaf.segments()]; level.leaf.rods()];
-    let mut carried = vec![DVec3::ZERO; level.state.n.len()];
-    for (response, step) in moves {
-        let increments = sum.iter_mut().flatten().flatten();
-        for (sum, value) in increments.zip(response.nodes.iter().flatten().flatten()) {
-            *sum += step * value;
-        }
-        for (sum, value) in carried.iter_mut().zip(&response.carried) {
-            *sum += step * *value;
-        }
-    }
-    let mut start = Level {
-        leaf: level.leaf.clone(),
-        state: level.state.clone(),
-    };
-    for (j, rod) in sum.iter().enumerate() {
-        let base = start.state.base(j);
+/// A state moved along an answer, in the units of another leaf.
+fn moved(level: &Level, leaf: &Leaf, answer: &Response) -> State {
+    let mut state = level.state.clone();
+    for (j, rod) in answer.nodes.iter().enumerate() {
+        let base = state.base(j);
         for (i, increment) in rod.iter().enumerate() {
-            start.state.advance(base + i + 1, increment, 1.0);
+            state.advance(base + i + 1, increment, 1.0);
         }
     }
-    let forces = start.state.n.iter_mut().zip(carried);
-    forces.for_each(|(force, change)| *force += change);
-    rescaled(&start, leaf)
+    let forces = state.n.iter_mut().zip(&answer.carried);
+    forces.for_each(|(force, change)| *force += *change);
+    rescaled(level, state, leaf)
 }

@@ -13,6 +13,7 @@ mod modes;
 mod number;
 mod options;
 mod place;
+mod plausible;
 pub(crate) mod prolong;
 mod request;
 mod result;
@@ -45,12 +46,14 @@ pub use options::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
     check_tolerance,
 };
+pub(crate) use plausible::doubts;
 pub use request::Relaxation;
 pub(crate) use run::Level;
 pub(crate) use saddle::polish;
 pub(crate) use segments::check_segments;
-pub(crate) use sensitivity::{eigenvalue_rate, responses, sensitivities};
+pub(crate) use sensitivity::{Linearized, Nearby, sensitivities, unit_forces};
 pub(crate) use shape::node as node_state;
 pub use solve::relax;
 pub(crate) use solve::relax_on_grids;
 pub(crate) use start::start;
+pub(crate) use stencil::Stencil;

@@ -1,6 +1,7 @@
 //! A number of a scenario, and how the scenario changes with it.
 
 use crate::scenario::Scenario;
+use std::sync::Arc;
 
 /// Step by which a scenario is differenced with a number in which it is linear, as
 /// a part of the number: large, as only rounding makes an error.
@@ -79,7 +80,9 @@ impl Number<'_> {
 
     /// Scenarios nearby, with their offsets and the weights by which a function of
     /// them is differenced.
-    pub fn nearby(&self) -> Option<Vec<(f64, f64, Scenario)>> {
-        self.by(SMALL * self.size(), &[&CENTRAL, &ONE_SIDED])
+    pub fn nearby(&self) -> Option<Vec<(f64, f64, Arc<Scenario>)>> {
+        let found = self.by(SMALL * self.size(), &[&CENTRAL, &ONE_SIDED])?;
+        let shared = |(offset, weight, scenario)| (offset, weight, Arc::new(scenario));
+        Some(found.into_iter().map(shared).collect())
     }
 }

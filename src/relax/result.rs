@@ -52,6 +52,7 @@ pub fn equilibrium(
         method: run.options.method,
         outcome,
         remark,
+        doubts: Vec::new(),
         rod_count: rods.len(),
         energy: Some(energies.column(columns)[0] * scale.moment()),
         tips: tips.map(|node| node.position).collect(),

@@ -8,6 +8,7 @@ use crate::relax::method::Method;
 use crate::relax::methods::{explicit, shooting};
 use crate::relax::modes;
 use crate::relax::options::{MOST_MODES, Options, Progress, RelaxError, check_tolerance};
+use crate::relax::plausible;
 use crate::relax::result;
 use crate::relax::run::{BUDGET, Level, Run};
 use crate::relax::segments::{check_segments, least, reducible};
@@ -32,7 +33,9 @@ pub fn relax(
     }
     let intervals = match options.method {
         Method::SemiImplicit(_) | Method::Explicit { .. } => {
-            return Ok(relax_on_grids(scenario, options, tolerance, progress)?.0);
+            let (mut found, _) = relax_on_grids(scenario, options, tolerance, progress)?;
+            found.doubts = plausible::doubts(scenario, &found);
+            return Ok(found);
         }
         Method::SingleShooting => Some(1),
         Method::Shooting { intervals } | Method::ShootingFromRest { intervals } => intervals,
@@ -44,9 +47,9 @@ pub fn relax(
             return Err(RelaxError::HeldTip { found });
         }
         let arcs = Start::Arcs;
-        return Ok(shooting::shoot(
-            scenario, options, intervals, tolerance, arcs,
-        ));
+        let mut found = shooting::shoot(scenario, options, intervals, tolerance, arcs);
+        found.doubts = plausible::doubts(scenario, &found);
+        return Ok(found);
     }
     let rest = Options {
         method: Method::default(),
@@ -55,9 +58,9 @@ pub fn relax(
         ..options.clone()
     };
     let rest = relax(scenario, &rest, progress)?;
-    Ok(shooting::from_rest(
-        scenario, options, intervals, tolerance, rest,
-    ))
+    let mut found = shooting::from_rest(scenario, options, intervals, tolerance, rest);
+    found.doubts = plausible::doubts(scenario, &found);
+    Ok(found)
 }
 
 /// The coarsest and the finest grid on which a leaf that did not come to rest is

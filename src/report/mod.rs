@@ -16,6 +16,7 @@ pub mod numbers;
 mod relax;
 #[cfg(test)]
 pub mod sample;
+mod sensitivity;
 mod simulate;
 pub mod table;
 mod trace;
@@ -39,6 +40,7 @@ pub use fit::{fitted, report as fit_report, table as fit_table};
 pub use map::{Told as MapTold, report as map_report};
 pub use map_table::{lines, map_table, read_rows, table};
 pub use relax::{lines as relax_lines, report as relax_report};
+pub use sensitivity::table as sensitivity_table;
 pub use simulate::{lines as simulate_lines, report as simulate_report};
 pub use trace::{lines as trace_lines, report as trace_report};
 pub use trace_table::trace_table;

@@ -58,6 +58,7 @@ pub fn lines(equilibrium: &Equilibrium, files: Option<String>) -> Lines {
     lines.push(("work", work(equilibrium)));
     lines.extend(files.map(|files| ("written", files)));
     lines.extend((equilibrium.remark.iter()).map(|remark| ("remark", remark.clone())));
+    lines.extend(under("doubtful", equilibrium.doubts.clone()));
     lines
 }
 

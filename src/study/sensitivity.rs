@@ -2,7 +2,7 @@
 
 use super::{Base, Keys, VaryError};
 use crate::relax::{
-    Equilibrium, Number, Options, Progress, RelaxError, check_tolerance, relax_on_grids,
+    Equilibrium, Number, Options, Progress, RelaxError, check_tolerance, doubts, relax_on_grids,
     sensitivities,
 };
 use crate::scenario::Scenario;
@@ -41,10 +41,14 @@ pub fn relax_with_sensitivities(
     check_tolerance(tolerance)?;
     let values = keys.iter().map(|keys| base.value(keys));
     let values = values.collect::<Result<Vec<f64>, _>>()?;
-    let made: Vec<_> = keys
-        .iter()
-        .map(|keys| {
-            move |value: f64| -> Option<Scenario> { Some(base.at(&[(keys, value)]).ok()?.scenario) }
+    let made: Vec<_> = (keys.iter().zip(&values))
+        .map(|(keys, &own)| {
+            move |value: f64| -> Option<Scenario> {
+                match value == own {
+                    true => Some(scenario.clone()),
+                    false => Some(base.at(&[(keys, value)]).ok()?.scenario),
+                }
+            }
         })
         .collect();
     let numbers: Vec<(String, Number)> = (keys.iter().zip(&values).zip(&made))
@@ -60,6 +64,7 @@ pub fn relax_with_sensitivities(
         .collect();
     let (mut leaf, levels) = relax_on_grids(scenario, options, tolerance, progress)?;
     let at_rest = leaf.accuracy.residual.is_some() && leaf.outcome.is_at_rest();
+    leaf.doubts = doubts(scenario, &leaf);
     leaf.sensitivities = Some(match at_rest {
         true => sensitivities(&levels, &numbers, tolerance, options.modes),
         false => Vec::new(),

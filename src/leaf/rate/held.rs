@@ -4,7 +4,7 @@ use super::{Forces, LeafRate, Response, add};
 use crate::leaf::dimensionless::Leaf;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::State;
-use crate::rod::Section;
+use crate::rod::{Section, Segment};
 use crate::scenario::{Clamp, Scenario};
 use glam::{DQuat, DVec3};
 
@@ -53,19 +53,25 @@ impl HeldRate {
 
 impl DiscreteLeaf {
     /// Holders that move, and turn.
-    pub(super) fn move_tips(&self, state: &State, rate: &HeldRate, forces: &mut Forces) {
+    pub(super) fn move_tips(
+        &self,
+        state: &State,
+        segments: &[Segment],
+        rate: &HeldRate,
+        forces: &mut Forces,
+    ) {
         let n = self.segments();
         let moved = rate.shift;
         for j in 0..self.rods() {
             let turned = rate.turns.get(j).copied().unwrap_or(DVec3::ZERO);
             let section = self.section(j, n - 1);
-            let segment = self.segment(state, j, n - 1, state.n[j * n + n - 1]);
+            let segment = &segments[j * n + n - 1];
             let bare = Section {
                 condensing: DVec3::ZERO,
                 ..*section
             };
             let k = segment.hessian(&bare);
-            let nodes = &mut forces.nodes[j];
+            let nodes = forces.on_nodes(j, n);
             if n > 1 {
                 let moment = k.ab * turned + k.xa.transpose() * moved;
                 add(&mut nodes[n - 2], -moment, k.xx * moved + k.xb * turned);
@@ -73,7 +79,7 @@ impl DiscreteLeaf {
             // A tip that is only pinned turns freely.
             let moment = k.bb * turned + k.xb.transpose() * moved;
             add(&mut nodes[n - 1], -moment, DVec3::ZERO);
-            forces.gaps[j * n + n - 1] +=
+            forces.on_gaps(j, n)[n - 1] +=
                 segment.gap_increment(section, moved, DVec3::ZERO, turned);
             let (g_x, _, g_b) = segment.gradient(section);
             let load = self.load(state, j, n).0;

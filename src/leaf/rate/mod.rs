@@ -2,14 +2,15 @@
 //! state, and of its energy. Exact but for the combination of scenarios by which
 //! the number's effect on the scenario itself is given.
 
+mod forces;
 mod held;
 
+pub use self::forces::{Forces, Response};
 use self::held::HeldRate;
 use super::dimensionless::Leaf;
 use super::discrete::DiscreteLeaf;
-use super::state::{Field, Increment, State};
-use crate::rod::{Section, SectionRate};
-use crate::rotation;
+use super::state::{Field, State};
+use crate::rod::{Section, SectionRate, Segment};
 use crate::scenario::{Profile, Scenario};
 use glam::DVec3;
 
@@ -24,14 +25,9 @@ pub struct LeafRate<'s> {
     held: Option<HeldRate>,
 }
 
-/// How a leaf answers forces.
-#[derive(Clone, Debug)]
-pub struct Response {
-    /// Increments of the nodes.
-    pub nodes: Field,
-    /// Of the spatial forces of the segments, rod after rod.
-    pub carried: Vec<DVec3>,
-}
+/// A gap that is left of one this many times larger is none: of a segment whose force
+/// is condensed out with its own stiffness.
+const CLOSED: f64 = 1e-12;
 
 /// The change of a rod, in the leaf's units.
 struct RodRate<'s> {
@@ -48,19 +44,6 @@ enum Slope<'s> {
     None,
     Constant(f64),
     Along(Vec<(f64, &'s Profile)>),
-}
-
-/// What a change of the leaf does in a state that is held.
-#[derive(Clone, Debug)]
-pub struct Forces {
-    /// To the unbalanced forces on the nodes.
-    pub nodes: Field,
-    /// To the gaps of the segments, rod after rod.
-    pub gaps: Vec<DVec3>,
-    /// To the energy.
-    pub energy: f64,
-    /// What it moves the tips by where they are held; none where it does not.
-    pub tips: Vec<Increment>,
 }
 
 impl<'s> Slope<'s> {
@@ -181,35 +164,45 @@ impl RodRate<'_> {
 }
 
 impl DiscreteLeaf {
-    /// What a change of the leaf (all of its rods, in space) does in a state.
-    pub fn rate(&self, state: &State, rate: &LeafRate) -> Forces {
+    /// All segments in a state, rod after rod: what its changes have in common.
+    pub fn all_segments(&self, state: &State) -> Vec<Segment> {
         let n = self.segments();
-        let mut forces = Forces {
-            nodes: vec![vec![[0.0; 6]; n]; self.rods()],
-            gaps: vec![DVec3::ZERO; self.rods() * n],
-            energy: 0.0,
-            tips: Vec::new(),
-        };
+        let each = self.each(0..n);
+        each.map(|(j, i)| self.segment(state, j, i, state.n[j * n + i]))
+            .collect()
+    }
+
+    /// What a change of the leaf (all of its rods, in space) does in a state with these
+    /// segments.
+    pub fn rate(&self, state: &State, segments: &[Segment], rate: &LeafRate) -> Forces {
+        let mut forces = Forces::none(self.rods());
+        let of_all = rate.gravity != DVec3::ZERO || rate.tip_force != DVec3::ZERO;
+        let of_all = of_all || rate.tip_moment != DVec3::ZERO;
         for (j, rod) in rate.rods.iter().enumerate() {
             if !rod.keeps_sections() {
-                self.change_sections(state, j, rod, &mut forces);
+                self.change_sections(segments, j, rod, &mut forces);
             }
-            self.change_loads(state, j, rate, &mut forces);
+            let coupling = rate.coupling.get(j).is_some_and(|gap| *gap != DVec3::ZERO);
+            if of_all || coupling || rod.length != 0.0 {
+                self.change_loads(state, j, rate, &mut forces);
+            }
             if rod.angle != 0.0 {
-                self.turn_base(state, j, rod.angle, &mut forces);
+                self.turn_base(segments, j, rod.angle, &mut forces);
             }
         }
         if let Some(held) = &rate.held {
-            self.move_tips(state, held, &mut forces);
+            self.move_tips(state, segments, held, &mut forces);
         }
         forces
     }
 
-    fn change_sections(&self, state: &State, j: usize, rod: &RodRate, forces: &mut Forces) {
+    fn change_sections(&self, segments: &[Segment], j: usize, rod: &RodRate, forces: &mut Forces) {
         let n = self.segments();
+        forces.on_nodes(j, n);
+        forces.on_gaps(j, n);
         for i in 0..n {
             let section = self.section(j, i);
-            let segment = self.segment(state, j, i, state.n[j * n + i]);
+            let segment = &segments[j * n + i];
             let change = rod.section(section, self.grid.middle(i), self.grid.width(i));
             let change = segment.rate(section, &change);
             let [left, right] = change.gradient;
@@ -218,7 +211,7 @@ impl DiscreteLeaf {
                 add(&mut nodes[i - 1], -left, DVec3::ZERO);
             }
             add(&mut nodes[i], -right, DVec3::ZERO);
-            forces.gaps[j * n + i] += change.gap;
+            forces.gaps[j][i] += change.gap;
             forces.energy += change.energy;
         }
     }
@@ -229,6 +222,10 @@ impl DiscreteLeaf {
         let rod = &rate.rods[j];
         let gravity = self.loads.gravity * rod.length + rate.gravity * self.leaf.length(j);
         let ends_here = j == 0 || !self.leaf.joined();
+        forces.on_nodes(j, n);
+        if rate.coupling.get(j).is_some_and(|gap| *gap != DVec3::ZERO) {
+            forces.on_nodes(j + 1, n);
+        }
         for i in 1..=n {
             let x = state.x[state.base(j) + i];
             let mut force = gravity * (self.load_factor * self.grid.weight(i));
@@ -236,7 +233,8 @@ impl DiscreteLeaf {
                 force += self.load_factor * rate.tip_force;
             }
             forces.energy -= force.dot(x);
-            if j + 1 < self.rods() && !(self.leaf.joined() && i == n) {
+            let coupled = rate.coupling.get(j).is_some_and(|gap| *gap != DVec3::ZERO);
+            if coupled && !(self.leaf.joined() && i == n) {
                 let stretch = state.x[state.base(j + 1) + i] - x;
                 let pull = rate.coupling[j] * self.grid.weight(i) * stretch;
                 forces.energy += 0.5 * pull.dot(stretch);
@@ -252,37 +250,38 @@ impl DiscreteLeaf {
     }
 
     /// A base turned about the normal of the fan.
-    fn turn_base(&self, state: &State, j: usize, angle: f64, forces: &mut Forces) {
+    fn turn_base(&self, segments: &[Segment], j: usize, angle: f64, forces: &mut Forces) {
         let n = self.segments();
         let (section, turn) = (self.section(j, 0), angle * DVec3::Z);
-        let segment = self.segment(state, j, 0, state.n[j * n]);
+        let segment = &segments[j * n];
         let bare = Section {
             condensing: DVec3::ZERO,
             ..*section
         };
         let k = segment.hessian(&bare);
         add(
-            &mut forces.nodes[j][0],
+            &mut forces.on_nodes(j, n)[0],
             -(k.ab.transpose() * turn),
             -(k.xa * turn),
         );
-        forces.gaps[j * n] += segment.gap_increment(section, DVec3::ZERO, turn, DVec3::ZERO);
+        forces.on_gaps(j, n)[0] += segment.gap_increment(section, DVec3::ZERO, turn, DVec3::ZERO);
         forces.energy += segment.gradient(section).1.dot(turn);
     }
 
     /// The work of forces on a response to others: by symmetry also that of the
     /// others on the response to these.
-    pub fn work(&self, state: &State, forces: &Forces, response: &Response) -> f64 {
+    pub fn work(&self, segments: &[Segment], forces: &Forces, response: &Response) -> f64 {
         let n = self.segments();
         let mut work = 0.0;
-        for (j, i) in self.each(0..n) {
-            let pairs = forces.nodes[j][i].iter().zip(&response.nodes[j][i]);
-            work += pairs.map(|(force, shift)| force * shift).sum::<f64>();
-            let gap = forces.gaps[j * n + i];
-            if gap != DVec3::ZERO {
-                let k = state.base(j) + i;
-                let frame = rotation::midpoint(state.q[k], state.q[k + 1]);
-                work -= response.carried[j * n + i].dot(frame * gap);
+        for (forces, response) in forces.nodes.iter().zip(&response.nodes) {
+            for (force, shift) in forces.iter().zip(response) {
+                let pairs = force.iter().zip(shift);
+                work += pairs.map(|(force, shift)| force * shift).sum::<f64>();
+            }
+        }
+        for (j, gaps) in forces.gaps.iter().enumerate() {
+            for (i, gap) in gaps.iter().enumerate() {
+                work -= response.carried[j * n + i].dot(segments[j * n + i].frame * *gap);
             }
         }
         work
@@ -290,14 +289,14 @@ impl DiscreteLeaf {
 
     /// Adds to forces on the nodes what changes of the gaps come to when the forces
     /// of the segments are condensed out.
-    pub fn condense_gaps(&self, state: &State, gaps: &[DVec3], nodes: &mut Field) {
+    pub fn condense_gaps(&self, segments: &[Segment], gaps: &[DVec3], nodes: &mut Field) {
         let n = self.segments();
         for (j, i) in self.each(0..n) {
             let gap = gaps[j * n + i];
             if gap == DVec3::ZERO {
                 continue;
             }
-            let segment = self.segment(state, j, i, state.n[j * n + i]);
+            let segment = &segments[j * n + i];
             let (g_x, g_a, g_b) = segment.gap_gradient(self.section(j, i), gap);
             if i > 0 {
                 add(&mut nodes[j][i - 1], -g_a, g_x);
@@ -321,7 +320,7 @@ impl DiscreteLeaf {
     /// stiffness that condenses the forces out falls short of the segments' own.
     pub fn carried(
         &self,
-        state: &State,
+        segments: &[Segment],
         increments: &Field,
         gaps: &mut [DVec3],
         carried: &mut [DVec3],
@@ -333,10 +332,12 @@ impl DiscreteLeaf {
                 let k = j * n + i;
                 let (b, dx1) = (super::turn(increment), super::shift(increment));
                 let section = self.section(j, i);
-                let segment = self.segment(state, j, i, state.n[k]);
+                let segment = &segments[k];
                 let gap = gaps[k] + segment.gap_increment(section, dx1 - dx0, a, b);
                 carried[k] += segment.frame * (section.condensing * gap / section.ds);
-                gaps[k] = gap * (DVec3::ONE - section.compliance * section.condensing);
+                let left = DVec3::ONE - section.compliance * section.condensing;
+                let none = left.cmplt(DVec3::splat(CLOSED));
+                gaps[k] = gap * DVec3::select(none, DVec3::ZERO, left);
                 (a, dx0) = (b, dx1);
             }
         }

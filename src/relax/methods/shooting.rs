@@ -124,6 +124,7 @@ pub fn shoot(
         method: options.method,
         outcome,
         remark,
+        doubts: Vec::new(),
         rod_count: rods.len(),
         energy,
         tips: tips.iter().take(listed).map(|node| node.position).collect(),

@@ -6,9 +6,8 @@ mod nearby;
 mod response;
 mod series;
 
-use self::nearby::clamp_moment_rates;
-pub(crate) use self::nearby::eigenvalue_rate;
-pub(crate) use self::response::responses;
+pub(crate) use self::nearby::Nearby;
+pub(crate) use self::response::Linearized;
 use self::series::Series;
 use crate::leaf::{DiscreteLeaf, Forces, LeafRate, Response, shift, turn};
 use crate::modes;
@@ -18,6 +17,7 @@ use crate::relax::number::Number;
 use crate::relax::run::Level;
 use crate::scenario::Scenario;
 use glam::DVec3;
+use std::sync::Arc;
 
 /// Numbers up to which the equations are solved for each, and everything is known
 /// of it; of more of them for each component of the tip.
@@ -32,8 +32,14 @@ const SOFTENED_COMPLIANCE: f64 = 1e-6;
 /// first.
 const FEW_UNKNOWNS: usize = 4_000;
 
-/// A number by its name, and the change of the scenario with it.
-type Known<'n, 'a> = (&'n String, &'n Number<'a>, Vec<(f64, Scenario)>);
+/// A number by its name, the change of the scenario with it, and scenarios nearby, if these
+/// are needed.
+type Known<'n, 'a> = (
+    &'n String,
+    &'n Number<'a>,
+    Vec<(f64, Scenario)>,
+    Vec<(f64, f64, Arc<Scenario>)>,
+);
 
 /// Changes on one grid, in the leaf's units.
 struct Changes {
@@ -58,11 +64,16 @@ pub(crate) fn sensitivities(
         return Vec::new();
     };
     let leaf = &finest.leaf.leaf;
+    let clamped = (leaf.held.as_ref()).is_some_and(|held| held.clamps.is_some());
+    let differences = modes > 0 || clamped;
     let known: Vec<Known> = (numbers.iter())
-        .filter_map(|(key, number)| Some((key, number, number.rate()?)))
+        .filter_map(|(key, number)| {
+            let near = if differences { number.nearby() } else { None };
+            Some((key, number, number.rate()?, near.unwrap_or_default()))
+        })
         .collect();
     let rates: Vec<LeafRate> = (known.iter())
-        .map(|(_, _, terms)| LeafRate::new(leaf, terms))
+        .map(|(_, _, terms, _)| LeafRate::new(leaf, terms))
         .collect();
     let mut found: Vec<[Series; 5]> = (rates.iter())
         .map(|_| [(); 5].map(|()| Series::new()))
@@ -120,7 +131,7 @@ struct Context<'l> {
 }
 
 impl Context<'_> {
-    fn sensitivity(&self, (key, number, _): &Known, series: [Series; 5]) -> Sensitivity {
+    fn sensitivity(&self, (key, number, ..): &Known, series: [Series; 5]) -> Sensitivity {
         let leaf = &self.levels[1].leaf.leaf;
         let scale = leaf.scale;
         let [tips, energy, eigenvalues, reaction, positions] =
@@ -181,7 +192,8 @@ impl Grid<'_> {
     /// The squared frequencies, and the changes with each number.
     fn changes(&self, known: &[Known], rates: &[LeafRate]) -> Option<(Vec<f64>, Vec<Changes>)> {
         let (leaf, state) = (&self.level.leaf, &self.level.state);
-        let forces: Vec<Forces> = rates.iter().map(|rate| leaf.rate(state, rate)).collect();
+        let mut linear = Linearized::new(self.level, self.tolerance);
+        let forces = linear.forces(self.level, rates);
         let moment = leaf.tip_moment();
         // A dead moment has no potential, and the matrix no real modes.
         let physics = Physics::new(&leaf.leaf);
@@ -195,17 +207,23 @@ impl Grid<'_> {
         let eigenvalues = modes.iter().map(squared).collect();
         let held = leaf.leaf.held.is_some();
         if forces.len() > EACH && modes.is_empty() && moment == DVec3::ZERO && !held {
-            return Some((eigenvalues, self.of_tips(&forces)?));
+            return Some((eigenvalues, self.of_tips(&mut linear, &forces)?));
         }
-        let responses = responses(self.level, &forces, self.tolerance)?;
+        let responses = linear.answers(self.level, &forces)?;
         let each = known.iter().zip(rates).zip(forces.iter().zip(&responses));
-        let changes = each.map(|(((_, number, _), rate), (forces, response))| {
+        let of_modes: Vec<_> = (modes.iter())
+            .map(|mode| modes::mode_forces(leaf, state, &mode.shape))
+            .collect();
+        let changes = each.map(|(((_, _, _, near), rate), (forces, response))| {
             let change = (rate, response);
-            let eigenvalue = |mode: &modes::Eigenpair| {
-                let rate = eigenvalue_rate(self.level, number, change, &mode.shape);
-                rate.filter(|_| !change.0.changes_moment())
-            };
-            let of_modes: Option<Vec<f64>> = modes.iter().map(eigenvalue).collect();
+            let differences = !near.is_empty() && (held || !modes.is_empty());
+            let near = differences.then(|| Nearby::new(self.level, near, change));
+            let of_modes = (near.iter())
+                .filter(|_| !rate.changes_moment())
+                .flat_map(|near| {
+                    let both = modes.iter().zip(&of_modes);
+                    both.map(|(mode, forces)| near.eigenvalue_rate(&mode.shape, forces))
+                });
             // What a dead moment does is not balanced in the energy.
             let n = leaf.segments();
             let work = moment.dot(turn(&response.nodes[0][n - 1]));
@@ -215,9 +233,9 @@ impl Grid<'_> {
                     .map(|j| shift(&response.nodes[j][n - 1]))
                     .collect(),
                 energy: forces.energy + work,
-                eigenvalues: of_modes.unwrap_or_default(),
+                eigenvalues: of_modes.collect(),
                 reaction: match held {
-                    true => self.reaction(number, change),
+                    true => self.reaction(near.as_ref(), change),
                     false => Vec::new(),
                 },
                 positions: self.positions(response),
@@ -231,12 +249,15 @@ impl Grid<'_> {
         0..if leaf.leaf.joined() { 1 } else { leaf.rods() }
     }
 
-    fn reaction(&self, number: &Number, change: (&LeafRate, &Response)) -> Vec<DVec3> {
+    fn reaction(&self, near: Option<&Nearby>, change: (&LeafRate, &Response)) -> Vec<DVec3> {
         let leaf = &self.level.leaf;
         let mut all = vec![leaf.reaction_rate(change.0, change.1)];
         let clamped = (leaf.leaf.held.as_ref()).is_some_and(|held| held.clamps.is_some());
         if clamped {
-            all.extend(clamp_moment_rates(self.level, number, change).unwrap_or_default());
+            all.extend(
+                near.iter()
+                    .flat_map(|near| near.clamp_moment_rates(self.level)),
+            );
         }
         all
     }
@@ -253,11 +274,11 @@ impl Grid<'_> {
 
     /// Changes of the tips and of the energy alone, by one solution for each component
     /// of a tip.
-    fn of_tips(&self, forces: &[Forces]) -> Option<Vec<Changes>> {
-        let (leaf, state) = (&self.level.leaf, &self.level.state);
-        let units = unit_forces(leaf, self.tips().len());
-        let adjoint = responses(self.level, &units, self.tolerance)?;
-        let component = |forces: &Forces, k: usize| leaf.work(state, forces, &adjoint[k]);
+    fn of_tips(&self, linear: &mut Linearized, forces: &[Forces]) -> Option<Vec<Changes>> {
+        let units = unit_forces(&self.level.leaf, self.tips().len());
+        let adjoint = linear.answers(self.level, &units)?;
+        let linear = &*linear;
+        let component = |forces: &Forces, k: usize| linear.work(self.level, forces, &adjoint[k]);
         let tip = |forces: &Forces, tip: usize| {
             DVec3::from_array([0, 1, 2].map(|axis| component(forces, 3 * tip + axis)))
         };
@@ -273,17 +294,12 @@ impl Grid<'_> {
 }
 
 /// A unit force on every tip along every axis.
-fn unit_forces(leaf: &DiscreteLeaf, tips: usize) -> Vec<Forces> {
+pub(crate) fn unit_forces(leaf: &DiscreteLeaf, tips: usize) -> Vec<Forces> {
     let n = leaf.segments();
     let force = |(tip, axis): (usize, usize)| {
-        let mut nodes = vec![vec![[0.0; 6]; n]; leaf.rods()];
-        nodes[tip][n - 1][3 + axis] = 1.0;
-        Forces {
-            nodes,
-            gaps: vec![DVec3::ZERO; leaf.rods() * n],
-            energy: 0.0,
-            tips: Vec::new(),
-        }
+        let mut unit = Forces::none(leaf.rods());
+        unit.on_nodes(tip, n)[n - 1][3 + axis] = 1.0;
+        unit
     };
     let all = (0..tips).flat_map(|tip| (0..3).map(move |axis| (tip, axis)));
     all.map(force).collect()

@@ -5,6 +5,7 @@ use crate::leaf::{
     System,
 };
 use crate::relax::run::Level;
+use crate::rod::Segment;
 use crate::rotation;
 use glam::DVec3;
 
@@ -18,66 +19,122 @@ const BEST_SOLUTION: f64 = 1e-11;
 const CORRECTIONS: usize = 3;
 const CORRECTED: f64 = 1e-10;
 
-/// The answers of a settled leaf (all rods, in space) to forces. `None` where its
-/// matrix is singular.
-pub(crate) fn responses(level: &Level, loads: &[Forces], tolerance: f64) -> Option<Vec<Response>> {
-    let (leaf, state) = (&level.leaf, &level.state);
-    let accuracy = (SOLUTION * tolerance).clamp(BEST_SOLUTION, 1e-4);
-    let mut system = System::new(leaf);
-    leaf.assemble(state, &mut system);
-    let factorized = match leaf.tip_moment() == DVec3::ZERO {
-        true => system.factorize(0.0),
-        false => system.factorize_indefinite(),
-    };
-    if factorized {
-        let rods = |system: &mut System, rhs: &Field| {
-            system.set_rhs(rhs);
-            match system.solve(None, accuracy) {
-                Solved::Yes(_) => Some(system.solution()),
-                _ => None,
-            }
-        };
-        let found: Option<Vec<_>> = (loads.iter())
-            .map(|load| answer(leaf, state, load, &mut |rhs| rods(&mut system, rhs)))
-            .collect();
-        if found.is_some() {
-            return found;
-        }
+/// A settled leaf (all rods, in space) with its equations linearised and factorised, once
+/// for all that is asked of it.
+pub(crate) struct Linearized {
+    system: System,
+    segments: Vec<Segment>,
+    /// Relative accuracy of the conjugate gradients.
+    accuracy: f64,
+    /// Whether the matrix is factorised rod by rod; else it is solved directly.
+    factorized: bool,
+    /// Solutions so far.
+    pub solves: usize,
+    /// Factorisations so far.
+    pub factorizations: usize,
+}
+
+impl Linearized {
+    /// About the state of a level.
+    pub fn new(level: &Level, tolerance: f64) -> Linearized {
+        let (leaf, state) = (&level.leaf, &level.state);
+        let mut system = System::new(leaf);
         leaf.assemble(state, &mut system);
+        let factorized = match leaf.tip_moment() == DVec3::ZERO {
+            true => system.factorize(0.0),
+            false => system.factorize_indefinite(),
+        };
+        Linearized {
+            system,
+            segments: leaf.all_segments(state),
+            accuracy: (SOLUTION * tolerance).clamp(BEST_SOLUTION, 1e-4),
+            factorized,
+            solves: 0,
+            factorizations: 1,
+        }
     }
-    let pattern = SparsePattern::new(&system).ok()?;
-    let mut factor: SparseFactor = pattern.factorize(&system, 0.0).ok()?;
-    let mut direct = |rhs: &Field| Some(factor.solve_bordered(rhs, &[]).increments);
-    (loads.iter())
-        .map(|load| answer(leaf, state, load, &mut direct))
-        .collect()
+
+    /// What changes of the leaf do in that state.
+    pub fn forces(&self, level: &Level, rates: &[LeafRate]) -> Vec<Forces> {
+        let force = |rate| level.leaf.rate(&level.state, &self.segments, rate);
+        rates.iter().map(force).collect()
+    }
+
+    /// The answers to forces. `None` where the matrix is singular.
+    pub fn answers(&mut self, level: &Level, loads: &[Forces]) -> Option<Vec<Response>> {
+        self.answers_to(level, loads, self.accuracy)
+    }
+
+    /// The same to another relative accuracy.
+    pub fn answers_to(
+        &mut self,
+        level: &Level,
+        loads: &[Forces],
+        accuracy: f64,
+    ) -> Option<Vec<Response>> {
+        let (leaf, segments, solves) = (&level.leaf, &self.segments, &mut self.solves);
+        if self.factorized {
+            let system = &mut self.system;
+            let mut by_rods = |rhs: &Field| {
+                *solves += 1;
+                system.set_rhs(rhs);
+                match system.solve(None, accuracy) {
+                    Solved::Yes(_) => Some(system.solution()),
+                    _ => None,
+                }
+            };
+            let found: Option<Vec<_>> = (loads.iter())
+                .map(|load| answer(leaf, segments, load, &mut by_rods))
+                .collect();
+            if found.is_some() {
+                return found;
+            }
+            self.factorized = false;
+        }
+        leaf.assemble(&level.state, &mut self.system);
+        self.factorizations += 1;
+        let pattern = SparsePattern::new(&self.system).ok()?;
+        let mut factor: SparseFactor = pattern.factorize(&self.system, 0.0).ok()?;
+        let mut direct = |rhs: &Field| {
+            *solves += 1;
+            Some(factor.solve_bordered(rhs, &[]).increments)
+        };
+        (loads.iter())
+            .map(|load| answer(leaf, segments, load, &mut direct))
+            .collect()
+    }
+
+    /// The work of forces on the answer to others: by symmetry also that of the others
+    /// on the answer to these.
+    pub fn work(&self, level: &Level, forces: &Forces, response: &Response) -> f64 {
+        level.leaf.work(&self.segments, forces, response)
+    }
 }
 
 fn answer(
     leaf: &DiscreteLeaf,
-    state: &State,
+    segments: &[Segment],
     load: &Forces,
     solve: &mut dyn FnMut(&Field) -> Option<Field>,
 ) -> Option<Response> {
-    let mut gaps = load.gaps.clone();
-    let mut rhs = load.nodes.clone();
+    let (mut rhs, mut gaps) = load.on_all(leaf.segments());
     let mut response = Response {
-        nodes: vec![vec![[0.0; 6]; leaf.segments()]; leaf.rods()],
+        nodes: Field::new(),
         carried: vec![DVec3::ZERO; gaps.len()],
     };
     let mut first = f64::INFINITY;
     for correction in 0..CORRECTIONS {
-        leaf.condense_gaps(state, &gaps, &mut rhs);
+        leaf.condense_gaps(segments, &gaps, &mut rhs);
         let increments = solve(&rhs)?;
-        leaf.carried(state, &increments, &mut gaps, &mut response.carried);
-        let mut largest = 0.0_f64;
-        let sums = response.nodes.iter_mut().flatten().flatten();
-        for (sum, increment) in sums.zip(increments.iter().flatten().flatten()) {
-            largest = largest.max(increment.abs());
-            *sum += increment;
-        }
+        leaf.carried(segments, &increments, &mut gaps, &mut response.carried);
+        let all = increments.iter().flatten().flatten();
+        let largest = all.fold(0.0_f64, |most, increment| most.max(increment.abs()));
         if correction == 0 {
             first = largest;
+            response.nodes = increments;
+        } else {
+            let sums = response.nodes.iter_mut().flatten().flatten();
+            (sums.zip(increments.iter().flatten().flatten())).for_each(|(sum, more)| *sum += more);
         }
         let settled = gaps.iter().all(|gap| *gap == DVec3::ZERO);
         if !largest.is_finite() || settled || largest < CORRECTED * first {
@@ -110,4 +167,27 @@ pub(crate) fn moved(level: &Level, rate: &LeafRate, response: &Response, step: f
     forces.for_each(|(force, change)| *force += step * change);
     debug_assert_eq!(state.segments(), leaf.segments());
     state
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::relax::{Options, relax_on_grids};
+    use crate::scenario::Scenario;
+
+    /// A derivative costs one solution on a grid, and none a factorisation of its own.
+    #[test]
+    fn a_number_costs_one_solution_on_a_grid() {
+        let text = include_str!("../../../scenarios/paper/fig04.toml");
+        let scenario = Scenario::from_toml(text).unwrap();
+        let (_, levels) =
+            relax_on_grids(&scenario, &Options::default(), 1e-6, &mut |_| {}).unwrap();
+        for level in &levels {
+            let mut linear = Linearized::new(level, 1e-6);
+            let units = super::super::unit_forces(&level.leaf, 1);
+            let loads: Vec<Forces> = units.iter().cycle().take(10).cloned().collect();
+            assert_eq!(linear.answers(level, &loads).unwrap().len(), 10);
+            assert_eq!((linear.solves, linear.factorizations), (10, 1));
+        }
+    }
 }

@@ -5,13 +5,15 @@ use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
-use super::data::{Measured, Origin, Traced};
+use super::answers::Answers;
+use super::change::Change;
+use super::data::{Experiment, Measured, Origin, Traced};
 use super::quantity::{Kind, Quantity};
 use super::vein::Vein;
 use crate::leaf::{LeafRate, Response, shift};
 use crate::modes;
 use crate::motion::Physics;
-use crate::relax::{AtRest, Level, Lost, Number, eigenvalue_rate, extrapolation};
+use crate::relax::{AtRest, Level, Lost, Nearby, Number, extrapolation, unit_forces};
 use crate::scenario::Scenario;
 use crate::study::Keys;
 
@@ -28,10 +30,12 @@ pub(super) struct Case {
     /// How its scenario changes with each free number, where that is the same
     /// wherever these are.
     pub changes: OnceLock<Option<Vec<Change>>>,
+    /// Its scenario with the numbers that the fit starts with.
+    pub start: OnceLock<Arc<Scenario>>,
+    /// Whether only loads set it apart from the others: it then changes with the free
+    /// numbers as they do.
+    pub loaded_only: bool,
 }
-
-/// The change of a scenario with a number: scenarios with weights.
-pub(super) type Change = Arc<Vec<(f64, Scenario)>>;
 
 /// One number that is compared.
 #[derive(Clone, Debug)]
@@ -77,10 +81,31 @@ pub(super) struct CaseAt {
     /// Modes on the first grids.
     pub modes: Vec<Vec<modes::Eigenpair>>,
     pub components: Vec<Component>,
-    /// How it answers each number, on every grid, and the gradients of the
-    /// components; empty until asked for.
-    pub responses: Vec<Vec<Response>>,
+    /// How it answers the numbers; none until asked for.
+    pub answers: Option<Answers>,
+    /// The gradients of the components; empty until asked for.
     pub gradients: Vec<Vec<f64>>,
+}
+
+impl Case {
+    /// One of which no points were traced.
+    pub fn new(experiment: Experiment) -> Case {
+        let mut targets = experiment.settings.iter().flat_map(|it| it.0.targets());
+        let loaded_only = targets.all(|target| {
+            let key = target.key();
+            key.is_some_and(|key| key.path().starts_with("load."))
+        });
+        Case {
+            loaded_only,
+            name: experiment.name,
+            settings: experiment.settings,
+            measured: experiment.measured,
+            traced: Vec::new(),
+            origin: experiment.origin,
+            changes: OnceLock::new(),
+            start: OnceLock::new(),
+        }
+    }
 }
 
 impl CaseAt {
@@ -111,7 +136,7 @@ impl CaseAt {
             at,
             modes,
             components: Vec::new(),
-            responses: Vec::new(),
+            answers: None,
             gradients: Vec::new(),
         };
         for measured in &of.measured {
@@ -129,11 +154,11 @@ impl CaseAt {
         for traced in &of.traced {
             veins.resize_with(veins.len().max(traced.rod + 1), || None);
             let vein = veins[traced.rod].get_or_insert_with(|| Vein::of(&found.at, traced.rod));
-            let (sigma, beside) = match traced.sigma {
-                Some(sigma) => (sigma, false),
-                None => (vein.nearest(traced.at), true),
+            let beside = traced.sigma.is_none();
+            let (sigma, model) = match traced.sigma {
+                Some(sigma) => (sigma, vein.point(sigma).0),
+                None => vein.nearest(traced.at),
             };
-            let model = vein.at(sigma);
             let seen = traced.at.iter().enumerate();
             let seen = seen.filter_map(|(axis, value)| value.map(|value| (axis, value)));
             for (number, (axis, observed)) in seen.enumerate() {
@@ -153,6 +178,61 @@ impl CaseAt {
             }
         }
         Ok(found)
+    }
+
+    /// The axes along which its tip was measured, if that is all that was, and on a leaf
+    /// whose equations are symmetric: their solution for each axis then tells the change
+    /// with any number. `None` where so many numbers are no more work.
+    pub fn tip_axes(&self, numbers: usize) -> Option<Vec<usize>> {
+        let leaf = &self.at.levels[0].leaf;
+        let symmetric = leaf.leaf.held.is_none() && leaf.tip_moment() == DVec3::ZERO;
+        let tip = |component: &Component| match component.what {
+            What::Result(Quantity::Tip(axis)) => Some(axis),
+            _ => None,
+        };
+        let mut axes: Vec<usize> = self.components.iter().map(tip).collect::<Option<_>>()?;
+        axes.sort_unstable();
+        axes.dedup();
+        // One more is for the step that follows.
+        (symmetric && axes.len() + 1 < numbers).then_some(axes)
+    }
+
+    /// The gradients of the components by these solutions.
+    pub fn tip_rates(
+        &self,
+        answers: &Answers,
+        axes: &[usize],
+        slopes: &[f64],
+    ) -> Result<Vec<Vec<f64>>, Lost> {
+        let mut sums = [(); 3].map(|()| vec![0.0; slopes.len()]);
+        for (k, level) in self.at.levels.iter().enumerate() {
+            let weight = self.at.weights[k] * self.length();
+            if weight == 0.0 {
+                continue;
+            }
+            let all = unit_forces(&level.leaf, 1);
+            let units: Vec<_> = axes.iter().map(|&axis| all[axis].clone()).collect();
+            let rates = answers.by_results((k, level), &units)?;
+            for (axis, rates) in axes.iter().zip(rates) {
+                let sums = sums[*axis].iter_mut().zip(rates).zip(slopes);
+                sums.for_each(|((sum, rate), slope)| *sum += weight * rate * slope);
+            }
+        }
+        let row = |component: &Component| match component.what {
+            What::Result(Quantity::Tip(axis)) => sums[axis].clone(),
+            _ => Vec::new(),
+        };
+        Ok(self.components.iter().map(row).collect())
+    }
+
+    /// How it answers steps of the numbers on these grids, of which each is one of its
+    /// own: not at all where there are none.
+    pub fn answer(&self, levels: &[Level], steps: &[f64]) -> Result<Vec<Response>, Lost> {
+        let none = |level: &Level| Response::none(level.leaf.rods(), level.leaf.segments());
+        match &self.answers {
+            Some(answers) if steps.iter().any(|step| *step != 0.0) => answers.to(levels, steps),
+            _ => Ok(levels.iter().map(none).collect()),
+        }
     }
 
     fn length(&self) -> f64 {
@@ -214,10 +294,13 @@ impl CaseAt {
                 self.at.best(force)[axis] * self.force()
             }
             Quantity::Frequency(mode) => {
+                let scenarios = number.nearby().unwrap_or_default();
                 let of = |k: usize| {
                     let shape = &self.modes[k][mode - 1].shape;
                     let (level, answer) = (&self.at.levels[k], &answers[k]);
-                    eigenvalue_rate(level, number, (rate, answer), shape).unwrap_or(0.0)
+                    let forces = modes::mode_forces(&level.leaf, &level.state, shape);
+                    let near = Nearby::new(level, &scenarios, (rate, answer));
+                    near.eigenvalue_rate(shape, &forces)
                 };
                 // omega^2 = (2 pi f)^2.
                 let frequency = self.result(quantity);
@@ -262,7 +345,8 @@ impl CaseAt {
             axes.iter().for_each(|&axis| seen[axis] = change[axis]);
             seen - seen.dot(along) * along
         };
-        let changes: Vec<DVec3> = self.responses.iter().map(change).collect();
+        let each = self.answers.iter().flat_map(|answers| &answers.each);
+        let changes: Vec<DVec3> = each.map(change).collect();
         let row = |&axis: &usize| {
             let all = changes.iter().zip(slopes);
             all.map(|(change, slope)| change[axis] * slope).collect()

@@ -4,45 +4,50 @@ use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
-use super::case::{CaseAt, Change, Component, What};
+use super::answers::Answers;
+use super::case::{CaseAt, Component, What};
+use super::change::Change;
 use super::model::{Model, Point};
-use crate::leaf::{Forces, LeafRate, Response};
-use crate::relax::{Lost, Number, responses};
+use crate::leaf::{Leaf, LeafRate, Response};
+use crate::relax::{Grids, Lost, Number};
 use crate::scenario::Scenario;
 
-/// Tables of a scenario whose numbers change it in proportion, whatever the others are:
-/// a length changes the coupling of its gap, and a section its stiffnesses.
-const APART: [&str; 4] = ["stiffness.", "coupling.", "load.", "rest."];
+/// Derivatives of a search are as accurate as of a leaf with this tolerance.
+const OF_SEARCH: f64 = 1e-5;
 
 impl Model<'_> {
     /// Finds how the components of a point change with the coordinates.
     pub fn differentiate(&self, point: &mut Point) -> Result<(), Lost> {
         let theta = point.theta.clone();
-        let each = |(case, at): (usize, &mut CaseAt)| self.differentiate_case(case, at, &theta);
+        let shared = OnceLock::new();
+        let each =
+            |(case, at): (usize, &mut CaseAt)| self.differentiate_case((case, at), &theta, &shared);
         let cases = point.cases.par_iter_mut().enumerate();
         cases.map(each).collect()
     }
 
-    fn differentiate_case(
-        &self,
-        case: usize,
-        found: &mut CaseAt,
+    /// The same of one leaf. Those that only loads set apart share how they change.
+    fn differentiate_case<'s>(
+        &'s self,
+        (case, found): (usize, &mut CaseAt),
         theta: &[f64],
+        shared: &OnceLock<Vec<LeafRate<'s>>>,
     ) -> Result<(), Lost> {
-        if !found.gradients.is_empty() {
+        if found.answers.is_some() {
             return Ok(());
         }
         let of = &self.cases[case];
         let fixed = self.values(of, theta);
         let first = fixed.len() - theta.len();
         // Where all numbers are as they are, all scenarios are the same.
-        let here: OnceLock<Option<Scenario>> = OnceLock::new();
+        let here: OnceLock<Option<Arc<Scenario>>> = OnceLock::new();
         let made: Vec<_> = (0..theta.len())
             .map(|k| {
                 let (fixed, here) = (&fixed, &here);
                 move |value: f64| -> Option<Scenario> {
                     if value == fixed[first + k].1 {
-                        return here.get_or_init(|| self.scenario(of, theta).ok()).clone();
+                        let here = here.get_or_init(|| self.scenario(of, theta).ok());
+                        return here.as_deref().cloned();
                     }
                     let mut values = fixed.clone();
                     values[first + k].1 = value;
@@ -62,32 +67,45 @@ impl Model<'_> {
             let changes = numbers.iter().map(|number| number.rate().map(Arc::new));
             changes.collect()
         };
-        let changes = match self.is_linear() {
-            true => of.changes.get_or_init(changes).clone(),
-            false => changes(),
-        };
         let at_limit = || Lost::NotAtRest("a number is at the limit of what it can be".into());
-        let changes = changes.ok_or_else(at_limit)?;
         let leaf = &found.at.levels[0].leaf.leaf;
-        let rates: Vec<LeafRate> = (changes.iter())
-            .map(|change| LeafRate::new(leaf, change))
-            .collect();
-        let mut all: Vec<Vec<Response>> = vec![Vec::new(); numbers.len()];
-        let scenario = self.base.scenario();
-        let tolerance = scenario.tolerance.min(self.tolerance());
-        for level in &found.at.levels {
-            let forces = rates.iter().map(|rate| level.leaf.rate(&level.state, rate));
-            let forces: Vec<Forces> = forces.collect();
-            let answers = responses(level, &forces, tolerance);
-            let answers =
-                answers.ok_or(Lost::NotAtRest("the leaf is at a singular point".into()))?;
-            for (all, answer) in all.iter_mut().zip(answers) {
-                all.push(answer);
-            }
+        fn rates<'c>(leaf: &Leaf, changes: &'c [Change]) -> Vec<LeafRate<'c>> {
+            let rates = changes.iter().map(|change| LeafRate::new(leaf, change));
+            rates.collect()
         }
-        found.responses = all;
+        let own: Vec<Change>;
+        let own_rates: Vec<LeafRate>;
+        let rates: &[LeafRate] = if self.linear && of.loaded_only {
+            let changes = self.changes.get_or_init(changes).as_ref();
+            let changes = changes.ok_or_else(at_limit)?;
+            shared.get_or_init(|| rates(leaf, changes))
+        } else {
+            let found = match self.linear {
+                true => of.changes.get_or_init(changes).clone(),
+                false => changes(),
+            };
+            own = found.ok_or_else(at_limit)?;
+            own_rates = rates(leaf, &own);
+            &own_rates
+        };
+        let tolerance = match self.grids {
+            Grids::AsNeeded => self.base.scenario().tolerance.min(self.tolerance()),
+            Grids::These => OF_SEARCH,
+        };
+        let mut answers = Answers::new(&found.at, rates, tolerance);
         let slopes = self.coordinates.iter().zip(theta);
         let slopes: Vec<f64> = slopes.map(|(free, theta)| free.slope(*theta)).collect();
+        if let Some(axes) = found.tip_axes(numbers.len()) {
+            found.gradients = found.tip_rates(&answers, &axes, &slopes)?;
+            found.answers = Some(answers);
+            return Ok(());
+        }
+        answers.solve_each(&found.at.levels)?;
+        found.answers = Some(answers);
+        let each = |k: usize| -> &[Response] {
+            let answers = found.answers.as_ref();
+            answers.map_or(&[], |answers| answers.each[k].as_slice())
+        };
         let mut gradients = Vec::new();
         let mut index = 0;
         while index < found.components.len() {
@@ -95,7 +113,7 @@ impl Model<'_> {
             match component.what {
                 What::Result(quantity) => {
                     let by = |k: usize| {
-                        let of = (&numbers[k], &rates[k], found.responses[k].as_slice());
+                        let of = (&numbers[k], &rates[k], each(k));
                         slopes[k] * found.result_rate(quantity, of)
                     };
                     gradients.push((0..numbers.len()).map(by).collect());
@@ -117,15 +135,5 @@ impl Model<'_> {
         }
         found.gradients = gradients;
         Ok(())
-    }
-
-    /// Whether the changes of a scenario with the free numbers are the same wherever
-    /// these are.
-    fn is_linear(&self) -> bool {
-        self.coordinates.iter().all(|free| {
-            let mut keys = free.keys.targets().iter().filter_map(|target| target.key());
-            let apart = keys.all(|key| APART.iter().any(|table| key.path().starts_with(table)));
-            apart && free.keys.is_linear()
-        })
     }
 }

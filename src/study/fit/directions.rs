@@ -15,6 +15,10 @@ pub(super) const NORMAL: f64 = 1.959_963_984_540_054;
 /// Singular values, ascending, and their right singular vectors as columns.
 pub(super) fn singular(jacobian: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
     let count = jacobian.ncols();
+    if jacobian.nrows() > 2 * count {
+        // Of many rows the triangle has the same.
+        return singular(&jacobian.clone().qr().r());
+    }
     // With rows of zeros there are as many values as columns.
     let rows = jacobian.nrows().max(count);
     let square = jacobian.clone().resize_vertically(rows, 0.0);

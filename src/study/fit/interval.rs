@@ -3,6 +3,7 @@
 
 use nalgebra::DVector;
 
+use super::around::{Around, Least, Slopes};
 use super::judge::Judge;
 use super::least_squares::{End, Iteration};
 use super::model::Point;
@@ -22,6 +23,18 @@ const PROFILE_STEPS: usize = 16;
 const PROFILE_ITERATIONS: usize = 25;
 const LEAST: f64 = 1e-2;
 const PROFILE_ACCURACY: f64 = 0.01;
+
+/// Points by which an end is looked for before the whole profile is, what part of the sum
+/// a correction may still take off there, and how exactly it is found.
+const FEW: usize = 10;
+const SETTLED: f64 = 0.1;
+const NEAR_ENOUGH: f64 = 0.03;
+
+/// How often leaves may be lost on the way to them.
+const FEW_LOST: usize = 3;
+
+/// A sum that is off by no more than this part of what may be needs no other look.
+const CLEARLY: f64 = 0.5;
 
 /// How often leaves may be lost on the way to an end of a profile.
 const MOST_LOST: usize = 6;
@@ -49,9 +62,10 @@ pub(super) fn intervals(
     shape: &Judge,
     progress: &mut dyn FnMut(usize, f64),
 ) -> Result<Vec<FitParameter>, Point> {
+    let around = Around::new(shape);
     let numbers = 0..judge.values.len();
     numbers
-        .map(|k| parameter(judge, shape, k, progress))
+        .map(|k| parameter(judge, (shape, around.as_ref()), k, progress))
         .collect()
 }
 
@@ -77,7 +91,7 @@ fn unknown(judge: &Judge, k: usize) -> FitParameter {
 
 fn parameter(
     judge: &Judge,
-    shape: &Judge,
+    (shape, around): (&Judge, Option<&Around>),
     k: usize,
     progress: &mut dyn FnMut(usize, f64),
 ) -> Result<FitParameter, Point> {
@@ -91,7 +105,13 @@ fn parameter(
     let half = judge.quantile * judge.deviation(k).0;
     let mut sides = [Side::At(half), Side::At(half)];
     let (deviation, along) = shape.deviation(k);
-    if half > OPEN || !straight(shape, &along, shape.quantile * deviation) {
+    let first = shape.quantile * deviation;
+    if let Some(found) = around.and_then(|around| ends(around, k, first, half)) {
+        if let Some(found) = found {
+            parameter.profiled = true;
+            sides = found;
+        }
+    } else if half > OPEN || around.is_some() || !straight(shape, &along, first) {
         parameter.profiled = true;
         let along = shape.conditional(k, OPEN);
         for (side, sign) in sides.iter_mut().zip([-1.0, 1.0]) {
@@ -123,6 +143,107 @@ fn above(judge: &Judge, point: &Point) -> f64 {
     let bound = judge.weighing.bound(&judge.residuals);
     let sum = |residuals: &DVector<f64>| judge.weighing.sum(residuals, bound);
     (sum(&residuals) - sum(&judge.residuals)) / judge.spread.powi(2)
+}
+
+/// The ends of an interval by a few points around the minimum: `Some(None)` where the
+/// curvature has them, and `None` where these points do not tell.
+fn ends(around: &Around, k: usize, first: f64, half: f64) -> Option<Option<[Side; 2]>> {
+    let judge = around.judge;
+    let slopes = around.slopes();
+    let along = judge.conditional(k, OPEN);
+    if half <= OPEN {
+        let expected = judge.quantile.powi(2);
+        let off = |above: f64| (above / expected - 1.0).abs();
+        let change = &along * first;
+        let (up, _) = around.residuals(&around.moved(&change)).ok()?;
+        // To second order the other side is its mirror image.
+        let linear = &judge.jacobian * change;
+        let down = &up - &linear - &linear;
+        let sides = [up, down].map(|residuals| around.least(&slopes, k, &residuals));
+        let clear = |least: &Option<Least>| {
+            (least.as_ref()).is_some_and(|least| off(least.above) < CLEARLY * STRAIGHT)
+        };
+        if sides.iter().all(clear) {
+            return Some(None);
+        }
+    }
+    let [low, high] = judge.model.coordinates[k].bounds;
+    let theta = judge.point.theta[k];
+    let reach = |sign: f64, room: f64| {
+        let most = (OPEN + 0.1).min(room);
+        reach(around, k, &slopes, (sign, first.min(most), most), &along)
+    };
+    let down = reach(-1.0, theta - low)?;
+    let up = reach(1.0, high - theta)?;
+    let same = |side: &Side| matches!(side, Side::At(reach) if *reach == first);
+    Some(match same(&down) && same(&up) && half <= OPEN {
+        true => None,
+        false => Some([down, up]),
+    })
+}
+
+/// The end of a profile on one side, from a first guess and not beyond what is most.
+fn reach(
+    around: &Around,
+    k: usize,
+    at_minimum: &Slopes,
+    (sign, first, most): (f64, f64, f64),
+    along: &DVector<f64>,
+) -> Option<Side> {
+    if most <= 0.0 {
+        return Some(Side::Open);
+    }
+    let judge = around.judge;
+    let mut reach = first;
+    let mut bend = DVector::zeros(along.len());
+    let mut before = (0.0, 0.0);
+    let mut lost = 0;
+    let mut known: Option<Slopes> = None;
+    for step in 0..FEW {
+        let change = along * (sign * reach) + &bend * reach.powi(2);
+        let theta = around.moved(&change);
+        let Ok((residuals, there)) = around.residuals(&theta) else {
+            lost += 1;
+            if lost > FEW_LOST {
+                return None;
+            }
+            reach = 0.5 * (before.0 + reach);
+            continue;
+        };
+        let mut least = around.least(known.as_ref().unwrap_or(at_minimum), k, &residuals)?;
+        if reach >= most && least.straight < judge.quantile.powi(2) {
+            return Some(Side::Open);
+        }
+        if step == 0 && (least.above / judge.quantile.powi(2) - 1.0).abs() < STRAIGHT {
+            return Some(Side::At(reach));
+        }
+        let settled = |least: &Least| {
+            let root = least.above.max(0.0).sqrt() / judge.quantile;
+            let corrected = least.straight - least.above < SETTLED * least.above;
+            corrected && (root - 1.0).abs() < NEAR_ENOUGH
+        };
+        if settled(&least) {
+            // By the derivatives there it may be lower still.
+            let slopes = around.slopes_at(there).ok()?;
+            least = around.least(&slopes, k, &residuals)?;
+            known = Some(slopes);
+            if settled(&least) {
+                return Some(Side::At(reach));
+            }
+        }
+        if least.above <= 0.0 {
+            return None;
+        }
+        let root = least.above.sqrt() / judge.quantile;
+        bend += least.correction / reach.powi(2);
+        let next = reach + (1.0 - root) * (reach - before.0) / (root - before.1);
+        before = (reach, root);
+        reach = match next.is_finite() && next > 0.0 {
+            true => next.clamp(0.5 * reach, 2.0 * reach).min(most),
+            false => return None,
+        };
+    }
+    None
 }
 
 /// Whether the sum of squares is, at the ends of an interval, what the curvature at

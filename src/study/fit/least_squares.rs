@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use super::directions::{NULL, singular};
 use super::free::LONGEST_STEP;
 use super::model::{Model, Point};
-use crate::relax::Lost;
+use crate::relax::{Grids, Lost};
 
 /// Steps tried before a minimum is given up.
 const MOST_STEPS: usize = 100;
@@ -44,6 +44,9 @@ const HUBER: f64 = 1.345;
 /// The standard deviation that is assumed where none is known, in lengths of the
 /// leaf, until the residuals tell it.
 pub(super) const ASSUMED: f64 = 1e-3;
+
+/// As [`NULL`] while the search goes on with less accurate derivatives.
+const NULL_OF_SEARCH: f64 = 3e-7;
 
 /// How residuals are weighed.
 #[derive(Clone, Copy, Debug)]
@@ -125,6 +128,9 @@ pub(super) struct Iteration<'m, 'a> {
     pub most_steps: usize,
     /// What the longest step may be expected to gain at the end, of a datum's variance.
     pub enough: f64,
+    /// Whether the derivatives of the last point but one will do for the last, if that is a
+    /// minimum by them.
+    pub lean: bool,
     /// Where a leaf would have had to jump, as near as that was tried.
     pub jump: Option<Vec<f64>>,
     /// Told the number of the step and the sum.
@@ -143,6 +149,7 @@ impl<'m, 'a> Iteration<'m, 'a> {
             held: vec![false; model.coordinates.len()],
             most_steps: MOST_STEPS,
             enough: GAIN,
+            lean: false,
             jump: None,
             progress,
         }
@@ -186,6 +193,10 @@ impl<'m, 'a> Iteration<'m, 'a> {
                     Ok(mut trial) => {
                         let found = self.weighing.residuals(&trial);
                         let gained = sum - self.weighing.sum(&found, bound);
+                        if self.lean && gained > 0.0 && self.rests(&point, &theta, &found) {
+                            trial.take_gradients(&mut point);
+                            return (trial, End::Converged, evaluations);
+                        }
                         if gained > 0.0 && self.model.differentiate(&mut trial).is_ok() {
                             let ratio = gained / predicted;
                             if ratio < 0.25 {
@@ -232,13 +243,27 @@ impl<'m, 'a> Iteration<'m, 'a> {
         }
         let (values, directions) = singular(&jacobian);
         let slopes = directions.tr_mul(&gradient);
-        let least = NULL * values.last().copied().unwrap_or(0.0);
+        let null = match self.model.grids {
+            Grids::AsNeeded => NULL,
+            Grids::These => NULL_OF_SEARCH,
+        };
+        let least = null * values.last().copied().unwrap_or(0.0);
         Linear {
             unfelt: values.iter().filter(|value| **value <= least).count(),
             slopes,
             values,
             directions,
         }
+    }
+
+    /// Whether residuals at `theta` are at their least by the derivatives at a point, as
+    /// far as these matter.
+    fn rests(&self, point: &Point, theta: &[f64], residuals: &DVector<f64>) -> bool {
+        let bound = self.weighing.bound(residuals);
+        let linear = self.linear(point, residuals);
+        let variance = linear.variance(point, self.weighing.sum(residuals, bound));
+        let longest = self.clamped(theta, &linear.step(LONGEST_STEP));
+        linear.gain(&change(theta, &longest)) < self.enough * variance
     }
 
     /// Coordinates that may move: not held, nor at a bound that the gradient drives

@@ -5,8 +5,11 @@
 //! derivatives from their linearised equations, so that a fit does not hop between
 //! branches. Positive numbers are fitted by their logarithms.
 
+mod answers;
+mod around;
 mod candidates;
 mod case;
+mod change;
 mod data;
 mod derivatives;
 mod directions;
@@ -107,20 +110,7 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result
     if let Some(tolerance) = request.tolerance {
         check_tolerance(tolerance)?;
     }
-    let free = expanded(request)?;
-    let coordinates = free.iter().map(|free| Coordinate::new(base, free));
-    let coordinates = coordinates.collect::<Result<Vec<_>, _>>()?;
-    for (k, one) in coordinates.iter().enumerate() {
-        if coordinates[..k]
-            .iter()
-            .any(|other| other.keys.overlaps(&one.keys))
-        {
-            let keys = &one.keys;
-            return Err(FitError::Free(format!(
-                "{keys}: is free twice: leave one out"
-            )));
-        }
-    }
+    let coordinates = coordinates(request)?;
     let options = Options {
         tolerance: request.tolerance,
         limit: request.limit.clone(),
@@ -128,29 +118,16 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result
     };
     let model = Model::new(base, &coordinates, &options, request.data.clone())?;
     let start: Vec<f64> = coordinates.iter().map(|free| free.start).collect();
-    let (first, _) = model.find(&start)?;
+    let assumed = ASSUMED * model.unit();
+    let (first, _) = model.loose(assumed).find(&start)?;
     let known = model.check_deviations(&first)?;
     let count = first
         .components()
         .filter(|component| !component.free)
         .count();
-    if coordinates.is_empty() || coordinates.len() > count {
-        let free = coordinates.len();
-        return Err(FitError::Free(match free {
-            0 => "no number is free: name at least one".into(),
-            _ => format!(
-                "{free} numbers are free, and there are {count} data: free fewer, or measure more"
-            ),
-        }));
-    }
-    if !known && coordinates.len() == count {
-        return Err(FitError::Free(format!(
-            "{count} numbers are free, and there are as many data, whose standard deviations are not \
-             known: nothing is left to tell them: add columns sd_tip_x, ..., free fewer, or measure more"
-        )));
-    }
+    check_count(coordinates.len(), count, known)?;
     let weighing = Weighing {
-        assumed: ASSUMED * unit(&first, base.scenario().scale().length),
+        assumed,
         robust: request.robust,
     };
     let (mut rough, mut point) = model.rough(&first, weighing)?;
@@ -167,7 +144,8 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result
             found.map(|(there, _)| there)
         })?;
         let mut last = Iteration::new(&model, weighing, progress);
-        let (least, end, more) = last.run(there);
+        last.lean = true;
+        let (mut least, end, more) = last.run(there);
         evaluations.accurate += 1 + more;
         let beyond = last
             .jump
@@ -180,9 +158,15 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result
             (rough, point) = model.rough(&there, weighing)?;
             continue;
         }
-        let judge = Judge::new(&model, weighing, known, &least, evaluations);
         let of_search = Judge::new(&rough, weighing, known, &near, evaluations);
-        let same = searched == End::Converged && of_search.spread < SAME_SPREAD * judge.spread;
+        let spread = Judge::new(&model, weighing, known, &least, evaluations).spread;
+        let same = searched == End::Converged && of_search.spread < SAME_SPREAD * spread;
+        if !same && end == End::Converged {
+            // What is around it is asked of its own leaves.
+            let differentiated = model.differentiate(&mut least);
+            differentiated.map_err(|lost| model.no_equilibrium(0, &lost))?;
+        }
+        let judge = Judge::new(&model, weighing, known, &least, evaluations);
         let shape = if same { &of_search } else { &judge };
         let parameters = match end {
             End::Converged => interval::intervals(&judge, shape, progress),
@@ -208,16 +192,43 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result
     Ok(found)
 }
 
-/// What the data are measured by: the length of the leaf, or the largest of them.
-fn unit(point: &model::Point, length: f64) -> f64 {
-    let kind = point.components().next().map(|first| first.what.kind());
-    match kind {
-        None | Some(quantity::Kind::Length) => length,
-        Some(_) => {
-            let sizes = point.components().map(|component| component.observed.abs());
-            sizes.fold(0.0, f64::max).max(f64::MIN_POSITIVE)
+/// The coordinates of the free numbers, none of which is another's.
+fn coordinates(request: &FitRequest) -> Result<Vec<Coordinate>, FitError> {
+    let base = &request.base;
+    let free = expanded(request)?;
+    let coordinates = free.iter().map(|free| Coordinate::new(base, free));
+    let coordinates = coordinates.collect::<Result<Vec<_>, _>>()?;
+    for (k, one) in coordinates.iter().enumerate() {
+        if coordinates[..k]
+            .iter()
+            .any(|other| other.keys.overlaps(&one.keys))
+        {
+            let keys = &one.keys;
+            return Err(FitError::Free(format!(
+                "{keys}: is free twice: leave one out"
+            )));
         }
     }
+    Ok(coordinates)
+}
+
+/// Whether there are data enough.
+fn check_count(free: usize, count: usize, known: bool) -> Result<(), FitError> {
+    if free == 0 || free > count {
+        return Err(FitError::Free(match free {
+            0 => "no number is free: name at least one".into(),
+            _ => format!(
+                "{free} numbers are free, and there are {count} data: free fewer, or measure more"
+            ),
+        }));
+    }
+    if !known && free == count {
+        return Err(FitError::Free(format!(
+            "{count} numbers are free, and there are as many data, whose standard deviations are not \
+             known: nothing is left to tell them: add columns sd_tip_x, ..., free fewer, or measure more"
+        )));
+    }
+    Ok(())
 }
 
 /// The free numbers, with every entry of a list or a profile in its place.

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::FitError;
 use super::case::{Case, CaseAt, Component};
+use super::change::{Addition, Change};
 use super::data::{Data, Experiment, Measured, Origin};
 use super::free::Coordinate;
 use super::quantity::Kind;
@@ -14,6 +15,13 @@ use crate::newton::Work;
 use crate::relax::{AtRest, Equilibrium, Grids, Lost, Options};
 use crate::scenario::Scenario;
 use crate::study::{Base, Keys};
+
+/// How far a prediction of a search may be from the accurate one, in standard deviations
+/// of its datum.
+pub(super) const UNNOTICED: f64 = 0.05;
+
+/// The largest tolerance of leaves from which a search starts.
+const LOOSEST: f64 = 1e-4;
 
 /// What all points of a fit have in common.
 pub(super) struct Model<'a> {
@@ -23,6 +31,12 @@ pub(super) struct Model<'a> {
     pub cases: Arc<Vec<Case>>,
     /// On which grids leaves are followed.
     pub grids: Grids,
+    /// Whether scenarios change with the free numbers in proportion, wherever these are.
+    pub linear: bool,
+    /// How scenarios change with the free numbers, where that is the same for all.
+    pub changes: Arc<OnceLock<Option<Vec<Change>>>>,
+    /// What to add to them.
+    pub additions: Arc<OnceLock<Option<Vec<Addition>>>>,
 }
 
 /// The leaves of all experiments.
@@ -36,9 +50,29 @@ impl Point {
         self.cases.iter().flat_map(|case| &case.components)
     }
 
+    /// Takes over the derivatives of another point.
+    pub fn take_gradients(&mut self, other: &mut Point) {
+        for (own, other) in self.cases.iter_mut().zip(&mut other.cases) {
+            own.gradients = std::mem::take(&mut other.gradients);
+        }
+    }
+
     pub fn gradients(&self) -> impl Iterator<Item = &Vec<f64>> {
         self.cases.iter().flat_map(|case| &case.gradients)
     }
+}
+
+/// Tables of a scenario whose numbers change it in proportion, whatever the others are:
+/// a length changes the coupling of its gap, and a section its stiffnesses.
+const APART: [&str; 4] = ["stiffness.", "coupling.", "load.", "rest."];
+
+/// Whether the changes of a scenario with these are the same wherever they are.
+fn is_linear(coordinates: &[Coordinate]) -> bool {
+    coordinates.iter().all(|free| {
+        let mut keys = free.keys.targets().iter().filter_map(|target| target.key());
+        let apart = keys.all(|key| APART.iter().any(|table| key.path().starts_with(table)));
+        apart && free.keys.is_linear()
+    })
 }
 
 impl<'a> Model<'a> {
@@ -49,15 +83,7 @@ impl<'a> Model<'a> {
         data: Data,
     ) -> Result<Self, FitError> {
         let rods = base.scenario().rods.len();
-        let case = |experiment: Experiment| Case {
-            name: experiment.name,
-            settings: experiment.settings,
-            measured: experiment.measured,
-            traced: Vec::new(),
-            origin: experiment.origin,
-            changes: OnceLock::new(),
-        };
-        let mut cases: Vec<Case> = data.experiments.into_iter().map(case).collect();
+        let mut cases: Vec<Case> = data.experiments.into_iter().map(Case::new).collect();
         let mut plain = None;
         for traced in data.traced {
             let place = match &traced.experiment {
@@ -72,14 +98,12 @@ impl<'a> Model<'a> {
                     })?
                 }
                 None => *plain.get_or_insert_with(|| {
-                    cases.push(Case {
+                    cases.push(Case::new(Experiment {
                         name: "as it is".into(),
                         settings: Vec::new(),
                         measured: Vec::new(),
-                        traced: Vec::new(),
                         origin: None,
-                        changes: OnceLock::new(),
-                    });
+                    }));
                     cases.len() - 1
                 }),
             };
@@ -125,6 +149,9 @@ impl<'a> Model<'a> {
             options: options.clone(),
             cases: Arc::new(cases),
             grids: Grids::AsNeeded,
+            linear: is_linear(coordinates),
+            changes: Arc::default(),
+            additions: Arc::default(),
         })
     }
 
@@ -136,12 +163,46 @@ impl<'a> Model<'a> {
             .collect()
     }
 
-    pub(super) fn scenario(&self, case: &Case, theta: &[f64]) -> Result<Scenario, FitError> {
-        let varied = self.base.at(&self.values(case, theta));
-        varied.map(|varied| varied.scenario).map_err(|refused| {
+    /// The scenario of an experiment.
+    pub(super) fn scenario(&self, case: &Case, theta: &[f64]) -> Result<Arc<Scenario>, FitError> {
+        if let Some(scenario) = self.by_additions(case, theta) {
+            return Ok(Arc::new(scenario));
+        }
+        let values = self.values(case, theta);
+        let made = self.base.at(&values).map(|varied| varied.scenario);
+        let made = made.map_err(|refused| {
             let place = case.origin.as_ref().map(|origin| format!("{origin}: "));
             FitError::Data(format!("{}{refused}", place.unwrap_or_default()))
-        })
+        })?;
+        let made = Arc::new(made);
+        if self.starts(theta) {
+            return Ok(Arc::clone(case.start.get_or_init(|| made)));
+        }
+        Ok(made)
+    }
+
+    /// Whether the numbers are those that the fit starts with.
+    fn starts(&self, theta: &[f64]) -> bool {
+        (self.coordinates.iter().zip(theta)).all(|(free, theta)| free.start == *theta)
+    }
+
+    /// The same where the free numbers change all scenarios in proportion, and alike.
+    fn by_additions(&self, case: &Case, theta: &[f64]) -> Option<Scenario> {
+        let start = case.start.get()?;
+        let changes = self.changes.get()?.as_ref()?;
+        if !case.loaded_only {
+            return None;
+        }
+        let additions = self.additions.get_or_init(|| {
+            let additions = changes.iter().map(|change| Addition::new(change));
+            additions.collect()
+        });
+        let mut scenario = Scenario::clone(start);
+        let steps = self.coordinates.iter().zip(theta);
+        for ((free, theta), addition) in steps.zip(additions.as_ref()?) {
+            addition.add(&mut scenario, free.value(*theta) - free.value(free.start));
+        }
+        Some(scenario)
     }
 
     /// The leaves at rest from where relaxations start.
@@ -181,15 +242,19 @@ impl<'a> Model<'a> {
     /// The leaves for other values, followed from those of a point that is
     /// differentiated.
     pub fn follow(&self, from: &Point, theta: &[f64]) -> Result<Point, Lost> {
-        let steps: Vec<f64> = (self.coordinates.iter().zip(theta).zip(&from.theta))
-            .map(|((free, to), from)| free.value(*to) - free.value(*from))
-            .collect();
+        self.follow_on(from, theta, self.grids)
+    }
+
+    /// The same on these grids.
+    pub fn follow_on(&self, from: &Point, theta: &[f64], grids: Grids) -> Result<Point, Lost> {
+        let steps = self.steps(&from.theta, theta);
         let follow = |case: usize| -> Result<CaseAt, Lost> {
             let scenario = self.scenario(&self.cases[case], theta);
             let scenario = scenario.map_err(|refused| Lost::NotAtRest(refused.to_string()))?;
             let from = &from.cases[case];
-            let how = (&self.options, self.grids);
-            let at = from.at.follow(&scenario, &from.responses, &steps, how)?;
+            let how = (&self.options, grids);
+            let answer = from.answer(&from.at.levels, &steps)?;
+            let at = from.at.follow(scenario, &answer, how)?;
             CaseAt::new(&self.cases[case], case, at)
         };
         let cases = (0..self.cases.len()).into_par_iter().map(follow);
@@ -197,6 +262,57 @@ impl<'a> Model<'a> {
             theta: theta.to_vec(),
             cases: cases.collect::<Result<_, _>>()?,
         })
+    }
+
+    /// What the data are measured by: the length of the leaf, or the largest of them.
+    pub fn unit(&self) -> f64 {
+        let mut measured = self.cases.iter().flat_map(|case| &case.measured);
+        let mut traced = self.cases.iter().flat_map(|case| &case.traced);
+        let lengths = |measured: &Measured| measured.quantity.kind() == Kind::Length;
+        match traced.next().is_some() || measured.clone().all(lengths) {
+            true => self.base.scenario().scale().length,
+            false => {
+                let sizes = measured.by_ref().filter_map(|measured| measured.value);
+                let size = sizes.fold(0.0_f64, |most, value| most.max(value.abs()));
+                size.max(f64::MIN_POSITIVE)
+            }
+        }
+    }
+
+    /// By how much the numbers change.
+    pub fn steps(&self, from: &[f64], to: &[f64]) -> Vec<f64> {
+        let each = self.coordinates.iter().zip(to).zip(from);
+        each.map(|((free, to), from)| free.value(*to) - free.value(*from))
+            .collect()
+    }
+
+    /// The same model with leaves no more accurate than its data notice, of which all are
+    /// lengths.
+    pub fn loose(&self, assumed: f64) -> Model<'a> {
+        let length = self.base.scenario().scale().length;
+        let sd = |sd: Option<f64>| sd.unwrap_or(assumed) / length;
+        let mut tolerance = f64::INFINITY;
+        for case in self.cases.iter() {
+            for measured in &case.measured {
+                let known = match measured.quantity.kind() {
+                    Kind::Length => UNNOTICED * sd(measured.sd),
+                    _ => 0.0,
+                };
+                tolerance = known.min(tolerance);
+            }
+            let traced = case.traced.iter().map(|traced| UNNOTICED * sd(traced.sd));
+            tolerance = traced.fold(tolerance, f64::min);
+        }
+        Model {
+            options: Options {
+                tolerance: Some(tolerance.min(LOOSEST).max(self.tolerance())),
+                ..self.options.clone()
+            },
+            cases: Arc::clone(&self.cases),
+            changes: Arc::clone(&self.changes),
+            additions: Arc::clone(&self.additions),
+            ..*self
+        }
     }
 
     pub fn tolerance(&self) -> f64 {

@@ -8,12 +8,8 @@ use rayon::prelude::*;
 use super::FitError;
 use super::case::{CaseAt, Component};
 use super::least_squares::Weighing;
-use super::model::{Model, Point};
+use super::model::{Model, Point, UNNOTICED};
 use crate::relax::{Grids, LARGEST_TOLERANCE, Lost, Options};
-
-/// How far a prediction on coarse grids may be from the accurate one, in standard
-/// deviations of its datum.
-const UNNOTICED: f64 = 0.05;
 
 /// Error of an iteration on them: of positions, in standard deviations.
 const ITERATED: f64 = 10.0 * UNNOTICED;
@@ -42,6 +38,9 @@ impl<'a> Model<'a> {
             },
             cases: Arc::clone(&self.cases),
             grids: Grids::These,
+            linear: self.linear,
+            changes: Arc::clone(&self.changes),
+            additions: Arc::clone(&self.additions),
         };
         let coarse = |case: usize| -> Result<CaseAt, FitError> {
             let lost = |lost| self.no_equilibrium(case, &lost);

@@ -1,0 +1,109 @@
+//! Remarks on a leaf at rest that can hardly be meant.
+
+use crate::relax::equilibrium::Equilibrium;
+use crate::scenario::{Rod, Scenario};
+use crate::shape::RodShape;
+use glam::DVec3;
+
+/// A vein that is longer by more than this part somewhere than it rests at.
+const STRETCHED: f64 = 0.2;
+
+/// A leaf so many times longer than (A/q)^(1/3) hangs like a thread: a column stands under
+/// its weight up to 1.99 of it (Greenhill 1881, Proc. Camb. Phil. Soc. 4).
+const TOO_LONG: f64 = 30.0;
+
+/// What gravity is where it is entered as an acceleration, in units of metres and seconds,
+/// and the part by which numbers that are meant so differ.
+const ACCELERATION: f64 = 9.81;
+const ROUNDED: f64 = 2e-3;
+
+/// From this many times that length on, gravity of such a size is such a slip.
+const SUSPICIOUS: f64 = 5.0;
+
+/// What is hardly meant about a leaf at rest, one short sentence each.
+pub fn doubts(scenario: &Scenario, leaf: &Equilibrium) -> Vec<String> {
+    if !leaf.outcome.is_at_rest() {
+        return Vec::new();
+    }
+    let rods = &leaf.shape.rods;
+    let mut all: Vec<String> = too_long(scenario).into_iter().collect();
+    all.extend(inverted(rods, &leaf.shape.stations).or_else(|| {
+        let all = strains(scenario, rods, &leaf.shape.stations);
+        stretched(all)
+    }));
+    all
+}
+
+/// Stretch less that at rest over it, with the vein and the fraction of its length.
+fn strains<'l>(
+    scenario: &'l Scenario,
+    rods: &'l [RodShape],
+    stations: &'l [f64],
+) -> impl Iterator<Item = (f64, usize, f64)> + 'l {
+    let of = move |(j, rod): (usize, &'l RodShape)| {
+        let rest = &scenario.rods[j].rest_stretch;
+        let nodes = rod.nodes.iter().zip(stations);
+        nodes.map(move |(node, at)| (node.v.x / rest.at(*at) - 1.0, j, *at))
+    };
+    rods.iter().enumerate().flat_map(of)
+}
+
+fn stretched(strains: impl Iterator<Item = (f64, usize, f64)>) -> Option<String> {
+    let (strain, j, at) = strains.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (strain > STRETCHED).then(|| {
+        format!(
+            "vein {} is stretched by {:.0} % at {at:.2} of its length: few materials follow a linear law so far",
+            j + 1,
+            100.0 * strain
+        )
+    })
+}
+
+/// A vein whose elements point backwards.
+fn inverted(rods: &[RodShape], stations: &[f64]) -> Option<String> {
+    let backwards = |rod: &RodShape| rod.nodes.iter().position(|node| node.v.x <= 0.0);
+    let mut rods = rods.iter().enumerate();
+    rods.find_map(|(j, rod)| {
+        let at = stations[backwards(rod)?];
+        Some(format!(
+            "vein {} is turned through itself at {at:.2} of its length, which no body can be: raise stiffness.axial",
+            j + 1
+        ))
+    })
+}
+
+/// A leaf that is longer than any can be by its own weight and stiffness, if nothing but its
+/// base holds it.
+fn too_long(scenario: &Scenario) -> Option<String> {
+    if scenario.held_tip.is_some() {
+        return None;
+    }
+    let weight = DVec3::from_array(scenario.gravity).length();
+    let times = |rod: &Rod| {
+        let bending = rod.couple_stiffness[1..]
+            .iter()
+            .map(|profile| profile.at(0.0));
+        let stiffest = bending.fold(0.0, f64::max);
+        rod.length / (stiffest / weight).cbrt()
+    };
+    let shortest = scenario
+        .rods
+        .iter()
+        .map(times)
+        .fold(f64::INFINITY, f64::min);
+    // 9.81, and with other units of length a power of ten of it.
+    let digits = weight / 10_f64.powf((weight / ACCELERATION).log10().round());
+    let slip = (digits / ACCELERATION - 1.0).abs() < ROUNDED;
+    if weight == 0.0 || shortest < if slip { SUSPICIOUS } else { TOO_LONG } {
+        return None;
+    }
+    let advice = match slip {
+        true => {
+            "load.gravity is a force per length, mass per length times 9.81, not the acceleration"
+        }
+        false => "load.gravity is a force per length: check it, the stiffnesses and the units",
+    };
+    Some(format!(
+        "every vein is {shortest:.0} times longer than (A/q)^(1/3), over which it carries its weight: {advice}"
+    ))
+}

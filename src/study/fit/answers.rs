@@ -1,0 +1,102 @@
+//! How a leaf at rest answers the free numbers.
+
+use std::sync::{Mutex, PoisonError};
+
+use crate::leaf::{Forces, LeafRate, Response};
+use crate::relax::{AtRest, Level, Linearized, Lost};
+
+/// Relative accuracy of where a leaf is expected, from which it is brought to rest.
+const PREDICTED: f64 = 1e-3;
+
+/// The equations of a leaf at rest, linearised on every grid, and what the free numbers
+/// do to them.
+pub(super) struct Answers {
+    linear: Mutex<Vec<Linearized>>,
+    /// On every grid, of each number.
+    forces: Vec<Vec<Forces>>,
+    /// Of each number, on every grid: none where equations are solved for the data, as
+    /// there are fewer of these.
+    pub each: Vec<Vec<Response>>,
+}
+
+fn singular() -> Lost {
+    Lost::NotAtRest("the leaf is at a singular point".into())
+}
+
+impl Answers {
+    /// The equations about a leaf at rest.
+    pub fn new(at: &AtRest, rates: &[LeafRate], tolerance: f64) -> Answers {
+        let linear = at.levels.iter();
+        let linear: Vec<_> = linear
+            .map(|level| Linearized::new(level, tolerance))
+            .collect();
+        let forces = linear.iter().zip(&at.levels);
+        Answers {
+            forces: forces
+                .map(|(linear, level)| linear.forces(level, rates))
+                .collect(),
+            linear: Mutex::new(linear),
+            each: Vec::new(),
+        }
+    }
+
+    /// Solves them for each number.
+    pub fn solve_each(&mut self, levels: &[Level]) -> Result<(), Lost> {
+        let count = self.forces.first().map_or(0, Vec::len);
+        let mut all = vec![Vec::new(); count];
+        let linear = self
+            .linear
+            .get_mut()
+            .unwrap_or_else(PoisonError::into_inner);
+        for ((level, linear), forces) in levels.iter().zip(linear).zip(&self.forces) {
+            let answers = linear.answers(level, forces).ok_or_else(singular)?;
+            for (all, answer) in all.iter_mut().zip(answers) {
+                all.push(answer);
+            }
+        }
+        self.each = all;
+        Ok(())
+    }
+
+    /// How results on one grid change with each number, if unit forces on the leaf
+    /// answer for these results: by one solution for each.
+    pub fn by_results(
+        &self,
+        (k, level): (usize, &Level),
+        units: &[Forces],
+    ) -> Result<Vec<Vec<f64>>, Lost> {
+        let mut all = self.linear.lock().unwrap_or_else(PoisonError::into_inner);
+        let linear = &mut all[k];
+        let answers = linear.answers(level, units).ok_or_else(singular)?;
+        let rates = |answer| {
+            let forces = self.forces[k].iter();
+            forces
+                .map(|force| linear.work(level, force, answer))
+                .collect()
+        };
+        Ok(answers.iter().map(rates).collect())
+    }
+
+    /// The answer on each of these grids to steps of the numbers.
+    pub fn to(&self, levels: &[Level], steps: &[f64]) -> Result<Vec<Response>, Lost> {
+        let on = |(k, level): (usize, &Level)| {
+            let (rods, segments) = (level.leaf.rods(), level.leaf.segments());
+            if !self.each.is_empty() {
+                let mut sum = Response::none(rods, segments);
+                for (answers, step) in self.each.iter().zip(steps) {
+                    sum.add(*step, &answers[k]);
+                }
+                return Ok(sum);
+            }
+            let mut sum = Forces::none(rods);
+            for (forces, step) in self.forces[k].iter().zip(steps) {
+                sum.add(*step, forces);
+            }
+            let mut all = self.linear.lock().unwrap_or_else(PoisonError::into_inner);
+            let answer = all[k].answers_to(level, &[sum], PREDICTED);
+            let answer = answer.ok_or_else(singular)?;
+            answer.into_iter().next().ok_or_else(singular)
+        };
+        levels.iter().enumerate().map(on).collect()
+    }
+}
