@@ -41,6 +41,9 @@ fn soft_leaf_with_many() {
     assert_eq!(saddle.equilibrium.stability.negative_eigenvalues, Some(18));
     let plain = all.found.iter().filter(|one| one.plain).count();
     assert_eq!(plain, 1, "the plain start is told");
+    let remark = all.remark.as_deref().unwrap();
+    println!("{remark}");
+    assert!(remark.contains("equilibrium 2, but number 1 is stable"));
     for one in &all.found {
         let residual = one.equilibrium.accuracy.residual.unwrap();
         assert!(residual < 1e-7, "{residual}");
@@ -74,6 +77,7 @@ fn a_stiff_leaf_has_one_whatever_the_threads() {
     assert_eq!(one, two);
     assert_eq!(one["equilibria"].as_array().unwrap().len(), 1);
     assert_eq!(one["equilibria"][0]["stable"], true);
+    assert_eq!(one["remark"], serde_json::Value::Null);
     let files = ["equilibria.json", "equilibria.png", "equilibria.svg"];
     assert_eq!(place.names("out/small"), files);
     place.picture("out/small/equilibria");

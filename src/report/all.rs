@@ -37,6 +37,7 @@ pub fn lines(all: &All, files: Option<String>) -> Lines {
         ),
     ));
     lines.extend(files.map(|files| ("written", files)));
+    lines.extend(all.remark.clone().map(|remark| ("remark", remark)));
     lines.push((
         "remark",
         "there may be more: no number of starts proves that these are all".into(),

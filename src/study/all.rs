@@ -6,6 +6,7 @@ use serde::{Serialize, Serializer};
 
 use super::judge::common;
 use crate::limit::Limit;
+use crate::numbers::power_of_ten;
 use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax, serialize_index};
 use crate::scenario::Scenario;
 use crate::shape::serialize_tips;
@@ -22,6 +23,9 @@ const MOST: usize = 160;
 /// their error estimates, are one.
 const SAME: f64 = 1e-3;
 
+/// Energies that differ by less than this part are the same.
+const SAME_ENERGY: f64 = 1e-6;
+
 /// The equilibria of a leaf that many starts have found. As JSON it is
 /// `equilibria.json`.
 #[derive(Clone, Debug, Serialize)]
@@ -35,6 +39,8 @@ pub struct All {
     /// The equilibria, lowest energy first.
     #[serde(rename = "equilibria")]
     pub found: Vec<Found>,
+    /// That a stable one has less energy than the one in which a relaxation ends.
+    pub remark: Option<String>,
     /// Time of all, in seconds.
     pub wall_seconds: f64,
 }
@@ -102,6 +108,7 @@ pub fn all(
         found: Vec::new(),
         starts: 0,
         failed: 0,
+        remark: None,
         wall_seconds: 0.0,
     };
     let find = |how: SemiImplicit| {
@@ -148,6 +155,7 @@ pub fn all(
         let [a, b] = [a, b].map(|found| found.equilibrium.energy.unwrap_or(f64::NAN));
         a.total_cmp(&b)
     });
+    all.remark = all.lower();
     all.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(all)
 }
@@ -171,6 +179,27 @@ impl All {
                 plain,
             }),
         }
+    }
+}
+
+impl All {
+    /// Which stable equilibrium has less energy than the one of the undisturbed start.
+    fn lower(&self) -> Option<String> {
+        let plain = self.found.iter().position(|found| found.plain)?;
+        let stable = |found: &Found| found.equilibrium.stable() == Some(true);
+        let lowest = self.found.iter().position(stable)?;
+        let [least, energy] = [lowest, plain].map(|k| self.found[k].equilibrium.energy);
+        let (least, energy) = (least?, energy?);
+        // Mirror images are alike but for rounding.
+        let less = energy - least;
+        (less > SAME_ENERGY * energy.abs()).then(|| {
+            format!(
+                "a relaxation ends in equilibrium {}, but number {} is stable, too, and has less energy, by {}",
+                plain + 1,
+                lowest + 1,
+                power_of_ten(less)
+            )
+        })
     }
 }
 
