@@ -398,7 +398,7 @@ fn keys_and_their_order_are_fixed() {
         ),
         (
             "relax --all",
-            "scenario starts failed equilibria wall_seconds",
+            "scenario starts failed equilibria remark wall_seconds",
         ),
         (
             "simulate --set dynamics.duration=0.2",
