@@ -17,7 +17,7 @@ use common::{
 use leafdyn::internals::leaf::{DiscreteLeaf, Leaf, State, shift, turn};
 use leafdyn::internals::modes;
 use leafdyn::internals::motion::{Inertia, Physics};
-use leafdyn::relax::{Equilibrium, Method, Mode, Options, relax};
+use leafdyn::relax::{Equilibrium, Limit, Method, Mode, Options, relax};
 use leafdyn::scenario::{Dynamics, Profile, Scenario, Schedule};
 use nalgebra::SymmetricEigen;
 use proptest::prelude::*;
@@ -272,7 +272,7 @@ fn a_leaf_let_go_in_a_mode_keeps_its_frequency() {
     let (grid, physics) = (discrete(&leaf, 6), Physics::new(&leaf));
     let mut exact = state.clone();
     settle_forces(&grid, &mut exact);
-    for pair in modes::lowest(&grid, &physics, &exact, 5).unwrap() {
+    for pair in modes::lowest(&grid, &physics, &exact, 5, &Limit::default()).unwrap() {
         let omega = pair.eigenvalue.sqrt();
         let mut start = state.clone();
         for (node, increment) in pair.shape.iter().enumerate() {
@@ -307,7 +307,7 @@ fn shapes_are_orthonormal() {
     let (grid, physics) = (discrete(&leaf, 8), Physics::new(&leaf));
     let mut exact = state.clone();
     settle_forces(&grid, &mut exact);
-    let pairs = modes::lowest(&grid, &physics, &exact, 8).unwrap();
+    let pairs = modes::lowest(&grid, &physics, &exact, 8, &Limit::default()).unwrap();
     for (a, first) in pairs.iter().enumerate() {
         for (b, second) in pairs.iter().enumerate() {
             let mut product = 0.0;

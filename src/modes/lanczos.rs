@@ -4,6 +4,7 @@
 //! inverse).
 
 use super::masses::Masses;
+use crate::limit::Limit;
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Accuracy of an eigenvector, relative to its eigenvalue; that of the
@@ -37,6 +38,8 @@ pub struct Lanczos<'a> {
     pub solve: &'a mut dyn FnMut(&mut [f64]),
     /// Eigenvectors that are not to be found again.
     pub known: &'a [Mode],
+    /// When it ends with nothing found.
+    pub time: &'a Limit,
 }
 
 /// In eight sums, so that none waits for the one before.
@@ -67,7 +70,7 @@ impl Lanczos<'_> {
         let mut basis: Vec<Vec<f64>> = Vec::new();
         let (mut diagonal, mut off): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
         let mut length = self.orthogonal(&mut next, &basis);
-        while basis.len() < most && length > 0.0 {
+        while basis.len() < most && length > 0.0 && !self.time.reached() {
             next.iter_mut().for_each(|x| *x /= length);
             let loaded = self.masses.times(&next);
             let mut image = loaded.clone();

@@ -21,6 +21,7 @@ mod quotient;
 use crate::leaf::{
     DiscreteLeaf, Increment, SparseError, SparseFactor, SparsePattern, State, System,
 };
+use crate::limit::Limit;
 use crate::motion::Physics;
 use glam::DVec3;
 use lanczos::{Lanczos, Mode};
@@ -68,16 +69,18 @@ struct Vibration<'a> {
     system: System,
     pattern: SparsePattern,
     masses: Masses,
+    time: &'a Limit,
 }
 
 /// The lowest `count` eigenvalues, ascending, all if there are fewer, with
-/// their modes, which are orthonormal with the masses. `None` if memory is short, or
-/// the list cannot be proved to be complete.
+/// their modes, which are orthonormal with the masses. `None` if memory is short, the
+/// time is over, or the list cannot be proved to be complete.
 pub fn lowest(
     leaf: &DiscreteLeaf,
     physics: &Physics,
     state: &State,
     count: usize,
+    time: &Limit,
 ) -> Option<Vec<Eigenpair>> {
     let soft = softened(leaf, state);
     let system = System::new(&soft);
@@ -88,6 +91,7 @@ pub fn lowest(
         state,
         system,
         pattern,
+        time,
     };
     let found = vibration.lowest(count)?;
     let pair = |vector: &Vec<f64>| {
@@ -173,6 +177,9 @@ impl Vibration<'_> {
         let (mut shift, mut limit) = (lowest, f64::INFINITY);
         let mut wanted = count;
         for search in 0..SEARCHES + count {
+            if self.time.reached() {
+                return None;
+            }
             if search > 0 {
                 let sought = (wanted, limit);
                 let searched = self.search((shift, None), sought, search, &mut found);
@@ -250,6 +257,7 @@ impl Vibration<'_> {
             shift,
             solve: &mut |b| factor.solve_vector(b),
             known: found,
+            time: self.time,
         };
         let (more, bound) = lanczos.run(start, wanted, limit);
         found.extend(more);

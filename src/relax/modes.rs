@@ -54,7 +54,10 @@ pub fn lowest(run: &Run) -> Option<Vec<Mode>> {
     let finest = levels.last()?;
     let physics = Physics::new(run.leaf);
     let count = options.modes;
-    let on = |level: &Level| modes::lowest(&level.leaf, &physics, &level.state, count);
+    let on = |level: &Level| {
+        let limit = &options.limit;
+        modes::lowest(&level.leaf, &physics, &level.state, count, limit)
+    };
     let coarser = &levels[levels.len().saturating_sub(GRIDS)..levels.len() - 1];
     let (pairs, coarser) =
         rayon::join(|| on(finest), || coarser.iter().map(on).collect::<Vec<_>>());

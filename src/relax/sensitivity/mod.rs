@@ -10,6 +10,7 @@ pub(crate) use self::nearby::Nearby;
 pub(crate) use self::response::Linearized;
 use self::series::Series;
 use crate::leaf::{DiscreteLeaf, Forces, LeafRate, Response, shift, turn};
+use crate::limit::Limit;
 use crate::modes;
 use crate::motion::Physics;
 use crate::relax::equilibrium::{Reaction, Sensitivity};
@@ -198,7 +199,7 @@ impl Grid<'_> {
         // A dead moment has no potential, and the matrix no real modes.
         let physics = Physics::new(&leaf.leaf);
         let modes = match self.modes > 0 && moment == DVec3::ZERO {
-            true => modes::lowest(leaf, &physics, state, self.modes),
+            true => modes::lowest(leaf, &physics, state, self.modes, &Limit::default()),
             false => None,
         };
         let modes = modes.unwrap_or_default();

@@ -11,6 +11,7 @@ use super::data::{Experiment, Measured, Origin, Traced};
 use super::quantity::{Kind, Quantity};
 use super::vein::Vein;
 use crate::leaf::{LeafRate, Response, shift};
+use crate::limit::Limit;
 use crate::modes;
 use crate::motion::Physics;
 use crate::relax::{AtRest, Level, Lost, Nearby, Number, extrapolation, unit_forces};
@@ -124,7 +125,13 @@ impl CaseAt {
             let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
             if modes.is_empty() || unknowns < FEW_UNKNOWNS {
                 let physics = Physics::new(&level.leaf.leaf);
-                let pairs = modes::lowest(&level.leaf, &physics, &level.state, count);
+                let pairs = modes::lowest(
+                    &level.leaf,
+                    &physics,
+                    &level.state,
+                    count,
+                    &Limit::default(),
+                );
                 let lost = || Lost::NotAtRest("its frequencies cannot be found".into());
                 let pairs = pairs
                     .filter(|pairs| pairs.len() == count)
