@@ -29,7 +29,7 @@ LONG: dict[str, Callable[[], Any]] = {
     "dicts": lambda: [leafdyn.Scenario(fan(5)) for _ in range(1_000_000)],
     "modes": lambda: leafdyn.modes(fan(1500), 20, tolerance=1e-8),
     "relax_many": lambda: leafdyn.relax_many([fan(5)] * 20_000),
-    "check": lambda: leafdyn.check(fan(60), tolerance=1e-10),
+    "check": lambda: leafdyn.check(fan(120), tolerance=1e-10),
     "all_shapes": lambda: leafdyn.all_shapes(FIG10, tolerance=1e-7),
     "trace": lambda: leafdyn.trace(FIG10, "load.gravity[2]=-0.01..-3", set={"leaf.rods": 9}, switch=True),
     "boundary": lambda: leafdyn.trace(
@@ -55,7 +55,7 @@ def time_to_stop(run: Callable[[], Any]) -> float:
         sent.append(time.perf_counter())
         os.kill(os.getpid(), signal.SIGINT)
 
-    timer = threading.Timer(0.3, send)
+    timer = threading.Timer(0.2, send)
     timer.start()
     try:
         with pytest.raises(KeyboardInterrupt):
