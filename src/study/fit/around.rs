@@ -4,8 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::case::CaseAt;
-use super::interval::OPEN;
-use super::judge::Judge;
+use super::judge::{Judge, OPEN};
 use super::model::Point;
 use crate::relax::{Grids, Lost};
 

@@ -4,14 +4,10 @@
 use nalgebra::DVector;
 
 use super::around::{Around, Least, Slopes};
-use super::judge::Judge;
+use super::judge::{Judge, OPEN};
 use super::least_squares::{End, Iteration};
 use super::model::Point;
 use super::result::FitParameter;
-
-/// A number that may be this far off, in logarithms or units, is not determined: a
-/// factor of ten.
-pub(super) const OPEN: f64 = std::f64::consts::LN_10;
 
 /// The sum of squares at the ends of an interval may be off by this part before the
 /// interval is taken from the profile of the sum.

@@ -8,6 +8,10 @@ use super::least_squares::Weighing;
 use super::model::{Model, Point};
 use super::quantity::Kind;
 
+/// A number that may be this far off, in logarithms or units, is not determined: a
+/// factor of ten.
+pub(super) const OPEN: f64 = std::f64::consts::LN_10;
+
 /// A number whose component in combinations that no datum feels is larger than this is
 /// not determined.
 const TAKES_PART: f64 = 1e-3;
