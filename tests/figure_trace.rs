@@ -140,6 +140,14 @@ fn what_varies_by_its_logarithm_has_a_logarithmic_axis() {
     assert!((first - second).abs() < 0.1 && first > 100.0, "{decades:?}");
 }
 
+/// The coordinates of a path of straight lines.
+fn numbers(path: &str) -> Vec<f64> {
+    let (_, path) = path.split_once("d=\"M").unwrap();
+    let path = path.split(['Z', '"']).next().unwrap();
+    let numbers = path.split([' ', 'L']).map(|number| number.parse().unwrap());
+    numbers.collect()
+}
+
 #[test]
 fn the_line_of_a_force_law_ends_within_its_frame() {
     let svg = figure(&PITCHFORK);
@@ -150,24 +158,18 @@ fn the_line_of_a_force_law_ends_within_its_frame() {
         .lines()
         .find(|line| line.contains("stroke=\"#d55e00\""))
         .unwrap();
-    let (_, path) = line.split_once("d=\"M").unwrap();
-    let numbers: Vec<f64> = (path.split('"').next().unwrap().split([' ', 'L']))
-        .map(|number| number.parse().unwrap())
-        .collect();
+    let ends = numbers(line);
     // The frame is the rectangle, the only closed path without a fill.
     let frame = law
         .lines()
         .find(|line| line.contains("Z\" stroke"))
         .unwrap();
-    let (_, path) = frame.split_once("d=\"M").unwrap();
-    let corners: Vec<f64> = (path.split('Z').next().unwrap().split([' ', 'L']))
-        .map(|number| number.parse().unwrap())
-        .collect();
+    let corners = numbers(frame);
     let [left, top, right, _, _, bottom] = corners[..6] else {
         panic!()
     };
-    let [x0, y0, x1, y1] = numbers[..] else {
-        panic!("{numbers:?}")
+    let [x0, y0, x1, y1] = ends[..] else {
+        panic!("{ends:?}")
     };
     // Not cut off at the frame, but ending inside.
     for (x, y) in [(x0, y0), (x1, y1)] {
