@@ -103,7 +103,7 @@ fn parameter(
     let (deviation, along) = shape.deviation(k);
     let first = shape.quantile * deviation;
     if let Some(found) = around.and_then(|around| ends(around, k, first, half)) {
-        if let Some(found) = found {
+        if let Ends::Apart(found) = found {
             parameter.profiled = true;
             sides = found;
         }
@@ -141,9 +141,17 @@ fn above(judge: &Judge, point: &Point) -> f64 {
     (sum(&residuals) - sum(&judge.residuals)) / judge.spread.powi(2)
 }
 
-/// The ends of an interval by a few points around the minimum: `Some(None)` where the
-/// curvature has them, and `None` where these points do not tell.
-fn ends(around: &Around, k: usize, first: f64, half: f64) -> Option<Option<[Side; 2]>> {
+/// What a few points around a minimum tell of the ends of an interval.
+enum Ends {
+    /// They are where the curvature has them,
+    Straight,
+    /// or elsewhere, below and above.
+    Apart([Side; 2]),
+}
+
+/// The ends of an interval by a few points around the minimum; `None` where these do not
+/// tell.
+fn ends(around: &Around, k: usize, first: f64, half: f64) -> Option<Ends> {
     let judge = around.judge;
     let slopes = around.slopes();
     let along = judge.conditional(k, OPEN);
@@ -160,7 +168,7 @@ fn ends(around: &Around, k: usize, first: f64, half: f64) -> Option<Option<[Side
             (least.as_ref()).is_some_and(|least| off(least.above) < CLEARLY * STRAIGHT)
         };
         if sides.iter().all(clear) {
-            return Some(None);
+            return Some(Ends::Straight);
         }
     }
     let [low, high] = judge.model.coordinates[k].bounds;
@@ -173,8 +181,8 @@ fn ends(around: &Around, k: usize, first: f64, half: f64) -> Option<Option<[Side
     let up = reach(1.0, high - theta)?;
     let same = |side: &Side| matches!(side, Side::At(reach) if *reach == first);
     Some(match same(&down) && same(&up) && half <= OPEN {
-        true => None,
-        false => Some([down, up]),
+        true => Ends::Straight,
+        false => Ends::Apart([down, up]),
     })
 }
 
