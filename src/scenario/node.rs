@@ -16,6 +16,9 @@ pub(super) enum Node<'e> {
     Alone(&'e Value),
 }
 
+/// A number is larger than numbers can be.
+pub(super) struct TooLarge;
+
 impl<'e> Node<'e> {
     pub(super) fn text(self) -> Option<&'e str> {
         match self {
@@ -42,10 +45,10 @@ impl<'e> Node<'e> {
         }
     }
 
-    /// A number, none if it is larger than numbers can be.
-    pub(super) fn number(self) -> Option<Option<f64>> {
+    /// A number.
+    pub(super) fn number(self) -> Option<Result<f64, TooLarge>> {
         let value = match self {
-            Node::Alone(value) => return number(value).map(Some),
+            Node::Alone(value) => return number(value).map(Ok),
             Node::Read(value) => value.get_ref(),
         };
         // 1e999 parses to infinity, which nobody wrote.
@@ -60,7 +63,8 @@ impl<'e> Node<'e> {
             DeValue::Float(float) => (float.as_str().parse().ok(), float.as_str().contains("inf")),
             _ => return None,
         };
-        Some(value.filter(|value| says_infinite || !f64::is_infinite(*value)))
+        let value = value.filter(|value| says_infinite || !f64::is_infinite(*value));
+        Some(value.ok_or(TooLarge))
     }
 
     /// How many entries a list has.

@@ -51,7 +51,7 @@ impl<'e> Item<'e> {
         let value = self.node().number();
         let value = value.ok_or_else(|| self.refuse("must be a number"))?;
         let too_large = "is not a number a computer can hold (the largest is 1.8e308)";
-        let value = value.ok_or_else(|| self.refuse(too_large))?;
+        let value = value.map_err(|_| self.refuse(too_large))?;
         let positive = matches!(range, Range::Positive | Range::PositiveOrInfinite);
         let problem = match value {
             _ if value.is_nan() || value == f64::NEG_INFINITY => "must be a finite number",
