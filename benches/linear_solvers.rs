@@ -4,7 +4,7 @@
 
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, Solved, SparsePattern, State, System};
 use leafdyn::internals::relax::start;
-use leafdyn::relax::{Equilibrium, Options, relax};
+use leafdyn::relax::{Equilibrium, Options, Progress, relax};
 use leafdyn::scenario::Scenario;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -154,7 +154,9 @@ fn run(scenario: &Scenario) -> (Equilibrium, BTreeMap<usize, usize>) {
     };
     let mut steps = BTreeMap::new();
     let found = relax(scenario, &options, &mut |progress| {
-        *steps.entry(progress.grid).or_default() += 1;
+        if let Progress::Relaxing { grid, .. } = progress {
+            *steps.entry(*grid).or_default() += 1;
+        }
     })
     .expect("a valid request");
     assert!(found.outcome.is_success());

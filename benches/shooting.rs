@@ -28,7 +28,7 @@ fn fastest(leaf: &Scenario, relaxed: &Equilibrium, threads: usize) -> (f64, Solu
     (0..2 + RODS_IN_ALL / leaf.rods.len())
         .map(|_| {
             let clock = Instant::now();
-            let solution = pool.install(|| bvp::solve(leaf, &options));
+            let solution = pool.install(|| bvp::solve(leaf, &options, &mut |_| {}));
             let milliseconds = 1e3 * clock.elapsed().as_secs_f64();
             (milliseconds, solution.expect("the leaf has a solution"))
         })

@@ -22,7 +22,7 @@ fn scenes() -> Vec<Scenario> {
 fn shot(scenario: &Scenario, leaf: &Equilibrium, precision: Precision) -> Solution {
     let (stations, rods) = (&leaf.shape.stations[..], &leaf.shape.rods[..]);
     let options = Options::new(Start::Leaf { stations, rods }, stations, precision);
-    found(scenario, solve(scenario, &options))
+    found(scenario, solve(scenario, &options, &mut |_| {}))
 }
 
 /// Asserts that no error is beyond its estimate, but for what the truth itself

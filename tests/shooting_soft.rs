@@ -95,7 +95,7 @@ fn the_accuracy_asked_for_is_reached() {
             let (stations, rods) = (&relaxed.shape.stations[..], &relaxed.shape.rods[..]);
             let start = Start::Leaf { stations, rods };
             let options = Options::new(start, stations, Precision::Error(accuracy));
-            let shot = found(&leaf, solve(&leaf, &options));
+            let shot = found(&leaf, solve(&leaf, &options, &mut |_| {}));
             assert!(shot.error.position <= accuracy);
             let off = apart(&leaf, &relaxed.shape.rods, &shot.rods);
             let both = accuracy + relaxed.accuracy.error_estimate.unwrap();

@@ -54,7 +54,7 @@ fn shooting_finds_equal_bits_on_one_two_and_five_threads() {
             let stations: Vec<f64> = (0..=16).map(|i| i as f64 / 16.0).collect();
             let precision = bvp::Precision::LocalError(1e-11);
             let options = bvp::Options::new(start, &stations, precision);
-            let shot = on_threads(threads, || bvp::solve(leaf, &options)).unwrap();
+            let shot = on_threads(threads, || bvp::solve(leaf, &options, &mut |_| {})).unwrap();
             let numbers = [
                 shot.error.position,
                 shot.error.force,

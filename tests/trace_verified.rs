@@ -157,7 +157,7 @@ fn is_equilibrium(what: &str, family: &Family, branch: &Followed, number: usize)
         rods: &rods,
     };
     let options = bvp::Options::new(start, stations, LocalError(SHARP));
-    let shot = bvp::solve(&scenario, &options).ok()?;
+    let shot = bvp::solve(&scenario, &options, &mut |_| {}).ok()?;
     let length = family.scale().length;
     for (rod, tip) in shot.rods.iter().zip(&point.tips) {
         let off = rod.nodes.last()?.position / length - DVec3::from_array(*tip);

@@ -4,7 +4,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use leafdyn::relax::{self, Equilibrium, Method, Options, Progress, RelaxError, Settings};
+use leafdyn::relax::{
+    self, Correction, Equilibrium, Method, Options, Progress, RelaxError, Settings,
+};
 use leafdyn::scenario;
 use leafdyn::study::{self, Keys, SensitivityError};
 use pyo3::exceptions::PyValueError;
@@ -91,14 +93,11 @@ impl Asked {
 /// Says how far a relaxation has come, step by step.
 pub fn heard<'a>(monitor: &'a Monitor, name: &'a str) -> impl FnMut(&Progress) + 'a {
     move |progress| {
-        monitor.say(progress.step as f64, None, || {
-            let Progress {
-                grid,
-                step,
-                residual,
-            } = progress;
-            format!("{name}: {grid} segments a vein, step {step}, residual {residual:.1e}")
-        });
+        let (Progress::Relaxing { step, .. }
+        | Progress::Shooting(Correction {
+            iteration: step, ..
+        })) = progress;
+        monitor.say(*step as f64, None, || format!("{name}: {progress}"));
     }
 }
 

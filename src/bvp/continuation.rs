@@ -4,8 +4,7 @@
 
 use super::equations::Equations;
 use super::newton::Newton;
-use super::solution::{Reason, Work};
-
+use super::solution::{Log, Reason};
 use super::trajectory::Trajectory;
 
 /// Accuracy of the solutions on the way.
@@ -57,11 +56,11 @@ enum Strategy {
 pub fn from_arcs(
     equations: &mut Equations,
     intervals: Option<usize>,
-    work: &mut Work,
+    log: &mut Log,
 ) -> Result<Trajectory, Interrupted> {
     let mut first = None;
     for strategy in STRATEGIES {
-        match strategy.follow(equations, intervals, work) {
+        match strategy.follow(equations, intervals, log) {
             Ok(near) => return Ok(near),
             Err(failure) => first = first.or(Some(failure)),
         }
@@ -74,7 +73,7 @@ impl Strategy {
         self,
         equations: &mut Equations,
         intervals: Option<usize>,
-        work: &mut Work,
+        log: &mut Log,
     ) -> Result<Trajectory, Interrupted> {
         equations.part = 0.0;
         let stiff = self == Strategy::Stiff;
@@ -86,12 +85,12 @@ impl Strategy {
             near: Trajectory::straight(equations),
         })?;
         let load: Stage = |equations| &mut equations.part;
-        let near = self.follow_stage(load, equations, near, intervals, work)?;
+        let near = self.follow_stage(load, equations, near, intervals, log)?;
         if !stiff {
             return Ok(near);
         }
         let soften: Stage = |equations| &mut equations.softened;
-        self.follow_stage(soften, equations, near, intervals, work)
+        self.follow_stage(soften, equations, near, intervals, log)
     }
 
     /// Changes the equations by one stage, all of it at first.
@@ -101,31 +100,33 @@ impl Strategy {
         equations: &mut Equations,
         mut near: Trajectory,
         intervals: Option<usize>,
-        work: &mut Work,
+        log: &mut Log,
     ) -> Result<Trajectory, Interrupted> {
         let (mut part, mut step) = (0.0, 1.0);
         let mut before: Option<(Trajectory, f64)> = None;
-        let (begun, rods) = (work.slopes, equations.rods());
+        let (begun, rods) = (log.work.slopes, equations.rods());
         while part < 1.0 {
-            let spent = |work: &Work| (work.slopes - begun) * rods;
+            log.way = part;
+            let spent = |log: &Log| (log.work.slopes - begun) * rods;
             let next = if step >= 1.0 - part { 1.0 } else { part + step };
             *stage(equations) = next;
             let predicted = match &before {
                 Some((earlier, at)) => near.beyond(equations, earlier, (next - part) / (part - at)),
                 None => near.clone(),
             };
-            match self.solve_near(equations, &predicted, intervals, work) {
+            match self.solve_near(equations, &predicted, intervals, log) {
                 Ok(trajectory) => {
                     before = Some((std::mem::replace(&mut near, trajectory), part));
                     part = next;
                     step *= 2.0;
                 }
-                Err(_) if step > LEAST_STEP && spent(work) < BUDGET => step *= 0.5,
+                Err(_) if step > LEAST_STEP && spent(log) < BUDGET => step *= 0.5,
                 Err(reason) => {
                     return Err(Interrupted { reason, part, near });
                 }
             }
         }
+        log.way = 1.0;
         Ok(near)
     }
 
@@ -135,13 +136,13 @@ impl Strategy {
         equations: &Equations,
         near: &Trajectory,
         intervals: Option<usize>,
-        work: &mut Work,
+        log: &mut Log,
     ) -> Result<Trajectory, Reason> {
         let count = intervals.unwrap_or_else(|| {
             let turns = (near.turn(equations) / TURN).ceil() as usize;
             turns.clamp(LEAST_INTERVALS, MOST_INTERVALS)
         });
-        let mut newton = Newton::near(equations, near, Some(count), work)?;
+        let mut newton = Newton::near(equations, near, Some(count), log)?;
         newton.only_near = self != Strategy::Far;
         newton.solve(ROUGH)?;
         let stations = STATIONS * count.max(LEAST_INTERVALS);

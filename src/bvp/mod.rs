@@ -52,5 +52,7 @@ mod state;
 mod tableau;
 mod trajectory;
 
-pub use solution::{Failure, Neutral, Options, Precision, Reason, Solution, Start, Work};
+pub use solution::{
+    Correction, Failure, Neutral, Options, Precision, Reason, Solution, Start, Work,
+};
 pub use solve::solve;

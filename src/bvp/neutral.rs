@@ -21,7 +21,7 @@ const NUDGE: f64 = 1e-5;
 /// Stations at which that is done.
 const STATIONS: [f64; 9] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
 
-impl Newton<'_, '_> {
+impl Newton<'_, '_, '_> {
     /// Smallest singular value of the condensed equations over the largest.
     pub fn condition(&self) -> f64 {
         self.march.as_ref().map_or(1.0, |march| march.condition())

@@ -10,7 +10,7 @@ use super::dop853::Unbounded;
 use super::equations::{Equations, RodState};
 use super::intervals::{Integrated, Units, choose, integrate, sensitivities};
 use super::march::March;
-use super::solution::{Reason, Work};
+use super::solution::{Correction, Log, Reason};
 use super::trajectory::{Nodes, Trajectory};
 use crate::memory::Request;
 
@@ -43,7 +43,7 @@ pub enum Stuck {
 }
 
 /// The state of a run: its linearisation is kept from one call to the next.
-pub struct Newton<'e, 'a> {
+pub struct Newton<'e, 'a, 'p> {
     /// The equations.
     pub equations: &'e Equations<'a>,
     /// Units of the unknowns.
@@ -58,8 +58,8 @@ pub struct Newton<'e, 'a> {
     pub growth: Vec<f64>,
     /// Largest defect at the last evaluation, in the units.
     pub defect: f64,
-    /// Work, added up.
-    work: &'e mut Work,
+    /// What is done.
+    log: &'e mut Log<'p>,
 }
 
 /// By how much the unknowns do not solve the equations.
@@ -70,7 +70,7 @@ struct Residuals {
     conditions: Vec<f64>,
 }
 
-impl<'e, 'a> Newton<'e, 'a> {
+impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
     /// Sets up the unknowns from a trajectory, over so many intervals; `None`:
     /// as many as the growth of perturbations needs, if that is possible and
     /// memory allows it.
@@ -78,7 +78,7 @@ impl<'e, 'a> Newton<'e, 'a> {
         equations: &'e Equations<'a>,
         near: &Trajectory,
         intervals: Option<usize>,
-        work: &'e mut Work,
+        log: &'e mut Log<'p>,
     ) -> Result<Self, Reason> {
         let mut nodes = match intervals {
             Some(count) => {
@@ -103,7 +103,7 @@ impl<'e, 'a> Newton<'e, 'a> {
             march: None,
             growth: Vec::new(),
             defect: f64::INFINITY,
-            work,
+            log,
         })
     }
 
@@ -120,12 +120,18 @@ impl<'e, 'a> Newton<'e, 'a> {
             true => self.linearize(tolerance)?,
         };
         let mut size = f64::INFINITY;
-        'iterations: for _ in 0..MAX_ITERATIONS {
+        'iterations: for iteration in 0..MAX_ITERATIONS {
             let step = self.correction(&residuals);
             size = largest(&step);
             if !size.is_finite() {
                 break;
             }
+            (self.log.progress)(&Correction {
+                way: self.log.way,
+                iteration,
+                size,
+                wanted: tolerance,
+            });
             factor = if fresh { (2.0 * factor).min(1.0) } else { 1.0 };
             let (trial, next, ratio) = loop {
                 let trial = self.moved(&step, factor);
@@ -149,7 +155,7 @@ impl<'e, 'a> Newton<'e, 'a> {
                     break 'iterations;
                 }
             };
-            self.work.iterations += 1;
+            self.log.work.iterations += 1;
             self.nodes = trial;
             self.defect = next.largest(self.march.as_ref());
             let remaining = ratio * size;
@@ -183,7 +189,7 @@ impl<'e, 'a> Newton<'e, 'a> {
         let residuals = self.residuals(&self.nodes, &integrated);
         self.growth.clear();
         let maps = sensitivities(self.equations, &self.units, &integrated, &mut self.growth);
-        self.work.linearizations += 1;
+        self.log.work.linearizations += 1;
         self.march = March::new(self.equations, &self.units, maps);
         match self.march {
             Some(_) => Ok(residuals),
@@ -208,8 +214,8 @@ impl<'e, 'a> Newton<'e, 'a> {
         let integrated =
             integrate(self.equations, nodes, tolerance, linear).map_err(Stuck::Unbounded)?;
         for interval in &integrated {
-            self.work.steps += interval.count;
-            self.work.slopes += interval.evaluations;
+            self.log.work.steps += interval.count;
+            self.log.work.slopes += interval.evaluations;
         }
         Ok(integrated)
     }

@@ -33,6 +33,30 @@ impl Work {
     }
 }
 
+/// A correction of Newton's method: how far a shooting has come.
+#[derive(Clone, Copy, Debug)]
+pub struct Correction {
+    /// From arcs: how much is made of the change that leads to the scenario's leaf (of its
+    /// loads, or of its stiffness), from 0 to 1; 1 where it starts near the leaf.
+    pub way: f64,
+    /// How many were made before it since the present solution was begun.
+    pub iteration: usize,
+    /// Its largest number, in the units of the unknowns.
+    pub size: f64,
+    /// What corrections are to shrink to.
+    pub wanted: f64,
+}
+
+/// What a shooting does is counted, and told step by step.
+pub(super) struct Log<'p> {
+    /// Counted so far.
+    pub work: Work,
+    /// How much of the present change of the leaf of arcs is made.
+    pub way: f64,
+    /// Told of each correction.
+    pub progress: &'p mut dyn FnMut(&Correction),
+}
+
 /// Displacements below this part of the largest are not worth telling.
 const MOVES: f64 = 0.2;
 

@@ -3,7 +3,9 @@
 use super::continuation::{Interrupted, from_arcs};
 use super::equations::Equations;
 use super::newton::Newton;
-use super::solution::{Failure, Options, Precision, Reason, Solution, Start, Work};
+use super::solution::{
+    Correction, Failure, Log, Options, Precision, Reason, Solution, Start, Work,
+};
 use super::trajectory::Trajectory;
 use crate::scenario::{Scenario, longest};
 use crate::shape::Difference;
@@ -22,25 +24,30 @@ const MOST_LOCAL: f64 = 1e-9;
 /// Factor between attempts to reach the accuracy.
 const SHARPER: f64 = 1e-2;
 
-/// Solves the boundary-value problem of a scenario.
+/// Solves the boundary-value problem of a scenario. `progress` is told of each
+/// correction.
 ///
 /// # Errors
 /// If no solution is found: why, and how far it came.
-pub fn solve(scenario: &Scenario, options: &Options) -> Result<Solution, Failure> {
+pub fn solve(
+    scenario: &Scenario,
+    options: &Options,
+    progress: &mut dyn FnMut(&Correction),
+) -> Result<Solution, Failure> {
     let accuracy = match options.precision {
         Precision::Error(accuracy) => accuracy,
         Precision::LocalError(tolerance) => {
-            return solve_once(scenario, options.start, tolerance, options);
+            return solve_once(scenario, options.start, tolerance, options, progress);
         }
     };
     let longest = longest(&scenario.rods);
     let mut tolerance = (LOCAL_PART * accuracy).clamp(LEAST_LOCAL, MOST_LOCAL);
-    let mut solution = solve_once(scenario, options.start, tolerance, options)?;
+    let mut solution = solve_once(scenario, options.start, tolerance, options, progress)?;
     while solution.error.position > accuracy * longest && tolerance > LEAST_LOCAL {
         tolerance = (SHARPER * tolerance).max(LEAST_LOCAL);
         let (stations, rods) = (options.stations, &solution.rods[..]);
         let start = Start::Leaf { stations, rods };
-        let mut sharper = solve_once(scenario, start, tolerance, options)?;
+        let mut sharper = solve_once(scenario, start, tolerance, options, progress)?;
         sharper.work.add(solution.work);
         solution = sharper;
     }
@@ -53,18 +60,26 @@ fn solve_once(
     start: Start,
     tolerance: f64,
     options: &Options,
+    progress: &mut dyn FnMut(&Correction),
 ) -> Result<Solution, Failure> {
     let mut equations = Equations::new(scenario);
     equations.limit = options.limit.clone();
-    let mut work = Work::default();
+    let mut log = Log {
+        work: Work::default(),
+        way: 1.0,
+        progress,
+    };
     let found = match start {
-        Start::Arcs => from_arcs(&mut equations, options.intervals, &mut work),
+        Start::Arcs => from_arcs(&mut equations, options.intervals, &mut log),
         Start::Leaf { stations, rods } => Ok(Trajectory::of_leaf(&equations, stations, rods)),
     };
     let end = match found {
         Err(end) => end,
-        Ok(near) => match solve_near(&equations, &near, tolerance, options, &mut work) {
-            Ok(solution) => return Ok(Solution { work, ..solution }),
+        Ok(near) => match solve_near(&equations, &near, tolerance, options, &mut log) {
+            Ok(solution) => {
+                let work = log.work;
+                return Ok(Solution { work, ..solution });
+            }
             Err(reason) => Interrupted {
                 reason,
                 part: 1.0,
@@ -78,7 +93,7 @@ fn solve_once(
         reason: end.reason,
         part: end.part,
         rods: near.shape(&equations),
-        work,
+        work: log.work,
     })
 }
 
@@ -87,10 +102,10 @@ fn solve_near(
     near: &Trajectory,
     tolerance: f64,
     options: &Options,
-    work: &mut Work,
+    log: &mut Log,
 ) -> Result<Solution, Reason> {
     let stations = options.stations;
-    let mut newton = Newton::near(equations, near, options.intervals, work)?;
+    let mut newton = Newton::near(equations, near, options.intervals, log)?;
     let mut at = |tolerance: f64| -> Result<Trajectory, Reason> {
         newton.solve(tolerance)?;
         let sampled = Trajectory::sampled(equations, &newton.nodes, stations, tolerance);

@@ -47,7 +47,7 @@ impl Check {
         let mut line = job.progress();
         let tolerance = self.request.tolerance.unwrap_or(job.scenario.tolerance);
         let check = study::check(&job.scenario, &options, &mut |progress| {
-            line.relaxing(progress, tolerance)
+            line.solving(progress, tolerance)
         })?;
         drop(line);
         if let Verdict::NotCompared(reason) = &check.verdict {

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::relax::Progress;
+use crate::relax::{Correction, Progress};
 
 /// Shorter runs show no line: it would only flicker.
 const LONG_RUN: Duration = Duration::from_millis(500);
@@ -23,6 +23,7 @@ pub struct ProgressLine {
     terminal: bool,
     bar: Option<ProgressBar>,
     grids: Grids,
+    shooting: Option<Corrections>,
     /// Since when parts of the run are told: before that it did something else.
     since: Duration,
 }
@@ -36,6 +37,7 @@ impl ProgressLine {
             terminal,
             bar: None,
             grids: Grids::default(),
+            shooting: None,
             since: Duration::ZERO,
         }
     }
@@ -48,19 +50,27 @@ impl ProgressLine {
             terminal: false,
             bar: None,
             grids: Grids::default(),
+            shooting: None,
             since: Duration::ZERO,
         }
     }
 
-    /// How far a relaxation to this tolerance has come.
-    pub fn relaxing(&mut self, progress: &Progress, tolerance: f64) {
-        let part = self.grids.part(progress, tolerance);
-        self.tell(part, || {
-            format!(
-                "{} segments a vein, step {}, residual {:.1e}",
-                progress.grid, progress.step, progress.residual,
-            )
-        });
+    /// How far a run to this tolerance has come.
+    pub fn solving(&mut self, progress: &Progress, tolerance: f64) {
+        let part = match progress {
+            &Progress::Relaxing {
+                grid,
+                step,
+                residual,
+            } => self.grids.part(grid, (step, residual), tolerance),
+            Progress::Shooting(now) => {
+                if self.shooting.is_none() {
+                    self.next();
+                }
+                self.shooting.get_or_insert_default().part(now)
+            }
+        };
+        self.tell(part, || progress.to_string());
     }
 
     /// Shows a message with the time taken and, where it is known which part of the
@@ -131,14 +141,14 @@ impl Grids {
     /// About which part of the work is done: that of the first grid, on which the leaf
     /// moves, as of six Newton steps there; of the others two each. Every grid removes
     /// some three digits of the error.
-    fn part(&mut self, progress: &Progress, tolerance: f64) -> Option<f64> {
+    fn part(&mut self, grid: usize, (step, residual): (usize, f64), tolerance: f64) -> Option<f64> {
         const FIRST: f64 = 6.0;
         const LATER: f64 = 2.0;
         const DIGITS: f64 = 3.0;
         /// Of the residual, on the way to rest.
         const REST: f64 = 12.0;
-        if self.seen.last() != Some(&progress.grid) {
-            self.seen.push(progress.grid);
+        if self.seen.last() != Some(&grid) {
+            self.seen.push(grid);
         }
         let present = self.seen.len() - 1;
         let wanted = (-tolerance.log10() / DIGITS).ceil().clamp(0.0, 16.0) as usize;
@@ -146,12 +156,30 @@ impl Grids {
         let size = |grid: usize| (1_u64 << grid.min(32)) as f64;
         let work = |grid: usize| if grid == 0 { FIRST } else { LATER * size(grid) };
         let here = match present {
-            0 => (-progress.residual.log10() / REST).clamp(0.0, 1.0),
-            _ => (progress.step as f64 / LATER).min(1.0),
+            0 => (-residual.log10() / REST).clamp(0.0, 1.0),
+            _ => (step as f64 / LATER).min(1.0),
         };
         let before: f64 = (0..present).map(work).sum();
         let all: f64 = (0..=last).map(work).sum();
         Some((before + here * work(present)) / all)
+    }
+}
+
+/// The corrections of a shooting.
+#[derive(Default)]
+struct Corrections {
+    /// The first near the leaf.
+    first: Option<f64>,
+}
+
+impl Corrections {
+    /// About which part of the work is done: of the way there, or of the digits wanted.
+    fn part(&mut self, now: &Correction) -> Option<f64> {
+        if now.way < 1.0 {
+            return Some(now.way);
+        }
+        let first = *self.first.get_or_insert(now.size);
+        part_of_way(first, now.size, now.wanted, true).map(|part| part.clamp(0.0, 1.0))
     }
 }
 
@@ -203,15 +231,29 @@ mod tests {
     }
 
     #[test]
+    fn a_shooting_goes_its_way_and_then_adds_digits() {
+        let mut corrections = Corrections::default();
+        let mut part = |way: f64, size: f64| {
+            let now = Correction {
+                way,
+                iteration: 0,
+                size,
+                wanted: 1e-10,
+            };
+            corrections.part(&now).unwrap()
+        };
+        assert_eq!(part(0.25, 1e-3), 0.25);
+        let parts = [part(1.0, 1e-2), part(1.0, 1e-6), part(1.0, 1e-12)];
+        assert_eq!(parts[0], 0.0);
+        assert!((parts[1] - 0.5).abs() < 1e-12);
+        assert_eq!(parts[2], 1.0);
+    }
+
+    #[test]
     fn a_relaxation_goes_on_from_grid_to_grid() {
         let mut grids = Grids::default();
         let mut part = |grid: usize, step: usize, residual: f64| {
-            let progress = Progress {
-                grid,
-                step,
-                residual,
-            };
-            grids.part(&progress, 1e-6).unwrap()
+            grids.part(grid, (step, residual), 1e-6).unwrap()
         };
         let parts = [
             part(8, 1, 1.0),

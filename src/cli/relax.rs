@@ -129,7 +129,7 @@ impl Relax {
         if !self.sensitivity.is_empty() {
             let (base, keys) = (job.base()?, &self.sensitivity);
             let found = study::relax_with_sensitivities(&base, keys, &options, &mut |progress| {
-                line.relaxing(progress, tolerance);
+                line.solving(progress, tolerance);
             });
             return found.map_err(|error| match error {
                 SensitivityError::Relax(error) => error.into(),
@@ -137,7 +137,7 @@ impl Relax {
             });
         }
         Ok(relax::relax(&job.scenario, &options, &mut |progress| {
-            line.relaxing(progress, tolerance)
+            line.solving(progress, tolerance)
         })?)
     }
 

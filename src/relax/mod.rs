@@ -30,6 +30,7 @@ pub(crate) mod start;
 mod stations;
 mod stencil;
 
+pub use crate::bvp::Correction;
 pub use crate::limit::Limit;
 pub use crate::newton::Work;
 pub use crate::shape::{NodeState, RodShape};

@@ -1,5 +1,8 @@
 //! What is asked of a relaxation, and what cannot be asked.
 
+use std::fmt;
+
+use crate::bvp;
 use crate::limit::Limit;
 use crate::memory::TooMuch;
 use crate::relax::method::Method;
@@ -24,16 +27,47 @@ pub struct Options {
     pub limit: Limit,
 }
 
-/// How far a running relaxation has come.
+/// How far a run has come.
 #[derive(Clone, Copy, Debug)]
-pub struct Progress {
-    /// Segments per rod of the present grid.
-    pub grid: usize,
-    /// Step on that grid.
-    pub step: usize,
-    /// Size of that step: largest rotation or displacement, in radians or
-    /// lengths of the leaf. It goes to zero as the leaf comes to rest.
-    pub residual: f64,
+pub enum Progress {
+    /// Of a relaxation.
+    Relaxing {
+        /// Segments per rod of the present grid.
+        grid: usize,
+        /// Step on that grid.
+        step: usize,
+        /// Size of that step: largest rotation or displacement, in radians or
+        /// lengths of the leaf. It goes to zero as the leaf comes to rest.
+        residual: f64,
+    },
+    /// Of a shooting.
+    Shooting(bvp::Correction),
+}
+
+impl fmt::Display for Progress {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Progress::Relaxing {
+                grid,
+                step,
+                residual,
+            } => write!(
+                f,
+                "{grid} segments a vein, step {step}, residual {residual:.1e}"
+            ),
+            Progress::Shooting(now) if now.way < 1.0 => write!(
+                f,
+                "shooting, {:.0} % of the way, correction {:.1e}",
+                100.0 * now.way,
+                now.size
+            ),
+            Progress::Shooting(now) => write!(
+                f,
+                "shooting, step {}, correction {:.1e}",
+                now.iteration, now.size
+            ),
+        }
+    }
 }
 
 /// Smallest tolerance that double precision can keep.

@@ -240,7 +240,7 @@ fn step_reporter(
     grid: usize,
 ) -> impl FnMut(usize, f64) + use<'_> {
     move |step, residual| {
-        progress(&Progress {
+        progress(&Progress::Relaxing {
             grid,
             step,
             residual,

@@ -47,7 +47,7 @@ pub fn relax(
             return Err(RelaxError::HeldTip { found });
         }
         let arcs = Start::Arcs;
-        let mut found = shooting::shoot(scenario, options, intervals, tolerance, arcs);
+        let mut found = shooting::shoot(scenario, options, intervals, tolerance, arcs, progress);
         found.doubts = plausible::doubts(scenario, &found);
         return Ok(found);
     }
@@ -58,7 +58,7 @@ pub fn relax(
         ..options.clone()
     };
     let rest = relax(scenario, &rest, progress)?;
-    let mut found = shooting::from_rest(scenario, options, intervals, tolerance, rest);
+    let mut found = shooting::from_rest(scenario, options, intervals, tolerance, rest, progress);
     found.doubts = plausible::doubts(scenario, &found);
     Ok(found)
 }

@@ -239,12 +239,17 @@ pub fn check(
     };
     let relaxed = relax::relax(scenario, &asked, progress)?;
     let lost = matches!(relaxed.outcome, Outcome::NotAtRest | Outcome::Diverged);
-    let shot = (!lost).then(|| shoot(scenario, &relaxed, options));
+    let shot = (!lost).then(|| shoot(scenario, &relaxed, options, progress));
     Ok(Check::new(relaxed, shot))
 }
 
 /// Solves the boundary-value problem from a relaxed leaf, as accurately.
-fn shoot(scenario: &Scenario, relaxed: &Equilibrium, asked: &CheckOptions) -> Shot {
+fn shoot(
+    scenario: &Scenario,
+    relaxed: &Equilibrium,
+    asked: &CheckOptions,
+    progress: &mut dyn FnMut(&Progress),
+) -> Shot {
     let grid = fine_grid(scenario, relaxed.shape.stations.len() - 1);
     let start = Start::Leaf {
         stations: &relaxed.shape.stations,
@@ -257,7 +262,11 @@ fn shoot(scenario: &Scenario, relaxed: &Equilibrium, asked: &CheckOptions) -> Sh
         limit: asked.limit.clone(),
         ..bvp::Options::new(start, &stations, precision)
     };
-    let (found, wall_seconds) = timed(|| bvp::solve(scenario, &options));
+    let (found, wall_seconds) = timed(|| {
+        bvp::solve(scenario, &options, &mut |step| {
+            progress(&Progress::Shooting(*step))
+        })
+    });
     let rods = found.as_ref().map_or(&[][..], |solution| &solution.rods);
     let ends = rods.iter().take(relaxed.tips.len());
     Shot {

@@ -30,13 +30,13 @@ pub fn shoot_over(
         intervals,
         ..bvp::Options::new(start, &leaf.shape.stations, LocalError(SHARP))
     };
-    bvp::solve(scenario, &options)
+    bvp::solve(scenario, &options, &mut |_| {})
 }
 
 /// Solves the boundary-value problem without any start.
 pub fn shoot_alone(scenario: &Scenario, stations: &[f64]) -> Result<Solution, Failure> {
     let options = bvp::Options::new(Start::Arcs, stations, LocalError(SHARP));
-    bvp::solve(scenario, &options)
+    bvp::solve(scenario, &options, &mut |_| {})
 }
 
 /// What shooting has found; the reason where it has not.

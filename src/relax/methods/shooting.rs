@@ -8,7 +8,7 @@ use crate::relax::equilibrium::{
     Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
 };
 use crate::relax::index::index_near;
-use crate::relax::options::{MAX_INTERVALS, Options, RelaxError};
+use crate::relax::options::{MAX_INTERVALS, Options, Progress, RelaxError};
 use crate::relax::segments::coarsest;
 use crate::scenario::{Scenario, longest};
 use crate::shape::RodShape;
@@ -48,6 +48,7 @@ pub fn from_rest(
     intervals: Option<usize>,
     tolerance: f64,
     rest: Equilibrium,
+    progress: &mut dyn FnMut(&Progress),
 ) -> Equilibrium {
     if matches!(rest.outcome, Outcome::NotAtRest | Outcome::Diverged) {
         return Equilibrium {
@@ -59,7 +60,7 @@ pub fn from_rest(
         stations: &rest.shape.stations,
         rods: &rest.shape.rods,
     };
-    let mut found = shoot(scenario, options, intervals, tolerance, start);
+    let mut found = shoot(scenario, options, intervals, tolerance, start, progress);
     found.stability.saddle = rest.stability.saddle;
     found.work = rest.work + found.work;
     found.wall_seconds += rest.wall_seconds;
@@ -86,6 +87,7 @@ pub fn shoot(
     intervals: Option<usize>,
     tolerance: f64,
     start: Start,
+    progress: &mut dyn FnMut(&Progress),
 ) -> Equilibrium {
     let clock = Instant::now();
     let grid = station_grid(scenario);
@@ -95,7 +97,9 @@ pub fn shoot(
         limit: options.limit.clone(),
         ..bvp::Options::new(start, &stations, bvp::Precision::Error(tolerance))
     };
-    let found = bvp::solve(scenario, &asked);
+    let found = bvp::solve(scenario, &asked, &mut |step| {
+        progress(&Progress::Shooting(*step))
+    });
     let mut accuracy = Accuracy {
         segments: Vec::new(),
         intervals: None,

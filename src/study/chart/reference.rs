@@ -49,7 +49,11 @@ pub fn find(
     let stations = union(wanted.into_iter().chain(known.copied()).collect());
     let start = relaxed.as_ref().map_or(Start::Arcs, Answer::as_start);
     let precision = bvp::Precision::Error(SMALLEST_TOLERANCE);
-    let solved = bvp::solve(scenario, &bvp::Options::new(start, &stations, precision));
+    let solved = bvp::solve(
+        scenario,
+        &bvp::Options::new(start, &stations, precision),
+        &mut |_| {},
+    );
     let neutral = match &solved {
         Ok(solution) => solution.neutral.as_ref().map(ToString::to_string),
         Err(_) => None,

@@ -40,7 +40,9 @@ fn shoot_from_rest(scenario: &Scenario, accuracy: f64) -> Result<(Answer, f64), 
         let rest = Answer::relaxed(scenario, &options)?;
         let precision = bvp::Precision::Error(accuracy);
         let asked = bvp::Options::new(rest.as_start(), &rest.stations, precision);
-        let shot = rest.at_rest().then(|| bvp::solve(scenario, &asked));
+        let shot = rest
+            .at_rest()
+            .then(|| bvp::solve(scenario, &asked, &mut |_| {}));
         Ok((rest, shot))
     });
     let (rest, shot) = found?;

@@ -160,7 +160,7 @@ impl<'a> Cell<'a> {
             limit: limit.clone(),
             ..bvp::Options::new(start, &stations, bvp::Precision::Error(accuracy))
         };
-        let solved = bvp::solve(self.scenario, &options);
+        let solved = bvp::solve(self.scenario, &options, &mut |_| {});
         let solution = solved.map_err(|failure| {
             let outcome = match failure.reason {
                 Reason::Unbounded { .. } => MapOutcome::Diverged,
