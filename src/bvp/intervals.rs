@@ -137,24 +137,52 @@ pub fn integrate(
         .collect()
 }
 
+/// What the perturbations of one rod do at the end of an interval, without units: the
+/// first rod that feels them, and rows of numbers from there on.
+type Effects = (usize, Vec<f64>);
+
+/// Intervals and rods a thread takes before it is told how far that is.
+const TOGETHER: usize = 4;
+
+/// The effects of all rods over all intervals, in parallel. `go_on` is told which part
+/// of them is known, and says whether to.
+pub fn effects(
+    equations: &Equations,
+    integrated: &[Integrated],
+    go_on: &mut dyn FnMut(f64) -> bool,
+) -> Option<Vec<Effects>> {
+    let rods = equations.rods();
+    let all = integrated.len() * rods;
+    let together = TOGETHER * rayon::current_num_threads();
+    let mut found = Vec::with_capacity(all);
+    while found.len() < all {
+        if !go_on(found.len() as f64 / all as f64) {
+            return None;
+        }
+        let some = found.len()..all.min(found.len() + together);
+        let some = some.into_par_iter().map(|task| {
+            let (steps, j) = (&integrated[task / rods].steps, task % rods);
+            match task < rods {
+                true => effects_of::<6>(equations, steps, j),
+                false => effects_of::<TANGENT>(equations, steps, j),
+            }
+        });
+        found.par_extend(some);
+    }
+    Some(found)
+}
+
 /// The sensitivities of the ends of all intervals to their beginnings, in the
 /// given units: square, but in the first interval, which begins at the clamp,
-/// only to forces and moments. Every interval and rod in parallel.
+/// only to forces and moments.
 pub fn sensitivities(
     equations: &Equations,
     units: &Units,
-    integrated: &[Integrated],
+    effects: &[Effects],
     growth: &mut Vec<f64>,
 ) -> Vec<Mat<f64>> {
     let rods = equations.rods();
-    let columns: Vec<(usize, Vec<f64>)> = (0..integrated.len() * rods)
-        .into_par_iter()
-        .map(|task| match (&integrated[task / rods].steps, task % rods) {
-            (steps, j) if task < rods => effects::<6>(equations, steps, j),
-            (steps, j) => effects::<TANGENT>(equations, steps, j),
-        })
-        .collect();
-    (columns.chunks(rods).enumerate())
+    (effects.chunks(rods).enumerate())
         .map(|(k, columns)| {
             let kinds = if k == 0 { 6 } else { TANGENT };
             let mut matrix = Mat::zeros(TANGENT * rods, kinds * rods);
@@ -178,13 +206,8 @@ pub fn sensitivities(
         .collect()
 }
 
-/// Effects of the perturbations of rod `j`, without units, from the first rod on
-/// that feels them.
-fn effects<const W: usize>(
-    equations: &Equations,
-    steps: &[LinearStep],
-    j: usize,
-) -> (usize, Vec<f64>) {
+/// Effects of the perturbations of rod `j`.
+fn effects_of<const W: usize>(equations: &Equations, steps: &[LinearStep], j: usize) -> Effects {
     let mut perturbations = Perturbations::<W>::unit(group(equations, j), j);
     for step in steps {
         perturbations.advance(equations, step);

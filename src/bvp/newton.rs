@@ -8,7 +8,7 @@
 
 use super::dop853::Unbounded;
 use super::equations::{Equations, RodState};
-use super::intervals::{Integrated, Units, choose, integrate, sensitivities};
+use super::intervals::{Integrated, Units, choose, effects, integrate, sensitivities};
 use super::march::March;
 use super::solution::{Correction, Log, Reason};
 use super::trajectory::{Nodes, Trajectory};
@@ -58,6 +58,8 @@ pub struct Newton<'e, 'a, 'p> {
     pub growth: Vec<f64>,
     /// Largest defect at the last evaluation, in the units.
     pub defect: f64,
+    /// How far it has come.
+    now: Correction,
     /// What is done.
     log: &'e mut Log<'p>,
 }
@@ -103,6 +105,13 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             march: None,
             growth: Vec::new(),
             defect: f64::INFINITY,
+            now: Correction {
+                way: log.way,
+                iteration: 0,
+                linearized: 0.0,
+                size: f64::INFINITY,
+                wanted: 0.0,
+            },
             log,
         })
     }
@@ -113,6 +122,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
     }
 
     fn iterate(&mut self, tolerance: f64) -> Result<(), Stuck> {
+        self.now.wanted = tolerance;
         let mut factor: f64 = 1.0;
         let mut fresh = self.march.is_none();
         let mut residuals = match fresh {
@@ -121,17 +131,14 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         };
         let mut size = f64::INFINITY;
         'iterations: for iteration in 0..MAX_ITERATIONS {
+            self.now.iteration = iteration;
             let step = self.correction(&residuals);
             size = largest(&step);
             if !size.is_finite() {
                 break;
             }
-            (self.log.progress)(&Correction {
-                way: self.log.way,
-                iteration,
-                size,
-                wanted: tolerance,
-            });
+            self.now.size = size;
+            self.tell(1.0);
             factor = if fresh { (2.0 * factor).min(1.0) } else { 1.0 };
             let (trial, next, ratio) = loop {
                 let trial = self.moved(&step, factor);
@@ -188,13 +195,26 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         let integrated = self.integrate(&self.nodes.clone(), tolerance, true)?;
         let residuals = self.residuals(&self.nodes, &integrated);
         self.growth.clear();
-        let maps = sensitivities(self.equations, &self.units, &integrated, &mut self.growth);
+        let effects = effects(self.equations, &integrated, &mut |part| {
+            self.tell(part);
+            !self.equations.limit.reached()
+        });
+        let Some(effects) = effects else {
+            return Err(Stuck::NoProgress(f64::INFINITY));
+        };
+        let maps = sensitivities(self.equations, &self.units, &effects, &mut self.growth);
         self.log.work.linearizations += 1;
         self.march = March::new(self.equations, &self.units, maps);
         match self.march {
             Some(_) => Ok(residuals),
             None => Err(Stuck::NoProgress(f64::INFINITY)),
         }
+    }
+
+    /// Tells how far it has come with this part of its linearisation.
+    fn tell(&mut self, linearized: f64) {
+        self.now.linearized = linearized;
+        (self.log.progress)(&self.now);
     }
 
     fn residuals_at(&mut self, nodes: &Nodes, tolerance: f64) -> Result<Residuals, Stuck> {

@@ -33,15 +33,18 @@ impl Work {
     }
 }
 
-/// A correction of Newton's method: how far a shooting has come.
+/// How far a shooting has come.
 #[derive(Clone, Copy, Debug)]
 pub struct Correction {
     /// From arcs: how much is made of the change that leads to the scenario's leaf (of its
     /// loads, or of its stiffness), from 0 to 1; 1 where it starts near the leaf.
     pub way: f64,
-    /// How many were made before it since the present solution was begun.
+    /// How many corrections were made since the present solution was begun.
     pub iteration: usize,
-    /// Its largest number, in the units of the unknowns.
+    /// How much is made of the linearisation that the next one needs, from 0 to 1.
+    pub linearized: f64,
+    /// The largest number of the last correction found, in the units of the unknowns;
+    /// infinite before the first.
     pub size: f64,
     /// What corrections are to shrink to.
     pub wanted: f64,

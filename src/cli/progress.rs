@@ -165,21 +165,31 @@ impl Grids {
     }
 }
 
+/// Part of the work left that a linearisation is.
+const LINEARISATION: f64 = 0.9;
+
 /// The corrections of a shooting.
 #[derive(Default)]
 struct Corrections {
-    /// The first near the leaf.
+    /// The size of the first near the leaf.
     first: Option<f64>,
 }
 
 impl Corrections {
-    /// About which part of the work is done: of the way there, or of the digits wanted.
+    /// About which part of the work is done: of the way there, or of the digits wanted
+    /// and the linearisation for the next ones.
     fn part(&mut self, now: &Correction) -> Option<f64> {
         if now.way < 1.0 {
             return Some(now.way);
         }
-        let first = *self.first.get_or_insert(now.size);
-        part_of_way(first, now.size, now.wanted, true).map(|part| part.clamp(0.0, 1.0))
+        let digits = match now.size.is_finite() {
+            true => {
+                let first = *self.first.get_or_insert(now.size);
+                part_of_way(first, now.size, now.wanted, true)?.clamp(0.0, 1.0)
+            }
+            false => 0.0,
+        };
+        Some(digits + (1.0 - digits) * LINEARISATION * now.linearized)
     }
 }
 
@@ -233,20 +243,29 @@ mod tests {
     #[test]
     fn a_shooting_goes_its_way_and_then_adds_digits() {
         let mut corrections = Corrections::default();
-        let mut part = |way: f64, size: f64| {
+        let mut part = |way: f64, linearized: f64, size: f64| {
             let now = Correction {
                 way,
                 iteration: 0,
+                linearized,
                 size,
                 wanted: 1e-10,
             };
             corrections.part(&now).unwrap()
         };
-        assert_eq!(part(0.25, 1e-3), 0.25);
-        let parts = [part(1.0, 1e-2), part(1.0, 1e-6), part(1.0, 1e-12)];
-        assert_eq!(parts[0], 0.0);
-        assert!((parts[1] - 0.5).abs() < 1e-12);
-        assert_eq!(parts[2], 1.0);
+        assert_eq!(part(0.25, 0.5, 1e-3), 0.25);
+        let parts = [
+            part(1.0, 0.0, f64::INFINITY),
+            part(1.0, 0.5, f64::INFINITY),
+            part(1.0, 1.0, 1e-2),
+            part(1.0, 0.0, 1e-6),
+            part(1.0, 1.0, 1e-6),
+            part(1.0, 1.0, 1e-12),
+        ];
+        let wanted = [0.0, 0.45, 0.9, 0.5, 0.95, 1.0];
+        for (part, wanted) in parts.into_iter().zip(wanted) {
+            assert!((part - wanted).abs() < 1e-12, "{parts:?}");
+        }
     }
 
     #[test]

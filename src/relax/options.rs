@@ -61,6 +61,12 @@ impl fmt::Display for Progress {
                 100.0 * now.way,
                 now.size
             ),
+            Progress::Shooting(now) if now.linearized < 1.0 => write!(
+                f,
+                "shooting, step {}, {:.0} % of its linearisation",
+                now.iteration,
+                100.0 * now.linearized
+            ),
             Progress::Shooting(now) => write!(
                 f,
                 "shooting, step {}, correction {:.1e}",
