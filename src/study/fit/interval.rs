@@ -3,15 +3,12 @@
 
 use nalgebra::DVector;
 
-use super::around::{Around, Least, Slopes};
+use super::around::Around;
+use super::end::{BETTER, Ends, STRAIGHT, Side, ends};
 use super::judge::{Judge, OPEN};
 use super::least_squares::{End, Iteration};
 use super::model::Point;
 use super::result::FitParameter;
-
-/// The sum of squares at the ends of an interval may be off by this part before the
-/// interval is taken from the profile of the sum.
-const STRAIGHT: f64 = 0.15;
 
 /// Steps to an end of a profile, iterations at each, how exactly the least sum is
 /// found there, in variances, and how exactly the end.
@@ -20,36 +17,8 @@ const PROFILE_ITERATIONS: usize = 25;
 const LEAST: f64 = 1e-2;
 const PROFILE_ACCURACY: f64 = 0.01;
 
-/// Points by which an end is looked for before the whole profile is, what part of the sum
-/// a correction may still take off there, and how exactly it is found.
-const FEW: usize = 14;
-const SETTLED: f64 = 0.1;
-const NEAR_ENOUGH: f64 = 0.03;
-
-/// Part of a correction that is taken where the one before went too far.
-const SHORTER: f64 = 0.5;
-
-/// How often leaves may be lost on the way to them.
-const FEW_LOST: usize = 3;
-
-/// A sum that is off by no more than this part of what may be needs no other look.
-const CLEARLY: f64 = 0.5;
-
 /// How often leaves may be lost on the way to an end of a profile.
 const MOST_LOST: usize = 6;
-
-/// A sum of squares so far below the minimum, in variances, belongs to a better one.
-const BETTER: f64 = 0.1;
-
-/// Where a profile ends.
-enum Side {
-    /// So far from the minimum.
-    At(f64),
-    /// Not within a factor of ten, nor before a bound.
-    Open,
-    /// Leaves cannot be followed there.
-    Lost,
-}
 
 /// The free numbers with their intervals. The shape of the sum of squares away from
 /// the minimum is that of `shape`, which may be a minimum on coarser grids.
@@ -149,165 +118,6 @@ fn above(judge: &Judge, point: &Point) -> f64 {
     let bound = judge.weighing.bound(&judge.residuals);
     let sum = |residuals: &DVector<f64>| judge.weighing.sum(residuals, bound);
     (sum(&residuals) - sum(&judge.residuals)) / judge.spread.powi(2)
-}
-
-/// What a few points around a minimum tell of the ends of an interval.
-enum Ends {
-    /// They are where the curvature has them,
-    Straight,
-    /// or elsewhere, below and above; or about so far where the points do not tell.
-    Apart([Result<Side, f64>; 2]),
-}
-
-/// Residuals at a point near a minimum.
-type Known = (DVector<f64>, Point);
-
-/// The ends of an interval by a few points around the minimum; `None` where there are none.
-fn ends(around: &Around, k: usize, first: f64, half: f64) -> Option<Ends> {
-    let judge = around.judge;
-    let slopes = around.slopes();
-    let along = judge.conditional(k, OPEN);
-    let mut known: Option<Known> = None;
-    if half <= OPEN {
-        let expected = judge.quantile.powi(2);
-        let off = |above: f64| (above / expected - 1.0).abs();
-        let change = &along * first;
-        let up = around.residuals(judge.point, &around.moved(&change)).ok()?;
-        // To second order the other side is its mirror image.
-        let linear = &judge.jacobian * change;
-        let down = &up.0 - &linear - &linear;
-        let sides =
-            [&up.0, &down].map(|residuals| around.least(&slopes, k, residuals, f64::INFINITY));
-        let clear = |least: &Option<Least>| {
-            (least.as_ref()).is_some_and(|least| off(least.above) < CLEARLY * STRAIGHT)
-        };
-        if sides.iter().all(clear) {
-            return Some(Ends::Straight);
-        }
-        known = Some(up);
-    }
-    let [low, high] = judge.model.coordinates[k].bounds;
-    let theta = judge.point.theta[k];
-    let reach = |sign: f64, room: f64, known: Option<Known>| {
-        let most = (OPEN + 0.1).min(room);
-        let known = known.filter(|_| first <= most);
-        let reach = (sign, first.min(most), most);
-        self::reach(around, (k, &slopes, &along), reach, known)
-    };
-    let down = reach(-1.0, theta - low, None);
-    let up = reach(1.0, high - theta, known);
-    let same = |side: &Result<Side, f64>| matches!(side, Ok(Side::At(reach)) if *reach == first);
-    Some(match same(&down) && same(&up) && half <= OPEN {
-        true => Ends::Straight,
-        false => Ends::Apart([down, up]),
-    })
-}
-
-/// The end of a profile on one side, from a first guess and not beyond what is most:
-/// along a parabola from the minimum, which is bent to where the sum is least.
-/// Derivatives are those of the minimum until an end is near, and then those there. `known`
-/// is what is found at the guess.
-///
-/// # Errors
-/// With how far the end may be, where that does not settle.
-fn reach(
-    around: &Around,
-    (k, at_minimum, along): (usize, &Slopes, &DVector<f64>),
-    (sign, first, most): (f64, f64, f64),
-    mut known: Option<Known>,
-) -> Result<Side, f64> {
-    if most <= 0.0 {
-        return Ok(Side::Open);
-    }
-    let judge = around.judge;
-    let wanted = judge.quantile.powi(2);
-    let mut reach = first;
-    let mut bend = DVector::zeros(along.len());
-    // Reach and root of the sum there.
-    let mut before = (0.0, 0.0);
-    let mut there: Option<(Point, Slopes)> = None;
-    // The longest correction, the last one, from what sum, and what it was to gain.
-    let (mut longest, mut corrected) = (f64::INFINITY, 0.0);
-    let (mut straight, mut to_gain) = (f64::INFINITY, f64::INFINITY);
-    let mut lost = 0;
-    for step in 0..FEW {
-        let theta = around.moved(&(along * (sign * reach) + &bend * reach.powi(2)));
-        let (from, mut slopes) = match &there {
-            Some((point, slopes)) => (point, slopes),
-            None => (judge.point, at_minimum),
-        };
-        let found = known
-            .take()
-            .map_or_else(|| around.residuals(from, &theta), Ok);
-        let Ok((residuals, point)) = found else {
-            lost += 1;
-            if lost > FEW_LOST {
-                break;
-            }
-            reach = 0.5 * (before.0 + reach);
-            continue;
-        };
-        let Some(mut least) = around.least(slopes, k, &residuals, longest) else {
-            break;
-        };
-        if least.straight < -BETTER {
-            break;
-        }
-        if reach >= most && least.straight < wanted {
-            return Ok(Side::Open);
-        }
-        if step == 0 && (least.above / wanted - 1.0).abs() < STRAIGHT {
-            return Ok(Side::At(reach));
-        }
-        let settled = |least: &Least| {
-            let root = least.above.max(0.0).sqrt() / judge.quantile;
-            let corrected = least.straight - least.above < SETTLED * least.above;
-            corrected && (root - 1.0).abs() < NEAR_ENOUGH
-        };
-        let stagnates = there.is_some() && least.straight - least.above > 0.5 * to_gain;
-        if settled(&least) || stagnates {
-            // By the derivatives there it may be lower still.
-            there = around.slopes_at(point).ok();
-            slopes = match &there {
-                Some((_, slopes)) => slopes,
-                None => break,
-            };
-            match around.least(slopes, k, &residuals, longest) {
-                Some(found) => least = found,
-                None => break,
-            }
-            if settled(&least) {
-                return Ok(Side::At(reach));
-            }
-        }
-        to_gain = least.straight - least.above;
-        if stagnates {
-            // The last correction went too far, or not far enough.
-            longest = match least.straight > straight {
-                true => SHORTER * corrected,
-                false => 2.0 * longest,
-            };
-            match around.least(slopes, k, &residuals, longest) {
-                Some(shorter) => least = shorter,
-                None => break,
-            }
-        }
-        (corrected, straight) = (least.correction.norm(), least.straight);
-        bend += &least.correction / reach.powi(2);
-        // The root of the sum is nearly linear.
-        let root = least.above.max(0.0).sqrt() / judge.quantile;
-        let secant = (root - before.1) / (reach - before.0);
-        let next = match &there {
-            None if secant > 0.0 => reach + (1.0 - root) / secant,
-            _ => reach + sign * least.step(wanted, sign),
-        };
-        if !next.is_finite() {
-            break;
-        }
-        before = (reach, root);
-        reach = next.clamp(0.5 * reach, 2.0 * reach).min(most);
-    }
-    Err(reach)
 }
 
 /// Whether the sum of squares is, at the ends of an interval, what the curvature at
