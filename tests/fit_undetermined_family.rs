@@ -6,7 +6,7 @@ mod common;
 use common::fit::{Noise, base, fitted, request};
 use leafdyn::study::FitOutcome;
 
-/// Drawn leaves of each kind.
+/// Drawn leaves of each kind; `LEAFDYN_LEAVES` in the environment asks for more.
 const DRAWN: u64 = 6;
 
 /// What is measured, which numbers are free, and which combinations stay open.
@@ -190,8 +190,10 @@ fn all_that_is_open_is_named_and_nothing_else() {
         along,
         other_vein,
     ];
+    let drawn = std::env::var("LEAFDYN_LEAVES").ok();
+    let drawn = drawn.and_then(|text| text.parse().ok()).unwrap_or(DRAWN);
     for (kind, built) in kinds.into_iter().enumerate() {
-        for number in 0..DRAWN {
+        for number in 0..drawn {
             let mut noise = Noise(1000 * kind as u64 + number);
             let [a, b] = [0.7 + 0.8 * noise.even(), 0.7 + 0.8 * noise.even()];
             let built = built(a, b);

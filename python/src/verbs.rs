@@ -246,7 +246,11 @@ pub fn map(
             });
             !monitor.cancelled()
         });
-        Map::new(request, rows)
+        let mut map = Map::new(request, rows);
+        if !monitor.cancelled() {
+            map.find_jumps();
+        }
+        map
     })?;
     map.show = show;
     Ok(Files::of(map, scenario.checked.clone()))

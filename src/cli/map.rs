@@ -118,13 +118,17 @@ impl Map {
             true => self.solve(job, kept, &request, &known)?,
             false => Vec::new(),
         };
-        let told = report::MapTold {
-            known: known.len(),
-            computed: computed.len(),
-            seconds: clock.elapsed().as_secs_f64(),
-        };
+        let counts = [known.len(), computed.len()];
         let mut map = Cells::new(request, [known, computed].concat());
         map.show = self.show;
+        if self.shard.is_none() && self.draw.is_empty() {
+            map.find_jumps();
+        }
+        let told = report::MapTold {
+            known: counts[0],
+            computed: counts[1],
+            seconds: clock.elapsed().as_secs_f64(),
+        };
         let report = |files| report::map_report(&map, told, files);
         let Some(shard) = self.shard else {
             return job.deliver(&map, true, report);

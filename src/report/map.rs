@@ -4,9 +4,12 @@ use std::fmt::Write;
 
 use crate::study::{Map, MapOutcome};
 
-use super::numbers::seconds;
+use super::numbers::{brief, seconds};
 use super::table::{lay_out, under};
 use super::words;
+
+/// Jumps that are listed.
+const JUMPS: usize = 5;
 
 /// What was done for it.
 #[derive(Clone, Copy)]
@@ -47,6 +50,7 @@ pub fn report(map: &Map, told: Told, files: Option<String>) -> String {
         ),
     ));
     lines.extend(under("found", counts(map)));
+    lines.extend(under("jumps", jumps(map)));
     lines.extend(files.map(|files| ("written", files)));
     lay_out(
         &format!(
@@ -56,6 +60,23 @@ pub fn report(map: &Map, told: Told, files: Option<String>) -> String {
         ),
         &lines,
     )
+}
+
+/// Between which cells the leaf jumps to another equilibrium; of many the first few.
+fn jumps(map: &Map) -> Vec<String> {
+    let all = map.jumps.as_deref().unwrap_or_default();
+    let mut lines: Vec<String> = (all.iter().take(JUMPS))
+        .map(|jump| {
+            let (from, to) = (jump.from.join(", "), jump.to.join(", "));
+            let key = &jump.key;
+            let between = jump.between.map(brief).join(" and ");
+            format!("from cell {from} to {to} to another equilibrium: {key} between {between}")
+        })
+        .collect();
+    if all.len() > JUMPS {
+        lines.push(format!("and {} more: map.json has all", all.len() - JUMPS));
+    }
+    lines
 }
 
 /// A table with the outcomes that occur.

@@ -26,8 +26,8 @@ pub use fit::{
     FitResidual, FitWork, Free, Measured, MeasuredQuantity, Origin, Traced, fit,
 };
 pub use map::{
-    CELL_SECONDS, Confidence, Map, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow, MapShow,
-    map,
+    CELL_SECONDS, Confidence, Map, MapJump, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow,
+    MapShow, map,
 };
 pub use sensitivity::{SensitivityError, relax_with_sensitivities};
 pub use trace::{

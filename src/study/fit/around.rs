@@ -30,6 +30,9 @@ pub(super) struct Least {
     pub straight: f64,
     /// How the others have to move.
     pub correction: DVector<f64>,
+    /// Half of the derivative of that sum, and of its second derivative.
+    slope: f64,
+    bend: f64,
 }
 
 impl<'j, 'm, 'a> Around<'j, 'm, 'a> {
@@ -52,10 +55,11 @@ impl<'j, 'm, 'a> Around<'j, 'm, 'a> {
         self.slopes_of(self.judge.jacobian.clone())
     }
 
-    /// Derivatives at another point.
-    pub fn slopes_at(&self, mut there: Point) -> Result<Slopes, Lost> {
+    /// Derivatives at another point, which has them then.
+    pub fn slopes_at(&self, mut there: Point) -> Result<(Point, Slopes), Lost> {
         self.judge.model.differentiate(&mut there)?;
-        Ok(self.slopes_of(self.judge.weighing.jacobian(&there)))
+        let slopes = self.slopes_of(self.judge.weighing.jacobian(&there));
+        Ok((there, slopes))
     }
 
     fn slopes_of(&self, mut jacobian: DMatrix<f64>) -> Slopes {
@@ -86,32 +90,63 @@ impl<'j, 'm, 'a> Around<'j, 'm, 'a> {
             .collect()
     }
 
-    /// The residuals for other values, and the point.
-    pub fn residuals(&self, theta: &[f64]) -> Result<(DVector<f64>, Point), Lost> {
+    /// The residuals for other values, and the point, followed from one that is
+    /// differentiated.
+    pub fn residuals(&self, from: &Point, theta: &[f64]) -> Result<(DVector<f64>, Point), Lost> {
         let judge = self.judge;
-        let there = judge.model.follow_on(judge.point, theta, Grids::These)?;
+        let there = judge.model.follow_on(from, theta, Grids::These)?;
         Ok((judge.weighing.residuals(&there), there))
     }
 
     /// The least sum of squares over all numbers but the `k`th, to first order from where
-    /// the residuals are these.
-    pub fn least(&self, slopes: &Slopes, k: usize, residuals: &DVector<f64>) -> Option<Least> {
+    /// the residuals are these, and no farther from there than `longest`.
+    pub fn least(
+        &self,
+        slopes: &Slopes,
+        k: usize,
+        residuals: &DVector<f64>,
+        longest: f64,
+    ) -> Option<Least> {
         let judge = self.judge;
         let mut curvature = slopes.curvature.clone();
+        let mut coupled = -curvature.column(k);
+        coupled[k] = 1.0;
         curvature.row_mut(k).fill(0.0);
         curvature.column_mut(k).fill(0.0);
         curvature[(k, k)] = 1.0;
-        let mut slope = slopes.jacobian.tr_mul(residuals) / judge.spread.powi(2);
+        let variance = judge.spread.powi(2);
+        let mut slope = slopes.jacobian.tr_mul(residuals) / variance;
         slope[k] = 0.0;
-        let correction = -curvature.cholesky()?.solve(&slope);
+        let inverse = curvature.clone().cholesky()?;
+        let along = inverse.solve(&coupled);
+        let mut correction = -inverse.solve(&slope);
         let corrected = residuals + &slopes.jacobian * &correction;
+        let change = &slopes.jacobian * &along;
+        let mut damping = (judge.quantile / OPEN).powi(2);
+        while correction.norm() > longest {
+            damping *= 2.0;
+            let count = curvature.nrows();
+            let damped = &curvature + DMatrix::identity(count, count) * damping;
+            correction = -damped.cholesky()?.solve(&slope);
+        }
         let least = judge.residuals.norm_squared();
-        let above =
-            |residuals: &DVector<f64>| (residuals.norm_squared() - least) / judge.spread.powi(2);
+        let above = |residuals: &DVector<f64>| (residuals.norm_squared() - least) / variance;
         Some(Least {
             above: above(&corrected),
             straight: above(residuals),
+            slope: corrected.dot(&change) / variance,
+            bend: change.norm_squared() / variance,
             correction,
         })
+    }
+}
+
+impl Least {
+    /// By how much the number has to move so that the least sum is `above` the minimum, to
+    /// first order of the residuals: the farther of two such places, or where it is
+    /// least if there are none.
+    pub fn step(&self, above: f64, sign: f64) -> f64 {
+        let root = self.slope.powi(2) - self.bend * (self.above - above);
+        (sign * root.max(0.0).sqrt() - self.slope) / self.bend
     }
 }

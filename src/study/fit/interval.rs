@@ -3,15 +3,12 @@
 
 use nalgebra::DVector;
 
-use super::around::{Around, Least, Slopes};
+use super::around::Around;
+use super::end::{BETTER, Ends, STRAIGHT, Side, ends};
 use super::judge::{Judge, OPEN};
 use super::least_squares::{End, Iteration};
 use super::model::Point;
 use super::result::FitParameter;
-
-/// The sum of squares at the ends of an interval may be off by this part before the
-/// interval is taken from the profile of the sum.
-const STRAIGHT: f64 = 0.15;
 
 /// Steps to an end of a profile, iterations at each, how exactly the least sum is
 /// found there, in variances, and how exactly the end.
@@ -20,33 +17,8 @@ const PROFILE_ITERATIONS: usize = 25;
 const LEAST: f64 = 1e-2;
 const PROFILE_ACCURACY: f64 = 0.01;
 
-/// Points by which an end is looked for before the whole profile is, what part of the sum
-/// a correction may still take off there, and how exactly it is found.
-const FEW: usize = 10;
-const SETTLED: f64 = 0.1;
-const NEAR_ENOUGH: f64 = 0.03;
-
-/// How often leaves may be lost on the way to them.
-const FEW_LOST: usize = 3;
-
-/// A sum that is off by no more than this part of what may be needs no other look.
-const CLEARLY: f64 = 0.5;
-
 /// How often leaves may be lost on the way to an end of a profile.
 const MOST_LOST: usize = 6;
-
-/// A sum of squares so far below the minimum, in variances, belongs to a better one.
-const BETTER: f64 = 0.1;
-
-/// Where a profile ends.
-enum Side {
-    /// So far from the minimum.
-    At(f64),
-    /// Not within a factor of ten, nor before a bound.
-    Open,
-    /// Leaves cannot be followed there.
-    Lost,
-}
 
 /// The free numbers with their intervals. The shape of the sum of squares away from
 /// the minimum is that of `shape`, which may be a minimum on coarser grids.
@@ -102,16 +74,23 @@ fn parameter(
     let mut sides = [Side::At(half), Side::At(half)];
     let (deviation, along) = shape.deviation(k);
     let first = shape.quantile * deviation;
-    if let Some(found) = around.and_then(|around| ends(around, k, first, half)) {
-        if let Ends::Apart(found) = found {
-            parameter.profiled = true;
-            sides = found;
+    let few = around.and_then(|around| ends(around, k, first, half));
+    let few = match few {
+        Some(Ends::Straight) => None,
+        Some(Ends::Apart(found)) => Some(found),
+        None if half > OPEN || around.is_some() || !straight(shape, &along, first) => {
+            Some([Err(half), Err(half)])
         }
-    } else if half > OPEN || around.is_some() || !straight(shape, &along, first) {
+        None => None,
+    };
+    if let Some(found) = few {
         parameter.profiled = true;
         let along = shape.conditional(k, OPEN);
-        for (side, sign) in sides.iter_mut().zip([-1.0, 1.0]) {
-            *side = profile(shape, k, (sign * half, &along), progress)?;
+        for ((side, sign), found) in sides.iter_mut().zip([-1.0, 1.0]).zip(found) {
+            *side = match found {
+                Ok(found) => found,
+                Err(guess) => profile(shape, k, (sign * guess, &along), progress)?,
+            };
         }
     }
     let end = |side: &Side, sign: f64, bound: f64, given: Option<f64>| match side {
@@ -139,115 +118,6 @@ fn above(judge: &Judge, point: &Point) -> f64 {
     let bound = judge.weighing.bound(&judge.residuals);
     let sum = |residuals: &DVector<f64>| judge.weighing.sum(residuals, bound);
     (sum(&residuals) - sum(&judge.residuals)) / judge.spread.powi(2)
-}
-
-/// What a few points around a minimum tell of the ends of an interval.
-enum Ends {
-    /// They are where the curvature has them,
-    Straight,
-    /// or elsewhere, below and above.
-    Apart([Side; 2]),
-}
-
-/// The ends of an interval by a few points around the minimum; `None` where these do not
-/// tell.
-fn ends(around: &Around, k: usize, first: f64, half: f64) -> Option<Ends> {
-    let judge = around.judge;
-    let slopes = around.slopes();
-    let along = judge.conditional(k, OPEN);
-    if half <= OPEN {
-        let expected = judge.quantile.powi(2);
-        let off = |above: f64| (above / expected - 1.0).abs();
-        let change = &along * first;
-        let (up, _) = around.residuals(&around.moved(&change)).ok()?;
-        // To second order the other side is its mirror image.
-        let linear = &judge.jacobian * change;
-        let down = &up - &linear - &linear;
-        let sides = [up, down].map(|residuals| around.least(&slopes, k, &residuals));
-        let clear = |least: &Option<Least>| {
-            (least.as_ref()).is_some_and(|least| off(least.above) < CLEARLY * STRAIGHT)
-        };
-        if sides.iter().all(clear) {
-            return Some(Ends::Straight);
-        }
-    }
-    let [low, high] = judge.model.coordinates[k].bounds;
-    let theta = judge.point.theta[k];
-    let reach = |sign: f64, room: f64| {
-        let most = (OPEN + 0.1).min(room);
-        reach(around, k, &slopes, (sign, first.min(most), most), &along)
-    };
-    let down = reach(-1.0, theta - low)?;
-    let up = reach(1.0, high - theta)?;
-    let same = |side: &Side| matches!(side, Side::At(reach) if *reach == first);
-    Some(match same(&down) && same(&up) && half <= OPEN {
-        true => Ends::Straight,
-        false => Ends::Apart([down, up]),
-    })
-}
-
-/// The end of a profile on one side, from a first guess and not beyond what is most.
-fn reach(
-    around: &Around,
-    k: usize,
-    at_minimum: &Slopes,
-    (sign, first, most): (f64, f64, f64),
-    along: &DVector<f64>,
-) -> Option<Side> {
-    if most <= 0.0 {
-        return Some(Side::Open);
-    }
-    let judge = around.judge;
-    let mut reach = first;
-    let mut bend = DVector::zeros(along.len());
-    let mut before = (0.0, 0.0);
-    let mut lost = 0;
-    let mut known: Option<Slopes> = None;
-    for step in 0..FEW {
-        let change = along * (sign * reach) + &bend * reach.powi(2);
-        let theta = around.moved(&change);
-        let Ok((residuals, there)) = around.residuals(&theta) else {
-            lost += 1;
-            if lost > FEW_LOST {
-                return None;
-            }
-            reach = 0.5 * (before.0 + reach);
-            continue;
-        };
-        let mut least = around.least(known.as_ref().unwrap_or(at_minimum), k, &residuals)?;
-        if reach >= most && least.straight < judge.quantile.powi(2) {
-            return Some(Side::Open);
-        }
-        if step == 0 && (least.above / judge.quantile.powi(2) - 1.0).abs() < STRAIGHT {
-            return Some(Side::At(reach));
-        }
-        let settled = |least: &Least| {
-            let root = least.above.max(0.0).sqrt() / judge.quantile;
-            let corrected = least.straight - least.above < SETTLED * least.above;
-            corrected && (root - 1.0).abs() < NEAR_ENOUGH
-        };
-        if settled(&least) {
-            // By the derivatives there it may be lower still.
-            let slopes = around.slopes_at(there).ok()?;
-            least = around.least(&slopes, k, &residuals)?;
-            known = Some(slopes);
-            if settled(&least) {
-                return Some(Side::At(reach));
-            }
-        }
-        if least.above <= 0.0 {
-            return None;
-        }
-        let root = least.above.sqrt() / judge.quantile;
-        bend += least.correction / reach.powi(2);
-        let next = reach + (1.0 - root) * (reach - before.0) / (root - before.1);
-        before = (reach, root);
-        reach = match next.is_finite() && next > 0.0 {
-            true => next.clamp(0.5 * reach, 2.0 * reach).min(most),
-            false => return None,
-        };
-    }
-    None
 }
 
 /// Whether the sum of squares is, at the ends of an interval, what the curvature at

@@ -13,6 +13,7 @@ mod change;
 mod data;
 mod derivatives;
 mod directions;
+mod end;
 mod found;
 mod free;
 mod interval;

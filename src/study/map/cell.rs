@@ -267,7 +267,7 @@ fn within(limit: Duration, all: &Limit, run: impl FnOnce(&Limit) -> Found) -> (F
 }
 
 /// Relaxes, perhaps on one grid. That tells no error: a finer grid does.
-fn relaxed(scenario: &Scenario, method: Method, tolerance: f64, limit: &Limit) -> Found {
+pub fn relaxed(scenario: &Scenario, method: Method, tolerance: f64, limit: &Limit) -> Found {
     let options = Options {
         method,
         tolerance: Some(tolerance),

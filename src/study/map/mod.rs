@@ -7,10 +7,12 @@
 //! reference is confirmed. Everything else is measured against it.
 
 mod cell;
+mod jumps;
 mod motion;
 mod request;
 mod row;
 
+pub use jumps::MapJump;
 pub use request::{CELL_SECONDS, MapRefused, MapRequest};
 pub use row::{Confidence, MapMethod, MapOutcome, MapRow, MapShow};
 
@@ -29,6 +31,8 @@ pub struct Map {
     pub rows: Vec<MapRow>,
     /// What the figure shows.
     pub show: MapShow,
+    /// Between which cells the leaf jumps to another equilibrium, once that was looked for.
+    pub jumps: Option<Vec<MapJump>>,
 }
 
 impl Map {
@@ -40,6 +44,7 @@ impl Map {
             request,
             rows,
             show: MapShow::default(),
+            jumps: None,
         }
     }
 
@@ -71,6 +76,7 @@ impl Serialize for Map {
             cells: usize,
             confirmed: usize,
             outcomes: Vec<Counts>,
+            jumps: &'a Option<Vec<MapJump>>,
         }
         #[derive(Serialize)]
         struct Counts {
@@ -91,6 +97,7 @@ impl Serialize for Map {
             cells: request.cells(),
             confirmed: self.known_and_confirmed().1,
             outcomes: outcomes.collect(),
+            jumps: &self.jumps,
         }
         .serialize(serializer)
     }

@@ -1,0 +1,95 @@
+//! Where the leaf of a map jumps to another equilibrium from a cell to the next, with its
+//! followed branch as the judge.
+
+mod common;
+
+use common::branch::follow;
+use common::{entries, path};
+use leafdyn::study::{Base, Map, MapMethod, MapRequest};
+
+/// An arch between clamps, shallow enough to snap through under a load along it.
+const ARCH: &str = r#"
+    name = "arch"
+    leaf = { rods = 1, length = 1.0, fan = [0.6] }
+    stiffness = { torsion = 50.0, bending_2 = 50.0, bending_3 = 1.0, axial = 5000.0, shear_2 = 5000.0, shear_3 = 5000.0 }
+    rest = { bend_3 = -1.2 }
+    tip = { held = "clamped", position = [0.941, 0.0, 0.0], angles = -0.6 }
+    load = { gravity = [0.0, -1.0, 0.0] }
+"#;
+
+/// A map by the default method, and its jumps.
+fn mapped(base: Base, axes: &[&str]) -> Map {
+    let axes = axes.iter().map(|axis| axis.parse().unwrap()).collect();
+    let methods = vec![MapMethod::default()];
+    let request = MapRequest::new(base, axes, Some(methods.clone()), None, 300.0).unwrap();
+    let cells = 0..request.cells();
+    let rows = cells.flat_map(|cell| request.solve(cell, &methods));
+    let mut map = Map::new(request.clone(), rows.collect());
+    map.find_jumps();
+    map
+}
+
+#[test]
+fn an_arch_snaps_where_its_branch_loses_its_stability() {
+    let base = Base::of_text(ARCH.into(), "arch.toml".into(), &[]).unwrap();
+    let map = mapped(base, &["load.gravity[1]=-1..-150:7"]);
+    let branch = &follow(ARCH, "", "load.gravity[1]=-1..-150", false).branches[0];
+    let critical: Vec<_> = branch.critical().collect();
+    // It comes back stable far below: between them there are two equilibria.
+    assert_eq!(critical.len(), 4);
+    let lost = critical[0].1.value;
+    let [jump] = map.jumps.as_deref().unwrap() else {
+        panic!("{:?}", map.jumps);
+    };
+    println!("{jump:?} {lost}");
+    let [a, b] = jump.between;
+    assert!(b < lost && lost < a + (a - b), "{lost} {jump:?}");
+    assert!((a - b) < 1e-2);
+    assert!(jump.distance > 0.1);
+    assert_eq!(
+        [&jump.from[0][..], &jump.to[0][..]],
+        ["-75.5", "-100.333333333"]
+    );
+}
+
+/// The same along either axis of a map of two, and only there.
+#[test]
+fn both_axes_are_looked_along() {
+    let base = Base::of_text(ARCH.into(), "arch.toml".into(), &[]).unwrap();
+    let axes = [
+        "load.gravity[1]=-60..-100:2",
+        "scale:stiffness.bending_3=1..1.5:2",
+    ];
+    let map = mapped(base, &axes);
+    let jumps = map.jumps.unwrap();
+    // A stiffer arch snaps later, at -80.6 times 1.5 if it did not stretch.
+    let keys: Vec<&str> = jumps.iter().map(|jump| jump.key.as_str()).collect();
+    assert_eq!(
+        keys,
+        ["load.gravity[1]", "scale:stiffness.bending_3"],
+        "{jumps:?}"
+    );
+}
+
+/// Branches that are stable throughout, and one that forks without a jump.
+#[test]
+fn what_is_continuous_does_not_jump() {
+    for (name, set, vary) in [
+        ("classic/lens_midrib", "", "leaf.length[1]=0.9..1.0:6"),
+        (
+            "classic/cantilever_heavy",
+            "",
+            "scale:load.gravity=0.5..2.0:5",
+        ),
+        ("paper/fig04", "leaf.rods=3", "load.gravity[2]=-0.1..-2:5"),
+        (
+            "paper/fig05",
+            "leaf.rods=3",
+            "scale:stiffness.bending_2=1..2:4",
+        ),
+    ] {
+        let base = Base::read(&path(name), &entries(set)).unwrap();
+        let map = mapped(base, &[vary]);
+        assert_eq!(map.jumps, Some(Vec::new()), "{name}");
+    }
+}
