@@ -94,7 +94,7 @@ fn reactions_give_stiffnesses() {
 fn an_experiment_without_equilibrium_is_named() {
     let refused = |text: &str, entries: &[&str], table: &str, free: &str| -> FitError {
         let asked = request(base(text, entries), &[table], &[free]);
-        fit(&asked, &mut |_, _| {}).unwrap_err()
+        fit(&asked, &mut |_| {}).unwrap_err()
     };
     let table = "load.tip_force[0],tip_x\n1.0,0.9\n2.0,0.92\n-1e6,0.1\n";
     let crushed = refused(VEIN, &[], table, "stiffness.bending_2");

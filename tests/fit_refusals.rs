@@ -23,7 +23,7 @@ fn bad_data_are_explained() {
             free,
             ..request(base, &[], &[])
         };
-        fit(&request, &mut |_, _| {}).unwrap_err().to_string()
+        fit(&request, &mut |_| {}).unwrap_err().to_string()
     };
     let good = "load.tip_force[2],tip_z\n-0.1,-0.2\n";
     let free = ["stiffness.bending_2"].as_slice();

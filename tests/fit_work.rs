@@ -31,7 +31,7 @@ fn on(threads: usize) -> Fit {
     let asked = request(base(LEAF, &[]), &[&data], &FREE);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
     let pool = pool.build().unwrap();
-    pool.install(|| fit(&asked, &mut |_, _| {}).unwrap())
+    pool.install(|| fit(&asked, &mut |_| {}).unwrap())
 }
 
 /// The search is one of a few steps on coarse grids; all grids are used for the first

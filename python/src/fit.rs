@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use leafdyn::scenario;
-use leafdyn::study::{self, Data, Experiment, FitError, FitRequest, Free};
+use leafdyn::study::{self, Data, Experiment, FitError, FitRequest, FitStep, Free};
 use pyo3::prelude::*;
 
 use crate::errors::{cannot, cannot_vary};
@@ -82,7 +82,8 @@ pub fn fit(
     };
     let found = run(py, progress, move |monitor| {
         request.limit = monitor.limit();
-        study::fit(&request, &mut |step, sum| {
+        study::fit(&request, &mut |now| {
+            let FitStep { step, sum, .. } = *now;
             monitor.say_or_end(step as f64, None, || {
                 format!("step {step}, sum of squares {sum:.6e}")
             });

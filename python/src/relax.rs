@@ -128,7 +128,7 @@ fn solve_here(
         let found = relax::relax(scenario, &options, &mut |progress| {
             say(progress);
             step(monitor);
-            if !few(progress.grid) {
+            if matches!(progress, Progress::Relaxing { grid, .. } if !few(*grid)) {
                 // It begins anew elsewhere, which costs little beside what is to come.
                 large = true;
                 monitor.cancel();

@@ -6,8 +6,9 @@ use clap::{Args, ValueHint};
 
 use crate::limit::Limit;
 use crate::report;
-use crate::study::{self, Data, Fit as Fitted, FitRequest, Free};
+use crate::study::{self, Data, Fit as Fitted, FitRequest, FitStep, Free};
 
+use super::progress::part_of;
 use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status};
 
@@ -80,10 +81,18 @@ impl Fit {
             limit: Limit::default(),
         };
         let mut line = job.progress();
-        let fit = study::fit(&request, &mut |step, sum| {
-            line.say(|time| {
-                let time = time.as_secs_f64();
-                format!("step {step}, sum of squares {sum:.6e}, {time:.0} s")
+        let mut profiling = false;
+        let fit = study::fit(&request, &mut |now| {
+            let FitStep { step, sum, known } = *now;
+            if known.is_some() && !std::mem::replace(&mut profiling, true) {
+                line.next();
+            }
+            let part = known.and_then(|(known, all)| part_of(known, all));
+            let intervals = known.map_or(String::new(), |(known, all)| {
+                format!("{known} of {all} intervals, ")
+            });
+            line.tell(part, || {
+                format!("{intervals}step {step}, sum of squares {sum:.6e}")
             });
         })?;
         drop(line);

@@ -63,7 +63,7 @@ pub fn request(base: Base, data: &[&str], free: &[&str]) -> FitRequest {
 
 /// What a fit found.
 pub fn fitted(request: &FitRequest) -> Fit {
-    fit(request, &mut |_, _| {}).unwrap_or_else(|refused| panic!("{refused}"))
+    fit(request, &mut |_| {}).unwrap_or_else(|refused| panic!("{refused}"))
 }
 
 /// Tips of a leaf pulled by these forces, as a table with noise of a deviation.

@@ -8,7 +8,7 @@ use super::end::{BETTER, Ends, STRAIGHT, Side, ends};
 use super::judge::{Judge, OPEN};
 use super::least_squares::{End, Iteration};
 use super::model::Point;
-use super::result::FitParameter;
+use super::result::{FitParameter, FitStep};
 
 /// Steps to an end of a profile, iterations at each, how exactly the least sum is
 /// found there, in variances, and how exactly the end.
@@ -28,12 +28,16 @@ const MOST_LOST: usize = 6;
 pub(super) fn intervals(
     judge: &Judge,
     shape: &Judge,
-    progress: &mut dyn FnMut(usize, f64),
+    progress: &mut dyn FnMut(&FitStep),
 ) -> Result<Vec<FitParameter>, Point> {
     let around = Around::new(shape);
-    let numbers = 0..judge.values.len();
-    numbers
-        .map(|k| parameter(judge, (shape, around.as_ref()), k, progress))
+    let all = judge.values.len();
+    (0..all)
+        .map(|k| {
+            let known = Some((k, all));
+            let mut profiling = |step, sum| progress(&FitStep { step, sum, known });
+            parameter(judge, (shape, around.as_ref()), k, &mut profiling)
+        })
         .collect()
 }
 

@@ -29,7 +29,9 @@ mod words;
 pub use data::{Data, Experiment, Measured, Origin, Traced};
 pub use free::Free;
 pub use quantity::Quantity as MeasuredQuantity;
-pub use result::{Fit, FitCandidate, FitLeaf, FitOutcome, FitParameter, FitResidual, FitWork};
+pub use result::{
+    Fit, FitCandidate, FitLeaf, FitOutcome, FitParameter, FitResidual, FitStep, FitWork,
+};
 
 use std::time::Instant;
 
@@ -100,12 +102,11 @@ impl FitRequest {
     }
 }
 
-/// Fits the free numbers to the data. `progress` is told the number of each step and
-/// the sum of squares.
+/// Fits the free numbers to the data. `progress` is told of each step.
 ///
 /// # Errors
 /// Requests that cannot be met; how the fit itself ended is its outcome.
-pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result<Fit, FitError> {
+pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<Fit, FitError> {
     let clock = Instant::now();
     let base = &request.base;
     if let Some(tolerance) = request.tolerance {
@@ -137,14 +138,19 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(usize, f64)) -> Result
     let mut jumps = 0;
     let mut found = loop {
         // The search on coarse grids, and the last steps on all.
-        let (near, searched, more) = Iteration::new(&rough, weighing, progress).run(point);
+        let mut searching = |step, sum| {
+            let known = None;
+            progress(&FitStep { step, sum, known });
+        };
+        let mut search = Iteration::new(&rough, weighing, &mut searching);
+        let (near, searched, more) = search.run(point);
         evaluations.rough += more;
         attempts += 1;
         let there = model.refined(&near).or_else(|_| {
             let found = model.find(&near.theta);
             found.map(|(there, _)| there)
         })?;
-        let mut last = Iteration::new(&model, weighing, progress);
+        let mut last = Iteration::new(&model, weighing, &mut searching);
         last.lean = true;
         let (mut least, end, more) = last.run(there);
         evaluations.accurate += 1 + more;

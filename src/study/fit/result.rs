@@ -87,6 +87,18 @@ pub struct FitCandidate {
     pub remark: Option<String>,
 }
 
+/// How far a fit has come.
+#[derive(Clone, Copy, Debug)]
+pub struct FitStep {
+    /// Steps made towards the present minimum.
+    pub step: usize,
+    /// The sum of squares there.
+    pub sum: f64,
+    /// Once the minimum is found: of how many numbers the interval is known, and of how
+    /// many there are.
+    pub known: Option<(usize, usize)>,
+}
+
 /// Work of a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct FitWork {
