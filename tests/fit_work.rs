@@ -91,7 +91,7 @@ fn twenty_numbers_of_a_large_leaf_take_few_evaluations() {
     let free: Vec<&str> = free.iter().map(String::as_str).collect();
     let found = fit(
         &request(base(&text, &[]), &[&pulled, &traced], &free),
-        &mut |_, _| {},
+        &mut |_| {},
     )
     .unwrap();
     println!("{:?} in {} s", found.work, found.wall_seconds);
