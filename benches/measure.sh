@@ -18,6 +18,7 @@ cargo bench --bench growth
 cargo bench --bench linear_solvers
 cargo bench --bench shooting
 cargo bench --bench explicit
+cargo bench --bench sensitivity
 
 # The paper's own route.
 leafdyn relax scenarios/paper/fig04.toml --set leaf.rods=5 --tolerance 1e-12 --out out/fig04-5
