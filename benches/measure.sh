@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Measures the tables of docs/speed.md and the error estimates of
-# docs/how-to-read.md, and draws the two charts. Hours on two cores, and worth
+# Measures the tables of docs/speed.md, the error estimates of
+# docs/how-to-read.md and the intervals of docs/fit.md, and draws the two charts. Hours on two cores, and worth
 # little on a busy machine. Needs Python 3.11 and what pip installs below.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -13,11 +13,14 @@ pip install scipy
 pip install pyelastica exudyn
 
 cargo test --release --test error_estimate -- --nocapture
+LEAFDYN_LEAVES=1000 cargo test --release --test fit_coverage -- --nocapture
+LEAFDYN_LEAVES=143 cargo test --release --test fit_undetermined_family
 cargo bench --bench relax
 cargo bench --bench growth
 cargo bench --bench linear_solvers
 cargo bench --bench shooting
 cargo bench --bench explicit
+cargo bench --bench sensitivity
 
 # The paper's own route.
 leafdyn relax scenarios/paper/fig04.toml --set leaf.rods=5 --tolerance 1e-12 --out out/fig04-5
