@@ -73,6 +73,8 @@ pub struct Verified {
     pub error: f64,
     /// The state on the finest grid.
     pub state: State,
+    /// Fractions of the length of its nodes.
+    pub stations: Vec<f64>,
     /// What it is.
     pub kind: Kind,
     pub special: Option<Special>,
@@ -356,6 +358,7 @@ impl Table {
             tips: tips.chunks(3).map(|tip| [tip[0], tip[1], tip[2]]).collect(),
             error: self.tips.best().map_or(f64::INFINITY, |best| best.error),
             state: place.spot.state.clone(),
+            stations: sheet.grid().sigma().to_vec(),
             kind: place.kind,
             special,
             indices: match forward {

@@ -5,7 +5,7 @@
 
 use super::sheet::{Direction, Sample, Sheet, Spot};
 use crate::branch::equations::{ITERATIONS, LARGEST, Stuck};
-use crate::branch::field::{is_finite, largest};
+use crate::branch::field::{is_finite, largest, times};
 use crate::leaf::Field;
 
 /// Evaluations in the search for a zero.
@@ -123,6 +123,7 @@ impl Search<'_> {
         let slope = slopes.along(self.across).abs();
         let slopes = slopes.scaled(1.0 / slope);
         let dual = sheet.equations.momentum(&self.along.increments);
+        let none = times(&self.held[0], 0.0);
         let mut spot = self.spot.clone();
         let mut previous = f64::INFINITY;
         for _ in 0..ITERATIONS {
@@ -141,6 +142,9 @@ impl Search<'_> {
             }
             let state = sheet.advanced(&sample.spot, &increments, 1.0)?;
             let place = [0, 1].map(|i| sample.spot.place[i] + changes[i]);
+            // The forces of the segments follow the numbers, as the derivatives take it.
+            let moved = Spot { state, place };
+            let state = sheet.advanced(&moved, &none, 1.0)?;
             spot = Spot { state, place };
             let rounded = size < ROUNDED && size > SHRINKS * previous;
             if size <= SHORT.max(self.accuracy) || rounded {

@@ -13,6 +13,7 @@ use super::page::{
 };
 use crate::report::words::map_shows;
 use crate::study::{Confidence, Knob, Map, MapMethod, MapOutcome, MapRow, MapShow};
+pub use panel::fill_index;
 use panel::{Panel, Tile, Varied};
 
 const SWATCH: f64 = 12.0;
