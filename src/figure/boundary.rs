@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use super::axes::Axes;
 use super::axis::Axis;
 use super::drawing::{Anchor, CURVES, Drawing, INK, NOTE, Stroke};
-use super::map::fill_index;
+use super::map::{fill_index, name};
 use super::markers::Marker;
 use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, new_page, title};
 use super::setting::Setting;
@@ -123,7 +123,7 @@ fn draw_curves(
         let solid = curve.points.iter().any(stable);
         let width = if solid { 2.0 } else { 1.2 };
         axes.curve(page, &line, Stroke::new(color, width).dashed(!solid));
-        label(page, &axes, curve);
+        label(page, &axes, boundary, curve);
     }
     for (kind, marker) in [("cusp", Marker::Diamond), ("crossing", Marker::Ring)] {
         let special = points().filter(|point| point.kind == kind);
@@ -179,7 +179,7 @@ fn draw_cells(page: &mut Drawing, axes: &Axes, boundary: &Boundary, map: &Bounda
 
 /// The index on both sides of a curve, in its middle: of a fold, where there are
 /// equilibria, of both that meet.
-fn label(page: &mut Drawing, axes: &Axes, curve: &BoundaryCurve) {
+fn label(page: &mut Drawing, axes: &Axes, boundary: &Boundary, curve: &BoundaryCurve) {
     let middle = curve.points.len() / 2;
     let Some(point) = curve.points.get(middle) else {
         return;
@@ -199,6 +199,8 @@ fn label(page: &mut Drawing, axes: &Axes, curve: &BoundaryCurve) {
         .across
         .part(point.values[0] + 1e-6 * point.values[0].abs().max(1e-9));
     let rises = rises >= axes.across.part(point.values[0]);
+    let [from, to] = boundary.ranges[0];
+    let rises = rises == (to > from);
     let (left, right) = if rises {
         (before, behind)
     } else {
@@ -225,7 +227,7 @@ fn label(page: &mut Drawing, axes: &Axes, curve: &BoundaryCurve) {
 /// An axis over the whole range, logarithmic if the number's logarithm varies evenly;
 /// from small to large.
 fn axis(boundary: &Boundary, which: usize, values: impl Iterator<Item = f64>) -> Axis {
-    let name = boundary.keys[which].to_string();
+    let name = name(&boundary.keys[which].to_string());
     let ends = boundary.ranges[which];
     let values = values.chain(ends);
     if !boundary.log[which] {

@@ -69,7 +69,7 @@ fn map_lines(map: &BoundaryMap) -> Vec<String> {
         map.known(),
         match map.disagreeing.len() {
             0 => "all as the curves say".into(),
-            count => format!("{count} not as the curves say"),
+            count => format!("{count} not as the curves say: others may begin elsewhere"),
         }
     )];
     let named = map.disagreeing.iter().take(MOST_NAMED);

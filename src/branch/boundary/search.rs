@@ -98,9 +98,10 @@ pub fn eigen(sample: &Sample, neutral: usize) -> Eigen {
 }
 
 /// Steps of Newton's method (radians, lengths, fractions) as short as this end it, and
-/// such as are below the second and do not shrink to the third part are rounding.
+/// such as are below the second and do not shrink to the third part are rounding; an
+/// eigenvalue that does not shrink as much is not led to zero.
 const SHORT: f64 = 1e-10;
-const ROUNDED: f64 = 1e-6;
+const ROUNDED: f64 = 1e-9;
 const SHRINKS: f64 = 0.3;
 
 impl Search<'_> {
@@ -125,13 +126,19 @@ impl Search<'_> {
         let dual = sheet.equations.momentum(&self.along.increments);
         let none = times(&self.held[0], 0.0);
         let mut spot = self.spot.clone();
-        let mut previous = f64::INFINITY;
+        let (mut previous, mut last) = (f64::INFINITY, f64::INFINITY);
         for _ in 0..ITERATIONS {
             let (sample, noise) = sheet.sample(spot, &border, rates.clone(), false)?;
             let eigen = eigen(&sample, self.neutral);
+            // The derivatives are good for nothing where they do not lead there.
+            let value = eigen.value / slope;
+            if value.abs() > SHORT.max(SHRINKS * last) {
+                return Err(not_converged());
+            }
+            last = value.abs();
             let sums = [
                 (&dual, self.along.place.as_slice(), 0.0),
-                (&slopes.dual, &slopes.numbers, eigen.value / slope),
+                (&slopes.dual, &slopes.numbers, value),
             ];
             let (increments, changes) = sample.solved.step(&sums, noise)?;
             let size = largest(&increments)

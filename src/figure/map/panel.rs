@@ -241,7 +241,7 @@ impl<'a> Panel<'a> {
 const NAMED: usize = 4;
 
 /// Keys of one table are told with its name once: `stiffness: axial = shear_2`.
-fn name(keys: &str) -> String {
+pub fn name(keys: &str) -> String {
     let keys: Vec<&str> = keys.split('+').collect();
     let table = |key: &str| key.split('.').next().unwrap_or_default().to_string();
     let first = table(keys[0]);
