@@ -14,7 +14,9 @@ const COLUMN: &str = "--set leaf.rods=1 --set leaf.fan=[0] --set load.gravity=[0
 #[test]
 fn cells_are_stable_below_the_load_and_not_above() {
     let place = Workplace::new();
-    let run = place.run(&format!("trace leaf.toml {COLUMN} --map 6x4 --write json,svg,html"));
+    let run = place.run(&format!(
+        "trace leaf.toml {COLUMN} --map 6x4 --write json,svg,html"
+    ));
     run.ends(0).says(&["6 x 4 cells", "all as the curves say"]);
     let map = &place.json("out/small/boundary.json")["map"];
     assert_eq!(map["disagreeing"].as_array().unwrap().len(), 0);
