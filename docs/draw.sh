@@ -52,4 +52,10 @@ K='stiffness.bending_2[0]+stiffness.bending_2[1]+stiffness.bending_2[2]+stiffnes
 K="$K+stiffness.bending_2[6]+stiffness.bending_2[7]+stiffness.bending_2[8]+stiffness.bending_2[9]+stiffness.bending_2[10]"
 leafdyn map scenarios/study/undulation.toml --tolerance 1e-4 --methods semi-implicit --show waves --out out/undulation-map \
   --vary "$K=1..1e-2:32log" --vary 'stiffness.torsion=0.1..10:32log'
+leafdyn trace scenarios/study/undulation.toml --set 'load.gravity=[0,0,0]' --tolerance 1e-4 --out out/below \
+  --vary "$K=1..0.4:50log" --vary 'stiffness.torsion=0.1..1.2:64log'
+leafdyn trace scenarios/study/undulation.toml --set 'load.gravity=[0,0,0]' --tolerance 1e-4 --out out/above \
+  --set 'stiffness.bending_2=[0.4,0.4,0.4,0.4,0.4,1000,0.4,0.4,0.4,0.4,0.4]' \
+  --vary 'stiffness.torsion=10..0.9:50log' --vary "$K=1..0.01:64log"
+leafdyn trace scenarios/study/undulation.toml --set 'load.gravity=[0,0,0]' --tolerance 1e-4 --switch --vary "$K=0.48..0.4:12log" --out out/waves
 cp out/undulation-map/map.svg "$top/docs/maps/undulation.svg"

@@ -29,6 +29,7 @@ fn follow(text: &str, overrides: &str, along: &str, across: &str) -> Boundary {
             cross_section: None,
         },
         across: across.parse().unwrap(),
+        map: None,
     };
     boundary(&request, &mut |_, _, _| {}).unwrap()
 }

@@ -126,6 +126,7 @@ fn follow(case: &Case) -> Result<Boundary, String> {
             cross_section: None,
         },
         across: case.across.parse().unwrap(),
+        map: None,
     };
     boundary(&request, &mut |_, _, _| {}).map_err(|error| error.to_string())
 }

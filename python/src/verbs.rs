@@ -178,6 +178,7 @@ pub fn boundary<'py>(
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Traced<'py>> {
     let request = BoundaryRequest {
+        map: None,
         trace: asked.request(py, scenario, along)?,
         across: across.parse().map_err(|error| cannot_vary(py, error))?,
     };

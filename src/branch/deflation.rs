@@ -64,7 +64,7 @@ impl Equations<'_> {
                     modes: solved.modes,
                 });
             }
-            let (increments, changes) = solved.step(&[(&dual, &[own])], linear.noise)?;
+            let (increments, changes) = solved.step(&[(&dual, &[own], 0.0)], linear.noise)?;
             let size = largest(&increments).max(changes[0].abs());
             if !is_finite(&increments) || size > LARGEST {
                 return Err(Stuck::NotConverged);
@@ -98,17 +98,20 @@ impl Equations<'_> {
         let zero = times(forces, 0.0);
         let unit = |i: usize| (0..p).map(|k| if k == i { 1.0 } else { 0.0 }).collect();
         let units: Vec<Vec<f64>> = (0..p).map(unit).collect();
-        let columns = units.iter().map(|unit| factor.solve_bordered(&zero, unit));
-        let columns: Vec<Bordered> = columns.collect();
+        let mut of: Vec<(&Field, &[f64])> = Vec::with_capacity(p + 1 + rates.len());
+        of.extend(units.iter().map(|unit| (&zero, unit.as_slice())));
+        of.push((forces, &none));
+        of.extend(rates.iter().map(|rate| (*rate, none.as_slice())));
+        let mut columns = factor.solve_all(&of).map_err(|_| Stuck::TooLarge)?;
+        let rates = columns.split_off(p + 1);
+        let forces = columns.pop().ok_or(Stuck::NotConverged)?;
         Ok(Solved {
             h: DMatrix::from_fn(p, p, |r, c| {
                 0.5 * (columns[c].multipliers[r] + columns[r].multipliers[c])
             }),
             modes: columns.into_iter().map(|it| it.increments).collect(),
-            forces: factor.solve_bordered(forces, &none),
-            rates: (rates.iter())
-                .map(|rate| factor.solve_bordered(rate, &none))
-                .collect(),
+            forces,
+            rates,
             negative: factor.negative(),
         })
     }
@@ -182,11 +185,12 @@ pub(super) struct Solved {
 }
 
 impl Solved {
-    /// Newton's increments and changes of the numbers within the plane normal to as many
-    /// directions: each by its momentum, and its own changes of the numbers.
+    /// Newton's increments and changes of the numbers that leave as many sums as there are
+    /// numbers at zero: each by its change with the increments and with the numbers, and
+    /// by what it is now. (The distance from a plane is one of them.)
     pub fn step(
         &self,
-        normals: &[(&Field, &[f64])],
+        sums: &[(&Field, &[f64], f64)],
         noise: f64,
     ) -> Result<(Field, Vec<f64>), Stuck> {
         let (p, numbers) = (self.modes.len(), self.rates.len());
@@ -196,7 +200,7 @@ impl Solved {
             for (i, rate) in self.rates.iter().enumerate() {
                 matrix[(r, p + i)] = rate.multipliers[r];
             }
-            for (k, (dual, _)) in normals.iter().enumerate() {
+            for (k, (dual, ..)) in sums.iter().enumerate() {
                 matrix[(p + k, r)] = dot(dual, &self.modes[r]);
             }
             // What is below rounding decides nothing.
@@ -205,11 +209,11 @@ impl Solved {
                 force => force,
             };
         }
-        for (k, (dual, own)) in normals.iter().enumerate() {
+        for (k, (dual, own, now)) in sums.iter().enumerate() {
             for (i, rate) in self.rates.iter().enumerate() {
                 matrix[(p + k, p + i)] = dot(dual, &rate.increments) + own[i];
             }
-            right[p + k] = -dot(dual, &self.forces.increments);
+            right[p + k] = -now - dot(dual, &self.forces.increments);
         }
         let svd = matrix.svd(true, true);
         let least = NEUTRAL * svd.singular_values.max();

@@ -47,6 +47,10 @@ pub struct Trace {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     show: Vec<TraceShow>,
 
+    /// Of a boundary also a coarse map under the curves: the index in so many cells along both numbers, from a trace along each row
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = cells)]
+    map: Option<[usize; 2]>,
+
     /// Area of the leaf's cross-section: gives Young's modulus where a tip force varies
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     cross_section: Option<f64>,
@@ -60,6 +64,9 @@ impl Trace {
             side_by_side: false,
         };
         match self.vary.as_slice() {
+            [_] if self.map.is_some() => {
+                Err("--map: a map is drawn over two numbers; give --vary twice".into())
+            }
             [along] => (self.request).each::<Traced>(how, |job| self.one(job, along)),
             [_, _] if !self.show.is_empty() => {
                 Err("--show: a boundary is drawn over both numbers; give one --vary".into())
@@ -92,6 +99,7 @@ impl Trace {
         let request = BoundaryRequest {
             trace: self.along(job, along)?,
             across: across.clone(),
+            map: self.map,
         };
         let mut line = job.progress();
         let mut seen = (usize::MAX, [0.0; 2]);
@@ -152,6 +160,16 @@ impl Trace {
         job.deliver(&trace, trace.complete, |files| {
             report::trace_report(&trace, files)
         })
+    }
+}
+
+/// Cells along both numbers, as 16x16.
+fn cells(given: &str) -> Result<[usize; 2], String> {
+    let sides = given.split_once('x').map(|(columns, rows)| [columns, rows]);
+    let sides = sides.map(|sides| sides.map(|side| side.trim().parse().ok()));
+    match sides {
+        Some([Some(columns), Some(rows)]) => Ok([columns, rows]),
+        _ => Err("give cells along both numbers, as 16x16".into()),
     }
 }
 

@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3};
 use super::axes::Axes;
 use super::axis::Axis;
 use super::drawing::{Anchor, CURVES, Drawing, INK, NOTE, Stroke};
+use super::map::{fill_index, name};
 use super::markers::Marker;
 use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, new_page, title};
 use super::setting::Setting;
@@ -14,7 +15,7 @@ use super::veins::Veins;
 use crate::report::numbers::{power_of_ten, short};
 use crate::report::{is_special, sides};
 use crate::scenario::Scenario;
-use crate::study::{Boundary, BoundaryCurve, BoundaryPoint};
+use crate::study::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint};
 
 const DIAGRAM: f64 = 400.0;
 /// Right of the panel, for the key.
@@ -110,6 +111,9 @@ fn draw_curves(
         up: axis(boundary, 1, points().map(|point| point.values[1])),
     };
     title(page, cell.corner, "", "curves, and the index on both sides");
+    if let Some(map) = &boundary.map {
+        draw_cells(page, &axes, boundary, map);
+    }
     axes.draw(page);
     let at = |point: &BoundaryPoint| (point.values[0], point.values[1]);
     for (c, curve) in boundary.curves.iter().enumerate() {
@@ -119,7 +123,7 @@ fn draw_curves(
         let solid = curve.points.iter().any(stable);
         let width = if solid { 2.0 } else { 1.2 };
         axes.curve(page, &line, Stroke::new(color, width).dashed(!solid));
-        label(page, &axes, curve);
+        label(page, &axes, boundary, curve);
     }
     for (kind, marker) in [("cusp", Marker::Diamond), ("crossing", Marker::Ring)] {
         let special = points().filter(|point| point.kind == kind);
@@ -140,9 +144,42 @@ fn draw_curves(
     draw_key(page, boundary, cell);
 }
 
+/// The cells of the map, each in the colour of its index.
+fn draw_cells(page: &mut Drawing, axes: &Axes, boundary: &Boundary, map: &BoundaryMap) {
+    let edges = |which: usize, cells: usize| -> Vec<f64> {
+        let [from, to] = boundary.ranges[which];
+        let part = |k: usize| k as f64 / cells as f64;
+        let value = |part: f64| match boundary.log[which] {
+            true => from * (to / from).powf(part),
+            false => from + (to - from) * part,
+        };
+        (0..=cells).map(|k| value(part(k))).collect()
+    };
+    let (x, y) = (edges(0, map.first.len()), edges(1, map.second.len()));
+    for (r, row) in map.index.iter().enumerate() {
+        for (c, index) in row.iter().enumerate() {
+            let corners = [axes.at((x[c], y[r])), axes.at((x[c + 1], y[r + 1]))];
+            let ([Some(a), Some(b)], Some(index)) = (corners, index) else {
+                continue;
+            };
+            let corner = a.min(b);
+            let cell = Cell {
+                corner,
+                size: a.max(b) - corner,
+            };
+            fill_index(page, cell, *index);
+        }
+    }
+    for [c, r] in &map.disagreeing {
+        if let Some(at) = axes.at((map.first[c - 1], map.second[r - 1])) {
+            page.label(at, "×", TICK_SIZE, Anchor::Middle, INK);
+        }
+    }
+}
+
 /// The index on both sides of a curve, in its middle: of a fold, where there are
 /// equilibria, of both that meet.
-fn label(page: &mut Drawing, axes: &Axes, curve: &BoundaryCurve) {
+fn label(page: &mut Drawing, axes: &Axes, boundary: &Boundary, curve: &BoundaryCurve) {
     let middle = curve.points.len() / 2;
     let Some(point) = curve.points.get(middle) else {
         return;
@@ -162,6 +199,8 @@ fn label(page: &mut Drawing, axes: &Axes, curve: &BoundaryCurve) {
         .across
         .part(point.values[0] + 1e-6 * point.values[0].abs().max(1e-9));
     let rises = rises >= axes.across.part(point.values[0]);
+    let [from, to] = boundary.ranges[0];
+    let rises = rises == (to > from);
     let (left, right) = if rises {
         (before, behind)
     } else {
@@ -188,7 +227,7 @@ fn label(page: &mut Drawing, axes: &Axes, curve: &BoundaryCurve) {
 /// An axis over the whole range, logarithmic if the number's logarithm varies evenly;
 /// from small to large.
 fn axis(boundary: &Boundary, which: usize, values: impl Iterator<Item = f64>) -> Axis {
-    let name = boundary.keys[which].to_string();
+    let name = name(&boundary.keys[which].to_string());
     let ends = boundary.ranges[which];
     let values = values.chain(ends);
     if !boundary.log[which] {
@@ -211,6 +250,18 @@ fn draw_key(page: &mut Drawing, boundary: &Boundary, cell: Cell) {
     if boundary.curves.len() > MOST_NAMED {
         let more = format!("and {} more", boundary.curves.len() - MOST_NAMED);
         key.entry(page, "", &more, |_, _| ());
+    }
+    if let Some(map) = &boundary.map {
+        let mut indices: Vec<usize> = map.index.iter().flatten().flatten().copied().collect();
+        indices.sort_unstable();
+        indices.dedup();
+        for index in indices.into_iter().take(MOST_NAMED) {
+            let name = match index {
+                0 => "stable".into(),
+                index => format!("index {index}"),
+            };
+            key.entry(page, "", &name, |page, cell| fill_index(page, cell, index));
+        }
     }
     let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
     for (kind, marker) in [("cusp", Marker::Diamond), ("crossing", Marker::Ring)] {

@@ -110,6 +110,7 @@ impl Written for Boundary {
         &Table("boundary.csv", report::boundary_table),
         &Picture::svg("boundary.svg", figure::boundary),
         &Picture::png("boundary.png", figure::boundary),
+        &Page("boundary.html"),
     ];
 }
 

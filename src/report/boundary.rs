@@ -2,9 +2,9 @@
 
 use std::io::{self, Write};
 
-use crate::study::{Boundary, BoundaryCurve, BoundaryPoint};
+use crate::study::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint};
 
-use super::numbers::{power_of_ten, seconds, veins_of};
+use super::numbers::{brief, power_of_ten, seconds, veins_of};
 use super::table::{Lines, lay_out, under};
 
 /// The curves, their ends and their special points.
@@ -34,6 +34,7 @@ pub fn lines(boundary: &Boundary, files: Option<String>) -> Lines {
             .reduce(f64::max)
             .map(|worst| ("error", format!("tips within {}", power_of_ten(worst)))),
     );
+    lines.extend((boundary.map.iter()).flat_map(|map| under("map", map_lines(map))));
     lines.push(("work", format!("{} in all", seconds(boundary.wall_seconds))));
     lines.extend(files.map(|files| ("written", files)));
     lines.extend((boundary.remark.iter()).map(|remark| ("remark", remark.clone())));
@@ -54,6 +55,30 @@ fn curve_lines(boundary: &Boundary, number: usize, curve: &BoundaryCurve) -> Vec
     let special = curve.points.iter().filter(|point| is_special(point));
     lines.extend(special.map(|point| format!("  {} at {}", point.kind, place(boundary, point))));
     lines.push(end("to", curve.points.last(), 1));
+    lines
+}
+
+/// Cells named of those that disagree.
+const MOST_NAMED: usize = 5;
+
+/// Whether the map agrees with the curves.
+fn map_lines(map: &BoundaryMap) -> Vec<String> {
+    let (columns, rows) = (map.first.len(), map.second.len());
+    let mut lines = vec![format!(
+        "{columns} x {rows} cells, {} with an equilibrium of the branch, {}",
+        map.known(),
+        match map.disagreeing.len() {
+            0 => "all as the curves say".into(),
+            count => format!("{count} not as the curves say: others may begin elsewhere"),
+        }
+    )];
+    let named = map.disagreeing.iter().take(MOST_NAMED);
+    lines.extend(named.map(|[column, row]| {
+        let (first, second) = (map.first[column - 1], map.second[row - 1]);
+        let what = map.index[row - 1][column - 1];
+        let what = what.map_or("none".into(), |index| format!("index {index}"));
+        format!("  at ({}, {}): {what}", brief(first), brief(second))
+    }));
     lines
 }
 

@@ -30,7 +30,9 @@ use serde::Serialize;
 use crate::scenario::{Scenario, printable};
 
 pub use all::{lines as all_lines, report as all_report};
-pub use boundary::{boundary_table, is_special, report as boundary_report, sides};
+pub use boundary::{
+    boundary_table, is_special, lines as boundary_lines, report as boundary_report, sides,
+};
 pub use centerlines::{centerlines, modes_table};
 pub use chart::report as chart_report;
 pub use chart_table::{chart_table, scaling_table};

@@ -3,9 +3,10 @@
 use super::grids::{on_coarser, on_finer};
 use super::place::Place;
 use super::search::{Found, Lost, Search};
-use super::sheet::{Direction, Plane, Sheet};
+use super::sheet::{Direction, Plane, Sheet, Spot};
 use super::special::{Special, locate_near};
 use crate::branch::critical::Kind;
+use crate::branch::field::prolong as prolong_field;
 use crate::branch::refine_critical::NEARLY_RIGID;
 use crate::branch::refined::Doubt;
 use crate::leaf::{Grid, State};
@@ -24,8 +25,9 @@ const STILL: f64 = 1e-4;
 /// Largest error of the tips (lengths) of a point that is known by its numbers.
 const NEUTRAL_TIPS: f64 = 1e-3;
 
-/// Numbers are to be so many times as exact as tips: of the part of their ranges.
-const EXACTER: f64 = 1e-3;
+/// Numbers, as parts of their ranges, are to be as exact as tips to this power: a
+/// thousand times at 1e-6.
+const EXACTER: f64 = 1.5;
 
 /// Compliance by which matrices of nearly rigid leaves are softened, in units of L^2/A,
 /// times one to four: the more, the less rounding; a part of third order is left.
@@ -38,9 +40,10 @@ const AMPLIFIED: f64 = 8.3;
 /// Numbers within this part of their ranges are exact.
 const EXACT: f64 = 1e-12;
 
-/// Accuracy of a point on its grid, as a part of the ranges, and how far it may lie from
-/// where it is on the grid before.
+/// Accuracy of a point on its grid, as a part of the ranges, at best and as a part of the
+/// wanted one; how far it may lie from where it is on the grid before.
 const ACCURACY: f64 = 1e-13;
+const PART_OF: f64 = 1e-3;
 const NEAR: f64 = 0.5;
 
 /// The line across the boundary leaves it at an angle of at least this (its sine), and one
@@ -70,6 +73,8 @@ pub struct Verified {
     pub error: f64,
     /// The state on the finest grid.
     pub state: State,
+    /// Fractions of the length of its nodes.
+    pub stations: Vec<f64>,
     /// What it is.
     pub kind: Kind,
     pub special: Option<Special>,
@@ -110,14 +115,20 @@ fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<
         amplified: 1.0,
         ..Table::default()
     };
-    let mut moved = f64::INFINITY;
+    let enough = accuracy.powf(EXACTER).max(EXACT);
+    let (mut moved, mut last_move) = (f64::INFINITY, None);
     for level in 0..GRIDS {
+        let mut unmoved = near.spot.clone();
         if level > 0 {
             (sheet, near) = on_finer(&mut sheet, &near)?;
+            unmoved = near.spot.clone();
+            if let Some(last) = &last_move {
+                near.spot = moved_on(&mut sheet, &near.spot, last)?;
+            }
         }
         let rigid = sheet.leaf(near.spot.place)?.stiffest() * NEARLY_RIGID < 1.0;
-        let place = again(&mut sheet, &near, step.special, given)?;
-        let way = near.spot.state.shift_to(&place.spot.state);
+        let place = again(&mut sheet, &near, step.special, given, PART_OF * enough)?;
+        let way = unmoved.state.shift_to(&place.spot.state);
         if way > moved.max(STILL) {
             return Err(Doubt::OtherBranch);
         }
@@ -126,6 +137,7 @@ fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<
         }
         if level > 0 {
             moved = way;
+            last_move = Some(sheet.way(&unmoved, &place.spot));
         }
         near = place;
         let numbers = match rigid {
@@ -136,7 +148,6 @@ fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<
         if level + 1 < FEWEST {
             continue;
         }
-        let enough = (EXACTER * accuracy).max(EXACT);
         let errors = table.errors().into_iter().zip(table.rounding);
         let exact = errors
             .into_iter()
@@ -179,16 +190,17 @@ fn again(
     near: &Place,
     special: Option<Special>,
     given: Option<usize>,
+    accuracy: f64,
 ) -> Result<Place, Lost> {
     if let Some(special) = special {
         return locate_near(sheet, near, special);
     }
-    let found = sought(sheet, near, given).run(sheet)?;
+    let found = sought(sheet, near, given, accuracy).run(sheet)?;
     Ok(near.moved(sheet, found))
 }
 
 /// How the point is sought, from where it is on the grid before.
-fn sought(sheet: &Sheet, near: &Place, given: Option<usize>) -> Owned {
+fn sought(sheet: &Sheet, near: &Place, given: Option<usize>, accuracy: f64) -> Owned {
     let (across, slope, along) = match given {
         Some(which) => {
             let (across, slope) = near.across_at(sheet, which);
@@ -201,7 +213,18 @@ fn sought(sheet: &Sheet, near: &Place, given: Option<usize>) -> Owned {
         across,
         slope,
         along,
+        accuracy: accuracy.max(ACCURACY),
     }
+}
+
+/// Where a point will be on the grid with all segments halved, by what it moved to the one
+/// before: a fourth part of it.
+fn moved_on(sheet: &mut Sheet, spot: &Spot, last: &Direction) -> Result<Spot, Lost> {
+    let on = Direction {
+        increments: prolong_field(&last.increments),
+        place: last.place,
+    };
+    Ok(sheet.moved(spot, &on, 0.25)?)
 }
 
 /// A search that owns its directions.
@@ -210,6 +233,7 @@ struct Owned {
     across: Direction,
     slope: f64,
     along: Direction,
+    accuracy: f64,
 }
 
 impl Owned {
@@ -221,7 +245,7 @@ impl Owned {
             along: &self.along,
             held: &self.near.held,
             neutral: self.near.neutral,
-            accuracy: ACCURACY,
+            accuracy: self.accuracy,
             furthest: NEAR,
         };
         search.run(sheet)
@@ -233,7 +257,7 @@ impl Owned {
 fn unsoftened(sheet: &mut Sheet, near: &Place, given: Option<usize>) -> Result<[f64; 2], Lost> {
     let grid = sheet.grid().clone();
     let mut places = [[0.0; 2]; 4];
-    let mut owned = sought(sheet, near, given);
+    let mut owned = sought(sheet, near, given, ACCURACY);
     for (k, place) in places.iter_mut().enumerate().rev() {
         let mut soft = Sheet::new(sheet.plane, grid.clone())?;
         soft.soften(SOFTENING * (k + 1) as f64);
@@ -334,6 +358,7 @@ impl Table {
             tips: tips.chunks(3).map(|tip| [tip[0], tip[1], tip[2]]).collect(),
             error: self.tips.best().map_or(f64::INFINITY, |best| best.error),
             state: place.spot.state.clone(),
+            stations: sheet.grid().sigma().to_vec(),
             kind: place.kind,
             special,
             indices: match forward {

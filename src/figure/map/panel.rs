@@ -63,6 +63,18 @@ pub fn fill_waves(page: &mut Drawing, cell: Cell, waves: f64) {
     page.shape(rectangle(cell.corner, cell.size), color, None);
 }
 
+/// Fills a cell lightly by the index of its equilibrium: the more, the darker.
+pub fn fill_index(page: &mut Drawing, cell: Cell, index: usize) {
+    let color = match index {
+        0 => PALE,
+        1 => Color(250, 232, 214),
+        2 => Color(246, 218, 196),
+        3 => Color(240, 204, 182),
+        _ => Color(232, 190, 170),
+    };
+    page.shape(rectangle(cell.corner, cell.size), color, None);
+}
+
 /// Marks a cell whose reference is not confirmed: a dot, or a ring if there is
 /// none.
 pub fn mark(page: &mut Drawing, cell: Cell, reference: Confidence) {
@@ -229,7 +241,7 @@ impl<'a> Panel<'a> {
 const NAMED: usize = 4;
 
 /// Keys of one table are told with its name once: `stiffness: axial = shear_2`.
-fn name(keys: &str) -> String {
+pub fn name(keys: &str) -> String {
     let keys: Vec<&str> = keys.split('+').collect();
     let table = |key: &str| key.split('.').next().unwrap_or_default().to_string();
     let first = table(keys[0]);

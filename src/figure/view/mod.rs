@@ -18,6 +18,7 @@
 //! `data.rs` says what the page is given, one file each how a result gives it; the
 //! scripts draw it. `three/` holds what is used of three.js, and how it is bundled.
 
+mod boundary;
 mod data;
 mod equilibria;
 pub mod glb;

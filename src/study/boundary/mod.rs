@@ -1,8 +1,10 @@
 //! `trace` over two numbers: the boundary of stability as curves in their plane.
 
+mod map;
 mod result;
 mod run;
 
+pub use map::BoundaryMap;
 pub use result::{Boundary, BoundaryCurve, BoundaryPoint, CurveEnd};
 pub use run::boundary;
 
@@ -22,6 +24,8 @@ pub struct BoundaryRequest {
     /// The second number, and over which range; no step is longer than the distance of its
     /// values.
     pub across: Vary,
+    /// Cells of a coarse map under the curves, along both numbers, if there is to be one.
+    pub map: Option<[usize; 2]>,
 }
 
 impl BoundaryRequest {
@@ -41,6 +45,12 @@ impl BoundaryRequest {
         if let Some(target) = shared {
             let why = format!("{target}: varies twice; give two numbers that differ");
             return Err(TraceError::Vary(why));
+        }
+        let possible = |cells: &usize| (1..=map::MOST_CELLS).contains(cells);
+        if self.map.is_some_and(|map| !map.iter().all(possible)) {
+            let most = map::MOST_CELLS;
+            let why = format!("map: give from 1 to {most} cells along each number, as 16x16");
+            return Err(TraceError::Option(why));
         }
         if self.trace.cross_section.is_some() {
             let why = "cross-section: Young's modulus is that of a branch; give one --vary";

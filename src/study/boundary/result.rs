@@ -3,6 +3,7 @@
 use glam::DVec3;
 use serde::ser::{Serialize, Serializer};
 
+use super::map::BoundaryMap;
 use crate::branch::boundary::{Halt, Special};
 use crate::branch::{Doubt, Kind};
 use crate::scenario::Units;
@@ -42,6 +43,9 @@ pub struct Boundary {
     pub remark: Option<String>,
     /// The curves.
     pub curves: Vec<BoundaryCurve>,
+    /// The map under them, if it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub map: Option<BoundaryMap>,
     /// Time of all, in seconds.
     pub wall_seconds: f64,
 }
@@ -82,6 +86,9 @@ pub struct BoundaryPoint {
     pub index_before: usize,
     /// See above.
     pub index_behind: usize,
+    /// Fractions of the length of the nodes of the finest grid.
+    #[serde(skip)]
+    pub stations: Vec<f64>,
     /// Centerlines on the finest grid, one per rod.
     #[serde(skip)]
     pub curves: Vec<Vec<DVec3>>,

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+use super::map::map;
 use super::result::{Boundary, BoundaryCurve, BoundaryPoint, CurveEnd, word};
 use super::{BoundaryRequest, MOST_CURVES};
 use crate::branch::boundary::{self as curves, Halt, Plane, Stride, Verified};
@@ -79,6 +80,7 @@ pub fn boundary(
         complete: false,
         remark: trace.remark,
         curves: Vec::new(),
+        map: None,
         wall_seconds: 0.0,
     };
     let first = |value: f64| make([value, start]);
@@ -147,6 +149,9 @@ pub fn boundary(
             .collect(),
     };
     boundary.curves = found.iter().map(units).collect();
+    if let Some(cells) = request.map {
+        boundary.map = Some(map(&request.trace, across, cells, &boundary)?);
+    }
     boundary.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(boundary)
 }
@@ -182,6 +187,7 @@ fn in_units(plane: &Plane, joined: bool, number: usize, point: &Verified) -> Bou
         error: point.error * length,
         index_before: point.indices[0],
         index_behind: point.indices[1],
+        stations: point.stations.clone(),
         curves: (point.state.x.chunks(nodes))
             .map(|rod| rod.iter().map(|x| *x * length).collect())
             .collect(),

@@ -1,0 +1,195 @@
+//! The coarse map under the curves of a boundary: the index in cells of the plane, from
+//! traces along its rows, which know nothing of the curves.
+
+use rayon::prelude::*;
+
+use super::result::{Boundary, BoundaryCurve};
+use crate::study::Vary;
+use crate::study::trace::{PointKind, TraceBranch, TraceError, TraceRequest, trace};
+
+/// Most cells along a side.
+pub const MOST_CELLS: usize = 256;
+
+/// Cells of the plane of two numbers, of equal size where the axes are even.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct BoundaryMap {
+    /// Values of the first number in the middle of the cells.
+    pub first: Vec<f64>,
+    /// Those of the second.
+    pub second: Vec<f64>,
+    /// Morse index of the branch that begins at the start of the first number's range,
+    /// row by row of the second; none where that has turned back before, or could not be
+    /// followed.
+    pub index: Vec<Vec<Option<usize>>>,
+    /// Cells that the curves have another index for: numbers of both values, from 1.
+    pub disagreeing: Vec<[usize; 2]>,
+}
+
+impl BoundaryMap {
+    /// How many cells have an index.
+    pub fn known(&self) -> usize {
+        self.index.iter().flatten().flatten().count()
+    }
+
+    /// How many cells there are.
+    pub fn cells(&self) -> usize {
+        self.first.len() * self.second.len()
+    }
+}
+
+/// The middles of so many cells of a range.
+fn middles(vary: &Vary, cells: usize) -> Vec<f64> {
+    let (from, to) = (vary.values[0], vary.values[vary.values.len() - 1]);
+    let part = |k: usize| (k as f64 + 0.5) / cells as f64;
+    let value = |part: f64| match vary.log {
+        true => from * (to / from).powf(part),
+        false => from + (to - from) * part,
+    };
+    (0..cells).map(|k| value(part(k))).collect()
+}
+
+/// The map of so many cells along both numbers, compared with the curves that are known.
+pub fn map(
+    along: &TraceRequest,
+    across: &Vary,
+    cells: [usize; 2],
+    boundary: &Boundary,
+) -> Result<BoundaryMap, TraceError> {
+    let first = middles(&along.vary, cells[0]);
+    let second = middles(across, cells[1]);
+    let row = |value: &f64| -> Result<Vec<Option<usize>>, TraceError> {
+        let request = TraceRequest {
+            base: along.base.with(&across.keys, *value)?,
+            switch: false,
+            ..along.clone()
+        };
+        let found = trace(&request, &mut |_, _, _| {})?;
+        let branch = found.branches.first();
+        Ok(first
+            .iter()
+            .map(|value| branch.and_then(|branch| index_at(branch, *value)))
+            .collect())
+    };
+    let index: Result<Vec<_>, TraceError> = second.par_iter().map(row).collect();
+    let mut map = BoundaryMap {
+        first,
+        second,
+        index: index?,
+        disagreeing: Vec::new(),
+    };
+    for (r, row) in map.index.iter().enumerate() {
+        let expected = expected(boundary, &map.first, map.second[r], row);
+        let wrong = row.iter().zip(&expected).enumerate();
+        let wrong = wrong.filter(|(_, (found, expected))| found != expected);
+        map.disagreeing.extend(wrong.map(|(c, _)| [c + 1, r + 1]));
+    }
+    Ok(map)
+}
+
+/// The index of a branch where it passes a value for the first time, before it turns.
+fn index_at(branch: &TraceBranch, value: f64) -> Option<usize> {
+    for pair in branch.points.windows(2) {
+        let [a, b] = [pair[0].value, pair[1].value];
+        if (value - a) * (value - b) <= 0.0 {
+            return Some(pair[0].index);
+        }
+        if pair[1].kind == PointKind::Fold {
+            return None;
+        }
+    }
+    None
+}
+
+/// What the curves make of a row of which the first index is known: at each of them that
+/// has this index on one side it becomes that on the other; at a fold the branch ends.
+fn expected(
+    boundary: &Boundary,
+    first: &[f64],
+    second: f64,
+    row: &[Option<usize>],
+) -> Vec<Option<usize>> {
+    let forward = boundary.ranges[0][1] > boundary.ranges[0][0];
+    let mut passed: Vec<(f64, bool, [usize; 2])> = (boundary.curves.iter())
+        .flat_map(|curve| crossings(boundary, curve, second))
+        .collect();
+    passed.sort_by(|a, b| match forward {
+        true => a.0.total_cmp(&b.0),
+        false => b.0.total_cmp(&a.0),
+    });
+    let mut passed = passed.into_iter().peekable();
+    let mut now = None;
+    let mut expected = Vec::with_capacity(row.len());
+    for (k, (value, found)) in first.iter().zip(row).enumerate() {
+        let mut crossed = Vec::new();
+        while let Some(next) = passed.next_if(|next| (next.0 < *value) == forward) {
+            crossed.push(next);
+        }
+        if k == 0 {
+            now = *found;
+        } else {
+            for (_, fold, indices) in crossed {
+                now = match (now, fold) {
+                    (Some(index), true) if indices.contains(&index) => None,
+                    (Some(index), false) if index == indices[0] => Some(indices[1]),
+                    (Some(index), false) if index == indices[1] => Some(indices[0]),
+                    (now, _) => now,
+                };
+            }
+        }
+        expected.push(now);
+    }
+    expected
+}
+
+/// Where a curve passes a value of the second number: the first number, whether it is a
+/// fold, and the indices on both sides.
+fn crossings(
+    boundary: &Boundary,
+    curve: &BoundaryCurve,
+    second: f64,
+) -> Vec<(f64, bool, [usize; 2])> {
+    let scaled = |which: usize, value: f64| match boundary.log[which] {
+        true => (value / boundary.ranges[which][0]).ln(),
+        false => value,
+    };
+    let unscaled = |value: f64| match boundary.log[0] {
+        true => boundary.ranges[0][0] * value.exp(),
+        false => value,
+    };
+    let points: Vec<[f64; 2]> = (curve.points.iter())
+        .map(|point| [0, 1].map(|i| scaled(i, point.values[i])))
+        .collect();
+    let at = scaled(1, second);
+    let mut crossings = Vec::new();
+    for k in 1..points.len() {
+        let [low, high] = [points[k - 1][1], points[k][1]];
+        if (low < at) == (high < at) {
+            continue;
+        }
+        // Through four points where the second number goes one way along them, or two.
+        let few = k.saturating_sub(2)..(k + 2).min(points.len());
+        let rises = |pair: &[[f64; 2]]| (pair[1][1] > pair[0][1]) == (high > low);
+        let near = match points[few.clone()].windows(2).all(rises) {
+            true => &points[few],
+            false => &points[k - 1..=k],
+        };
+        let point = &curve.points[k];
+        let fold = matches!(point.kind, "fold" | "cusp") && curve.multiplicity == 1;
+        let sides = [point.index_before, point.index_behind];
+        crossings.push((unscaled(through(near, at)), fold, sides));
+    }
+    crossings
+}
+
+/// The polynomial through points, at a value of their second coordinate.
+fn through(points: &[[f64; 2]], at: f64) -> f64 {
+    let mut sum = 0.0;
+    for (i, [value, own]) in points.iter().enumerate() {
+        let others = points.iter().enumerate().filter(|(j, _)| *j != i);
+        let weight: f64 = others
+            .map(|(_, [_, other])| (at - other) / (own - other))
+            .product();
+        sum += weight * value;
+    }
+    sum
+}
