@@ -26,6 +26,7 @@
 
 mod begin;
 pub mod boundary;
+mod climb;
 mod critical;
 mod deflation;
 mod equations;
@@ -44,6 +45,7 @@ pub use equations::{Equations, Stuck};
 pub use family::Family;
 pub use follow::{Followed, Grids};
 pub use refined::{Doubt, Refined};
+pub(crate) use refine::on_finer;
 pub use switch::switch;
 pub use walk::{End, Walk, walk};
 

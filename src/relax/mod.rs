@@ -2,11 +2,13 @@
 //! the nested grids with their extrapolation, saddles, modes, and the result.
 
 mod equilibrium;
+mod fall;
 mod fields;
 mod follow;
 mod grids;
 mod grip;
 pub(crate) mod index;
+mod margin;
 mod method;
 mod methods;
 mod modes;
@@ -39,6 +41,8 @@ pub use equilibrium::{
 };
 pub(crate) use follow::{AtRest, Grids, Lost, extrapolation};
 pub(crate) use index::{index_near, project};
+pub(crate) use fall::{fall, settle_from};
+pub use margin::{Barrier, Direction, Fate, Loss, Margin, Neighbour, Push};
 pub use method::{Method, SemiImplicit, Settings, Unfit, UnknownMethod};
 pub(crate) use methods::shooting::{START as SHOOTING_START, check_intervals};
 pub(crate) use number::Number;

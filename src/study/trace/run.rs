@@ -169,6 +169,7 @@ impl Run<'_, '_> {
         let how = Walk {
             longest: (1.0 / (values - 1) as f64).min(LONGEST),
             most: self.request.most_points,
+            enough: None,
         };
         let mut entrances = VecDeque::from([(first, None)]);
         while let Some((first, from)) = entrances.pop_front() {
