@@ -10,8 +10,6 @@ use super::refined::{Doubt, Refined, Table, Values};
 use crate::leaf::Grid;
 use crate::relax::prolong::prolong;
 
-/// Grids of a critical point unless its tips need more.
-const CRITICAL_GRIDS: usize = 4;
 
 /// A critical parameter within this part of its range is exact.
 const EXACT: f64 = 1e-12;
@@ -26,12 +24,13 @@ pub(super) const NEARLY_RIGID: f64 = 1.01e5;
 const APART: [f64; 4] = [0.03, 0.01, 0.003, 0.001];
 const ENOUGH: f64 = 0.1;
 
-/// A critical point, to the given accuracy of its tips, on four grids or more.
+/// A critical point, to the given accuracy of its tips, on so many `grids` or more.
 pub fn refine_critical(
     family: &Family,
     grid: &Grid,
     found: &Critical,
     accuracy: f64,
+    grids: usize,
 ) -> Result<Refined, Doubt> {
     let mut table = Table::default();
     let mut equations = Equations::new(family, grid.clone())?;
@@ -85,7 +84,7 @@ pub fn refine_critical(
         table.push(equations.grid().segments(), values);
         // A finer grid would only add rounding.
         let exact = table.fraction_error() < table.rounding.max(EXACT);
-        let enough = exact || level + 1 >= CRITICAL_GRIDS;
+        let enough = exact || level + 1 >= grids;
         if enough && table.error() <= accuracy {
             return Ok(table.refined(critical.state, equations.grid().clone()));
         }

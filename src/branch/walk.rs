@@ -46,6 +46,9 @@ const CLOSED_AFTER: usize = 8;
 const CLOSING: usize = 5;
 const SAME: f64 = 1e-7;
 
+/// Grids of a critical point, unless its tips need more.
+const CRITICAL_GRIDS: usize = 4;
+
 /// How to follow a branch.
 #[derive(Clone, Copy)]
 pub struct Walk<'a> {
@@ -54,8 +57,22 @@ pub struct Walk<'a> {
     pub longest: f64,
     /// Most points.
     pub most: usize,
+    /// Grids on which a critical point is found at least.
+    pub critical_grids: usize,
     /// Whether enough is known once there are these points.
     pub enough: Option<&'a dyn Fn(&[Point]) -> bool>,
+}
+
+impl Walk<'_> {
+    /// To wherever the branch ends.
+    pub fn new(longest: f64, most: usize) -> Self {
+        Walk {
+            longest,
+            most,
+            critical_grids: CRITICAL_GRIDS,
+            enough: None,
+        }
+    }
 }
 
 /// How a branch ended.

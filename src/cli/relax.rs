@@ -156,7 +156,12 @@ impl Relax {
             });
         }
         if self.margin {
+            let mut searching = false;
             let found = study::relax_with_margin(&job.scenario, &options, &mut |progress| {
+                if let (false, MarginProgress::Searching { .. }) = (searching, progress) {
+                    searching = true;
+                    line.next();
+                }
                 tell_margin(&mut line, progress, tolerance);
             });
             return found.map_err(|error| match error {

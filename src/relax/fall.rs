@@ -16,7 +16,7 @@ const PUSH: f64 = 0.01;
 
 /// Where a leaf comes to rest that sets out from a state on a grid, with no motion; none
 /// if it does not.
-pub(crate) fn settle_from(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -> Option<State> {
+pub fn settle_from(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -> Option<State> {
     let options = Options {
         limit: limit.clone(),
         ..Options::default()
@@ -29,7 +29,7 @@ pub(crate) fn settle_from(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit)
 
 /// Where a leaf comes to rest that leaves a saddle along its unstable mode, and against
 /// it.
-pub(crate) fn fall(leaf: &Leaf, grid: &Grid, saddle: &State, limit: &Limit) -> [Option<State>; 2] {
+pub fn fall(leaf: &Leaf, grid: &Grid, saddle: &State, limit: &Limit) -> [Option<State>; 2] {
     let discrete = DiscreteLeaf::new(leaf, grid.clone());
     let mut system = System::new(&discrete);
     [PUSH, -PUSH].map(|by| {

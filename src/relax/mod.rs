@@ -2,7 +2,7 @@
 //! the nested grids with their extrapolation, saddles, modes, and the result.
 
 mod equilibrium;
-mod fall;
+pub(crate) mod fall;
 mod fields;
 mod follow;
 mod grids;
@@ -41,7 +41,7 @@ pub use equilibrium::{
 };
 pub(crate) use follow::{AtRest, Grids, Lost, extrapolation};
 pub(crate) use index::{index_near, project};
-pub(crate) use fall::{fall, settle_from};
+pub(crate) use fall::fall;
 pub use margin::{Barrier, Direction, Fate, Loss, Margin, Neighbour, Push};
 pub use method::{Method, SemiImplicit, Settings, Unfit, UnknownMethod};
 pub(crate) use methods::shooting::{START as SHOOTING_START, check_intervals};

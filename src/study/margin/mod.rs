@@ -3,6 +3,7 @@
 mod barrier;
 mod pushes;
 
+use std::f64::consts::PI;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -19,11 +20,12 @@ use crate::relax::{
 };
 use crate::scenario::Scenario;
 
-/// The largest push: so many times the force by which all veins together are stiff, A/L^2
-/// each, and so many weights; but no more than this part of their axial stiffness.
-const STIFF: f64 = 20.0;
+/// The largest push: the loads under which the veins buckle as columns that are pinned at
+/// both ends (Euler), so many A/L^2, and so many weights; but no more than this part of
+/// their axial stiffness.
+const STIFF: f64 = PI * PI;
 const WEIGHTS: f64 = 10.0;
-const AXIAL: f64 = 0.5;
+const AXIAL: f64 = 0.2;
 
 /// Points on the way need no more accuracy (of the tips, relative to the leaf): a
 /// critical one has its own error.
@@ -200,8 +202,8 @@ fn margin(
     })
 }
 
-/// The leaf on the second grid of its relaxation, or on a finer one on which it is
-/// stable, as on the finest.
+/// The leaf on the coarsest grid of its relaxation on which it is stable, as on the
+/// finest.
 fn walking_grid(scenario: &Scenario, levels: &[Level]) -> (Grid, State) {
     let make = |_: f64| Ok(scenario.clone());
     let family = Family::new(&make, (0.0, 1.0), false);
@@ -217,12 +219,11 @@ fn walking_grid(scenario: &Scenario, levels: &[Level]) -> (Grid, State) {
         found.is_ok_and(|(point, _)| point.index == 0)
     };
     let last = &levels[levels.len() - 1];
-    let nested = levels.iter().filter(|level| {
+    let mut nested = levels.iter().filter(|level| {
         let segments = level.leaf.segments();
         segments.is_multiple_of(first) && (segments / first).is_power_of_two()
     });
-    let coarse = usize::from(levels.len() > 1);
-    on(nested.skip(coarse).find(stable).unwrap_or(last))
+    on(nested.find(stable).unwrap_or(last))
 }
 
 /// Weight of a leaf.

@@ -16,6 +16,9 @@ const MOST_POINTS: usize = 400;
 /// Points behind the place where stability is lost by which it is known.
 const BEHIND: usize = 2;
 
+/// Grids of a critical point.
+const CRITICAL_GRIDS: usize = 3;
+
 /// Rounding of a force, relative.
 const ROUNDING: f64 = 1e-14;
 
@@ -96,6 +99,7 @@ fn follow(
     let walk = Walk {
         longest: LONGEST,
         most: MOST_POINTS,
+        critical_grids: CRITICAL_GRIDS,
         enough: Some(&enough),
     };
     let mut tell = |_, fraction: f64| {

@@ -1,0 +1,295 @@
+//! How far a stable leaf is from losing its stability: pushes and the energy of the lowest
+//! pass against columns and the elastica, and against relaxations under such forces.
+
+mod common;
+mod workplace;
+
+use std::f64::consts::PI;
+
+use common::random::splitmix64;
+use common::{RIGID, parse, rod};
+use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use leafdyn::internals::relax::{project, settle_from};
+use leafdyn::relax::{Equilibrium, Fate, Limit, Loss, Margin, Options, Push};
+use leafdyn::scenario::Scenario;
+use leafdyn::study::relax_with_margin;
+use workplace::Workplace;
+
+fn found(scenario: &Scenario, tolerance: f64) -> (Equilibrium, Margin) {
+    let options = Options {
+        tolerance: Some(tolerance),
+        every_node: true,
+        ..Options::default()
+    };
+    let leaf = relax_with_margin(scenario, &options, &mut |_| {}).unwrap();
+    let margin = leaf.margin.clone().unwrap();
+    (leaf, margin)
+}
+
+fn push<'m>(margin: &'m Margin, direction: &str) -> &'m Push {
+    let mut pushes = margin.pushes.iter();
+    let found = pushes.find(|push| push.direction.to_string() == direction);
+    found.unwrap_or_else(|| panic!("{direction}: {margin:?}"))
+}
+
+/// The force of a push, which must be right within its error bar.
+#[track_caller]
+fn is_at(push: &Push, right: f64) {
+    let (force, error) = (push.force.unwrap(), push.error.unwrap());
+    println!("{}: {force} within {error:.1e}, off by {:.1e}", push.direction, force - right);
+    assert!((force - right).abs() <= error.max(1e-11), "{push:?}: {right}");
+    assert!(error < 1e-5 * right, "{push:?}");
+}
+
+/// The largest tip load of a standing column of this weight: w' = theta, theta'' +
+/// (load + weight (1 - s)) theta = 0 with theta(0) = 0 and theta'(1) = 0, by the method of
+/// Runge and Kutta from the base.
+fn standing(weight: f64) -> f64 {
+    let slope_at_tip = |load: f64| {
+        let steps = 2000;
+        let h = 1.0 / f64::from(steps);
+        let rate = |s: f64, [y, v]: [f64; 2]| [v, -(load + weight * (1.0 - s)) * y];
+        let mut y = [0.0, 1.0];
+        for step in 0..steps {
+            let s = h * f64::from(step);
+            let ahead = |k: [f64; 2], by: f64| [y[0] + by * k[0], y[1] + by * k[1]];
+            let a = rate(s, y);
+            let b = rate(s + 0.5 * h, ahead(a, 0.5 * h));
+            let c = rate(s + 0.5 * h, ahead(b, 0.5 * h));
+            let d = rate(s + h, ahead(c, h));
+            y = std::array::from_fn(|k| y[k] + h / 6.0 * (a[k] + 2.0 * (b[k] + c[k]) + d[k]));
+        }
+        y[1]
+    };
+    bisect(0.0, 3.0, slope_at_tip)
+}
+
+fn bisect(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
+    let sign = f(low).signum();
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        match f(middle) * sign > 0.0 {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    0.5 * (low + high)
+}
+
+#[test]
+fn a_column_gives_way_at_the_loads_of_euler_and_greenhill() {
+    for weight in [0.0, 2.0, 5.0] {
+        let column = rod(&format!(
+            "{RIGID}; stiffness.bending_2=2.0; load.gravity=[{:?}, 0, 0]",
+            -weight
+        ));
+        let right = match weight {
+            0.0 => 0.25 * PI * PI,
+            weight => standing(weight),
+        };
+        let (_, margin) = found(&column, 1e-8);
+        let down = push(&margin, "-x");
+        is_at(down, right);
+        assert_eq!((down.kind, down.then), (Loss::BranchPoint, Some(Fate::BendsAside)));
+        assert_eq!(margin.pushes[0].direction, down.direction, "the least comes first");
+    }
+}
+
+/// Compressed by its load P, of axial stiffness H, Reissner's column has buckled where
+/// P (1 - P/H) is Euler's load.
+#[test]
+fn an_extensible_column_gives_way_at_the_load_of_reissner() {
+    let column = rod("stiffness.axial=50; stiffness.shear_2=inf; stiffness.shear_3=inf; stiffness.bending_2=2");
+    let right = 25.0 * (1.0 - (1.0 - 4.0 * 0.25 * PI * PI / 50.0).sqrt());
+    is_at(push(&found(&column, 1e-8).1, "-x"), right);
+}
+
+/// Load of a column beyond Euler's.
+const LOAD: f64 = 3.0;
+
+/// At the base of an elastica under the load along it and a force across, from its tip at
+/// this angle: its angle, its length along the load, and its bending energy.
+fn elastica(tip: f64, across: f64) -> [f64; 3] {
+    let rate = |[theta, m, _, _]: [f64; 4]| {
+        let (sin, cos) = theta.sin_cos();
+        [-m, LOAD * sin + across * cos, cos, 0.5 * m * m]
+    };
+    let steps = 1000;
+    let h = 1.0 / f64::from(steps);
+    let mut y = [tip, 0.0, 0.0, 0.0];
+    for _ in 0..steps {
+        let ahead = |k: [f64; 4], by: f64| std::array::from_fn(|c| y[c] + by * k[c]);
+        let a = rate(y);
+        let b = rate(ahead(a, 0.5 * h));
+        let c = rate(ahead(b, 0.5 * h));
+        let d = rate(ahead(c, h));
+        y = std::array::from_fn(|k| y[k] + h / 6.0 * (a[k] + 2.0 * (b[k] + c[k]) + d[k]));
+    }
+    [y[0], y[2], y[3]]
+}
+
+/// The force across that bends the elastica to this angle of its tip.
+fn across(tip: f64) -> f64 {
+    bisect(-2.0, 2.0, |force| elastica(tip, force)[0])
+}
+
+/// A buckled column, pushed back to the other side, snaps where the force across that
+/// holds it is largest; the pass is the straight one.
+#[test]
+fn a_buckled_column_snaps_as_the_elastica() {
+    let strip = format!("{RIGID}; stiffness.bending_2=50; stiffness.torsion=50");
+    let column = rod(&format!("{strip}; load.tip_force=[{:?}, 0, 0]", -LOAD));
+    let (leaf, margin) = found(&column, 1e-8);
+    let buckled = bisect(0.3, 2.5, |tip| elastica(tip, 0.0)[0]);
+    // Golden section for the largest force.
+    let part = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let (mut low, mut high) = (0.01, buckled);
+    while high - low > 1e-7 {
+        let (a, b) = (high - part * (high - low), low + part * (high - low));
+        match across(a).abs() > across(b).abs() {
+            true => high = b,
+            false => low = a,
+        }
+    }
+    let least = &margin.pushes[0];
+    is_at(least, across(low).abs());
+    assert_eq!((least.kind, least.then), (Loss::Fold, Some(Fate::Snaps)));
+    let back = if leaf.tips[0].y > 0.0 { "-y" } else { "+y" };
+    assert_eq!(least.direction.to_string(), back);
+
+    let [_, along, bending] = elastica(buckled, 0.0);
+    let right = LOAD - (bending + LOAD * along);
+    let barrier = margin.barrier.unwrap();
+    let error = barrier.error.unwrap();
+    println!("{} within {error:.1e}, off by {:.1e}", barrier.energy, barrier.energy - right);
+    assert!((barrier.energy - right).abs() <= error.max(1e-11));
+    assert!(error < 1e-5 * right);
+    assert!((barrier.saddle.tip.x - 1.0).abs() < 1e-9);
+    assert!((barrier.neighbour.tip.y + leaf.tips[0].y).abs() < 1e-2);
+    assert_eq!((margin.weight, barrier.height), (0.0, None));
+}
+
+/// A strip that is curved at rest, under a load along it and this force across.
+fn curved(across: f64) -> Scenario {
+    rod(&format!(
+        "{RIGID}; stiffness.bending_2=50; stiffness.torsion=50; rest.bend_3=0.5; \
+         load.tip_force=[-4.0, {across:?}, 0]"
+    ))
+}
+
+/// Near a fold what is left of the force is what is left of the margin, and the barrier
+/// goes to zero with the power 3/2 of it.
+#[test]
+fn the_barrier_vanishes_at_the_fold_with_the_power_three_halves() {
+    let (_, whole) = found(&curved(0.0), 1e-8);
+    let fold = push(&whole, "-y");
+    assert_eq!(fold.kind, Loss::Fold);
+    let fold = fold.force.unwrap();
+    let barriers = [0.04, 0.01, 0.0025].map(|part| {
+        let (leaf, margin) = found(&curved(-(1.0 - part) * fold), 1e-8);
+        assert!(leaf.tips[0].y > 0.0, "it stays on its side");
+        let left = push(&margin, "-y").force.unwrap();
+        assert!((left - part * fold).abs() < 1e-8, "{left}");
+        margin.barrier.unwrap().energy
+    });
+    let ratios = [barriers[0] / barriers[1], barriers[1] / barriers[2]];
+    println!("{barriers:?} {ratios:?}");
+    // Eight, and a correction in proportion to the root of the distance.
+    assert!((ratios[1] - 8.0).abs() < 0.6 * (ratios[0] - 8.0).abs() + 0.01, "{ratios:?}");
+    assert!((ratios[1] - 8.0).abs() < 0.4, "{ratios:?}");
+}
+
+/// A soft leaf that may have several places to rest.
+fn soft(draw: &mut u64) -> Scenario {
+    let mut between = |from: f64, to: f64| from + splitmix64(draw) * (to - from);
+    let rods = 1 + (3.0 * between(0.0, 1.0)) as usize;
+    parse(&format!(
+        r#"
+        name = "soft"
+        leaf = {{ rods = {rods}, length = 1.0, fan = "paper" }}
+        stiffness = {{ torsion = {:?}, bending_2 = {:?}, bending_3 = 1.0, axial = 20.0, shear_2 = 20.0, shear_3 = 20.0 }}
+        rest.bend_2 = {:?}
+        rest.bend_3 = {:?}
+        load = {{ gravity = [0.0, 0.0, {:?}] }}
+        {}
+        "#,
+        10.0_f64.powf(between(-2.0, 0.0)),
+        10.0_f64.powf(between(-2.0, -0.5)),
+        between(-2.0, 2.0),
+        between(-1.0, 1.0),
+        -between(0.0, 0.2),
+        if rods > 1 { "coupling = { y = 1.0, z = 1.0 }" } else { "" },
+    ))
+}
+
+/// At rest under a push of so much, from a state.
+fn under(scenario: &Scenario, push: &Push, force: f64, grid: &Grid, from: State) -> Option<State> {
+    let mut pushed = scenario.clone();
+    pushed.tip_force[push.direction.axis] += push.direction.sign() * force;
+    settle_from(&Leaf::new(&pushed), grid, from, &Limit::default())
+}
+
+/// Ten leaves that some push unseats: up to 0.98 of the least they follow it, and under
+/// 1.02 of it they come to rest elsewhere.
+#[test]
+fn random_leaves_stay_below_the_push_and_leave_above_it() {
+    let (mut draw, mut tried, mut unseated) = (7, 0, 0);
+    while unseated < 10 {
+        tried += 1;
+        assert!(tried < 80, "{unseated} of {tried}");
+        let scenario = soft(&mut draw);
+        let (rest, margin) = found(&scenario, 1e-5);
+        let Some(push) = margin.pushes.first().filter(|push| push.force.is_some()) else {
+            continue;
+        };
+        let force = push.force.unwrap();
+        assert!(push.error.unwrap() < 1e-3 * force, "{push:?}");
+        let leaf = Leaf::new(&scenario);
+        let grid = Grid::new(rest.shape.stations.len() - 1, leaf.kinks());
+        let discrete = DiscreteLeaf::new(&leaf, grid.clone());
+        let mut state = project(&leaf, &discrete, &rest.shape.rods);
+        let mut last = f64::INFINITY;
+        for step in 1..=49 {
+            let next = under(&scenario, push, 0.02 * f64::from(step) * force, &grid, state.clone());
+            let next = next.expect("at rest below");
+            last = state.shift_to(&next);
+            state = next;
+        }
+        let beyond = under(&scenario, push, 1.02 * force, &grid, state.clone());
+        let jump = beyond.map_or(f64::INFINITY, |beyond| state.shift_to(&beyond));
+        println!("{tried}: {} {force:.5} {:?}: {last:.4}, then {jump:.4}", push.direction, push.then);
+        assert!(last < 0.3, "{push:?}");
+        match push.then.unwrap() {
+            Fate::Snaps => assert!(jump > 3.0 * last && jump > 0.05, "{push:?}: {last} {jump}"),
+            Fate::BendsAside => assert!(jump > last, "{push:?}: {last} {jump}"),
+        }
+        unseated += 1;
+    }
+    println!("{unseated} of {tried}");
+}
+
+#[test]
+fn what_has_no_margin_is_said() {
+    let place = Workplace::new();
+    let run = |more: &str| place.run(&format!("relax leaf.toml --margin --write none {more}"));
+    place.refuses("relax leaf.toml --margin --all", "cannot be used with");
+    place.refuses("relax leaf.toml --margin --method shooting", "--margin: a margin is that of a relaxed leaf");
+    place.refuses("relax leaf.toml --margin --set leaf.rods=1 --set load.tip_moment=[0,0,1]", "dead moment");
+    let held = "--set tip.held=\"pinned\" --set tip.position=[0.8,0,0]";
+    run(held).ends(0).says(&["the tip is held: a force on it moves nothing"]);
+    let free = run("--set leaf.joined=false").ends(0);
+    assert!(!free.out.contains(" at the tip"), "{}", free.out);
+}
+
+#[test]
+fn margins_do_not_depend_on_threads() {
+    let place = Workplace::new();
+    let [one, two] = ["1", "2"].map(|threads| {
+        let run = place.run_on(threads, "relax leaf.toml --margin --json --set load.tip_force=[-3,0,0] --set leaf.rods=1");
+        let mut margin = run.ends(0).json()["margin"].clone();
+        margin.as_object_mut().unwrap().remove("wall_seconds");
+        margin
+    });
+    assert_eq!(one, two);
+    assert!(one["pushes"].as_array().unwrap().len() == 6);
+}
