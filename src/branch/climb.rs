@@ -66,7 +66,6 @@ impl Equations<'_> {
             let Valley { solved, shift, curvature } = valley;
             let (along, force) = (&solved.modes[0], solved.forces.multipliers[0]);
             let across = &solved.forces.increments;
-            if std::env::var("CLIMB").is_ok() { eprintln!("  curvature {curvature:.3e} force {force:.3e} across {:.3e} along {:.3e} shift {shift:.1e} negative {}", largest(across), largest(along), solved.negative); }
             let mut increments = across.clone();
             // With one negative eigenvalue the whole step is Newton's.
             let newton = curvature < 0.0 && shift == linear.shift;

@@ -94,10 +94,7 @@ fn along_modes(stable: &Stable, family: &Family) -> Option<Vec<Entrance>> {
 fn climb(stable: &Stable, family: &Family, entrance: &Entrance) -> Option<Pass> {
     let mut equations = Equations::new(family, entrance.grid.clone()).ok()?;
     let stop = || stable.limit.reached();
-    let clock = std::time::Instant::now();
-    let saddle = equations.climb(&entrance.state, 0.0, &entrance.way, &stop);
-    eprintln!("DEBUG climb on {}: {:?} {:.2} s", entrance.grid.segments(), saddle.as_ref().map(|s| (s.index, s.state.tip(0))), clock.elapsed().as_secs_f64());
-    let saddle = saddle?;
+    let saddle = equations.climb(&entrance.state, 0.0, &entrance.way, &stop)?;
     let mut own = Equations::new(family, stable.grid.clone()).ok()?;
     let (mut leaf, _) = own.correct(&stable.state, 0.0, None).ok()?;
     while own.grid().segments() < entrance.grid.segments() {
@@ -117,7 +114,6 @@ fn climb(stable: &Stable, family: &Family, entrance: &Entrance) -> Option<Pass> 
 fn behind(stable: &Stable, leaf: &Leaf, pass: &Pass) -> Option<State> {
     let way = pass.saddle.state.shift_to(&pass.leaf.state);
     let same = |state: &State| state.shift_to(&pass.leaf.state) < SAME.min(SAME_PART * way);
-    for it in fall(leaf, &pass.grid, &pass.saddle.state, stable.limit) { eprintln!("DEBUG fall height {} way {way}: {:?}", pass.height, it.map(|s| (s.shift_to(&pass.leaf.state), s.tip(0)))); }
     match fall(leaf, &pass.grid, &pass.saddle.state, stable.limit) {
         [Some(one), Some(other)] if same(&one) && !same(&other) => Some(other),
         [Some(one), Some(other)] if same(&other) && !same(&one) => Some(one),

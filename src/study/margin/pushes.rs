@@ -16,8 +16,9 @@ const MOST_POINTS: usize = 400;
 /// Points behind the place where stability is lost by which it is known.
 const BEHIND: usize = 2;
 
-/// Grids of a critical point.
-const CRITICAL_GRIDS: usize = 3;
+/// Grids of a critical point: of a leaf of few nodes, and of another.
+const CRITICAL_GRIDS: [usize; 2] = [4, 3];
+const FEW_NODES: usize = 500;
 
 /// Rounding of a force, relative.
 const ROUNDING: f64 = 1e-14;
@@ -96,10 +97,11 @@ fn follow(
         let behind = points.len().checked_sub(BEHIND);
         behind.is_some_and(|behind| points[behind].index > 0) || stable.limit.reached()
     };
+    let nodes = stable.state.rods() * stable.grid.segments();
     let walk = Walk {
         longest: LONGEST,
         most: MOST_POINTS,
-        critical_grids: CRITICAL_GRIDS,
+        critical_grids: CRITICAL_GRIDS[usize::from(nodes > FEW_NODES)],
         enough: Some(&enough),
     };
     let mut tell = |_, fraction: f64| {
