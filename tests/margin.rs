@@ -9,11 +9,9 @@ use std::f64::consts::PI;
 use common::random::splitmix64;
 use common::{RIGID, parse, rod};
 use leafdyn::internals::branch::{Equations, Family};
-use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf};
+use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use leafdyn::internals::relax::{project, settle_from};
-use leafdyn::relax::{
-    Equilibrium, Fate, Limit, Loss, Margin, Options, Push, SemiImplicit, relax,
-};
+use leafdyn::relax::{Equilibrium, Fate, Limit, Loss, Margin, Options, Push};
 use leafdyn::scenario::Scenario;
 use leafdyn::study::relax_with_margin;
 use workplace::Workplace;
@@ -39,8 +37,15 @@ fn push<'m>(margin: &'m Margin, direction: &str) -> &'m Push {
 #[track_caller]
 fn is_at(push: &Push, right: f64) {
     let (force, error) = (push.force.unwrap(), push.error.unwrap());
-    println!("{}: {force} within {error:.1e}, off by {:.1e}", push.direction, force - right);
-    assert!((force - right).abs() <= error.max(1e-11), "{push:?}: {right}");
+    println!(
+        "{}: {force} within {error:.1e}, off by {:.1e}",
+        push.direction,
+        force - right
+    );
+    assert!(
+        (force - right).abs() <= error.max(1e-11),
+        "{push:?}: {right}"
+    );
     assert!(error < 1e-5 * right, "{push:?}");
 }
 
@@ -93,8 +98,14 @@ fn a_column_gives_way_at_the_loads_of_euler_and_greenhill() {
         let (_, margin) = found(&column, 1e-8);
         let down = push(&margin, "-x");
         is_at(down, right);
-        assert_eq!((down.kind, down.then), (Loss::BranchPoint, Some(Fate::BendsAside)));
-        assert_eq!(margin.pushes[0].direction, down.direction, "the least comes first");
+        assert_eq!(
+            (down.kind, down.then),
+            (Loss::BranchPoint, Some(Fate::BendsAside))
+        );
+        assert_eq!(
+            margin.pushes[0].direction, down.direction,
+            "the least comes first"
+        );
     }
 }
 
@@ -102,7 +113,9 @@ fn a_column_gives_way_at_the_loads_of_euler_and_greenhill() {
 /// P (1 - P/H) is Euler's load.
 #[test]
 fn an_extensible_column_gives_way_at_the_load_of_reissner() {
-    let column = rod("stiffness.axial=50; stiffness.shear_2=inf; stiffness.shear_3=inf; stiffness.bending_2=2");
+    let column = rod(
+        "stiffness.axial=50; stiffness.shear_2=inf; stiffness.shear_3=inf; stiffness.bending_2=2",
+    );
     let right = 25.0 * (1.0 - (1.0 - 4.0 * 0.25 * PI * PI / 50.0).sqrt());
     is_at(push(&found(&column, 1e-8).1, "-x"), right);
 }
@@ -144,7 +157,32 @@ fn a_buckled_column_snaps_as_the_elastica() {
     let column = rod(&format!("{strip}; load.tip_force=[{:?}, 0, 0]", -LOAD));
     let (leaf, margin) = found(&column, 1e-8);
     let buckled = bisect(0.3, 2.5, |tip| elastica(tip, 0.0)[0]);
-    // Golden section for the largest force.
+    let least = &margin.pushes[0];
+    is_at(least, fold().0);
+    assert_eq!((least.kind, least.then), (Loss::Fold, Some(Fate::Snaps)));
+    let back = if leaf.tips[0].y > 0.0 { "-y" } else { "+y" };
+    assert_eq!(least.direction.to_string(), back);
+
+    let [_, along, bending] = elastica(buckled, 0.0);
+    let right = LOAD - (bending + LOAD * along);
+    let barrier = margin.barrier.unwrap();
+    let error = barrier.error.unwrap();
+    println!(
+        "{} within {error:.1e}, off by {:.1e}",
+        barrier.energy,
+        barrier.energy - right
+    );
+    assert!((barrier.energy - right).abs() <= error.max(1e-11));
+    assert!(error < 1e-5 * right);
+    assert!((barrier.saddle.tip.x - 1.0).abs() < 1e-9);
+    assert!((barrier.neighbour.tip.y + leaf.tips[0].y).abs() < 1e-2);
+    assert_eq!((margin.weight, barrier.height), (0.0, None));
+}
+
+/// The largest force across that a buckled elastica bears from the side to which it is
+/// bent, and its tip's angle under it, by golden section.
+fn fold() -> (f64, f64) {
+    let buckled = bisect(0.3, 2.5, |tip| elastica(tip, 0.0)[0]);
     let part = 0.5 * (5.0_f64.sqrt() - 1.0);
     let (mut low, mut high) = (0.01, buckled);
     while high - low > 1e-7 {
@@ -154,68 +192,42 @@ fn a_buckled_column_snaps_as_the_elastica() {
             false => low = a,
         }
     }
-    let least = &margin.pushes[0];
-    is_at(least, across(low).abs());
-    assert_eq!((least.kind, least.then), (Loss::Fold, Some(Fate::Snaps)));
-    let back = if leaf.tips[0].y > 0.0 { "-y" } else { "+y" };
-    assert_eq!(least.direction.to_string(), back);
-
-    let [_, along, bending] = elastica(buckled, 0.0);
-    let right = LOAD - (bending + LOAD * along);
-    let barrier = margin.barrier.unwrap();
-    let error = barrier.error.unwrap();
-    println!("{} within {error:.1e}, off by {:.1e}", barrier.energy, barrier.energy - right);
-    assert!((barrier.energy - right).abs() <= error.max(1e-11));
-    assert!(error < 1e-5 * right);
-    assert!((barrier.saddle.tip.x - 1.0).abs() < 1e-9);
-    assert!((barrier.neighbour.tip.y + leaf.tips[0].y).abs() < 1e-2);
-    assert_eq!((margin.weight, barrier.height), (0.0, None));
+    (across(low).abs(), low)
 }
 
-/// A column that has buckled up, from a start that is thrown up far enough, under this
-/// force down.
-fn pushed_down(force: f64) -> (Equilibrium, Margin) {
-    let column = rod(&format!(
-        "{RIGID}; stiffness.bending_3=50; stiffness.torsion=50; load.tip_force=[-2.6, 0, {:?}]",
-        -force
-    ));
-    let starts = (0..40).map(|number| {
-        let method = SemiImplicit {
-            disturbance: Some(number),
-            ..SemiImplicit::default()
-        };
-        let options = Options {
-            method: method.into(),
-            tolerance: Some(1e-8),
-            ..Options::default()
-        };
-        (relax(&column, &options, &mut |_| {}).unwrap(), options)
-    });
-    let up = |(leaf, _): &(Equilibrium, Options)| leaf.stable() == Some(true) && leaf.tips[0].z > 0.1;
-    let (_, options) = starts.into_iter().find(up).unwrap_or_else(|| panic!("it stays up under {force} from no start"));
-    let leaf = relax_with_margin(&column, &options, &mut |_| {}).unwrap();
-    let margin = leaf.margin.clone().unwrap();
-    (leaf, margin)
-}
-
-/// Near a fold what is left of the force is what is left of the margin, and the barrier
-/// goes to zero with the power 3/2 of it.
+/// Under a force across, the pass and the equilibrium behind it are those of the elastica
+/// bent against the force; near the fold they meet, and the way back over the pass vanishes
+/// with the power 3/2.
 #[test]
 fn the_barrier_vanishes_at_the_fold_with_the_power_three_halves() {
-    let (_, whole) = pushed_down(0.0);
-    let fold = push(&whole, "-z");
-    assert_eq!(fold.kind, Loss::Fold);
-    let fold = fold.force.unwrap();
+    let (most, angle) = fold();
+    let strip = format!("{RIGID}; stiffness.bending_2=50; stiffness.torsion=50");
     let barriers = [0.04, 0.01, 0.0025].map(|part| {
-        let (_, margin) = pushed_down((1.0 - part) * fold);
-        let left = push(&margin, "-z").force.unwrap();
-        assert!((left - part * fold).abs() < 1e-8, "{left}");
-        margin.barrier.unwrap().energy
+        let force = (1.0 - part) * most;
+        let column = rod(&format!(
+            "{strip}; load.tip_force=[{:?}, {force:?}, 0]",
+            -LOAD
+        ));
+        let (leaf, margin) = found(&column, 1e-8);
+        let barrier = margin.barrier.unwrap();
+        let right = |from: f64, to: f64| {
+            let tip = bisect(from, to, |tip| across(tip).abs() - force);
+            let [_, along, bending] = elastica(tip, -force);
+            (tip, bending + LOAD * along)
+        };
+        let (saddle, behind) = (right(0.01, angle).1, right(angle, 1.4).1);
+        let back = barrier.saddle.energy - barrier.neighbour.energy;
+        println!("{part}: {back} behind, {}", saddle - behind);
+        assert!(leaf.tips[0].y > 0.0 && barrier.neighbour.tip.y < 0.0);
+        back
     });
     let ratios = [barriers[0] / barriers[1], barriers[1] / barriers[2]];
     println!("{barriers:?} {ratios:?}");
     // Eight, and a correction in proportion to the root of the distance.
-    assert!((ratios[1] - 8.0).abs() < 0.6 * (ratios[0] - 8.0).abs() + 0.01, "{ratios:?}");
+    assert!(
+        (ratios[1] - 8.0).abs() < 0.6 * (ratios[0] - 8.0).abs() + 0.01,
+        "{ratios:?}"
+    );
     assert!((ratios[1] - 8.0).abs() < 0.4, "{ratios:?}");
 }
 
@@ -238,8 +250,30 @@ fn soft(draw: &mut u64) -> Scenario {
         between(-2.0, 2.0),
         between(-1.0, 1.0),
         -between(0.0, 0.2),
-        if rods > 1 { "coupling = { y = 1.0, z = 1.0 }" } else { "" },
+        if rods > 1 {
+            "coupling = { y = 1.0, z = 1.0 }"
+        } else {
+            ""
+        },
     ))
+}
+
+/// A stable leaf followed from a fraction of its push to another by Newton's method, in
+/// halves where that does not get there at once or goes far.
+fn advanced(
+    equations: &mut Equations,
+    state: &State,
+    way: [f64; 2],
+    halvings: usize,
+) -> Option<State> {
+    if let Ok((point, _)) = equations.correct(state, way[1].max(0.0), None)
+        && state.shift_to(&point.state) < 0.05
+    {
+        return (point.index == 0).then_some(point.state);
+    }
+    let middle = 0.5 * (way[0] + way[1]);
+    let half = advanced(equations, state, [way[0], middle], halvings.checked_sub(1)?)?;
+    advanced(equations, &half, [middle, way[1]], halvings - 1)
 }
 
 /// Ten leaves that some push unseats: followed in small steps they are stable up to 0.98 of
@@ -271,11 +305,16 @@ fn random_leaves_stay_below_the_push_and_leave_above_it() {
         let mut last = 0.0;
         for step in 0..=196 {
             let part = 0.005 * f64::from(step);
-            let (point, _) = equations.correct(&state, 0.5 * part, None).unwrap();
-            assert_eq!(point.index, 0, "{push:?} at {part}");
-            last = state.shift_to(&point.state);
-            assert!(last < 0.1, "{push:?} at {part}: {last}");
-            state = point.state;
+            let next = advanced(
+                &mut equations,
+                &state,
+                [0.5 * (part - 0.005), 0.5 * part],
+                8,
+            );
+            let next = next.unwrap_or_else(|| panic!("{push:?} at {part}"));
+            last = state.shift_to(&next);
+            assert!(last < 0.2, "{push:?} at {part}: {last}");
+            state = next;
         }
         let pushed = Leaf::new(&make(1.02).unwrap());
         let beyond = settle_from(&pushed, &grid, state.clone(), &Limit::default());
@@ -294,10 +333,18 @@ fn what_has_no_margin_is_said() {
     let place = Workplace::new();
     let run = |more: &str| place.run(&format!("relax leaf.toml --margin --write none {more}"));
     place.refuses("relax leaf.toml --margin --all", "cannot be used with");
-    place.refuses("relax leaf.toml --margin --method shooting", "--margin: a margin is that of a relaxed leaf");
-    place.refuses("relax leaf.toml --margin --set leaf.rods=1 --set load.tip_moment=[0,0,1]", "dead moment");
+    place.refuses(
+        "relax leaf.toml --margin --method shooting",
+        "--margin: a margin is that of a relaxed leaf",
+    );
+    place.refuses(
+        "relax leaf.toml --margin --set leaf.rods=1 --set load.tip_moment=[0,0,1]",
+        "dead moment",
+    );
     let held = "--set tip.held=\"pinned\" --set tip.position=[0.8,0,0]";
-    run(held).ends(0).says(&["the tip is held: a force on it moves nothing"]);
+    run(held)
+        .ends(0)
+        .says(&["the tip is held: a force on it moves nothing"]);
     let free = run("--set leaf.joined=false").ends(0);
     assert!(!free.out.contains(" at the tip"), "{}", free.out);
 }
@@ -306,7 +353,10 @@ fn what_has_no_margin_is_said() {
 fn margins_do_not_depend_on_threads() {
     let place = Workplace::new();
     let [one, two] = ["1", "2"].map(|threads| {
-        let run = place.run_on(threads, "relax leaf.toml --margin --json --set load.tip_force=[-3,0,0] --set leaf.rods=1");
+        let run = place.run_on(
+            threads,
+            "relax leaf.toml --margin --json --set load.tip_force=[-3,0,0] --set leaf.rods=1",
+        );
         let mut margin = run.ends(0).json()["margin"].clone();
         margin.as_object_mut().unwrap().remove("wall_seconds");
         margin

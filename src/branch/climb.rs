@@ -63,7 +63,11 @@ impl Equations<'_> {
                 way = self.lowest_mode(&way)?;
                 valley = self.valley(&way, &linear)?;
             }
-            let Valley { solved, shift, curvature } = valley;
+            let Valley {
+                solved,
+                shift,
+                curvature,
+            } = valley;
             let (along, force) = (&solved.modes[0], solved.forces.multipliers[0]);
             let across = &solved.forces.increments;
             let mut increments = across.clone();
@@ -92,7 +96,9 @@ impl Equations<'_> {
         let border = [self.momentum(way)];
         let mut shift = linear.shift;
         while shift < LARGEST_SHIFT {
-            let solved = self.solve_shifted(&border, &linear.forces, &[], shift).ok()?;
+            let solved = self
+                .solve_shifted(&border, &linear.forces, &[], shift)
+                .ok()?;
             // One of them is the border's own.
             if solved.negative <= 1 {
                 let along = &solved.modes[0];

@@ -164,7 +164,7 @@ impl Followed {
                 None => {
                     let critical = &critical[k - points.len()].1;
                     refine_critical(family, grid, critical, accuracy, grids)
-                },
+                }
             })
             .collect();
         let mut critical = found.split_off(points.len()).into_iter();

@@ -44,8 +44,9 @@ pub use critical::{Critical, Kind};
 pub use equations::{Equations, Stuck};
 pub use family::Family;
 pub use follow::{Followed, Grids};
-pub use refined::{Doubt, Refined};
 pub(crate) use refine::on_finer;
+pub(crate) use refine_critical::NEARLY_RIGID;
+pub use refined::{Doubt, Refined};
 pub use switch::switch;
 pub use walk::{End, Walk, walk};
 

@@ -10,14 +10,13 @@ use super::refined::{Doubt, Refined, Table, Values};
 use crate::leaf::Grid;
 use crate::relax::prolong::prolong;
 
-
 /// A critical parameter within this part of its range is exact.
 const EXACT: f64 = 1e-12;
 
 /// Compliance by which matrices of nearly rigid leaves are softened, in units
 /// of L^2/A, times one to four; and the stiffness from which on they are.
 const SOFTENING: f64 = 1e-4;
-pub(super) const NEARLY_RIGID: f64 = 1.01e5;
+pub const NEARLY_RIGID: f64 = 1.01e5;
 
 /// The cubic through values at softenings of 1, 2, 3, 4 at zero.
 const UNSOFTENING: [f64; 4] = [4.0, -6.0, 4.0, -1.0];
@@ -91,7 +90,7 @@ pub fn refine_critical(
         }
         table.push(equations.grid().segments(), values);
         // A finer grid would only add rounding.
-        let exact = table.fraction_error() < table.rounding.max(EXACT);
+        let exact = table.fraction_error() < (table.rounding / growth).max(EXACT);
         let enough = exact || level + 1 >= grids;
         if enough && table.error() <= accuracy {
             return Ok(table.refined(critical.state, equations.grid().clone()));

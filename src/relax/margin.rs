@@ -154,7 +154,7 @@ pub struct Barrier {
     pub relative: Option<f64>,
     /// The equilibrium on the pass.
     pub saddle: Saddle,
-    /// Where the leaf comes to rest behind it, on one grid.
+    /// Where the leaf comes to rest behind it.
     pub neighbour: Neighbour,
 }
 

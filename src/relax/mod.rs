@@ -39,9 +39,9 @@ pub(crate) use equilibrium::serialize_index;
 pub use equilibrium::{
     Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Saddle, Sensitivity, Shape, Stability,
 };
+pub(crate) use fall::fall;
 pub(crate) use follow::{AtRest, Grids, Lost, extrapolation};
 pub(crate) use index::{index_near, project};
-pub(crate) use fall::fall;
 pub use margin::{Barrier, Direction, Fate, Loss, Margin, Neighbour, Push};
 pub use method::{Method, SemiImplicit, Settings, Unfit, UnknownMethod};
 pub(crate) use methods::shooting::{START as SHOOTING_START, check_intervals};

@@ -43,11 +43,17 @@ fn lost_by(margin: &Margin, push: &Push) -> String {
         Some(Fate::Snaps) | None => "snaps it",
     };
     let error = push.error.map(|error| format!(", within {}", bound(error)));
-    let weights = push.per_weight.map(|part| format!(" ({} weights)", brief(part)));
+    let weights = push
+        .per_weight
+        .map(|part| format!(" ({} weights)", brief(part)));
     format!(
         "a push of {at} {} {} {then}{}{}",
         directions(margin, push),
-        if margin.every_tip { "at every tip" } else { "at the tip" },
+        if margin.every_tip {
+            "at every tip"
+        } else {
+            "at the tip"
+        },
         error.unwrap_or_default(),
         weights.unwrap_or_default(),
     )
@@ -55,7 +61,10 @@ fn lost_by(margin: &Margin, push: &Push) -> String {
 
 /// Directions in which no push up to the largest unseats the leaf.
 fn none_met(margin: &Margin) -> Option<String> {
-    let none = margin.pushes.iter().filter(|push| push.kind == Loss::NoneUpTo);
+    let none = margin
+        .pushes
+        .iter()
+        .filter(|push| push.kind == Loss::NoneUpTo);
     let none: Vec<String> = none.map(|push| push.direction.to_string()).collect();
     let largest = force(margin, margin.largest_push?);
     (!none.is_empty()).then(|| format!("more than {largest} is needed along {}", none.join(", ")))
@@ -64,10 +73,16 @@ fn none_met(margin: &Margin) -> Option<String> {
 fn barrier(margin: &Margin, barrier: &Barrier) -> String {
     let energy = brief(barrier.energy);
     let unit = margin.units.energy().map(|unit| format!(" {unit}"));
-    let error = barrier.error.map(|error| format!(" within {}", bound(error)));
+    let error = barrier
+        .error
+        .map(|error| format!(" within {}", bound(error)));
     let lifted = barrier.height.map(|height| {
         let unit = margin.units.length.as_ref().map(|unit| format!(" {unit}"));
-        format!(", as the leaf lifted by {}{}", brief(height), unit.unwrap_or_default())
+        format!(
+            ", as the leaf lifted by {}{}",
+            brief(height),
+            unit.unwrap_or_default()
+        )
     });
     format!(
         "barrier of {energy}{}{}{}, over a saddle with tip {} to rest with tip {}",

@@ -53,7 +53,10 @@ pub(super) fn barrier(
     let all = &stable.searches.all;
     let counted = all.load(std::sync::atomic::Ordering::Relaxed);
     let pushes = counted.saturating_sub(MODE_CLIMBS);
-    all.store(pushes + entrances.len(), std::sync::atomic::Ordering::Relaxed);
+    all.store(
+        pushes + entrances.len(),
+        std::sync::atomic::Ordering::Relaxed,
+    );
     let mut passes: Vec<Pass> = (entrances.par_iter())
         .filter_map(|entrance| {
             let pass = climb(stable, &family, entrance);
@@ -68,9 +71,8 @@ pub(super) fn barrier(
         let neighbour = behind(stable, leaf, pass)?;
         Some((pass, neighbour))
     });
-    let barrier = lowest.and_then(|(pass, neighbour)| {
-        in_units(stable, &family, pass, &neighbour, weight)
-    });
+    let barrier =
+        lowest.and_then(|(pass, neighbour)| in_units(stable, &family, pass, &neighbour, weight));
     (barrier, entrances.len())
 }
 
@@ -83,7 +85,11 @@ fn along_modes(stable: &Stable, family: &Family) -> Option<Vec<Entrance>> {
         grid: stable.grid.clone(),
         state: point.state.clone(),
         way: (mode.iter())
-            .map(|rod| rod.iter().map(|node| node.map(|part| sign * part)).collect())
+            .map(|rod| {
+                rod.iter()
+                    .map(|node| node.map(|part| sign * part))
+                    .collect()
+            })
             .collect(),
     };
     let both = |mode: &Field| [1.0, -1.0].map(|sign| entrance(mode, sign));
@@ -130,34 +136,35 @@ fn in_units(
     weight: f64,
 ) -> Option<Barrier> {
     let mut equations = Equations::new(family, pass.grid.clone()).ok()?;
-    let (mut saddle, mut leaf) = (pass.saddle.clone(), pass.leaf.clone());
-    let discrete = equations.leaves.at(0.0).ok()?;
-    let above = discrete.energy(neighbour) - discrete.energy(&leaf.state);
-    let rounding = ROUNDING * discrete.energy(&saddle.state).abs();
+    let (neighbour, _) = equations.correct(neighbour, 0.0, None).ok()?;
+    let mut three = [pass.saddle.clone(), neighbour, pass.leaf.clone()];
+    let rounding = ROUNDING * equations.leaves.at(0.0).ok()?.energy(&three[0].state).abs();
     let mut table = Richardson::default();
-    // In units of the first, so that what is judged is relative.
-    table.push(pass.grid.segments(), vec![1.0, 0.0, 0.0]);
+    table.push(
+        pass.grid.segments(),
+        heights(&mut equations, &three, pass.height)?,
+    );
     for _ in 1..GRIDS {
-        let (rods, finer) = (saddle.state.rods(), 2 * equations.grid().segments());
+        let (rods, segments) = (three[0].state.rods(), 2 * equations.grid().segments());
         let known = table.best().is_some_and(|best| best.error < ENOUGH);
-        if known || rods * finer > MOST_NODES || stable.limit.reached() {
+        if known || rods * segments > MOST_NODES || stable.limit.reached() {
             break;
         }
-        let Ok((_, finer_leaf)) = on_finer(&mut equations, &leaf) else {
+        let finer: Result<Vec<_>, _> = (three.iter())
+            .map(|point| on_finer(&mut equations, point))
+            .collect();
+        let Ok(Ok([(finer, saddle), (_, neighbour), (_, leaf)])) = finer.map(<[_; 3]>::try_from)
+        else {
             break;
         };
-        let Ok((finer, finer_saddle)) = on_finer(&mut equations, &saddle) else {
-            break;
-        };
-        (equations, saddle, leaf) = (finer, finer_saddle, finer_leaf);
-        let discrete = equations.leaves.at(0.0).ok()?;
-        let height = discrete.energy(&saddle.state) - discrete.energy(&leaf.state);
-        table.push(discrete.segments(), vec![height / pass.height, 0.0, 0.0]);
+        (equations, three) = (finer, [saddle, neighbour, leaf]);
+        table.push(segments, heights(&mut equations, &three, pass.height)?);
     }
+    let [saddle, neighbour, _] = three;
     let scale = family.scale();
     let best = table.best();
-    let columns = best.map_or(0, |best| best.columns);
-    let energy = table.column(columns)[0] * pass.height * scale.moment();
+    let values = table.column(best.map_or(0, |best| best.columns));
+    let [energy, above] = [values[0], values[3]].map(|it| it * pass.height * scale.moment());
     let own = stable.rest.energy?;
     Some(Barrier {
         energy,
@@ -170,8 +177,23 @@ fn in_units(
             tip: saddle.state.tip(0) * scale.length,
         },
         neighbour: Neighbour {
-            energy: own + above * scale.moment(),
-            tip: neighbour.tip(0) * scale.length,
+            energy: own + above,
+            tip: neighbour.state.tip(0) * scale.length,
         },
     })
+}
+
+/// Energies of a saddle and of the equilibrium behind it above that of the leaf, by this
+/// `unit`, so that what is judged is relative; each as a point on a line.
+fn heights(equations: &mut Equations, three: &[Point; 3], unit: f64) -> Option<Vec<f64>> {
+    let leaf = equations.leaves.at(0.0).ok()?;
+    let [saddle, neighbour, own] = [0, 1, 2].map(|k| leaf.energy(&three[k].state));
+    Some(vec![
+        (saddle - own) / unit,
+        0.0,
+        0.0,
+        (neighbour - own) / unit,
+        0.0,
+        0.0,
+    ])
 }

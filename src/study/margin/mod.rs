@@ -236,7 +236,11 @@ fn weight(scenario: &Scenario) -> f64 {
 fn largest_push(scenario: &Scenario, weight: f64) -> f64 {
     let rods = scenario.rods.iter();
     let axial: f64 = rods.map(|rod| rod.force_stiffness[0].min()).sum();
-    let together = if scenario.joined { scenario.rods.len() } else { 1 } as f64;
+    let together = if scenario.joined {
+        scenario.rods.len()
+    } else {
+        1
+    } as f64;
     let stiff = STIFF * together * scenario.scale().force();
     (stiff + WEIGHTS * weight).min(AXIAL * axial * together / scenario.rods.len() as f64)
 }
@@ -247,7 +251,11 @@ fn directions(scenario: &Scenario, rest: &Equilibrium) -> Vec<Direction> {
     if scenario.held_tip.is_some() {
         return Vec::new();
     }
-    let mirrored = [false, rest.model.rods < scenario.rods.len(), rest.model.planar];
+    let mirrored = [
+        false,
+        rest.model.rods < scenario.rods.len(),
+        rest.model.planar,
+    ];
     let own = |direction: &Direction| !(direction.negative && mirrored[direction.axis]);
     Direction::all().filter(own).collect()
 }
