@@ -49,6 +49,9 @@ const SAME: f64 = 1e-7;
 /// Grids of a critical point, unless its tips need more.
 const CRITICAL_GRIDS: usize = 4;
 
+/// Whether these points are enough.
+type Enough<'a> = dyn Fn(&[Point]) -> bool + 'a;
+
 /// How to follow a branch.
 #[derive(Clone, Copy)]
 pub struct Walk<'a> {
@@ -60,7 +63,7 @@ pub struct Walk<'a> {
     /// Grids on which a critical point is found at least.
     pub critical_grids: usize,
     /// Whether enough is known once there are these points.
-    pub enough: Option<&'a dyn Fn(&[Point]) -> bool>,
+    pub enough: Option<&'a Enough<'a>>,
 }
 
 impl Walk<'_> {
