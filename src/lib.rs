@@ -260,6 +260,7 @@ pub mod internals {
         pub use crate::rotation::{exp, log, outer};
     }
     pub mod relax {
+        pub use crate::relax::fall::settle_from;
         pub use crate::relax::index::{index_near, project};
         pub use crate::relax::start::start;
     }

@@ -52,10 +52,7 @@ fn random_branches() {
             lost += 1;
             continue;
         };
-        let how = Walk {
-            longest: 0.02,
-            most: 120,
-        };
+        let how = Walk::new(0.02, 120);
         let branch = walk(&mut equations, first, &how, &mut |_, _| {});
         points += branch.points.len();
         missed += branch.missed.len();

@@ -95,10 +95,7 @@ fn follow(case: usize, leaf: &Scenario) -> Found {
         }
     };
     first.tangent = first.tangent.towards(true);
-    let how = Walk {
-        longest: 0.1,
-        most: 200,
-    };
+    let how = Walk::new(0.1, 200);
     let branch = grids.follow(first, &how, TOLERANCE, &mut |_, _| {});
     match &branch.end {
         End::Reached | End::Returned | End::Closed | End::MostPoints => {}

@@ -8,7 +8,7 @@ use leafdyn::relax::{
     self, Correction, Equilibrium, Method, Options, Progress, RelaxError, Settings,
 };
 use leafdyn::scenario;
-use leafdyn::study::{self, Keys, SensitivityError};
+use leafdyn::study::{self, Keys, MarginProgress, SensitivityError};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -36,6 +36,8 @@ pub struct Asked {
     stations: Option<usize>,
     /// Numbers by which derivatives are found; only of one leaf.
     sensitivity: Vec<String>,
+    /// Whether it is found how far it is from losing its stability; only of one leaf.
+    margin: bool,
 }
 
 /// Refuses what cannot be asked.
@@ -150,7 +152,23 @@ pub fn relax_one(
 ) -> PyResult<Leaf> {
     let mut options = asked.options()?;
     let input = scenario.checked.clone();
-    let found = if asked.sensitivity.is_empty() {
+    let found = if asked.margin {
+        let scenario = input.clone();
+        let found = run(py, progress, move |monitor| {
+            options.limit = monitor.limit();
+            let mut say = heard(monitor, &scenario.name);
+            let mut tell = |progress: &MarginProgress| match progress {
+                MarginProgress::Relaxing(progress) => say(progress),
+                MarginProgress::Searching { done, all, .. } => {
+                    monitor.say(*done as f64, Some(*all as f64), || {
+                        format!("{}: {done} of {all} searches", scenario.name)
+                    });
+                }
+            };
+            study::relax_with_margin(&scenario, &options, &mut tell)
+        })?;
+        found.map_err(cannot)?
+    } else if asked.sensitivity.is_empty() {
         if let Some(found) = solve_here(py, &input, &asked, &options, progress)? {
             return Ok(Leaf::new(found.map_err(cannot)?, input, asked.stations));
         }

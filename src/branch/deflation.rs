@@ -85,6 +85,17 @@ impl Equations<'_> {
         forces: &Field,
         rates: &[&Field],
     ) -> Result<Solved, Stuck> {
+        self.solve_shifted(border, forces, rates, 0.0)
+    }
+
+    /// The same with K + `shift` M.
+    pub(super) fn solve_shifted(
+        &mut self,
+        border: &[Field],
+        forces: &Field,
+        rates: &[&Field],
+        shift: f64,
+    ) -> Result<Solved, Stuck> {
         let p = border.len();
         if self.bordered.as_ref().is_none_or(|(held, _)| *held != p) {
             let pattern = SparsePattern::bordered(&self.system, p);
@@ -92,7 +103,7 @@ impl Equations<'_> {
         }
         let (_, pattern) = self.bordered.as_ref().ok_or(Stuck::TooLarge)?;
         self.factorizations += 1;
-        let factor = pattern.factorize_bordered(&self.system, 0.0, border);
+        let factor = pattern.factorize_bordered(&self.system, shift, border);
         let mut factor = factor.map_err(|_| Stuck::TooLarge)?;
         let none = vec![0.0; p];
         let zero = times(forces, 0.0);

@@ -58,7 +58,7 @@ pub struct Equations<'a> {
     /// would not converge.
     pub softened: Option<Leaves<'a>>,
     /// The mass of the leaf but for its base.
-    mass: f64,
+    pub(super) mass: f64,
     pub(super) system: System,
     pub(super) pattern: Option<SparsePattern>,
     pub(super) bordered: Option<(usize, SparsePattern)>,
@@ -93,7 +93,7 @@ pub(super) struct Linear {
     /// Their change with the parameter.
     pub rate: Field,
     /// The shift that leaves neutral modes where they are.
-    shift: f64,
+    pub(super) shift: f64,
     /// Rounding of the forces.
     pub noise: f64,
 }

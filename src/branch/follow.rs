@@ -109,7 +109,7 @@ impl<'a> Grids<'a> {
             let equations = self.of(&now);
             (known.branch).go_on(equations, how, before + ahead, progress);
             let leaves = &equations.leaves;
-            let doubt = known.verify(leaves.family, &leaves.grid, accuracy);
+            let doubt = known.verify(leaves.family, &leaves.grid, (accuracy, how.critical_grids));
             if known.points.len() > before {
                 tries = 0;
             }
@@ -148,7 +148,12 @@ impl<'a> Grids<'a> {
 impl Followed {
     /// Verifies the points that are not yet, all on one grid; ends with the first that
     /// cannot be, and says why.
-    fn verify(&mut self, family: &Family, grid: &Grid, accuracy: f64) -> Option<Doubt> {
+    fn verify(
+        &mut self,
+        family: &Family,
+        grid: &Grid,
+        (accuracy, grids): (f64, usize),
+    ) -> Option<Doubt> {
         let critical = &self.branch.critical[self.critical.len()..];
         let points = &self.branch.points[self.points.len()..];
         // One list, so that all threads have work.
@@ -156,7 +161,10 @@ impl Followed {
             .into_par_iter()
             .map(|k| match points.get(k) {
                 Some(point) => refine(family, grid, point, accuracy),
-                None => refine_critical(family, grid, &critical[k - points.len()].1, accuracy),
+                None => {
+                    let critical = &critical[k - points.len()].1;
+                    refine_critical(family, grid, critical, accuracy, grids)
+                }
             })
             .collect();
         let mut critical = found.split_off(points.len()).into_iter();

@@ -26,6 +26,7 @@
 
 mod begin;
 pub mod boundary;
+mod climb;
 mod critical;
 mod deflation;
 mod equations;
@@ -43,6 +44,8 @@ pub use critical::{Critical, Kind};
 pub use equations::{Equations, Stuck};
 pub use family::Family;
 pub use follow::{Followed, Grids};
+pub(crate) use refine::on_finer;
+pub(crate) use refine_critical::NEARLY_RIGID;
 pub use refined::{Doubt, Refined};
 pub use switch::switch;
 pub use walk::{End, Walk, walk};

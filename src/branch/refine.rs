@@ -71,7 +71,7 @@ fn goes_along(point: &Point) -> bool {
 
 /// A point on the grid with all segments halved, with the equations there: in the same
 /// plane, unless the branch goes along the parameter alone.
-pub(super) fn on_finer<'a>(
+pub fn on_finer<'a>(
     equations: &mut Equations<'a>,
     point: &Point,
 ) -> Result<(Equations<'a>, Point), Stuck> {

@@ -10,28 +10,29 @@ use super::refined::{Doubt, Refined, Table, Values};
 use crate::leaf::Grid;
 use crate::relax::prolong::prolong;
 
-/// Grids of a critical point unless its tips need more.
-const CRITICAL_GRIDS: usize = 4;
-
 /// A critical parameter within this part of its range is exact.
 const EXACT: f64 = 1e-12;
 
 /// Compliance by which matrices of nearly rigid leaves are softened, in units
 /// of L^2/A, times one to four; and the stiffness from which on they are.
 const SOFTENING: f64 = 1e-4;
-pub(super) const NEARLY_RIGID: f64 = 1.01e5;
+pub const NEARLY_RIGID: f64 = 1.01e5;
+
+/// The cubic through values at softenings of 1, 2, 3, 4 at zero.
+const UNSOFTENING: [f64; 4] = [4.0, -6.0, 4.0, -1.0];
 
 /// Distances from a crossing (as of arclength) between which the branch is
 /// interpolated, in turn, until tips are within this part of their accuracy.
 const APART: [f64; 4] = [0.03, 0.01, 0.003, 0.001];
 const ENOUGH: f64 = 0.1;
 
-/// A critical point, to the given accuracy of its tips, on four grids or more.
+/// A critical point, to the given accuracy of its tips, on so many `grids` or more.
 pub fn refine_critical(
     family: &Family,
     grid: &Grid,
     found: &Critical,
     accuracy: f64,
+    grids: usize,
 ) -> Result<Refined, Doubt> {
     let mut table = Table::default();
     let mut equations = Equations::new(family, grid.clone())?;
@@ -69,7 +70,12 @@ pub fn refine_critical(
         let stiffest = condensing.fold(0.0_f64, |most, it| most.max(it.min(limit)));
         let segments = leaf.segments() as f64;
         let rounding = f64::EPSILON * stiffest * segments * segments / critical.steepness();
-        table.rounding = table.rounding.max(rounding);
+        // Extrapolated to no softening, that of each matrix grows by its weight.
+        let growth: f64 = match rigid {
+            true => UNSOFTENING.iter().map(|weight| weight.abs()).sum(),
+            false => 1.0,
+        };
+        table.rounding = table.rounding.max(growth * rounding);
         let mut values = match rigid {
             false => Values::of(&mut equations, &critical.state, critical.fraction)?,
             true => unsoftened(family, equations.grid(), &critical)?,
@@ -84,8 +90,8 @@ pub fn refine_critical(
         }
         table.push(equations.grid().segments(), values);
         // A finer grid would only add rounding.
-        let exact = table.fraction_error() < table.rounding.max(EXACT);
-        let enough = exact || level + 1 >= CRITICAL_GRIDS;
+        let exact = table.fraction_error() < (table.rounding / growth).max(EXACT);
+        let enough = exact || level + 1 >= grids;
         if enough && table.error() <= accuracy {
             return Ok(table.refined(critical.state, equations.grid().clone()));
         }
@@ -98,11 +104,9 @@ pub fn refine_critical(
 
 /// A critical point of a nearly rigid leaf: by softened matrices, extrapolated to none.
 fn unsoftened(family: &Family, grid: &Grid, critical: &Critical) -> Result<Values, Stuck> {
-    // The cubic through values at 1, 2, 3, 4 at zero.
-    const WEIGHTS: [f64; 4] = [4.0, -6.0, 4.0, -1.0];
     let mut parts = Vec::new();
     let mut near = critical.clone();
-    for (k, weight) in WEIGHTS.into_iter().enumerate().rev() {
+    for (k, weight) in UNSOFTENING.into_iter().enumerate().rev() {
         let soft = family.softened(SOFTENING * (k + 1) as f64);
         let mut equations = Equations::new(family, grid.clone())?;
         equations.softened = Some(Leaves::new(&soft, grid.clone()));

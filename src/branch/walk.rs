@@ -46,14 +46,36 @@ const CLOSED_AFTER: usize = 8;
 const CLOSING: usize = 5;
 const SAME: f64 = 1e-7;
 
+/// Grids of a critical point, unless its tips need more.
+const CRITICAL_GRIDS: usize = 4;
+
+/// Whether these points are enough.
+type Enough<'a> = dyn Fn(&[Point]) -> bool + 'a;
+
 /// How to follow a branch.
-#[derive(Clone, Copy, Debug)]
-pub struct Walk {
+#[derive(Clone, Copy)]
+pub struct Walk<'a> {
     /// The longest step; the parameter's range is one, and so is a turn of all
     /// nodes by ten radians or a shift by one length.
     pub longest: f64,
     /// Most points.
     pub most: usize,
+    /// Grids on which a critical point is found at least.
+    pub critical_grids: usize,
+    /// Whether enough is known once there are these points.
+    pub enough: Option<&'a Enough<'a>>,
+}
+
+impl Walk<'_> {
+    /// To wherever the branch ends.
+    pub fn new(longest: f64, most: usize) -> Self {
+        Walk {
+            longest,
+            most,
+            critical_grids: CRITICAL_GRIDS,
+            enough: None,
+        }
+    }
 }
 
 /// How a branch ended.
@@ -67,6 +89,8 @@ pub enum End {
     Closed,
     /// After as many points as were allowed.
     MostPoints,
+    /// Where enough was known.
+    Enough,
     /// No step however short could be made.
     Stuck(Stuck),
     /// What comes next is another thing on every grid up to the finest.
@@ -128,6 +152,10 @@ impl Branch {
         progress: &mut dyn FnMut(usize, f64),
     ) {
         while self.end.is_none() && self.points.len() < until.min(how.most) {
+            if how.enough.is_some_and(|enough| enough(&self.points)) {
+                self.end = Some(End::Enough);
+                return;
+            }
             if let Err(stuck) = self.try_step(equations, how) {
                 self.end = Some(End::Stuck(stuck));
             }
@@ -256,7 +284,7 @@ struct Found {
     drift: f64,
 }
 
-impl Walk {
+impl Walk<'_> {
     /// Whether a step may be believed to have stayed on the branch.
     fn accepts(&self, equations: &Equations, now: &Point, found: &Found, step: f64) -> bool {
         let changes = found.point.index.abs_diff(now.index);

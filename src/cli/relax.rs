@@ -4,10 +4,10 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::relax::{self, Equilibrium, Method, Options, Settings};
-use crate::report;
-use crate::study::{self, All, Keys, SensitivityError};
+use crate::report::{self, numbers::brief};
+use crate::study::{self, All, Keys, MarginError, MarginProgress, SensitivityError};
 
-use super::progress::part_of;
+use super::progress::{ProgressLine, part_of};
 use super::request::{Done, How, Job, Request};
 use super::{Refusal, Status};
 
@@ -56,6 +56,10 @@ pub struct Relax {
     )]
     sensitivity: Vec<Keys>,
 
+    /// Also find how far a stable leaf is from losing its stability: which push at the tip unseats it, and the lowest barrier to another equilibrium
+    #[arg(long, conflicts_with_all = ["all", "sensitivity"])]
+    margin: bool,
+
     /// Solve for the whole leaf, in space, even if half of it or its plane would do
     #[arg(long)]
     full_model: bool,
@@ -72,6 +76,21 @@ fn method_parser() -> impl TypedValueParser<Value = Method> {
         }
     });
     PossibleValuesParser::new(words).try_map(|word| word.parse::<Method>())
+}
+
+/// How far a margin has come.
+fn tell_margin(line: &mut ProgressLine, progress: &MarginProgress, tolerance: f64) {
+    match progress {
+        MarginProgress::Relaxing(progress) => line.relaxing(progress, tolerance),
+        MarginProgress::Searching { done, all, push } => {
+            line.tell(part_of(*done, *all), || {
+                let push = push.map(|(direction, force)| {
+                    format!(", pushed by {} along {direction}", brief(force))
+                });
+                format!("{done} of {all} searches{}", push.unwrap_or_default())
+            });
+        }
+    }
 }
 
 impl Relax {
@@ -134,6 +153,20 @@ impl Relax {
             return found.map_err(|error| match error {
                 SensitivityError::Relax(error) => error.into(),
                 error => format!("--sensitivity {error}").into(),
+            });
+        }
+        if self.margin {
+            let mut searching = false;
+            let found = study::relax_with_margin(&job.scenario, &options, &mut |progress| {
+                if let (false, MarginProgress::Searching { .. }) = (searching, progress) {
+                    searching = true;
+                    line.next();
+                }
+                tell_margin(&mut line, progress, tolerance);
+            });
+            return found.map_err(|error| match error {
+                MarginError::Relax(error) => error.into(),
+                error => format!("--margin: {error}").into(),
             });
         }
         Ok(relax::relax(&job.scenario, &options, &mut |progress| {

@@ -2,6 +2,7 @@
 
 use crate::newton::Work;
 use crate::numbers::power_of_ten;
+use crate::relax::margin::Margin;
 use crate::relax::method::Method;
 use crate::shape::{self, RodShape};
 use crate::undulation::Undulation;
@@ -328,6 +329,9 @@ pub struct Equilibrium {
     /// How the results change with numbers of the scenario, of those asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensitivities: Option<Vec<Sensitivity>>,
+    /// How far it is from losing its stability, if that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub margin: Option<Margin>,
     /// Waves and twist of the veins on the finest grid.
     pub undulation: Undulation,
     /// What was solved.

@@ -2,11 +2,13 @@
 //! the nested grids with their extrapolation, saddles, modes, and the result.
 
 mod equilibrium;
+pub(crate) mod fall;
 mod fields;
 mod follow;
 mod grids;
 mod grip;
 pub(crate) mod index;
+mod margin;
 mod method;
 mod methods;
 mod modes;
@@ -38,8 +40,10 @@ pub(crate) use equilibrium::serialize_index;
 pub use equilibrium::{
     Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Saddle, Sensitivity, Shape, Stability,
 };
+pub(crate) use fall::fall;
 pub(crate) use follow::{AtRest, Grids, Lost, extrapolation};
 pub(crate) use index::{index_near, project};
+pub use margin::{Barrier, Direction, Fate, Loss, Margin, Neighbour, Push};
 pub use method::{Method, SemiImplicit, Settings, Unfit, UnknownMethod};
 pub(crate) use methods::shooting::{START as SHOOTING_START, check_intervals};
 pub(crate) use number::Number;

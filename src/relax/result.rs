@@ -65,6 +65,7 @@ pub fn equilibrium(
             saddle: run.saddle,
         },
         sensitivities: None,
+        margin: None,
         undulation: Undulation::of(scenario, &lines, &stations, &rods, error_estimate),
         model: Model::new(
             rods.len(),

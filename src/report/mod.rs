@@ -12,6 +12,7 @@ mod fit;
 pub mod json;
 mod map;
 mod map_table;
+mod margin;
 pub mod numbers;
 mod relax;
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use crate::relax::{Equilibrium, Mode, Outcome, Sensitivity};
 use crate::report::words::{shooting, verdict};
 
+use super::margin;
 use super::numbers::{
     bound, brief, decimals, eigenvalues, grids, point, seconds, significant, veins,
 };
@@ -52,6 +53,8 @@ pub fn lines(equilibrium: &Equilibrium, files: Option<String>) -> Lines {
     lines.push(("error", error(equilibrium)));
     lines.extend(modes(equilibrium).map(|modes| ("modes", modes)));
     lines.extend(under("changes", changes(equilibrium)));
+    let margin = equilibrium.margin.as_ref().map(margin::lines);
+    lines.extend(under("margin", margin.unwrap_or_default()));
     if !equilibrium.accuracy.segments.is_empty() {
         lines.push(("model", equilibrium.model.description.clone()));
     }

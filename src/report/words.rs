@@ -84,7 +84,7 @@ pub fn branch_end(end: &End) -> &'static str {
         End::Reached => "to the end of the range",
         End::Returned => "back to the start of the range",
         End::Closed => "closed",
-        End::MostPoints => "goes on",
+        End::MostPoints | End::Enough => "goes on",
         End::Stuck(Stuck::OutOfRange(_)) => "ends where no leaf is",
         End::Stuck(Stuck::Unresolved) => "ends: grid too coarse",
         End::Stuck(_) => "lost",

@@ -7,6 +7,7 @@ mod check;
 mod fit;
 mod judge;
 mod map;
+mod margin;
 mod sensitivity;
 mod trace;
 mod vary;
@@ -30,6 +31,7 @@ pub use map::{
     CELL_SECONDS, Confidence, Map, MapJump, MapMethod, MapOutcome, MapRefused, MapRequest, MapRow,
     MapShow, map,
 };
+pub use margin::{MarginError, MarginProgress, relax_with_margin};
 pub use sensitivity::{SensitivityError, relax_with_sensitivities};
 pub use trace::{
     Law, MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceError, TracePoint,

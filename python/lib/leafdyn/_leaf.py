@@ -209,6 +209,11 @@ class Equilibrium(Viewed):
         entries = self.to_dict()["sensitivities"]
         return {entry["key"]: Sensitivity(entry, *places[entry["key"]]) for entry in entries}
 
+    @property
+    def margin(self) -> dict[str, Any] | None:
+        """How far a stable leaf is from losing its stability, as in ``summary.json``; none if that was not asked for."""
+        return self.to_dict().get("margin")
+
     def plot(self, ax: Any = None, **style: Any) -> Any:
         """Draw the veins with matplotlib: in space, or from the side in axes without a third axis.
 

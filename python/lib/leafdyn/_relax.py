@@ -24,6 +24,7 @@ def _asked(
     mode_shapes: bool = False,
     stations: int | None = None,
     sensitivity: Iterable[str] = (),
+    margin: bool = False,
 ) -> dict[str, Any]:
     return {**locals(), "sensitivity": list(sensitivity)}
 
@@ -44,6 +45,7 @@ def relax(
     keep_unstable: bool = False,
     full_model: bool = False,
     modes: int = 0,
+    margin: bool = False,
     stations: int | None = None,
     progress: Progress = None,
 ) -> Equilibrium:
@@ -69,6 +71,8 @@ def relax(
         Solve for the whole leaf, in space, even if half of it or its plane would do.
     modes
         How many of the lowest eigenvalues to find, too (the program finds 3); `leafdyn.modes` finds their shapes.
+    margin
+        Also find how far a stable leaf is from losing its stability, as its ``margin``.
     stations
         At ``stations + 1`` equally spaced stations of every vein; left out: those of the finest grid, at least 17.
     progress
@@ -100,7 +104,9 @@ def relax(
     >>> leaf.tip.round(6)
     array([ 0.956663,  0.047746, -0.147358])
     """
-    asked = _asked(method, tolerance, segments, intervals, keep_unstable, full_model, modes, False, stations)
+    asked = _asked(
+        method, tolerance, segments, intervals, keep_unstable, full_model, modes, False, stations, margin=margin
+    )
     leaf = checked(scenario, set)
     with reporter(progress) as heard:
         found = Equilibrium(_leafdyn.relax(leaf._core, asked, heard), (leaf, asked))

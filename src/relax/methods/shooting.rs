@@ -148,6 +148,7 @@ pub fn shoot(
             ..Stability::default()
         },
         sensitivities: None,
+        margin: None,
         undulation: Undulation::at_stations(scenario, &stations, &rods, accuracy.error_estimate),
         accuracy,
         model: Model::new(rods.len(), (rods.len(), false), &[], [None; 2]),

@@ -175,7 +175,7 @@ impl End {
             End::Reached => "reached",
             End::Returned => "returned",
             End::Closed => "closed",
-            End::MostPoints => "most-points",
+            End::MostPoints | End::Enough => "most-points",
             End::Stuck(Stuck::OutOfRange(_)) => "out-of-range",
             End::Stuck(Stuck::Unresolved) => "unresolved",
             End::Stuck(_) => "stuck",
@@ -192,7 +192,7 @@ impl End {
     pub(super) fn remark(&self) -> Option<String> {
         match self {
             End::Reached | End::Returned | End::Closed => None,
-            End::MostPoints => Some("there are more points: allow more".into()),
+            End::MostPoints | End::Enough => Some("there are more points: allow more".into()),
             End::Stuck(stuck) => Some(stuck.to_string()),
             End::Unverified(Doubt::Inaccurate) => {
                 Some(format!("{}: ask for a larger one", Doubt::Inaccurate))

@@ -166,10 +166,8 @@ impl Run<'_, '_> {
         trace.segments = first.state.segments();
         first.tangent = first.tangent.towards(true);
         let values = self.request.vary.values.len();
-        let how = Walk {
-            longest: (1.0 / (values - 1) as f64).min(LONGEST),
-            most: self.request.most_points,
-        };
+        let longest = (1.0 / (values - 1) as f64).min(LONGEST);
+        let how = Walk::new(longest, self.request.most_points);
         let mut entrances = VecDeque::from([(first, None)]);
         while let Some((first, from)) = entrances.pop_front() {
             let number = trace.branches.len();

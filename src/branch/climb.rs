@@ -1,0 +1,149 @@
+//! From a stable equilibrium uphill to a saddle.
+//!
+//! Along a direction v the energy is made as large as it can be, across it as
+//! small: with the matrix bordered by the masses times v (as at a critical point),
+//! the solution for the border's unit is the direction X of the valley floor, and
+//! -H its curvature. Where that is positive the way goes on along X by a given
+//! length; where it is not, v becomes the mode of the lowest eigenvalue, and the steps
+//! Newton's (Crippen and Scheraga, Arch. Biochem. Biophys. 144, 1971; Henkelman and
+//! Jonsson, J. Chem. Phys. 111, 1999).
+
+use super::Point;
+use super::deflation::Solved;
+use super::equations::{Equations, Linear, factorized};
+use super::field::{add, largest, times};
+use crate::leaf::{Field, State};
+
+/// Steps of a climb, and the longest (radians, lengths).
+const STEPS: usize = 60;
+const LONGEST: f64 = 0.2;
+
+/// Increments below this lead to the saddle by Newton's method.
+const NEAR: f64 = 1e-2;
+
+/// Shift (in squared frequencies, over the masses) that makes the matrix across the
+/// way positive definite: the first tried, and that at which a climb ends.
+const FIRST_SHIFT: f64 = 1.0;
+const LARGEST_SHIFT: f64 = 1e6;
+
+/// Steps of inverse iteration for the lowest mode, and how far below its eigenvalue the
+/// second shift is.
+const INVERSE_ITERATIONS: usize = 4;
+const BELOW: f64 = 1.05;
+
+/// The valley floor in some direction.
+struct Valley {
+    /// Solutions with the bordered matrix.
+    solved: Solved,
+    /// By how much it was shifted.
+    shift: f64,
+    /// Curvature of the floor.
+    curvature: f64,
+}
+
+impl Equations<'_> {
+    /// A saddle of index one that is reached from `state` uphill, first in the direction
+    /// `way`; none if the way does not lead to one, or `stop` says so.
+    pub fn climb(
+        &mut self,
+        state: &State,
+        fraction: f64,
+        way: &Field,
+        stop: &dyn Fn() -> bool,
+    ) -> Option<Point> {
+        let (mut state, mut way) = (state.clone(), self.unit(way));
+        for _ in 0..STEPS {
+            if stop() {
+                return None;
+            }
+            let linear = self.linearise(&mut state, fraction).ok()?;
+            let mut valley = self.valley(&way, &linear)?;
+            if valley.curvature < 0.0 || valley.shift > linear.shift {
+                // Past the rim the way is that of the lowest eigenvalue.
+                way = self.lowest_mode(&way)?;
+                valley = self.valley(&way, &linear)?;
+            }
+            let Valley {
+                solved,
+                shift,
+                curvature,
+            } = valley;
+            let (along, force) = (&solved.modes[0], solved.forces.multipliers[0]);
+            let across = &solved.forces.increments;
+            let mut increments = across.clone();
+            // With one negative eigenvalue the whole step is Newton's.
+            let newton = curvature < 0.0 && shift == linear.shift;
+            if newton {
+                add(&mut increments, force / curvature, along);
+            }
+            let (size, settled) = (largest(&increments), largest(across) < LONGEST);
+            let mut step = times(&increments, (LONGEST / size).min(1.0));
+            if !newton && settled {
+                add(&mut step, LONGEST / largest(along), along);
+                way = self.unit(along);
+            }
+            state = self.moved(&state, fraction, &step, 1.0).ok()?;
+            if newton && size < NEAR {
+                let (point, _) = self.correct(&state, fraction, None).ok()?;
+                return (point.index == 1).then_some(point);
+            }
+        }
+        None
+    }
+
+    /// The valley in the direction `way`, by the matrix that is assembled.
+    fn valley(&mut self, way: &Field, linear: &Linear) -> Option<Valley> {
+        let border = [self.momentum(way)];
+        let mut shift = linear.shift;
+        while shift < LARGEST_SHIFT {
+            let solved = self
+                .solve_shifted(&border, &linear.forces, &[], shift)
+                .ok()?;
+            // One of them is the border's own.
+            if solved.negative <= 1 {
+                let along = &solved.modes[0];
+                let mass = self.mass * self.product(along, along);
+                return Some(Valley {
+                    curvature: -solved.h[(0, 0)] - shift * mass,
+                    solved,
+                    shift,
+                });
+            }
+            shift = (4.0 * shift).max(FIRST_SHIFT);
+        }
+        None
+    }
+
+    /// The mode of the lowest eigenvalue of the matrix that is assembled, near `way` and
+    /// to its side; by inverse iteration, the second time with a shift near that value.
+    fn lowest_mode(&mut self, way: &Field) -> Option<Field> {
+        let mut pattern = self.pattern.take();
+        let mut mode = way.clone();
+        let mut shift = FIRST_SHIFT;
+        for _ in 0..2 {
+            let mut factor = factorized(&mut pattern, &self.system, shift).ok()?;
+            while factor.negative() > 0 {
+                shift *= 2.0;
+                if shift > LARGEST_SHIFT {
+                    return None;
+                }
+                factor = factorized(&mut pattern, &self.system, shift).ok()?;
+            }
+            let mut eigenvalue = 0.0;
+            for _ in 0..INVERSE_ITERATIONS {
+                let next = factor.solve_bordered(&self.momentum(&mode), &[]).increments;
+                eigenvalue = 1.0 / (self.mass * self.product(&mode, &next)) - shift;
+                mode = self.unit(&next);
+            }
+            shift = BELOW * eigenvalue.abs();
+        }
+        self.pattern = pattern;
+        let same = self.product(&mode, way) >= 0.0;
+        Some(if same { mode } else { times(&mode, -1.0) })
+    }
+
+    /// A direction of mass one.
+    fn unit(&self, way: &Field) -> Field {
+        times(way, 1.0 / self.product(way, way).sqrt())
+    }
+}

@@ -1,0 +1,122 @@
+//! How far a leaf is from losing its stability, in words.
+
+use crate::relax::{Barrier, Direction, Fate, Loss, Margin, Push};
+
+use super::numbers::{bound, brief, point};
+
+/// Decimals of positions that are known on one grid.
+const DECIMALS: usize = 3;
+
+/// The lines of it, the least push first.
+pub fn lines(margin: &Margin) -> Vec<String> {
+    let lost = margin.pushes.iter().filter(|push| push.force.is_some());
+    let mut lines: Vec<String> = lost
+        .filter(|push| !push.mirrored)
+        .map(|push| lost_by(margin, push))
+        .collect();
+    lines.extend(none_met(margin));
+    let unknown = margin.pushes.iter();
+    let unknown = unknown.filter(|push| push.kind == Loss::Unknown && !push.mirrored);
+    lines.extend(unknown.map(|push| {
+        let least = force(margin, push.more_than.unwrap_or_default());
+        let why = push.remark.as_deref().unwrap_or_default();
+        let which = directions(margin, push);
+        format!("a push {which} is known up to {least} only, under which it is stable: {why}")
+    }));
+    match &margin.barrier {
+        Some(found) => lines.push(barrier(margin, found)),
+        None if margin.climbs > 0 => lines.push(format!(
+            "no pass to another equilibrium found from {} places",
+            margin.climbs
+        )),
+        None => {}
+    }
+    lines.extend(margin.remark.clone());
+    lines
+}
+
+/// A push under which stability is lost.
+fn lost_by(margin: &Margin, push: &Push) -> String {
+    let at = force(margin, push.force.unwrap_or_default());
+    let then = match push.then {
+        Some(Fate::BendsAside) => "makes it bend aside",
+        Some(Fate::Snaps) | None => "snaps it",
+    };
+    let error = push.error.map(|error| format!(", within {}", bound(error)));
+    let weights = push
+        .per_weight
+        .map(|part| format!(" ({} weights)", brief(part)));
+    format!(
+        "a push of {at} {} {} {then}{}{}",
+        directions(margin, push),
+        if margin.every_tip {
+            "at every tip"
+        } else {
+            "at the tip"
+        },
+        error.unwrap_or_default(),
+        weights.unwrap_or_default(),
+    )
+}
+
+/// Directions in which no push up to the largest unseats the leaf.
+fn none_met(margin: &Margin) -> Option<String> {
+    let none = margin
+        .pushes
+        .iter()
+        .filter(|push| push.kind == Loss::NoneUpTo);
+    let none: Vec<String> = none.map(|push| push.direction.to_string()).collect();
+    let largest = force(margin, margin.largest_push?);
+    (!none.is_empty()).then(|| format!("more than {largest} is needed along {}", none.join(", ")))
+}
+
+fn barrier(margin: &Margin, barrier: &Barrier) -> String {
+    let energy = brief(barrier.energy);
+    let unit = margin.units.energy().map(|unit| format!(" {unit}"));
+    let error = barrier
+        .error
+        .map(|error| format!(" within {}", bound(error)));
+    let lifted = barrier.height.map(|height| {
+        let unit = margin.units.length.as_ref().map(|unit| format!(" {unit}"));
+        format!(
+            ", as the leaf lifted by {}{}",
+            brief(height),
+            unit.unwrap_or_default()
+        )
+    });
+    format!(
+        "barrier of {energy}{}{}{}, over a saddle with tip {} to rest with tip {}",
+        unit.unwrap_or_default(),
+        error.unwrap_or_default(),
+        lifted.unwrap_or_default(),
+        point(barrier.saddle.tip.to_array(), DECIMALS),
+        point(barrier.neighbour.tip.to_array(), DECIMALS),
+    )
+}
+
+fn force(margin: &Margin, force: f64) -> String {
+    match &margin.units.force {
+        Some(unit) => format!("{} {unit}", brief(force)),
+        None => brief(force),
+    }
+}
+
+/// The direction of a push, with that of its mirror image.
+fn directions(margin: &Margin, push: &Push) -> String {
+    let image = push.direction.opposite();
+    let mut pushes = margin.pushes.iter();
+    match pushes.any(|other| other.mirrored && other.direction == image) {
+        true => format!("{} ({} or {image})", word(push.direction), push.direction),
+        false => format!("{} ({})", word(push.direction), push.direction),
+    }
+}
+
+fn word(direction: Direction) -> &'static str {
+    match (direction.axis, direction.negative) {
+        (0, false) => "forwards",
+        (0, true) => "backwards",
+        (1, _) => "sideways",
+        (_, false) => "upwards",
+        (_, true) => "downwards",
+    }
+}

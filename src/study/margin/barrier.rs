@@ -1,0 +1,199 @@
+//! The lowest pass from a stable leaf to another equilibrium.
+
+use rayon::prelude::*;
+
+use super::{Entrance, Stable};
+use crate::branch::{Equations, Family, Point, on_finer};
+use crate::leaf::{Field, Grid, Leaf, State};
+use crate::relax::richardson::Richardson;
+use crate::relax::{Barrier, Neighbour, Saddle, fall};
+
+/// Modes of the leaf along which saddles are looked for, to both sides.
+const MODES: usize = 3;
+pub(super) const MODE_CLIMBS: usize = 2 * MODES;
+
+/// Grids over which the energy of a pass is extrapolated at most, nodes of the finest,
+/// and the relative error at which it is known well enough.
+const GRIDS: usize = 5;
+const MOST_NODES: usize = 20_000;
+const ENOUGH: f64 = 1e-7;
+
+/// The leaf comes back to where it was within this distance, in lengths and as a part of
+/// the way to the pass.
+const SAME: f64 = 1e-3;
+const SAME_PART: f64 = 0.1;
+
+/// Passes whose heights differ by less than this part are tried once.
+const SAME_HEIGHT: f64 = 1e-6;
+
+/// Rounding of an energy, relative.
+const ROUNDING: f64 = 1e-14;
+
+/// A saddle on the grid on which it was found, with the leaf there.
+struct Pass {
+    grid: Grid,
+    saddle: Point,
+    leaf: Point,
+    /// Energy of the saddle above the leaf's, without units.
+    height: f64,
+}
+
+/// The lowest pass that is found from these entrances and along the softest modes; also
+/// from how many places it was looked for.
+pub(super) fn barrier(
+    stable: &Stable,
+    mut entrances: Vec<Entrance>,
+    weight: f64,
+) -> (Option<Barrier>, usize) {
+    let make = |_: f64| Ok(stable.scenario.clone());
+    let Ok(family) = Family::new(&make, (0.0, 1.0), false) else {
+        return (None, 0);
+    };
+    entrances.extend(along_modes(stable, &family).unwrap_or_default());
+    let all = &stable.searches.all;
+    let counted = all.load(std::sync::atomic::Ordering::Relaxed);
+    let pushes = counted.saturating_sub(MODE_CLIMBS);
+    all.store(
+        pushes + entrances.len(),
+        std::sync::atomic::Ordering::Relaxed,
+    );
+    let mut passes: Vec<Pass> = (entrances.par_iter())
+        .filter_map(|entrance| {
+            let pass = climb(stable, &family, entrance);
+            stable.searches.finish_one();
+            pass
+        })
+        .collect();
+    passes.sort_by(|a, b| a.height.total_cmp(&b.height));
+    passes.dedup_by(|a, b| (a.height - b.height).abs() < SAME_HEIGHT * b.height);
+    let leaf = family.first();
+    let lowest = passes.iter().find_map(|pass| {
+        let neighbour = behind(stable, leaf, pass)?;
+        Some((pass, neighbour))
+    });
+    let barrier =
+        lowest.and_then(|(pass, neighbour)| in_units(stable, &family, pass, &neighbour, weight));
+    (barrier, entrances.len())
+}
+
+/// Both ways along the softest modes of the leaf.
+fn along_modes(stable: &Stable, family: &Family) -> Option<Vec<Entrance>> {
+    let mut equations = Equations::new(family, stable.grid.clone()).ok()?;
+    let (point, _) = equations.correct(&stable.state, 0.0, None).ok()?;
+    let modes = equations.soft_modes(&point, MODES).ok()?;
+    let entrance = |mode: &Field, sign: f64| Entrance {
+        grid: stable.grid.clone(),
+        state: point.state.clone(),
+        way: (mode.iter())
+            .map(|rod| {
+                rod.iter()
+                    .map(|node| node.map(|part| sign * part))
+                    .collect()
+            })
+            .collect(),
+    };
+    let both = |mode: &Field| [1.0, -1.0].map(|sign| entrance(mode, sign));
+    Some(modes.iter().flat_map(both).collect())
+}
+
+/// Climbs to a saddle, and finds the leaf on the same grid.
+fn climb(stable: &Stable, family: &Family, entrance: &Entrance) -> Option<Pass> {
+    let mut equations = Equations::new(family, entrance.grid.clone()).ok()?;
+    let stop = || stable.limit.reached();
+    let saddle = equations.climb(&entrance.state, 0.0, &entrance.way, &stop)?;
+    let mut own = Equations::new(family, stable.grid.clone()).ok()?;
+    let (mut leaf, _) = own.correct(&stable.state, 0.0, None).ok()?;
+    while own.grid().segments() < entrance.grid.segments() {
+        (own, leaf) = on_finer(&mut own, &leaf).ok()?;
+    }
+    let discrete = equations.leaves.at(0.0).ok()?;
+    let height = discrete.energy(&saddle.state) - discrete.energy(&leaf.state);
+    (height > 0.0).then(|| Pass {
+        grid: entrance.grid.clone(),
+        saddle,
+        leaf,
+        height,
+    })
+}
+
+/// The equilibrium behind a pass, if the leaf is the one before it.
+fn behind(stable: &Stable, leaf: &Leaf, pass: &Pass) -> Option<State> {
+    let way = pass.saddle.state.shift_to(&pass.leaf.state);
+    let same = |state: &State| state.shift_to(&pass.leaf.state) < SAME.min(SAME_PART * way);
+    match fall(leaf, &pass.grid, &pass.saddle.state, stable.limit) {
+        [Some(one), Some(other)] if same(&one) && !same(&other) => Some(other),
+        [Some(one), Some(other)] if same(&other) && !same(&one) => Some(one),
+        _ => None,
+    }
+}
+
+/// A pass in the scenario's units, its energy without the error of its grid.
+fn in_units(
+    stable: &Stable,
+    family: &Family,
+    pass: &Pass,
+    neighbour: &State,
+    weight: f64,
+) -> Option<Barrier> {
+    let mut equations = Equations::new(family, pass.grid.clone()).ok()?;
+    let (neighbour, _) = equations.correct(neighbour, 0.0, None).ok()?;
+    let mut three = [pass.saddle.clone(), neighbour, pass.leaf.clone()];
+    let rounding = ROUNDING * equations.leaves.at(0.0).ok()?.energy(&three[0].state).abs();
+    let mut table = Richardson::default();
+    table.push(
+        pass.grid.segments(),
+        heights(&mut equations, &three, pass.height)?,
+    );
+    for _ in 1..GRIDS {
+        let (rods, segments) = (three[0].state.rods(), 2 * equations.grid().segments());
+        let known = table.best().is_some_and(|best| best.error < ENOUGH);
+        if known || rods * segments > MOST_NODES || stable.limit.reached() {
+            break;
+        }
+        let finer: Result<Vec<_>, _> = (three.iter())
+            .map(|point| on_finer(&mut equations, point))
+            .collect();
+        let Ok(Ok([(finer, saddle), (_, neighbour), (_, leaf)])) = finer.map(<[_; 3]>::try_from)
+        else {
+            break;
+        };
+        (equations, three) = (finer, [saddle, neighbour, leaf]);
+        table.push(segments, heights(&mut equations, &three, pass.height)?);
+    }
+    let [saddle, neighbour, _] = three;
+    let scale = family.scale();
+    let best = table.best();
+    let values = table.column(best.map_or(0, |best| best.columns));
+    let [energy, above] = [values[0], values[3]].map(|it| it * pass.height * scale.moment());
+    let own = stable.rest.energy?;
+    Some(Barrier {
+        energy,
+        error: best.map(|best| (best.error * pass.height + rounding) * scale.moment()),
+        height: (weight > 0.0).then(|| energy / weight),
+        relative: (weight > 0.0).then(|| energy / (weight * scale.length)),
+        saddle: Saddle {
+            energy: own + energy,
+            negative_eigenvalues: saddle.index,
+            tip: saddle.state.tip(0) * scale.length,
+        },
+        neighbour: Neighbour {
+            energy: own + above,
+            tip: neighbour.state.tip(0) * scale.length,
+        },
+    })
+}
+
+/// Energies of a saddle and of the equilibrium behind it above that of the leaf, by this
+/// `unit`, so that what is judged is relative; each as a point on a line.
+fn heights(equations: &mut Equations, three: &[Point; 3], unit: f64) -> Option<Vec<f64>> {
+    let leaf = equations.leaves.at(0.0).ok()?;
+    let [saddle, neighbour, own] = [0, 1, 2].map(|k| leaf.energy(&three[k].state));
+    Some(vec![
+        (saddle - own) / unit,
+        0.0,
+        0.0,
+        (neighbour - own) / unit,
+        0.0,
+        0.0,
+    ])
+}

@@ -1,0 +1,281 @@
+//! `relax --margin`: how far a stable leaf is from losing its stability.
+
+mod barrier;
+mod pushes;
+
+use std::f64::consts::PI;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use crate::branch::{Equations, Family};
+use crate::leaf::{Field, Grid, State};
+use crate::limit::Limit;
+use crate::memory::Request;
+use crate::relax::{
+    Direction, Equilibrium, Level, Margin, Options, Progress, Push, RelaxError, check_tolerance,
+    doubts, relax_on_grids,
+};
+use crate::scenario::Scenario;
+
+/// The largest push: the loads under which the veins buckle as columns that are pinned at
+/// both ends (Euler), so many A/L^2, and so many weights; but no more than this part of
+/// their axial stiffness.
+const STIFF: f64 = PI * PI;
+const WEIGHTS: f64 = 10.0;
+const AXIAL: f64 = 0.2;
+
+/// Points on the way need no more accuracy (of the tips, relative to the leaf): a
+/// critical one has its own error.
+const ACCURACY: f64 = 1e-4;
+
+/// A margin that cannot be found.
+#[derive(Debug, thiserror::Error)]
+pub enum MarginError {
+    /// A relaxation that cannot be.
+    #[error(transparent)]
+    Relax(#[from] RelaxError),
+    /// Shooting has no grids on which branches are followed.
+    #[error("a margin is that of a relaxed leaf: use the method semi-implicit")]
+    Method,
+    /// Without energy there is neither an index nor a barrier.
+    #[error("a dead moment on the tip has no potential, hence no barrier; use loads that have")]
+    Moment,
+}
+
+/// How far a margin has come.
+#[derive(Clone, Copy, Debug)]
+pub enum MarginProgress {
+    /// The leaf comes to rest.
+    Relaxing(Progress),
+    /// So many searches of so many are done; one of them pushes in a direction with
+    /// a force.
+    Searching {
+        /// Searches done.
+        done: usize,
+        /// All of them.
+        all: usize,
+        /// What one of them is at.
+        push: Option<(Direction, f64)>,
+    },
+}
+
+/// Brings a leaf to rest and finds how far it is from losing its stability, as
+/// [`Equilibrium::margin`].
+///
+/// # Errors
+/// Requests that cannot be met.
+pub fn relax_with_margin(
+    scenario: &Scenario,
+    options: &Options,
+    progress: &mut (dyn FnMut(&MarginProgress) + Send),
+) -> Result<Equilibrium, MarginError> {
+    if options.method.is_shooting() {
+        return Err(MarginError::Method);
+    }
+    if scenario.tip_moment != [0.0; 3] {
+        return Err(MarginError::Moment);
+    }
+    let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
+    check_tolerance(tolerance)?;
+    let (mut leaf, levels) = relax_on_grids(scenario, options, tolerance, &mut |step| {
+        progress(&MarginProgress::Relaxing(*step));
+    })?;
+    leaf.doubts = doubts(scenario, &leaf);
+    leaf.margin = Some(match (leaf.outcome.is_at_rest(), leaf.stable()) {
+        (true, Some(true)) => margin(scenario, &leaf, &levels, options, progress)?,
+        (true, Some(false)) => Margin::none("an unstable leaf has no margin to lose"),
+        _ => Margin::none("only a leaf at rest whose stability is known has a margin"),
+    });
+    Ok(leaf)
+}
+
+/// A stable leaf on the grid on which it is pushed, and how.
+struct Stable<'a> {
+    scenario: &'a Scenario,
+    rest: &'a Equilibrium,
+    grid: Grid,
+    state: State,
+    accuracy: f64,
+    /// The largest push.
+    largest: f64,
+    limit: &'a Limit,
+    searches: Searches<'a>,
+}
+
+/// Counts searches, and tells of them.
+struct Searches<'a> {
+    done: AtomicUsize,
+    all: AtomicUsize,
+    progress: Mutex<&'a mut (dyn FnMut(&MarginProgress) + Send)>,
+}
+
+impl Searches<'_> {
+    fn tell(&self, push: Option<(Direction, f64)>) {
+        // Whoever finds another one telling has nothing to say.
+        if let Ok(mut progress) = self.progress.try_lock() {
+            progress(&MarginProgress::Searching {
+                done: self.done.load(Ordering::Relaxed),
+                all: self.all.load(Ordering::Relaxed),
+                push,
+            });
+        }
+    }
+
+    fn finish_one(&self) {
+        self.done.fetch_add(1, Ordering::Relaxed);
+        self.tell(None);
+    }
+}
+
+/// A place from which a saddle is looked for: on its grid, in this direction.
+struct Entrance {
+    grid: Grid,
+    state: State,
+    way: Field,
+}
+
+fn margin(
+    scenario: &Scenario,
+    rest: &Equilibrium,
+    levels: &[Level],
+    options: &Options,
+    progress: &mut (dyn FnMut(&MarginProgress) + Send),
+) -> Result<Margin, MarginError> {
+    let clock = Instant::now();
+    let (grid, state) = walking_grid(scenario, levels);
+    let (rods, segments) = (scenario.rods.len(), grid.segments());
+    (Request::Branches { rods, segments }.weigh()).map_err(RelaxError::Memory)?;
+    let weight = weight(scenario);
+    let directions = directions(scenario, rest);
+    let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
+    let stable = Stable {
+        scenario,
+        rest,
+        grid,
+        state,
+        accuracy: tolerance.max(ACCURACY),
+        largest: largest_push(scenario, weight),
+        limit: &options.limit,
+        searches: Searches {
+            done: AtomicUsize::new(0),
+            all: AtomicUsize::new(directions.len() + barrier::MODE_CLIMBS),
+            progress: Mutex::new(progress),
+        },
+    };
+    let pushed: Vec<_> = directions
+        .into_par_iter()
+        .map(|direction| {
+            let pushed = pushes::push(&stable, direction, weight);
+            stable.searches.finish_one();
+            pushed
+        })
+        .collect();
+    let (mut pushes, mut entrances) = (Vec::new(), Vec::new());
+    for (push, found) in pushed {
+        entrances.extend(found);
+        pushes.push(push);
+    }
+    add_mirrored(&mut pushes, rods);
+    pushes.sort_by(|a, b| {
+        let [a, b] = [a, b].map(|push| push.force.unwrap_or(f64::INFINITY));
+        a.total_cmp(&b)
+    });
+    let (barrier, climbs) = barrier::barrier(&stable, entrances, weight);
+    let held = scenario.held_tip.is_some();
+    let remark = match options.limit.reached() {
+        true => Some("the time allowed was over before all was tried".into()),
+        false => held.then(|| "the tip is held: a force on it moves nothing".into()),
+    };
+    Ok(Margin {
+        units: scenario.units.clone(),
+        weight,
+        every_tip: !scenario.joined && rods > 1,
+        largest_push: (!held).then_some(stable.largest),
+        pushes,
+        barrier,
+        climbs,
+        remark,
+        wall_seconds: clock.elapsed().as_secs_f64(),
+    })
+}
+
+/// The leaf on the coarsest grid of its relaxation on which it is stable, as on the
+/// finest.
+fn walking_grid(scenario: &Scenario, levels: &[Level]) -> (Grid, State) {
+    let make = |_: f64| Ok(scenario.clone());
+    let family = Family::new(&make, (0.0, 1.0), false);
+    let first = levels[0].leaf.segments();
+    let on = |level: &Level| (level.leaf.grid.clone(), level.state.clone());
+    let stable = |level: &&Level| {
+        let equations = family.as_ref().ok();
+        let equations = equations.map(|family| Equations::new(family, level.leaf.grid.clone()));
+        let Some(Ok(mut equations)) = equations else {
+            return false;
+        };
+        let found = equations.correct(&level.state, 0.0, None);
+        found.is_ok_and(|(point, _)| point.index == 0)
+    };
+    let last = &levels[levels.len() - 1];
+    let mut nested = levels.iter().filter(|level| {
+        let segments = level.leaf.segments();
+        segments.is_multiple_of(first) && (segments / first).is_power_of_two()
+    });
+    on(nested.find(stable).unwrap_or(last))
+}
+
+/// Weight of a leaf.
+fn weight(scenario: &Scenario) -> f64 {
+    let lengths: f64 = scenario.rods.iter().map(|rod| rod.length).sum();
+    let [x, y, z] = scenario.gravity;
+    (x * x + y * y + z * z).sqrt() * lengths
+}
+
+fn largest_push(scenario: &Scenario, weight: f64) -> f64 {
+    let rods = scenario.rods.iter();
+    let axial: f64 = rods.map(|rod| rod.force_stiffness[0].min()).sum();
+    let together = if scenario.joined {
+        scenario.rods.len()
+    } else {
+        1
+    } as f64;
+    let stiff = STIFF * together * scenario.scale().force();
+    (stiff + WEIGHTS * weight).min(AXIAL * axial * together / scenario.rods.len() as f64)
+}
+
+/// The directions to push in: none if the tip is held; of two that are mirror images, of
+/// a leaf that is one, the first.
+fn directions(scenario: &Scenario, rest: &Equilibrium) -> Vec<Direction> {
+    if scenario.held_tip.is_some() {
+        return Vec::new();
+    }
+    let mirrored = [
+        false,
+        rest.model.rods < scenario.rods.len(),
+        rest.model.planar,
+    ];
+    let own = |direction: &Direction| !(direction.negative && mirrored[direction.axis]);
+    Direction::all().filter(own).collect()
+}
+
+/// Adds the mirror images of pushes that were not tried the other way.
+fn add_mirrored(pushes: &mut Vec<Push>, rods: usize) {
+    let has = |other: Direction| pushes.iter().any(|push| push.direction == other);
+    let alone = pushes.iter().filter(|push| !has(push.direction.opposite()));
+    let images: Vec<Push> = alone
+        .map(|push| {
+            let axis = push.direction.axis;
+            let mut image = push.clone();
+            image.direction = push.direction.opposite();
+            image.mirrored = true;
+            image.tips.iter_mut().for_each(|tip| tip[axis] = -tip[axis]);
+            if axis == 1 && image.tips.len() == rods {
+                image.tips.reverse();
+            }
+            image
+        })
+        .collect();
+    pushes.extend(images);
+}

@@ -1,0 +1,192 @@
+//! The force at the tip at which a leaf loses its stability.
+
+use glam::DVec3;
+
+use super::{Entrance, Stable};
+use crate::branch::{
+    Critical, End, Family, Followed, Grids, Kind, NEARLY_RIGID, Point, Refined, Stuck, Walk, switch,
+};
+use crate::relax::{Direction, Fate, Loss, Push};
+use crate::scenario::Scenario;
+
+/// Longest step along the branch, and most points.
+const LONGEST: f64 = 0.1;
+const MOST_POINTS: usize = 400;
+
+/// Points behind the place where stability is lost by which it is known.
+const BEHIND: usize = 2;
+
+/// Grids of a critical point: of a leaf of few nodes, and of another.
+const CRITICAL_GRIDS: [usize; 2] = [4, 3];
+const FEW_NODES: usize = 500;
+
+/// Rounding of a force, relative to itself, and of a nearly rigid leaf to all that its tip
+/// bears: in eight runs of a buckled column it was 9e-10 at most.
+const ROUNDING: f64 = 1e-14;
+const OF_RIGID: f64 = 3e-9;
+
+/// Pushes a leaf in one direction until it loses its stability, or to the largest push;
+/// also from where, and in which direction, saddles may be found then.
+pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push, Vec<Entrance>) {
+    let make = |force: f64| -> Result<Scenario, String> {
+        let mut scenario = stable.scenario.clone();
+        scenario.tip_force[direction.axis] += direction.sign() * force;
+        Ok(scenario)
+    };
+    let unknown = |why: String| {
+        let push = Push {
+            direction,
+            kind: Loss::Unknown,
+            force: None,
+            error: None,
+            per_weight: None,
+            more_than: Some(0.0),
+            then: None,
+            tips: Vec::new(),
+            mirrored: false,
+            remark: Some(why),
+        };
+        (push, Vec::new())
+    };
+    let family = match Family::new(&make, (0.0, stable.largest), false) {
+        Ok(family) => family,
+        Err(out) => return unknown(out.to_string()),
+    };
+    let followed = Grids::new(&family, stable.grid.clone())
+        .map_err(Stuck::from)
+        .and_then(|mut grids| {
+            let followed = follow(stable, direction, &mut grids)?;
+            Ok((grids, followed))
+        });
+    let (mut grids, followed) = match followed {
+        Ok(followed) => followed,
+        Err(stuck) => return unknown(stuck.to_string()),
+    };
+    let critical = followed.branch.critical.iter().zip(&followed.critical);
+    let lost = |critical: &Critical| critical.indices[0] == 0 && critical.indices[1] > 0;
+    let Some(((_, critical), refined)) = critical.into_iter().find(|((_, it), _)| lost(it)) else {
+        let push = not_lost(stable, &followed, &unknown(String::new()).0);
+        return (push, Vec::new());
+    };
+    let force = refined.fraction * stable.largest;
+    let push = Push {
+        direction,
+        kind: match critical.kind {
+            Kind::Fold => Loss::Fold,
+            Kind::Branching => Loss::BranchPoint,
+        },
+        force: Some(force),
+        error: Some(refined.fraction_error * stable.largest + rounding(stable, force, weight)),
+        per_weight: (weight > 0.0).then(|| force / weight),
+        more_than: None,
+        then: Some(fate(stable, &mut grids, critical)),
+        tips: tips(stable, refined),
+        mirrored: false,
+        remark: None,
+    };
+    (push, entrances(&mut grids, critical))
+}
+
+/// Rounding of a critical force.
+fn rounding(stable: &Stable, force: f64, weight: f64) -> f64 {
+    let rods = stable.scenario.rods.iter();
+    let stiffness = rods.flat_map(|rod| &rod.force_stiffness);
+    let stiffest = stiffness.fold(0.0, |most: f64, it| most.max(it.max_abs()));
+    let rigid = stiffest > NEARLY_RIGID * stable.scenario.scale().force();
+    let borne = force + weight + DVec3::from_array(stable.scenario.tip_force).length();
+    ROUNDING * force + if rigid { OF_RIGID * borne } else { 0.0 }
+}
+
+/// The branch of a push, to where it is known to have lost its stability.
+fn follow(stable: &Stable, direction: Direction, grids: &mut Grids) -> Result<Followed, Stuck> {
+    let (mut first, _) = (grids.of(&stable.state)).correct(&stable.state, 0.0, None)?;
+    first.tangent = first.tangent.towards(true);
+    let enough = |points: &[Point]| {
+        let behind = points.len().checked_sub(BEHIND);
+        behind.is_some_and(|behind| points[behind].index > 0) || stable.limit.reached()
+    };
+    let nodes = stable.state.rods() * stable.grid.segments();
+    let walk = Walk {
+        longest: LONGEST,
+        most: MOST_POINTS,
+        critical_grids: CRITICAL_GRIDS[usize::from(nodes > FEW_NODES)],
+        enough: Some(&enough),
+    };
+    let mut tell = |_, fraction: f64| {
+        let push = (direction, fraction * stable.largest);
+        stable.searches.tell(Some(push));
+    };
+    Ok(grids.follow(first, &walk, stable.accuracy, &mut tell))
+}
+
+/// What is known of a push under which stability was not lost as far as it is known.
+fn not_lost(stable: &Stable, followed: &Followed, unknown: &Push) -> Push {
+    let points = followed.branch.points.iter().zip(&followed.points);
+    let stably = points.take_while(|(point, _)| point.index == 0);
+    let furthest = stably.fold(0.0, |most: f64, (_, refined)| most.max(refined.fraction));
+    let reached = matches!(followed.end, End::Reached);
+    Push {
+        kind: match reached {
+            true => Loss::NoneUpTo,
+            false => Loss::Unknown,
+        },
+        more_than: Some(furthest * stable.largest),
+        remark: match &followed.end {
+            End::Reached => None,
+            _ if stable.limit.reached() => Some("the time allowed was over".into()),
+            End::Stuck(stuck) => Some(stuck.to_string()),
+            End::Unverified(doubt) => Some(doubt.to_string()),
+            End::Closed | End::Returned | End::MostPoints | End::Enough => {
+                Some("the branch could not be followed further".into())
+            }
+        },
+        ..unknown.clone()
+    }
+}
+
+/// What the leaf does at a critical point: where a stable branch crosses, it goes on
+/// along that.
+fn fate(stable: &Stable, grids: &mut Grids, critical: &Critical) -> Fate {
+    if critical.kind == Kind::Fold {
+        return Fate::Snaps;
+    }
+    let branches = switch(grids.of(&critical.state), critical, 0, stable.accuracy);
+    match branches.iter().any(|point| point.index == 0) {
+        true => Fate::BendsAside,
+        false => Fate::Snaps,
+    }
+}
+
+/// Saddles may be found from a critical point along its neutral modes: at a fold
+/// onwards, at a branch point to both sides.
+fn entrances(grids: &mut Grids, critical: &Critical) -> Vec<Entrance> {
+    let equations = grids.of(&critical.state);
+    let along = |mode| equations.product(mode, &critical.tangent.increments);
+    let mut signs = vec![1.0, -1.0];
+    if critical.kind == Kind::Fold {
+        signs = vec![along(&critical.modes[0]).signum()];
+    }
+    let way = |sign: f64| {
+        let of = |node: &[f64; 6]| node.map(|part| sign * part);
+        let rods = critical.modes[0].iter();
+        rods.map(|rod| rod.iter().map(of).collect()).collect()
+    };
+    let entrance = |sign| Entrance {
+        grid: equations.grid().clone(),
+        state: critical.state.clone(),
+        way: way(sign),
+    };
+    signs.into_iter().map(entrance).collect()
+}
+
+/// Tips in the scenario's units: the joint one alone, or each.
+fn tips(stable: &Stable, refined: &Refined) -> Vec<DVec3> {
+    let length = stable.scenario.scale().length;
+    let count = if stable.scenario.joined {
+        1
+    } else {
+        usize::MAX
+    };
+    let tips = refined.tips.iter().take(count);
+    tips.map(|tip| DVec3::from_array(*tip) * length).collect()
+}

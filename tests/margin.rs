@@ -1,0 +1,373 @@
+//! How far a stable leaf is from losing its stability: pushes and the energy of the lowest
+//! pass against columns and the elastica, and against relaxations under such forces.
+
+mod common;
+mod workplace;
+
+use std::f64::consts::PI;
+
+use common::random::splitmix64;
+use common::{RIGID, on, parse, relaxed, rod};
+use leafdyn::internals::branch::{Equations, Family};
+use leafdyn::internals::leaf::{DiscreteLeaf, Grid, Leaf, State};
+use leafdyn::internals::relax::{project, settle_from};
+use leafdyn::relax::{Equilibrium, Fate, Limit, Loss, Margin, Options, Push};
+use leafdyn::scenario::Scenario;
+use leafdyn::study::relax_with_margin;
+use workplace::Workplace;
+
+fn found(scenario: &Scenario, tolerance: f64) -> (Equilibrium, Margin) {
+    let options = Options {
+        tolerance: Some(tolerance),
+        every_node: true,
+        ..Options::default()
+    };
+    let leaf = relax_with_margin(scenario, &options, &mut |_| {}).unwrap();
+    let margin = leaf.margin.clone().unwrap();
+    (leaf, margin)
+}
+
+fn push<'m>(margin: &'m Margin, direction: &str) -> &'m Push {
+    let mut pushes = margin.pushes.iter();
+    let found = pushes.find(|push| push.direction.to_string() == direction);
+    found.unwrap_or_else(|| panic!("{direction}: {margin:?}"))
+}
+
+/// The force of a push, which must be right within its error bar.
+#[track_caller]
+fn is_at(push: &Push, right: f64) {
+    let (force, error) = (push.force.unwrap(), push.error.unwrap());
+    println!(
+        "{}: {force} within {error:.1e}, off by {:.1e}",
+        push.direction,
+        force - right
+    );
+    assert!(
+        (force - right).abs() <= error.max(1e-11),
+        "{push:?}: {right}"
+    );
+    assert!(error < 1e-5 * right, "{push:?}");
+}
+
+/// The largest tip load of a standing column of this weight: w' = theta, theta'' +
+/// (load + weight (1 - s)) theta = 0 with theta(0) = 0 and theta'(1) = 0, by the method of
+/// Runge and Kutta from the base.
+fn standing(weight: f64) -> f64 {
+    let slope_at_tip = |load: f64| {
+        let steps = 2000;
+        let h = 1.0 / f64::from(steps);
+        let rate = |s: f64, [y, v]: [f64; 2]| [v, -(load + weight * (1.0 - s)) * y];
+        let mut y = [0.0, 1.0];
+        for step in 0..steps {
+            let s = h * f64::from(step);
+            let ahead = |k: [f64; 2], by: f64| [y[0] + by * k[0], y[1] + by * k[1]];
+            let a = rate(s, y);
+            let b = rate(s + 0.5 * h, ahead(a, 0.5 * h));
+            let c = rate(s + 0.5 * h, ahead(b, 0.5 * h));
+            let d = rate(s + h, ahead(c, h));
+            y = std::array::from_fn(|k| y[k] + h / 6.0 * (a[k] + 2.0 * (b[k] + c[k]) + d[k]));
+        }
+        y[1]
+    };
+    bisect(0.0, 3.0, slope_at_tip)
+}
+
+fn bisect(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
+    let sign = f(low).signum();
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        match f(middle) * sign > 0.0 {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    0.5 * (low + high)
+}
+
+#[test]
+fn a_column_gives_way_at_the_loads_of_euler_and_greenhill() {
+    for weight in [0.0, 2.0, 5.0] {
+        let column = rod(&format!(
+            "{RIGID}; stiffness.bending_2=2.0; load.gravity=[{:?}, 0, 0]",
+            -weight
+        ));
+        let right = match weight {
+            0.0 => 0.25 * PI * PI,
+            weight => standing(weight),
+        };
+        let (_, margin) = found(&column, 1e-8);
+        let down = push(&margin, "-x");
+        is_at(down, right);
+        assert_eq!(
+            (down.kind, down.then),
+            (Loss::BranchPoint, Some(Fate::BendsAside))
+        );
+        assert_eq!(
+            margin.pushes[0].direction, down.direction,
+            "the least comes first"
+        );
+    }
+}
+
+/// Compressed by its load P, of axial stiffness H, Reissner's column has buckled where
+/// P (1 - P/H) is Euler's load.
+#[test]
+fn an_extensible_column_gives_way_at_the_load_of_reissner() {
+    let column = rod(
+        "stiffness.axial=50; stiffness.shear_2=inf; stiffness.shear_3=inf; stiffness.bending_2=2",
+    );
+    let right = 25.0 * (1.0 - (1.0 - 4.0 * 0.25 * PI * PI / 50.0).sqrt());
+    is_at(push(&found(&column, 1e-8).1, "-x"), right);
+}
+
+/// Load of a column beyond Euler's.
+const LOAD: f64 = 3.0;
+
+/// At the base of an elastica under the load along it and a force across, from its tip at
+/// this angle: its angle, and its energy: of bending, and of both loads.
+fn elastica(tip: f64, across: f64) -> [f64; 2] {
+    let rate = |[theta, m, _]: [f64; 3]| {
+        let (sin, cos) = theta.sin_cos();
+        let energy = 0.5 * m * m + LOAD * cos - across * sin;
+        [-m, LOAD * sin + across * cos, energy]
+    };
+    let steps = 1000;
+    let h = 1.0 / f64::from(steps);
+    let mut y = [tip, 0.0, 0.0];
+    for _ in 0..steps {
+        let ahead = |k: [f64; 3], by: f64| std::array::from_fn(|c| y[c] + by * k[c]);
+        let a = rate(y);
+        let b = rate(ahead(a, 0.5 * h));
+        let c = rate(ahead(b, 0.5 * h));
+        let d = rate(ahead(c, h));
+        y = std::array::from_fn(|k| y[k] + h / 6.0 * (a[k] + 2.0 * (b[k] + c[k]) + d[k]));
+    }
+    [y[0], y[2]]
+}
+
+/// The force across that bends the elastica to this angle of its tip.
+fn across(tip: f64) -> f64 {
+    bisect(-2.0, 2.0, |force| elastica(tip, force)[0])
+}
+
+/// A buckled column, pushed back to the other side, snaps where the force across that
+/// holds it is largest; the pass is the straight one.
+#[test]
+fn a_buckled_column_snaps_as_the_elastica() {
+    let strip = format!("{RIGID}; stiffness.bending_2=50; stiffness.torsion=50");
+    let column = rod(&format!("{strip}; load.tip_force=[{:?}, 0, 0]", -LOAD));
+    let (leaf, margin) = found(&column, 1e-8);
+    let buckled = bisect(0.3, 2.5, |tip| elastica(tip, 0.0)[0]);
+    let least = &margin.pushes[0];
+    is_at(least, fold().0);
+    assert_eq!((least.kind, least.then), (Loss::Fold, Some(Fate::Snaps)));
+    let back = if leaf.tips[0].y > 0.0 { "-y" } else { "+y" };
+    assert_eq!(least.direction.to_string(), back);
+
+    let right = LOAD - elastica(buckled, 0.0)[1];
+    let barrier = margin.barrier.unwrap();
+    let error = barrier.error.unwrap();
+    println!(
+        "{} within {error:.1e}, off by {:.1e}",
+        barrier.energy,
+        barrier.energy - right
+    );
+    assert!((barrier.energy - right).abs() <= error.max(1e-11));
+    assert!(error < 1e-5 * right);
+    assert!((barrier.saddle.tip.x - 1.0).abs() < 1e-9);
+    assert!((barrier.neighbour.tip.y + leaf.tips[0].y).abs() < 1e-2);
+    assert_eq!((margin.weight, barrier.height), (0.0, None));
+}
+
+/// The largest force across that a buckled elastica bears from the side to which it is
+/// bent, and its tip's angle under it, by golden section.
+fn fold() -> (f64, f64) {
+    let buckled = bisect(0.3, 2.5, |tip| elastica(tip, 0.0)[0]);
+    let part = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let (mut low, mut high) = (0.01, buckled);
+    while high - low > 1e-7 {
+        let (a, b) = (high - part * (high - low), low + part * (high - low));
+        match across(a).abs() > across(b).abs() {
+            true => high = b,
+            false => low = a,
+        }
+    }
+    (across(low).abs(), low)
+}
+
+/// Under a force across, the pass and the equilibrium behind it are those of the elastica
+/// bent against the force; near the fold they meet, and the way back over the pass vanishes
+/// with the power 3/2.
+#[test]
+fn the_barrier_vanishes_at_the_fold_with_the_power_three_halves() {
+    let (most, angle) = fold();
+    let strip = format!("{RIGID}; stiffness.bending_2=50; stiffness.torsion=50");
+    let barriers = [0.4, 0.2].map(|part| {
+        let force = (1.0 - part) * most;
+        let column = rod(&format!(
+            "{strip}; load.tip_force=[{:?}, {force:?}, 0]",
+            -LOAD
+        ));
+        let (leaf, margin) = found(&column, 1e-8);
+        let barrier = margin.barrier.unwrap();
+        let right = |from: f64, to: f64| {
+            let tip = bisect(from, to, |tip| across(tip).abs() - force);
+            elastica(tip, -force)[1]
+        };
+        let (saddle, behind) = (right(0.01, angle), right(angle, 1.4));
+        let back = barrier.saddle.energy - barrier.neighbour.energy;
+        println!(
+            "{part}: {back} behind, off by {:.1e}",
+            back - (saddle - behind)
+        );
+        assert!((back - (saddle - behind)).abs() < 1e-8);
+        assert!(leaf.tips[0].y > 0.0 && barrier.neighbour.tip.y < 0.0);
+        back
+    });
+    let exponent = (barriers[0] / barriers[1]).log2();
+    println!("{exponent}");
+    assert!((exponent - 1.5).abs() < 0.03, "{exponent}");
+}
+
+/// A soft leaf that may have several places to rest.
+fn soft(draw: &mut u64) -> Scenario {
+    let mut between = |from: f64, to: f64| from + splitmix64(draw) * (to - from);
+    let rods = 1 + (3.0 * between(0.0, 1.0)) as usize;
+    parse(&format!(
+        r#"
+        name = "soft"
+        leaf = {{ rods = {rods}, length = 1.0, fan = "paper" }}
+        stiffness = {{ torsion = {:?}, bending_2 = {:?}, bending_3 = 1.0, axial = 20.0, shear_2 = 20.0, shear_3 = 20.0 }}
+        rest.bend_2 = {:?}
+        rest.bend_3 = {:?}
+        load = {{ gravity = [0.0, 0.0, {:?}] }}
+        {}
+        "#,
+        10.0_f64.powf(between(-2.0, 0.0)),
+        10.0_f64.powf(between(-2.0, -0.5)),
+        between(-2.0, 2.0),
+        between(-1.0, 1.0),
+        -between(0.0, 0.2),
+        if rods > 1 {
+            "coupling = { y = 1.0, z = 1.0 }"
+        } else {
+            ""
+        },
+    ))
+}
+
+/// A stable leaf followed from a fraction of its push to another by Newton's method, in
+/// halves where that does not get there at once or goes far.
+fn advanced(
+    equations: &mut Equations,
+    state: &State,
+    way: [f64; 2],
+    halvings: usize,
+) -> Option<State> {
+    if let Ok((point, _)) = equations.correct(state, way[1].max(0.0), None)
+        && state.shift_to(&point.state) < 0.05
+        && point.index == 0
+    {
+        return Some(point.state);
+    }
+    let middle = 0.5 * (way[0] + way[1]);
+    let half = advanced(equations, state, [way[0], middle], halvings.checked_sub(1)?)?;
+    advanced(equations, &half, [middle, way[1]], halvings - 1)
+}
+
+/// Ten leaves that some push unseats: followed in small steps they are stable up to 0.98 of
+/// the least, and under 1.02 of it they come to rest elsewhere.
+#[test]
+fn random_leaves_stay_below_the_push_and_leave_above_it() {
+    let (mut draw, mut tried, mut unseated) = (7, 0, 0);
+    while unseated < 10 {
+        tried += 1;
+        assert!(tried < 80, "{unseated} of {tried}");
+        let scenario = soft(&mut draw);
+        let (rest, margin) = found(&scenario, 1e-5);
+        let Some(push) = margin.pushes.first().filter(|push| push.force.is_some()) else {
+            continue;
+        };
+        let force = push.force.unwrap();
+        assert!(push.error.unwrap() < 1e-3 * force, "{push:?}");
+        let make = |part: f64| {
+            let mut pushed = scenario.clone();
+            pushed.tip_force[push.direction.axis] += push.direction.sign() * part * force;
+            Ok(pushed)
+        };
+        let family = Family::new(&make, (0.0, 2.0), false).unwrap();
+        let leaf = Leaf::new(&scenario);
+        // On one grid, fine enough for its folds.
+        let alone = Options {
+            every_node: true,
+            ..on(64)
+        };
+        let alone = relaxed(&scenario, &alone);
+        if alone.tips[0].distance(rest.tips[0]) > 1e-2 {
+            continue;
+        }
+        let grid = Grid::new(alone.shape.stations.len() - 1, leaf.kinks());
+        let discrete = DiscreteLeaf::new(&leaf, grid.clone());
+        let mut state = project(&leaf, &discrete, &alone.shape.rods);
+        let mut equations = Equations::new(&family, grid.clone()).unwrap();
+        let mut last = 0.0;
+        for step in 0..=196 {
+            let part = 0.005 * f64::from(step);
+            let next = advanced(
+                &mut equations,
+                &state,
+                [0.5 * (part - 0.005), 0.5 * part],
+                14,
+            );
+            let next = next.unwrap_or_else(|| panic!("{push:?} at {part}"));
+            last = state.shift_to(&next);
+            state = next;
+        }
+        let pushed = Leaf::new(&make(1.02).unwrap());
+        let beyond = settle_from(&pushed, &grid, state.clone(), &Limit::default());
+        let jump = beyond.map_or(f64::INFINITY, |beyond| state.shift_to(&beyond));
+        let (direction, then) = (push.direction, push.then.unwrap());
+        println!("{tried}: {direction} {force:.5} {then:?}: {last:.4}, then {jump:.4}");
+        // As far as eight more such steps would lead at most, if it only bends aside.
+        assert!(jump > 8.0 * last, "{push:?}: {last} {jump}");
+        unseated += 1;
+    }
+    println!("{unseated} of {tried}");
+}
+
+#[test]
+fn what_has_no_margin_is_said() {
+    let place = Workplace::new();
+    let run = |more: &str| place.run(&format!("relax leaf.toml --margin --write none {more}"));
+    place.refuses("relax leaf.toml --margin --all", "cannot be used with");
+    place.refuses(
+        "relax leaf.toml --margin --method shooting",
+        "--margin: a margin is that of a relaxed leaf",
+    );
+    place.refuses(
+        "relax leaf.toml --margin --set leaf.rods=1 --set load.tip_moment=[0,0,1]",
+        "dead moment",
+    );
+    let held = "--set tip.held=\"pinned\" --set tip.position=[0.8,0,0]";
+    run(held)
+        .ends(0)
+        .says(&["the tip is held: a force on it moves nothing"]);
+    let free = run("--set leaf.joined=false").ends(0);
+    assert!(!free.out.contains(" at the tip"), "{}", free.out);
+}
+
+#[test]
+fn margins_do_not_depend_on_threads() {
+    let place = Workplace::new();
+    let [one, two] = ["1", "2"].map(|threads| {
+        let run = place.run_on(
+            threads,
+            "relax leaf.toml --margin --json --set load.tip_force=[-3,0,0] --set leaf.rods=1",
+        );
+        let mut margin = run.ends(0).json()["margin"].clone();
+        margin.as_object_mut().unwrap().remove("wall_seconds");
+        margin
+    });
+    assert_eq!(one, two);
+    assert!(one["pushes"].as_array().unwrap().len() == 6);
+}
