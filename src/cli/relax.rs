@@ -81,7 +81,7 @@ fn method_parser() -> impl TypedValueParser<Value = Method> {
 /// How far a margin has come.
 fn tell_margin(line: &mut ProgressLine, progress: &MarginProgress, tolerance: f64) {
     match progress {
-        MarginProgress::Relaxing(progress) => line.relaxing(progress, tolerance),
+        MarginProgress::Relaxing(progress) => line.solving(progress, tolerance),
         MarginProgress::Searching { done, all, push } => {
             line.tell(part_of(*done, *all), || {
                 let push = push.map(|(direction, force)| {
