@@ -64,7 +64,7 @@ impl Equations<'_> {
                     modes: solved.modes,
                 });
             }
-            let (increments, changes) = solved.step(&[(&dual, &[own], 0.0)], linear.noise)?;
+            let (increments, changes) = solved.step(&[(&dual, &[own])], linear.noise)?;
             let size = largest(&increments).max(changes[0].abs());
             if !is_finite(&increments) || size > LARGEST {
                 return Err(Stuck::NotConverged);
@@ -196,12 +196,11 @@ pub(super) struct Solved {
 }
 
 impl Solved {
-    /// Newton's increments and changes of the numbers that leave as many sums as there are
-    /// numbers at zero: each by its change with the increments and with the numbers, and
-    /// by what it is now. (The distance from a plane is one of them.)
+    /// Newton's increments and changes of the numbers within the plane normal to as many
+    /// directions: each by its momentum, and its own changes of the numbers.
     pub fn step(
         &self,
-        sums: &[(&Field, &[f64], f64)],
+        normals: &[(&Field, &[f64])],
         noise: f64,
     ) -> Result<(Field, Vec<f64>), Stuck> {
         let (p, numbers) = (self.modes.len(), self.rates.len());
@@ -211,7 +210,7 @@ impl Solved {
             for (i, rate) in self.rates.iter().enumerate() {
                 matrix[(r, p + i)] = rate.multipliers[r];
             }
-            for (k, (dual, ..)) in sums.iter().enumerate() {
+            for (k, (dual, _)) in normals.iter().enumerate() {
                 matrix[(p + k, r)] = dot(dual, &self.modes[r]);
             }
             // What is below rounding decides nothing.
@@ -220,11 +219,11 @@ impl Solved {
                 force => force,
             };
         }
-        for (k, (dual, own, now)) in sums.iter().enumerate() {
+        for (k, (dual, own)) in normals.iter().enumerate() {
             for (i, rate) in self.rates.iter().enumerate() {
                 matrix[(p + k, p + i)] = dot(dual, &rate.increments) + own[i];
             }
-            right[p + k] = -now - dot(dual, &self.forces.increments);
+            right[p + k] = -dot(dual, &self.forces.increments);
         }
         let svd = matrix.svd(true, true);
         let least = NEUTRAL * svd.singular_values.max();

@@ -326,24 +326,16 @@ fn linearise(
 /// The change of forces with a number of which `forces` are given at some distance
 /// from where it is.
 pub(super) fn rate(
-    forces: impl FnMut(f64) -> Result<Field, OutOfRange>,
+    mut forces: impl FnMut(f64) -> Result<Field, OutOfRange>,
 ) -> Result<Field, OutOfRange> {
-    let [(after, forces_after), (before, forces_before)] = around(DIFFERENCE, forces)?;
-    let rate = plus(&forces_after, -1.0, &forces_before);
-    Ok(times(&rate, 1.0 / (after - before)))
-}
-
-/// What is so far behind, and so far before, with the distances; at an end of the range
-/// there may be nothing beyond.
-pub(super) fn around<T>(
-    distance: f64,
-    mut of: impl FnMut(f64) -> Result<T, OutOfRange>,
-) -> Result<[(f64, T); 2], OutOfRange> {
-    let [after, before] = [distance, -distance].map(|step| {
-        let mut at = |step: f64| Ok((step, of(step)?));
+    let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
+        // At an end of the range there may be nothing beyond.
+        let mut at = |step: f64| Ok((step, forces(step)?));
         at(step).or_else(|_: OutOfRange| at(0.0))
     });
-    Ok([after?, before?])
+    let ((after, forces_after), (before, forces_before)) = (after?, before?);
+    let rate = plus(&forces_after, -1.0, &forces_before);
+    Ok(times(&rate, 1.0 / (after - before)))
 }
 
 /// The unbalanced forces of a leaf in a state, but for its clamps, which are its own.

@@ -33,7 +33,6 @@ mod place;
 mod refine;
 mod search;
 mod sheet;
-mod slopes;
 mod special;
 
 pub use follow::{Boundary, Halt, Stride, follow};

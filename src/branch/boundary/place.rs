@@ -9,6 +9,9 @@ use crate::branch::equations::Stuck;
 use crate::branch::field::{add, combined, dot, plus, times};
 use crate::leaf::Field;
 
+/// The distance over which the change of a singular value is differenced.
+const DIFFERENCE: f64 = 3e-4;
+
 /// Below this part of what a mode could feel of a number, it feels nothing but rounding.
 const DRIVEN: f64 = 1e-5;
 
@@ -110,13 +113,16 @@ impl Place {
         let eigen = search::eigen(&sample, self.neutral);
         let basis = self.basis(sheet, &sample, &eigen)?;
         let held = held(sheet, &sample, &eigen);
-        let modes = &eigen.vectors[..self.neutral];
-        let modes: Vec<Field> = modes
-            .iter()
-            .map(|it| combined(it, &sample.solved.modes))
-            .collect();
-        let (slopes, _) = sheet.slopes(&sample.spot, &modes)?;
-        let change = basis.each_ref().map(|direction| slopes.along(direction));
+        let border: Vec<Field> = held.iter().map(|it| sheet.equations.momentum(it)).collect();
+        let mut change = [0.0; 2];
+        for (change, direction) in change.iter_mut().zip(&basis) {
+            let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
+                let spot = sheet.moved(&sample.spot, direction, step)?;
+                let sample = sheet.settle(&spot, [&basis[0], &basis[1]], &border, &sample.rates)?;
+                Ok::<f64, Stuck>(search::eigen(&sample, self.neutral).value)
+            });
+            *change = (after? - before?) / (2.0 * DIFFERENCE);
+        }
         let slope = change[0].hypot(change[1]);
         if !(slope.is_finite() && slope > NEUTRAL) {
             return Err(Lost::Stuck(Stuck::NotConverged));

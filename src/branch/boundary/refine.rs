@@ -3,10 +3,9 @@
 use super::grids::{on_coarser, on_finer};
 use super::place::Place;
 use super::search::{Found, Lost, Search};
-use super::sheet::{Direction, Plane, Sheet, Spot};
+use super::sheet::{Direction, Plane, Sheet};
 use super::special::{Special, locate_near};
 use crate::branch::critical::Kind;
-use crate::branch::field::prolong as prolong_field;
 use crate::branch::refine_critical::NEARLY_RIGID;
 use crate::branch::refined::Doubt;
 use crate::leaf::{Grid, State};
@@ -25,9 +24,8 @@ const STILL: f64 = 1e-4;
 /// Largest error of the tips (lengths) of a point that is known by its numbers.
 const NEUTRAL_TIPS: f64 = 1e-3;
 
-/// Numbers, as parts of their ranges, are to be as exact as tips to this power: a
-/// thousand times at 1e-6.
-const EXACTER: f64 = 1.5;
+/// Numbers are to be so many times as exact as tips: of the part of their ranges.
+const EXACTER: f64 = 1e-3;
 
 /// Compliance by which matrices of nearly rigid leaves are softened, in units of L^2/A,
 /// times one to four: the more, the less rounding; a part of third order is left.
@@ -40,10 +38,9 @@ const AMPLIFIED: f64 = 8.3;
 /// Numbers within this part of their ranges are exact.
 const EXACT: f64 = 1e-12;
 
-/// Accuracy of a point on its grid, as a part of the ranges, at best and as a part of the
-/// wanted one; how far it may lie from where it is on the grid before.
+/// Accuracy of a point on its grid, as a part of the ranges, and how far it may lie from
+/// where it is on the grid before.
 const ACCURACY: f64 = 1e-13;
-const PART_OF: f64 = 1e-3;
 const NEAR: f64 = 0.5;
 
 /// The line across the boundary leaves it at an angle of at least this (its sine), and one
@@ -115,20 +112,14 @@ fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<
         amplified: 1.0,
         ..Table::default()
     };
-    let enough = accuracy.powf(EXACTER).max(EXACT);
-    let (mut moved, mut last_move) = (f64::INFINITY, None);
+    let mut moved = f64::INFINITY;
     for level in 0..GRIDS {
-        let mut unmoved = near.spot.clone();
         if level > 0 {
             (sheet, near) = on_finer(&mut sheet, &near)?;
-            unmoved = near.spot.clone();
-            if let Some(last) = &last_move {
-                near.spot = moved_on(&mut sheet, &near.spot, last)?;
-            }
         }
         let rigid = sheet.leaf(near.spot.place)?.stiffest() * NEARLY_RIGID < 1.0;
-        let place = again(&mut sheet, &near, step.special, given, PART_OF * enough)?;
-        let way = unmoved.state.shift_to(&place.spot.state);
+        let place = again(&mut sheet, &near, step.special, given)?;
+        let way = near.spot.state.shift_to(&place.spot.state);
         if way > moved.max(STILL) {
             return Err(Doubt::OtherBranch);
         }
@@ -137,7 +128,6 @@ fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<
         }
         if level > 0 {
             moved = way;
-            last_move = Some(sheet.way(&unmoved, &place.spot));
         }
         near = place;
         let numbers = match rigid {
@@ -148,6 +138,7 @@ fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<
         if level + 1 < FEWEST {
             continue;
         }
+        let enough = (EXACTER * accuracy).max(EXACT);
         let errors = table.errors().into_iter().zip(table.rounding);
         let exact = errors
             .into_iter()
@@ -190,17 +181,16 @@ fn again(
     near: &Place,
     special: Option<Special>,
     given: Option<usize>,
-    accuracy: f64,
 ) -> Result<Place, Lost> {
     if let Some(special) = special {
         return locate_near(sheet, near, special);
     }
-    let found = sought(sheet, near, given, accuracy).run(sheet)?;
+    let found = sought(sheet, near, given).run(sheet)?;
     Ok(near.moved(sheet, found))
 }
 
 /// How the point is sought, from where it is on the grid before.
-fn sought(sheet: &Sheet, near: &Place, given: Option<usize>, accuracy: f64) -> Owned {
+fn sought(sheet: &Sheet, near: &Place, given: Option<usize>) -> Owned {
     let (across, slope, along) = match given {
         Some(which) => {
             let (across, slope) = near.across_at(sheet, which);
@@ -213,18 +203,7 @@ fn sought(sheet: &Sheet, near: &Place, given: Option<usize>, accuracy: f64) -> O
         across,
         slope,
         along,
-        accuracy: accuracy.max(ACCURACY),
     }
-}
-
-/// Where a point will be on the grid with all segments halved, by what it moved to the one
-/// before: a fourth part of it.
-fn moved_on(sheet: &mut Sheet, spot: &Spot, last: &Direction) -> Result<Spot, Lost> {
-    let on = Direction {
-        increments: prolong_field(&last.increments),
-        place: last.place,
-    };
-    Ok(sheet.moved(spot, &on, 0.25)?)
 }
 
 /// A search that owns its directions.
@@ -233,7 +212,6 @@ struct Owned {
     across: Direction,
     slope: f64,
     along: Direction,
-    accuracy: f64,
 }
 
 impl Owned {
@@ -245,7 +223,7 @@ impl Owned {
             along: &self.along,
             held: &self.near.held,
             neutral: self.near.neutral,
-            accuracy: self.accuracy,
+            accuracy: ACCURACY,
             furthest: NEAR,
         };
         search.run(sheet)
@@ -257,7 +235,7 @@ impl Owned {
 fn unsoftened(sheet: &mut Sheet, near: &Place, given: Option<usize>) -> Result<[f64; 2], Lost> {
     let grid = sheet.grid().clone();
     let mut places = [[0.0; 2]; 4];
-    let mut owned = sought(sheet, near, given, ACCURACY);
+    let mut owned = sought(sheet, near, given);
     for (k, place) in places.iter_mut().enumerate().rev() {
         let mut soft = Sheet::new(sheet.plane, grid.clone())?;
         soft.soften(SOFTENING * (k + 1) as f64);

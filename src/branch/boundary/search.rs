@@ -1,11 +1,7 @@
-//! The search for a point of a boundary: the zero of an eigenvalue across it, by Newton's
-//! method for the equilibrium and the eigenvalue together. Where that fails, and where the
-//! matrices that decide are others than those of the equilibrium, by the secant method
-//! across the boundary, every step of which goes back to the sheet.
+//! The search for a point of a boundary: the zero of an eigenvalue across it.
 
 use super::sheet::{Direction, Sample, Sheet, Spot};
-use crate::branch::equations::{ITERATIONS, LARGEST, Stuck};
-use crate::branch::field::{is_finite, largest, times};
+use crate::branch::equations::Stuck;
 use crate::leaf::Field;
 
 /// Evaluations in the search for a zero.
@@ -97,82 +93,9 @@ pub fn eigen(sample: &Sample, neutral: usize) -> Eigen {
     }
 }
 
-/// Steps of Newton's method (radians, lengths, fractions) as short as this end it, and
-/// such as are below the second and do not shrink to the third part are rounding; an
-/// eigenvalue that does not shrink as much is not led to zero.
-const SHORT: f64 = 1e-10;
-const ROUNDED: f64 = 1e-9;
-const SHRINKS: f64 = 0.3;
-
 impl Search<'_> {
-    /// The zero of the eigenvalue.
+    /// The zero of the eigenvalue by the secant method.
     pub fn run(&self, sheet: &mut Sheet) -> Result<Found, Lost> {
-        match sheet.is_softened() {
-            true => self.by_secants(sheet),
-            false => self.at_once(sheet).or_else(|_| self.by_secants(sheet)),
-        }
-    }
-
-    /// Newton's method for all unknowns, its derivatives of the eigenvalue those at the
-    /// start.
-    fn at_once(&self, sheet: &mut Sheet) -> Result<Found, Lost> {
-        let not_converged = || Lost::Stuck(Stuck::NotConverged);
-        let border: Vec<Field> = (self.held.iter())
-            .map(|mode| sheet.equations.momentum(mode))
-            .collect();
-        let (slopes, rates) = sheet.slopes(self.spot, &self.held[..self.neutral])?;
-        let slope = slopes.along(self.across).abs();
-        let slopes = slopes.scaled(1.0 / slope);
-        let dual = sheet.equations.momentum(&self.along.increments);
-        let none = times(&self.held[0], 0.0);
-        let mut spot = self.spot.clone();
-        let (mut previous, mut last) = (f64::INFINITY, f64::INFINITY);
-        for _ in 0..ITERATIONS {
-            let (sample, noise) = sheet.sample(spot, &border, rates.clone(), false)?;
-            let eigen = eigen(&sample, self.neutral);
-            // The derivatives are good for nothing where they do not lead there.
-            let value = eigen.value / slope;
-            if value.abs() > SHORT.max(SHRINKS * last) {
-                return Err(not_converged());
-            }
-            last = value.abs();
-            let sums = [
-                (&dual, self.along.place.as_slice(), 0.0),
-                (&slopes.dual, &slopes.numbers, value),
-            ];
-            let (increments, changes) = sample.solved.step(&sums, noise)?;
-            let size = largest(&increments)
-                .max(changes[0].abs())
-                .max(changes[1].abs());
-            if !is_finite(&increments) || !size.is_finite() || size > LARGEST {
-                return Err(not_converged());
-            }
-            let state = sheet.advanced(&sample.spot, &increments, 1.0)?;
-            let place = [0, 1].map(|i| sample.spot.place[i] + changes[i]);
-            // The forces of the segments follow the numbers, as the derivatives take it.
-            let moved = Spot { state, place };
-            let state = sheet.advanced(&moved, &none, 1.0)?;
-            spot = Spot { state, place };
-            let rounded = size < ROUNDED && size > SHRINKS * previous;
-            if size <= SHORT.max(self.accuracy) || rounded {
-                let way = sheet.way(self.spot, &spot);
-                let distance = sheet.along(&way, self.across);
-                if distance.abs() > self.furthest {
-                    return Err(not_converged());
-                }
-                return Ok(Found {
-                    sample: Sample { spot, ..sample },
-                    eigen,
-                    distance,
-                });
-            }
-            previous = size;
-        }
-        Err(not_converged())
-    }
-
-    /// The secant method.
-    fn by_secants(&self, sheet: &mut Sheet) -> Result<Found, Lost> {
         let border: Vec<Field> = (self.held.iter())
             .map(|mode| sheet.equations.momentum(mode))
             .collect();

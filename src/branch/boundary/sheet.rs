@@ -56,13 +56,13 @@ impl Plane<'_> {
 
 /// The last few leaves of a plane, as in [`crate::branch::family::Leaves`].
 #[derive(Default)]
-pub(super) struct Kept(VecDeque<([f64; 2], DiscreteLeaf)>);
+struct Kept(VecDeque<([f64; 2], DiscreteLeaf)>);
 
 /// Of differences over both numbers, and one more.
 const KEPT: usize = 6;
 
 impl Kept {
-    pub(super) fn at(
+    fn at(
         &mut self,
         plane: &Plane,
         family: &Family,
@@ -132,7 +132,7 @@ pub struct Sample {
 pub struct Sheet<'a> {
     pub plane: Plane<'a>,
     pub equations: Equations<'a>,
-    pub(super) kept: Kept,
+    kept: Kept,
     /// The family whose matrices decide what is singular, if that is another.
     softened: Option<(Family<'a>, Kept)>,
 }
@@ -172,11 +172,6 @@ impl<'a> Sheet<'a> {
     pub fn soften(&mut self, softening: f64) {
         let family = self.plane.family.softened(softening);
         self.softened = Some((family, Kept::default()));
-    }
-
-    /// Whether other matrices decide that.
-    pub fn is_softened(&self) -> bool {
-        self.softened.is_some()
     }
 
     /// The grid.
@@ -231,7 +226,7 @@ impl<'a> Sheet<'a> {
         Ok(Spot { state, place })
     }
 
-    pub(super) fn advanced(
+    fn advanced(
         &mut self,
         spot: &Spot,
         increments: &Field,
@@ -248,7 +243,7 @@ impl<'a> Sheet<'a> {
 
     /// What the bordered equations say at a spot, at rest or not, with the rates of both
     /// numbers.
-    pub(super) fn sample(
+    fn sample(
         &mut self,
         mut spot: Spot,
         border: &[Field],
@@ -316,7 +311,7 @@ impl<'a> Sheet<'a> {
         rates: &[Field],
     ) -> Result<Sample, Stuck> {
         let duals = normals.map(|normal| self.equations.momentum(&normal.increments));
-        let normals = [0, 1].map(|k| (&duals[k], normals[k].place.as_slice(), 0.0));
+        let normals = [0, 1].map(|k| (&duals[k], normals[k].place.as_slice()));
         let mut spot = spot.clone();
         let mut previous = f64::INFINITY;
         let mut finished = false;

@@ -6,7 +6,6 @@
 //! take care of E, which is weak beside a rod's own stiffness ([`solve`]).
 
 mod kernels;
-mod product;
 mod solve;
 
 pub use solve::Solved;
