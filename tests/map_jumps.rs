@@ -25,7 +25,7 @@ fn mapped(base: Base, axes: &[&str]) -> Map {
     let cells = 0..request.cells();
     let rows = cells.flat_map(|cell| request.solve(cell, &methods));
     let mut map = Map::new(request.clone(), rows.collect());
-    map.find_jumps();
+    map.find_jumps(&|_, _| {});
     map
 }
 

@@ -249,7 +249,11 @@ pub fn map(
         });
         let mut map = Map::new(request, rows);
         if !monitor.cancelled() {
-            map.find_jumps();
+            map.find_jumps(&|done, pairs| {
+                monitor.say(done as f64, Some(pairs as f64), || {
+                    format!("{done} of {pairs} pairs of cells that stand apart")
+                });
+            });
         }
         map
     })?;

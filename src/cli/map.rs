@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::Mutex;
 use std::time::Instant;
 
 use clap::{Args, ValueHint};
@@ -122,7 +123,14 @@ impl Map {
         let mut map = Cells::new(request, [known, computed].concat());
         map.show = self.show;
         if self.shard.is_none() && self.draw.is_empty() {
-            map.find_jumps();
+            let line = Mutex::new(job.progress());
+            map.find_jumps(&|done, pairs| {
+                if let Ok(mut line) = line.lock() {
+                    line.tell(part_of(done, pairs), || {
+                        format!("{done} of {pairs} pairs of cells that stand apart")
+                    });
+                }
+            });
         }
         let told = report::MapTold {
             known: counts[0],

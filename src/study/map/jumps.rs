@@ -5,6 +5,7 @@
 //! again: the leaf is brought to rest half way, then half way of the half in which it
 //! moves more. What is continuous moves less and less; what jumps goes on jumping.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
@@ -58,12 +59,17 @@ struct Pair {
 impl Map {
     /// Looks where the leaf jumps to another equilibrium from a cell to the next, by the
     /// default method: `jumps` has these then.
-    pub fn find_jumps(&mut self) {
-        self.jumps = Some(jumps(&self.request, &self.rows));
+    /// `progress` is told how many pairs of cells are looked at, and of how many.
+    pub fn find_jumps(&mut self, progress: &(dyn Fn(usize, usize) + Sync)) {
+        self.jumps = Some(jumps(&self.request, &self.rows, progress));
     }
 }
 
-fn jumps(request: &MapRequest, rows: &[MapRow]) -> Vec<MapJump> {
+fn jumps(
+    request: &MapRequest,
+    rows: &[MapRow],
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Vec<MapJump> {
     let method = MapMethod::default();
     let mut known: Vec<Option<&MapRow>> = vec![None; request.cells()];
     let at_rest = |row: &&MapRow| row.method == method && row.tip_x.is_some();
@@ -73,7 +79,12 @@ fn jumps(request: &MapRequest, rows: &[MapRow]) -> Vec<MapJump> {
     let pairs: Vec<Pair> = pairs(request)
         .filter(|pair| stands_out(request, &known, pair))
         .collect();
-    let found = pairs.par_iter().map(|pair| jump(request, pair));
+    let done = AtomicUsize::new(0);
+    let found = pairs.par_iter().map(|pair| {
+        let found = jump(request, pair);
+        progress(1 + done.fetch_add(1, Ordering::Relaxed), pairs.len());
+        found
+    });
     found.flatten().collect()
 }
 
