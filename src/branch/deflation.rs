@@ -109,20 +109,17 @@ impl Equations<'_> {
         let zero = times(forces, 0.0);
         let unit = |i: usize| (0..p).map(|k| if k == i { 1.0 } else { 0.0 }).collect();
         let units: Vec<Vec<f64>> = (0..p).map(unit).collect();
-        let mut of: Vec<(&Field, &[f64])> = Vec::with_capacity(p + 1 + rates.len());
-        of.extend(units.iter().map(|unit| (&zero, unit.as_slice())));
-        of.push((forces, &none));
-        of.extend(rates.iter().map(|rate| (*rate, none.as_slice())));
-        let mut columns = factor.solve_all(&of).map_err(|_| Stuck::TooLarge)?;
-        let rates = columns.split_off(p + 1);
-        let forces = columns.pop().ok_or(Stuck::NotConverged)?;
+        let columns = units.iter().map(|unit| factor.solve_bordered(&zero, unit));
+        let columns: Vec<Bordered> = columns.collect();
         Ok(Solved {
             h: DMatrix::from_fn(p, p, |r, c| {
                 0.5 * (columns[c].multipliers[r] + columns[r].multipliers[c])
             }),
             modes: columns.into_iter().map(|it| it.increments).collect(),
-            forces,
-            rates,
+            forces: factor.solve_bordered(forces, &none),
+            rates: (rates.iter())
+                .map(|rate| factor.solve_bordered(rate, &none))
+                .collect(),
             negative: factor.negative(),
         })
     }

@@ -227,29 +227,17 @@ impl SparseFactor<'_> {
 
     /// Solves in place, with unknowns numbered as by [`SparsePattern::unknowns`].
     pub fn solve_vector(&mut self, b: &mut [f64]) {
+        let mut x: Vec<f64> = self.forward.iter().map(|&k| b[k]).collect();
         let mut memory = std::mem::replace(&mut self.memory, MemBuffer::new(Default::default()));
-        self.solve_columns(b, &mut memory);
-        self.memory = memory;
-    }
-
-    /// The same for as many vectors as there are, one behind the other.
-    fn solve_columns(&self, all: &mut [f64], memory: &mut MemBuffer) {
-        let size = self.pattern.size;
-        let columns = all.chunks_exact(size);
-        let mut x: Vec<f64> = columns
-            .flat_map(|b| self.forward.iter().map(|&k| b[k]))
-            .collect();
-        let count = all.len() / size;
         self.parts().solve_in_place_no_numeric_permute_with_conj(
             Conj::No,
-            MatMut::from_column_major_slice_mut(&mut x, size, count),
+            MatMut::from_column_major_slice_mut(&mut x, b.len(), 1),
             Par::Seq,
-            MemStack::new(memory),
+            MemStack::new(&mut memory),
         );
-        for (b, x) in all.chunks_exact_mut(size).zip(x.chunks_exact(size)) {
-            for (b, &k) in b.iter_mut().zip(&self.inverse) {
-                *b = x[k];
-            }
+        self.memory = memory;
+        for (b, &k) in b.iter_mut().zip(&self.inverse) {
+            *b = x[k];
         }
     }
 
@@ -276,23 +264,6 @@ impl SparseFactor<'_> {
     /// Solves the bordered system for forces `rhs`, and `below` in the rows of
     /// the border.
     pub fn solve_bordered(&mut self, rhs: &Field, below: &[f64]) -> Bordered {
-        let mut b = self.column(rhs, below);
-        self.solve_vector(&mut b);
-        self.bordered(&b)
-    }
-
-    /// The same for several of both at once, which takes less time than one by one.
-    pub fn solve_all(&mut self, of: &[(&Field, &[f64])]) -> Result<Vec<Bordered>, SparseError> {
-        let columns = of.iter().flat_map(|(rhs, below)| self.column(rhs, below));
-        let mut all: Vec<f64> = columns.collect();
-        let scratch = (self.parts().symbolic()).solve_in_place_scratch::<f64>(of.len(), Par::Seq);
-        let mut memory = MemBuffer::try_new(scratch).map_err(|_| SparseError)?;
-        self.solve_columns(&mut all, &mut memory);
-        let columns = all.chunks_exact(self.pattern.size);
-        Ok(columns.map(|b| self.bordered(b)).collect())
-    }
-
-    fn column(&self, rhs: &Field, below: &[f64]) -> Vec<f64> {
         let unknowns = &self.pattern.unknowns;
         let mut b = vec![0.0; self.pattern.size];
         for (j, rod) in rhs.iter().enumerate() {
@@ -301,12 +272,9 @@ impl SparseFactor<'_> {
             }
         }
         b[self.pattern.border..].copy_from_slice(below);
-        b
-    }
-
-    fn bordered(&self, b: &[f64]) -> Bordered {
+        self.solve_vector(&mut b);
         Bordered {
-            increments: self.increments(b),
+            increments: self.increments(&b),
             multipliers: b[self.pattern.border..].to_vec(),
         }
     }
