@@ -1,6 +1,8 @@
 //! Gradient and Hessian of the midpoint element equal those of automatic
 //! differentiation, applied to the element's functional written out again.
 
+mod common;
+
 use glam::{DMat3, DQuat, DVec3};
 use leafdyn::internals::rod::{Ends, Section, Segment};
 use leafdyn::internals::rotation;
@@ -122,7 +124,7 @@ fn block(matrix: &mut SMatrix<f64, 12, 12>, row: usize, column: usize, k: DMat3,
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(common::random::cases(400))]
     #[test]
     fn element_matches_automatic_differentiation((section, ends, n) in state()) {
         let (value, gradient, hessian) = hessian(

@@ -1,6 +1,8 @@
 //! The table `[dynamics]`: what it may say, what holds where it says nothing,
 //! and every way to get it wrong.
 
+mod common;
+
 use leafdyn::scenario::{Dynamics, Profile, Scenario, ScenarioError, Schedule};
 use proptest::prelude::*;
 
@@ -305,7 +307,7 @@ fn positive_and_finite(dynamics: &Dynamics) -> bool {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(2000) })]
+    #![proptest_config(common::random::cases(2000))]
 
     /// In any units.
     #[test]

@@ -1,6 +1,8 @@
 //! Bad input: every refusal is one message that says where, what was found,
 //! and what to change.
 
+mod common;
+
 use std::fs;
 use std::path::Path;
 
@@ -464,7 +466,7 @@ fn debris() -> impl Strategy<Value = String> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(4000) })]
+    #![proptest_config(common::random::cases(4000))]
 
     #[test]
     fn no_mutation_of_a_file_panics(

@@ -238,7 +238,7 @@ fn a_round_column_leaves_its_saddle_in_pairs_of_ways() {
 }
 
 proptest! {
-    #![proptest_config(cases(24, None))]
+    #![proptest_config(cases(24))]
 
     #[test]
     fn random_leaves_have_as_many_negative_eigenvalues_as_their_index(

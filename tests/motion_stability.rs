@@ -55,7 +55,7 @@ fn total(e: &Energy) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(cases(40, Some(7)))]
+    #![proptest_config(cases(40))]
 
     #[test]
     fn of_random_leaves(

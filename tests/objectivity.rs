@@ -93,7 +93,7 @@ fn assert_mapped(
 }
 
 proptest! {
-    #![proptest_config(cases(48, Some(7)))]
+    #![proptest_config(cases(48))]
 
     #[test]
     fn turned_about_e3(leaf in leaves(), angle in -3.0..3.0_f64) {

@@ -34,7 +34,7 @@ fn in_plane(mut leaf: Scenario) -> Scenario {
 }
 
 proptest! {
-    #![proptest_config(cases(100, None))]
+    #![proptest_config(cases(100))]
 
     #[test]
     fn a_leaf_in_its_plane_is_the_leaf(leaf in leaves()) {

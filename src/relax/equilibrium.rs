@@ -4,6 +4,7 @@ use crate::newton::Work;
 use crate::numbers::power_of_ten;
 use crate::relax::margin::Margin;
 use crate::relax::method::Method;
+use crate::relax::saddle::Saddle;
 use crate::shape::{self, RodShape};
 use crate::undulation::Undulation;
 use glam::DVec3;
@@ -58,17 +59,6 @@ impl Outcome {
             Outcome::Converged | Outcome::ConvergedAfterSaddle | Outcome::Saddle
         )
     }
-}
-
-/// A saddle that was met before rest, and left.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Saddle {
-    /// Its energy.
-    pub energy: f64,
-    /// Its number of negative eigenvalues (Morse index).
-    pub negative_eigenvalues: usize,
-    /// Position of the joint tip, or of the first rod's.
-    pub tip: DVec3,
 }
 
 /// What was solved, and what it shows to be dispensable.

@@ -1,6 +1,6 @@
 //! How far a stable leaf is from losing its stability.
 
-use crate::relax::equilibrium::Saddle;
+use crate::relax::saddle::Saddle;
 use crate::scenario::Units;
 use crate::shape::serialize_tips;
 use glam::DVec3;

@@ -38,7 +38,7 @@ pub use crate::newton::Work;
 pub use crate::shape::{NodeState, RodShape};
 pub(crate) use equilibrium::serialize_index;
 pub use equilibrium::{
-    Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Saddle, Sensitivity, Shape, Stability,
+    Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Sensitivity, Shape, Stability,
 };
 pub(crate) use fall::fall;
 pub(crate) use follow::{AtRest, Grids, Lost, extrapolation};
@@ -54,6 +54,7 @@ pub use options::{
 pub(crate) use plausible::doubts;
 pub use request::Relaxation;
 pub(crate) use run::Level;
+pub use saddle::Saddle;
 pub(crate) use saddle::polish;
 pub(crate) use segments::check_segments;
 pub(crate) use sensitivity::{Linearized, Nearby, sensitivities, unit_forces};

@@ -3,10 +3,10 @@
 
 use crate::leaf::{DiscreteLeaf, Leaf, State, System, whole_of};
 use crate::newton::Work;
-use crate::relax::equilibrium::Saddle;
 use crate::relax::method::Method;
 use crate::relax::options::{Options, Progress};
 use crate::relax::richardson::Richardson;
+use crate::relax::saddle::Saddle;
 use glam::DVec3;
 
 /// Segments of the coarsest grid, in two panels or more if profiles have kinks.

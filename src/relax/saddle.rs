@@ -2,7 +2,8 @@
 
 use crate::leaf::{DiscreteLeaf, Solved, SparsePattern, State, System};
 use crate::newton::{Equations, Newton, Work};
-use crate::relax::equilibrium::Saddle;
+use glam::DVec3;
+use serde::Serialize;
 
 /// Size of the push off a saddle: largest rotation (radians) or displacement
 /// (lengths) along the unstable mode.
@@ -13,6 +14,17 @@ const MODE_ITERATIONS: usize = 6;
 
 /// Largest rotation or displacement in one of them.
 const MAX_STEP: f64 = 0.5;
+
+/// A saddle that was met before rest, and left.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Saddle {
+    /// Its energy.
+    pub energy: f64,
+    /// Its number of negative eigenvalues (Morse index).
+    pub negative_eigenvalues: usize,
+    /// Position of the joint tip, or of the first rod's.
+    pub tip: DVec3,
+}
 
 /// Morse index of a state at rest: the number of negative eigenvalues of the
 /// Hessian of its energy (the symmetric part of it, under a dead moment).

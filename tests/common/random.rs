@@ -17,11 +17,15 @@ pub fn splitmix64(state: &mut u64) -> f64 {
     ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// So many cases, without a file of those that failed; with a seed always the same.
-pub fn cases(cases: u32, seed: Option<u64>) -> ProptestConfig {
+/// So many cases, without a file of those that failed: always the same, or others with
+/// another SEED in the environment.
+pub fn cases(cases: u32) -> ProptestConfig {
     let mut config = ProptestConfig::with_cases(cases);
     config.failure_persistence = None;
-    config.rng_seed = seed.map_or(config.rng_seed, RngSeed::Fixed);
+    let seed = std::env::var("SEED")
+        .ok()
+        .and_then(|seed| seed.parse().ok());
+    config.rng_seed = RngSeed::Fixed(seed.unwrap_or(7));
     config
 }
 

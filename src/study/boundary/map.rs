@@ -3,39 +3,12 @@
 
 use rayon::prelude::*;
 
-use super::result::{Boundary, BoundaryCurve};
+use super::result::{Boundary, BoundaryCurve, BoundaryMap};
 use crate::study::Vary;
 use crate::study::trace::{PointKind, TraceBranch, TraceError, TraceRequest, trace};
 
 /// Most cells along a side.
 pub const MOST_CELLS: usize = 256;
-
-/// Cells of the plane of two numbers, of equal size where the axes are even.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct BoundaryMap {
-    /// Values of the first number in the middle of the cells.
-    pub first: Vec<f64>,
-    /// Those of the second.
-    pub second: Vec<f64>,
-    /// Morse index of the branch that begins at the start of the first number's range,
-    /// row by row of the second; none where that has turned back before, or could not be
-    /// followed.
-    pub index: Vec<Vec<Option<usize>>>,
-    /// Cells that the curves have another index for: numbers of both values, from 1.
-    pub disagreeing: Vec<[usize; 2]>,
-}
-
-impl BoundaryMap {
-    /// How many cells have an index.
-    pub fn known(&self) -> usize {
-        self.index.iter().flatten().flatten().count()
-    }
-
-    /// How many cells there are.
-    pub fn cells(&self) -> usize {
-        self.first.len() * self.second.len()
-    }
-}
 
 /// The middles of so many cells of a range.
 fn middles(vary: &Vary, cells: usize) -> Vec<f64> {

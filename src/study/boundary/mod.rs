@@ -4,8 +4,7 @@ mod map;
 mod result;
 mod run;
 
-pub use map::BoundaryMap;
-pub use result::{Boundary, BoundaryCurve, BoundaryPoint, CurveEnd};
+pub use result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, CurveEnd};
 pub use run::boundary;
 
 use super::trace::{TraceError, TraceRequest};

@@ -3,7 +3,6 @@
 use glam::DVec3;
 use serde::ser::{Serialize, Serializer};
 
-use super::map::BoundaryMap;
 use crate::branch::boundary::{Halt, Special};
 use crate::branch::{Doubt, Kind};
 use crate::scenario::Units;
@@ -92,6 +91,33 @@ pub struct BoundaryPoint {
     /// Centerlines on the finest grid, one per rod.
     #[serde(skip)]
     pub curves: Vec<Vec<DVec3>>,
+}
+
+/// Cells of the plane of two numbers, of equal size where the axes are even.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct BoundaryMap {
+    /// Values of the first number in the middle of the cells.
+    pub first: Vec<f64>,
+    /// Those of the second.
+    pub second: Vec<f64>,
+    /// Morse index of the branch that begins at the start of the first number's range,
+    /// row by row of the second; none where that has turned back before, or could not be
+    /// followed.
+    pub index: Vec<Vec<Option<usize>>>,
+    /// Cells that the curves have another index for: numbers of both values, from 1.
+    pub disagreeing: Vec<[usize; 2]>,
+}
+
+impl BoundaryMap {
+    /// How many cells have an index.
+    pub fn known(&self) -> usize {
+        self.index.iter().flatten().flatten().count()
+    }
+
+    /// How many cells there are.
+    pub fn cells(&self) -> usize {
+        self.first.len() * self.second.len()
+    }
 }
 
 /// How a curve ended.
