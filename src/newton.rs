@@ -13,6 +13,10 @@ pub const ROUNDING: f64 = 1e-9;
 /// Increments that do not shrink at least to this part are said not to shrink.
 const SHRINKS: f64 = 0.3;
 
+/// What the conjugate gradients may have left at most, in units of the accuracy: far
+/// more than they leave of most increments.
+const BOUND: f64 = 5.0;
+
 /// Increments below this (radians, lengths) may be nothing but rounding that
 /// drives a neutral mode, if no force or moment above the second number (A/L^2,
 /// A/L) is unbalanced.
@@ -76,13 +80,16 @@ pub enum Stop {
 }
 
 /// The error that is left after an increment of this `size`, which follows one of
-/// size `previous`: of second order at best, and never less than what the solution
-/// of its equations left. `None` if that is more than `accuracy`, unless the
-/// increment is below `rounding` and does not shrink.
+/// size `previous`: of second order at best, and never less than what the conjugate
+/// gradients left. Their accuracies, of the previous increment and of this one, are in
+/// the energy norm, in which soft modes hardly count; as this increment is not less
+/// than what they left of the previous one, it bounds by how much more they leave.
+/// `None` if the error is more than `accuracy` or that bound more than [`BOUND`] times
+/// as much, unless the increment is below `rounding` and does not shrink.
 pub fn converged(
     size: f64,
     previous: f64,
-    cg_tolerance: f64,
+    cg_tolerances: [f64; 2],
     (accuracy, rounding): (f64, f64),
 ) -> Option<f64> {
     let rate = (size / previous).min(1.0);
@@ -90,10 +97,12 @@ pub fn converged(
         true => size * (rate * rate),
         false => 10.0 * size * size,
     };
-    let remaining = quadratic.max(cg_tolerance * size);
+    let [before, now] = cg_tolerances;
+    let remaining = quadratic.max(now * size);
+    let bounded = rate * now * size <= BOUND * accuracy * before;
     match size < rounding && rate > SHRINKS {
         true => Some(size),
-        false => (remaining <= accuracy).then_some(remaining),
+        false => (remaining <= accuracy && bounded).then_some(remaining),
     }
 }
 
@@ -262,7 +271,7 @@ impl Newton<'_> {
             back: Field::new(),
         };
         let mut next = state.clone();
-        let mut previous = f64::INFINITY;
+        let (mut previous, mut previous_tolerance) = (f64::INFINITY, 0.0);
         for step in 0..self.iterations {
             let turn = leaf.assemble(state, system).turn;
             self.work.force_evaluations += 1;
@@ -287,17 +296,18 @@ impl Newton<'_> {
                 if at_saddle(leaf, state, size) {
                     return Err(Stop::Saddle);
                 }
-            } else if size < longest
-                && let Some(remaining) =
-                    converged(size, previous, tolerance, (self.accuracy, ROUNDING))
-            {
-                return Ok(remaining);
+            } else if size < longest {
+                let tolerances = [previous_tolerance, tolerance];
+                let remaining = converged(size, previous, tolerances, (self.accuracy, ROUNDING));
+                if let Some(remaining) = remaining {
+                    return Ok(remaining);
+                }
             }
             linear.shift /= 10.0;
             if linear.shift < LEAST_SHIFT {
                 linear.shift = 0.0;
             }
-            previous = size;
+            (previous, previous_tolerance) = (size, tolerance);
         }
         Err(match any_sign {
             true => Stop::StepLimit,

@@ -5,8 +5,8 @@
 mod common;
 
 use common::random::{cases, leaves};
-use common::{in_full, on, relaxed, rest, same, scale, scenario, set_stiffness};
-use leafdyn::relax::{Options, Outcome};
+use common::{on, relaxed, rest, same, scale, scenario, set_stiffness};
+use leafdyn::relax::Outcome;
 use leafdyn::scenario::{Profile, Scenario};
 use leafdyn::shape::Difference;
 use proptest::prelude::*;

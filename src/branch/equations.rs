@@ -386,5 +386,5 @@ pub fn reversed(t: Tangent) -> Tangent {
 
 /// Whether a Newton step of this size after one of size `previous` ends it.
 pub(super) fn at_rest(size: f64, previous: f64) -> bool {
-    converged(size, previous, 0.0, (ACCURACY, ROUNDED)).is_some()
+    converged(size, previous, [0.0; 2], (ACCURACY, ROUNDED)).is_some()
 }

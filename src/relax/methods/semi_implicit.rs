@@ -177,7 +177,7 @@ impl Relaxation<'_> {
             growth: MAX_GROWTH,
         };
         let mut resting = false;
-        let mut previous = f64::INFINITY;
+        let (mut previous, mut previous_tolerance) = (f64::INFINITY, 0.0);
         let space = self.solver.space.is_some().then(|| leaf.in_space());
         let mut sums = leaf.assemble(&self.state, system);
         self.work.force_evaluations += 1;
@@ -237,14 +237,15 @@ impl Relaxation<'_> {
                 }
             } else {
                 resting = false;
+                let tolerances = [previous_tolerance, tolerance];
                 if part == 1.0
                     && let Some(remaining) =
-                        converged(size, previous, tolerance, (accuracy, ROUNDING))
+                        converged(size, previous, tolerances, (accuracy, ROUNDING))
                 {
                     return Ok(remaining);
                 }
             }
-            previous = size;
+            (previous, previous_tolerance) = (size, tolerance);
         }
         Err(Stop::StepLimit)
     }
