@@ -114,9 +114,12 @@ pub fn at_saddle(leaf: &DiscreteLeaf, state: &State, size: f64) -> bool {
 
 /// Relative accuracy of the conjugate gradients after an increment of size
 /// `previous`: an iteration is cheap beside a new assembly, so that the next
-/// step is never held up by them.
-pub fn cg_tolerance(previous: f64, loosest: f64) -> f64 {
-    (3e-3 * previous).clamp(1e-10, loosest)
+/// step is never held up by them. Rods that are not coupled are solved directly.
+pub fn cg_tolerance(system: &System, previous: f64, loosest: f64) -> f64 {
+    match system.coupled() {
+        true => (3e-3 * previous).clamp(1e-10, loosest),
+        false => 0.0,
+    }
 }
 
 /// Solves with matrices that must be positive definite: by conjugate gradients
@@ -374,7 +377,7 @@ impl Linear<'_> {
                 cg_tolerance: loosest,
                 ..
             } => {
-                let tolerance = cg_tolerance(previous, *loosest);
+                let tolerance = cg_tolerance(system, previous, *loosest);
                 loop {
                     let shift = self.neutral + self.shift;
                     if solver.convex_in_space(space, state, shift, work)

@@ -334,7 +334,8 @@ impl Table {
                 false => 0.0,
             }),
             tips: tips.chunks(3).map(|tip| [tip[0], tip[1], tip[2]]).collect(),
-            error: self.tips.best().map_or(f64::INFINITY, |best| best.error),
+            // No tip is better than the precision of its numbers.
+            error: (self.tips.best()).map_or(f64::INFINITY, |best| best.error + f64::EPSILON),
             state: place.spot.state.clone(),
             stations: sheet.grid().sigma().to_vec(),
             kind: place.kind,

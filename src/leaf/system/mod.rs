@@ -144,6 +144,11 @@ impl System {
         self.rods
     }
 
+    /// Whether neighbours are coupled, so that conjugate gradients solve it.
+    pub fn coupled(&self) -> bool {
+        self.coupled
+    }
+
     /// Whether its nodes move in space, not only in a plane.
     pub fn spatial(&self) -> bool {
         matches!(self.groups[0].matrix, GroupMatrix::Spatial(_))

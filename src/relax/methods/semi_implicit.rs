@@ -188,7 +188,7 @@ impl Relaxation<'_> {
             }
             // A positive definite matrix and its solution, with as long a time
             // step as it takes.
-            let tolerance = cg_tolerance(previous, self.cg_tolerance);
+            let tolerance = cg_tolerance(system, previous, self.cg_tolerance);
             while !self.solve(leaf, space.as_ref(), system, pace.dt, &velocity, tolerance) {
                 if resting {
                     return Err(Stop::Saddle);
