@@ -83,7 +83,8 @@ pub enum Stop {
 /// size `previous`: of second order at best, and never less than what the conjugate
 /// gradients left. Their accuracies, of the previous increment and of this one, are in
 /// the energy norm, in which soft modes hardly count; as this increment is not less
-/// than what they left of the previous one, it bounds by how much more they leave.
+/// than what they left of the previous one, it bounds by how much more they leave
+/// (an infinite one: they are not used, as rods are not coupled).
 /// `None` if the error is more than `accuracy` or that bound more than [`BOUND`] times
 /// as much, unless the increment is below `rounding` and does not shrink.
 pub fn converged(
@@ -114,12 +115,9 @@ pub fn at_saddle(leaf: &DiscreteLeaf, state: &State, size: f64) -> bool {
 
 /// Relative accuracy of the conjugate gradients after an increment of size
 /// `previous`: an iteration is cheap beside a new assembly, so that the next
-/// step is never held up by them. Rods that are not coupled are solved directly.
-pub fn cg_tolerance(system: &System, previous: f64, loosest: f64) -> f64 {
-    match system.coupled() {
-        true => (3e-3 * previous).clamp(1e-10, loosest),
-        false => 0.0,
-    }
+/// step is never held up by them.
+pub fn cg_tolerance(previous: f64, loosest: f64) -> f64 {
+    (3e-3 * previous).clamp(1e-10, loosest)
 }
 
 /// Solves with matrices that must be positive definite: by conjugate gradients
@@ -274,7 +272,7 @@ impl Newton<'_> {
             back: Field::new(),
         };
         let mut next = state.clone();
-        let (mut previous, mut previous_tolerance) = (f64::INFINITY, 0.0);
+        let (mut previous, mut previous_tolerance) = (f64::INFINITY, f64::INFINITY);
         for step in 0..self.iterations {
             let turn = leaf.assemble(state, system).turn;
             self.work.force_evaluations += 1;
@@ -310,7 +308,10 @@ impl Newton<'_> {
             if linear.shift < LEAST_SHIFT {
                 linear.shift = 0.0;
             }
-            (previous, previous_tolerance) = (size, tolerance);
+            previous = size;
+            if system.coupled() {
+                previous_tolerance = tolerance;
+            }
         }
         Err(match any_sign {
             true => Stop::StepLimit,
@@ -377,7 +378,7 @@ impl Linear<'_> {
                 cg_tolerance: loosest,
                 ..
             } => {
-                let tolerance = cg_tolerance(system, previous, *loosest);
+                let tolerance = cg_tolerance(previous, *loosest);
                 loop {
                     let shift = self.neutral + self.shift;
                     if solver.convex_in_space(space, state, shift, work)

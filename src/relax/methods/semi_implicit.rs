@@ -177,7 +177,7 @@ impl Relaxation<'_> {
             growth: MAX_GROWTH,
         };
         let mut resting = false;
-        let (mut previous, mut previous_tolerance) = (f64::INFINITY, 0.0);
+        let (mut previous, mut previous_tolerance) = (f64::INFINITY, f64::INFINITY);
         let space = self.solver.space.is_some().then(|| leaf.in_space());
         let mut sums = leaf.assemble(&self.state, system);
         self.work.force_evaluations += 1;
@@ -188,7 +188,7 @@ impl Relaxation<'_> {
             }
             // A positive definite matrix and its solution, with as long a time
             // step as it takes.
-            let tolerance = cg_tolerance(system, previous, self.cg_tolerance);
+            let tolerance = cg_tolerance(previous, self.cg_tolerance);
             while !self.solve(leaf, space.as_ref(), system, pace.dt, &velocity, tolerance) {
                 if resting {
                     return Err(Stop::Saddle);
@@ -245,7 +245,10 @@ impl Relaxation<'_> {
                     return Ok(remaining);
                 }
             }
-            (previous, previous_tolerance) = (size, tolerance);
+            previous = size;
+            if system.coupled() {
+                previous_tolerance = tolerance;
+            }
         }
         Err(Stop::StepLimit)
     }
