@@ -164,8 +164,7 @@ impl Run<'_, '_> {
             let grid = Grid::through(&stations, family.first().kinks());
             let progress = &mut *self.progress;
             let mut tell = |points, place| progress(Some(number), points, plane.values(place));
-            let curve =
-                curves::follow(plane, &grid, &start.critical, start.second, &how, &mut tell);
+            let curve = curves::follow(plane, &grid, start.critical, start.second, &how, &mut tell);
             boundary
                 .curves
                 .push(in_units(&plane, boundary.joined, &curve));
