@@ -42,6 +42,70 @@ fn cells_are_stable_below_the_load_and_not_above() {
     contains(&page, &["\"curve 1\"", "load.tip_force[0]", "branch point"]);
 }
 
+/// Of a column that buckles in two planes only one load lies on the first trace: 2.467 for
+/// the bending that stays. That for the other, 2.467 times its bending, meets the map's
+/// lower rows alone, and becomes a curve as soon as one of them tells of it; once, and
+/// bit by bit the same on any number of threads.
+#[test]
+fn curves_that_do_not_pass_the_first_trace_begin_at_rows_of_the_map() {
+    let place = Workplace::new();
+    let column = "--set leaf.rods=1 --set leaf.fan=[0] --set load.gravity=[0,0,0] \
+        --set stiffness.bending_2=1.2 --set stiffness.bending_3=1.5 \
+        --set stiffness.axial=inf --set stiffness.shear_2=inf --set stiffness.shear_3=inf \
+        --vary load.tip_force[0]=0..-3.3 --vary stiffness.bending_3=1.5..0.5";
+    let curves = |threads: &str, more: &str| {
+        let run = place.run_on(
+            threads,
+            &format!("trace leaf.toml {column} --write json --json {more}"),
+        );
+        let mut found = run.ends(0).json();
+        found.as_object_mut().unwrap().remove("wall_seconds");
+        found
+    };
+    assert_eq!(curves("2", "")["curves"].as_array().unwrap().len(), 1);
+    let [one, two] = ["1", "2"].map(|threads| curves(threads, "--map 4x5"));
+    assert_eq!(one, two);
+    let [other, new] = &one["curves"].as_array().unwrap()[..] else {
+        panic!("{one:#}");
+    };
+    let euler = 0.25 * PI * PI;
+    for (curve, own) in [(other, false), (new, true)] {
+        let points = curve["points"].as_array().unwrap();
+        assert_eq!(curve["ends"], serde_json::json!(["reached", "reached"]));
+        for point in points {
+            let [load, bending] = [0, 1].map(|k| point["values"][k].as_f64().unwrap());
+            let error = [0, 1].map(|k| point["errors"][k].as_f64().unwrap());
+            let right = -euler * if own { bending } else { 1.2 };
+            let stated = error[0] + euler * error[1];
+            assert!((load - right).abs() <= stated + 1e-11, "{point}: {right}");
+            assert!(stated < 1e-6, "{point}");
+        }
+    }
+    assert_eq!(one["map"]["disagreeing"].as_array().unwrap().len(), 0);
+}
+
+/// The curve turns back between two weights and meets every row above twice: it is found
+/// from a first trace that does not meet it, once.
+#[test]
+fn a_curve_that_rows_meet_twice_is_followed_once() {
+    let place = Workplace::new();
+    let run = place.run(
+        "trace scenarios/classic/hanging_curved.toml --set rest.bend_3=5 --map 3x5 \
+        --vary load.gravity[0]=8..20 --vary rest.bend_3=5..6.4 --write json --json",
+    );
+    let found = run.ends(0).json();
+    let [curve] = &found["curves"].as_array().unwrap()[..] else {
+        panic!("{found:#}");
+    };
+    assert_eq!(curve["ends"], serde_json::json!(["reached", "reached"]));
+    let points = curve["points"].as_array().unwrap();
+    let rest = |k: usize| points[k]["values"][1].as_f64().unwrap();
+    let least = (0..points.len()).map(rest).fold(f64::INFINITY, f64::min);
+    println!("{least} of {} points", points.len());
+    assert!((5.5..5.6).contains(&least) && rest(points.len() - 1) == 6.4);
+    assert_eq!(found["map"]["disagreeing"].as_array().unwrap().len(), 0);
+}
+
 #[test]
 fn maps_that_cannot_be_are_refused() {
     all_refused(

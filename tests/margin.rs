@@ -229,6 +229,32 @@ fn the_barrier_vanishes_at_the_fold_with_the_power_three_halves() {
     assert!((exponent - 1.5).abs() < 0.03, "{exponent}");
 }
 
+/// An elastica of natural curvature 1/2 that a force across would push back, beyond the
+/// force from which on its other shape is the lower one: near the fold of the other one
+/// the pass to it is found.
+#[test]
+fn passes_next_to_a_fold_are_not_overstepped() {
+    let strip = format!("{RIGID}; stiffness.bending_2=50; stiffness.torsion=50; rest.bend_3=0.5");
+    let energies = [1.1, 1.2, 1.269, 1.34].map(|force| {
+        let column = rod(&format!("{strip}; load.tip_force=[-3, {:?}, 0]", -force));
+        let (leaf, margin) = found(&column, 1e-8);
+        assert!(leaf.tips[0].y < 0.0, "{force}");
+        let barrier = margin.barrier.unwrap_or_else(|| panic!("{force}"));
+        let (energy, error) = (barrier.energy, barrier.error.unwrap());
+        println!("{force}: {energy} within {error:.1e}");
+        assert!(error < 1e-6 * energy);
+        // By the theorem of Castigliano it changes with the way between both tips.
+        let way = barrier.saddle.tip.y - leaf.tips[0].y;
+        [force, energy, way]
+    });
+    for pair in energies.windows(2) {
+        let [[f, e, w], [g, h, v]] = [pair[0], pair[1]];
+        let trapezium = 0.5 * (g - f) * (w + v);
+        println!("{} {trapezium}", h - e);
+        assert!((h - e - trapezium).abs() < 0.01 * (h - e));
+    }
+}
+
 /// A soft leaf that may have several places to rest.
 fn soft(draw: &mut u64) -> Scenario {
     let mut between = |from: f64, to: f64| from + splitmix64(draw) * (to - from);

@@ -3,8 +3,8 @@
 //! Along a direction v the energy is made as large as it can be, across it as
 //! small: with the matrix bordered by the masses times v (as at a critical point),
 //! the solution for the border's unit is the direction X of the valley floor, and
-//! -H its curvature. Where that is positive the way goes on along X by a given
-//! length; where it is not, v becomes the mode of the lowest eigenvalue, and the steps
+//! -H its curvature. Where that is positive the way goes on along X, by a given length or
+//! to where the floor is highest by a cubic, as near a fold it is; where it is not, v becomes the mode of the lowest eigenvalue, and the steps
 //! Newton's (Crippen and Scheraga, Arch. Biochem. Biophys. 144, 1971; Henkelman and
 //! Jonsson, J. Chem. Phys. 111, 1999).
 
@@ -17,6 +17,9 @@ use crate::leaf::{Field, State};
 /// Steps of a climb, and the longest (radians, lengths).
 const STEPS: usize = 60;
 const LONGEST: f64 = 0.2;
+
+/// The first step, and the shortest by the cubic model, in the same measure.
+const FIRST: f64 = 0.01;
 
 /// Increments below this lead to the saddle by Newton's method.
 const NEAR: f64 = 1e-2;
@@ -52,6 +55,8 @@ impl Equations<'_> {
         stop: &dyn Fn() -> bool,
     ) -> Option<Point> {
         let (mut state, mut way) = (state.clone(), self.unit(way));
+        // Curvature of the floor before the last step along it, and that step.
+        let mut before: Option<(f64, f64)> = None;
         for _ in 0..STEPS {
             if stop() {
                 return None;
@@ -79,7 +84,16 @@ impl Equations<'_> {
             let (size, settled) = (largest(&increments), largest(across) < LONGEST);
             let mut step = times(&increments, (LONGEST / size).min(1.0));
             if !newton && settled {
-                add(&mut step, LONGEST / largest(along), along);
+                let [shortest, longest] = [FIRST, LONGEST].map(|by| by / largest(along));
+                let far = match before {
+                    None => shortest,
+                    Some((last, by)) => {
+                        let change = (curvature - last) / by;
+                        to_rim(force, curvature, change).clamp(shortest, longest)
+                    }
+                };
+                before = Some((curvature, far));
+                add(&mut step, far, along);
                 way = self.unit(along);
             }
             state = self.moved(&state, fraction, &step, 1.0).ok()?;
@@ -145,5 +159,16 @@ impl Equations<'_> {
     /// A direction of mass one.
     fn unit(&self, way: &Field) -> Field {
         times(way, 1.0 / self.product(way, way).sqrt())
+    }
+}
+
+/// How far the highest point of the floor is, where its slope is minus `force`, its
+/// curvature positive, and this changes so much with the way: as of a cubic, which the
+/// energy is near a fold. Infinite if there is none.
+fn to_rim(force: f64, curvature: f64, change: f64) -> f64 {
+    let square = curvature * curvature + 2.0 * change * force;
+    match change < 0.0 && square >= 0.0 {
+        true => -(curvature + square.sqrt()) / change,
+        false => f64::INFINITY,
     }
 }

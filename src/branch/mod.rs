@@ -43,6 +43,7 @@ pub use begin::begin;
 pub use critical::{Critical, Kind};
 pub use equations::{Equations, Stuck};
 pub use family::Family;
+pub(crate) use field::{between, largest};
 pub use follow::{Followed, Grids};
 pub(crate) use refine::on_finer;
 pub(crate) use refine_critical::NEARLY_RIGID;

@@ -11,9 +11,6 @@ use crate::relax::settle::InitialGuess;
 /// Accuracy to which it comes to rest.
 const TOLERANCE: f64 = 1e-6;
 
-/// Push off a saddle (radians, lengths).
-const PUSH: f64 = 0.01;
-
 /// Where a leaf comes to rest that sets out from a state on a grid, with no motion; none
 /// if it does not.
 pub fn settle_from(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -> Option<State> {
@@ -27,12 +24,18 @@ pub fn settle_from(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -> Opt
     settled.rest.ok().map(|_| settled.level.state)
 }
 
-/// Where a leaf comes to rest that leaves a saddle along its unstable mode, and against
-/// it.
-pub fn fall(leaf: &Leaf, grid: &Grid, saddle: &State, limit: &Limit) -> [Option<State>; 2] {
+/// Where a leaf comes to rest that leaves a saddle along its unstable mode, pushed so far
+/// (radians, lengths), and against it.
+pub fn fall(
+    leaf: &Leaf,
+    grid: &Grid,
+    saddle: &State,
+    push: f64,
+    limit: &Limit,
+) -> [Option<State>; 2] {
     let discrete = DiscreteLeaf::new(leaf, grid.clone());
     let mut system = System::new(&discrete);
-    [PUSH, -PUSH].map(|by| {
+    [push, -push].map(|by| {
         let mut state = saddle.clone();
         push_along(&discrete, &mut state, &mut system, &mut Work::default(), by);
         settle_from(leaf, grid, state, limit)

@@ -3,9 +3,11 @@
 
 use rayon::prelude::*;
 
+use super::known::criticals;
 use super::result::{Boundary, BoundaryCurve, BoundaryMap};
+use crate::branch::{Critical, Refined};
 use crate::study::Vary;
-use crate::study::trace::{PointKind, TraceBranch, TraceError, TraceRequest, trace};
+use crate::study::trace::{PointKind, TraceBranch, TraceError, TraceRequest};
 
 /// Most cells along a side.
 pub const MOST_CELLS: usize = 256;
@@ -21,33 +23,48 @@ fn middles(vary: &Vary, cells: usize) -> Vec<f64> {
     (0..cells).map(|k| value(part(k))).collect()
 }
 
-/// The map of so many cells along both numbers, compared with the curves that are known.
-pub fn map(
+/// A row of the map: a trace along the first number.
+pub struct Row {
+    /// The second number.
+    pub second: f64,
+    /// The index in the cells.
+    index: Vec<Option<usize>>,
+    /// Critical points that the trace met.
+    pub criticals: Vec<(Critical, Refined)>,
+}
+
+/// The rows of a map of so many cells along both numbers.
+pub fn rows(
     along: &TraceRequest,
     across: &Vary,
     cells: [usize; 2],
-    boundary: &Boundary,
-) -> Result<BoundaryMap, TraceError> {
+) -> Result<Vec<Row>, TraceError> {
     let first = middles(&along.vary, cells[0]);
-    let second = middles(across, cells[1]);
-    let row = |value: &f64| -> Result<Vec<Option<usize>>, TraceError> {
+    let row = |&second: &f64| -> Result<Row, TraceError> {
         let request = TraceRequest {
-            base: along.base.with(&across.keys, *value)?,
+            base: along.base.with(&across.keys, second)?,
             switch: false,
             ..along.clone()
         };
-        let found = trace(&request, &mut |_, _, _| {})?;
+        let (found, criticals) = criticals(&request, &mut |_, _| {})?;
         let branch = found.branches.first();
-        Ok(first
-            .iter()
-            .map(|value| branch.and_then(|branch| index_at(branch, *value)))
-            .collect())
+        let index = first.iter();
+        let index = index.map(|value| branch.and_then(|branch| index_at(branch, *value)));
+        Ok(Row {
+            second,
+            index: index.collect(),
+            criticals,
+        })
     };
-    let index: Result<Vec<_>, TraceError> = second.par_iter().map(row).collect();
+    middles(across, cells[1]).par_iter().map(row).collect()
+}
+
+/// The map of these rows, compared with the curves that are known.
+pub fn compared(vary: &Vary, rows: Vec<Row>, boundary: &Boundary) -> BoundaryMap {
     let mut map = BoundaryMap {
-        first,
-        second,
-        index: index?,
+        first: middles(vary, rows[0].index.len()),
+        second: rows.iter().map(|row| row.second).collect(),
+        index: rows.into_iter().map(|row| row.index).collect(),
         disagreeing: Vec::new(),
     };
     for (r, row) in map.index.iter().enumerate() {
@@ -56,7 +73,7 @@ pub fn map(
         let wrong = wrong.filter(|(_, (found, expected))| found != expected);
         map.disagreeing.extend(wrong.map(|(c, _)| [c + 1, r + 1]));
     }
-    Ok(map)
+    map
 }
 
 /// The index of a branch where it passes a value for the first time, before it turns.

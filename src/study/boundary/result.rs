@@ -23,7 +23,8 @@ pub struct Boundary {
     /// Whether their logarithms vary evenly.
     #[serde(skip)]
     pub log: [bool; 2],
-    /// The second number where curves begin: at the critical points along the first.
+    /// The second number at the first trace, at whose critical points curves begin; others
+    /// begin at those of the map's rows.
     pub start: f64,
     /// Names of the units, if the scenario gives any.
     #[serde(skip)]

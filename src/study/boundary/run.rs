@@ -4,26 +4,18 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::map::map;
+use super::known::{Known, Start, criticals};
+use super::map::{compared, rows};
 use super::result::{Boundary, BoundaryCurve, BoundaryPoint, CurveEnd, word};
 use super::{BoundaryRequest, MOST_CURVES};
-use crate::branch::boundary::{self as curves, Halt, Plane, Stride, Verified};
+use crate::branch::boundary::{self as curves, Plane, Stride, Verified};
 use crate::branch::{Critical, Family, Refined};
 use crate::leaf::Grid;
 use crate::scenario::Scenario;
-use crate::study::trace::{TraceError, TraceRequest, trace_seen};
+use crate::study::trace::{TraceError, TraceRequest};
 
 /// Longest step along a curve where few values are asked for.
 const LONGEST: f64 = 0.1;
-
-/// A critical point that lies on a curve: the same numbers and tips within these.
-const SAME: [f64; 2] = [1e-7, 1e-4];
-
-/// A critical point of a branch along the first number.
-struct Start {
-    critical: Critical,
-    refined: Refined,
-}
 
 /// The curves on which the index of a leaf changes in the plane of two numbers, through
 /// the critical points of a trace along the first. `progress` is told of each point: the
@@ -55,18 +47,9 @@ pub fn boundary(
         base: base.with(&across.keys, start)?,
         ..request.trace.clone()
     };
-    let mut starts: Vec<Start> = Vec::new();
-    let trace = trace_seen(
-        &along,
-        &mut |_, points, value| progress(None, points, [value, start]),
-        &mut |followed| {
-            let critical = followed.branch.critical.iter().zip(&followed.critical);
-            starts.extend(critical.map(|((_, critical), refined)| Start {
-                critical: critical.clone(),
-                refined: refined.clone(),
-            }));
-        },
-    )?;
+    let (trace, criticals) = criticals(&along, &mut |points, value| {
+        progress(None, points, [value, start]);
+    })?;
     let mut boundary = Boundary {
         scenario: trace.scenario,
         keys: [vary.keys.clone(), across.keys.clone()],
@@ -83,50 +66,26 @@ pub fn boundary(
         map: None,
         wall_seconds: 0.0,
     };
-    let first = |value: f64| make([value, start]);
-    let family = Family::new(&first, (ends[0][0], ends[0][1]), vary.log);
-    let family = family.map_err(|out| TraceError::Vary(format!("{}: {out}", vary.keys)))?;
-    let plane = Plane {
-        family: &family,
+    let mut run = Run {
+        request,
         make: &make,
-        range: ends[1],
-        log: across.log,
-    };
-    let how = Stride {
-        longest: (1.0 / (across.values.len() - 1) as f64).min(LONGEST),
-        most: request.trace.most_points,
         accuracy: trace.tolerance,
+        known: Vec::new(),
+        tried: 0,
+        progress,
     };
-    let second = plane.fraction(start);
-    let mut found: Vec<curves::Boundary> = Vec::new();
-    for it in &starts {
-        if found.iter().any(|curve| passes(curve, it, second)) {
-            continue;
+    run.follow_new(start, &criticals, &mut boundary)?;
+    if let Some(cells) = request.map {
+        let rows = rows(&request.trace, across, cells)?;
+        // One after the other, so that it is the same on any number of threads.
+        for row in &rows {
+            run.follow_new(row.second, &row.criticals, &mut boundary)?;
         }
-        let number = found.len();
-        if number == MOST_CURVES {
-            boundary.remark = Some(format!("there are more than {MOST_CURVES} curves"));
-            break;
-        }
-        let finest = it.refined.grid.sigma();
-        let stride = (finest.len() - 1) / it.critical.state.segments();
-        let stations: Vec<f64> = finest.iter().copied().step_by(stride).collect();
-        let grid = Grid::through(&stations, family.first().kinks());
-        let mut tell = |points, place| progress(Some(number), points, plane.values(place));
-        found.push(curves::follow(
-            plane,
-            &grid,
-            &it.critical,
-            second,
-            &how,
-            &mut tell,
-        ));
+        boundary.map = Some(compared(vary, rows, &boundary));
     }
-    let whole = found
-        .iter()
-        .flat_map(|curve| curve.ends)
-        .all(Halt::complete);
-    if found.is_empty() && boundary.remark.is_none() {
+    let curves = &boundary.curves;
+    let whole = (curves.iter().flat_map(|curve| curve.ends)).all(CurveEnd::complete);
+    if curves.is_empty() && boundary.remark.is_none() {
         let at = across.keys.text(start);
         let (vary, across) = (&vary.keys, &across.keys);
         let why = format!("along {vary} the index changes nowhere at {across} = {at}");
@@ -140,39 +99,96 @@ pub fn boundary(
                 .into(),
         );
     }
-    let units = |curve: &curves::Boundary| BoundaryCurve {
-        kind: curve.kind,
-        multiplicity: curve.neutral,
-        ends: curve.ends.map(CurveEnd),
-        points: (curve.points.iter().enumerate())
-            .map(|(k, point)| in_units(&plane, boundary.joined, k + 1, point))
-            .collect(),
-    };
-    boundary.curves = found.iter().map(units).collect();
-    if let Some(cells) = request.map {
-        boundary.map = Some(map(&request.trace, across, cells, &boundary)?);
-    }
     boundary.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(boundary)
 }
 
-/// Whether a curve passes through a critical point along the first number.
-fn passes(curve: &curves::Boundary, start: &Start, second: f64) -> bool {
-    let Start { critical, refined } = start;
-    curve.points.iter().any(|point| {
-        let off = (point.place[0] - refined.fraction).abs();
-        let within = SAME[0] + point.errors[0] + refined.fraction_error;
-        let mut tips = point.tips.iter().zip(&refined.tips);
-        let shift = |a: &[f64; 3], b: &[f64; 3]| DVec3::from(*a).distance(DVec3::from(*b));
-        (point.place[1] - second).abs() < SAME[0]
-            && point.kind == critical.kind
-            && off < within
-            && tips.all(|(a, b)| shift(a, b) < SAME[1])
-    })
+/// Following curves.
+struct Run<'r, 'p> {
+    request: &'r BoundaryRequest,
+    make: &'r (dyn Fn([f64; 2]) -> Result<Scenario, String> + Sync),
+    accuracy: f64,
+    known: Vec<Known>,
+    /// Critical points from which curves were followed.
+    tried: usize,
+    progress: &'p mut dyn FnMut(Option<usize>, usize, [f64; 2]),
+}
+
+impl Run<'_, '_> {
+    /// Follows the curves through critical points at a value of the second number that lie
+    /// on none that is known.
+    fn follow_new(
+        &mut self,
+        second: f64,
+        criticals: &[(Critical, Refined)],
+        boundary: &mut Boundary,
+    ) -> Result<(), TraceError> {
+        if criticals.is_empty() {
+            return Ok(());
+        }
+        let (vary, across) = (&self.request.trace.vary, &self.request.across);
+        let first = |value: f64| (self.make)([value, second]);
+        let [from, to] = boundary.ranges[0];
+        let family = Family::new(&first, (from, to), vary.log);
+        let family = family.map_err(|out| TraceError::Vary(format!("{}: {out}", vary.keys)))?;
+        let plane = Plane {
+            family: &family,
+            make: self.make,
+            range: boundary.ranges[1],
+            log: across.log,
+        };
+        let how = Stride {
+            longest: (1.0 / (across.values.len() - 1) as f64).min(LONGEST),
+            most: self.request.trace.most_points,
+            accuracy: self.accuracy,
+        };
+        for (critical, refined) in criticals {
+            let start = Start {
+                critical,
+                refined,
+                second: plane.fraction(second),
+                length: family.scale().length,
+            };
+            if self.known.iter().any(|known| start.is_on(known)) {
+                continue;
+            }
+            if self.tried == MOST_CURVES {
+                boundary.remark = Some(format!("there are more than {MOST_CURVES} curves"));
+                break;
+            }
+            self.tried += 1;
+            let number = boundary.curves.len();
+            let finest = start.refined.grid.sigma();
+            let stride = (finest.len() - 1) / start.critical.state.segments();
+            let stations: Vec<f64> = finest.iter().copied().step_by(stride).collect();
+            let grid = Grid::through(&stations, family.first().kinks());
+            let progress = &mut *self.progress;
+            let mut tell = |points, place| progress(Some(number), points, plane.values(place));
+            let curve = curves::follow(plane, &grid, start.critical, start.second, &how, &mut tell);
+            boundary
+                .curves
+                .push(in_units(&plane, boundary.joined, &curve));
+            let length = start.length;
+            self.known.push(Known { curve, length });
+        }
+        Ok(())
+    }
+}
+
+/// A curve in the scenario's units.
+fn in_units(plane: &Plane, joined: bool, curve: &curves::Boundary) -> BoundaryCurve {
+    BoundaryCurve {
+        kind: curve.kind,
+        multiplicity: curve.neutral,
+        ends: curve.ends.map(CurveEnd),
+        points: (curve.points.iter().enumerate())
+            .map(|(k, point)| point_in_units(plane, joined, k + 1, point))
+            .collect(),
+    }
 }
 
 /// A point in the scenario's units.
-fn in_units(plane: &Plane, joined: bool, number: usize, point: &Verified) -> BoundaryPoint {
+fn point_in_units(plane: &Plane, joined: bool, number: usize, point: &Verified) -> BoundaryPoint {
     let length = plane.family.scale().length;
     let values = plane.values(point.place);
     let beyond = plane.values([0, 1].map(|i| point.place[i] + point.errors[i]));

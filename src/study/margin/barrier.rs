@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{Entrance, Stable};
-use crate::branch::{Equations, Family, Point, on_finer};
+use crate::branch::{Equations, Family, Point, between, largest, on_finer};
 use crate::leaf::{Field, Grid, Leaf, State};
 use crate::relax::richardson::Richardson;
 use crate::relax::{Barrier, Neighbour, Saddle, fall};
@@ -22,6 +22,9 @@ const ENOUGH: f64 = 1e-7;
 /// the way to the pass.
 const SAME: f64 = 1e-3;
 const SAME_PART: f64 = 0.1;
+
+/// Furthest push off a pass (radians, lengths).
+const FURTHEST: f64 = 0.1;
 
 /// Passes whose heights differ by less than this part are tried once.
 const SAME_HEIGHT: f64 = 1e-6;
@@ -120,7 +123,9 @@ fn climb(stable: &Stable, family: &Family, entrance: &Entrance) -> Option<Pass> 
 fn behind(stable: &Stable, leaf: &Leaf, pass: &Pass) -> Option<State> {
     let way = pass.saddle.state.shift_to(&pass.leaf.state);
     let same = |state: &State| state.shift_to(&pass.leaf.state) < SAME.min(SAME_PART * way);
-    match fall(leaf, &pass.grid, &pass.saddle.state, stable.limit) {
+    // Half way, where by a cubic the valley of the leaf begins.
+    let push = (0.5 * largest(&between(&pass.saddle.state, &pass.leaf.state))).min(FURTHEST);
+    match fall(leaf, &pass.grid, &pass.saddle.state, push, stable.limit) {
         [Some(one), Some(other)] if same(&one) && !same(&other) => Some(other),
         [Some(one), Some(other)] if same(&other) && !same(&one) => Some(one),
         _ => None,
