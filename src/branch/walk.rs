@@ -2,6 +2,7 @@
 
 use super::critical::{Critical, Kind, locate};
 use super::equations::{Equations, Stuck, reversed};
+use super::family::OutOfRange;
 use super::field::{add, between, plus};
 use super::refine::on_finer;
 use super::refined::Doubt;
@@ -218,11 +219,14 @@ impl Branch {
     fn try_step(&mut self, equations: &mut Equations, how: &Walk) -> Result<(), Stuck> {
         let now = &self.points[self.points.len() - 1];
         let step = self.step;
-        let found = advance(equations, now, step).and_then(|found| {
-            match how.accepts(equations, now, &found, step) {
-                true => Ok(found),
-                false => Err(Stuck::NotConverged),
-            }
+        let found = match advance(equations, now, step) {
+            // Behind the end of the range there may be no leaf, and at it one.
+            Err(Stuck::OutOfRange(out)) => advance_to_edge(equations, now, step, out),
+            found => found,
+        };
+        let found = found.and_then(|found| match how.accepts(equations, now, &found, step) {
+            true => Ok(found),
+            false => Err(Stuck::NotConverged),
         });
         let mut next = match found {
             Ok(found) => found,
@@ -247,7 +251,13 @@ impl Branch {
         if next.point.index != now.index || turned {
             let after = self.points.len() - 1;
             let way = equations.along(&chord(now, &next.point), &now.tangent);
-            let found = locate(equations, now, &next.point, way).unwrap_or_default();
+            let found = locate(equations, now, &next.point, way);
+            // A branch that turns round with no eigenvalue changing its sign touches
+            // another where that one crosses: the vertex of a pitchfork.
+            let vertex = turned
+                && next.point.index == now.index
+                && found.as_ref().is_ok_and(|found| found.is_empty());
+            let found = found.unwrap_or_default();
             let changes: usize = found.iter().map(|critical| critical.modes.len()).sum();
             let folds = found.iter().filter(|critical| critical.kind == Kind::Fold);
             let explained = changes == next.point.index.abs_diff(now.index)
@@ -259,7 +269,9 @@ impl Branch {
                     self.step = 0.5 * next.step;
                     return Ok(());
                 }
-                self.missed.push(after);
+                if !vertex {
+                    self.missed.push(after);
+                }
             }
             let all = found.into_iter();
             self.critical.extend(all.map(|point| (after, point)));
@@ -342,19 +354,55 @@ fn arrive_at_edge(
     step: f64,
 ) -> Result<Option<End>, Stuck> {
     let (edge, end) = match next.point.fraction {
+        1.0 if now.fraction < 1.0 => return Ok(Some(End::Reached)),
+        0.0 if now.fraction > 0.0 => return Ok(Some(End::Returned)),
         fraction if fraction > 1.0 => (1.0, End::Reached),
         fraction if fraction < 0.0 => (0.0, End::Returned),
         _ => return Ok(None),
     };
     let part = (edge - now.fraction) / (next.point.fraction - now.fraction);
+    (next.point, _) = at_edge(equations, now, edge, part * step)?;
     next.step = part * step;
-    let increments = &now.tangent.increments;
-    let state = equations.moved(&now.state, now.fraction, increments, next.step)?;
-    (next.point, _) = equations.correct(&state, edge, None)?;
-    if equations.along(&next.point.tangent, &now.tangent) < 0.0 {
-        next.point.tangent = reversed(next.point.tangent.clone());
-    }
     Ok(Some(end))
+}
+
+/// A step that ends where the range does, if one of this length would leave it.
+fn advance_to_edge(
+    equations: &mut Equations,
+    now: &Point,
+    step: f64,
+    out: OutOfRange,
+) -> Result<Found, Stuck> {
+    let edge = if now.tangent.fraction > 0.0 { 1.0 } else { 0.0 };
+    let way = (edge - now.fraction) / now.tangent.fraction;
+    if way <= 0.0 || way > step {
+        return Err(out.into());
+    }
+    let (point, iterations) = at_edge(equations, now, edge, way)?;
+    let part = way / step;
+    let state = equations.moved(&now.state, now.fraction, &now.tangent.increments, way)?;
+    Ok(Found {
+        drift: state.shift_to(&point.state) / part,
+        point,
+        iterations,
+        step: way,
+    })
+}
+
+/// The point at an end of the range, about so far along the tangent.
+fn at_edge(
+    equations: &mut Equations,
+    now: &Point,
+    edge: f64,
+    way: f64,
+) -> Result<(Point, usize), Stuck> {
+    let increments = &now.tangent.increments;
+    let state = equations.moved(&now.state, now.fraction, increments, way)?;
+    let (mut point, iterations) = equations.correct(&state, edge, None)?;
+    if equations.along(&point.tangent, &now.tangent) < 0.0 {
+        point.tangent = reversed(point.tangent);
+    }
+    Ok((point, iterations))
 }
 
 /// The point of the branch of `near` that is the branch's first again: in value,
