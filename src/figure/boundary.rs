@@ -2,11 +2,13 @@
 //! sides, and the leaf at some of their points.
 
 use glam::{DVec2, DVec3};
+use std::collections::BTreeSet;
 
 use super::axes::Axes;
 use super::axis::Axis;
 use super::drawing::{Anchor, CURVES, Drawing, INK, NOTE, Stroke};
-use super::map::{fill_index, name};
+use super::labels::Labels;
+use super::map::{DARKEST_INDEX, fill_index, name};
 use super::markers::Marker;
 use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, new_page, title};
 use super::setting::Setting;
@@ -116,6 +118,8 @@ fn draw_curves(
     }
     axes.draw(page);
     let at = |point: &BoundaryPoint| (point.values[0], point.values[1]);
+    let mut labels = Labels::within(cell);
+    let mut indices: Vec<Sides> = Vec::new();
     for (c, curve) in boundary.curves.iter().enumerate() {
         let color = CURVES[c % CURVES.len()];
         let line: Vec<(f64, f64)> = curve.points.iter().map(at).collect();
@@ -123,7 +127,11 @@ fn draw_curves(
         let solid = curve.points.iter().any(stable);
         let width = if solid { 2.0 } else { 1.2 };
         axes.curve(page, &line, Stroke::new(color, width).dashed(!solid));
-        label(page, &axes, boundary, curve);
+        labels.avoid(&axes, &line);
+        label(page, &axes, boundary, curve, &mut indices);
+    }
+    for sides in &indices {
+        sides.draw(page);
     }
     for (kind, marker) in [("cusp", Marker::Diamond), ("crossing", Marker::Ring)] {
         let special = points().filter(|point| point.kind == kind);
@@ -131,16 +139,10 @@ fn draw_curves(
     }
     for (index, (_, point)) in shown.iter().enumerate() {
         if let Some(place) = axes.at(at(point)) {
-            let beside = place + DVec2::new(6.0, -6.0);
-            page.label(
-                beside,
-                &(index + 1).to_string(),
-                TICK_SIZE,
-                Anchor::Start,
-                INK,
-            );
+            labels.add(place, &(index + 1).to_string());
         }
     }
+    labels.draw(page);
     draw_key(page, boundary, cell);
 }
 
@@ -177,9 +179,34 @@ fn draw_cells(page: &mut Drawing, axes: &Axes, boundary: &Boundary, map: &Bounda
     }
 }
 
-/// The index on both sides of a curve, in its middle: of a fold, where there are
-/// equilibria, of both that meet.
-fn label(page: &mut Drawing, axes: &Axes, boundary: &Boundary, curve: &BoundaryCurve) {
+/// The index on both sides of a curve, or of several that lie close together.
+struct Sides {
+    left: (DVec2, usize),
+    right: (DVec2, usize),
+}
+
+impl Sides {
+    fn draw(&self, page: &mut Drawing) {
+        let level = DVec2::new(BESIDE, 0.35 * TICK_SIZE);
+        for ((place, index), way, anchor) in [
+            (self.left, DVec2::new(-1.0, 1.0), Anchor::End),
+            (self.right, DVec2::ONE, Anchor::Start),
+        ] {
+            let text = format!("index {index}");
+            page.label(place + level * way, &text, TICK_SIZE, anchor, NOTE);
+        }
+    }
+}
+
+/// The index on both sides of a curve, in its middle, unless it lies close to one before:
+/// then what is outside both. Of a fold, where there are equilibria, of both that meet.
+fn label(
+    page: &mut Drawing,
+    axes: &Axes,
+    boundary: &Boundary,
+    curve: &BoundaryCurve,
+    indices: &mut Vec<Sides>,
+) {
     let middle = curve.points.len() / 2;
     let Some(point) = curve.points.get(middle) else {
         return;
@@ -206,22 +233,18 @@ fn label(page: &mut Drawing, axes: &Axes, boundary: &Boundary, curve: &BoundaryC
     } else {
         (behind, before)
     };
-    let level = DVec2::new(BESIDE, 0.35 * TICK_SIZE);
-    let left_end = place + level * DVec2::new(-1.0, 1.0);
-    page.label(
-        left_end,
-        &format!("index {left}"),
-        TICK_SIZE,
-        Anchor::End,
-        NOTE,
-    );
-    page.label(
-        place + level,
-        &format!("index {right}"),
-        TICK_SIZE,
-        Anchor::Start,
-        NOTE,
-    );
+    let close = |sides: &&mut Sides| {
+        sides.left.0.distance(place) < TICK_SIZE || sides.right.0.distance(place) < TICK_SIZE
+    };
+    match indices.iter_mut().find(close) {
+        Some(sides) if place.x < sides.left.0.x => sides.left = (place, left),
+        Some(sides) if place.x > sides.right.0.x => sides.right = (place, right),
+        Some(_) => {}
+        None => indices.push(Sides {
+            left: (place, left),
+            right: (place, right),
+        }),
+    }
 }
 
 /// An axis over the whole range, logarithmic if the number's logarithm varies evenly;
@@ -252,12 +275,12 @@ fn draw_key(page: &mut Drawing, boundary: &Boundary, cell: Cell) {
         key.entry(page, "", &more, |_, _| ());
     }
     if let Some(map) = &boundary.map {
-        let mut indices: Vec<usize> = map.index.iter().flatten().flatten().copied().collect();
-        indices.sort_unstable();
-        indices.dedup();
-        for index in indices.into_iter().take(MOST_NAMED) {
+        let found = map.index.iter().flatten().flatten();
+        let indices: BTreeSet<usize> = found.map(|index| *index.min(&DARKEST_INDEX)).collect();
+        for index in indices {
             let name = match index {
                 0 => "stable".into(),
+                DARKEST_INDEX => format!("index {index} or more"),
                 index => format!("index {index}"),
             };
             key.entry(page, "", &name, |page, cell| fill_index(page, cell, index));

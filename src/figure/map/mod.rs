@@ -13,8 +13,8 @@ use super::page::{
 };
 use crate::report::words::map_shows;
 use crate::study::{Confidence, Knob, Map, MapMethod, MapOutcome, MapRow, MapShow};
+pub use panel::{DARKEST_INDEX, fill_index, name};
 use panel::{Panel, Tile, Varied};
-pub use panel::{fill_index, name};
 
 const SWATCH: f64 = 12.0;
 /// Below each panel, for ticks and, below the last, the name of the axis.

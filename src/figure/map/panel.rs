@@ -63,6 +63,9 @@ pub fn fill_waves(page: &mut Drawing, cell: Cell, waves: f64) {
     page.shape(rectangle(cell.corner, cell.size), color, None);
 }
 
+/// From this index on all have one colour.
+pub const DARKEST_INDEX: usize = 4;
+
 /// Fills a cell lightly by the index of its equilibrium: the more, the darker.
 pub fn fill_index(page: &mut Drawing, cell: Cell, index: usize) {
     let color = match index {

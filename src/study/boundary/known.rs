@@ -47,6 +47,10 @@ const SAME: f64 = 1e-6;
 /// Improvements of the nearest point.
 const ITERATIONS: usize = 20;
 
+/// Points of a curve closer than this are one for the polynomials: their errors over
+/// their distance would be slopes.
+const APART: f64 = 1e-3;
+
 /// A point may lie before an interval of a curve or behind it, by this part of it.
 const BEYOND: f64 = 0.05;
 
@@ -62,14 +66,20 @@ impl Start<'_> {
     /// more modes become neutral than those of the curve, others cross it.
     pub fn is_on(&self, known: &Known) -> bool {
         let Known { curve, length } = known;
-        let points = &curve.points;
         let modes = self.critical.modes.len();
         let crossed = modes > curve.neutral;
         if modes < curve.neutral || !crossed && curve.kind != self.critical.kind {
             return false;
         }
         let scale = length / self.length;
-        let places: Vec<Vec<f64>> = points.iter().map(|it| place(it, scale)).collect();
+        let (mut points, mut places) = (Vec::new(), Vec::<Vec<f64>>::new());
+        for point in &curve.points {
+            let place = place(point, scale);
+            if (places.last()).is_none_or(|last| distance(last, &place) > APART) {
+                points.push(point);
+                places.push(place);
+            }
+        }
         let target = self.place();
         let sides = sorted(self.critical.indices);
         let own = self.refined.fraction_error + self.refined.error;

@@ -131,6 +131,10 @@ fn expected(
     expected
 }
 
+/// Points closer than this part of both ranges are one: polynomials through both would
+/// make slopes of their errors.
+const APART: f64 = 1e-4;
+
 /// Where a curve passes a value of the second number: the first number, whether it is a
 /// fold, and the indices on both sides.
 fn crossings(
@@ -146,9 +150,19 @@ fn crossings(
         true => boundary.ranges[0][0] * value.exp(),
         false => value,
     };
-    let points: Vec<[f64; 2]> = (curve.points.iter())
-        .map(|point| [0, 1].map(|i| scaled(i, point.values[i])))
-        .collect();
+    let spans = [0, 1].map(|i| {
+        let [from, to] = boundary.ranges[i];
+        (scaled(i, to) - scaled(i, from)).abs()
+    });
+    let (mut kept, mut points) = (Vec::new(), Vec::<[f64; 2]>::new());
+    for point in &curve.points {
+        let place = [0, 1].map(|i| scaled(i, point.values[i]));
+        let far = |i: usize, last: &[f64; 2]| (place[i] - last[i]).abs() > APART * spans[i];
+        if (points.last()).is_none_or(|last| far(0, last) || far(1, last)) {
+            kept.push(point);
+            points.push(place);
+        }
+    }
     let at = scaled(1, second);
     let mut crossings = Vec::new();
     for k in 1..points.len() {
@@ -163,7 +177,12 @@ fn crossings(
             true => &points[few],
             false => &points[k - 1..=k],
         };
-        let point = &curve.points[k];
+        // Where curves cross, other modes count as well.
+        let point = if kept[k].kind == "crossing" {
+            kept[k - 1]
+        } else {
+            kept[k]
+        };
         let fold = matches!(point.kind, "fold" | "cusp") && curve.multiplicity == 1;
         let sides = [point.index_before, point.index_behind];
         crossings.push((unscaled(through(near, at)), fold, sides));
