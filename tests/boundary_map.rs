@@ -106,6 +106,19 @@ fn a_curve_that_rows_meet_twice_is_followed_once() {
     assert_eq!(found["map"]["disagreeing"].as_array().unwrap().len(), 0);
 }
 
+/// Both loads of a column meet where its bendings are the same, at the end of a range:
+/// a crossing and an end nearly coincide there. Rows beside them know the curves.
+#[test]
+fn curves_that_cross_at_the_end_of_a_range_are_followed_once() {
+    let run = Workplace::new().run(
+        "trace scenarios/classic/elastica_buckled.toml --set stiffness.bending_2=0.55 --map 2x8 \
+        --vary load.tip_force[0]=-1..-30 --vary stiffness.bending_3=0.5..0.55 --write none --json",
+    );
+    let found = run.ends(0).json();
+    assert_eq!(found["curves"].as_array().unwrap().len(), 4);
+    assert_eq!(found["map"]["disagreeing"].as_array().unwrap().len(), 0);
+}
+
 #[test]
 fn maps_that_cannot_be_are_refused() {
     all_refused(
