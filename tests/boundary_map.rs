@@ -101,7 +101,6 @@ fn a_curve_that_rows_meet_twice_is_followed_once() {
     let points = curve["points"].as_array().unwrap();
     let rest = |k: usize| points[k]["values"][1].as_f64().unwrap();
     let least = (0..points.len()).map(rest).fold(f64::INFINITY, f64::min);
-    println!("{least} of {} points", points.len());
     assert!((5.5..5.6).contains(&least) && rest(points.len() - 1) == 6.4);
     assert_eq!(found["map"]["disagreeing"].as_array().unwrap().len(), 0);
 }
