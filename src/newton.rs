@@ -29,6 +29,9 @@ const BALANCED: f64 = 1e-9;
 const SADDLE_STEP: f64 = 1e-7;
 const SADDLE_RESIDUAL: f64 = 1e-6;
 
+/// By how much a nearly rigid rod may be too long or too short by rounding.
+const CLOSED: f64 = 1e-11;
+
 /// Shift of the matrix (times the mass matrix, in squared frequencies; the
 /// lowest of a clamped rod is 12) that carries Newton's method of a stiff leaf
 /// over a region where its energy is not convex: the first tried, the one below
@@ -105,6 +108,11 @@ pub fn converged(
         true => Some(size),
         false => (remaining <= accuracy && bounded).then_some(remaining),
     }
+}
+
+/// Whether nearly rigid segments of a leaf whose nodes move no more have their lengths.
+pub fn closes(leaf: &DiscreteLeaf, state: &State, accuracy: f64) -> bool {
+    leaf.closes(state, accuracy.max(CLOSED))
 }
 
 /// Whether a leaf whose matrix without inertia is not positive definite rests at
@@ -300,7 +308,9 @@ impl Newton<'_> {
             } else if size < longest {
                 let tolerances = [previous_tolerance, tolerance];
                 let remaining = converged(size, previous, tolerances, (self.accuracy, ROUNDING));
-                if let Some(remaining) = remaining {
+                if let Some(remaining) = remaining
+                    && closes(leaf, state, self.accuracy)
+                {
                     return Ok(remaining);
                 }
             }

@@ -146,6 +146,70 @@ fn a_ring_closes_on_itself() {
     assert!(reaction.force.length() < 1e-6);
 }
 
+/// A rod that neither stretches nor shears, and bends easily in the plane alone.
+const STRIP: &str = "stiffness.axial=inf; stiffness.shear_2=inf; stiffness.shear_3=inf; \
+     stiffness.torsion=10.0; stiffness.bending_2=10.0";
+
+/// Between clamps such a rod is four times that of a quarter of its length with a free
+/// end, as bent: P/P_cr and x/L of the elastica at end slopes of 20 and 60 degrees (closed
+/// form, elliptic integrals). Pushed straight it has no way to go but sideways.
+#[test]
+fn a_rod_pushed_together_between_clamps_is_the_elastica() {
+    for (load, place) in [
+        (1.0153968655397, 0.96973090736352),
+        (1.1517196204691, 0.74101960607633),
+    ] {
+        let leaf = settle(
+            &held_rod("clamped", &format!("{STRIP}; tip.position=[{place}, 0, 0]")),
+            1e-9,
+        );
+        let force = leaf.reaction.unwrap().force;
+        let euler = 4.0 * PI * PI;
+        close("force", force.x, load * euler, 1e-8 * euler);
+        assert!(force.with_x(0.0).length() < 1e-7, "{force}");
+    }
+}
+
+/// A rod between pins that meet leaves them at 130.7 degrees to the force that holds them
+/// together, without a moment (closed form: 2 E = K, k^2 = 0.8261147659849703).
+#[test]
+fn pinned_ends_meet() {
+    let angle = 130.7099107079_f64.to_radians();
+    let rod = format!("{STRIP}; leaf.fan=[{angle}]; tip.position=[0, 0, 0]");
+    let leaf = settle(&held_rod("pinned", &rod), 1e-9);
+    let force = leaf.reaction.as_ref().unwrap().force;
+    assert!(
+        (force - DVec3::X * 21.54908744351816).length() < 1e-7,
+        "{force}"
+    );
+    let base = leaf.shape.rods[0].nodes[0].m;
+    assert!(base.length() < 1e-7, "{base}");
+}
+
+/// However little such a rod is shortened it buckles, and never rests straight, too long
+/// for its place: its energy is what Euler's load does on the way there, and a little more
+/// as the load rises.
+#[test]
+fn rods_that_do_not_stretch_keep_their_length() {
+    for (how, euler) in [
+        ("clamped", 39.47841760435743),
+        ("pinned", 20.19072855642663),
+    ] {
+        for short in [1e-6, 1e-4, 1e-2, 0.1] {
+            let place = format!("{STRIP}; tip.position=[{}, 0, 0]", 1.0 - short);
+            let leaf = settle(&held_rod(how, &place), 1e-9);
+            let ratio = leaf.energy.unwrap() / (euler * short);
+            let rounded = 1e-6;
+            assert!(ratio > 1.0 - rounded, "{how}, {short}: {ratio}");
+            assert!(ratio < 1.0 + short + rounded, "{how}, {short}: {ratio}");
+        }
+        for place in [0.5, 0.3, 0.1, -0.3] {
+            let place = format!("{STRIP}; tip.position=[{place}, 0, 0]");
+            settle(&held_rod(how, &place), 1e-6);
+        }
+    }
+}
+
 /// Random leaves whose joint tip is held somewhere around where it would rest.
 fn held_leaves(count: usize) -> Vec<Scenario> {
     let mut drawn = drawn(leaves(), 2 * count);

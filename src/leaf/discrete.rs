@@ -101,6 +101,27 @@ impl DiscreteLeaf {
         }
     }
 
+    /// Whether the ends of nearly rigid segments are as far apart as their lengths say, to
+    /// `within` along a rod. Their forces are found by proximal steps: where no shape
+    /// nearby has their lengths these grow from step to step while no node moves.
+    pub fn closes(&self, state: &State, within: f64) -> bool {
+        let n = self.segments();
+        let open = |j: usize| -> f64 {
+            let gap = |i: usize| {
+                let section = self.section(j, i);
+                let nearly_rigid =
+                    (section.compliance * section.condensing).cmplt(DVec3::splat(0.5));
+                if !nearly_rigid.any() {
+                    return 0.0;
+                }
+                let gap = self.segment(state, j, i, state.n[j * n + i]).gap;
+                DVec3::select(nearly_rigid, gap, DVec3::ZERO).length()
+            };
+            (0..n).map(gap).sum()
+        };
+        (0..self.rods()).all(|j| open(j) <= within)
+    }
+
     /// A shift of the matrix (times the mass matrix) that is far below the
     /// squared frequency of any bending mode, and above what rounding and
     /// unfinished iterations make of a neutral mode's zero.

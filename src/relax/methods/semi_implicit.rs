@@ -15,7 +15,7 @@
 use crate::leaf::{DiscreteLeaf, Increment, State, System};
 use crate::limit::Limit;
 use crate::newton::{
-    Definite, Equations, Newton, ROUNDING, Stop, Work, at_saddle, cg_tolerance, converged,
+    Definite, Equations, Newton, ROUNDING, Stop, Work, at_saddle, cg_tolerance, closes, converged,
 };
 use crate::rod::RESOLVED_TURN;
 
@@ -117,7 +117,12 @@ impl Relaxation<'_> {
         loop {
             if soften {
                 let moved = std::mem::take(&mut self.moved);
-                let rest = self.move_to_rest(&leaf.softened(floor), system, SOFT_ACCURACY);
+                let soft = leaf.softened(floor);
+                if self.pushes > 0 {
+                    // The forces of the saddle are those of a stiffer leaf.
+                    soft.strain_forces(&mut self.state);
+                }
+                let rest = self.move_to_rest(&soft, system, SOFT_ACCURACY);
                 self.moved_softened |= self.moved;
                 self.moved |= moved;
                 rest?;
@@ -241,6 +246,7 @@ impl Relaxation<'_> {
                 if part == 1.0
                     && let Some(remaining) =
                         converged(size, previous, tolerances, (accuracy, ROUNDING))
+                    && closes(leaf, &self.state, accuracy)
                 {
                     return Ok(remaining);
                 }
