@@ -170,6 +170,43 @@ fn a_rod_pushed_together_between_clamps_is_the_elastica() {
     }
 }
 
+/// The grip of a testing machine travels, along and across, and turns: the branch is
+/// followed in few steps, as the prediction takes the motion of the grip along, and its
+/// points are those of relaxations there.
+#[test]
+fn the_travel_of_a_grip_is_followed() {
+    let arch = "stiffness.bending_2=10.0; stiffness.torsion=10.0; stiffness.axial=1e4; \
+         leaf.fan=[0.3]; tip.position=[0.9, 0, 0]; tip.angles=-0.3; load.gravity=[0, -1, 0]";
+    for travel in [
+        "tip.position[0]=0.9..0.3",
+        "tip.position[1]=0..0.3",
+        "tip.angles=-0.3..-1",
+        "leaf.fan[0]=0.3..1",
+    ] {
+        let found = follow(&held("clamped"), arch, travel, false);
+        let [branch] = &found.branches[..] else {
+            panic!("{travel}: {} branches", found.branches.len());
+        };
+        assert!(found.complete, "{travel}: {:?}", branch.end);
+        let followed = found.factorizations;
+        assert!(followed < 100, "{travel}: {followed}");
+        assert!(branch.points.len() > 5, "{travel}");
+        let key = travel.split('=').next().unwrap();
+        for point in &branch.points {
+            let there = format!("{arch}; {key}={:?}", point.value);
+            let leaf = settle(&held_rod("clamped", &there), 1e-10);
+            let error = point.error.unwrap();
+            assert!(error > 0.0 && error < 1e-8, "{error:e}");
+            // If its middle is off by the error, forces of some hundred bear it.
+            let off = (point.energy - leaf.energy.unwrap()).abs();
+            assert!(off < 1e3 * error, "{travel}, {}: {off:e}", point.value);
+            let force = leaf.reaction.unwrap().force;
+            let off = point.reaction.unwrap().distance(force);
+            assert!(off < 1e3 * error, "{travel}, {}: {off:e}", point.value);
+        }
+    }
+}
+
 /// A rod between pins that meet leaves them at 130.7 degrees to the force that holds them
 /// together, without a moment (closed form: 2 E = K, k^2 = 0.8261147659849703).
 #[test]

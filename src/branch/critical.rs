@@ -129,8 +129,8 @@ impl Search<'_, '_> {
     fn at(&mut self, distance: f64) -> Result<Sample, Stuck> {
         let t = &self.from.tangent;
         let (state, fraction) = (&self.from.state, self.from.fraction);
-        let moved = (self.equations).moved(state, fraction, &t.increments, distance)?;
         let fraction = fraction + distance * t.fraction;
+        let moved = (self.equations).moved(state, fraction, &t.increments, distance)?;
         let deflated = (self.equations).deflated(&moved, fraction, t, self.held)?;
         let eigen = deflated.h.clone().symmetric_eigen();
         let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();

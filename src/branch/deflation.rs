@@ -69,8 +69,8 @@ impl Equations<'_> {
             if !is_finite(&increments) || size > LARGEST {
                 return Err(Stuck::NotConverged);
             }
-            state = self.moved(&state, fraction, &increments, 1.0)?;
             fraction += changes[0];
+            state = self.moved(&state, fraction, &increments, 1.0)?;
             finished = at_rest(size, previous);
             previous = size;
         }

@@ -1,7 +1,7 @@
 //! The equations of a branch on one grid, linearised and solved.
 
 use super::family::{Family, Leaves, OutOfRange, clamp};
-use super::field::{between, dot, is_finite, largest, plus, times};
+use super::field::{add, between, dot, is_finite, largest, plus, times};
 use super::{Point, Tangent};
 use crate::leaf::{DiscreteLeaf, Field, Grid, Solved, SparseFactor, SparsePattern, State, System};
 use crate::newton::converged;
@@ -160,7 +160,7 @@ impl<'a> Equations<'a> {
         }
     }
 
-    /// The state that lies `step` further along a direction.
+    /// The state that lies `step` further along a direction, at the fraction there.
     pub fn moved(
         &mut self,
         state: &State,
@@ -168,11 +168,22 @@ impl<'a> Equations<'a> {
         increments: &Field,
         step: f64,
     ) -> Result<State, OutOfRange> {
-        self.system.set_solution(increments);
         let leaf = self.leaves.at(fraction)?;
-        let mut next = state.clone();
-        leaf.advance(state, &self.system, step, &mut next);
-        Ok(next)
+        Ok(advanced(leaf, state, &mut self.system, increments, step))
+    }
+
+    /// How nodes that the leaf holds away from its bases move with the parameter, which
+    /// no forces say; none if it holds none.
+    fn held_rate(&mut self, state: &State, fraction: f64) -> Result<Option<Field>, OutOfRange> {
+        if self.leaves.at(fraction)?.leaf.held.is_none() {
+            return Ok(None);
+        }
+        let held = |step: f64| {
+            let mut held = state.clone();
+            clamp(self.leaves.at(fraction + step)?, &mut held);
+            Ok(between(state, &held))
+        };
+        rate(held).map(Some)
     }
 
     /// The forces, their rates, and the matrix (left in the system).
@@ -249,7 +260,10 @@ impl<'a> Equations<'a> {
         let mut previous = f64::INFINITY;
         for iteration in 1..=ITERATIONS {
             let linear = self.linearise(&mut state, fraction)?;
-            let (forces, rate, counted) = self.solve(&linear)?;
+            let (forces, mut rate, counted) = self.solve(&linear)?;
+            if let Some(held) = self.held_rate(&state, fraction)? {
+                add(&mut rate, 1.0, &held);
+            }
             let step = plane.map_or(0.0, |plane| {
                 let off = plane.distance(&state) + dot(&plane.dual, &forces);
                 -off / (dot(&plane.dual, &rate) + plane.own)
@@ -259,8 +273,8 @@ impl<'a> Equations<'a> {
             if !is_finite(&increments) || !step.is_finite() || size > LARGEST {
                 return Err(Stuck::NotConverged);
             }
-            state = self.moved(&state, fraction, &increments, 1.0)?;
             fraction += step;
+            state = self.moved(&state, fraction, &increments, 1.0)?;
             if at_rest(size, previous) {
                 clamp(self.leaves.at(fraction)?, &mut state);
                 let tangent = self.normalised(Tangent {
@@ -300,6 +314,40 @@ impl<'a> Equations<'a> {
         self.factorizations += 1;
         Ok(factorized(&mut self.pattern, system, shift)?.negative())
     }
+}
+
+/// A state after `step` times these increments. What the leaf clamps goes there first:
+/// the forces of the segments at a clamp feel all of its motion, however long the step.
+pub(super) fn advanced(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    system: &mut System,
+    increments: &Field,
+    step: f64,
+) -> State {
+    let mut clamped = state.clone();
+    clamp(leaf, &mut clamped);
+    let mut next = clamped.clone();
+    if clamped.x == state.x && clamped.q == state.q {
+        // Rounding of what nearly rigid segments have for their lengths counts as little
+        // as the step is long.
+        system.set_solution(increments);
+        leaf.advance(state, system, step, &mut next);
+        return next;
+    }
+    let mut increments = times(increments, step);
+    if let Some(held) = &leaf.leaf.held {
+        let tips = increments.iter_mut().filter_map(|rod| rod.last_mut());
+        for (j, tip) in tips.enumerate() {
+            tip[3..].fill(0.0);
+            if held.rotation(j).is_some() {
+                tip[..3].fill(0.0);
+            }
+        }
+    }
+    system.set_solution(&increments);
+    leaf.advance(&clamped, system, 1.0, &mut next);
+    next
 }
 
 /// The forces on a state, their rates, and the matrix (left in the system).

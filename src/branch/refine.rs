@@ -3,10 +3,11 @@
 use super::equations::{DIFFERENCE, Equations, Plane, Stuck, reversed};
 use super::family::Family;
 use super::field::{at_same_nodes, prolong as prolong_field};
-use super::refined::{Doubt, Refined, Table, Values};
+use super::refined::{Doubt, Refined, Table, Values, looked_at};
 use super::{Point, Tangent};
 use crate::leaf::{DiscreteLeaf, Grid};
 use crate::relax::prolong::prolong;
+use glam::DVec3;
 
 /// Grids of a point at most, and segments of the finest.
 pub(super) const GRIDS: usize = 6;
@@ -177,11 +178,11 @@ fn refine_in(
     Err(Doubt::Inaccurate)
 }
 
-/// Change of a point's values with the parameter: tips go as the tangent; the energy,
-/// stationary in the state, as the work of what varies.
+/// Change of a point's values with the parameter: points go as the tangent; the energy,
+/// stationary in the state, as the work of what varies; the reaction as on the states
+/// beside it.
 fn slope(equations: &mut Equations, point: &Point) -> Result<Values, Stuck> {
     let tangent = &point.tangent;
-    let tips = tangent.increments.iter().filter_map(|rod| rod.last());
     let mut energy = |step: f64| {
         let at = point.fraction + step;
         let leaf = equations
@@ -194,11 +195,36 @@ fn slope(equations: &mut Equations, point: &Point) -> Result<Values, Stuck> {
     let here = energy(0.0);
     let (after, before) = (energy(DIFFERENCE).or(here), energy(-DIFFERENCE).or(here));
     let (after, before) = after.zip(before).ok_or(Stuck::NotConverged)?;
+    let reaction = reaction_rate(equations, point)?;
+    let leaf = equations.leaves.at(point.fraction)?;
+    let nodes = looked_at(leaf, leaf.segments());
+    let ways = nodes.flat_map(|i| tangent.increments.iter().map(move |rod| &rod[i - 1]));
     Ok(Values {
-        tips: tips
-            .flat_map(|tip| [3, 4, 5].map(|c| tip[c] / tangent.fraction))
+        points: ways
+            .flat_map(|way| [3, 4, 5].map(|c| way[c] / tangent.fraction))
             .collect(),
         fraction: 1.0,
         energy: (after.1 - before.1) / (after.0 - before.0),
+        reaction,
     })
+}
+
+/// Change of the force that the holder of the tips feels with the parameter.
+fn reaction_rate(equations: &mut Equations, point: &Point) -> Result<DVec3, Stuck> {
+    if equations.leaves.at(point.fraction)?.leaf.held.is_none() {
+        return Ok(DVec3::ZERO);
+    }
+    let tangent = &point.tangent;
+    let mut beside = |step: f64| {
+        let at = point.fraction + step;
+        let way = step / tangent.fraction;
+        let state = equations.moved(&point.state, at, &tangent.increments, way)?;
+        Ok((at, equations.leaves.at(at)?.reaction(&state).0))
+    };
+    let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
+        // At an end of the range there may be nothing beyond.
+        beside(step).or_else(|_: Stuck| beside(0.0))
+    });
+    let ((after, force), (before, force_before)) = (after?, before?);
+    Ok((force - force_before) / (after - before))
 }

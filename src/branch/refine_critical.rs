@@ -146,9 +146,8 @@ fn tips_across(
         let unit = apart * critical.tangent.fraction;
         let mut beside = |side: f64| {
             let increments = &critical.tangent.increments;
-            let moved =
-                equations.moved(&critical.state, critical.fraction, increments, side * apart);
             let at = fraction + side * unit;
+            let moved = equations.moved(&critical.state, at, increments, side * apart);
             let (point, _) = equations.correct(&moved.ok()?, at, None).ok()?;
             Values::of(equations, &point.state, at).ok()
         };

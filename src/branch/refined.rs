@@ -6,6 +6,7 @@ use crate::leaf::{DiscreteLeaf, Grid, State};
 use crate::relax::node_state;
 use crate::relax::richardson::Richardson;
 use crate::shape::RodShape;
+use glam::DVec3;
 
 /// A term of fourth order falls to this part from grid to grid: a change that falls to
 /// less is zero by chance.
@@ -20,8 +21,10 @@ pub struct Refined {
     pub energy: f64,
     /// Tips of all rods, likewise.
     pub tips: Vec<[f64; 3]>,
-    /// Bound on the error of the tips, as those of the branch at this parameter; at a
-    /// fold, as those of the fold.
+    /// The force that the holder of the tips feels, likewise; zero of free ones.
+    pub reaction: DVec3,
+    /// Bound on the error of the tips, or if they are held of the middles of the rods, as
+    /// those of the branch at this parameter; at a fold, as those of the fold.
     pub error: f64,
     /// Bound on the error of the parameter, as a fraction of its range.
     pub fraction_error: f64,
@@ -71,7 +74,8 @@ pub enum Doubt {
     /// The index changes, and no singular matrix explains it.
     #[error("the index changes there without a singular matrix")]
     Unexplained,
-    /// The error of the tips stays above the accuracy.
+    /// The error of the tips, or of what is looked at in their place, stays above the
+    /// accuracy.
     #[error("the tolerance is not reached there on any grid")]
     Inaccurate,
 }
@@ -91,37 +95,56 @@ impl From<OutOfRange> for Doubt {
 /// What is known of a point on one grid.
 #[derive(Clone)]
 pub(super) struct Values {
-    /// Three coordinates of every tip.
-    pub tips: Vec<f64>,
+    /// Three coordinates of every tip, then of the middle of every rod if its tip is held
+    /// and says nothing.
+    pub points: Vec<f64>,
     pub fraction: f64,
     pub energy: f64,
+    /// What the holder of the tips feels; zero of free ones.
+    pub reaction: DVec3,
+}
+
+/// The nodes of each rod at which values are taken.
+pub(super) fn looked_at(leaf: &DiscreteLeaf, segments: usize) -> impl Iterator<Item = usize> {
+    let middle = leaf.leaf.held.is_some().then_some(segments / 2);
+    [segments].into_iter().chain(middle)
 }
 
 impl Values {
     pub fn of(equations: &mut Equations, state: &State, fraction: f64) -> Result<Self, Stuck> {
-        let tips = (0..state.rods()).flat_map(|j| state.tip(j).to_array());
+        let leaf = equations.leaves.at(fraction)?;
+        let nodes = looked_at(leaf, state.segments());
+        let reaction = match leaf.leaf.held {
+            Some(_) => leaf.reaction(state).0,
+            None => DVec3::ZERO,
+        };
+        let points = nodes.flat_map(|i| (0..state.rods()).map(move |j| state.base(j) + i));
         Ok(Values {
-            tips: tips.collect(),
+            points: points.flat_map(|k| state.x[k].to_array()).collect(),
             fraction,
-            energy: equations.leaves.at(fraction)?.energy(state),
+            energy: leaf.energy(state),
+            reaction,
         })
     }
 
     /// The sum of values, each times its weight.
     pub fn sum(parts: &[(f64, Values)]) -> Self {
         let sum = |of: &dyn Fn(&Values) -> f64| parts.iter().map(|(w, v)| w * of(v)).sum();
-        let tips = parts.first().map_or(0, |(_, values)| values.tips.len());
+        let points = parts.first().map_or(0, |(_, values)| values.points.len());
         Values {
-            tips: (0..tips).map(|k| sum(&|values| values.tips[k])).collect(),
+            points: (0..points)
+                .map(|k| sum(&|values| values.points[k]))
+                .collect(),
             fraction: sum(&|values| values.fraction),
             energy: sum(&|values| values.energy),
+            reaction: parts.iter().map(|(w, v)| *w * v.reaction).sum(),
         }
     }
 
-    /// The largest distance between tips.
+    /// The largest distance between points.
     pub fn distance(&self, other: &Values) -> f64 {
-        let tips = self.tips.chunks(3).zip(other.tips.chunks(3));
-        let squares = tips.map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum());
+        let points = self.points.chunks(3).zip(other.points.chunks(3));
+        let squares = points.map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum());
         squares.fold(0.0, f64::max).sqrt()
     }
 }
@@ -130,13 +153,13 @@ impl Values {
 #[derive(Default)]
 pub(super) struct Table {
     rows: Vec<(usize, Values)>,
-    /// Change of the values with the fraction along the branch. Tips are those of the
+    /// Change of the values with the fraction along the branch. Points are those of the
     /// branch at the fraction that is stated, whatever the error of that; where there is
     /// no such change, at a fold, they are those of the point itself.
     pub slope: Option<Values>,
     /// What rounding of the matrix may have done to the fraction.
     pub rounding: f64,
-    /// An error of the tips that all grids have.
+    /// An error of the points that all grids have.
     pub common: f64,
 }
 
@@ -153,22 +176,23 @@ impl Table {
         table
     }
 
-    /// The tips at the fraction of the last grid.
-    fn tips(&self) -> Richardson {
+    /// The points at the fraction of the last grid.
+    fn points(&self) -> Richardson {
         let last = self.rows.last().map_or(0.0, |(_, last)| last.fraction);
         self.of(|values| match &self.slope {
-            None => values.tips.clone(),
+            None => values.points.clone(),
             Some(slope) => {
-                let tips = values.tips.iter().zip(&slope.tips);
-                tips.map(|(tip, slope)| tip + slope * (last - values.fraction))
+                let points = values.points.iter().zip(&slope.points);
+                points
+                    .map(|(point, slope)| point + slope * (last - values.fraction))
                     .collect()
             }
         })
     }
 
-    /// Estimate of the error of the tips.
+    /// Estimate of the error of the points.
     pub fn error(&self) -> f64 {
-        let best = self.tips().best();
+        let best = self.points().best();
         best.map_or(f64::INFINITY, |best| best.error + self.common)
     }
 
@@ -194,21 +218,26 @@ impl Table {
     /// The point, with its state on the finest grid.
     pub fn refined(&self, state: State, grid: Grid) -> Refined {
         let columns = |table: &Richardson| table.best().map_or(0, |best| best.columns);
-        let own = columns(&self.tips());
+        let own = columns(&self.points());
         let fractions = self.of(|values| vec![values.fraction]);
         let fraction = fractions.column(columns(&fractions))[0];
-        let mut tips = self.of(|values| values.tips.clone()).column(own).to_vec();
+        let mut points = self.of(|values| values.points.clone()).column(own).to_vec();
         let mut energy = self.of(|values| vec![values.energy]).column(own)[0];
+        let reaction = self.of(|values| values.reaction.to_array().to_vec());
+        let mut reaction = DVec3::from_slice(reaction.column(own));
         if let Some(slope) = &self.slope {
             let way = fraction - fractions.column(own)[0];
-            let moved = tips.iter_mut().zip(&slope.tips);
-            moved.for_each(|(tip, slope)| *tip += way * slope);
+            let moved = points.iter_mut().zip(&slope.points);
+            moved.for_each(|(point, slope)| *point += way * slope);
             energy += way * slope.energy;
+            reaction += way * slope.reaction;
         }
+        let tips = points.chunks(3).take(state.rods());
         Refined {
             fraction,
             energy,
-            tips: (tips.chunks(3).map(|tip| [tip[0], tip[1], tip[2]])).collect(),
+            tips: tips.map(|tip| [tip[0], tip[1], tip[2]]).collect(),
+            reaction,
             error: self.error(),
             fraction_error: self.fraction_error() + self.rounding,
             state,

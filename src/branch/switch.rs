@@ -44,8 +44,8 @@ fn leave(
     away: f64,
 ) -> Result<Point, Stuck> {
     let increments = &direction.increments;
-    let state = equations.moved(&critical.state, critical.fraction, increments, away)?;
     let fraction = critical.fraction + away * direction.fraction;
+    let state = equations.moved(&critical.state, fraction, increments, away)?;
     let (point, _) = equations.correct(&state, fraction, Some(direction))?;
     Ok(point)
 }

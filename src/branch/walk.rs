@@ -334,7 +334,7 @@ fn across(equations: &Equations, a: &Point, b: &Point) -> f64 {
 fn advance(equations: &mut Equations, now: &Point, step: f64) -> Result<Found, Stuck> {
     let tangent = &now.tangent;
     let fraction = now.fraction + step * tangent.fraction;
-    let state = equations.moved(&now.state, now.fraction, &tangent.increments, step)?;
+    let state = equations.moved(&now.state, fraction, &tangent.increments, step)?;
     let (point, iterations) = equations.correct(&state, fraction, Some(tangent))?;
     let drift = (state.shift_to(&point.state)).max((point.fraction - fraction).abs());
     Ok(Found {
@@ -380,7 +380,7 @@ fn advance_to_edge(
     }
     let (point, iterations) = at_edge(equations, now, edge, way)?;
     let part = way / step;
-    let state = equations.moved(&now.state, now.fraction, &now.tangent.increments, way)?;
+    let state = equations.moved(&now.state, edge, &now.tangent.increments, way)?;
     Ok(Found {
         drift: state.shift_to(&point.state) / part,
         point,
@@ -397,7 +397,7 @@ fn at_edge(
     way: f64,
 ) -> Result<(Point, usize), Stuck> {
     let increments = &now.tangent.increments;
-    let state = equations.moved(&now.state, now.fraction, increments, way)?;
+    let state = equations.moved(&now.state, edge, increments, way)?;
     let (mut point, iterations) = equations.correct(&state, edge, None)?;
     if equations.along(&point.tangent, &now.tangent) < 0.0 {
         point.tangent = reversed(point.tangent);
@@ -422,8 +422,8 @@ fn closing(equations: &mut Equations, first: &Point, near: &Point, step: f64) ->
             return None;
         }
         let increments = &near.tangent.increments;
-        let state = (equations.moved(&near.state, near.fraction, increments, way)).ok()?;
         let fraction = near.fraction + way * near.tangent.fraction;
+        let state = (equations.moved(&near.state, fraction, increments, way)).ok()?;
         (near, _) = (equations.correct(&state, fraction, Some(&first.tangent))).ok()?;
     }
     None

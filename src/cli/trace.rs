@@ -43,7 +43,7 @@ pub struct Trace {
     #[arg(long, value_name = "N", default_value_t = MOST_POINTS)]
     points: usize,
 
-    /// What the figure shows against that number, a panel each: x, y, z of the tip, energy, twist; left out: the coordinate of the tip that varies most
+    /// What the figure shows against that number, a panel each: x, y, z of the tip, reaction_x, reaction_y, reaction_z on the holder of a held tip, energy, twist; left out: the coordinate of the tip that varies most, of the reaction if it is held
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     show: Vec<TraceShow>,
 
@@ -134,6 +134,12 @@ impl Trace {
 
     fn one(&self, job: &Job, vary: &Vary) -> Result<Done, Refusal> {
         let request = self.along(job, vary)?;
+        let free = request.base.scenario().held_tip.is_none();
+        if let Some(show) = self.show.iter().find(|show| free && show.is_reaction()) {
+            return Err(
+                format!("--show {show}: nothing holds the tip: add [tip] with held").into(),
+            );
+        }
         let mut line = job.progress();
         let mut seen = (0, ends(vary)[0]);
         let mut trace = study::trace(&request, &mut |branch, points, value| {

@@ -12,6 +12,7 @@ use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, new_page, ti
 use super::setting::{Setting, with_unit};
 use super::small::SmallPanels;
 use super::veins::Veins;
+use crate::report::looked_at;
 use crate::report::numbers::{power_of_ten, short};
 use crate::report::words::branch_end;
 use crate::scenario::{Scenario, Units};
@@ -33,6 +34,8 @@ const SEEN: f64 = 0.04;
 const PART_SEEN: f64 = 0.25;
 /// Parts of a vein between the places at which leaves are compared.
 const PARTS: usize = 8;
+/// Where the components of the reaction begin among what may be shown.
+const REACTION: usize = 3;
 /// Smaller twists, in radians, and ways of tips, in lengths, are rounding.
 const ROUNDING: f64 = 1e-7;
 
@@ -103,7 +106,11 @@ fn notes(trace: &Trace) -> Vec<String> {
     let errors = trace.branches.iter().flat_map(|b| &b.points);
     let worst = errors.filter_map(|p| p.error).fold(0.0, f64::max);
     if worst > 0.0 {
-        notes.push(format!("tips within {}", power_of_ten(worst)));
+        notes.push(format!(
+            "{} within {}",
+            looked_at(trace),
+            power_of_ten(worst)
+        ));
     }
     notes
 }
@@ -162,15 +169,18 @@ fn what(point: &TracePoint) -> String {
     format!("{}, {kind}", short(point.value))
 }
 
-/// The coordinate along which the tip goes farthest.
+/// The coordinate along which the tip goes farthest; of a held one the component of the
+/// reaction that changes most.
 fn farthest(trace: &Trace) -> TraceShow {
     let points = trace.branches.iter().flat_map(|branch| &branch.points);
-    let tips = points.filter_map(|point| point.tips.first().map(|&tip| (tip, tip)));
-    let extent = tips.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let of = |point: &TracePoint| point.reaction.or(point.tips.first().copied());
+    let values = points.filter_map(|point| of(point).map(|it| (it, it)));
+    let extent = values.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
     let (low, high) = extent.unwrap_or_default();
     let way = high - low;
     let longest = (0..3).max_by(|&a, &b| way[a].total_cmp(&way[b]));
-    TraceShow::ALL[longest.unwrap_or(2)]
+    let first = if trace.held { REACTION } else { 0 };
+    TraceShow::ALL[first + longest.unwrap_or(2)]
 }
 
 /// A quantity with its unit.
@@ -178,6 +188,10 @@ fn name(quantity: TraceShow, units: &Units) -> String {
     match quantity {
         TraceShow::Energy => with_unit("energy", units.energy().as_deref()),
         TraceShow::Twist => with_unit("mean twist", Some("rad")),
+        TraceShow::ReactionX | TraceShow::ReactionY | TraceShow::ReactionZ => {
+            let force = quantity.word().replace('_', ", ");
+            with_unit(&force, units.force.as_deref())
+        }
         tip => with_unit(&format!("{tip} of the tip"), units.length.as_deref()),
     }
 }
@@ -188,7 +202,9 @@ fn axis_of(trace: &Trace, quantity: TraceShow) -> Axis {
     let values = points().map(|point| quantity.of(point));
     let least = match quantity {
         TraceShow::Twist => ROUNDING,
-        TraceShow::Energy => 0.0,
+        TraceShow::Energy | TraceShow::ReactionX | TraceShow::ReactionY | TraceShow::ReactionZ => {
+            0.0
+        }
         _ => {
             let curves = points().take(1).flat_map(|point| &point.curves);
             ROUNDING * curves.map(|curve| length(curve)).fold(0.0, f64::max)
@@ -323,7 +339,7 @@ fn draw_law(
 ) {
     let start = branch.points.first().map_or(0.0, |p| tip(p, law.axis));
     let points: Vec<(f64, f64)> = (branch.points.iter())
-        .map(|point| (tip(point, law.axis) - start, point.value))
+        .map(|point| (tip(point, law.axis) - start, point.force_on_tip(law.axis)))
         .collect();
     let units = &trace.units;
     let across = format!("displacement along {}", TraceShow::ALL[law.axis]);

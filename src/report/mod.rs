@@ -45,7 +45,7 @@ pub use map_table::{lines, map_table, read_rows, table};
 pub use relax::{lines as relax_lines, report as relax_report};
 pub use sensitivity::table as sensitivity_table;
 pub use simulate::{lines as simulate_lines, report as simulate_report};
-pub use trace::{lines as trace_lines, report as trace_report};
+pub use trace::{lines as trace_lines, looked_at, report as trace_report};
 pub use trace_table::trace_table;
 
 /// One way to write a result down.

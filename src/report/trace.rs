@@ -2,7 +2,7 @@
 
 use crate::study::{Law, PointKind, Trace, TraceBranch, TracePoint};
 
-use super::numbers::{power_of_ten, seconds, veins_of};
+use super::numbers::{power_of_ten, seconds, short, veins_of};
 use super::table::{Lines, lay_out, under};
 use super::words::branch_end;
 
@@ -27,7 +27,8 @@ pub fn lines(trace: &Trace, files: Option<String>) -> Lines {
     let errors = errors.filter_map(|point| point.error);
     lines.extend(errors.reduce(f64::max).map(|worst| {
         let (worst, segments) = (power_of_ten(worst), trace.segments);
-        let error = format!("tips within {worst}, followed on {segments} segments a vein");
+        let what = looked_at(trace);
+        let error = format!("{what} within {worst}, followed on {segments} segments a vein");
         ("error", error)
     }));
     lines.push((
@@ -84,16 +85,34 @@ fn law_lines(trace: &Trace, law: &Law) -> Vec<String> {
     lines
 }
 
+/// What errors are those of.
+pub fn looked_at(trace: &Trace) -> &'static str {
+    match trace.held {
+        true => "middles of the veins",
+        false => "tips",
+    }
+}
+
 fn place(trace: &Trace, point: &TracePoint) -> String {
     let stability = match point.index {
         0 => "stable".into(),
         index => format!("index {index}"),
     };
     let tip = match &point.tips[..] {
-        [tip] => format!(", tip ({:.7}, {:.7}, {:.7})", tip.x, tip.y, tip.z),
+        [tip] if point.reaction.is_none() => {
+            format!(", tip ({:.7}, {:.7}, {:.7})", tip.x, tip.y, tip.z)
+        }
         _ => String::new(),
     };
-    format!("{}: {stability}{tip}", trace.keys.text(point.value))
+    let reaction = point.reaction.map(|force| {
+        let [x, y, z] = force.to_array().map(short);
+        format!(", reaction ({x}, {y}, {z})")
+    });
+    let reaction = reaction.unwrap_or_default();
+    format!(
+        "{}: {stability}{tip}{reaction}",
+        trace.keys.text(point.value)
+    )
 }
 
 fn critical(trace: &Trace, point: &TracePoint, before: usize) -> String {

@@ -29,6 +29,26 @@ struct Row {
     twist: f64,
 }
 
+/// What a row goes on with if tips are held: the force that their holder feels.
+#[derive(Default, Serialize)]
+struct Held {
+    reaction_x: f64,
+    reaction_y: f64,
+    reaction_z: f64,
+}
+
+impl Held {
+    fn of(point: &TracePoint) -> Self {
+        let [reaction_x, reaction_y, reaction_z] =
+            (point.reaction.unwrap_or_default().to_array()).map(|x| x + 0.0);
+        Held {
+            reaction_x,
+            reaction_y,
+            reaction_z,
+        }
+    }
+}
+
 impl Row {
     fn of(branch: usize, point: &TracePoint) -> Self {
         let tip = point.tips.first();
@@ -62,9 +82,17 @@ impl Row {
 
 /// `trace.csv`: one row per branch and point.
 pub fn trace_table(trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
-    // Even of a trace without points.
-    out.write_all(&header(Row::default()))?;
     let branches = trace.branches.iter().enumerate();
-    let rows = branches.flat_map(|(b, branch)| branch.points.iter().map(move |p| Row::of(b, p)));
-    append_csv(rows, out)
+    let points = branches.flat_map(|(b, branch)| branch.points.iter().map(move |p| (b, p)));
+    // Even of a trace without points.
+    match trace.held {
+        false => {
+            out.write_all(&header(Row::default()))?;
+            append_csv(points.map(|(b, p)| Row::of(b, p)), out)
+        }
+        true => {
+            out.write_all(&header((Row::default(), Held::default())))?;
+            append_csv(points.map(|(b, p)| (Row::of(b, p), Held::of(p))), out)
+        }
+    }
 }

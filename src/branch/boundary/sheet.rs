@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::branch::deflation::Solved;
 use crate::branch::equations::{
-    Equations, ITERATIONS, LARGEST, Stuck, assembled, at_rest, forces_on, rate,
+    Equations, ITERATIONS, LARGEST, Stuck, advanced, assembled, at_rest, forces_on, rate,
 };
 use crate::branch::family::{Family, OutOfRange};
 use crate::branch::field::{between, is_finite, largest, plus, times};
@@ -222,23 +222,23 @@ impl<'a> Sheet<'a> {
     /// What lies `step` further along a direction.
     pub fn moved(&mut self, spot: &Spot, to: &Direction, step: f64) -> Result<Spot, OutOfRange> {
         let place = [0, 1].map(|i| spot.place[i] + step * to.place[i]);
-        let state = self.advanced(spot, &to.increments, step)?;
+        let state = self.advanced(&spot.state, place, &to.increments, step)?;
         Ok(Spot { state, place })
     }
 
+    /// A state after `step` times these increments, at the place that is then reached.
     fn advanced(
         &mut self,
-        spot: &Spot,
+        state: &State,
+        place: [f64; 2],
         increments: &Field,
         step: f64,
     ) -> Result<State, OutOfRange> {
-        self.equations.system.set_solution(increments);
         let grid = &self.equations.leaves.grid;
         let family = self.plane.family;
-        let leaf = self.kept.at(&self.plane, family, grid, spot.place)?;
-        let mut next = spot.state.clone();
-        leaf.advance(&spot.state, &self.equations.system, step, &mut next);
-        Ok(next)
+        let leaf = self.kept.at(&self.plane, family, grid, place)?;
+        let system = &mut self.equations.system;
+        Ok(advanced(leaf, state, system, increments, step))
     }
 
     /// What the bordered equations say at a spot, at rest or not, with the rates of both
@@ -327,8 +327,8 @@ impl<'a> Sheet<'a> {
             if !is_finite(&increments) || !size.is_finite() || size > LARGEST {
                 return Err(Stuck::NotConverged);
             }
-            let state = self.advanced(&sample.spot, &increments, 1.0)?;
             let place = [0, 1].map(|i| sample.spot.place[i] + changes[i]);
+            let state = self.advanced(&sample.spot.state, place, &increments, 1.0)?;
             spot = Spot { state, place };
             finished = at_rest(size, previous);
             previous = size;

@@ -36,6 +36,9 @@ pub struct Trace {
     /// Whether the tips share one point.
     #[serde(skip)]
     pub joined: bool,
+    /// Whether the tips are held.
+    #[serde(skip)]
+    pub held: bool,
     /// Segments a rod of the finest grid on which branches were followed.
     pub segments: usize,
     /// Wanted accuracy of the tips, relative to the longest rod.
@@ -47,7 +50,8 @@ pub struct Trace {
     pub remark: Option<String>,
     /// The branches: first that of the first equilibrium.
     pub branches: Vec<TraceBranch>,
-    /// Force against displacement, if it is a tip force that varied.
+    /// Force against displacement, if it is a tip force that varied, or the place where
+    /// tips are held.
     pub law: Option<Law>,
     /// Matrices factorised while following.
     pub factorizations: usize,
@@ -83,7 +87,11 @@ pub struct TracePoint {
     /// The joint tip alone, or every tip.
     #[serde(flatten, serialize_with = "serialize_tips")]
     pub tips: Vec<DVec3>,
-    /// Bound on the error of the tips: within the tolerance.
+    /// The force that the holder of held tips feels.
+    #[serde(rename = "tip_reaction", skip_serializing_if = "Option::is_none")]
+    pub reaction: Option<DVec3>,
+    /// Bound on the error of the tips, of held ones on that of the middles of the rods:
+    /// within the tolerance.
     pub error: Option<f64>,
     /// Potential energy.
     pub energy: f64,
@@ -101,6 +109,14 @@ pub struct TracePoint {
     pub curves: Vec<Vec<DVec3>>,
 }
 
+impl TracePoint {
+    /// The force on the tip along an axis where it is that which varies, or where the tip
+    /// is held.
+    pub fn force_on_tip(&self, axis: usize) -> f64 {
+        self.reaction.map_or(self.value, |reaction| -reaction[axis])
+    }
+}
+
 /// What the figure of a trace shows against the number that varies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TraceShow {
@@ -110,6 +126,12 @@ pub enum TraceShow {
     TipY,
     /// Its z.
     TipZ,
+    /// A component of the force that the holder of the tips feels.
+    ReactionX,
+    /// Its y.
+    ReactionY,
+    /// Its z.
+    ReactionZ,
     /// The potential energy.
     Energy,
     /// The mean twist of the veins, in radians.
@@ -121,19 +143,32 @@ words! {
         TipX = "x",
         TipY = "y",
         TipZ = "z",
+        ReactionX = "reaction_x",
+        ReactionY = "reaction_y",
+        ReactionZ = "reaction_z",
         Energy = "energy",
         Twist = "twist",
     }
 }
 
 impl TraceShow {
+    /// Whether only tips that are held have it.
+    pub fn is_reaction(self) -> bool {
+        use TraceShow::{ReactionX, ReactionY, ReactionZ};
+        matches!(self, ReactionX | ReactionY | ReactionZ)
+    }
+
     /// Of a point.
     pub fn of(self, point: &TracePoint) -> f64 {
         let tip = |axis: usize| point.tips.first().map_or(f64::NAN, |tip| tip[axis]);
+        let reaction = |axis: usize| point.reaction.map_or(f64::NAN, |force| force[axis]);
         match self {
             TraceShow::TipX => tip(0),
             TraceShow::TipY => tip(1),
             TraceShow::TipZ => tip(2),
+            TraceShow::ReactionX => reaction(0),
+            TraceShow::ReactionY => reaction(1),
+            TraceShow::ReactionZ => reaction(2),
             TraceShow::Energy => point.energy,
             TraceShow::Twist => point.undulation.twist(),
         }

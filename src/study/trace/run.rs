@@ -83,6 +83,7 @@ pub fn trace_seen(
         show: Vec::new(),
         units: scenario.units.clone(),
         rods: scenario.rods.len(),
+        held: scenario.held_tip.is_some(),
         joined: scenario.joined,
         segments: wanted.unwrap_or(2 * (rest.shape.stations.len() - 1)),
         tolerance,
@@ -125,11 +126,11 @@ pub fn trace_seen(
 }
 
 /// Force against displacement, if it is one component of the force on the joint
-/// tip that varies.
+/// tip that varies, or of the place where it is held.
 fn law(request: &TraceRequest, branch: &TraceBranch) -> Option<Law> {
     let [
         Target::Entry(Part {
-            key: Key::TipForce,
+            key: Key::TipForce | Key::TipPosition,
             indices: [Some(axis), None],
             scale: false,
             ..
@@ -139,7 +140,7 @@ fn law(request: &TraceRequest, branch: &TraceBranch) -> Option<Law> {
         return None;
     };
     let points = branch.points.iter().map(|point| match point.tips[..] {
-        [tip] => Some((point.value, tip)),
+        [tip] => Some((point.force_on_tip(*axis), tip)),
         _ => None,
     });
     let points: Option<Vec<(f64, DVec3)>> = points.collect();
@@ -274,6 +275,8 @@ impl Run<'_, '_> {
                 }
             },
             tips: tips.take(if joined { 1 } else { usize::MAX }).collect(),
+            reaction: (self.request.base.scenario().held_tip.is_some())
+                .then_some(refined.reaction * scale.force()),
             error: Some(refined.error * scale.length),
             energy: refined.energy * scale.moment(),
             index,
