@@ -120,7 +120,7 @@
 //! conditions hold exactly at nodes, so that its error is a series in even
 //! powers of ds. The leaf settles on 8 segments a rod (to 1e-3 and coarser on 4, if
 //! it need not move far), then on twice as many, and so on, each
-//! started from the one before, and Richardson extrapolation removes one term
+//! started from what those before it tell, and Richardson extrapolation removes one term
 //! of the series with every grid. The last correction, times a safety factor
 //! that falls as the corrections do, is the error estimate
 //! ([`relax::Accuracy::error_estimate`]); what is left of unfinished

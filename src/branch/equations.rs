@@ -4,7 +4,7 @@ use super::family::{Family, Leaves, OutOfRange, clamp};
 use super::field::{add, between, dot, is_finite, largest, plus, times};
 use super::{Point, Tangent};
 use crate::leaf::{DiscreteLeaf, Field, Grid, Solved, SparseFactor, SparsePattern, State, System};
-use crate::newton::converged;
+use crate::newton::{Contraction, converged};
 use crate::rod::RESOLVED_TURN;
 
 /// Part of the parameter's range over which forces are differenced: the error
@@ -434,5 +434,6 @@ pub fn reversed(t: Tangent) -> Tangent {
 
 /// Whether a Newton step of this size after one of size `previous` ends it.
 pub(super) fn at_rest(size: f64, previous: f64) -> bool {
-    converged(size, previous, [0.0; 2], (ACCURACY, ROUNDED)).is_some()
+    let first = Contraction::default().after_first(size, 0.0);
+    converged(size, previous, [0.0; 2], (ACCURACY, ROUNDED), first).is_some()
 }

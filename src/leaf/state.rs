@@ -83,6 +83,13 @@ impl State {
         nodes.fold(0.0, |most, (j, i)| most.max(distance(j, i)))
     }
 
+    /// The largest change of a segment's force between this state and another on the
+    /// same grid.
+    pub fn force_change(&self, other: &State) -> f64 {
+        let changes = self.n.iter().zip(&other.n).map(|(a, b)| a.distance(*b));
+        changes.fold(0.0, f64::max)
+    }
+
     /// Turns and moves node `k` by `step` times the increment.
     #[inline]
     pub fn advance(&mut self, k: usize, increment: &Increment, step: f64) {

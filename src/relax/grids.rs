@@ -5,10 +5,12 @@ use crate::memory::Request;
 use crate::newton::Stop;
 use crate::relax::method::Method;
 use crate::relax::options::MAX_NODES;
-use crate::relax::prolong::{between, predict, prolong};
+use crate::relax::predict::predict;
+use crate::relax::prolong::prolong;
 use crate::relax::run::{BUDGET, Level, Run, positions};
 use crate::relax::segments::{COARSEST_TURN, FINEST};
 use crate::relax::settle::{InitialGuess, Settled};
+use glam::{DQuat, DVec3};
 
 /// Two grids on which the leaf moved far are said to have settled in the same place
 /// if no station differs by more than this, in lengths.
@@ -71,13 +73,25 @@ impl Run<'_, '_> {
                 return Ok(false);
             }
             let mut state = prolong(&level.leaf, &level.state);
-            if let [.., coarse, middle] = self.levels.as_slice() {
-                predict(&coarse.state, &middle.state, &mut state);
-            }
-            let Settled { level, rest, .. } = self.settle(finer, InitialGuess::Coarser(state));
+            let guess = match self.predicting().as_slice() {
+                [_] => InitialGuess::Coarser(state),
+                levels => {
+                    predict(levels, &mut state);
+                    InitialGuess::Predicted(state)
+                }
+            };
+            let Settled { level, rest, .. } = self.settle(finer, guess);
             self.push(level);
             rest?;
         }
+    }
+
+    /// The levels of which the next one can be told: those that the extrapolation
+    /// believes, but the finest two at least.
+    fn predicting(&self) -> Vec<&Level> {
+        let columns = self.table.best().map_or(0, |best| best.columns);
+        let count = (columns + 1).max(2).min(self.levels.len());
+        self.levels[self.levels.len() - count..].iter().collect()
     }
 
     /// Whether the tolerance is reached; a fixed grid always is.
@@ -136,7 +150,7 @@ impl Run<'_, '_> {
     /// enough: it gains about as much as one twice as fine as the finest, for
     /// three eighths of its segments.
     fn accurate_with_between(&mut self) -> bool {
-        let [.., coarse, middle, fine] = self.levels.as_slice() else {
+        let [.., coarse, _, _] = self.levels.as_slice() else {
             return false;
         };
         let near = (self.error()).is_some_and(|error| error <= BETWEEN * self.tolerance);
@@ -144,12 +158,14 @@ impl Run<'_, '_> {
         if !near || !clean || !matches!(self.options.method, Method::SemiImplicit(_)) {
             return false;
         }
-        let mut state = between(&fine.state);
-        predict(&middle.state, &fine.state, &mut state);
         let grid = coarse.leaf.grid.tripled();
+        let nodes = self.leaf.rods() * (grid.segments() + 1);
+        let (x, q) = (vec![DVec3::ZERO; nodes], vec![DQuat::IDENTITY; nodes]);
+        let mut state = State::new(grid.segments(), x, q);
+        predict(&self.levels.iter().collect::<Vec<_>>(), &mut state);
         // Stability is judged on the finest grid.
         let last = self.last.take();
-        let Settled { level, rest, .. } = self.settle(grid, InitialGuess::Finer(state));
+        let Settled { level, rest, .. } = self.settle(grid, InitialGuess::Predicted(state));
         self.last = last;
         if rest.is_err() {
             return false;

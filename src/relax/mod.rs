@@ -16,6 +16,7 @@ mod number;
 mod options;
 mod place;
 mod plausible;
+mod predict;
 pub(crate) mod prolong;
 mod request;
 mod result;

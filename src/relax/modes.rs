@@ -1,12 +1,13 @@
 //! The modes of the settled leaf: from nested grids to the units of the
 //! scenario.
 
-use crate::leaf::{DiscreteLeaf, State, System, shift, turn};
+use crate::leaf::{DiscreteLeaf, System, shift, turn};
 use crate::modes::{self, Eigenpair};
 use crate::motion::Physics;
 use crate::newton::{Newton, Work};
 use crate::relax::equilibrium::Mode;
-use crate::relax::prolong::{predict, prolong};
+use crate::relax::predict::predict;
+use crate::relax::prolong::prolong;
 use crate::relax::richardson::Richardson;
 use crate::relax::run::{Level, Run};
 use crate::relax::saddle::ANY_SIGN;
@@ -118,8 +119,7 @@ fn refine(
         if 2 * unknowns(&last.leaf) > MANY_MORE_UNKNOWNS {
             break;
         }
-        let before = levels.len().checked_sub(2).map(|k| &levels[k].state);
-        let next = settle(last, before, run.tolerance)?;
+        let next = settle(&levels[levels.len().saturating_sub(2)..], run.tolerance)?;
         series.push(&on(&next)?);
         finer.push(next);
     }
@@ -127,10 +127,11 @@ fn refine(
 }
 
 /// The same equilibrium on the next finer grid.
-fn settle(last: &Level, before: Option<&State>, tolerance: f64) -> Option<Level> {
+fn settle(levels: &[&Level], tolerance: f64) -> Option<Level> {
+    let last = levels.last()?;
     let mut state = prolong(&last.leaf, &last.state);
-    if let Some(before) = before {
-        predict(before, &last.state, &mut state);
+    if levels.len() > 1 {
+        predict(levels, &mut state);
     }
     let leaf = DiscreteLeaf::new(&last.leaf.leaf, last.leaf.grid.refined());
     let mut system = System::new(&leaf);

@@ -1,7 +1,6 @@
-//! From a grid to the one with all segments halved, and to the one between.
+//! From a grid to the one with all segments halved.
 
 use crate::leaf::{DiscreteLeaf, State};
-use crate::rotation;
 use glam::{DQuat, DVec3};
 
 /// The state on the refined grid: nodes in common are kept, new ones lie on
@@ -61,42 +60,6 @@ pub fn prolong(leaf: &DiscreteLeaf, state: &State) -> State {
     fine
 }
 
-/// Adds to `fine`, interpolated from `middle`, what the error series in ds^2 tells
-/// from the two grids before: if halving `coarse` to `middle` changed the
-/// solution by e, halving once more will change it by e/4. Interpolated
-/// cubically between the nodes of `coarse`.
-pub fn predict(coarse: &State, middle: &State, fine: &mut State) {
-    let n = coarse.segments();
-    let square = |state: &State| (state.segments() as f64).powi(-2);
-    let part = (square(fine) - square(middle)) / (square(middle) - square(coarse));
-    let width = n as f64 / fine.segments() as f64;
-    for j in 0..coarse.rods() {
-        let changes: Vec<(DVec3, DVec3)> = (0..=n)
-            .map(|i| {
-                let (a, b) = (coarse.base(j) + i, middle.base(j) + 2 * i);
-                let turn = rotation::log(middle.q[b] * coarse.q[a].conjugate());
-                (part * (middle.x[b] - coarse.x[a]), part * turn)
-            })
-            .collect();
-        for k in 1..=fine.segments() {
-            // Four neighbouring nodes, shifted inwards at the ends.
-            let at = k as f64 * width;
-            let first = (at as usize).saturating_sub(1).min(n.saturating_sub(3));
-            let t = at - first as f64;
-            let (mut shift, mut turn) = (DVec3::ZERO, DVec3::ZERO);
-            let count = 4.min(n + 1);
-            for a in 0..count {
-                let weight = lagrange(count, a, t);
-                shift += weight * changes[first + a].0;
-                turn += weight * changes[first + a].1;
-            }
-            let node = fine.base(j) + k;
-            fine.x[node] += shift;
-            fine.q[node] = (rotation::exp(turn) * fine.q[node]).normalize();
-        }
-    }
-}
-
 /// Weight of the value at point `a` of 0, 1, ..., `count` - 1 in the value at `t` of
 /// the polynomial through all of them.
 pub fn lagrange(count: usize, a: usize, t: f64) -> f64 {
@@ -104,35 +67,4 @@ pub fn lagrange(count: usize, a: usize, t: f64) -> f64 {
         .filter(|&b| b != a)
         .map(|b| (t - b as f64) / (a as f64 - b as f64))
         .product()
-}
-
-/// The state on the grid that has three segments for every four of `state`'s, which
-/// are the parts of one coarser segment: on the polynomials through them.
-pub fn between(state: &State) -> State {
-    let n = state.segments();
-    let (mut x, mut q, mut forces) = (Vec::new(), Vec::new(), Vec::new());
-    for j in 0..state.rods() {
-        for k in 0..=3 * n / 4 {
-            let first = state.base(j) + 4 * (k / 3).min(n / 4 - 1);
-            let t = state.base(j) as f64 + 4.0 * k as f64 / 3.0 - first as f64;
-            let (mut position, mut rotation) = (DVec3::ZERO, DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0));
-            for a in 0..5 {
-                let weight = lagrange(5, a, t);
-                let turned = state.q[first + a];
-                let sign = turned.dot(state.q[first]).signum();
-                position += weight * state.x[first + a];
-                rotation += turned * (weight * sign);
-            }
-            x.push(position);
-            q.push(rotation.normalize());
-        }
-        for i in 0..3 * n / 4 {
-            let first = j * n + 4 * (i / 3);
-            let t = 4.0 * ((i % 3) as f64 + 0.5) / 3.0 - 0.5;
-            forces.push((0..4).map(|a| lagrange(4, a, t) * state.n[first + a]).sum());
-        }
-    }
-    let mut between = State::new(3 * n / 4, x, q);
-    between.n = forces;
-    between
 }

@@ -2,7 +2,7 @@
 //! and the error estimate of their extrapolation.
 
 use crate::leaf::{DiscreteLeaf, Leaf, State, System, whole_of};
-use crate::newton::Work;
+use crate::newton::{Contraction, Work};
 use crate::relax::method::Method;
 use crate::relax::options::{Options, Progress};
 use crate::relax::richardson::Richardson;
@@ -62,6 +62,8 @@ pub struct Run<'a, 'o> {
     pub index: Option<usize>,
     /// Largest iteration error left on any grid.
     pub remaining: f64,
+    /// Of Newton's method on the grids so far.
+    pub contraction: Contraction,
     /// Nodes times force evaluations so far.
     pub spent: usize,
     /// Saddles left that were only noticed by their index.
@@ -101,6 +103,7 @@ impl<'a, 'o> Run<'a, 'o> {
             table: Richardson::default(),
             index: None,
             remaining: 0.0,
+            contraction: Contraction::default(),
             spent: 0,
             pushes: 0,
             last: None,
@@ -123,6 +126,7 @@ impl<'a, 'o> Run<'a, 'o> {
         self.effects = [None; 2];
         self.index = None;
         self.remaining = 0.0;
+        self.contraction = Contraction::default();
         self.pushes = 0;
         self.last = None;
     }

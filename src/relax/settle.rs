@@ -44,8 +44,8 @@ pub enum InitialGuess {
     Start,
     /// The equilibrium of the next coarser grid, prolonged.
     Coarser(State),
-    /// The equilibrium of the next finer grid, interpolated.
-    Finer(State),
+    /// What equilibria on several grids tell of that on this one.
+    Predicted(State),
     /// A saddle the leaf was pushed off.
     Pushed(State),
 }
@@ -64,7 +64,7 @@ impl Run<'_, '_> {
     pub fn settle(&mut self, grid: Grid, guess: InitialGuess) -> Settled {
         self.last = None;
         let mut leaf = DiscreteLeaf::new(self.leaf, grid);
-        let mut near_rest = matches!(guess, InitialGuess::Coarser(_) | InitialGuess::Finer(_));
+        let mut near_rest = matches!(guess, InitialGuess::Coarser(_) | InitialGuess::Predicted(_));
         let from_start = matches!(guess, InitialGuess::Start);
         let grip = leaf.leaf.held.is_some() && from_start;
         let cg_tolerance = match guess {
@@ -72,12 +72,12 @@ impl Run<'_, '_> {
             InitialGuess::Coarser(_) => 1e-4,
             // The error of interpolation is one of stiff modes, the error that
             // is to be removed one of soft ones: a small part of the energy.
-            InitialGuess::Finer(_) => 1e-8,
+            InitialGuess::Predicted(_) => 1e-8,
         };
         let mut state = match guess {
             InitialGuess::Start => self.start(&leaf),
             InitialGuess::Coarser(state)
-            | InitialGuess::Finer(state)
+            | InitialGuess::Predicted(state)
             | InitialGuess::Pushed(state) => state,
         };
         let mut moved = false;
@@ -186,6 +186,7 @@ impl Run<'_, '_> {
                 cg_tolerance,
                 pushes,
                 solver: Definite {
+                    contraction: self.contraction,
                     direct: None,
                     space: (leaf.leaf.planar() && self.levels.is_empty())
                         .then(|| System::new(&leaf.in_space())),
@@ -203,6 +204,7 @@ impl Run<'_, '_> {
             let spent = relaxation.work.force_evaluations - before;
             moved |= relaxation.moved;
             let direct = relaxation.solver.direct.is_some();
+            self.contraction = relaxation.solver.contraction;
             self.part = relaxation.part.max(self.part);
             self.moved_softened |= relaxation.moved_softened;
             state = relaxation.state;

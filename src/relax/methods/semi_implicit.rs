@@ -40,6 +40,10 @@ const MAX_TURN: f64 = 1.0;
 /// Largest displacement of a node in one step, in units of length.
 const MAX_SHIFT: f64 = 1.0;
 
+/// A last step of Newton's method that is smaller than this (radians, lengths) is not
+/// judged by the energy: that tells it from none by rounding only.
+const SMALL: f64 = 1e-3;
+
 /// Steps on one grid before the run is given up.
 const MAX_STEPS: usize = 2000;
 
@@ -182,6 +186,8 @@ impl Relaxation<'_> {
             growth: MAX_GROWTH,
         };
         let mut resting = false;
+        // Size of the last step if it was one of Newton's method.
+        let mut newton = f64::INFINITY;
         let (mut previous, mut previous_tolerance) = (f64::INFINITY, f64::INFINITY);
         let space = self.solver.space.is_some().then(|| leaf.in_space());
         let mut sums = leaf.assemble(&self.state, system);
@@ -207,6 +213,29 @@ impl Relaxation<'_> {
             let size = turn.max(shift);
             let part = (MAX_TURN / turn).min(MAX_SHIFT / shift).min(1.0);
             leaf.advance(&self.state, system, part, &mut trial);
+            let mut rest = None;
+            if pace.dt.is_infinite() && part == 1.0 {
+                let contraction = &mut self.solver.contraction;
+                contraction.learn(size, newton);
+                newton = size;
+                let first = contraction.after_first(size, trial.force_change(&self.state));
+                let tolerances = [previous_tolerance, tolerance];
+                rest = converged(size, previous, tolerances, (accuracy, ROUNDING), first);
+            } else {
+                newton = f64::INFINITY;
+            }
+            if let Some(remaining) = rest
+                && size < SMALL
+                && closes(leaf, &trial, accuracy)
+            {
+                if sums.turn > RESOLVED_TURN {
+                    return Err(Stop::Unresolved);
+                }
+                std::mem::swap(&mut self.state, &mut trial);
+                self.work.steps += 1;
+                (self.progress)(step, size);
+                return Ok(remaining);
+            }
             let next = leaf.assemble(&trial, system);
             self.work.force_evaluations += 1;
             (self.progress)(step, size);
@@ -242,10 +271,7 @@ impl Relaxation<'_> {
                 }
             } else {
                 resting = false;
-                let tolerances = [previous_tolerance, tolerance];
-                if part == 1.0
-                    && let Some(remaining) =
-                        converged(size, previous, tolerances, (accuracy, ROUNDING))
+                if let Some(remaining) = rest
                     && closes(leaf, &self.state, accuracy)
                 {
                     return Ok(remaining);

@@ -1,0 +1,188 @@
+//! What the leaf at rest on nested grids tells of it on another one.
+
+use crate::leaf::{Grid, State};
+use crate::relax::prolong::lagrange;
+use crate::relax::run::Level;
+use crate::rotation;
+use glam::{DQuat, DVec3};
+
+/// Most points that a polynomial along a panel goes through.
+const POINTS: usize = 7;
+
+/// Segments of a panel from which on such polynomials are better than cubic Hermite
+/// interpolants.
+const SEGMENTS: usize = 4;
+
+/// Predicts the state on another grid, the finest one refined or one between the
+/// finest two: the polynomial in ds^2 through the states on nested `levels`, from
+/// coarse to fine. Along the panels between kinks these are polynomials as well; in
+/// panels of few segments `state`, the finest one prolonged, is kept as the finest
+/// grid's part of it.
+pub fn predict(levels: &[&Level], state: &mut State) {
+    let [coarser @ .., finest] = levels else {
+        return;
+    };
+    let first = &levels[0].leaf;
+    let edges = edges(&first.grid, first.leaf.kinks());
+    let panel = |ends: &[usize]| Panel {
+        first: ends[0],
+        last: ends[1],
+        coarsest: first.segments(),
+    };
+    let panels: Vec<Panel> = edges.windows(2).map(panel).collect();
+    for panel in &panels {
+        if panel.count(&finest.state) >= SEGMENTS {
+            panel.interpolate(&finest.state, state);
+        }
+    }
+    let square = |segments: usize| (segments as f64).powi(-2);
+    let squares: Vec<f64> = (levels.iter().map(|it| square(it.leaf.segments()))).collect();
+    let target = square(state.segments());
+    for (k, level) in coarser.iter().enumerate() {
+        let others = squares.iter().enumerate().filter(|(other, _)| *other != k);
+        let weight = others.map(|(_, other)| (target - other) / (squares[k] - other));
+        let weight = weight.product();
+        for panel in &panels {
+            panel.add_change(weight, &level.state, &finest.state, state);
+        }
+    }
+}
+
+/// Nodes of a grid at its ends and kinks.
+fn edges(grid: &Grid, kinks: &[f64]) -> Vec<usize> {
+    let node = |kink: &f64| grid.sigma().partition_point(|at| *at < kink - 1e-12);
+    let inner = kinks.iter().map(node);
+    [0].into_iter()
+        .chain(inner)
+        .chain([grid.segments()])
+        .collect()
+}
+
+/// The part of the rods between two kinks: segments `first` to `last` of `coarsest`
+/// ones on the coarsest grid.
+struct Panel {
+    first: usize,
+    last: usize,
+    coarsest: usize,
+}
+
+impl Panel {
+    /// Its first node or segment on the grid of a state.
+    fn first(&self, state: &State) -> usize {
+        self.first * state.segments() / self.coarsest
+    }
+
+    /// Its segments there.
+    fn count(&self, state: &State) -> usize {
+        (self.last - self.first) * state.segments() / self.coarsest
+    }
+
+    /// Polynomials through its nodes on a grid at those on another.
+    fn nodes(&self, from: &State, to: &State) -> Vec<Polynomial> {
+        let (have, want) = (self.count(from), self.count(to));
+        let place = |k: usize| (k * have) as f64 / want as f64;
+        let through = |k: usize| Polynomial::new(self.first(from), have + 1, place(k));
+        (0..=want).map(through).collect()
+    }
+
+    /// The same with the middles of segments.
+    fn middles(&self, from: &State, to: &State) -> Vec<Polynomial> {
+        let (have, want) = (self.count(from), self.count(to));
+        let place = |i: usize| (i as f64 + 0.5) * have as f64 / want as f64 - 0.5;
+        let through = |i: usize| Polynomial::new(self.first(from), have, place(i));
+        (0..want).map(through).collect()
+    }
+
+    /// Writes the values of the polynomials through the state on one grid.
+    fn interpolate(&self, from: &State, to: &mut State) {
+        let (nodes, middles) = (self.nodes(from, to), self.middles(from, to));
+        for j in 0..from.rods() {
+            let base = from.base(j);
+            let first = to.base(j) + self.first(to);
+            for (k, node) in nodes.iter().enumerate() {
+                let reference = from.q[base + node.first];
+                let mut sum = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
+                for (i, weight) in node.terms() {
+                    let q = from.q[base + i];
+                    sum += q * (weight * q.dot(reference).signum());
+                }
+                to.x[first + k] = node.value(|i| from.x[base + i]);
+                to.q[first + k] = sum.normalize();
+            }
+            let base = j * from.segments();
+            let first = j * to.segments() + self.first(to);
+            for (i, middle) in middles.iter().enumerate() {
+                to.n[first + i] = middle.value(|i| from.n[base + i]);
+            }
+        }
+    }
+
+    /// Adds `weight` times the change from the state on the `fine` grid to that on
+    /// the `coarse` one.
+    fn add_change(&self, weight: f64, coarse: &State, fine: &State, to: &mut State) {
+        let (nodes, middles) = (self.nodes(coarse, to), self.middles(coarse, to));
+        let on_coarse = self.middles(fine, coarse);
+        let (start, count) = (self.first(coarse), self.count(coarse));
+        let stride = fine.segments() / coarse.segments();
+        for j in 0..coarse.rods() {
+            let change = |i: usize| {
+                let (a, b) = (coarse.base(j) + i, fine.base(j) + stride * i);
+                let turn = rotation::log(coarse.q[a] * fine.q[b].conjugate());
+                (weight * (coarse.x[a] - fine.x[b]), weight * turn)
+            };
+            let changes: Vec<_> = (start..=start + count).map(change).collect();
+            let first = to.base(j) + self.first(to);
+            // The first node is the base, or at a kink and done.
+            for (k, node) in nodes.iter().enumerate().skip(1) {
+                let turn = node.value(|i| changes[i - start].1);
+                to.x[first + k] += node.value(|i| changes[i - start].0);
+                to.q[first + k] = (rotation::exp(turn) * to.q[first + k]).normalize();
+            }
+            let [base, fine_base] = [coarse, fine].map(|state| j * state.segments());
+            let change = |i: usize| {
+                let known = on_coarse[i - start].value(|i| fine.n[fine_base + i]);
+                weight * (coarse.n[base + i] - known)
+            };
+            let changes: Vec<_> = (start..start + count).map(change).collect();
+            let first = j * to.segments() + self.first(to);
+            for (i, middle) in middles.iter().enumerate() {
+                to.n[first + i] += middle.value(|i| changes[i - start]);
+            }
+        }
+    }
+}
+
+/// A value of the polynomial through points next to each other.
+struct Polynomial {
+    first: usize,
+    count: usize,
+    weights: [f64; POINTS],
+}
+
+impl Polynomial {
+    /// At `place` among `points` equally spaced points, of which `first` is the
+    /// first: through the nearest of them.
+    fn new(first: usize, points: usize, place: f64) -> Self {
+        let count = POINTS.min(points);
+        let centred = (place - 0.5 * (count - 1) as f64).round().max(0.0);
+        let skipped = (centred as usize).min(points - count);
+        let mut weights = [0.0; POINTS];
+        for (a, weight) in weights[..count].iter_mut().enumerate() {
+            *weight = lagrange(count, a, place - skipped as f64);
+        }
+        Polynomial {
+            first: first + skipped,
+            count,
+            weights,
+        }
+    }
+
+    /// Points and their weights.
+    fn terms(&self) -> impl Iterator<Item = (usize, f64)> {
+        (self.first..).zip(self.weights[..self.count].iter().copied())
+    }
+
+    fn value(&self, at: impl Fn(usize) -> DVec3) -> DVec3 {
+        self.terms().map(|(i, weight)| weight * at(i)).sum()
+    }
+}
