@@ -1,6 +1,6 @@
 //! The search for a point of a boundary: the zero of an eigenvalue across it.
 
-use super::sheet::{Direction, Sample, Sheet, Spot};
+use super::sheet::{Direction, Near, Sample, Sheet, Spot};
 use crate::branch::equations::Stuck;
 use crate::leaf::Field;
 
@@ -99,11 +99,17 @@ impl Search<'_> {
         let border: Vec<Field> = (self.held.iter())
             .map(|mode| sheet.equations.momentum(mode))
             .collect();
-        let rates = sheet.rates(self.spot)?;
+        let pattern = sheet.equations.bordered_pattern(border.len())?;
+        let mut near = Near {
+            pattern: &pattern,
+            border: &border,
+            rates: sheet.rates(self.spot)?,
+            factored: None,
+        };
         // From the last spot, which the next is near.
         let mut at = |from: &Spot, step: f64, distance: f64| -> Result<Found, Lost> {
             let spot = sheet.moved(from, self.across, step)?;
-            let sample = sheet.settle(&spot, [self.along, self.across], &border, &rates)?;
+            let sample = sheet.settle(&spot, [self.along, self.across], &mut near)?;
             let eigen = eigen(&sample, self.neutral);
             Ok(Found {
                 sample,
