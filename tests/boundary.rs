@@ -7,7 +7,7 @@ mod workplace;
 use std::f64::consts::PI;
 
 use common::branch::text;
-use common::{RIGID, ROD, entries};
+use common::{RIGID, ROD, entries, path};
 use leafdyn::study::{
     Base, Boundary, BoundaryCurve, BoundaryPoint, BoundaryRequest, TraceRequest, boundary,
 };
@@ -337,6 +337,50 @@ fn a_boundary_is_a_table_a_summary_and_a_figure() {
         json["curves"][0]["points"].as_array().unwrap().len(),
         rows.len()
     );
+}
+
+/// A column buckles in both directions at once where it is equally stiff in both: at the end
+/// of the range, and within it.
+#[test]
+fn crossings_are_where_their_errors_say() {
+    for (stiffness, count) in [(0.55, 2), (0.52, 4)] {
+        let more = format!("{RIGID}; stiffness.torsion=10; stiffness.bending_2={stiffness:?}");
+        let (along, across) = ("load.tip_force[0]=-1..-30", "stiffness.bending_3=0.5..0.55");
+        let found = follow(ROD, &more, along, across);
+        let points = found.curves.iter().flat_map(|curve| &curve.points);
+        let crossings: Vec<_> = points.filter(|point| point.kind == "crossing").collect();
+        assert_eq!(crossings.len(), count);
+        for (k, point) in crossings.iter().enumerate() {
+            let half_waves = 0.5 + (2 * k / count) as f64;
+            let load = -(half_waves * PI).powi(2) * stiffness;
+            let ([p, s], [pe, se]) = (point.values, point.errors);
+            println!(
+                "{:.1e} of {pe:.1e}, {:.1e} of {se:.1e}",
+                p - load,
+                s - stiffness
+            );
+            assert!((p - load).abs() <= pe && pe < 2e-6, "{point:?}");
+            assert!((s - stiffness).abs() <= se && se < 1e-9, "{point:?}");
+        }
+    }
+}
+
+/// The undulation boundary takes a few matrices a point and grid, of which there are three or
+/// four: work must not grow unnoticed.
+#[test]
+fn points_of_the_undulation_boundary_take_few_factorizations() {
+    let text = std::fs::read_to_string(path("study/undulation")).unwrap();
+    let weak = (0..11).filter(|vein| *vein != 5);
+    let weak: Vec<String> = weak
+        .map(|vein| format!("stiffness.bending_2[{vein}]"))
+        .collect();
+    let along = format!("{}=1..0.4:50log", weak.join("+"));
+    let across = "stiffness.torsion=0.9..1:2log";
+    let found = follow(&text, "load.gravity=[0,0,0]", &along, across);
+    let points: usize = found.curves.iter().map(|curve| curve.points.len()).sum();
+    println!("{} for {points} points", found.factorizations);
+    assert!(points >= 6, "{points}");
+    assert!(found.factorizations <= 18 * points);
 }
 
 /// What ends early is said, with what was found until then.

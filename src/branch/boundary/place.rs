@@ -88,6 +88,7 @@ impl Place {
             neutral: like.neutral,
             accuracy: 1e-11,
             furthest: 0.1,
+            expected: 0.0,
         };
         let found = found.run(sheet)?;
         like.at(sheet, found)

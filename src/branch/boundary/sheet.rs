@@ -317,12 +317,12 @@ impl<'a> Sheet<'a> {
     /// spot; the matrix may be singular: it is bordered, and what this cannot decide is left
     /// as it is. Matrix and rates may be those of a point nearby: they only decide how fast
     /// the method goes, and cost more than some iterations. A slow one takes a new matrix.
-    pub fn settle(
+    pub fn rest(
         &mut self,
         spot: &Spot,
         normals: [&Direction; 2],
         near: &mut Near,
-    ) -> Result<Sample, Stuck> {
+    ) -> Result<Spot, Stuck> {
         let duals = normals.map(|normal| self.equations.momentum(&normal.increments));
         let normals = [0, 1].map(|k| (&duals[k], normals[k].place.as_slice()));
         let mut spot = spot.clone();
@@ -363,17 +363,27 @@ impl<'a> Sheet<'a> {
             let place = [0, 1].map(|i| spot.place[i] + changes[i]);
             spot = Spot { state, place };
             if converged(size, previous, [1.0, rate], AT_REST).is_some() {
-                self.assembled(&mut spot, true)?;
-                let (pattern, border) = (near.pattern, near.border);
-                let here = (self.equations).factorize_bordered(pattern, border, &[], 0.0)?;
-                return Ok(Sample {
-                    spot,
-                    solved: here.solved,
-                    rates: Vec::new(),
-                });
+                return Ok(spot);
             }
             previous = size;
         }
         Err(Stuck::NotConverged)
+    }
+    /// The same, and what the bordered equations say there.
+    pub fn settle(
+        &mut self,
+        spot: &Spot,
+        normals: [&Direction; 2],
+        near: &mut Near,
+    ) -> Result<Sample, Stuck> {
+        let mut spot = self.rest(spot, normals, near)?;
+        self.assembled(&mut spot, true)?;
+        let (pattern, border) = (near.pattern, near.border);
+        let here = (self.equations).factorize_bordered(pattern, border, &[], 0.0)?;
+        Ok(Sample {
+            spot,
+            solved: here.solved,
+            rates: Vec::new(),
+        })
     }
 }

@@ -7,6 +7,7 @@ use crate::branch::{
     Critical, End, Family, Followed, Grids, Kind, NEARLY_RIGID, Point, Refined, Stuck, Walk,
     refine_at, switch,
 };
+use crate::relax::fall::settle_from;
 use crate::relax::{Direction, Fate, Loss, Neighbour, Push};
 use crate::scenario::Scenario;
 
@@ -173,9 +174,17 @@ fn landing(
     let equations = grids.of(&critical.state);
     let stop = || stable.limit.reached();
     let fallen = equations.descend(&critical.state, critical.fraction, &entrance.way, &stop);
-    let point = equations.correct(&fallen.ok()?.state, fold.fraction, None);
-    let (point, _) = point.ok().filter(|(point, _)| point.index == 0)?;
     let family = equations.leaves.family;
+    let state = match fallen {
+        Ok(point) => point.state,
+        // It may have to turn out of the way.
+        Err(state) => {
+            let leaf = family.leaf(fold.fraction).ok()?;
+            settle_from(&leaf, &entrance.grid, state, stable.limit)?
+        }
+    };
+    let point = equations.correct(&state, fold.fraction, None);
+    let (point, _) = point.ok().filter(|(point, _)| point.index == 0)?;
     let rest = refine_at(family, &entrance.grid, &point, stable.accuracy).ok()?;
     let scale = family.scale();
     Some(Neighbour {
