@@ -1,13 +1,11 @@
 //! The equations of a branch where the matrix is singular, or nearly so.
 
-use std::sync::Arc;
-
 use nalgebra::{DMatrix, DVector};
 
 use super::equations::{Equations, ITERATIONS, LARGEST, Stuck, at_rest, factorized};
 use super::field::{add, combined, dot, is_finite, largest, times};
 use super::{Point, Tangent};
-use crate::leaf::{Bordered, Field, SparseFactor, SparsePattern, State, System};
+use crate::leaf::{Bordered, Field, SparsePattern, State, System};
 
 /// What of a singular matrix of the border counts as zero, relative to the rest.
 const NEUTRAL: f64 = 1e-7;
@@ -98,59 +96,32 @@ impl Equations<'_> {
         rates: &[&Field],
         shift: f64,
     ) -> Result<Solved, Stuck> {
-        let pattern = self.bordered_pattern(border.len())?;
-        let mut factored = self.factorize_bordered(&pattern, border, rates, shift)?;
-        factored.solve(forces);
-        Ok(factored.solved)
-    }
-
-    /// The pattern of the matrix with a border of so many rows.
-    pub(super) fn bordered_pattern(&mut self, rows: usize) -> Result<Arc<SparsePattern>, Stuck> {
-        match &self.bordered {
-            Some((held, pattern)) if *held == rows => Ok(pattern.clone()),
-            _ => {
-                let pattern = SparsePattern::bordered(&self.system, rows);
-                let pattern = Arc::new(pattern.map_err(|_| Stuck::TooLarge)?);
-                self.bordered = Some((rows, pattern.clone()));
-                Ok(pattern)
-            }
-        }
-    }
-
-    /// Factorises the matrix of the system, K + `shift` M, bordered, and solves for rates of
-    /// forces and the units of the border.
-    pub(super) fn factorize_bordered<'p>(
-        &mut self,
-        pattern: &'p SparsePattern,
-        border: &[Field],
-        rates: &[&Field],
-        shift: f64,
-    ) -> Result<Factored<'p>, Stuck> {
         let p = border.len();
+        if self.bordered.as_ref().is_none_or(|(held, _)| *held != p) {
+            let pattern = SparsePattern::bordered(&self.system, p);
+            self.bordered = Some((p, pattern.map_err(|_| Stuck::TooLarge)?));
+        }
+        let (_, pattern) = self.bordered.as_ref().ok_or(Stuck::TooLarge)?;
         self.factorizations += 1;
         let factor = pattern.factorize_bordered(&self.system, shift, border);
         let mut factor = factor.map_err(|_| Stuck::TooLarge)?;
         let none = vec![0.0; p];
-        let zero = border.first().map_or_else(Vec::new, |row| times(row, 0.0));
+        let zero = times(forces, 0.0);
         let unit = |i: usize| (0..p).map(|k| if k == i { 1.0 } else { 0.0 }).collect();
         let units: Vec<Vec<f64>> = (0..p).map(unit).collect();
         let columns = units.iter().map(|unit| factor.solve_bordered(&zero, unit));
         let columns: Vec<Bordered> = columns.collect();
-        let solved = Solved {
+        Ok(Solved {
             h: DMatrix::from_fn(p, p, |r, c| {
                 0.5 * (columns[c].multipliers[r] + columns[r].multipliers[c])
             }),
             modes: columns.into_iter().map(|it| it.increments).collect(),
+            forces: factor.solve_bordered(forces, &none),
             rates: (rates.iter())
                 .map(|rate| factor.solve_bordered(rate, &none))
                 .collect(),
             negative: factor.negative(),
-            forces: Bordered {
-                increments: zero,
-                multipliers: none,
-            },
-        };
-        Ok(Factored { factor, solved })
+        })
     }
 
     /// The `count` modes whose eigenvalues are next to zero at a point, by
@@ -208,22 +179,7 @@ impl Equations<'_> {
     }
 }
 
-/// A bordered matrix that is factorised, and solutions with it.
-pub(super) struct Factored<'p> {
-    factor: SparseFactor<'p>,
-    pub solved: Solved,
-}
-
-impl Factored<'_> {
-    /// Solves for forces.
-    pub fn solve(&mut self, forces: &Field) {
-        let none = vec![0.0; self.solved.modes.len()];
-        self.solved.forces = self.factor.solve_bordered(forces, &none);
-    }
-}
-
 /// Solutions of the bordered equations at some state.
-#[derive(Clone)]
 pub(super) struct Solved {
     /// For the forces, and for the rates at which they change with each number.
     pub forces: Bordered,

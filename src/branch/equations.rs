@@ -1,7 +1,5 @@
 //! The equations of a branch on one grid, linearised and solved.
 
-use std::sync::Arc;
-
 use super::family::{Family, Leaves, OutOfRange, clamp};
 use super::field::{between, dot, is_finite, largest, plus, times};
 use super::{Point, Tangent};
@@ -63,7 +61,7 @@ pub struct Equations<'a> {
     pub(super) mass: f64,
     pub(super) system: System,
     pub(super) pattern: Option<SparsePattern>,
-    pub(super) bordered: Option<(usize, Arc<SparsePattern>)>,
+    pub(super) bordered: Option<(usize, SparsePattern)>,
     /// Whether rods are solved one by one, as can be in a valley.
     rodwise: bool,
     /// Matrices factorised so far.

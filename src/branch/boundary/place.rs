@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::search::{self, Eigen, Found, Lost, Search};
-use super::sheet::{Direction, Near, Sample, Sheet, Spot};
+use super::sheet::{Direction, Sample, Sheet, Spot};
 use crate::branch::critical::{Critical, Kind};
 use crate::branch::equations::Stuck;
 use crate::branch::field::{add, combined, dot, plus, times};
@@ -88,7 +88,6 @@ impl Place {
             neutral: like.neutral,
             accuracy: 1e-11,
             furthest: 0.1,
-            expected: 0.0,
         };
         let found = found.run(sheet)?;
         like.at(sheet, found)
@@ -110,27 +109,16 @@ impl Place {
     pub fn at(&self, sheet: &mut Sheet, found: Found) -> Result<Place, Lost> {
         let border = self.held.iter().map(|mode| sheet.equations.momentum(mode));
         let border: Vec<Field> = border.collect();
-        let pattern = sheet.equations.bordered_pattern(border.len())?;
-        let mut near = Near {
-            pattern: &pattern,
-            border: &border,
-            rates: Vec::new(),
-            factored: None,
-        };
-        let sample = sheet.look(found.sample.spot, &mut near)?;
+        let sample = sheet.look(found.sample.spot, &border)?;
         let eigen = search::eigen(&sample, self.neutral);
         let basis = self.basis(sheet, &sample, &eigen)?;
         let held = held(sheet, &sample, &eigen);
         let border: Vec<Field> = held.iter().map(|it| sheet.equations.momentum(it)).collect();
-        let mut near = Near {
-            border: &border,
-            ..near
-        };
         let mut change = [0.0; 2];
         for (change, direction) in change.iter_mut().zip(&basis) {
             let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
                 let spot = sheet.moved(&sample.spot, direction, step)?;
-                let sample = sheet.settle(&spot, [&basis[0], &basis[1]], &mut near)?;
+                let sample = sheet.settle(&spot, [&basis[0], &basis[1]], &border, &sample.rates)?;
                 Ok::<f64, Stuck>(search::eigen(&sample, self.neutral).value)
             });
             *change = (after? - before?) / (2.0 * DIFFERENCE);

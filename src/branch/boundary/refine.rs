@@ -78,8 +78,6 @@ pub struct Verified {
     /// Morse indices where the first number is smaller and where it is larger; of a fold,
     /// of both branches that meet there.
     pub indices: [usize; 2],
-    /// Matrices that were factorised for it, but for softened ones.
-    pub factorizations: usize,
 }
 
 /// A point on as many grids as it takes; on all of them it must be the same. Of a nearly
@@ -115,17 +113,12 @@ fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<
         ..Table::default()
     };
     let mut moved = f64::INFINITY;
-    let (mut distance, mut factorizations) = (0.0, 0);
     for level in 0..GRIDS {
         if level > 0 {
             (sheet, near) = on_finer(&mut sheet, &near)?;
         }
         let rigid = sheet.leaf(near.spot.place)?.stiffest() * NEARLY_RIGID < 1.0;
-        // Each grid moves it by a quarter of what the one before did.
-        let again = again(&mut sheet, &near, (step.special, given), 0.25 * distance)?;
-        let Again { place, along, .. } = again;
-        distance = if level > 0 { again.distance } else { 0.0 };
-        factorizations += sheet.equations.factorizations;
+        let (place, along) = again(&mut sheet, &near, step.special, given)?;
         let way = near.spot.state.shift_to(&place.spot.state);
         if way > moved.max(STILL) {
             return Err(Doubt::OtherBranch);
@@ -156,10 +149,7 @@ fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<
         let tips = table.tips.best().is_some_and(|best| best.error <= tips);
         let numbers = table.errors().iter().all(|error| *error <= accuracy);
         if tips && (exact || last && numbers) {
-            return Ok(Verified {
-                factorizations,
-                ..table.verified(&sheet, &near, step.special)
-            });
+            return Ok(table.verified(&sheet, &near, step.special));
         }
         if last {
             break;
@@ -185,46 +175,25 @@ fn given_at(sheet: &Sheet, place: &Place) -> Option<usize> {
     order.into_iter().find(|&k| changes[k] && sine(k) > SINE)
 }
 
-/// A point on a grid, to rounding.
-struct Again {
-    place: Place,
-    /// Of a crossing, the change of the other eigenvalue along the boundary, which is all that
-    /// tells where on it the crossing is. (At a cusp the numbers do not change along it.)
-    along: Option<f64>,
-    /// How far across the boundary it was.
-    distance: f64,
-}
-
-/// The point on this grid, about so far from where it was.
+/// The point on this grid, to rounding; of a crossing also the change of the other
+/// eigenvalue along the boundary, which is all that tells where on it the crossing is. (At a
+/// cusp the numbers do not change along it.)
 fn again(
     sheet: &mut Sheet,
     near: &Place,
-    (special, given): (Option<Special>, Option<usize>),
-    expected: f64,
-) -> Result<Again, Lost> {
+    special: Option<Special>,
+    given: Option<usize>,
+) -> Result<(Place, Option<f64>), Lost> {
     if let Some(special) = special {
         let (place, slope) = locate_near(sheet, near, special)?;
-        return Ok(Again {
-            place,
-            along: (special == Special::Crossing).then_some(slope),
-            distance: 0.0,
-        });
+        return Ok((place, (special == Special::Crossing).then_some(slope)));
     }
-    let search = sought(sheet, near, given, expected);
-    let found = search.run(sheet)?;
-    let (distance, slope) = (found.distance, near.slope * found.slope / search.slope);
-    Ok(Again {
-        place: Place {
-            slope,
-            ..near.moved(sheet, found)
-        },
-        along: None,
-        distance,
-    })
+    let found = sought(sheet, near, given).run(sheet)?;
+    Ok((near.moved(sheet, found), None))
 }
 
 /// How the point is sought, from where it is on the grid before.
-fn sought(sheet: &Sheet, near: &Place, given: Option<usize>, expected: f64) -> Owned {
+fn sought(sheet: &Sheet, near: &Place, given: Option<usize>) -> Owned {
     let (across, slope, along) = match given {
         Some(which) => {
             let (across, slope) = near.across_at(sheet, which);
@@ -237,7 +206,6 @@ fn sought(sheet: &Sheet, near: &Place, given: Option<usize>, expected: f64) -> O
         across,
         slope,
         along,
-        expected,
     }
 }
 
@@ -247,7 +215,6 @@ struct Owned {
     across: Direction,
     slope: f64,
     along: Direction,
-    expected: f64,
 }
 
 impl Owned {
@@ -259,7 +226,6 @@ impl Owned {
             along: &self.along,
             held: &self.near.held,
             neutral: self.near.neutral,
-            expected: self.expected,
             accuracy: ACCURACY,
             furthest: NEAR,
         };
@@ -277,7 +243,7 @@ fn unsoftened(
 ) -> Result<[f64; 2], Lost> {
     let grid = sheet.grid().clone();
     let mut places = [[0.0; 2]; 4];
-    let mut owned = sought(sheet, near, given, 0.0);
+    let mut owned = sought(sheet, near, given);
     for (k, place) in places.iter_mut().enumerate().rev() {
         let mut soft = Sheet::new(sheet.plane, grid.clone())?;
         soft.soften(SOFTENING * (k + 1) as f64);
@@ -390,7 +356,6 @@ impl Table {
                 true => [below, beyond],
                 false => [beyond, below],
             },
-            factorizations: 0,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The search for a point of a boundary: the zero of an eigenvalue across it.
 
-use super::sheet::{Direction, Near, Sample, Sheet, Spot};
+use super::sheet::{Direction, Sample, Sheet, Spot};
 use crate::branch::equations::Stuck;
 use crate::leaf::Field;
 
@@ -9,9 +9,6 @@ const EVALUATIONS: usize = 30;
 
 /// A slope from points nearer than this is rounding.
 const LOCAL: f64 = 1e-6;
-
-/// A step of the secant method leaves so many times itself times the step that gave its slope.
-const LAST: f64 = 100.0;
 
 /// What one evaluation says of the modes that become neutral.
 pub struct Eigen {
@@ -52,8 +49,6 @@ pub struct Search<'s> {
     /// with these modes in the border, of which so many, the first, become neutral,
     pub held: &'s [Field],
     pub neutral: usize,
-    /// first so far from there,
-    pub expected: f64,
     /// to this accuracy, and not further.
     pub accuracy: f64,
     pub furthest: f64,
@@ -63,9 +58,8 @@ pub struct Search<'s> {
 pub struct Found {
     pub sample: Sample,
     pub eigen: Eigen,
-    /// How far from the start of the search, and the change of the eigenvalue with that.
+    /// How far from the start of the search.
     pub distance: f64,
-    pub slope: f64,
 }
 
 impl Found {
@@ -105,58 +99,43 @@ impl Search<'_> {
         let border: Vec<Field> = (self.held.iter())
             .map(|mode| sheet.equations.momentum(mode))
             .collect();
-        let pattern = sheet.equations.bordered_pattern(border.len())?;
-        let mut near = Near {
-            pattern: &pattern,
-            border: &border,
-            rates: sheet.rates(self.spot)?,
-            factored: None,
+        let rates = sheet.rates(self.spot)?;
+        // From the last spot, which the next is near.
+        let mut at = |from: &Spot, step: f64, distance: f64| -> Result<Found, Lost> {
+            let spot = sheet.moved(from, self.across, step)?;
+            let sample = sheet.settle(&spot, [self.along, self.across], &border, &rates)?;
+            let eigen = eigen(&sample, self.neutral);
+            Ok(Found {
+                sample,
+                eigen,
+                distance,
+            })
         };
-        let normals = [self.along, self.across];
-        let (mut distance, mut slope) = (self.expected, self.slope);
-        let mut spot = sheet.moved(self.spot, self.across, distance)?;
-        let mut best: Option<Found> = None;
-        let (mut value, mut step, mut span) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
+        let (mut distance, mut slope) = (0.0, self.slope);
+        let mut best = at(self.spot, 0.0, distance)?;
+        let (mut value, mut last) = (best.eigen.value, best.spot().clone());
         let mut worse = 0;
         for _ in 0..EVALUATIONS {
-            let sample = sheet.settle(&spot, normals, &mut near)?;
-            // From the last spot, which the next is near.
-            spot.clone_from(&sample.spot);
-            let eigen = eigen(&sample, self.neutral);
-            let (before, way) = (std::mem::replace(&mut value, eigen.value), step);
-            if way.is_finite() && way.abs() > LOCAL {
-                slope = (value - before) / way;
-                span = way;
+            let step = -value / slope;
+            if !step.is_finite() || (distance + step).abs() > self.furthest {
+                return Err(Lost::Stuck(Stuck::NotConverged));
             }
-            match (best.as_ref()).is_none_or(|best| value.abs() < best.eigen.value.abs()) {
-                true => {
-                    best = Some(Found {
-                        sample,
-                        eigen,
-                        distance,
-                        slope,
-                    });
-                }
+            if step.abs() < self.accuracy {
+                return Ok(best);
+            }
+            let next = at(&last, step, distance + step)?;
+            let after = next.eigen.value;
+            last.clone_from(next.spot());
+            if step.abs() > LOCAL {
+                slope = (after - value) / step;
+            }
+            (distance, value) = (distance + step, after);
+            match after.abs() < best.eigen.value.abs() {
+                true => best = next,
                 false => worse += 1,
             }
-            step = -value / slope;
-            if !step.is_finite() || (distance + step).abs() > self.furthest {
-                break;
-            }
-            if step.abs() < self.accuracy || worse > 1 {
-                return best.ok_or(Lost::Stuck(Stuck::NotConverged));
-            }
-            spot = sheet.moved(&spot, self.across, step)?;
-            distance += step;
-            // The slope is right but for the distance of the points that gave it.
-            if worse == 0
-                && let Some(found) = &mut best
-                && LAST * (step * span).abs() < self.accuracy
-            {
-                found.sample.spot = sheet.rest(&spot, normals, &mut near)?;
-                found.distance = distance;
-                found.slope = slope;
-                return best.ok_or(Lost::Stuck(Stuck::NotConverged));
+            if worse > 1 {
+                return Ok(best);
             }
         }
         Err(Lost::Stuck(Stuck::NotConverged))

@@ -3,19 +3,14 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use crate::branch::deflation::{Factored, Solved};
-use crate::branch::equations::{Equations, LARGEST, Stuck, assembled, forces_on, rate};
+use crate::branch::deflation::Solved;
+use crate::branch::equations::{
+    Equations, ITERATIONS, LARGEST, Stuck, assembled, at_rest, forces_on, rate,
+};
 use crate::branch::family::{Family, OutOfRange};
 use crate::branch::field::{between, is_finite, largest, plus, times};
-use crate::leaf::{DiscreteLeaf, Field, Grid, Leaf, SparsePattern, State, System};
-use crate::newton::converged;
+use crate::leaf::{DiscreteLeaf, Field, Grid, Leaf, State, System};
 use crate::scenario::Scenario;
-
-/// Iterations to the sheet; a matrix by which increments do not shrink to this part is left;
-/// the accuracy of a point, and increments that are rounding if they do not shrink.
-const ITERATIONS: usize = 30;
-const SLOW: f64 = 0.1;
-const AT_REST: (f64, f64) = (1e-13, 1e-8);
 
 /// Leaves that differ in two numbers: a family along the first for every value of the
 /// second.
@@ -129,17 +124,8 @@ impl Direction {
 pub struct Sample {
     pub spot: Spot,
     pub solved: Solved,
-    /// How the forces change with both numbers, if that was asked for.
+    /// How the forces change with both numbers.
     pub rates: Vec<Field>,
-}
-
-/// What points share that are near each other: the border, the rates of both numbers, and a
-/// matrix that is factorised, if there is one.
-pub struct Near<'p> {
-    pub pattern: &'p SparsePattern,
-    pub border: &'p [Field],
-    pub rates: Vec<Field>,
-    pub factored: Option<Factored<'p>>,
 }
 
 /// The equations of a plane on a grid.
@@ -255,41 +241,41 @@ impl<'a> Sheet<'a> {
         Ok(next)
     }
 
-    /// The forces at a spot and their rounding; the matrix is left in the system.
-    fn assembled(&mut self, spot: &mut Spot, soft: bool) -> Result<(Field, f64), Stuck> {
+    /// What the bordered equations say at a spot, at rest or not, with the rates of both
+    /// numbers.
+    fn sample(
+        &mut self,
+        mut spot: Spot,
+        border: &[Field],
+        rates: Vec<Field>,
+        soft: bool,
+    ) -> Result<(Sample, f64), Stuck> {
         let Sheet {
             plane,
             equations,
             kept,
             softened,
         } = self;
-        let grid = &equations.leaves.grid;
+        let grid = equations.leaves.grid.clone();
         let leaf = match softened {
-            Some((family, kept)) if soft => kept.at(plane, family, grid, spot.place)?,
-            _ => kept.at(plane, plane.family, grid, spot.place)?,
+            Some((family, kept)) if soft => kept.at(plane, family, &grid, spot.place)?,
+            _ => kept.at(plane, plane.family, &grid, spot.place)?,
         };
-        assembled(leaf, &mut equations.system, &mut spot.state)
-    }
-
-    /// What the bordered equations say at a spot at rest; with the rates of both numbers.
-    /// The matrix is left for points nearby.
-    pub fn look<'p>(&mut self, mut spot: Spot, near: &mut Near<'p>) -> Result<Sample, Stuck> {
-        let rates = self.rates(&spot)?;
-        let (forces, _) = self.assembled(&mut spot, true)?;
+        let (forces, noise) = assembled(leaf, &mut equations.system, &mut spot.state)?;
         let each: Vec<&Field> = rates.iter().collect();
-        let factored = (self.equations).factorize_bordered(near.pattern, near.border, &each, 0.0);
-        let mut factored = factored?;
-        factored.solve(&forces);
-        let solved = factored.solved.clone();
-        if self.softened.is_none() {
-            near.factored = Some(factored);
-        }
-        near.rates = rates.clone();
-        Ok(Sample {
+        let solved = equations.solve_bordered(border, &forces, &each)?;
+        let sample = Sample {
             spot,
             solved,
             rates,
-        })
+        };
+        Ok((sample, noise))
+    }
+
+    /// The same at a spot at rest, with its own rates.
+    pub fn look(&mut self, spot: Spot, border: &[Field]) -> Result<Sample, Stuck> {
+        let rates = self.rates(&spot)?;
+        Ok(self.sample(spot, border, rates, true)?.0)
     }
 
     /// How the forces change with both numbers.
@@ -314,76 +300,39 @@ impl<'a> Sheet<'a> {
     }
 
     /// Newton's method to the sheet within the plane normal to two directions through a
-    /// spot; the matrix may be singular: it is bordered, and what this cannot decide is left
-    /// as it is. Matrix and rates may be those of a point nearby: they only decide how fast
-    /// the method goes, and cost more than some iterations. A slow one takes a new matrix.
-    pub fn rest(
-        &mut self,
-        spot: &Spot,
-        normals: [&Direction; 2],
-        near: &mut Near,
-    ) -> Result<Spot, Stuck> {
-        let duals = normals.map(|normal| self.equations.momentum(&normal.increments));
-        let normals = [0, 1].map(|k| (&duals[k], normals[k].place.as_slice()));
-        let mut spot = spot.clone();
-        let mut previous = f64::INFINITY;
-        for _ in 0..ITERATIONS {
-            let (forces, noise) = self.assembled(&mut spot, false)?;
-            let known = near.factored.take();
-            let fresh = known.is_none();
-            let mut factored = match known {
-                Some(factored) => factored,
-                None => {
-                    let rates: Vec<&Field> = near.rates.iter().collect();
-                    self.equations
-                        .factorize_bordered(near.pattern, near.border, &rates, 0.0)?
-                }
-            };
-            factored.solve(&forces);
-            let (increments, changes) = factored.solved.step(&normals, noise)?;
-            let size = largest(&increments)
-                .max(changes[0].abs())
-                .max(changes[1].abs());
-            let sound = is_finite(&increments) && size.is_finite() && size <= LARGEST;
-            if !sound && fresh {
-                return Err(Stuck::NotConverged);
-            }
-            if !sound {
-                continue;
-            }
-            // By a matrix that stays, increments shrink in proportion.
-            let rate = match previous.is_finite() {
-                true => size / previous,
-                false => SLOW,
-            };
-            if rate <= SLOW || size < AT_REST.1 {
-                near.factored = Some(factored);
-            }
-            let state = self.advanced(&spot, &increments, 1.0)?;
-            let place = [0, 1].map(|i| spot.place[i] + changes[i]);
-            spot = Spot { state, place };
-            if converged(size, previous, [1.0, rate], AT_REST).is_some() {
-                return Ok(spot);
-            }
-            previous = size;
-        }
-        Err(Stuck::NotConverged)
-    }
-    /// The same, and what the bordered equations say there.
+    /// spot; the matrix may be singular: it is bordered by `border`, and what this cannot
+    /// decide is left as it is. The rates may be those of a spot nearby: they only decide
+    /// how fast the method goes, and leaves at other numbers cost more than an iteration.
     pub fn settle(
         &mut self,
         spot: &Spot,
         normals: [&Direction; 2],
-        near: &mut Near,
+        border: &[Field],
+        rates: &[Field],
     ) -> Result<Sample, Stuck> {
-        let mut spot = self.rest(spot, normals, near)?;
-        self.assembled(&mut spot, true)?;
-        let (pattern, border) = (near.pattern, near.border);
-        let here = (self.equations).factorize_bordered(pattern, border, &[], 0.0)?;
-        Ok(Sample {
-            spot,
-            solved: here.solved,
-            rates: Vec::new(),
-        })
+        let duals = normals.map(|normal| self.equations.momentum(&normal.increments));
+        let normals = [0, 1].map(|k| (&duals[k], normals[k].place.as_slice()));
+        let mut spot = spot.clone();
+        let mut previous = f64::INFINITY;
+        let mut finished = false;
+        for _ in 0..=ITERATIONS {
+            let (sample, noise) = self.sample(spot, border, rates.to_vec(), finished)?;
+            if finished {
+                return Ok(sample);
+            }
+            let (increments, changes) = sample.solved.step(&normals, noise)?;
+            let size = largest(&increments)
+                .max(changes[0].abs())
+                .max(changes[1].abs());
+            if !is_finite(&increments) || !size.is_finite() || size > LARGEST {
+                return Err(Stuck::NotConverged);
+            }
+            let state = self.advanced(&sample.spot, &increments, 1.0)?;
+            let place = [0, 1].map(|i| sample.spot.place[i] + changes[i]);
+            spot = Spot { state, place };
+            finished = at_rest(size, previous);
+            previous = size;
+        }
+        Err(Stuck::NotConverged)
     }
 }

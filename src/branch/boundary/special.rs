@@ -64,7 +64,6 @@ pub fn onto(
         along: &now.tangent,
         held: &now.held,
         neutral: now.neutral,
-        expected: 0.0,
         accuracy,
         furthest,
     };
@@ -153,7 +152,6 @@ pub fn land(
         along: &along,
         held: &now.held,
         neutral: now.neutral,
-        expected: 0.0,
         accuracy: GIVEN,
         furthest: 0.5,
     };
