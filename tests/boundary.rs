@@ -339,6 +339,32 @@ fn a_boundary_is_a_table_a_summary_and_a_figure() {
     );
 }
 
+/// A column buckles in both directions at once where it is equally stiff in both: at the end
+/// of the range, and within it.
+#[test]
+fn crossings_are_where_their_errors_say() {
+    for (stiffness, count) in [(0.55, 2), (0.52, 4)] {
+        let more = format!("{RIGID}; stiffness.torsion=10; stiffness.bending_2={stiffness:?}");
+        let (along, across) = ("load.tip_force[0]=-1..-30", "stiffness.bending_3=0.5..0.55");
+        let found = follow(ROD, &more, along, across);
+        let points = found.curves.iter().flat_map(|curve| &curve.points);
+        let crossings: Vec<_> = points.filter(|point| point.kind == "crossing").collect();
+        assert_eq!(crossings.len(), count);
+        for (k, point) in crossings.iter().enumerate() {
+            let half_waves = 0.5 + (2 * k / count) as f64;
+            let load = -(half_waves * PI).powi(2) * stiffness;
+            let ([p, s], [pe, se]) = (point.values, point.errors);
+            println!(
+                "{:.1e} of {pe:.1e}, {:.1e} of {se:.1e}",
+                p - load,
+                s - stiffness
+            );
+            assert!((p - load).abs() <= pe && pe < 2e-6, "{point:?}");
+            assert!((s - stiffness).abs() <= se && se < 1e-9, "{point:?}");
+        }
+    }
+}
+
 /// What ends early is said, with what was found until then.
 #[test]
 fn a_curve_that_goes_on_is_an_outcome() {

@@ -1,4 +1,4 @@
-//! From a stable equilibrium uphill to a saddle.
+//! From a stable equilibrium uphill to a saddle, and down from there.
 //!
 //! Along a direction v the energy is made as large as it can be, across it as
 //! small: with the matrix bordered by the masses times v (as at a critical point),
@@ -7,10 +7,13 @@
 //! to where the floor is highest by a cubic, as near a fold it is; where it is not, v becomes the mode of the lowest eigenvalue, and the steps
 //! Newton's (Crippen and Scheraga, Arch. Biochem. Biophys. 144, 1971; Henkelman and
 //! Jonsson, J. Chem. Phys. 111, 1999).
+//!
+//! The way down follows the same floor, whose lowest point is Newton's once it is convex. No
+//! stiffness is taken from the leaf meanwhile, which near a fold would lead elsewhere.
 
 use super::Point;
 use super::deflation::Solved;
-use super::equations::{Equations, Linear, factorized};
+use super::equations::{Equations, Linear, Stuck, factorized};
 use super::field::{add, largest, times};
 use crate::leaf::{Field, State};
 
@@ -21,7 +24,12 @@ const LONGEST: f64 = 0.2;
 /// The first step, and the shortest by the cubic model, in the same measure.
 const FIRST: f64 = 0.01;
 
-/// Increments below this lead to the saddle by Newton's method.
+/// Steps of a way down, the push at its beginning, and the growth of its steps.
+const DOWN: usize = 200;
+const PUSH: f64 = 0.01;
+const GROWTH: f64 = 1.5;
+
+/// Increments below this lead to the equilibrium by Newton's method.
 const NEAR: f64 = 1e-2;
 
 /// Shift (in squared frequencies, over the masses) that makes the matrix across the
@@ -103,6 +111,83 @@ impl Equations<'_> {
             }
         }
         None
+    }
+
+    /// Where the leaf comes to rest that leaves a saddle along its unstable mode, to the side
+    /// of `way` and to the other: see [`Equations::descend`].
+    pub fn fall(
+        &mut self,
+        saddle: &Point,
+        way: &Field,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<[Result<Point, State>; 2], Stuck> {
+        self.linearise(&mut saddle.state.clone(), saddle.fraction)?;
+        let mode = self.lowest_mode(way).ok_or(Stuck::NotConverged)?;
+        Ok([1.0, -1.0].map(|sign| {
+            let way = times(&mode, sign);
+            self.descend(&saddle.state, saddle.fraction, &way, stop)
+        }))
+    }
+
+    /// The stable equilibrium that is reached downhill from a state that is none, or hardly
+    /// one, first in the direction `way`; if none is, how far the way led.
+    pub fn descend(
+        &mut self,
+        state: &State,
+        fraction: f64,
+        way: &Field,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Point, State> {
+        let (mut way, mut far) = (self.unit(way), PUSH);
+        let push = times(&way, PUSH / largest(&way));
+        let mut state = (self.moved(state, fraction, &push, 1.0)).map_err(|_| state.clone())?;
+        for _ in 0..DOWN {
+            let next = match stop() {
+                true => None,
+                false => self.step_down(&mut state, fraction, &mut way, &mut far),
+            };
+            let Some((next, near)) = next else {
+                return Err(state);
+            };
+            state = next;
+            if near {
+                let rest = self.correct(&state, fraction, None).ok();
+                let rest = rest.filter(|(point, _)| point.index == 0);
+                return rest.map(|(point, _)| point).ok_or(state);
+            }
+        }
+        Err(state)
+    }
+
+    /// A step down the valley floor; also whether it was a short one of Newton's method.
+    fn step_down(
+        &mut self,
+        state: &mut State,
+        fraction: f64,
+        way: &mut Field,
+        far: &mut f64,
+    ) -> Option<(State, bool)> {
+        let linear = self.linearise(state, fraction).ok()?;
+        let Valley {
+            solved,
+            shift,
+            curvature,
+        } = self.valley(way, &linear)?;
+        let (along, force) = (&solved.modes[0], solved.forces.multipliers[0]);
+        let across = &solved.forces.increments;
+        let newton = curvature > 0.0 && shift == linear.shift;
+        let mut increments = across.clone();
+        if newton {
+            add(&mut increments, force / curvature, along);
+        } else if largest(across) < LONGEST {
+            add(&mut increments, far.copysign(force) / largest(along), along);
+            *far = (GROWTH * *far).min(LONGEST);
+        }
+        *way = self.unit(along);
+        let size = largest(&increments);
+        let step = times(&increments, (LONGEST / size).min(1.0));
+        let next = self.moved(state, fraction, &step, 1.0).ok()?;
+        Some((next, newton && size < NEAR))
     }
 
     /// The valley in the direction `way`, by the matrix that is assembled.

@@ -89,7 +89,7 @@ impl<'a> Family<'a> {
     }
 
     /// The leaf there.
-    fn leaf(&self, fraction: f64) -> Result<Leaf, OutOfRange> {
+    pub fn leaf(&self, fraction: f64) -> Result<Leaf, OutOfRange> {
         Ok(match fraction {
             0.0 => self.ends[0].clone(),
             1.0 => self.ends[1].clone(),

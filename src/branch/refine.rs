@@ -136,6 +136,16 @@ pub fn refine(
     }
 }
 
+/// The same where the parameter is what it is.
+pub fn refine_at(
+    family: &Family,
+    grid: &Grid,
+    point: &Point,
+    accuracy: f64,
+) -> Result<Refined, Doubt> {
+    refine_in(family, grid, point, accuracy, false)
+}
+
 fn refine_in(
     family: &Family,
     grid: &Grid,

@@ -106,6 +106,8 @@ pub struct Push {
     pub more_than: Option<f64>,
     /// What the leaf does there.
     pub then: Option<Fate>,
+    /// Where it comes to rest under this force, if it snaps at a fold.
+    pub neighbour: Option<Neighbour>,
     /// Where the tips are then.
     #[serde(flatten, serialize_with = "serialize_tips")]
     pub tips: Vec<DVec3>,
@@ -158,7 +160,7 @@ pub struct Barrier {
     pub neighbour: Neighbour,
 }
 
-/// The equilibrium behind a pass.
+/// The equilibrium behind a pass, or behind a fold.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Neighbour {
     /// Its energy.

@@ -41,7 +41,6 @@ pub(crate) use equilibrium::serialize_index;
 pub use equilibrium::{
     Accuracy, Equilibrium, Mode, Model, Outcome, Reaction, Sensitivity, Shape, Stability,
 };
-pub(crate) use fall::fall;
 pub(crate) use follow::{AtRest, Grids, Lost, extrapolation};
 pub(crate) use index::{index_near, project};
 pub use margin::{Barrier, Direction, Fate, Loss, Margin, Neighbour, Push};

@@ -90,17 +90,6 @@ pub fn polish(
 /// Pushes a state at a saddle along its most unstable mode, by inverse
 /// iteration with the smallest shift that makes the matrix positive definite.
 pub fn push_off(leaf: &DiscreteLeaf, state: &mut State, system: &mut System, work: &mut Work) {
-    push_along(leaf, state, system, work, PUSH);
-}
-
-/// The same by so much along that mode, or against it.
-pub fn push_along(
-    leaf: &DiscreteLeaf,
-    state: &mut State,
-    system: &mut System,
-    work: &mut Work,
-    by: f64,
-) {
     leaf.assemble(state, system);
     work.force_evaluations += 1;
     system.seed_mode();
@@ -123,7 +112,7 @@ pub fn push_along(
     }
     let (turn, displacement) = system.largest();
     let mut pushed = state.clone();
-    leaf.advance(state, system, by / turn.max(displacement), &mut pushed);
+    leaf.advance(state, system, PUSH / turn.max(displacement), &mut pushed);
     *state = pushed;
 }
 

@@ -1,5 +1,7 @@
 //! How far a leaf is from losing its stability, in words.
 
+use glam::DVec3;
+
 use crate::relax::{Barrier, Direction, Fate, Loss, Margin, Push};
 
 use super::numbers::{bound, brief, point};
@@ -42,18 +44,20 @@ fn lost_by(margin: &Margin, push: &Push) -> String {
         Some(Fate::BendsAside) => "makes it bend aside",
         Some(Fate::Snaps) | None => "snaps it",
     };
+    let rest = (push.neighbour.as_ref()).map(|it| format!(" to rest with tip {}", tip(it.tip)));
     let error = push.error.map(|error| format!(", within {}", bound(error)));
     let weights = push
         .per_weight
         .map(|part| format!(" ({} weights)", brief(part)));
     format!(
-        "a push of {at} {} {} {then}{}{}",
+        "a push of {at} {} {} {then}{}{}{}",
         directions(margin, push),
         if margin.every_tip {
             "at every tip"
         } else {
             "at the tip"
         },
+        rest.unwrap_or_default(),
         error.unwrap_or_default(),
         weights.unwrap_or_default(),
     )
@@ -89,9 +93,13 @@ fn barrier(margin: &Margin, barrier: &Barrier) -> String {
         unit.unwrap_or_default(),
         error.unwrap_or_default(),
         lifted.unwrap_or_default(),
-        point(barrier.saddle.tip.to_array(), DECIMALS),
-        point(barrier.neighbour.tip.to_array(), DECIMALS),
+        tip(barrier.saddle.tip),
+        tip(barrier.neighbour.tip),
     )
+}
+
+fn tip(tip: DVec3) -> String {
+    point(tip.to_array(), DECIMALS)
 }
 
 fn force(margin: &Margin, force: f64) -> String {

@@ -118,7 +118,7 @@ fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<
             (sheet, near) = on_finer(&mut sheet, &near)?;
         }
         let rigid = sheet.leaf(near.spot.place)?.stiffest() * NEARLY_RIGID < 1.0;
-        let place = again(&mut sheet, &near, step.special, given)?;
+        let (place, along) = again(&mut sheet, &near, step.special, given)?;
         let way = near.spot.state.shift_to(&place.spot.state);
         if way > moved.max(STILL) {
             return Err(Doubt::OtherBranch);
@@ -132,9 +132,9 @@ fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<
         near = place;
         let numbers = match rigid {
             false => near.spot.place,
-            true => unsoftened(&mut sheet, &near, given)?,
+            true => unsoftened(&mut sheet, &near, step.special, given)?,
         };
-        table.push(&mut sheet, &near, numbers, rigid)?;
+        table.push(&mut sheet, (&near, along), numbers, rigid)?;
         if level + 1 < FEWEST {
             continue;
         }
@@ -175,18 +175,21 @@ fn given_at(sheet: &Sheet, place: &Place) -> Option<usize> {
     order.into_iter().find(|&k| changes[k] && sine(k) > SINE)
 }
 
-/// The point on this grid, to rounding.
+/// The point on this grid, to rounding; of a crossing also the change of the other
+/// eigenvalue along the boundary, which is all that tells where on it the crossing is. (At a
+/// cusp the numbers do not change along it.)
 fn again(
     sheet: &mut Sheet,
     near: &Place,
     special: Option<Special>,
     given: Option<usize>,
-) -> Result<Place, Lost> {
+) -> Result<(Place, Option<f64>), Lost> {
     if let Some(special) = special {
-        return locate_near(sheet, near, special);
+        let (place, slope) = locate_near(sheet, near, special)?;
+        return Ok((place, (special == Special::Crossing).then_some(slope)));
     }
     let found = sought(sheet, near, given).run(sheet)?;
-    Ok(near.moved(sheet, found))
+    Ok((near.moved(sheet, found), None))
 }
 
 /// How the point is sought, from where it is on the grid before.
@@ -232,16 +235,23 @@ impl Owned {
 
 /// The numbers at a point of a nearly rigid leaf: by softened matrices, extrapolated to
 /// none.
-fn unsoftened(sheet: &mut Sheet, near: &Place, given: Option<usize>) -> Result<[f64; 2], Lost> {
+fn unsoftened(
+    sheet: &mut Sheet,
+    near: &Place,
+    special: Option<Special>,
+    given: Option<usize>,
+) -> Result<[f64; 2], Lost> {
     let grid = sheet.grid().clone();
     let mut places = [[0.0; 2]; 4];
     let mut owned = sought(sheet, near, given);
     for (k, place) in places.iter_mut().enumerate().rev() {
         let mut soft = Sheet::new(sheet.plane, grid.clone())?;
         soft.soften(SOFTENING * (k + 1) as f64);
-        let found = owned.run(&mut soft)?;
-        *place = found.spot().place;
-        owned.near.spot = found.spot().clone();
+        owned.near.spot = match special {
+            Some(special) => locate_near(&mut soft, &owned.near, special)?.0.spot,
+            None => owned.run(&mut soft)?.spot().clone(),
+        };
+        *place = owned.near.spot.place;
     }
     // The cubic through values at 1, 2, 3, 4 at zero.
     let [a, b, c, d] = places;
@@ -265,7 +275,7 @@ impl Table {
     fn push(
         &mut self,
         sheet: &mut Sheet,
-        place: &Place,
+        (place, along): (&Place, Option<f64>),
         numbers: [f64; 2],
         rigid: bool,
     ) -> Result<(), Lost> {
@@ -286,9 +296,11 @@ impl Table {
         let stiffest = condensing.fold(0.0_f64, |most, it| most.max(it.min(limit)));
         let state = &place.spot.state;
         let segments = state.segments() as f64;
-        let rounding = (f64::EPSILON * stiffest * segments * segments / slope).abs();
+        let rounding = f64::EPSILON * stiffest * segments * segments;
         for i in 0..2 {
-            self.rounding[i] = self.rounding[i].max(rounding * across.place[i].abs());
+            let own = (rounding / slope * across.place[i]).abs();
+            let along = along.map_or(0.0, |slope| rounding / slope * place.tangent.place[i]);
+            self.rounding[i] = self.rounding[i].max(own + along.abs());
         }
         let tips = (0..state.rods()).flat_map(|j| state.tip(j).to_array());
         self.tips.push(state.segments(), tips.collect());

@@ -275,7 +275,7 @@ impl<'a> Sheet<'a> {
     /// The same at a spot at rest, with its own rates.
     pub fn look(&mut self, spot: Spot, border: &[Field]) -> Result<Sample, Stuck> {
         let rates = self.rates(&spot)?;
-        Ok(self.sample(spot, border, rates, false)?.0)
+        Ok(self.sample(spot, border, rates, true)?.0)
     }
 
     /// How the forces change with both numbers.

@@ -82,11 +82,16 @@ fn locate(
 ) -> Result<Place, Lost> {
     let values = [now, next].map(|place| special.value(place));
     let slope = (values[1] - values[0]) / step;
-    zero(sheet, now, special, slope, [-0.1 * step, 1.1 * step])
+    Ok(zero(sheet, now, special, slope, [-0.1 * step, 1.1 * step])?.0)
 }
 
-/// The special point near one that is nearly it.
-pub fn locate_near(sheet: &mut Sheet, near: &Place, special: Special) -> Result<Place, Lost> {
+/// The special point near one that is nearly it, and the change of what is zero there with
+/// the way along the boundary.
+pub fn locate_near(
+    sheet: &mut Sheet,
+    near: &Place,
+    special: Special,
+) -> Result<(Place, f64), Lost> {
     let first = onto(sheet, near, 0.0, EXACT, REACH)?.0;
     let away = 1e-2;
     let second = onto(sheet, &first, away, EXACT, REACH)?.0;
@@ -101,7 +106,7 @@ fn zero(
     special: Special,
     mut slope: f64,
     [least, most]: [f64; 2],
-) -> Result<Place, Lost> {
+) -> Result<(Place, f64), Lost> {
     let mut best = now.clone();
     let (mut at, mut value) = (0.0, special.value(now));
     let mut worse = 0;
@@ -121,7 +126,7 @@ fn zero(
             false => worse += 1,
         }
         if step.abs() < ACCURACY || worse > 1 {
-            return Ok(best);
+            return Ok((best, slope));
         }
     }
     Err(Lost::Stuck(Stuck::NotConverged))

@@ -3,10 +3,12 @@
 use rayon::prelude::*;
 
 use super::{Entrance, Stable};
-use crate::branch::{Equations, Family, Point, between, largest, on_finer};
-use crate::leaf::{Field, Grid, Leaf, State};
+use crate::branch::{Equations, Family, Point, between, on_finer, prolong_field};
+use crate::leaf::{Field, Grid, State};
+use crate::relax::fall::settle_from;
+use crate::relax::prolong::prolong;
 use crate::relax::richardson::Richardson;
-use crate::relax::{Barrier, Neighbour, Saddle, fall};
+use crate::relax::{Barrier, Neighbour, Saddle};
 
 /// Modes of the leaf along which saddles are looked for, to both sides.
 const MODES: usize = 3;
@@ -14,7 +16,7 @@ pub(super) const MODE_CLIMBS: usize = 2 * MODES;
 
 /// Grids over which the energy of a pass is extrapolated at most, nodes of the finest,
 /// and the relative error at which it is known well enough.
-const GRIDS: usize = 5;
+const GRIDS: usize = 7;
 const MOST_NODES: usize = 20_000;
 const ENOUGH: f64 = 1e-7;
 
@@ -23,8 +25,10 @@ const ENOUGH: f64 = 1e-7;
 const SAME: f64 = 1e-3;
 const SAME_PART: f64 = 0.1;
 
-/// Furthest push off a pass (radians, lengths).
-const FURTHEST: f64 = 0.1;
+/// Near a fold a coarse grid may have no pass, or another one: so often it is looked for on
+/// a grid with all segments halved, of so many nodes at most.
+const HALVINGS: usize = 3;
+const FEW_NODES: usize = 800;
 
 /// Passes whose heights differ by less than this part are tried once.
 const SAME_HEIGHT: f64 = 1e-6;
@@ -60,23 +64,54 @@ pub(super) fn barrier(
         pushes + entrances.len(),
         std::sync::atomic::Ordering::Relaxed,
     );
+    let looked = entrances.len();
+    for _ in 0..HALVINGS {
+        let found = lowest(stable, &family, &entrances, weight);
+        if found.is_some() || stable.limit.reached() {
+            return (found, looked);
+        }
+        let finer: Option<_> = entrances.iter().map(|it| on_halved(&family, it)).collect();
+        match finer {
+            Some(finer) => entrances = finer,
+            None => return (None, looked),
+        }
+        all.fetch_add(looked, std::sync::atomic::Ordering::Relaxed);
+    }
+    (lowest(stable, &family, &entrances, weight), looked)
+}
+
+/// The lowest pass that is found from these entrances on their grids.
+fn lowest(
+    stable: &Stable,
+    family: &Family,
+    entrances: &[Entrance],
+    weight: f64,
+) -> Option<Barrier> {
     let mut passes: Vec<Pass> = (entrances.par_iter())
         .filter_map(|entrance| {
-            let pass = climb(stable, &family, entrance);
+            let pass = climb(stable, family, entrance);
             stable.searches.finish_one();
             pass
         })
         .collect();
     passes.sort_by(|a, b| a.height.total_cmp(&b.height));
     passes.dedup_by(|a, b| (a.height - b.height).abs() < SAME_HEIGHT * b.height);
-    let leaf = family.first();
-    let lowest = passes.iter().find_map(|pass| {
-        let neighbour = behind(stable, leaf, pass)?;
+    let (pass, neighbour) = passes.iter().find_map(|pass| {
+        let neighbour = behind(stable, family, pass)?;
         Some((pass, neighbour))
-    });
-    let barrier =
-        lowest.and_then(|(pass, neighbour)| in_units(stable, &family, pass, &neighbour, weight));
-    (barrier, entrances.len())
+    })?;
+    in_units(stable, family, pass, &neighbour, weight)
+}
+
+/// The same entrance on the grid with all segments halved; none if that has too many nodes.
+fn on_halved(family: &Family, entrance: &Entrance) -> Option<Entrance> {
+    let mut equations = Equations::new(family, entrance.grid.clone()).ok()?;
+    let leaf = equations.leaves.at(0.0).ok()?;
+    (2 * leaf.rods() * leaf.segments() <= FEW_NODES).then(|| Entrance {
+        grid: entrance.grid.refined(),
+        state: prolong(leaf, &entrance.state),
+        way: prolong_field(&entrance.way),
+    })
 }
 
 /// Both ways along the softest modes of the leaf.
@@ -120,12 +155,20 @@ fn climb(stable: &Stable, family: &Family, entrance: &Entrance) -> Option<Pass> 
 }
 
 /// The equilibrium behind a pass, if the leaf is the one before it.
-fn behind(stable: &Stable, leaf: &Leaf, pass: &Pass) -> Option<State> {
+fn behind(stable: &Stable, family: &Family, pass: &Pass) -> Option<State> {
     let way = pass.saddle.state.shift_to(&pass.leaf.state);
     let same = |state: &State| state.shift_to(&pass.leaf.state) < SAME.min(SAME_PART * way);
-    // Half way, where by a cubic the valley of the leaf begins.
-    let push = (0.5 * largest(&between(&pass.saddle.state, &pass.leaf.state))).min(FURTHEST);
-    match fall(leaf, &pass.grid, &pass.saddle.state, push, stable.limit) {
+    let mut equations = Equations::new(family, pass.grid.clone()).ok()?;
+    let towards = between(&pass.saddle.state, &pass.leaf.state);
+    let stop = || stable.limit.reached();
+    let both = equations.fall(&pass.saddle, &towards, &stop).ok()?;
+    let rest = |fallen: Result<Point, State>| match fallen {
+        Ok(point) => Some(point.state),
+        // It may have to turn out of the way.
+        Err(state) => settle_from(family.first(), &pass.grid, state, stable.limit),
+    };
+    let both = both.map(rest);
+    match both {
         [Some(one), Some(other)] if same(&one) && !same(&other) => Some(other),
         [Some(one), Some(other)] if same(&other) && !same(&one) => Some(one),
         _ => None,
@@ -158,11 +201,12 @@ fn in_units(
         let finer: Result<Vec<_>, _> = (three.iter())
             .map(|point| on_finer(&mut equations, point))
             .collect();
-        let Ok(Ok([(finer, saddle), (_, neighbour), (_, leaf)])) = finer.map(<[_; 3]>::try_from)
-        else {
-            break;
-        };
+        let [(finer, saddle), (_, neighbour), (_, leaf)] = <[_; 3]>::try_from(finer.ok()?).ok()?;
         (equations, three) = (finer, [saddle, neighbour, leaf]);
+        // Or a finer grid has no such pass.
+        if three.each_ref().map(|point| point.index) != [1, 0, 0] {
+            return None;
+        }
         table.push(segments, heights(&mut equations, &three, pass.height)?);
     }
     let [saddle, neighbour, _] = three;

@@ -270,7 +270,9 @@ fn add_mirrored(pushes: &mut Vec<Push>, rods: usize) {
             let mut image = push.clone();
             image.direction = push.direction.opposite();
             image.mirrored = true;
-            image.tips.iter_mut().for_each(|tip| tip[axis] = -tip[axis]);
+            let behind = image.neighbour.iter_mut().map(|it| &mut it.tip);
+            let tips = image.tips.iter_mut().chain(behind);
+            tips.for_each(|tip| tip[axis] = -tip[axis]);
             if axis == 1 && image.tips.len() == rods {
                 image.tips.reverse();
             }

@@ -4,9 +4,11 @@ use glam::DVec3;
 
 use super::{Entrance, Stable};
 use crate::branch::{
-    Critical, End, Family, Followed, Grids, Kind, NEARLY_RIGID, Point, Refined, Stuck, Walk, switch,
+    Critical, End, Family, Followed, Grids, Kind, NEARLY_RIGID, Point, Refined, Stuck, Walk,
+    refine_at, switch,
 };
-use crate::relax::{Direction, Fate, Loss, Push};
+use crate::relax::fall::settle_from;
+use crate::relax::{Direction, Fate, Loss, Neighbour, Push};
 use crate::scenario::Scenario;
 
 /// Longest step along the branch, and most points.
@@ -42,6 +44,7 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
             per_weight: None,
             more_than: Some(0.0),
             then: None,
+            neighbour: None,
             tips: Vec::new(),
             mirrored: false,
             remark: Some(why),
@@ -69,6 +72,8 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
         return (push, Vec::new());
     };
     let force = refined.fraction * stable.largest;
+    let then = fate(stable, &mut grids, critical);
+    let entrances = entrances(&mut grids, critical);
     let push = Push {
         direction,
         kind: match critical.kind {
@@ -79,12 +84,13 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
         error: Some(refined.fraction_error * stable.largest + rounding(stable, force, weight)),
         per_weight: (weight > 0.0).then(|| force / weight),
         more_than: None,
-        then: Some(fate(stable, &mut grids, critical)),
+        then: Some(then),
+        neighbour: landing(stable, &mut grids, (critical, refined), &entrances),
         tips: tips(stable, refined),
         mirrored: false,
         remark: None,
     };
-    (push, entrances(&mut grids, critical))
+    (push, entrances)
 }
 
 /// Rounding of a critical force.
@@ -155,6 +161,36 @@ fn fate(stable: &Stable, grids: &mut Grids, critical: &Critical) -> Fate {
         true => Fate::BendsAside,
         false => Fate::Snaps,
     }
+}
+
+/// Where the leaf comes to rest that leaves a fold onwards, under the force there.
+fn landing(
+    stable: &Stable,
+    grids: &mut Grids,
+    (critical, fold): (&Critical, &Refined),
+    entrances: &[Entrance],
+) -> Option<Neighbour> {
+    let entrance = entrances.first().filter(|_| critical.kind == Kind::Fold)?;
+    let equations = grids.of(&critical.state);
+    let stop = || stable.limit.reached();
+    let fallen = equations.descend(&critical.state, critical.fraction, &entrance.way, &stop);
+    let family = equations.leaves.family;
+    let state = match fallen {
+        Ok(point) => point.state,
+        // It may have to turn out of the way.
+        Err(state) => {
+            let leaf = family.leaf(fold.fraction).ok()?;
+            settle_from(&leaf, &entrance.grid, state, stable.limit)?
+        }
+    };
+    let point = equations.correct(&state, fold.fraction, None);
+    let (point, _) = point.ok().filter(|(point, _)| point.index == 0)?;
+    let rest = refine_at(family, &entrance.grid, &point, stable.accuracy).ok()?;
+    let scale = family.scale();
+    Some(Neighbour {
+        energy: rest.energy * scale.moment(),
+        tip: DVec3::from_array(*rest.tips.first()?) * scale.length,
+    })
 }
 
 /// Saddles may be found from a critical point along its neutral modes: at a fold
