@@ -103,8 +103,10 @@ impl Contraction {
     }
 
     /// The error that is left after a first increment, if the largest force (A/L^2)
-    /// changed by so much with it.
+    /// changed by so much with it; of which nothing is made where the leaf is not known to
+    /// be near rest.
     pub fn after_first(&self, size: f64, force: f64) -> f64 {
+        let force = if self.0 > 0.0 { force } else { 0.0 };
         FIRST * self.0.max(1.0) * size * size.max(force)
     }
 }

@@ -51,6 +51,19 @@ def test_a_held_tip_pushes_back() -> None:
     assert leafdyn.relax(fan(1), set={"leaf.fan": [0.0]}).tip_reaction is None
 
 
+def test_a_grip_that_travels_is_pushed_back() -> None:
+    vein = {**fan(1), "tip": {"held": "clamped", "position": [0.9, 0.0, 0.0]}}
+    vein["leaf"] = {"rods": 1, "length": 1.0, "fan": [0.0]}
+    (branch,) = leafdyn.trace(vein, "tip.position[0]=0.9..0.7:41", tolerance=1e-6).branches
+    assert branch.reactions is not None
+    # The holder's work is the energy that the vein gains, by the trapezoidal rule.
+    push, way = branch.reactions[:, 0], np.diff(branch.values)
+    work = -np.sum(0.5 * (push[1:] + push[:-1]) * way)
+    assert work == pytest.approx(branch.energies[-1] - branch.energies[0], rel=1e-4)
+    (free,) = leafdyn.trace(fan(1), "load.gravity[2]=-1..-2").branches
+    assert free.reactions is None
+
+
 def test_stations_that_are_asked_for() -> None:
     leaf = leafdyn.relax(fan(3), stations=10)
     assert np.allclose(leaf.stations, np.linspace(0.0, 1.0, 11), atol=1e-15)

@@ -4,9 +4,9 @@
 //! small: with the matrix bordered by the masses times v (as at a critical point),
 //! the solution for the border's unit is the direction X of the valley floor, and
 //! -H its curvature. Where that is positive the way goes on along X, by a given length or
-//! to where the floor is highest by a cubic, as near a fold it is; where it is not, v becomes the mode of the lowest eigenvalue, and the steps
-//! Newton's (Crippen and Scheraga, Arch. Biochem. Biophys. 144, 1971; Henkelman and
-//! Jonsson, J. Chem. Phys. 111, 1999).
+//! to where the floor is highest by a cubic, as near a fold it is; where it is not, v
+//! becomes the mode of the lowest eigenvalue, and the steps Newton's (Crippen and Scheraga,
+//! Arch. Biochem. Biophys. 144, 1971; Henkelman and Jonsson, J. Chem. Phys. 111, 1999).
 //!
 //! The way down follows the same floor, whose lowest point is Newton's once it is convex. No
 //! stiffness is taken from the leaf meanwhile, which near a fold would lead elsewhere.

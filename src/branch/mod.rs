@@ -36,6 +36,8 @@ mod follow;
 mod refine;
 mod refine_critical;
 mod refined;
+mod states;
+mod step;
 mod switch;
 mod walk;
 

@@ -1,9 +1,10 @@
 //! Regular points of a branch on finer and finer grids.
 
-use super::equations::{DIFFERENCE, Equations, Plane, Stuck, reversed};
+use super::equations::{Equations, Plane, Stuck, reversed};
 use super::family::Family;
 use super::field::{at_same_nodes, prolong as prolong_field};
 use super::refined::{Doubt, Refined, Table, Values, looked_at};
+use super::states::DIFFERENCE;
 use super::{Point, Tangent};
 use crate::leaf::{DiscreteLeaf, Grid};
 use crate::relax::prolong::prolong;

@@ -2,10 +2,10 @@
 
 use super::critical::{Critical, Kind, locate};
 use super::equations::{Equations, Stuck, reversed};
-use super::family::OutOfRange;
 use super::field::{add, between, plus};
 use super::refine::on_finer;
 use super::refined::Doubt;
+use super::step::Found;
 use super::{Point, Tangent};
 
 /// First step as a part of the longest, and the shortest.
@@ -96,6 +96,16 @@ pub enum End {
     Stuck(Stuck),
     /// What comes next is another thing on every grid up to the finest.
     Unverified(Doubt),
+}
+
+impl End {
+    /// That of a branch that has come to this end of the range.
+    fn at_edge(edge: f64) -> Self {
+        match edge {
+            1.0 => End::Reached,
+            _ => End::Returned,
+        }
+    }
 }
 
 /// A branch on one grid, or on finer and finer ones.
@@ -219,14 +229,11 @@ impl Branch {
     fn try_step(&mut self, equations: &mut Equations, how: &Walk) -> Result<(), Stuck> {
         let now = &self.points[self.points.len() - 1];
         let step = self.step;
-        let found = match advance(equations, now, step) {
-            // Behind the end of the range there may be no leaf, and at it one.
-            Err(Stuck::OutOfRange(out)) => advance_to_edge(equations, now, step, out),
-            found => found,
-        };
-        let found = found.and_then(|found| match how.accepts(equations, now, &found, step) {
-            true => Ok(found),
-            false => Err(Stuck::NotConverged),
+        let found = Found::by_step(equations, now, step).and_then(|found| {
+            match how.accepts(equations, now, &found, step) {
+                true => Ok(found),
+                false => Err(Stuck::NotConverged),
+            }
         });
         let mut next = match found {
             Ok(found) => found,
@@ -237,7 +244,7 @@ impl Branch {
             Err(stuck) => return Err(stuck),
         };
         let turn = equations.along(&now.tangent, &next.point.tangent);
-        let mut end = arrive_at_edge(equations, now, &mut next, step)?;
+        let mut end = next.arrive_at_edge(equations, now, step)?.map(End::at_edge);
         if let Some(first) = &self.first
             && end.is_none()
             && self.points.len() > CLOSED_AFTER
@@ -286,16 +293,6 @@ impl Branch {
     }
 }
 
-/// A point found by a step.
-struct Found {
-    point: Point,
-    iterations: usize,
-    /// Length of the step, along the tangent it was made from.
-    step: f64,
-    /// By how much Newton moved the prediction.
-    drift: f64,
-}
-
 impl Walk<'_> {
     /// Whether a step may be believed to have stayed on the branch.
     fn accepts(&self, equations: &Equations, now: &Point, found: &Found, step: f64) -> bool {
@@ -328,81 +325,6 @@ fn across(equations: &Equations, a: &Point, b: &Point) -> f64 {
     add(&mut way.increments, -along, &mean.increments);
     way.fraction -= along * mean.fraction;
     equations.along(&way, &way).sqrt() / length
-}
-
-/// One step along the branch.
-fn advance(equations: &mut Equations, now: &Point, step: f64) -> Result<Found, Stuck> {
-    let tangent = &now.tangent;
-    let fraction = now.fraction + step * tangent.fraction;
-    let state = equations.moved(&now.state, fraction, &tangent.increments, step)?;
-    let (point, iterations) = equations.correct(&state, fraction, Some(tangent))?;
-    let drift = (state.shift_to(&point.state)).max((point.fraction - fraction).abs());
-    Ok(Found {
-        point,
-        iterations,
-        step,
-        drift,
-    })
-}
-
-/// Shortens a step that leaves the range to end where the range does; returns
-/// which end that is.
-fn arrive_at_edge(
-    equations: &mut Equations,
-    now: &Point,
-    next: &mut Found,
-    step: f64,
-) -> Result<Option<End>, Stuck> {
-    let (edge, end) = match next.point.fraction {
-        1.0 if now.fraction < 1.0 => return Ok(Some(End::Reached)),
-        0.0 if now.fraction > 0.0 => return Ok(Some(End::Returned)),
-        fraction if fraction > 1.0 => (1.0, End::Reached),
-        fraction if fraction < 0.0 => (0.0, End::Returned),
-        _ => return Ok(None),
-    };
-    let part = (edge - now.fraction) / (next.point.fraction - now.fraction);
-    (next.point, _) = at_edge(equations, now, edge, part * step)?;
-    next.step = part * step;
-    Ok(Some(end))
-}
-
-/// A step that ends where the range does, if one of this length would leave it.
-fn advance_to_edge(
-    equations: &mut Equations,
-    now: &Point,
-    step: f64,
-    out: OutOfRange,
-) -> Result<Found, Stuck> {
-    let edge = if now.tangent.fraction > 0.0 { 1.0 } else { 0.0 };
-    let way = (edge - now.fraction) / now.tangent.fraction;
-    if way <= 0.0 || way > step {
-        return Err(out.into());
-    }
-    let (point, iterations) = at_edge(equations, now, edge, way)?;
-    let part = way / step;
-    let state = equations.moved(&now.state, edge, &now.tangent.increments, way)?;
-    Ok(Found {
-        drift: state.shift_to(&point.state) / part,
-        point,
-        iterations,
-        step: way,
-    })
-}
-
-/// The point at an end of the range, about so far along the tangent.
-fn at_edge(
-    equations: &mut Equations,
-    now: &Point,
-    edge: f64,
-    way: f64,
-) -> Result<(Point, usize), Stuck> {
-    let increments = &now.tangent.increments;
-    let state = equations.moved(&now.state, edge, increments, way)?;
-    let (mut point, iterations) = equations.correct(&state, edge, None)?;
-    if equations.along(&point.tangent, &now.tangent) < 0.0 {
-        point.tangent = reversed(point.tangent);
-    }
-    Ok((point, iterations))
 }
 
 /// The point of the branch of `near` that is the branch's first again: in value,

@@ -113,6 +113,12 @@ class Branch:
         return np.stack([self.columns[name] for name in ("tip_x", "tip_y", "tip_z")], axis=1)
 
     @property
+    def reactions(self) -> Array | None:
+        """The force that the holder of held tips feels, shape (P, 3); none if they are free."""
+        names = ("reaction_x", "reaction_y", "reaction_z")
+        return np.stack([self.columns[name] for name in names], axis=1) if names[0] in self.columns else None
+
+    @property
     def energies(self) -> Array:
         """Potential energies, shape (P,)."""
         return self.columns["energy"]

@@ -4,11 +4,10 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use crate::branch::deflation::Solved;
-use crate::branch::equations::{
-    Equations, ITERATIONS, LARGEST, Stuck, advanced, assembled, at_rest, forces_on, rate,
-};
+use crate::branch::equations::{Equations, ITERATIONS, LARGEST, Stuck, assembled, at_rest};
 use crate::branch::family::{Family, OutOfRange};
 use crate::branch::field::{between, is_finite, largest, plus, times};
+use crate::branch::states::{advanced, forces_on, rate};
 use crate::leaf::{DiscreteLeaf, Field, Grid, Leaf, State, System};
 use crate::scenario::Scenario;
 
