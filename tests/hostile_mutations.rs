@@ -11,6 +11,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use leafdyn::scenario::Scenario;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
@@ -117,6 +118,20 @@ fn each(what: &str, text: &str, cases: u32, check: impl Fn(&[u8])) {
 #[test]
 fn scenarios() {
     each("scenario.toml", bodies::LEAF, 150, bodies::scenario);
+}
+
+/// More of them, which are only read.
+#[test]
+fn scenario_texts() {
+    each(
+        "read.toml",
+        bodies::LEAF,
+        4000,
+        |text| match Scenario::from_toml(std::str::from_utf8(text).unwrap()) {
+            Ok(leaf) => assert!(leaf.coupling.len() + 1 == leaf.rods.len()),
+            Err(error) => assert!(error.to_string().starts_with("scenario:")),
+        },
+    );
 }
 
 /// Entries replaced, and numbers that vary, as they are typed.

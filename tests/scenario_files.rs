@@ -1,4 +1,4 @@
-//! The scenarios that come with the program.
+//! The scenarios that come with the program, and files that are none.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -98,4 +98,40 @@ fn what_the_comments_offer_works() {
         }
     }
     assert!(offered >= 15, "found {offered}");
+}
+
+#[test]
+fn files_that_cannot_be_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |path: &Path| {
+        let message = Scenario::read(path).unwrap_err().to_string();
+        let rest = message.strip_prefix(path.to_str().unwrap());
+        rest.unwrap_or_else(|| panic!("{message}")).to_string()
+    };
+    let absent = folder.path().join("absent.toml");
+    assert!(message(&absent).starts_with(": cannot be read: "));
+    assert_eq!(
+        message(folder.path()),
+        ": is a folder: give the TOML file itself"
+    );
+    let latin = folder.path().join("latin.toml");
+    fs::write(&latin, b"name = \"a\"\n# Bl\xe4tter\n").unwrap();
+    let expected = ":2: is not text in UTF-8: byte 15 is 0xe4: save the file as UTF-8";
+    assert_eq!(message(&latin), expected);
+    let empty = folder.path().join("empty.toml");
+    fs::write(&empty, "").unwrap();
+    assert!(message(&empty).starts_with(": name is missing"));
+}
+
+#[test]
+fn ten_thousand_rods_are_read() {
+    let rods = 10_000;
+    let list = |count: usize| vec!["1.25"; count].join(", ");
+    let text = format!(
+        "name = \"many\"\n[leaf]\nrods = {rods}\nlength = [{0}]\nfan = \"symmetric\"\n[stiffness]\ntorsion = [{0}]\n\
+         bending_2 = [{0}]\nbending_3 = 1.0\naxial = [{0}]\nshear_2 = inf\nshear_3 = inf\n[coupling]\nx = [{1}]\n",
+        list(rods),
+        list(rods - 1)
+    );
+    assert_eq!(Scenario::from_toml(&text).unwrap().rods.len(), rods);
 }

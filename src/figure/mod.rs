@@ -31,6 +31,7 @@ mod modes;
 mod page;
 mod panels;
 mod png;
+mod round;
 mod sensitivity;
 mod setting;
 mod small;

@@ -2,9 +2,9 @@
 
 use glam::{DVec2, DVec3};
 
-use super::axis::round_step;
 use super::drawing::{Color, Drawing};
 use super::page::{Cell, HEADER, PANEL_TITLE, WIDTH, title_in};
+use super::round::round_step;
 use super::setting::Setting;
 use super::space::{Camera, Room, Scene, View, surrounding_box};
 use super::veins::Veins;

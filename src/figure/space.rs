@@ -3,13 +3,13 @@
 
 use glam::{DVec2, DVec3};
 
-use super::axis::{multiples, round_step};
 use super::drawing::{
     Anchor, Drawing, FLOOR, FRAME, GRID, INK, NOTE, SHADOW, Step, Stroke, polygon, polyline,
 };
 use super::gravity;
 use super::markers::leaf_markers;
 use super::page::{Cell, TEXT_SIZE, TICK_SIZE};
+use super::round::{multiples, round_step};
 use super::setting::Setting;
 use super::veins::{Piece, Vein, Veins};
 

@@ -4,11 +4,13 @@ mod element;
 mod planar;
 mod section;
 mod segment;
+mod spatial;
 
-pub use element::{Element, Nodes, SpatialElement};
+pub use element::{Element, Nodes};
 pub use planar::PlanarElement;
 pub use section::{Section, Sections};
 pub use segment::{Ends, SectionRate, Segment};
+pub use spatial::SpatialElement;
 
 /// A segment that is bent by more than this (radians) is not resolved by its grid.
 pub const RESOLVED_TURN: f64 = 1.6;

@@ -1,7 +1,8 @@
 //! One segment, as numbers.
 
-use super::element::{Element, Nodes, SpatialElement};
+use super::element::{Element, Nodes};
 use super::section::Section;
+use super::spatial::SpatialElement;
 use crate::lanes::Vectors;
 use crate::rotation::{self, Relative};
 use glam::{DMat3, DQuat, DVec3};

@@ -8,6 +8,7 @@ pub mod fit;
 pub mod motion;
 pub mod random;
 mod shot;
+pub mod valid;
 pub mod vibration;
 
 use std::f64::consts::PI;
