@@ -200,8 +200,9 @@ fn results(leaf: &Equilibrium) -> (Vec<f64>, usize) {
     (all, count)
 }
 
-/// The same derivatives from eight relaxations.
-fn differenced(base: &Base, key: &Keys, options: &Options) -> Vec<f64> {
+/// The same derivatives from eight relaxations, and how far those of four are off: much
+/// where modes come close to each other.
+fn differenced(base: &Base, key: &Keys, options: &Options) -> Vec<(f64, f64)> {
     let value = base.value(key).unwrap();
     let size = if value == 0.0 { 1.0 } else { value.abs() };
     let at = |steps: f64, step: f64| -> Option<Vec<f64>> {
@@ -229,10 +230,11 @@ fn differenced(base: &Base, key: &Keys, options: &Options) -> Vec<f64> {
     };
     // With half the step, of the error of the fourth order a sixteenth is left.
     let (Some(coarse), Some(fine)) = (by(central, 3e-3 * size), by(central, 1.5e-3 * size)) else {
-        return by(forward, 1e-3 * size).unwrap();
+        let found = by(forward, 1e-3 * size).unwrap().into_iter();
+        return found.map(|value| (value, 0.0)).collect();
     };
     let both = fine.iter().zip(coarse);
-    both.map(|(fine, coarse)| fine + (fine - coarse) / 15.0)
+    both.map(|(fine, coarse)| (fine + (fine - coarse) / 15.0, (fine - coarse).abs() / 15.0))
         .collect()
 }
 
@@ -261,8 +263,7 @@ fn they_are_those_of_whole_relaxations() {
         let (text, wanted) = random(number);
         let base = base(&text);
         let options = Options {
-            // Higher modes of a nearly rigid leaf are known too roughly to be differenced.
-            modes: if number % 5 == 4 { 1 } else { 2 },
+            modes: 2,
             tolerance: Some(1e-9),
             ..on(12)
         };
@@ -278,17 +279,13 @@ fn they_are_those_of_whole_relaxations() {
                 theirs.truncate(count);
             }
             assert_eq!(ours.len(), theirs.len(), "{number} {key}");
-            for (k, (ours, theirs)) in ours.iter().zip(&theirs).enumerate() {
+            for (k, (ours, (theirs, unsure))) in ours.iter().zip(&theirs).enumerate() {
                 // What a change by the whole number would change, against the result.
                 let unit = units[k].abs().max(1.0);
-                let error = (ours - theirs).abs() * size / (unit + theirs.abs() * size);
+                let error =
+                    ((ours - theirs).abs() - 4.0 * unsure) * size / (unit + theirs.abs() * size);
                 // Eigenvalues are differenced to the second order.
-                // and the modes of a stiff leaf are those of a softened one.
-                let allowed = match (k >= count, number % 5 == 4) {
-                    (false, _) => 1e-7,
-                    (true, false) => 1e-6,
-                    (true, true) => 2e-5,
-                };
+                let allowed = if k < count { 1e-7 } else { 1e-6 };
                 worst = worst.max(error / allowed);
                 assert!(
                     error < allowed,

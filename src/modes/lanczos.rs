@@ -7,10 +7,7 @@ use super::masses::Masses;
 use crate::limit::Limit;
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// Accuracy of an eigenvector, relative to its eigenvalue; that of the
-/// eigenvalue is the square of it. The second is relative to the largest, and
-/// rounding.
-const ACCURACY: f64 = 1e-7;
+/// Accuracy of an eigenvector relative to the largest eigenvalue: rounding.
 const LEAST_ACCURACY: f64 = 1e-13;
 
 /// Directions after which a run ends, and those more for every pair wanted.
@@ -38,6 +35,9 @@ pub struct Lanczos<'a> {
     pub solve: &'a mut dyn FnMut(&mut [f64]),
     /// Eigenvectors that are not to be found again.
     pub known: &'a [Mode],
+    /// Of an eigenvector, relative to its eigenvalue; that of the eigenvalue is the
+    /// square of it.
+    pub accuracy: f64,
     /// When it ends with nothing found.
     pub time: &'a Limit,
 }
@@ -86,8 +86,9 @@ impl Lanczos<'_> {
             if size.is_multiple_of(CHECK_EVERY) || size == most || length == 0.0 {
                 let (values, vectors) = ritz(&diagonal, &off);
                 let error = |k: usize| length * vectors[(size - 1, k)].abs();
-                let good =
-                    |k: usize| error(k) <= (ACCURACY * values[k]).max(LEAST_ACCURACY * values[0]);
+                let good = |k: usize| {
+                    error(k) <= (self.accuracy * values[k]).max(LEAST_ACCURACY * values[0])
+                };
                 let done = (0..size).take_while(|&k| good(k)).count();
                 let eigenvalue = |k: usize| self.shift + 1.0 / values[k];
                 let beyond = done > 0 && eigenvalue(done - 1) > limit;

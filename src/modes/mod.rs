@@ -36,6 +36,17 @@ const STIFFEST: f64 = 1e6;
 /// It is at least so many times the largest force carried.
 const STIFFER: f64 = 1e4;
 
+/// Accuracy of eigenvectors where only eigenvalues are wanted, whose error is the square
+/// of it, and where their derivatives are.
+const ACCURACY: f64 = 1e-7;
+const DERIVED: f64 = 1e-9;
+
+/// So many times as much is softened what shows to first order what softening does.
+const SOFTER: f64 = 4.0;
+
+/// Cosine of the angle between shapes that are those of one mode.
+const ALIKE: f64 = 0.99;
+
 /// The first shift below zero that is tried for an unstable leaf, in
 /// A/(rho L^4), and the factor to the next.
 const FIRST_SHIFT: f64 = 1e-3;
@@ -69,6 +80,7 @@ struct Vibration<'a> {
     system: System,
     pattern: SparsePattern,
     masses: Masses,
+    accuracy: f64,
     time: &'a Limit,
 }
 
@@ -82,21 +94,32 @@ pub fn lowest(
     count: usize,
     time: &Limit,
 ) -> Option<Vec<Eigenpair>> {
-    let soft = softened(leaf, state);
-    let system = System::new(&soft);
+    let soft = softened(leaf, state, 1.0);
+    of_softened(&soft, physics, state, (count, ACCURACY), time)
+}
+
+fn of_softened(
+    soft: &DiscreteLeaf,
+    physics: &Physics,
+    state: &State,
+    (count, accuracy): (usize, f64),
+    time: &Limit,
+) -> Option<Vec<Eigenpair>> {
+    let system = System::new(soft);
     let pattern = SparsePattern::new(&system).ok()?;
     let mut vibration = Vibration {
-        masses: Masses::new(&soft, physics, state, &pattern),
-        leaf: &soft,
+        masses: Masses::new(soft, physics, state, &pattern),
+        leaf: soft,
         state,
         system,
         pattern,
+        accuracy,
         time,
     };
     let found = vibration.lowest(count)?;
     let pair = |vector: &Vec<f64>| {
         let shape = vibration.shape(vector);
-        let eigenvalue = quotient(&soft, state, &shape);
+        let eigenvalue = quotient(soft, state, &shape);
         Eigenpair { eigenvalue, shape }
     };
     let mut pairs: Vec<Eigenpair> = found.iter().map(pair).collect();
@@ -104,19 +127,83 @@ pub fn lowest(
     Some(pairs)
 }
 
-/// The leaf with a matrix that keeps the digits of its soft modes.
-fn softened(leaf: &DiscreteLeaf, state: &State) -> DiscreteLeaf {
+/// The leaf with a matrix that keeps the digits of its soft modes; what is softened is
+/// so `times` as much.
+fn softened(leaf: &DiscreteLeaf, state: &State, times: f64) -> DiscreteLeaf {
     let mut soft = leaf.clone();
     let tension = state.n.iter().fold(0.0_f64, |m, n| m.max(n.length()));
     for section in &mut soft.sections {
         *section = section.condense(STIFFEST.max(STIFFER * tension));
+        let added = section.condensing.recip() - section.compliance;
+        section.condensing = (section.compliance + times * added).recip();
     }
     soft
 }
 
-/// The spatial forces that a mode lets the segments carry.
-pub fn mode_forces(leaf: &DiscreteLeaf, state: &State, shape: &[Increment]) -> Vec<DVec3> {
-    quotient::forces(&softened(leaf, state), state, shape)
+/// A mode with the spatial forces that it lets the segments carry.
+#[derive(Clone, Debug)]
+pub struct LoadedMode {
+    /// Lambda.
+    pub eigenvalue: f64,
+    /// Turns and shifts of all nodes, rod after rod, base to tip.
+    pub shape: Vec<Increment>,
+    /// Of all segments, rod after rod.
+    pub forces: Vec<DVec3>,
+}
+
+/// As [`lowest`], with shapes and forces that are those of the leaf as stiff as it is:
+/// the derivatives of an eigenvalue, unlike itself, have an error of the first order of
+/// theirs. It is taken off by the modes of a leaf that is softened more.
+pub fn loaded(
+    leaf: &DiscreteLeaf,
+    physics: &Physics,
+    state: &State,
+    count: usize,
+    time: &Limit,
+) -> Option<Vec<LoadedMode>> {
+    let of = |times: f64| -> Option<Vec<LoadedMode>> {
+        let soft = softened(leaf, state, times);
+        let pairs = of_softened(&soft, physics, state, (count, DERIVED), time)?.into_iter();
+        let loaded = |pair: Eigenpair| LoadedMode {
+            forces: quotient::forces(&soft, state, &pair.shape),
+            eigenvalue: pair.eigenvalue,
+            shape: pair.shape,
+        };
+        Some(pairs.map(loaded).collect())
+    };
+    let mut modes = of(1.0)?;
+    let limit = 1.0 / STIFFEST;
+    if leaf.stiffest() < limit {
+        let softer = of(SOFTER)?;
+        for (mode, softer) in modes.iter_mut().zip(&softer) {
+            mode.stiffen(softer);
+        }
+    }
+    Some(modes)
+}
+
+impl LoadedMode {
+    /// Takes off what softening does to first order, by the same mode of a leaf that is
+    /// softened more. Where modes lie so close together that each is a mixture of
+    /// several, all remains.
+    fn stiffen(&mut self, softer: &LoadedMode) {
+        let dot = |a: &[Increment], b: &[Increment]| -> f64 {
+            let both = a.iter().flatten().zip(b.iter().flatten());
+            both.map(|(a, b)| a * b).sum()
+        };
+        let (a, b) = (&self.shape, &softer.shape);
+        let product = dot(a, b);
+        if product.abs() < ALIKE * (dot(a, a) * dot(b, b)).sqrt() {
+            return;
+        }
+        let sign = product.signum();
+        let part = 1.0 / (SOFTER - 1.0);
+        let both = (self.shape.iter_mut().flatten()).zip(softer.shape.iter().flatten());
+        both.for_each(|(value, softer)| *value += part * (*value - sign * softer));
+        for (force, softer) in self.forces.iter_mut().zip(&softer.forces) {
+            *force += part * (*force - sign * *softer);
+        }
+    }
 }
 
 /// The eigenvalue by the shape and the forces of a mode, be they those of a leaf and
@@ -257,6 +344,7 @@ impl Vibration<'_> {
             shift,
             solve: &mut |b| factor.solve_vector(b),
             known: found,
+            accuracy: self.accuracy,
             time: self.time,
         };
         let (more, bound) = lanczos.run(start, wanted, limit);

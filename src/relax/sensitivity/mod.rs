@@ -24,11 +24,6 @@ use std::sync::Arc;
 /// of it; of more of them for each component of the tip.
 const EACH: usize = 100;
 
-/// Relative error of the eigenvalue's where modes are those of a softened leaf, and the
-/// compliance of one that is.
-const SOFTENED: f64 = 2e-5;
-const SOFTENED_COMPLIANCE: f64 = 1e-6;
-
 /// Unknowns of the finest grid on which eigenvalues are differenced, but for the
 /// first.
 const FEW_UNKNOWNS: usize = 4_000;
@@ -106,14 +101,9 @@ pub(crate) fn sensitivities(
             positions.push_any(segments, changes.positions);
         }
     }
-    let softened = match finest.leaf.stiffest() < SOFTENED_COMPLIANCE {
-        true => SOFTENED,
-        false => 0.0,
-    };
     let context = Context {
         levels: [coarsest, finest],
         tolerance,
-        softened,
         eigenvalues,
     };
     (known.iter().zip(found))
@@ -126,8 +116,6 @@ struct Context<'l> {
     /// The coarsest and the finest.
     levels: [&'l Level; 2],
     tolerance: f64,
-    /// Relative error of eigenvalues.
-    softened: f64,
     eigenvalues: Vec<f64>,
 }
 
@@ -146,10 +134,8 @@ impl Context<'_> {
             let stable = *squared > 0.0;
             stable.then(|| change.x / (2.0 * std::f64::consts::TAU * squared.sqrt()))
         };
-        // Of a nearly rigid leaf higher modes are too rough to be differenced.
-        let known = if self.softened > 0.0 { 1 } else { usize::MAX };
         let frequencies = eigenvalues.0.iter().zip(&self.eigenvalues);
-        let frequencies = frequencies.take(known).map(frequency);
+        let frequencies = frequencies.map(frequency);
         let stations = self.levels[0].leaf.grid.sigma().to_vec();
         let places = positions.0.chunks(stations.len().max(1));
         let held = reaction.0.split_first().map(|(force, moments)| Reaction {
@@ -166,8 +152,7 @@ impl Context<'_> {
             energy: energy.0.first().map_or(f64::NAN, |it| it.x) * scale.moment(),
             energy_error: energy.1.map(|error| error * scale.moment()),
             lowest_eigenvalue: lowest,
-            lowest_eigenvalue_error: lowest
-                .and_then(|value| Some(eigenvalues.1? + self.softened * value.abs())),
+            lowest_eigenvalue_error: lowest.and(eigenvalues.1),
             frequencies: frequencies.collect(),
             tip_reaction_error: (reaction.1)
                 .filter(|_| held.is_some())
@@ -199,12 +184,12 @@ impl Grid<'_> {
         // A dead moment has no potential, and the matrix no real modes.
         let physics = Physics::new(&leaf.leaf);
         let modes = match self.modes > 0 && moment == DVec3::ZERO {
-            true => modes::lowest(leaf, &physics, state, self.modes, &Limit::default()),
+            true => modes::loaded(leaf, &physics, state, self.modes, &Limit::default()),
             false => None,
         };
         let modes = modes.unwrap_or_default();
         // In the scenario's unit of time, as their changes are.
-        let squared = |mode: &modes::Eigenpair| mode.eigenvalue / physics.time.powi(2);
+        let squared = |mode: &modes::LoadedMode| mode.eigenvalue / physics.time.powi(2);
         let eigenvalues = modes.iter().map(squared).collect();
         let held = leaf.leaf.held.is_some();
         if forces.len() > EACH && modes.is_empty() && moment == DVec3::ZERO && !held {
@@ -212,19 +197,13 @@ impl Grid<'_> {
         }
         let responses = linear.answers(self.level, &forces)?;
         let each = known.iter().zip(rates).zip(forces.iter().zip(&responses));
-        let of_modes: Vec<_> = (modes.iter())
-            .map(|mode| modes::mode_forces(leaf, state, &mode.shape))
-            .collect();
         let changes = each.map(|(((_, _, _, near), rate), (forces, response))| {
             let change = (rate, response);
             let differences = !near.is_empty() && (held || !modes.is_empty());
             let near = differences.then(|| Nearby::new(self.level, near, change));
             let of_modes = (near.iter())
                 .filter(|_| !rate.changes_moment())
-                .flat_map(|near| {
-                    let both = modes.iter().zip(&of_modes);
-                    both.map(|(mode, forces)| near.eigenvalue_rate(&mode.shape, forces))
-                });
+                .flat_map(|near| modes.iter().map(|mode| near.eigenvalue_rate(mode)));
             // What a dead moment does is not balanced in the energy.
             let n = leaf.segments();
             let work = moment.dot(turn(&response.nodes[0][n - 1]));

@@ -2,7 +2,7 @@
 //! along the response, from equilibrium to equilibrium.
 
 use crate::leaf::{DiscreteLeaf, Leaf, LeafRate, Response, State};
-use crate::modes;
+use crate::modes::{self, LoadedMode};
 use crate::motion::Physics;
 use crate::relax::run::Level;
 use crate::relax::sensitivity::response::moved;
@@ -33,10 +33,10 @@ impl Nearby {
     /// The change of the eigenvalue of a mode, by its shape and its forces: that of its
     /// quotient as the leaf goes from equilibrium to equilibrium, since its shape enters in
     /// the second order only.
-    pub fn eigenvalue_rate(&self, shape: &[[f64; 6]], forces: &[DVec3]) -> f64 {
+    pub fn eigenvalue_rate(&self, mode: &LoadedMode) -> f64 {
         let term = |(weight, leaf, state): &(f64, DiscreteLeaf, State)| {
             let physics = Physics::new(&leaf.leaf);
-            weight * modes::eigenvalue(leaf, &physics, state, shape, forces)
+            weight * modes::eigenvalue(leaf, &physics, state, &mode.shape, &mode.forces)
         };
         self.0.iter().map(term).sum()
     }

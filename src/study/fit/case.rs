@@ -80,7 +80,7 @@ impl What {
 pub(super) struct CaseAt {
     pub at: AtRest,
     /// Modes on the first grids.
-    pub modes: Vec<Vec<modes::Eigenpair>>,
+    pub modes: Vec<Vec<modes::LoadedMode>>,
     pub components: Vec<Component>,
     /// How it answers the numbers; none until asked for.
     pub answers: Option<Answers>,
@@ -125,7 +125,7 @@ impl CaseAt {
             let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
             if modes.is_empty() || unknowns < FEW_UNKNOWNS {
                 let physics = Physics::new(&level.leaf.leaf);
-                let pairs = modes::lowest(
+                let pairs = modes::loaded(
                     &level.leaf,
                     &physics,
                     &level.state,
@@ -303,11 +303,8 @@ impl CaseAt {
             Quantity::Frequency(mode) => {
                 let scenarios = number.nearby().unwrap_or_default();
                 let of = |k: usize| {
-                    let shape = &self.modes[k][mode - 1].shape;
-                    let (level, answer) = (&self.at.levels[k], &answers[k]);
-                    let forces = modes::mode_forces(&level.leaf, &level.state, shape);
-                    let near = Nearby::new(level, &scenarios, (rate, answer));
-                    near.eigenvalue_rate(shape, &forces)
+                    let near = Nearby::new(&self.at.levels[k], &scenarios, (rate, &answers[k]));
+                    near.eigenvalue_rate(&self.modes[k][mode - 1])
                 };
                 // omega^2 = (2 pi f)^2.
                 let frequency = self.result(quantity);
