@@ -326,6 +326,41 @@ fn their_errors_are_bounds() {
     }
 }
 
+/// A round rod vibrates alike in all directions. Other bending in one of them splits
+/// the lowest eigenvalue, which has no derivative then; weight along the rod does not.
+#[test]
+fn an_eigenvalue_that_splits_has_no_derivative() {
+    let text = r#"
+        name = "round"
+        leaf = { rods = 1, length = 1.0, fan = [0.0] }
+        stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 1e3, shear_2 = 1e3, shear_3 = 1e3 }
+        load = { gravity = [-1.0, 0.0, 0.0] }
+    "#;
+    let wanted = [
+        "stiffness.bending_2",
+        "load.gravity[0]",
+        "stiffness.torsion",
+    ];
+    let base = base(text);
+    let options = Options {
+        modes: 3,
+        ..common::to(1e-8)
+    };
+    let found = derivatives(&base, &wanted, &options).1;
+    let [bending, weight, torsion] = found.as_slice() else {
+        panic!("{found:?}");
+    };
+    assert_eq!(bending.lowest_eigenvalue, None);
+    assert_eq!(bending.lowest_eigenvalue_error, None);
+    assert_eq!(bending.frequencies[..2], [None, None]);
+    assert!(bending.frequencies[2].is_some());
+    let differenced = differenced(&base, &keys(&wanted)[1], &options);
+    let lowest = weight.lowest_eigenvalue.unwrap();
+    let same = |(value, _): &(f64, f64)| (value - lowest).abs() < 1e-6;
+    assert!(differenced.iter().any(same), "{lowest} {differenced:?}");
+    assert!(torsion.lowest_eigenvalue.unwrap().abs() < 1e-9);
+}
+
 #[test]
 fn what_has_no_derivative_is_refused() {
     let (text, _) = random(4);

@@ -183,6 +183,15 @@ pub fn loaded(
 }
 
 impl LoadedMode {
+    /// Both modes at once.
+    pub fn plus(&self, other: &LoadedMode) -> LoadedMode {
+        let mut sum = self.clone();
+        let both = sum.shape.iter_mut().flatten();
+        (both.zip(other.shape.iter().flatten())).for_each(|(value, other)| *value += other);
+        (sum.forces.iter_mut().zip(&other.forces)).for_each(|(force, other)| *force += *other);
+        sum
+    }
+
     /// Takes off what softening does to first order, by the same mode of a leaf that is
     /// softened more. Where modes lie so close together that each is a mixture of
     /// several, all remains.
@@ -209,15 +218,9 @@ impl LoadedMode {
 /// The eigenvalue by the shape and the forces of a mode, be they those of a leaf and
 /// a state nearby: an error of theirs enters in the second order only. In the
 /// scenario's unit of time.
-pub fn eigenvalue(
-    leaf: &DiscreteLeaf,
-    physics: &Physics,
-    state: &State,
-    shape: &[Increment],
-    forces: &[DVec3],
-) -> f64 {
-    let quotient = quotient::with_forces(leaf, state, shape, forces);
-    quotient / masses::mass(leaf, physics, state, shape) * physics.time.powi(-2)
+pub fn eigenvalue(leaf: &DiscreteLeaf, physics: &Physics, state: &State, mode: &LoadedMode) -> f64 {
+    let quotient = quotient::with_forces(leaf, state, &mode.shape, &mode.forces);
+    quotient / masses::mass(leaf, physics, state, &mode.shape) * physics.time.powi(-2)
 }
 
 /// What a search has come to.

@@ -128,11 +128,15 @@ impl Context<'_> {
         let of = |values: &[DVec3], unit: f64| -> Vec<DVec3> {
             values.iter().map(|value| *value * unit).collect()
         };
-        let lowest = eigenvalues.0.first().map(|value| value.x);
+        let lowest = eigenvalues
+            .0
+            .first()
+            .map(|value| value.x)
+            .filter(|it| it.is_finite());
         // omega^2 = (2 pi f)^2, and an eigenvalue is omega^2.
         let frequency = |(change, squared): (&DVec3, &f64)| {
-            let stable = *squared > 0.0;
-            stable.then(|| change.x / (2.0 * std::f64::consts::TAU * squared.sqrt()))
+            let known = *squared > 0.0 && change.x.is_finite();
+            known.then(|| change.x / (2.0 * std::f64::consts::TAU * squared.sqrt()))
         };
         let frequencies = eigenvalues.0.iter().zip(&self.eigenvalues);
         let frequencies = frequencies.map(frequency);
@@ -203,7 +207,7 @@ impl Grid<'_> {
             let near = differences.then(|| Nearby::new(self.level, near, change));
             let of_modes = (near.iter())
                 .filter(|_| !rate.changes_moment())
-                .flat_map(|near| modes.iter().map(|mode| near.eigenvalue_rate(mode)));
+                .flat_map(|near| near.eigenvalue_rates(&modes));
             // What a dead moment does is not balanced in the energy.
             let n = leaf.segments();
             let work = moment.dot(turn(&response.nodes[0][n - 1]));

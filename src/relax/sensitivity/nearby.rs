@@ -12,7 +12,20 @@ use std::sync::Arc;
 
 /// The leaf for nearby values of a number, at rest there to first order, with the
 /// weights by which a function of it is differenced.
-pub(crate) struct Nearby(Vec<(f64, DiscreteLeaf, State)>);
+pub(crate) struct Nearby(Vec<Near>);
+
+struct Near {
+    offset: f64,
+    weight: f64,
+    leaf: DiscreteLeaf,
+    state: State,
+}
+
+/// Eigenvalues closer to each other than by this part are one, and their changes if
+/// closer than by the second; the third is the rounding error of an eigenvalue.
+const EQUAL: f64 = 1e-6;
+const SAME: f64 = 1e-3;
+const NOISE: f64 = 1e-3;
 
 impl Nearby {
     /// From scenarios nearby, with their offsets and weights.
@@ -25,7 +38,12 @@ impl Nearby {
         let near = |(offset, weight, scenario): &(f64, f64, Arc<Scenario>)| {
             let near = Leaf::in_units(Arc::clone(scenario), leaf.leaf.scale);
             let near = DiscreteLeaf::new(&near, leaf.grid.clone());
-            (*weight, near, moved(level, rate, response, *offset))
+            Near {
+                offset: *offset,
+                weight: *weight,
+                leaf: near,
+                state: moved(level, rate, response, *offset),
+            }
         };
         Nearby(scenarios.iter().map(near).collect())
     }
@@ -34,21 +52,47 @@ impl Nearby {
     /// quotient as the leaf goes from equilibrium to equilibrium, since its shape enters in
     /// the second order only.
     pub fn eigenvalue_rate(&self, mode: &LoadedMode) -> f64 {
-        let term = |(weight, leaf, state): &(f64, DiscreteLeaf, State)| {
-            let physics = Physics::new(&leaf.leaf);
-            weight * modes::eigenvalue(leaf, &physics, state, &mode.shape, &mode.forces)
+        let term = |near: &Near| {
+            let physics = Physics::new(&near.leaf.leaf);
+            near.weight * modes::eigenvalue(&near.leaf, &physics, &near.state, mode)
         };
         self.0.iter().map(term).sum()
+    }
+
+    /// The same of several modes. Not a number where modes of one eigenvalue change
+    /// differently: it splits, and the lower one is another mode to either side.
+    pub fn eigenvalue_rates(&self, modes: &[LoadedMode]) -> Vec<f64> {
+        let mut rates: Vec<f64> = modes
+            .iter()
+            .map(|mode| self.eigenvalue_rate(mode))
+            .collect();
+        let offsets = self.0.iter().map(|near| near.offset.abs());
+        let farthest = offsets.fold(0.0, f64::max);
+        let pairs = modes.windows(2).enumerate();
+        let equal = |pair: &[LoadedMode]| {
+            let [a, b] = [pair[0].eigenvalue, pair[1].eigenvalue];
+            (a - b).abs() <= EQUAL * a.abs().max(b.abs())
+        };
+        for (k, pair) in pairs.filter(|(_, pair)| equal(pair)) {
+            let [a, b] = [rates[k], rates[k + 1]];
+            let mixed = self.eigenvalue_rate(&pair[0].plus(&pair[1])) - 0.5 * (a + b);
+            let rounding = EQUAL * NOISE * pair[0].eigenvalue.abs() / farthest;
+            let same = SAME * a.abs().max(b.abs()) + rounding;
+            if !(mixed.abs() <= same && (a - b).abs() <= same) {
+                rates[k..k + 2].fill(f64::NAN);
+            }
+        }
+        rates
     }
 
     /// The changes of the moments of the rods on a clamp.
     pub fn clamp_moment_rates(&self, level: &Level) -> Vec<DVec3> {
         let first = level.leaf.reaction(&level.state).1;
         let mut rates = vec![DVec3::ZERO; first.len()];
-        for (weight, leaf, state) in &self.0 {
-            let moments = leaf.reaction(state).1;
+        for near in &self.0 {
+            let moments = near.leaf.reaction(&near.state).1;
             for ((rate, moment), first) in rates.iter_mut().zip(moments).zip(&first) {
-                *rate += *weight * (moment - *first);
+                *rate += near.weight * (moment - *first);
             }
         }
         rates
