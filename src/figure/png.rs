@@ -184,14 +184,13 @@ fn encode(
     // Row by row: buffers of the whole page cost more than what is done with them.
     let mut writer = encoder.write_header()?;
     let mut rows = writer.stream_writer_with_size(CHUNK)?;
-    let mut rgb = vec![0; 3 * width as usize];
+    let mut rgb = vec![[0; 3]; width as usize];
     for band in bands {
         for row in band.data().chunks_exact(4 * width as usize) {
             // The page is opaque: its transparency need not be stored.
-            for (to, from) in rgb.chunks_exact_mut(3).zip(row.chunks_exact(4)) {
-                to.copy_from_slice(&from[..3]);
-            }
-            rows.write_all(&rgb)?;
+            let pixels = rgb.iter_mut().zip(row.as_chunks::<4>().0);
+            pixels.for_each(|(to, [red, green, blue, _])| *to = [*red, *green, *blue]);
+            rows.write_all(rgb.as_flattened())?;
         }
     }
     rows.finish()?;

@@ -17,6 +17,10 @@ const MOST_A_PAIR: usize = 4;
 /// Directions between checks of what has converged.
 const CHECK_EVERY: usize = 4;
 
+/// Where some pairs are found and the next one would take more checks than this, a
+/// shift closer to it is cheaper.
+const MORE_CHECKS: f64 = 3.0;
+
 /// A direction shorter than this part of what it was has no digit left: all
 /// that the start can reach is found.
 const EXHAUSTED: f64 = 1e-13;
@@ -70,6 +74,8 @@ impl Lanczos<'_> {
         let mut basis: Vec<Vec<f64>> = Vec::new();
         let (mut diagonal, mut off): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
         let mut length = self.orthogonal(&mut next, &basis);
+        // How many pairs were found at the last check, and how far off the next one was.
+        let mut last_check = (0, f64::INFINITY);
         while basis.len() < most && length > 0.0 && !self.time.reached() {
             next.iter_mut().for_each(|x| *x /= length);
             let loaded = self.masses.times(&next);
@@ -90,9 +96,19 @@ impl Lanczos<'_> {
                     error(k) <= (self.accuracy * values[k]).max(LEAST_ACCURACY * values[0])
                 };
                 let done = (0..size).take_while(|&k| good(k)).count();
+                let next_error = if done < size {
+                    error(done) / values[done]
+                } else {
+                    0.0
+                };
+                let slow = limit.is_infinite() && last_check.0 == done && done > 0 && {
+                    let gained = (last_check.1 / next_error).ln().max(0.0);
+                    (next_error / self.accuracy).ln() > MORE_CHECKS * gained
+                };
+                last_check = (done, next_error);
                 let eigenvalue = |k: usize| self.shift + 1.0 / values[k];
                 let beyond = done > 0 && eigenvalue(done - 1) > limit;
-                if done >= wanted || beyond || size == most || length == 0.0 {
+                if done >= wanted || beyond || slow || size == most || length == 0.0 {
                     let pair = |k: usize| Mode {
                         eigenvalue: eigenvalue(k),
                         vector: self.combined(&basis, &vectors, k),
