@@ -128,6 +128,19 @@ impl Richardson {
         })
     }
 
+    /// The change before the one that judges the best column, `columns`: of the finest
+    /// grid by the column before or, of a column that is no further extrapolated, from
+    /// grid to grid. Zero if there is none.
+    pub fn change_before(&self, columns: usize) -> f64 {
+        match self.table.as_slice() {
+            [.., row] if columns > 1 && columns + 1 == row.len() => {
+                distance(&row[columns - 1], &row[columns - 2])
+            }
+            [.., coarse, before, _] if columns == 0 => distance(&before[0], &coarse[0]),
+            _ => 0.0,
+        }
+    }
+
     /// Ratio of the last two changes of column `m` from grid to grid if its error
     /// is in proportion to the first term that is left: to the product of ds^2 of
     /// the grids it joins.
