@@ -7,7 +7,7 @@ mod workplace;
 use std::f64::consts::PI;
 
 use common::branch::text;
-use common::{RIGID, ROD, entries};
+use common::{RIGID, ROD, entries, path};
 use leafdyn::study::{
     Base, Boundary, BoundaryCurve, BoundaryPoint, BoundaryRequest, TraceRequest, boundary,
 };
@@ -363,6 +363,24 @@ fn crossings_are_where_their_errors_say() {
             assert!((s - stiffness).abs() <= se && se < 1e-9, "{point:?}");
         }
     }
+}
+
+/// Verifying a point of the undulation boundary takes few matrices, eleven on four or five
+/// grids: work must not grow unnoticed.
+#[test]
+fn points_of_the_undulation_boundary_take_few_factorizations() {
+    let text = std::fs::read_to_string(path("study/undulation")).unwrap();
+    let weak = (0..11).filter(|vein| *vein != 5);
+    let weak: Vec<String> = weak
+        .map(|vein| format!("stiffness.bending_2[{vein}]"))
+        .collect();
+    let along = format!("{}=1..0.4:50log", weak.join("+"));
+    let across = "stiffness.torsion=0.9..1:2log";
+    let found = follow(&text, "load.gravity=[0,0,0]", &along, across);
+    let points: usize = found.curves.iter().map(|curve| curve.points.len()).sum();
+    println!("{} for {points} points", found.factorizations);
+    assert!(points >= 6, "{points}");
+    assert!(found.factorizations <= 12 * points);
 }
 
 /// What ends early is said, with what was found until then.

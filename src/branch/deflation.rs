@@ -64,7 +64,7 @@ impl Equations<'_> {
                     modes: solved.modes,
                 });
             }
-            let (increments, changes) = solved.step(&[(&dual, &[own])], linear.noise)?;
+            let (increments, changes) = solved.step(&[(&dual, &[own], 0.0)], linear.noise)?;
             let size = largest(&increments).max(changes[0].abs());
             if !is_finite(&increments) || size > LARGEST {
                 return Err(Stuck::NotConverged);
@@ -193,11 +193,13 @@ pub(super) struct Solved {
 }
 
 impl Solved {
-    /// Newton's increments and changes of the numbers within the plane normal to as many
-    /// directions: each by its momentum, and its own changes of the numbers.
+    /// Newton's increments and changes of the numbers by which as many further functions
+    /// become zero: each by its change with the increments and with the numbers, and its
+    /// value. Within the plane normal to a direction these are its momentum, its own
+    /// changes of the numbers, and zero.
     pub fn step(
         &self,
-        normals: &[(&Field, &[f64])],
+        functions: &[(&Field, &[f64], f64)],
         noise: f64,
     ) -> Result<(Field, Vec<f64>), Stuck> {
         let (p, numbers) = (self.modes.len(), self.rates.len());
@@ -207,7 +209,7 @@ impl Solved {
             for (i, rate) in self.rates.iter().enumerate() {
                 matrix[(r, p + i)] = rate.multipliers[r];
             }
-            for (k, (dual, _)) in normals.iter().enumerate() {
+            for (k, (dual, _, _)) in functions.iter().enumerate() {
                 matrix[(p + k, r)] = dot(dual, &self.modes[r]);
             }
             // What is below rounding decides nothing.
@@ -216,11 +218,11 @@ impl Solved {
                 force => force,
             };
         }
-        for (k, (dual, own)) in normals.iter().enumerate() {
+        for (k, (dual, own, value)) in functions.iter().enumerate() {
             for (i, rate) in self.rates.iter().enumerate() {
                 matrix[(p + k, p + i)] = dot(dual, &rate.increments) + own[i];
             }
-            right[p + k] = -dot(dual, &self.forces.increments);
+            right[p + k] = -value - dot(dual, &self.forces.increments);
         }
         let svd = matrix.svd(true, true);
         let least = NEUTRAL * svd.singular_values.max();

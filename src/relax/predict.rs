@@ -35,17 +35,24 @@ pub fn predict(levels: &[&Level], state: &mut State) {
             panel.interpolate(&finest.state, state);
         }
     }
-    let square = |segments: usize| (segments as f64).powi(-2);
-    let squares: Vec<f64> = (levels.iter().map(|it| square(it.leaf.segments()))).collect();
-    let target = square(state.segments());
-    for (k, level) in coarser.iter().enumerate() {
-        let others = squares.iter().enumerate().filter(|(other, _)| *other != k);
-        let weight = others.map(|(_, other)| (target - other) / (squares[k] - other));
-        let weight = weight.product();
+    let segments: Vec<usize> = levels.iter().map(|it| it.leaf.segments()).collect();
+    for (level, weight) in coarser.iter().zip(weights(&segments, state.segments())) {
         for panel in &panels {
             panel.add_change(weight, &level.state, &finest.state, state);
         }
     }
+}
+
+/// Weights of values on grids of so many segments in that of another, by the polynomial in
+/// ds^2 through all of them.
+pub fn weights(segments: &[usize], target: usize) -> Vec<f64> {
+    let square = |segments: usize| (segments as f64).powi(-2);
+    let weight = |own: &usize| {
+        let others = segments.iter().filter(|other| *other != own);
+        let parts = others.map(|it| (square(target) - square(*it)) / (square(*own) - square(*it)));
+        parts.product()
+    };
+    segments.iter().map(weight).collect()
 }
 
 /// Nodes of a grid at its ends and kinks.

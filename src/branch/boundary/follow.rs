@@ -182,20 +182,24 @@ impl<'a> Walk<'a, '_> {
             Err(_) => return Halt::OutOfRange,
         };
         loop {
-            while self.end.is_none() && self.steps.len() < self.verified.len() + AHEAD {
-                if self.steps.len() >= self.how.most {
-                    self.end = Some(Halt::MostPoints);
-                    break;
-                }
-                self.try_step(&mut sheet);
-                let last = &self.steps[self.steps.len() - 1];
-                progress(self.steps.len(), last.place.spot.place);
-            }
-            let doubt = self.verify(sheet.grid());
-            let end = match (doubt, self.end) {
-                (None, None) => continue,
-                (None, Some(end @ (Halt::Stuck | Halt::Unfolded | Halt::Parted))) => end,
-                (None, Some(end)) => return end,
+            // The next points are made while those before are verified, side by side.
+            let (plane, accuracy, grid) = (self.plane, self.how.accuracy, sheet.grid().clone());
+            let new = self.steps[self.verified.len()..].to_vec();
+            let mut found = Vec::new();
+            rayon::in_place_scope(|scope| {
+                scope.spawn(|_| {
+                    let each = new.par_iter();
+                    found = each.map(|it| refine(plane, &grid, it, accuracy)).collect();
+                });
+                self.go_on(&mut sheet, AHEAD, progress);
+            });
+            let all = new.len() + self.verified.len() == self.steps.len();
+            let end = match (self.accept(found), self.end) {
+                (None, Some(end)) if all => match end {
+                    Halt::Stuck | Halt::Unfolded | Halt::Parted => end,
+                    _ => return end,
+                },
+                (None, _) => continue,
                 (Some(doubt), _) => Halt::Unverified(doubt),
             };
             // Perhaps a finer grid knows better.
@@ -205,13 +209,27 @@ impl<'a> Walk<'a, '_> {
         }
     }
 
-    /// Verifies what is not yet, side by side; forgets what cannot be.
-    fn verify(&mut self, grid: &Grid) -> Option<Doubt> {
-        let new = &self.steps[self.verified.len()..];
-        let (plane, accuracy) = (self.plane, self.how.accuracy);
-        let found: Vec<Result<Verified, Doubt>> = (new.par_iter())
-            .map(|step| refine(plane, grid, step, accuracy))
-            .collect();
+    /// Makes so many further points, unless it comes to an end.
+    fn go_on(
+        &mut self,
+        sheet: &mut Sheet,
+        points: usize,
+        progress: &mut dyn FnMut(usize, [f64; 2]),
+    ) {
+        let enough = self.steps.len() + points;
+        while self.end.is_none() && self.steps.len() < enough {
+            if self.steps.len() >= self.how.most {
+                self.end = Some(Halt::MostPoints);
+                break;
+            }
+            self.try_step(sheet);
+            let last = &self.steps[self.steps.len() - 1];
+            progress(self.steps.len(), last.place.spot.place);
+        }
+    }
+
+    /// Keeps what was verified; forgets what cannot be, and what was made after that.
+    fn accept(&mut self, found: Vec<Result<Verified, Doubt>>) -> Option<Doubt> {
         for point in found {
             match point {
                 Ok(point) => self.verified.push(point),

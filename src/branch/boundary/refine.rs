@@ -3,13 +3,16 @@
 use super::grids::{on_coarser, on_finer};
 use super::place::Place;
 use super::search::{Found, Lost, Search};
-use super::sheet::{Direction, Plane, Sheet};
+use super::sheet::{Direction, Plane, Sheet, Spot};
 use super::special::{Special, locate_near};
 use crate::branch::critical::Kind;
 use crate::branch::refine_critical::NEARLY_RIGID;
 use crate::branch::refined::Doubt;
 use crate::leaf::{Grid, State};
+use crate::newton::Contraction;
+use crate::relax::predict::{predict, weights};
 use crate::relax::richardson::Richardson;
+use crate::relax::run::Level;
 
 /// Grids of a point at least and at most, those of a nearly rigid leaf, and segments of
 /// the finest.
@@ -25,7 +28,7 @@ const STILL: f64 = 1e-4;
 const NEUTRAL_TIPS: f64 = 1e-3;
 
 /// Numbers are to be so many times as exact as tips: of the part of their ranges.
-const EXACTER: f64 = 1e-3;
+const EXACTER: f64 = 1e-2;
 
 /// Compliance by which matrices of nearly rigid leaves are softened, in units of L^2/A,
 /// times one to four: the more, the less rounding; a part of third order is left.
@@ -34,6 +37,11 @@ const SOFTENING: f64 = 1e-3;
 /// What extrapolation to none makes of rounding: the root of the sum of the squares of its
 /// weights.
 const AMPLIFIED: f64 = 8.3;
+
+/// Newton's method leaves at most this part of the error that is allowed, on a grid, of
+/// which extrapolation makes at most so much.
+const LEFT: f64 = 1e-3;
+const KEPT: f64 = 2.0;
 
 /// Numbers within this part of their ranges are exact.
 const EXACT: f64 = 1e-12;
@@ -78,6 +86,8 @@ pub struct Verified {
     /// Morse indices where the first number is smaller and where it is larger; of a fold,
     /// of both branches that meet there.
     pub indices: [usize; 2],
+    /// Matrices factorised for it, but for those of softened leaves.
+    pub factorizations: usize,
 }
 
 /// A point on as many grids as it takes; on all of them it must be the same. Of a nearly
@@ -113,23 +123,45 @@ fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<
         ..Table::default()
     };
     let mut moved = f64::INFINITY;
+    let mut contraction = Contraction::default();
+    let (mut levels, mut places) = (Vec::<Level>::new(), Vec::new());
+    let enough = (EXACTER * accuracy).max(EXACT);
+    let mut factorizations = 0;
     for level in 0..GRIDS {
         if level > 0 {
             (sheet, near) = on_finer(&mut sheet, &near)?;
         }
+        let mut start = near.spot.clone();
+        let believed = table.tips.best().map_or(0, |best| best.columns + 1);
+        predict_spot(&levels, &places, believed, &mut start);
         let rigid = sheet.leaf(near.spot.place)?.stiffest() * NEARLY_RIGID < 1.0;
-        let (place, along) = again(&mut sheet, &near, step.special, given)?;
-        let way = near.spot.state.shift_to(&place.spot.state);
-        if way > moved.max(STILL) {
+        let (place, along) = match (step.special, rigid) {
+            (None, false) => {
+                let left = LEFT * enough;
+                let from = (&near, &start);
+                let found = from_near(&mut sheet, from, given, left, &mut contraction)?;
+                table.left = table.left.max(found.1);
+                (found.0, None)
+            }
+            _ => again(&mut sheet, &near, step.special, given)?,
+        };
+        factorizations += sheet.equations.factorizations;
+        let shift = near.spot.state.shift_to(&place.spot.state);
+        if shift > moved.max(STILL) {
             return Err(Doubt::OtherBranch);
         }
         if place.index != step.place.index {
             return Err(Doubt::OtherIndex);
         }
         if level > 0 {
-            moved = way;
+            moved = shift;
         }
         near = place;
+        levels.push(Level {
+            leaf: sheet.leaf(near.spot.place)?.clone(),
+            state: near.spot.state.clone(),
+        });
+        places.push(near.spot.place);
         let numbers = match rigid {
             false => near.spot.place,
             true => unsoftened(&mut sheet, &near, step.special, given)?,
@@ -138,7 +170,6 @@ fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<
         if level + 1 < FEWEST {
             continue;
         }
-        let enough = (EXACTER * accuracy).max(EXACT);
         let errors = table.errors().into_iter().zip(table.rounding);
         let exact = errors
             .into_iter()
@@ -149,7 +180,10 @@ fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<
         let tips = table.tips.best().is_some_and(|best| best.error <= tips);
         let numbers = table.errors().iter().all(|error| *error <= accuracy);
         if tips && (exact || last && numbers) {
-            return Ok(table.verified(&sheet, &near, step.special));
+            return Ok(Verified {
+                factorizations,
+                ..table.verified(&sheet, &near, step.special)
+            });
         }
         if last {
             break;
@@ -192,6 +226,40 @@ fn again(
     Ok((near.moved(sheet, found), None))
 }
 
+/// The spot on the next grid by those on coarser ones, if there are two at least: of as
+/// many as are believed to be of one series.
+fn predict_spot(levels: &[Level], places: &[[f64; 2]], believed: usize, spot: &mut Spot) {
+    if levels.len() < 2 {
+        return;
+    }
+    let skipped = levels.len() - believed.clamp(2, levels.len());
+    let (levels, places) = (&levels[skipped..], &places[skipped..]);
+    predict(&levels.iter().collect::<Vec<_>>(), &mut spot.state);
+    let segments: Vec<usize> = levels.iter().map(|it| it.leaf.segments()).collect();
+    let weights = weights(&segments, spot.state.segments());
+    spot.place = [0, 1].map(|i| (places.iter().zip(&weights).map(|(at, part)| part * at[i])).sum());
+}
+
+/// The point on this grid from where it is predicted, if it can be found from there, and
+/// what is left of its error on this grid.
+fn from_near(
+    sheet: &mut Sheet,
+    (near, start): (&Place, &Spot),
+    given: Option<usize>,
+    accuracy: f64,
+    contraction: &mut Contraction,
+) -> Result<(Place, f64), Lost> {
+    let mut owned = sought(sheet, near, given);
+    let own = std::mem::replace(&mut owned.near.spot, start.clone());
+    let frozen = near.kind == Kind::Branching;
+    let found = owned.search(accuracy).near(sheet, frozen, contraction);
+    let (found, left) = found.or_else(|_| {
+        owned.near.spot = own;
+        owned.run(sheet).map(|found| (found, 0.0))
+    })?;
+    Ok((near.moved(sheet, found), left))
+}
+
 /// How the point is sought, from where it is on the grid before.
 fn sought(sheet: &Sheet, near: &Place, given: Option<usize>) -> Owned {
     let (across, slope, along) = match given {
@@ -219,17 +287,20 @@ struct Owned {
 
 impl Owned {
     fn run(&self, sheet: &mut Sheet) -> Result<Found, Lost> {
-        let search = Search {
+        self.search(ACCURACY).run(sheet)
+    }
+
+    fn search(&self, accuracy: f64) -> Search<'_> {
+        Search {
             spot: &self.near.spot,
             across: &self.across,
             slope: self.slope,
             along: &self.along,
             held: &self.near.held,
             neutral: self.near.neutral,
-            accuracy: ACCURACY,
+            accuracy,
             furthest: NEAR,
-        };
-        search.run(sheet)
+        }
     }
 }
 
@@ -269,6 +340,8 @@ struct Table {
     /// times as much to those of no softening.
     rounding: [f64; 2],
     amplified: f64,
+    /// What Newton's method may have left on a grid.
+    left: f64,
 }
 
 impl Table {
@@ -342,12 +415,14 @@ impl Table {
         Verified {
             place: [number(0), number(1)],
             errors: [0, 1].map(|i| match free(i) {
-                true => errors[i] + self.amplified * self.rounding[i],
+                true => errors[i] + self.amplified * self.rounding[i] + KEPT * self.left,
                 false => 0.0,
             }),
             tips: tips.chunks(3).map(|tip| [tip[0], tip[1], tip[2]]).collect(),
             // No tip is better than the precision of its numbers.
-            error: (self.tips.best()).map_or(f64::INFINITY, |best| best.error + f64::EPSILON),
+            error: (self.tips.best()).map_or(f64::INFINITY, |best| {
+                best.error + KEPT * self.left + f64::EPSILON
+            }),
             state: place.spot.state.clone(),
             stations: sheet.grid().sigma().to_vec(),
             kind: place.kind,
@@ -356,6 +431,7 @@ impl Table {
                 true => [below, beyond],
                 false => [beyond, below],
             },
+            factorizations: 0,
         }
     }
 }

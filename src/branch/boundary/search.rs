@@ -1,14 +1,21 @@
 //! The search for a point of a boundary: the zero of an eigenvalue across it.
 
 use super::sheet::{Direction, Sample, Sheet, Spot};
-use crate::branch::equations::Stuck;
+use crate::branch::equations::{ITERATIONS, LARGEST, Stuck};
+use crate::branch::field::{add, combined, dot, is_finite, largest, times};
 use crate::leaf::Field;
+use crate::newton::{Contraction, converged};
 
 /// Evaluations in the search for a zero.
 const EVALUATIONS: usize = 30;
 
 /// A slope from points nearer than this is rounding.
 const LOCAL: f64 = 1e-6;
+
+/// Newton's method for state and boundary together knows the change of the eigenvalue to
+/// this part; increments below the other that do not shrink are rounding.
+const SLOPES: f64 = 1e-3;
+const ROUNDED: f64 = 1e-9;
 
 /// What one evaluation says of the modes that become neutral.
 pub struct Eigen {
@@ -94,6 +101,100 @@ pub fn eigen(sample: &Sample, neutral: usize) -> Eigen {
 }
 
 impl Search<'_> {
+    /// The same point by Newton's method for the state and the zero of the eigenvalue
+    /// together, from near it, and what it leaves. Where branches cross, the modes are
+    /// `frozen`: the sheet is that of a symmetric branch, whose forces do not excite them.
+    /// Of one that crosses askew this does not find the point: with the matrix singular,
+    /// nothing tells how much of the mode it has.
+    pub fn near(
+        &self,
+        sheet: &mut Sheet,
+        frozen: bool,
+        contraction: &mut Contraction,
+    ) -> Result<(Found, f64), Lost> {
+        let border: Vec<Field> = (self.held.iter())
+            .map(|mode| sheet.equations.momentum(mode))
+            .collect();
+        let along = sheet.equations.momentum(&self.along.increments);
+        let mut spot = sheet.with_forces(self.spot)?;
+        let mut previous = f64::INFINITY;
+        for _ in 0..ITERATIONS {
+            let rates = sheet.rates(&spot)?;
+            let (mut sample, noise) = sheet.sample(spot, &border, rates, false)?;
+            let eigen = eigen(&sample, self.neutral);
+            let forces = &sample.solved.forces.multipliers;
+            let excited = |mode: &Vec<f64>| {
+                let force: f64 = mode.iter().zip(forces).map(|(part, f)| part * f).sum();
+                force.abs() > noise
+            };
+            if frozen && eigen.vectors[..self.neutral].iter().any(excited) {
+                break;
+            }
+            let (slope, numbers) = self.change(sheet, &sample, &eigen, &border, frozen)?;
+            let value = eigen.value / self.slope;
+            let functions = [
+                (&along, self.along.place.as_slice(), 0.0),
+                (&slope, numbers.as_slice(), value),
+            ];
+            let (increments, changes) = sample.solved.step(&functions, noise)?;
+            let size = largest(&increments)
+                .max(changes[0].abs())
+                .max(changes[1].abs());
+            if !is_finite(&increments) || !size.is_finite() || size > LARGEST {
+                break;
+            }
+            let place = [0, 1].map(|i| sample.spot.place[i] + changes[i]);
+            let state = sheet.advanced(&sample.spot.state, place, &increments, 1.0)?;
+            spot = Spot { state, place };
+            contraction.learn(size, previous);
+            let first = contraction.after_first(size, 0.0);
+            let accuracy = (self.accuracy, ROUNDED);
+            if let Some(left) = converged(size, previous, [SLOPES; 2], accuracy, first) {
+                let distance = sheet.along(&sheet.way(self.spot, &spot), self.across);
+                sample.spot = spot;
+                let found = Found {
+                    sample,
+                    eigen,
+                    distance,
+                };
+                return Ok((found, left));
+            }
+            previous = size;
+        }
+        Err(Lost::Stuck(Stuck::NotConverged))
+    }
+
+    /// The change of the eigenvalue with increments and numbers, in units of that across.
+    fn change(
+        &self,
+        sheet: &mut Sheet,
+        sample: &Sample,
+        eigen: &Eigen,
+        border: &[Field],
+        frozen: bool,
+    ) -> Result<(Field, [f64; 2]), Lost> {
+        let own = &eigen.vectors[..self.neutral];
+        let modes = own.iter().map(|it| combined(it, &sample.solved.modes));
+        let modes: Vec<Field> = modes.collect();
+        let part = 1.0 / (self.slope * self.neutral as f64);
+        let mut all = times(&modes[0], 0.0);
+        let mut numbers = [0.0; 2];
+        for mode in &modes {
+            let (change, rates) = sheet.curvature_change(&sample.spot, mode)?;
+            add(&mut all, part, &change);
+            for (number, rate) in numbers.iter_mut().zip(rates) {
+                *number += part * rate;
+            }
+        }
+        if frozen {
+            for (vector, mode) in own.iter().zip(&modes) {
+                let along = dot(&all, mode);
+                add(&mut all, -along, &combined(vector, border));
+            }
+        }
+        Ok((all, numbers))
+    }
+
     /// The zero of the eigenvalue by the secant method.
     pub fn run(&self, sheet: &mut Sheet) -> Result<Found, Lost> {
         let border: Vec<Field> = (self.held.iter())

@@ -6,10 +6,13 @@ use std::sync::Arc;
 use crate::branch::deflation::Solved;
 use crate::branch::equations::{Equations, ITERATIONS, LARGEST, Stuck, assembled, at_rest};
 use crate::branch::family::{Family, OutOfRange};
-use crate::branch::field::{between, is_finite, largest, plus, times};
+use crate::branch::field::{add, between, dot, is_finite, largest, plus, times};
 use crate::branch::states::{advanced, forces_on, rate};
 use crate::leaf::{DiscreteLeaf, Field, Grid, Leaf, State, System};
 use crate::scenario::Scenario;
+
+/// The part of a mode of mass one over which forces are differenced twice.
+const ALONG_MODE: f64 = 3e-4;
 
 /// Leaves that differ in two numbers: a family along the first for every value of the
 /// second.
@@ -226,7 +229,7 @@ impl<'a> Sheet<'a> {
     }
 
     /// A state after `step` times these increments, at the place that is then reached.
-    fn advanced(
+    pub fn advanced(
         &mut self,
         state: &State,
         place: [f64; 2],
@@ -242,7 +245,7 @@ impl<'a> Sheet<'a> {
 
     /// What the bordered equations say at a spot, at rest or not, with the rates of both
     /// numbers.
-    fn sample(
+    pub fn sample(
         &mut self,
         mut spot: Spot,
         border: &[Field],
@@ -298,6 +301,48 @@ impl<'a> Sheet<'a> {
         Ok(rates)
     }
 
+    /// How the curvature of the energy along a mode, with the sign of H, changes with all
+    /// increments and with both numbers.
+    pub fn curvature_change(
+        &mut self,
+        spot: &Spot,
+        mode: &Field,
+    ) -> Result<(Field, [f64; 2]), Stuck> {
+        let way = Direction {
+            increments: mode.clone(),
+            place: [0.0; 2],
+        };
+        let mut change = vec![vec![[0.0; 6]; self.grid().segments()]; self.equations.rods()];
+        let mut numbers = [0.0; 2];
+        for step in [ALONG_MODE, -ALONG_MODE] {
+            let moved = self.moved(spot, &way, step)?;
+            add(&mut change, 1.0, &self.forces(&moved)?);
+            for (number, rate) in numbers.iter_mut().zip(self.rates(&moved)?) {
+                *number += dot(&rate, mode) / (2.0 * step);
+            }
+        }
+        // The last, so that increments are those of the spot again.
+        add(&mut change, -2.0, &self.forces(spot)?);
+        Ok((times(&change, ALONG_MODE.powi(-2)), numbers))
+    }
+
+    /// A spot with the forces in the segments that their strains say.
+    pub fn with_forces(&mut self, spot: &Spot) -> Result<Spot, OutOfRange> {
+        self.forces(spot)?;
+        let none = Direction {
+            place: [0.0; 2],
+            ..self.number(0)
+        };
+        self.moved(spot, &none, 1.0)
+    }
+
+    /// The unbalanced forces at a spot; segments are as there afterwards.
+    fn forces(&mut self, spot: &Spot) -> Result<Field, OutOfRange> {
+        let grid = &self.equations.leaves.grid;
+        let leaf = (self.kept).at(&self.plane, self.plane.family, grid, spot.place)?;
+        Ok(forces_on(leaf, &spot.state, &mut self.equations.system))
+    }
+
     /// Newton's method to the sheet within the plane normal to two directions through a
     /// spot; the matrix may be singular: it is bordered by `border`, and what this cannot
     /// decide is left as it is. The rates may be those of a spot nearby: they only decide
@@ -310,7 +355,7 @@ impl<'a> Sheet<'a> {
         rates: &[Field],
     ) -> Result<Sample, Stuck> {
         let duals = normals.map(|normal| self.equations.momentum(&normal.increments));
-        let normals = [0, 1].map(|k| (&duals[k], normals[k].place.as_slice()));
+        let normals = [0, 1].map(|k| (&duals[k], normals[k].place.as_slice(), 0.0));
         let mut spot = spot.clone();
         let mut previous = f64::INFINITY;
         let mut finished = false;

@@ -46,6 +46,9 @@ pub struct Boundary {
     /// The map under them, if it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub map: Option<BoundaryMap>,
+    /// Matrices that were factorised to verify its points, but for those of softened leaves.
+    #[serde(skip)]
+    pub factorizations: usize,
     /// Time of all, in seconds.
     pub wall_seconds: f64,
 }

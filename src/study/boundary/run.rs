@@ -64,6 +64,7 @@ pub fn boundary(
         remark: trace.remark,
         curves: Vec::new(),
         map: None,
+        factorizations: 0,
         wall_seconds: 0.0,
     };
     let mut run = Run {
@@ -165,6 +166,8 @@ impl Run<'_, '_> {
             let progress = &mut *self.progress;
             let mut tell = |points, place| progress(Some(number), points, plane.values(place));
             let curve = curves::follow(plane, &grid, start.critical, start.second, &how, &mut tell);
+            let work = curve.points.iter().map(|point| point.factorizations);
+            boundary.factorizations += work.sum::<usize>();
             boundary
                 .curves
                 .push(in_units(&plane, boundary.joined, &curve));
