@@ -10,7 +10,7 @@ from leaves import fan, program
 
 import leafdyn
 
-HOSTILE = Path(__file__).parents[2] / "tests" / "hostile_scenarios.rs"
+TESTS = Path(__file__).parents[2] / "tests"
 TEXT = r'"((?:[^"\\]|\\.)*)"'
 
 
@@ -20,8 +20,8 @@ def unescape(text: str) -> str:
 
 def hostile() -> tuple[str, list[tuple[str, list[str]]]]:
     """The valid scenario of the tests in Rust, and every line that they put into it with parts of the message."""
-    source = HOSTILE.read_text()
-    valid = source.split('r#"', 1)[1].split('"#', 1)[0]
+    source = (TESTS / "hostile_scenarios.rs").read_text()
+    valid = (TESTS / "common" / "valid.rs").read_text().split('r#"', 1)[1].split('"#', 1)[0]
     rows = []
     for table in re.findall(r"each! \{ refused;\n(.*?)\n    \}", source, re.S):
         for row in re.finditer(rf"{TEXT}\s*=>\s*((?:{TEXT}\s*,?\s*)+);", table):
