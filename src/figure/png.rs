@@ -2,9 +2,8 @@
 
 use std::io::{self, Write};
 use std::ops::Range;
-use std::sync::mpsc;
-use std::thread;
 
+use rayon::prelude::*;
 use tiny_skia::{
     FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Stroke as Pen, StrokeDash, Transform,
 };
@@ -18,23 +17,19 @@ const CHUNK: usize = 1 << 16;
 /// 192 dots per inch, as the file says them: dots per metre.
 const DOTS_PER_METRE: u32 = 7559;
 
-/// Rows that are painted together, while those before them are written.
-const BAND: u32 = 512;
+/// Rows that are painted together, bands side by side.
+const BAND: u32 = 320;
 
 pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
     let [width, height] = size(drawing);
-    thread::scope(|scope| {
-        let (send, bands) = mpsc::sync_channel(1);
-        scope.spawn(move || {
-            let starts = (0..height).step_by(BAND as usize);
-            let bands = starts.map(|start| start..(start + BAND).min(height));
-            // Nobody takes what comes after an error.
-            let _ = bands
-                .map(|rows| send.send(paint_rows(drawing, rows)))
-                .find(Result::is_err);
-        });
-        encode([width, height], bands.into_iter(), out)
-    })
+    let starts = (0..height).step_by(BAND as usize);
+    let bands: Vec<Range<u32>> = starts.map(|at| at..(at + BAND).min(height)).collect();
+    let together = bands.chunks(rayon::current_num_threads());
+    let painted = together.flat_map(|some| -> Vec<Pixmap> {
+        let each = some.par_iter().cloned();
+        each.map(|rows| paint_rows(drawing, rows)).collect()
+    });
+    encode([width, height], painted, out)
 }
 
 /// Pixels of a drawing, across and down.
@@ -51,7 +46,8 @@ pub fn paint(drawing: &Drawing) -> Pixmap {
 fn paint_rows(drawing: &Drawing, rows: Range<u32>) -> Pixmap {
     let mut canvas = Pixmap::new(size(drawing)[0], rows.end - rows.start)
         .expect("a page has a width and a height");
-    canvas.fill(tiny_skia::Color::WHITE);
+    // White.
+    canvas.data_mut().fill(u8::MAX);
     let font = Font::embedded();
     let place = Transform::from_translate(0.0, -(rows.start as f32)).pre_concat(page_to_pixels());
     let [top, bottom] = [rows.start, rows.end].map(|row| f64::from(row) / SCALE);
