@@ -244,7 +244,7 @@ pub mod internals {
         };
     }
     pub mod modes {
-        pub use crate::modes::lowest;
+        pub use crate::modes::{Eigenpair, Wanted, lowest};
     }
     pub mod motion {
         pub use crate::motion::{

@@ -272,7 +272,7 @@ fn a_leaf_let_go_in_a_mode_keeps_its_frequency() {
     let (grid, physics) = (discrete(&leaf, 6), Physics::new(&leaf));
     let mut exact = state.clone();
     settle_forces(&grid, &mut exact);
-    for pair in modes::lowest(&grid, &physics, &exact, 5, &Limit::default()).unwrap() {
+    for pair in modes::lowest(&grid, &physics, &exact, wanted(5, &Limit::default(), &[])).unwrap() {
         let omega = pair.eigenvalue.sqrt();
         let mut start = state.clone();
         for (node, increment) in pair.shape.iter().enumerate() {
@@ -281,6 +281,38 @@ fn a_leaf_let_go_in_a_mode_keeps_its_frequency() {
         let worst = off_cosine(&leaf, (&state, &start), (omega, 1e-3), (SIZE, 40));
         println!("omega {omega}: within {worst:.1e}");
         assert!(worst < 1e-4, "omega {omega}: {worst:.1e}");
+    }
+}
+
+fn wanted<'a>(count: usize, time: &'a Limit, near: &'a [modes::Eigenpair]) -> modes::Wanted<'a> {
+    modes::Wanted {
+        count,
+        accuracy: 1e-7,
+        near,
+        time,
+    }
+}
+
+/// The list does not depend on the shapes from which the search goes, be they those of
+/// other modes, or all the same one.
+#[test]
+fn where_the_search_begins_does_not_matter() {
+    let veins = fig04(4);
+    let state = rest(&veins, 8);
+    let leaf = Leaf::new(&veins);
+    let (grid, physics) = (discrete(&leaf, 8), Physics::new(&leaf));
+    let time = Limit::default();
+    let lowest = |count, near: &[_]| {
+        modes::lowest(&grid, &physics, &state, wanted(count, &time, near)).unwrap()
+    };
+    let many = lowest(12, &[]);
+    let highest: Vec<_> = many[8..].to_vec();
+    let alike = vec![many[1].clone(); 4];
+    for near in [&many[..4], &many[2..4], &highest, &alike] {
+        for (found, plain) in lowest(4, near).iter().zip(&many) {
+            let off = found.eigenvalue / plain.eigenvalue - 1.0;
+            assert!(off.abs() < 1e-10, "{off:e}");
+        }
     }
 }
 
@@ -307,7 +339,7 @@ fn shapes_are_orthonormal() {
     let (grid, physics) = (discrete(&leaf, 8), Physics::new(&leaf));
     let mut exact = state.clone();
     settle_forces(&grid, &mut exact);
-    let pairs = modes::lowest(&grid, &physics, &exact, 8, &Limit::default()).unwrap();
+    let pairs = modes::lowest(&grid, &physics, &exact, wanted(8, &Limit::default(), &[])).unwrap();
     for (a, first) in pairs.iter().enumerate() {
         for (b, second) in pairs.iter().enumerate() {
             let mut product = 0.0;

@@ -19,6 +19,6 @@ pub use discrete::DiscreteLeaf;
 pub use grid::Grid;
 pub use rate::{Forces, LeafRate, Response};
 pub use reduce::{half_of, whole_of};
-pub use sparse::{Bordered, SparseError, SparseFactor, SparsePattern};
+pub use sparse::{Bordered, SparseFactor, SparsePattern};
 pub use state::{Field, Increment, State, shift, turn};
 pub use system::{Solved, System};

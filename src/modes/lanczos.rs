@@ -14,9 +14,6 @@ const LEAST_ACCURACY: f64 = 1e-13;
 const MOST: usize = 40;
 const MOST_A_PAIR: usize = 4;
 
-/// Directions between checks of what has converged.
-const CHECK_EVERY: usize = 4;
-
 /// Where some pairs are found and the next one would take more checks than this, a
 /// shift closer to it is cheaper.
 const MORE_CHECKS: f64 = 3.0;
@@ -42,6 +39,8 @@ pub struct Lanczos<'a> {
     /// Of an eigenvector, relative to its eigenvalue; that of the eigenvalue is the
     /// square of it.
     pub accuracy: f64,
+    /// Directions between checks of what has converged.
+    pub check_every: usize,
     /// When it ends with nothing found.
     pub time: &'a Limit,
 }
@@ -89,7 +88,7 @@ impl Lanczos<'_> {
                 length = 0.0;
             }
             let size = basis.len();
-            if size.is_multiple_of(CHECK_EVERY) || size == most || length == 0.0 {
+            if size.is_multiple_of(self.check_every) || size == most || length == 0.0 {
                 let (values, vectors) = ritz(&diagonal, &off);
                 let error = |k: usize| length * vectors[(size - 1, k)].abs();
                 let good = |k: usize| {

@@ -18,11 +18,10 @@ mod lanczos;
 mod masses;
 mod quotient;
 
-use crate::leaf::{
-    DiscreteLeaf, Increment, SparseError, SparseFactor, SparsePattern, State, System,
-};
+use crate::leaf::{DiscreteLeaf, Increment, SparseFactor, SparsePattern, State, System};
 use crate::limit::Limit;
 use crate::motion::Physics;
+use crate::rod::Section;
 use glam::DVec3;
 use lanczos::{Lanczos, Mode};
 use masses::Masses;
@@ -36,9 +35,7 @@ const STIFFEST: f64 = 1e6;
 /// It is at least so many times the largest force carried.
 const STIFFER: f64 = 1e4;
 
-/// Accuracy of eigenvectors where only eigenvalues are wanted, whose error is the square
-/// of it, and where their derivatives are.
-const ACCURACY: f64 = 1e-7;
+/// Accuracy of eigenvectors where the derivatives of eigenvalues are wanted.
 const DERIVED: f64 = 1e-9;
 
 /// So many times as much is softened what shows to first order what softening does.
@@ -61,6 +58,9 @@ const BELOW: [f64; 3] = [1e-7, 1e-6, 1e-5];
 const FIRST_PART: f64 = 2e-3;
 const NEXT_PART: f64 = 6.0;
 
+/// Searches that begin with modes near those that are sought.
+const FROM_NEAR: usize = 2;
+
 /// Searches before the list is given up, besides one for every mode wanted: of
 /// equal eigenvalues each finds one.
 const SEARCHES: usize = 16;
@@ -74,49 +74,61 @@ pub struct Eigenpair {
     pub shape: Vec<Increment>,
 }
 
+/// What is asked of the modes of a leaf.
+#[derive(Clone, Copy)]
+pub struct Wanted<'a> {
+    /// How many of the lowest.
+    pub count: usize,
+    /// Of eigenvectors; the error of an eigenvalue is the square of it.
+    pub accuracy: f64,
+    /// The modes of the same grid in a shape nearby, or of another grid
+    /// interpolated: the search begins with them.
+    pub near: &'a [Eigenpair],
+    /// When it ends with nothing found.
+    pub time: &'a Limit,
+}
+
 struct Vibration<'a> {
     leaf: &'a DiscreteLeaf,
     state: &'a State,
-    system: System,
     pattern: SparsePattern,
     masses: Masses,
-    accuracy: f64,
-    time: &'a Limit,
+    wanted: Wanted<'a>,
+    /// [`Wanted::near`] as vectors.
+    near: Vec<Vec<f64>>,
 }
 
-/// The lowest `count` eigenvalues, ascending, all if there are fewer, with
+/// The lowest eigenvalues, ascending, all if there are fewer than are wanted, with
 /// their modes, which are orthonormal with the masses. `None` if memory is short, the
 /// time is over, or the list cannot be proved to be complete.
 pub fn lowest(
     leaf: &DiscreteLeaf,
     physics: &Physics,
     state: &State,
-    count: usize,
-    time: &Limit,
+    wanted: Wanted,
 ) -> Option<Vec<Eigenpair>> {
-    let soft = softened(leaf, state, 1.0);
-    of_softened(&soft, physics, state, (count, ACCURACY), time)
+    of_softened(&softened(leaf, state, 1.0), physics, state, wanted)
 }
 
 fn of_softened(
     soft: &DiscreteLeaf,
     physics: &Physics,
     state: &State,
-    (count, accuracy): (usize, f64),
-    time: &Limit,
+    wanted: Wanted,
 ) -> Option<Vec<Eigenpair>> {
-    let system = System::new(soft);
+    let mut system = System::new(soft);
     let pattern = SparsePattern::new(&system).ok()?;
     let mut vibration = Vibration {
         masses: Masses::new(soft, physics, state, &pattern),
         leaf: soft,
         state,
-        system,
         pattern,
-        accuracy,
-        time,
+        wanted,
+        near: Vec::new(),
     };
-    let found = vibration.lowest(count)?;
+    let near = wanted.near.iter().map(|near| vibration.vector(&near.shape));
+    vibration.near = near.collect();
+    let found = vibration.lowest(&mut system)?;
     let pair = |vector: &Vec<f64>| {
         let shape = vibration.shape(vector);
         let eigenvalue = quotient(soft, state, &shape);
@@ -161,23 +173,37 @@ pub fn loaded(
     count: usize,
     time: &Limit,
 ) -> Option<Vec<LoadedMode>> {
-    let of = |times: f64| -> Option<Vec<LoadedMode>> {
-        let soft = softened(leaf, state, times);
-        let pairs = of_softened(&soft, physics, state, (count, DERIVED), time)?.into_iter();
+    let of = |soft: &DiscreteLeaf, near: &[Eigenpair]| {
+        let wanted = Wanted {
+            count,
+            accuracy: DERIVED,
+            near,
+            time,
+        };
+        of_softened(soft, physics, state, wanted)
+    };
+    let with_forces = |soft: &DiscreteLeaf, pairs: Vec<Eigenpair>| -> Vec<LoadedMode> {
         let loaded = |pair: Eigenpair| LoadedMode {
-            forces: quotient::forces(&soft, state, &pair.shape),
+            forces: quotient::forces(soft, state, &pair.shape),
             eigenvalue: pair.eigenvalue,
             shape: pair.shape,
         };
-        Some(pairs.map(loaded).collect())
+        pairs.into_iter().map(loaded).collect()
     };
-    let mut modes = of(1.0)?;
-    let limit = 1.0 / STIFFEST;
-    if leaf.stiffest() < limit {
-        let softer = of(SOFTER)?;
-        for (mode, softer) in modes.iter_mut().zip(&softer) {
-            mode.stiffen(softer);
+    let soft = softened(leaf, state, 1.0);
+    let pairs = of(&soft, &[])?;
+    let changed = |(soft, stiff): (&Section, &Section)| soft.condensing != stiff.condensing;
+    let softer = match soft.sections.iter().zip(&leaf.sections).any(changed) {
+        true => {
+            let softer = softened(leaf, state, SOFTER);
+            let pairs = of(&softer, &pairs)?;
+            with_forces(&softer, pairs)
         }
+        false => Vec::new(),
+    };
+    let mut modes = with_forces(&soft, pairs);
+    for (mode, softer) in modes.iter_mut().zip(&softer) {
+        mode.stiffen(softer);
     }
     Some(modes)
 }
@@ -223,31 +249,21 @@ pub fn eigenvalue(leaf: &DiscreteLeaf, physics: &Physics, state: &State, mode: &
     quotient / masses::mass(leaf, physics, state, &mode.shape) * physics.time.powi(-2)
 }
 
-/// What a search has come to.
-enum Searched {
-    /// More eigenvalues than were allowed are below the shift.
-    BelowMany,
-    /// The bound on those that may be left, as of [`Lanczos::run`].
-    UpTo(Option<f64>),
-}
-
 impl Vibration<'_> {
     /// K - shift M.
-    fn factorize(&mut self, shift: f64) -> Option<SparseFactor<'_>> {
-        self.leaf.assemble(self.state, &mut self.system);
-        self.masses.add(&mut self.system, -shift);
-        self.pattern.factorize(&self.system, 0.0).ok()
+    fn factorize(&self, system: &mut System, shift: f64) -> Option<SparseFactor<'_>> {
+        self.leaf.assemble(self.state, system);
+        self.masses.add(system, -shift);
+        self.pattern.factorize(system, 0.0).ok()
     }
 
-    /// The first search, from a shift below all eigenvalues, no farther than it must be,
-    /// which is returned.
-    fn first_search(&mut self, wanted: usize, found: &mut Vec<Mode>) -> Option<(f64, Option<f64>)> {
+    /// A shift below all eigenvalues, no farther than it must be.
+    fn below_all(&self, system: &mut System) -> Option<(f64, SparseFactor<'_>)> {
         let mut shift = -self.leaf.neutral_shift();
         loop {
-            let sought = (wanted, f64::INFINITY);
-            let searched = self.search((shift, Some(0)), sought, 0, found).ok()?;
-            if let Searched::UpTo(bound) = searched {
-                return Some((shift, bound));
+            let factor = self.factorize(system, shift)?;
+            if factor.negative() == 0 {
+                return Some((shift, factor));
             }
             shift = (NEXT_SHIFT * shift).min(-FIRST_SHIFT);
             if !shift.is_finite() {
@@ -257,51 +273,55 @@ impl Vibration<'_> {
     }
 
     /// Eigenvectors of unit mass, eigenvalues ascending.
-    fn lowest(&mut self, count: usize) -> Option<Vec<Vec<f64>>> {
-        let count = count.min(self.pattern.size());
+    fn lowest(&self, system: &mut System) -> Option<Vec<Vec<f64>>> {
+        let count = self.wanted.count.min(self.pattern.size());
         if count == 0 {
             return Some(Vec::new());
         }
         let mut found: Vec<Mode> = Vec::new();
-        let (lowest, mut bound) = self.first_search(count, &mut found)?;
-        let (mut shift, mut limit) = (lowest, f64::INFINITY);
-        let mut wanted = count;
+        let (lowest, mut factor) = self.below_all(system)?;
+        let (mut shift, mut limit, mut sought) = (lowest, f64::INFINITY, count);
         for search in 0..SEARCHES + count {
-            if self.time.reached() {
+            if self.wanted.time.reached() {
                 return None;
             }
-            if search > 0 {
-                let sought = (wanted, limit);
-                let searched = self.search((shift, None), sought, search, &mut found);
-                if let Searched::UpTo(next) = searched.ok()? {
-                    bound = next;
-                }
-            }
+            let bound = self.search((shift, &mut factor), (sought, limit), search, &mut found);
             if found.len() < count {
-                wanted = count - found.len();
-                if let Some(bound) = bound {
-                    shift = self.closer(shift, bound, &found)?;
+                sought = count - found.len();
+                if let Some(bound) = bound
+                    && let Some(closer) = self.closer(system, shift, bound, &found)?
+                {
+                    (shift, factor) = closer;
                 }
                 continue;
             }
-            let (missing, below) = self.missing(&found, count, lowest)?;
+            let (missing, below) = self.missing(system, &found, count, lowest)?;
             if missing == 0 {
                 found.truncate(count);
                 return Some(found.into_iter().map(|found| found.vector).collect());
             }
-            (wanted, limit, shift) = (missing.min(count), below, lowest);
+            (sought, limit) = (missing.min(count), below);
+            if shift != lowest {
+                (shift, factor) = (lowest, self.factorize(system, lowest)?);
+            }
         }
         None
     }
 
     /// How many eigenvalues are missing, and below what value: just below the
     /// `count`-th of those found, to which there may be more that are equal.
-    fn missing(&mut self, found: &[Mode], count: usize, lowest: f64) -> Option<(usize, f64)> {
+    fn missing(
+        &self,
+        system: &mut System,
+        found: &[Mode],
+        count: usize,
+        lowest: f64,
+    ) -> Option<(usize, f64)> {
         let last = found[count - 1].eigenvalue;
         let rounding = self.leaf.rounding();
         for part in BELOW {
             let below = last - (part * (last - lowest)).max(4.0 * rounding);
-            let there = self.factorize(below)?.negative();
+            let there = self.factorize(system, below)?.negative();
             let here = found.iter().filter(|f| f.eigenvalue < below).count();
             // Too many: one is equal to the limit but for rounding.
             if let Some(count) = there.checked_sub(here) {
@@ -313,47 +333,61 @@ impl Vibration<'_> {
 
     /// A shift closer to the next eigenvalues, where many are close together:
     /// somewhat below `bound`, but above no more than those found.
-    fn closer(&mut self, shift: f64, bound: f64, found: &[Mode]) -> Option<f64> {
+    fn closer(
+        &self,
+        system: &mut System,
+        shift: f64,
+        bound: f64,
+        found: &[Mode],
+    ) -> Option<Option<(f64, SparseFactor<'_>)>> {
         let mut part = FIRST_PART;
         while part < 1.0 {
             let closer = bound - part * (bound - shift);
-            if self.factorize(closer)?.negative() <= found.len() {
-                return Some(closer);
+            let factor = self.factorize(system, closer)?;
+            if factor.negative() <= found.len() {
+                return Some(Some((closer, factor)));
             }
             part *= NEXT_PART;
         }
-        Some(shift)
+        Some(None)
     }
 
-    /// Adds to the eigenvalues found `wanted` more of those next above the
-    /// shift, fewer if there are no more below a limit; see [`Lanczos::run`]. Nothing is
-    /// searched if more eigenvalues than so many are below the shift.
+    /// Adds to the eigenvalues found so many more of those next above the
+    /// shift, fewer if there are no more below a limit; see [`Lanczos::run`].
     fn search(
-        &mut self,
-        (shift, most_below): (f64, Option<usize>),
-        (wanted, limit): (usize, f64),
+        &self,
+        (shift, factor): (f64, &mut SparseFactor),
+        (sought, limit): (usize, f64),
         search: usize,
         found: &mut Vec<Mode>,
-    ) -> Result<Searched, SparseError> {
-        let start = self.start(search);
-        self.leaf.assemble(self.state, &mut self.system);
-        self.masses.add(&mut self.system, -shift);
-        let mut factor = self.pattern.factorize(&self.system, 0.0)?;
-        if most_below.is_some_and(|most| factor.negative() > most) {
-            return Ok(Searched::BelowMany);
-        }
+    ) -> Option<f64> {
+        let from_near = search < FROM_NEAR && found.len() < self.near.len();
+        let (start, check_every) = match from_near {
+            true => (self.near_start(found.len()), 2),
+            false => (self.start(search), 4),
+        };
         let mut lanczos = Lanczos {
             masses: &self.masses,
             shift,
             solve: &mut |b| factor.solve_vector(b),
             known: found,
-            accuracy: self.accuracy,
-            time: self.time,
+            accuracy: self.wanted.accuracy,
+            check_every,
+            time: self.wanted.time,
         };
-        let (more, bound) = lanczos.run(start, wanted, limit);
+        let (more, bound) = lanczos.run(start, sought, limit);
         found.extend(more);
         found.sort_by(|a, b| a.eigenvalue.total_cmp(&b.eigenvalue));
-        Ok(Searched::UpTo(bound))
+        bound
+    }
+
+    /// A load of all modes that are near those not found yet.
+    fn near_start(&self, found: usize) -> Vec<f64> {
+        let mut load = vec![0.0; self.pattern.size()];
+        for near in &self.near[found..] {
+            (load.iter_mut().zip(near)).for_each(|(load, near)| *load += near);
+        }
+        self.masses.times(&load)
     }
 
     /// A load without any symmetry, another one in every search.
@@ -385,5 +419,17 @@ impl Vibration<'_> {
             node[3..].copy_from_slice(&vector[shift..shift + 3]);
         }
         shape
+    }
+
+    /// Turns and shifts of all nodes as a vector.
+    fn vector(&self, shape: &[Increment]) -> Vec<f64> {
+        let mut vector = vec![0.0; self.pattern.size()];
+        for (j, i) in self.leaf.each(1..=self.leaf.segments()) {
+            let [turn, shift] = self.pattern.unknowns(j, i);
+            let node = &shape[self.state.base(j) + i];
+            vector[turn..turn + 3].copy_from_slice(&node[..3]);
+            vector[shift..shift + 3].copy_from_slice(&node[3..]);
+        }
+        vector
     }
 }

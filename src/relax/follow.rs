@@ -155,7 +155,7 @@ impl AtRest {
     /// fraction `sigma`, and the derivatives of the weights with it; beyond the ends the
     /// values go on linearly.
     pub fn stencils(&self, sigma: f64) -> Vec<Stencil> {
-        let on = |level: &Level| Stencil::new(level, sigma);
+        let on = |level: &Level| Stencil::new(&level.leaf, sigma);
         self.levels.iter().map(on).collect()
     }
 }

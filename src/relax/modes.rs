@@ -1,8 +1,8 @@
 //! The modes of the settled leaf: from nested grids to the units of the
 //! scenario.
 
-use crate::leaf::{DiscreteLeaf, System, shift, turn};
-use crate::modes::{self, Eigenpair};
+use crate::leaf::{DiscreteLeaf, Increment, System, shift, turn};
+use crate::modes::{self, Eigenpair, Wanted};
 use crate::motion::Physics;
 use crate::newton::{Newton, Work};
 use crate::relax::equilibrium::Mode;
@@ -11,6 +11,7 @@ use crate::relax::prolong::prolong;
 use crate::relax::richardson::{Best, Richardson};
 use crate::relax::run::{Level, Run};
 use crate::relax::saddle::ANY_SIGN;
+use crate::relax::stencil::Stencil;
 use glam::DVec3;
 
 /// Unknowns of the finest grid on which modes are looked for unless their
@@ -43,6 +44,11 @@ const BY_CHANCE: f64 = 0.1;
 /// Relative error of an eigenvalue by unfinished iterations, as a part of the tolerance.
 const UNFINISHED: f64 = 2e-3;
 
+/// Accuracy of eigenvectors, times the root of the tolerance: that of eigenvalues is the
+/// square of it. No better than this.
+const ACCURACY: f64 = 5e-3;
+const LEAST_ACCURACY: f64 = 1e-7;
+
 /// Newton iterations on a further grid, and how far they may move a node, in
 /// lengths: farther away is another equilibrium.
 const ITERATIONS: usize = 12;
@@ -64,30 +70,34 @@ pub fn lowest(run: &Run) -> Option<Vec<Mode>> {
     let levels = levels(run)?;
     let finest = levels.last()?;
     let physics = Physics::new(run.leaf);
-    let count = options.modes;
-    let on = |level: &Level| {
-        let limit = &options.limit;
-        modes::lowest(&level.leaf, &physics, &level.state, count, limit)
+    let on = |level: &Level, near: &[Eigenpair]| {
+        let wanted = Wanted {
+            count: options.modes,
+            accuracy: (ACCURACY * run.tolerance.sqrt()).max(LEAST_ACCURACY),
+            near,
+            time: &options.limit,
+        };
+        modes::lowest(&level.leaf, &physics, &level.state, wanted)
     };
-    let coarser = &levels[levels.len().saturating_sub(GRIDS)..levels.len() - 1];
-    let (pairs, coarser) =
-        rayon::join(|| on(finest), || coarser.iter().map(on).collect::<Vec<_>>());
-    let pairs = pairs?;
-    let mut series = Series {
-        grids: Vec::new(),
-        count: pairs.len(),
-    };
-    for pairs in coarser {
-        match pairs {
-            Some(pairs) => series.push(&pairs),
+    let mut series = Series::default();
+    let mut before: Option<(&Level, Vec<Eigenpair>)> = None;
+    for level in &levels[levels.len().saturating_sub(GRIDS)..] {
+        let near = |(coarse, pairs): (&Level, Vec<Eigenpair>)| {
+            interpolated(&coarse.leaf, &pairs, &level.leaf)
+        };
+        let near = before.map(near).unwrap_or_default();
+        let found = on(level, &near);
+        match &found {
+            Some(pairs) => series.push(pairs),
             // Grids must follow each other.
             None => series.grids.clear(),
         }
+        before = found.map(|pairs| (level, pairs));
     }
-    series.push(&pairs);
+    let (_, pairs) = before?;
     let shapes = shapes(finest, &pairs);
     if options.method.segments().is_none() && options.mode_shapes {
-        refine(run, &mut series, on);
+        refine(run, &mut series, pairs, on);
     }
     let rounding = modes::rounding(&finest.leaf);
     let unit = physics.time.powi(-2);
@@ -127,7 +137,8 @@ fn unknowns(leaf: &DiscreteLeaf) -> usize {
 fn refine(
     run: &Run,
     series: &mut Series,
-    on: impl Fn(&Level) -> Option<Vec<Eigenpair>>,
+    mut pairs: Vec<Eigenpair>,
+    on: impl Fn(&Level, &[Eigenpair]) -> Option<Vec<Eigenpair>>,
 ) -> Option<()> {
     let mut finer: Vec<Level> = Vec::new();
     while finer.len() < MORE_GRIDS && !series.accurate(run.tolerance) && !run.late() {
@@ -137,10 +148,35 @@ fn refine(
             break;
         }
         let next = settle(&levels[levels.len().saturating_sub(2)..], run.tolerance)?;
-        series.push(&on(&next)?);
+        let near = interpolated(&levels.last()?.leaf, &pairs, &next.leaf);
+        pairs = on(&next, &near)?;
+        series.push(&pairs);
         finer.push(next);
     }
     Some(())
+}
+
+/// Modes of a leaf on a finer grid.
+fn interpolated(coarse: &DiscreteLeaf, pairs: &[Eigenpair], fine: &DiscreteLeaf) -> Vec<Eigenpair> {
+    let nodes = fine.grid.sigma().iter();
+    let stencils: Vec<Stencil> = nodes.map(|&sigma| Stencil::new(coarse, sigma)).collect();
+    let on_grid = |pair: &Eigenpair| {
+        let rods = pair.shape.chunks(coarse.segments() + 1);
+        let node = |(rod, stencil): (&[Increment], &Stencil)| -> Increment {
+            let [turn, shift] = [turn, shift].map(|part| stencil.value(|i| part(&rod[i])));
+            let mut both = [0.0; 6];
+            turn.write_to_slice(&mut both[..3]);
+            shift.write_to_slice(&mut both[3..]);
+            both
+        };
+        Eigenpair {
+            eigenvalue: pair.eigenvalue,
+            shape: rods
+                .flat_map(|rod| stencils.iter().map(move |stencil| node((rod, stencil))))
+                .collect(),
+        }
+    };
+    pairs.iter().map(on_grid).collect()
 }
 
 /// The same equilibrium on the next finer grid.
@@ -164,9 +200,9 @@ fn settle(levels: &[&Level], tolerance: f64) -> Option<Level> {
 }
 
 /// Eigenvalues on nested grids, each extrapolated on its own.
+#[derive(Default)]
 struct Series {
     grids: Vec<Vec<f64>>,
-    count: usize,
 }
 
 impl Series {
@@ -201,7 +237,9 @@ impl Series {
             };
             (value, best.map(error))
         };
-        let found: Vec<_> = (0..self.count).map(judge).collect();
+        let found: Vec<_> = (0..self.grids.last().map_or(0, Vec::len))
+            .map(judge)
+            .collect();
         let largest = found.iter().filter_map(|(_, error)| *error);
         let largest = largest.fold(0.0, f64::max);
         let bound = |error: f64| SAFETY * (error * largest).sqrt() + UNFINISHED * tolerance;

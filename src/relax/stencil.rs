@@ -1,6 +1,6 @@
 //! Values between the nodes of a grid.
 
-use crate::relax::run::Level;
+use crate::leaf::DiscreteLeaf;
 use glam::DVec3;
 
 /// Nodes between which a position along a vein is interpolated.
@@ -18,16 +18,17 @@ pub(crate) struct Stencil {
 impl Stencil {
     /// Of the polynomial through the nodes around a fraction of the length; beyond the
     /// ends of the rod it goes on linearly.
-    pub fn new(level: &Level, sigma: f64) -> Stencil {
+    pub fn new(leaf: &DiscreteLeaf, sigma: f64) -> Stencil {
         let (beyond, sigma) = (sigma - sigma.clamp(0.0, 1.0), sigma.clamp(0.0, 1.0));
-        let nodes = level.leaf.grid.sigma();
+        let nodes = leaf.grid.sigma();
         // A polynomial does not reach across a kink.
-        let kinks = level.leaf.leaf.kinks();
+        let kinks = leaf.leaf.kinks();
         let panel = kinks.partition_point(|&kink| kink < sigma);
         let low = panel.checked_sub(1).map_or(0.0, |k| kinks[k]);
         let high = kinks.get(panel).copied().unwrap_or(1.0);
-        let low = nodes.partition_point(|&node| node < low);
-        let high = nodes.partition_point(|&node| node < high);
+        // A node at a kink is there but for rounding.
+        let node = |kink: f64| nodes.partition_point(|&node| node < kink - 1e-12);
+        let (low, high) = (node(low), node(high));
         let count = NODES.min(high - low + 1);
         let right = nodes.partition_point(|&node| node < sigma);
         let first = (right.saturating_sub(count / 2)).clamp(low, high + 1 - count);

@@ -35,7 +35,7 @@ impl<'a> Vein<'a> {
         let (mut x, mut slope) = (DVec3::ZERO, DVec3::ZERO);
         for (level, weight) in self.at.levels.iter().zip(&self.at.weights) {
             if *weight != 0.0 {
-                let stencil = Stencil::new(level, sigma);
+                let stencil = Stencil::new(&level.leaf, sigma);
                 let base = level.state.base(self.rod);
                 let node = |i: usize| level.state.x[base + i];
                 x += *weight * stencil.value(node);
