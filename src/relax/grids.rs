@@ -6,14 +6,14 @@ use crate::newton::Stop;
 use crate::relax::method::Method;
 use crate::relax::options::MAX_NODES;
 use crate::relax::predict::predict;
-use crate::relax::prolong::prolong;
+use crate::relax::prolong::{prolong, restrict};
 use crate::relax::run::{BUDGET, Level, Run, positions};
 use crate::relax::segments::{COARSEST_TURN, FINEST};
 use crate::relax::settle::{InitialGuess, Settled};
 use glam::{DQuat, DVec3};
 
 /// Two grids on which the leaf moved far are said to have settled in the same place
-/// if no station differs by more than this, in lengths.
+/// if no coordinate of a station differs by more than this, in lengths.
 const SAME_PLACE: f64 = 0.05;
 
 /// The finest grid on which such places are compared.
@@ -103,6 +103,7 @@ impl Run<'_, '_> {
     /// had to move far must settle in the same place on two grids.
     fn settle_from_start(&mut self, mut grid: Grid) -> Result<(), Stop> {
         let mut before: Option<Level> = None;
+        let mut failed: Vec<Grid> = Vec::new();
         loop {
             let settled = self.settle(grid.clone(), InitialGuess::Start);
             let Settled { level, rest, moved } = settled;
@@ -119,10 +120,18 @@ impl Run<'_, '_> {
                 }
                 Ok(_) => {
                     if let Some(coarser) = before.take()
-                        && distance(&coarser, &level) < SAME_PLACE
+                        && distance(&positions(&coarser, 1), &positions(&level, 2)) < SAME_PLACE
                     {
                         self.push(coarser);
                         self.push(level);
+                        return Ok(());
+                    }
+                    if before.is_none()
+                        && let [.., coarse, _] = failed.as_slice()
+                        && self.settles_alike(&level, coarse.tripled())
+                    {
+                        self.push(level);
+                        self.add_coarser(&failed);
                         return Ok(());
                     }
                     before = Some(level);
@@ -140,10 +149,41 @@ impl Run<'_, '_> {
                         return Err(stop);
                     }
                     before = None;
+                    failed.push(grid);
                 }
             }
             grid = finer;
         }
+    }
+
+    /// Whether the leaf moves to the same place on a grid with three quarters of the
+    /// segments.
+    fn settles_alike(&mut self, level: &Level, grid: Grid) -> bool {
+        let last = self.last.take();
+        let Settled {
+            level: other, rest, ..
+        } = self.settle(grid, InitialGuess::Start);
+        self.last = last;
+        let (a, b) = (positions(level, 4), positions(&other, 3));
+        rest.is_ok() && distance(&a, &b) < SAME_PLACE
+    }
+
+    /// Lets the leaf settle where it did on the only grid on coarser ones, too, on which
+    /// it did not get there by itself: up to two, the finest last.
+    fn add_coarser(&mut self, grids: &[Grid]) {
+        let last = self.last.take();
+        for grid in grids.iter().rev().take(2) {
+            let fine = &self.levels[0];
+            let (guess, fine) = (restrict(&fine.state), positions(fine, 2));
+            let settled = self.settle(grid.clone(), InitialGuess::Coarser(guess));
+            let there = distance(&positions(&settled.level, 1), &fine) < SAME_PLACE;
+            if settled.rest.is_err() || settled.moved || !there {
+                break;
+            }
+            self.levels.insert(0, settled.level);
+        }
+        self.last = last;
+        self.tabulate();
     }
 
     /// Whether a grid between the finest two makes the extrapolation accurate
@@ -191,8 +231,7 @@ fn largest_turn(level: &Level) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Largest distance between a level and the next finer one at common stations.
-fn distance(coarse: &Level, fine: &Level) -> f64 {
-    let (a, b) = (positions(coarse, 1), positions(fine, 2));
-    a.iter().zip(&b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
+/// Largest difference between coordinates of places.
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
 }

@@ -1,4 +1,4 @@
-//! From a grid to the one with all segments halved.
+//! From a grid to the one with all segments halved, and back.
 
 use crate::leaf::{DiscreteLeaf, State};
 use glam::{DQuat, DVec3};
@@ -58,6 +58,20 @@ pub fn prolong(leaf: &DiscreteLeaf, state: &State) -> State {
     let mut fine = State::new(2 * n, x, q);
     fine.n = forces;
     fine
+}
+
+/// The state on the grid of which this one is the refined one: forces are means of both
+/// halves of a segment.
+pub fn restrict(fine: &State) -> State {
+    let (mut x, mut q) = (Vec::new(), Vec::new());
+    for j in 0..fine.rods() {
+        let nodes = (0..=fine.segments()).step_by(2).map(|i| fine.base(j) + i);
+        x.extend(nodes.clone().map(|k| fine.x[k]));
+        q.extend(nodes.map(|k| fine.q[k]));
+    }
+    let mut coarse = State::new(fine.segments() / 2, x, q);
+    coarse.n = fine.n.chunks(2).map(|n| 0.5 * (n[0] + n[1])).collect();
+    coarse
 }
 
 /// Weight of the value at point `a` of 0, 1, ..., `count` - 1 in the value at `t` of
