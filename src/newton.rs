@@ -175,6 +175,19 @@ pub enum Equations<'s> {
     },
 }
 
+impl Equations<'_> {
+    /// Sizes to which an increment is shortened, and above which it is refused.
+    fn limits(&self) -> (f64, f64) {
+        match self {
+            Equations::AnySign { largest } => (*largest, f64::INFINITY),
+            Equations::Unsymmetric => (f64::INFINITY, f64::INFINITY),
+            Equations::Definite { largest, .. } | Equations::Held { largest, .. } => {
+                (f64::INFINITY, *largest)
+            }
+        }
+    }
+}
+
 /// What is asked of an iteration.
 pub struct Newton<'a> {
     /// Of positions and rotations.
@@ -207,18 +220,11 @@ impl Newton<'_> {
         system: &mut System,
         equations: Equations,
     ) -> Result<f64, Stop> {
-        let (mut longest, mut refused, mut space) = (f64::INFINITY, f64::INFINITY, None);
-        match &equations {
-            Equations::AnySign { largest } => longest = *largest,
-            Equations::Unsymmetric => {}
-            Equations::Definite {
-                solver, largest, ..
-            } => {
-                refused = *largest;
-                space = solver.space.is_some().then(|| leaf.in_space());
-            }
-            Equations::Held { largest, .. } => refused = *largest,
-        }
+        let (longest, refused) = equations.limits();
+        let space = match &equations {
+            Equations::Definite { solver, .. } if solver.space.is_some() => Some(leaf.in_space()),
+            _ => None,
+        };
         let any_sign = longest.is_finite();
         let mut linear = Linear {
             equations,

@@ -5,20 +5,17 @@ mod common;
 
 use std::f64::consts::PI;
 
-use common::motion::{
-    CHAIN, SLENDER, beam, chain, discrete, layered, off_cosine, rest, state_of, three_veins,
-};
+use common::motion::{CHAIN, SLENDER, beam, chain, discrete, layered, state_of, three_veins};
 use common::random::{cases, leaves};
 use common::vibration::Linear;
 use common::{
     TIMOSHENKO, close, extrapolate, fig04, in_full, keeping, linear, on_threads, paper_leaf,
     relaxed, scenario, settled, table,
 };
-use leafdyn::internals::leaf::{DiscreteLeaf, Leaf, State, shift, turn};
-use leafdyn::internals::modes;
-use leafdyn::internals::motion::{Inertia, Physics};
-use leafdyn::relax::{Equilibrium, Limit, Method, Mode, Options, relax};
-use leafdyn::scenario::{Dynamics, Profile, Scenario, Schedule};
+use leafdyn::internals::leaf::{Leaf, State};
+use leafdyn::internals::motion::Physics;
+use leafdyn::relax::{Equilibrium, Method, Mode, Options, relax};
+use leafdyn::scenario::{Dynamics, Profile, Scenario};
 use nalgebra::SymmetricEigen;
 use proptest::prelude::*;
 
@@ -255,105 +252,6 @@ proptest! {
             let negative = negative(&found);
             prop_assert_eq!(index.min(12), negative);
             prop_assert!(modes_of(&found).is_sorted_by_key(|mode| mode.eigenvalue));
-        }
-    }
-}
-
-/// The stable leaf does vibrate with the frequency of a mode if it is let go in
-/// its shape: by leapfrog with steps of h at 2/h asin(omega h/2).
-#[test]
-fn a_leaf_let_go_in_a_mode_keeps_its_frequency() {
-    const SIZE: f64 = 1e-6;
-    let mut veins = three_veins();
-    veins.dynamics.gravity = Schedule::constant([1.0, -2.0, -3.0]);
-    veins.gravity = [1.0, -2.0, -3.0];
-    let state = rest(&veins, 6);
-    let leaf = Leaf::new(&veins);
-    let (grid, physics) = (discrete(&leaf, 6), Physics::new(&leaf));
-    let mut exact = state.clone();
-    settle_forces(&grid, &mut exact);
-    for pair in modes::lowest(&grid, &physics, &exact, wanted(5, &Limit::default(), &[])).unwrap() {
-        let omega = pair.eigenvalue.sqrt();
-        let mut start = state.clone();
-        for (node, increment) in pair.shape.iter().enumerate() {
-            start.advance(node, increment, SIZE);
-        }
-        let worst = off_cosine(&leaf, (&state, &start), (omega, 1e-3), (SIZE, 40));
-        println!("omega {omega}: within {worst:.1e}");
-        assert!(worst < 1e-4, "omega {omega}: {worst:.1e}");
-    }
-}
-
-fn wanted<'a>(count: usize, time: &'a Limit, near: &'a [modes::Eigenpair]) -> modes::Wanted<'a> {
-    modes::Wanted {
-        count,
-        accuracy: 1e-7,
-        near,
-        time,
-    }
-}
-
-/// The list does not depend on the shapes from which the search goes, be they those of
-/// other modes, or all the same one.
-#[test]
-fn where_the_search_begins_does_not_matter() {
-    let veins = fig04(4);
-    let state = rest(&veins, 8);
-    let leaf = Leaf::new(&veins);
-    let (grid, physics) = (discrete(&leaf, 8), Physics::new(&leaf));
-    let time = Limit::default();
-    let lowest = |count, near: &[_]| {
-        modes::lowest(&grid, &physics, &state, wanted(count, &time, near)).unwrap()
-    };
-    let many = lowest(12, &[]);
-    let highest: Vec<_> = many[8..].to_vec();
-    let alike = vec![many[1].clone(); 4];
-    for near in [&many[..4], &many[2..4], &highest, &alike] {
-        for (found, plain) in lowest(4, near).iter().zip(&many) {
-            let off = found.eigenvalue / plain.eigenvalue - 1.0;
-            assert!(off.abs() < 1e-10, "{off:e}");
-        }
-    }
-}
-
-/// Lets the segments carry what their strains tell.
-fn settle_forces(grid: &DiscreteLeaf, state: &mut State) {
-    let n = grid.segments();
-    for j in 0..grid.rods() {
-        for i in 0..n {
-            let section = *grid.section(j, i);
-            let idle = grid.segment(state, j, i, glam::DVec3::ZERO);
-            let strain = idle.v(&section) - section.rest_strain;
-            state.n[j * n + i] = idle.frame * (strain / section.compliance);
-        }
-    }
-}
-
-/// Shapes are orthonormal with the masses, and satisfy the equations: their
-/// quotient is the eigenvalue.
-#[test]
-fn shapes_are_orthonormal() {
-    let veins = fig04(4);
-    let state = rest(&veins, 8);
-    let leaf = Leaf::new(&veins);
-    let (grid, physics) = (discrete(&leaf, 8), Physics::new(&leaf));
-    let mut exact = state.clone();
-    settle_forces(&grid, &mut exact);
-    let pairs = modes::lowest(&grid, &physics, &exact, wanted(8, &Limit::default(), &[])).unwrap();
-    for (a, first) in pairs.iter().enumerate() {
-        for (b, second) in pairs.iter().enumerate() {
-            let mut product = 0.0;
-            for j in 0..4 {
-                for i in 1..=8 {
-                    let node = state.base(j) + i;
-                    let (p, q) = (first.shape[node], second.shape[node]);
-                    let inertia: Inertia = physics.inertia(&grid, j, i);
-                    let tensor = inertia.tensor(exact.q[node]);
-                    let [p, q] = [p, q].map(|s| (turn(&s), shift(&s)));
-                    product += p.0.dot(tensor * q.0) + inertia.mass * p.1.dot(q.1);
-                }
-            }
-            close("product", product, f64::from(u8::from(a == b)), 1e-9);
         }
     }
 }

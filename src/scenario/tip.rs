@@ -6,7 +6,7 @@ use glam::DQuat;
 
 use super::error::ScenarioError;
 use super::key::Key;
-use super::raw::Raw;
+use super::raw::{Item, Raw};
 use super::{Rod, longest};
 
 /// Farther from the base than this, in lengths of the longest rod with its
@@ -74,26 +74,7 @@ pub(super) fn held(
         "needs leaf.joined = true: one point is held, which all tips share",
     )?;
     let position = at.vector()?;
-    let [x, y, z] = position;
-    let distance = x.hypot(y).hypot(z);
-    let reach = |rod: &Rod| rod.length * rod.rest_stretch.integral(1.0);
-    let most = FARTHEST * rods.iter().map(reach).fold(longest(rods), f64::max);
-    at.ensure(
-        distance <= most,
-        format_args!(
-            "is {distance:e} away from the base, more than {FARTHEST} times the longest rod"
-        ),
-    )?;
-    for (index, rod) in rods.iter().enumerate() {
-        at.ensure(
-            !rod.force_stiffness[0].min().is_infinite() || distance < reach(rod),
-            format_args!(
-                "is {distance:e} away from the base, but rod {} is inextensible and {:e} long",
-                index + 1,
-                reach(rod)
-            ),
-        )?;
-    }
+    check_reach(&at, position, rods)?;
     if let Some(moment) = raw.given(Key::TipMoment) {
         moment.ensure(
             moment.vector()? == [0.0; 3],
@@ -124,4 +105,28 @@ pub(super) fn held(
         false => None,
     };
     Ok(Some(HeldTip { position, clamps }))
+}
+
+/// Refuses places that rods cannot reach.
+fn check_reach(at: &Item, [x, y, z]: [f64; 3], rods: &[Rod]) -> Result<(), ScenarioError> {
+    let distance = x.hypot(y).hypot(z);
+    let reach = |rod: &Rod| rod.length * rod.rest_stretch.integral(1.0);
+    let most = FARTHEST * rods.iter().map(reach).fold(longest(rods), f64::max);
+    at.ensure(
+        distance <= most,
+        format_args!(
+            "is {distance:e} away from the base, more than {FARTHEST} times the longest rod"
+        ),
+    )?;
+    for (index, rod) in rods.iter().enumerate() {
+        at.ensure(
+            !rod.force_stiffness[0].min().is_infinite() || distance < reach(rod),
+            format_args!(
+                "is {distance:e} away from the base, but rod {} is inextensible and {:e} long",
+                index + 1,
+                reach(rod)
+            ),
+        )?;
+    }
+    Ok(())
 }

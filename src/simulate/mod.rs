@@ -122,8 +122,8 @@ impl Simulation {
             // Tips that are held are led to their holders, the leaf at rest.
             Start::Released | Start::AtRest => at_rest(&leaf, &physics, &grid, tolerance)?,
         };
-        let discrete = || DiscreteLeaf::new(&leaf, grid.clone());
-        let rigid = discrete().stiffest() == 0.0;
+        let discrete = DiscreteLeaf::new(&leaf, grid.clone());
+        let rigid = discrete.stiffest() == 0.0;
         let scheme = options.scheme.unwrap_or(match rigid {
             true => Scheme::SemiImplicit,
             false => Scheme::Explicit,
@@ -131,33 +131,20 @@ impl Simulation {
         if scheme == Scheme::SemiImplicit && !physics.clamped() {
             return Err(Refused::Held { rigid });
         }
-        let step = options.step.map(|step| step / physics.time);
-        let (mut stable, mut made) = (None, step);
+        let mut step = options.step;
+        let mut stable = None;
         let method: Box<dyn Method + Send> = match scheme {
             Scheme::Explicit => {
-                let explicit = Explicit::new(discrete(), physics.clone(), &state, step)
-                    .map_err(|Rigid| Refused::Rigid)?;
-                let bound = explicit.stable_step();
-                if let Some(found) = options.step
-                    && found > bound.step * physics.time
-                {
-                    return Err(Refused::Unstable {
-                        found,
-                        stable: bound.step * physics.time,
-                        limit: bound.limit,
-                    });
-                }
-                made = Some(explicit.longest_step());
-                stable = Some(StableStep {
-                    step: bound.step * physics.time,
-                    ..bound
-                });
+                let (explicit, bound) = explicit(discrete, &physics, &state, step)?;
+                step = Some(explicit.longest_step() * physics.time);
+                stable = Some(bound);
                 Box::new(explicit)
             }
             Scheme::SemiImplicit => {
+                let step = step.map(|step| step / physics.time);
                 let steps = step.map_or(Steps::Error(tolerance), Steps::Fixed);
                 let physics = physics.clone();
-                Box::new(SemiImplicit::new(discrete(), physics, &state, steps))
+                Box::new(SemiImplicit::new(discrete, physics, &state, steps))
             }
         };
         let (duration, interval) = physics.duration();
@@ -165,7 +152,7 @@ impl Simulation {
             leaf,
             scheme,
             stable,
-            step: made.map(|step| step * physics.time),
+            step,
             method,
             // A duration that is a whole number of intervals but for rounding
             // has no short one at its end.
@@ -313,6 +300,35 @@ impl Simulation {
             self.made = made as usize;
         }
         fits
+    }
+}
+
+/// The explicit method, and its stable step in the scenario's unit of time, which `step`
+/// must not exceed.
+fn explicit(
+    leaf: DiscreteLeaf,
+    physics: &Physics,
+    state: &State,
+    step: Option<f64>,
+) -> Result<(Explicit, StableStep), Refused> {
+    let own = step.map(|step| step / physics.time);
+    let explicit =
+        Explicit::new(leaf, physics.clone(), state, own).map_err(|Rigid| Refused::Rigid)?;
+    let bound = explicit.stable_step();
+    let stable = bound.step * physics.time;
+    match step {
+        Some(found) if found > stable => Err(Refused::Unstable {
+            found,
+            stable,
+            limit: bound.limit,
+        }),
+        _ => Ok((
+            explicit,
+            StableStep {
+                step: stable,
+                ..bound
+            },
+        )),
     }
 }
 

@@ -122,6 +122,7 @@ pub fn shoot(
     };
     let tips: Vec<_> = rods.iter().filter_map(|rod| rod.nodes.last()).collect();
     let listed = if scenario.joined { 1 } else { tips.len() };
+    let tip_force_sum = tips.iter().map(|node| node.rotation * node.n).sum();
     let curve = |rod: &RodShape| rod.nodes.iter().map(|node| node.position).collect();
     Equilibrium {
         scenario: scenario.name.clone(),
@@ -132,13 +133,9 @@ pub fn shoot(
         rod_count: rods.len(),
         energy,
         tips: tips.iter().take(listed).map(|node| node.position).collect(),
-        tip_force_sum: tips.iter().map(|node| node.rotation * node.n).sum(),
+        tip_force_sum,
         reaction: scenario.held_tip.as_ref().map(|held| Reaction {
-            force: DVec3::from_array(scenario.tip_force)
-                - tips
-                    .iter()
-                    .map(|node| node.rotation * node.n)
-                    .sum::<DVec3>(),
+            force: DVec3::from_array(scenario.tip_force) - tip_force_sum,
             moments: (held.clamps.is_some())
                 .then(|| tips.iter().map(|node| -(node.rotation * node.m)).collect()),
         }),

@@ -317,8 +317,8 @@ impl CaseAt {
     /// point that was not marked only those across the vein.
     pub fn vein_rates(
         &self,
-        rod: usize,
-        sigma: f64,
+        answers: &Answers,
+        (rod, sigma): (usize, f64),
         point: &[&Component],
         slopes: &[f64],
     ) -> Vec<Vec<f64>> {
@@ -349,8 +349,7 @@ impl CaseAt {
             axes.iter().for_each(|&axis| seen[axis] = change[axis]);
             seen - seen.dot(along) * along
         };
-        let each = self.answers.iter().flat_map(|answers| &answers.each);
-        let changes: Vec<DVec3> = each.map(change).collect();
+        let changes: Vec<DVec3> = answers.each.iter().map(change).collect();
         let row = |&axis: &usize| {
             let all = changes.iter().zip(slopes);
             all.map(|(change, slope)| change[axis] * slope).collect()

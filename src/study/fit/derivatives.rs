@@ -8,7 +8,7 @@ use super::answers::Answers;
 use super::case::{CaseAt, Component, What};
 use super::change::Change;
 use super::model::{Model, Point};
-use crate::leaf::{Leaf, LeafRate, Response};
+use crate::leaf::{Leaf, LeafRate};
 use crate::relax::{Grids, Lost, Number};
 use crate::scenario::Scenario;
 
@@ -69,10 +69,6 @@ impl Model<'_> {
         };
         let at_limit = || Lost::NotAtRest("a number is at the limit of what it can be".into());
         let leaf = &found.at.levels[0].leaf.leaf;
-        fn rates<'c>(leaf: &Leaf, changes: &'c [Change]) -> Vec<LeafRate<'c>> {
-            let rates = changes.iter().map(|change| LeafRate::new(leaf, change));
-            rates.collect()
-        }
         let own: Vec<Change>;
         let own_rates: Vec<LeafRate>;
         let rates: &[LeafRate] = if self.linear && of.loaded_only {
@@ -101,20 +97,34 @@ impl Model<'_> {
             return Ok(());
         }
         answers.solve_each(&found.at.levels)?;
+        found.gradients = found.rates(&answers, (&numbers, rates), &slopes);
         found.answers = Some(answers);
-        let each = |k: usize| -> &[Response] {
-            let answers = found.answers.as_ref();
-            answers.map_or(&[], |answers| answers.each[k].as_slice())
-        };
+        Ok(())
+    }
+}
+
+fn rates<'c>(leaf: &Leaf, changes: &'c [Change]) -> Vec<LeafRate<'c>> {
+    let rates = changes.iter().map(|change| LeafRate::new(leaf, change));
+    rates.collect()
+}
+
+impl CaseAt {
+    /// How its components change with the coordinates, each a number of `slopes` as steep.
+    fn rates(
+        &self,
+        answers: &Answers,
+        (numbers, rates): (&[Number], &[LeafRate]),
+        slopes: &[f64],
+    ) -> Vec<Vec<f64>> {
         let mut gradients = Vec::new();
         let mut index = 0;
-        while index < found.components.len() {
-            let component = &found.components[index];
+        while index < self.components.len() {
+            let component = &self.components[index];
             match component.what {
                 What::Result(quantity) => {
                     let by = |k: usize| {
-                        let of = (&numbers[k], &rates[k], each(k));
-                        slopes[k] * found.result_rate(quantity, of)
+                        let of = (&numbers[k], &rates[k], answers.each[k].as_slice());
+                        slopes[k] * self.result_rate(quantity, of)
                     };
                     gradients.push((0..numbers.len()).map(by).collect());
                     index += 1;
@@ -126,14 +136,13 @@ impl Model<'_> {
                         What::Result(_) => false,
                     };
                     let point: Vec<&Component> =
-                        found.components[index..].iter().take_while(same).collect();
-                    let rows = found.vein_rates(rod, sigma, &point, &slopes);
+                        self.components[index..].iter().take_while(same).collect();
+                    let rows = self.vein_rates(answers, (rod, sigma), &point, slopes);
                     index += point.len();
                     gradients.extend(rows);
                 }
             }
         }
-        found.gradients = gradients;
-        Ok(())
+        gradients
     }
 }

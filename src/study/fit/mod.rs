@@ -102,6 +102,10 @@ impl FitRequest {
     }
 }
 
+/// What is said where a leaf did not stay on its branch.
+const JUMPED: &str = "on the way a leaf jumped to another equilibrium, that to which it \
+    relaxes from the start: compare with a fit that starts from the values found";
+
 /// Fits the free numbers to the data. `progress` is told of each step.
 ///
 /// # Errors
@@ -123,11 +127,8 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
     let assumed = ASSUMED * model.unit();
     let (first, _) = model.loose(assumed).find(&start)?;
     let known = model.check_deviations(&first)?;
-    let count = first
-        .components()
-        .filter(|component| !component.free)
-        .count();
-    check_count(coordinates.len(), count, known)?;
+    let measured = first.components().filter(|component| !component.free);
+    check_count(coordinates.len(), measured.count(), known)?;
     let weighing = Weighing {
         assumed,
         robust: request.robust,
@@ -189,11 +190,7 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
         }
     };
     if jumps > 0 {
-        found.remarks.push(
-            "on the way a leaf jumped to another equilibrium, that to which it relaxes from the start: \
-             compare with a fit that starts from the values found"
-                .into(),
-        );
+        found.remarks.push(JUMPED.into());
     }
     found.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(found)

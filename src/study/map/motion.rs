@@ -77,9 +77,8 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
         }
     }
     let end = motion.snapshot();
-    let fastest = (end.velocity.iter())
-        .map(|v| v.linear.length().max(v.angular.length()))
-        .fold(0.0, f64::max);
+    let speeds = (end.velocity.iter()).map(|v| v.linear.length().max(v.angular.length()));
+    let fastest = speeds.fold(0.0, f64::max);
     if fastest.is_nan() || fastest > tolerance {
         let moves = format!("still moves by {fastest:.1e} lengths in a unit of time");
         return failed(MapOutcome::NotConverged, moves);

@@ -66,15 +66,8 @@ pub fn trace_seen(
         ..Options::default()
     };
     let rest = relax(&scenario, &options, &mut |_| {})?;
-    let wanted = match request.segments {
-        None => None,
-        wanted @ Some(least) => {
-            let segments = check_segments(family.first(), wanted, least)?;
-            let rods = scenario.rods.len();
-            (Request::Branches { rods, segments }.weigh()).map_err(RelaxError::Memory)?;
-            Some(segments)
-        }
-    };
+    let check = |least| check_grid(&family, request.segments, least);
+    let wanted = request.segments.map(check).transpose()?;
     let mut trace = Trace {
         scenario: scenario.name.clone(),
         keys: keys.clone(),
@@ -94,35 +87,42 @@ pub fn trace_seen(
         factorizations: 0,
         wall_seconds: 0.0,
     };
-    let why = match rest.stability.negative_eigenvalues {
-        Some(_) => match begin(&family, &rest, &options, wanted) {
-            Ok((grids, first)) => {
-                let mut run = Run {
-                    family: &family,
-                    request,
-                    grids,
-                    tolerance,
-                    crossings: Vec::new(),
-                    progress,
-                    seen,
-                };
-                run.follow_all(first, &mut trace);
-                None
-            }
-            Err(stuck) => Some(stuck.to_string()),
-        },
-        None => Some(rest.remark.unwrap_or("the leaf is not at rest".into())),
+    let began = match rest.stability.negative_eigenvalues {
+        Some(_) => begin(&family, &rest, &options, wanted).map_err(|stuck| stuck.to_string()),
+        None => Err(rest.remark.unwrap_or("the leaf is not at rest".into())),
     };
-    if let Some(why) = why {
-        let at = keys.text(ends[0]);
-        let remark = format!("no equilibrium to begin with at {keys} = {at}: {why}");
-        trace.remark = Some(remark);
+    match began {
+        Ok((grids, first)) => {
+            let mut run = Run {
+                family: &family,
+                request,
+                grids,
+                tolerance,
+                crossings: Vec::new(),
+                progress,
+                seen,
+            };
+            run.follow_all(first, &mut trace);
+        }
+        Err(why) => {
+            let at = keys.text(ends[0]);
+            let remark = format!("no equilibrium to begin with at {keys} = {at}: {why}");
+            trace.remark = Some(remark);
+        }
     }
     let branches = &trace.branches;
     trace.complete = trace.remark.is_none() && branches.iter().all(|branch| branch.end.complete());
     trace.law = branches.first().and_then(|branch| law(request, branch));
     trace.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(trace)
+}
+
+/// Segments of the grid that is wanted, as many as the leaf needs, if memory allows.
+fn check_grid(family: &Family, wanted: Option<usize>, least: usize) -> Result<usize, RelaxError> {
+    let segments = check_segments(family.first(), wanted, least)?;
+    let rods = family.first().rods();
+    (Request::Branches { rods, segments }.weigh()).map_err(RelaxError::Memory)?;
+    Ok(segments)
 }
 
 /// Force against displacement, if it is one component of the force on the joint
