@@ -1,7 +1,7 @@
 //! The fields along the veins, extrapolated over the grids.
 
 use crate::leaf::DiscreteLeaf;
-use crate::relax::place::{self, Place, Values};
+use crate::relax::place::{Measures, Place, Values};
 use crate::relax::richardson::Richardson;
 use crate::relax::run::Level;
 use crate::relax::shape;
@@ -77,7 +77,8 @@ pub fn fields(
         };
         let weights = finer.leaf.grid.sigma().iter().enumerate().map(weights);
         let weights: Vec<_> = weights.collect();
-        let others: Vec<_> = known.iter().map(|at| place(*at).others()).collect();
+        let others = known.iter().map(|at| place(*at));
+        let others: Vec<_> = others.map(|place| (place.first, place.others())).collect();
         let mut added = on(finer);
         let mut error = 0.0_f64;
         for (added, nodes) in added.iter_mut().zip(&nodes) {
@@ -188,18 +189,17 @@ fn correct(
     known: &[Node],
     stride: usize,
     weights: &[Values],
-    others: &[[Values; 2]],
+    others: &[(usize, [Values; 2])],
 ) -> f64 {
     let own = nodes.iter().step_by(stride);
     let corrections: Vec<Node> = known.iter().zip(own).map(|(a, b)| minus(a, b)).collect();
     let position = |node: &Node| DVec3::from_slice(node);
     let term = |&(i, weight): &(usize, f64)| weight * position(&corrections[i]);
     let told = |weights: &Values| -> DVec3 { weights.iter().map(term).sum() };
-    let mut errors = [0.0_f64; 2];
-    for (correction, others) in corrections.iter().zip(others) {
-        for (error, weights) in errors.iter_mut().zip(others) {
-            *error = error.max((told(weights) - position(correction)).length());
-        }
+    let mut errors = Measures::new(known.len());
+    for (correction, (first, others)) in corrections.iter().zip(others) {
+        let off = |weights: &Values| (told(weights) - position(correction)).length();
+        errors.add(*first, others.each_ref().map(off));
     }
     for (k, (node, weights)) in nodes.iter_mut().zip(weights).enumerate() {
         if k.is_multiple_of(stride) {
@@ -212,7 +212,7 @@ fn correct(
             }
         }
     }
-    place::error(errors).max(AT_ENDS * errors[0])
+    errors.error(AT_ENDS)
 }
 
 fn minus(a: &Node, b: &Node) -> Node {

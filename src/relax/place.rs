@@ -1,9 +1,16 @@
 //! Places between the stations where fields along a vein are known.
 
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+
 use crate::shape::weights;
 
 /// Most nodes that a polynomial goes through whose slopes there are known.
 const HERMITE: usize = 4;
+
+/// One more station gains so many times less than the one before it did, at least.
+const GAIN: f64 = 4.0;
 
 /// Most nodes of one whose slopes are not known.
 const LAGRANGE: usize = 6;
@@ -13,9 +20,10 @@ pub struct Place {
     /// The station that it is.
     pub node: Option<usize>,
     pub at: f64,
-    /// Stations between the same knots, and the first of them.
+    /// Stations between the same knots.
     near: Vec<f64>,
-    first: usize,
+    /// The first of them.
+    pub first: usize,
 }
 
 /// Weights of the values at stations.
@@ -44,10 +52,29 @@ impl Place {
         }
     }
 
-    /// The polynomial with the values and slopes at the nearest stations, so many
-    /// fewer than can be.
-    pub fn hermite(&self, fewer: usize) -> Slopes {
-        let count = HERMITE.min(self.near.len()).saturating_sub(fewer).max(1);
+    /// The polynomial with the values and slopes at the nearest stations, as many as can
+    /// be.
+    pub fn hermite(&self) -> Slopes {
+        self.fewer(0)
+    }
+
+    /// How many stations that of so many fewer goes through.
+    fn count(&self, fewer: usize) -> usize {
+        HERMITE.min(self.near.len()).saturating_sub(fewer).max(1)
+    }
+
+    /// That which vanishes there with its slope, and the highest power of which has
+    /// the coefficient one.
+    fn vanishing(&self, fewer: usize) -> f64 {
+        let count = self.count(fewer);
+        let (first, _) = weights(&self.near, self.at, count);
+        let near = &self.near[first..first + count];
+        near.iter().map(|node| (self.at - node).powi(2)).product()
+    }
+
+    /// The polynomial through so many fewer.
+    fn fewer(&self, fewer: usize) -> Slopes {
+        let count = self.count(fewer);
         let (first, lagrange) = weights(&self.near, self.at, count);
         let near = &self.near[first..first + count];
         let each = lagrange.iter().enumerate().map(|(i, weight)| {
@@ -80,11 +107,77 @@ impl Place {
     }
 }
 
-/// What a polynomial may be wrong by, from a measure of that and the same of one of
-/// lower order.
-pub fn error([best, second]: [f64; 2]) -> f64 {
-    match second > best {
-        true => best * (best / second),
-        false => best,
+/// What polynomials with values and slopes may be wrong by between the same knots of a
+/// rod: as much as they differ from those through one station less, times what one more
+/// station gains. Both are taken from the differences of three of them, largest
+/// coefficients of what vanishes at their stations.
+#[derive(Default)]
+pub struct Differences {
+    /// By the first station between those knots.
+    panels: BTreeMap<usize, Panel>,
+}
+
+#[derive(Default)]
+struct Panel {
+    /// Largest coefficients of the difference of the second and third polynomial, and of
+    /// the first and second.
+    coefficients: [f64; 2],
+    /// What vanishes at the stations of the second, and of the first, at every place.
+    vanishing: Vec<[f64; 2]>,
+}
+
+impl Differences {
+    /// Adds those at a place, of values that weights tell.
+    pub fn add(&mut self, place: &Place, value: impl Fn(&Slopes) -> DVec3) {
+        let panel = self.panels.entry(place.first).or_default();
+        let [best, second, third] = [0, 1, 2].map(|fewer| value(&place.fewer(fewer)));
+        let [first_vanishes, second_vanishes, third_vanishes] =
+            [0, 1, 2].map(|fewer| place.vanishing(fewer));
+        let coefficients = [
+            (second - third).length() / third_vanishes,
+            (best - second).length() / second_vanishes,
+        ];
+        let largest = panel.coefficients.iter_mut().zip(coefficients);
+        largest.for_each(|(largest, it)| *largest = largest.max(it));
+        (panel.vanishing).push([second_vanishes, first_vanishes]);
+    }
+
+    /// The largest error.
+    pub fn error(&self) -> f64 {
+        let errors = self.panels.values().flat_map(|panel| {
+            let [before, last] = panel.coefficients;
+            (panel.vanishing.iter()).map(move |[second, first]| {
+                // Without a third polynomial nothing is known of the gain.
+                let gain = GAIN * last * first / (before * second);
+                last * second * if gain < 1.0 { gain } else { 1.0 }
+            })
+        });
+        errors.fold(0.0, f64::max)
+    }
+}
+
+/// Largest measures of what polynomials between the same knots may be wrong by, and the
+/// same of those of lower order: between other knots the order may be another.
+pub struct Measures(Vec<[f64; 2]>);
+
+impl Measures {
+    /// Of none yet, of so many stations.
+    pub fn new(stations: usize) -> Self {
+        Measures(vec![[0.0; 2]; stations])
+    }
+
+    /// Adds those at a place between the knots whose first station is `first`.
+    pub fn add(&mut self, first: usize, measures: [f64; 2]) {
+        let largest = self.0[first].iter_mut().zip(measures);
+        largest.for_each(|(largest, measure)| *largest = largest.max(measure));
+    }
+
+    /// What the polynomials may be wrong by, no less than `part` of the measures.
+    pub fn error(&self, part: f64) -> f64 {
+        let error = |&[best, second]: &[f64; 2]| match second > best {
+            true => best * (best / second).max(part),
+            false => best,
+        };
+        self.0.iter().map(error).fold(0.0, f64::max)
     }
 }

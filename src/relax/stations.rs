@@ -2,7 +2,7 @@
 
 use crate::leaf::Leaf;
 use crate::relax::equilibrium::{Equilibrium, Outcome, Shape};
-use crate::relax::place::{self, Place, Slopes};
+use crate::relax::place::{Differences, Place, Slopes};
 use crate::scenario::{Profile, Rod, Scenario};
 use crate::shape::{NodeState, RodShape, equally_spaced};
 use glam::{DQuat, DVec3};
@@ -63,34 +63,34 @@ impl Equilibrium {
                 .map(|&at| Place::new(&self.shape.stations, leaf.kinks(), at));
             places.collect()
         };
-        let mut differences = [0.0_f64; 2];
+        let mut between = 0.0_f64;
         let rods = self.shape.rods.iter().enumerate().map(|(j, rod)| {
             let known = Known::new(rod);
+            let mut differences = Differences::default();
             let nodes = places.iter().map(|place| {
                 if let Some(node) = place.node {
                     return rod.nodes[node];
                 }
                 if at_rest {
-                    let [best, second, third] = [0, 1, 2].map(|fewer| {
-                        let nodes = place.hermite(fewer);
-                        sum(&nodes, &known.positions, &known.tangents)
+                    differences.add(place, |weights| {
+                        sum(weights, &known.positions, &known.tangents)
                     });
-                    differences[0] = differences[0].max((best - second).length());
-                    differences[1] = differences[1].max((second - third).length());
                 }
                 let mut node = known.at(place, at_rest);
                 strains(&scenario.rods[j], place.at, &mut node);
                 node
             });
+            let nodes = nodes.collect();
+            between = between.max(differences.error());
             RodShape {
                 length: rod.length,
-                nodes: nodes.collect(),
+                nodes,
             }
         });
         self.shape.rods = rods.collect();
         self.shape.stations = to;
         if let Some(error) = &mut self.accuracy.error_estimate {
-            *error += place::error(differences);
+            *error += between;
         }
         self
     }
@@ -154,7 +154,7 @@ impl Known {
             .map(|(i, weight)| (i, weight, 0.0))
             .collect();
         let hermite = match at_rest {
-            true => &place.hermite(0),
+            true => &place.hermite(),
             false => &lagrange,
         };
         let mut q = [0.0; 4];
