@@ -1,3 +1,5 @@
+//! The folds of a stiff arch with one end pinned, against shooting.
+//!
 //! A clamped arch under a load along it, against its symmetric half, whose crown is guided,
 //! solved by shooting; and the load at which it sways, against the antisymmetric half.
 
@@ -129,4 +131,103 @@ fn an_arch_sways_where_its_antisymmetric_half_does() {
     let vary = format!("load.gravity[1]=0..{:?}", -1.1 * low);
     let found = follow(&arch(0.0), "", &vary, false);
     changes_at("arch", &found, &[(-low, 1)], 1e-6);
+}
+
+/// Half of the opening angle of a shallow arch, of which one end is pinned.
+const SHALLOW: f64 = 0.5;
+
+/// The place, angle and moment at the pinned end of an arch with this compliance in
+/// stretch and shear that leaves its base with this moment and force, by the method of
+/// Runge and Kutta.
+fn pinned_end(compliance: f64, steps: u32, [moment, along, across, load]: [f64; 4]) -> [f64; 4] {
+    let slope = |s: f64, [_, _, theta, m]: [f64; 4]| {
+        let n_y = across + load * s;
+        let (sin, cos) = theta.sin_cos();
+        let stretch = 1.0 + compliance * (along * cos + n_y * sin);
+        let shear = compliance * (n_y * cos - along * sin);
+        let (x, y) = (stretch * cos - shear * sin, stretch * sin + shear * cos);
+        [x, y, m - 2.0 * SHALLOW, y * along - x * n_y]
+    };
+    let h = 1.0 / f64::from(steps);
+    let ahead = |y: [f64; 4], k: [f64; 4], by: f64| std::array::from_fn(|c| y[c] + by * k[c]);
+    let mut y = [0.0, 0.0, SHALLOW, moment];
+    for step in 0..steps {
+        let s = h * f64::from(step);
+        let a = slope(s, y);
+        let b = slope(s + 0.5 * h, ahead(y, a, 0.5 * h));
+        let c = slope(s + 0.5 * h, ahead(y, b, 0.5 * h));
+        let d = slope(s + h, ahead(y, c, h));
+        y = std::array::from_fn(|k| y[k] + h / 6.0 * (a[k] + 2.0 * (b[k] + c[k]) + d[k]));
+    }
+    y
+}
+
+/// The load at the fold next to a base and a load: the end is where it is pinned, without
+/// a moment, and to first order stays so at this load.
+fn fold(compliance: f64, steps: u32, near: [f64; 4]) -> f64 {
+    type Base = nalgebra::Vector4<f64>;
+    let span = SHALLOW.sin() / SHALLOW;
+    let off = |base: Base| {
+        let [x, y, _, m] = pinned_end(compliance, steps, base.into());
+        nalgebra::Vector3::new(x - span, y, m)
+    };
+    let by = |base: Base| {
+        let column = |k: usize| {
+            let step = Base::ith(k, 1e-5);
+            (off(base + step) - off(base - step)) / 2e-5
+        };
+        nalgebra::Matrix3::from_columns(&[column(0), column(1), column(2)])
+    };
+    let all = |base: Base| {
+        let off = off(base);
+        Base::new(off.x, off.y, off.z, by(base).determinant())
+    };
+    let mut base = Base::from(near);
+    for _ in 0..20 {
+        let column = |k: usize| {
+            let step = Base::ith(k, 1e-3);
+            (all(base + step) - all(base - step)) / 2e-3
+        };
+        let columns = [0, 1, 2, 3].map(column);
+        let matrix = nalgebra::Matrix4::from_columns(&columns);
+        base -= matrix.try_inverse().unwrap() * all(base);
+    }
+    base[3]
+}
+
+#[test]
+fn folds_of_stiff_arches_are_within_what_is_told() {
+    let near = [
+        [-1.389, -56.789, -30.936, 59.885],
+        [-0.0736, -81.902, -8.415, 16.679],
+    ];
+    let span = SHALLOW.sin() / SHALLOW;
+    for axial in ["1e5", "1e6", "inf"] {
+        let text = format!(
+            r#"
+            name = "arch"
+            leaf = {{ rods = 1, length = 1.0, fan = [{SHALLOW}] }}
+            stiffness = {{ torsion = 50.0, bending_2 = 50.0, bending_3 = 1.0, axial = {axial}, shear_2 = {axial}, shear_3 = {axial} }}
+            rest = {{ bend_3 = {:?} }}
+            tip = {{ held = "pinned", position = [{span:?}, 0.0, 0.0] }}
+            load = {{ gravity = [0.0, 0.0, 0.0] }}
+            "#,
+            -2.0 * SHALLOW
+        );
+        let found = follow(&text, "", "load.gravity[1]=0..-60", false);
+        assert!(found.complete, "{axial}: {:?}", found.remark);
+        let compliance = axial.parse::<f64>().unwrap().recip();
+        let critical: Vec<_> = found.branches[0].critical().collect();
+        assert_eq!(critical.len(), near.len(), "{axial}");
+        for ((_, point), near) in critical.iter().zip(near) {
+            let [coarse, fine] = [400, 800].map(|steps| fold(compliance, steps, near));
+            let wanted = -(fine + (fine - coarse) / 15.0);
+            let off = (point.value - wanted).abs();
+            let told = point.value_error.unwrap();
+            println!("{axial}: {} {off:.1e} off, {told:.1e} told", point.value);
+            // What is left of the shooting.
+            assert!(off < told + 3e-9, "{axial}: {} {wanted}", point.value);
+            assert!(off < 1e-7 && told < 3e-6, "{axial}: {told}");
+        }
+    }
 }

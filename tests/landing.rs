@@ -1,7 +1,7 @@
-//! Where a leaf of stiff veins has several equilibria, a relaxation mostly ends in the one
-//! in which the motion of the leaf in time, with the same mass and damping, ends; where it
-//! does not, stiff rods were softened on the way, and nearly always it says so. `LANDINGS`
-//! is how many such leaves are tried, `SEED` which.
+//! Where a leaf of stiff veins has several equilibria, a relaxation ends in the one in
+//! which the motion of the leaf in time, with the same mass and damping, ends: with few
+//! exceptions in hundreds, and none in these. `LANDINGS` is how many such leaves are
+//! tried, `SEED` which.
 
 mod common;
 
@@ -70,9 +70,9 @@ fn landing(leaf: &Scenario, segments: usize) -> Option<glam::DVec3> {
 }
 
 #[test]
-fn is_mostly_that_of_the_motion_or_said_to_be_doubtful() {
-    let (count, mut state) = (number("LANDINGS", 4), number("SEED", 1));
-    let (mut judged, mut elsewhere, mut silent) = (0, Vec::new(), Vec::new());
+fn is_that_of_the_motion() {
+    let (count, mut state) = (number("LANDINGS", 6), number("SEED", 1));
+    let (mut judged, mut elsewhere) = (0, Vec::new());
     let mut drawn = 0;
     while judged < count {
         let this = state;
@@ -101,18 +101,31 @@ fn is_mostly_that_of_the_motion_or_said_to_be_doubtful() {
             let remark = plain.remark.unwrap_or_default();
             let what = format!("seed {this}: {off:.2} away; {remark}");
             println!("{what}");
-            if !remark.contains("softened") {
-                silent.push(what.clone());
-            }
             elsewhere.push(what);
         }
     }
-    println!(
-        "{} of {judged} elsewhere, {} silently; {drawn} drawn",
-        elsewhere.len(),
-        silent.len()
-    );
+    println!("{} of {judged} elsewhere; {drawn} drawn", elsewhere.len());
     // docs/tried.md tells of more.
-    assert!(elsewhere.len() as u64 <= 1 + judged / 3, "{elsewhere:#?}");
-    assert!(silent.len() as u64 <= judged / 10, "{silent:#?}");
+    assert!(elsewhere.len() as u64 <= judged / 15, "{elsewhere:#?}");
+}
+
+#[test]
+fn of_a_column_that_is_pushed_along_its_axis_stays_doubtful() {
+    // It stands on a saddle, which its motion in time does not leave.
+    let column = parse(
+        r#"
+        name = "column"
+        leaf = { rods = 1, length = 1.0, fan = [0.0] }
+        stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 0.5, axial = 1e4, shear_2 = 1e4, shear_3 = 1e4 }
+        load = { tip_force = [-4.0, 0.0, 0.0] }
+        "#,
+    );
+    let rest = column.relax().unwrap();
+    assert!(rest.stability.saddle.is_some());
+    assert!(
+        rest.remark
+            .is_some_and(|remark| remark.contains("softened"))
+    );
+    // The motion is given up long before it has spent what it may.
+    assert!(rest.work.factorizations < 2000, "{:?}", rest.work);
 }

@@ -10,6 +10,9 @@ use crate::leaf::{Bordered, Field, SparsePattern, State, System};
 /// What of a singular matrix of the border counts as zero, relative to the rest.
 const NEUTRAL: f64 = 1e-7;
 
+/// Stiffness in stretch and shear, in units of A/L^2, from which on segments are stiff.
+const STIFF: f64 = 1e4;
+
 /// Iterations of the subspace: the wanted modes are far softer than the rest.
 const SUBSPACE_ITERATIONS: usize = 8;
 
@@ -47,7 +50,10 @@ impl Equations<'_> {
         let (dual, own) = (self.momentum(&normal.increments), normal.fraction);
         let mut previous = f64::INFINITY;
         let mut finished = false;
-        for _ in 0..=ITERATIONS {
+        // Stiff segments answer an error of their length by a force: a leaf of such that
+        // rests is corrected once more.
+        let mut corrected = self.leaves.at(fraction)?.stiffest() * STIFF > 1.0;
+        for _ in 0..=ITERATIONS + 1 {
             let linear = match finished {
                 true => self.linearise_softened(&mut state, fraction)?,
                 false => self.linearise(&mut state, fraction)?,
@@ -71,7 +77,9 @@ impl Equations<'_> {
             }
             fraction += changes[0];
             state = self.moved(&state, fraction, &increments, 1.0)?;
-            finished = at_rest(size, previous);
+            let rests = at_rest(size, previous);
+            finished = rests && corrected;
+            corrected |= rests;
             previous = size;
         }
         Err(Stuck::NotConverged)

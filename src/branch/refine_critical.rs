@@ -13,17 +13,23 @@ use crate::relax::prolong::prolong;
 /// A critical parameter within this part of its range is exact.
 const EXACT: f64 = 1e-12;
 
-/// Compliance by which matrices of nearly rigid leaves are softened, in units
-/// of L^2/A, times one to four; and the stiffness from which on they are.
-const SOFTENING: f64 = 1e-4;
+/// Compliances by which matrices of nearly rigid leaves are softened, in units of
+/// L^2/A, times one to four: smaller ones lose more to rounding, larger ones more to their
+/// extrapolation to none. And the stiffness from which on matrices are softened.
+const SOFTENINGS: [f64; 5] = [1e-4, 3e-5, 1e-5, 3e-6, 1e-6];
 pub const NEARLY_RIGID: f64 = 1.01e5;
 
-/// The cubic through values at softenings of 1, 2, 3, 4 at zero.
+/// The cubic through values at softenings of 1, 2, 3, 4 at zero, and the parabola
+/// through the first three.
 const UNSOFTENING: [f64; 4] = [4.0, -6.0, 4.0, -1.0];
+const BY_PARABOLA: [f64; 4] = [3.0, -3.0, 1.0, 0.0];
+
+/// Of the finest grid of a critical point, over the one it was found on.
+const FINER: f64 = 4.0;
 
 /// Distances from a crossing (as of arclength) between which the branch is
 /// interpolated, in turn, until tips are within this part of their accuracy.
-const APART: [f64; 4] = [0.03, 0.01, 0.003, 0.001];
+const APART: [f64; 6] = [0.03, 0.01, 0.003, 0.001, 3e-4, 1e-4];
 const ENOUGH: f64 = 0.1;
 
 /// A critical point, to the given accuracy of its tips, on so many `grids` or more.
@@ -37,6 +43,7 @@ pub fn refine_critical(
     let mut table = Table::default();
     let mut equations = Equations::new(family, grid.clone())?;
     let mut critical = found.clone();
+    let mut softening = Softening(SOFTENINGS[0]);
     let mut moved = f64::INFINITY;
     for level in 0..GRIDS {
         if level > 0 {
@@ -60,26 +67,7 @@ pub fn refine_critical(
             }
             moved = way;
         }
-        let leaf = equations.leaves.at(critical.fraction)?;
-        let rigid = leaf.stiffest() * NEARLY_RIGID < 1.0;
-        let limit = match rigid {
-            true => 1.0 / SOFTENING,
-            false => f64::INFINITY,
-        };
-        let condensing = leaf.sections.iter().map(|it| it.condensing.max_element());
-        let stiffest = condensing.fold(0.0_f64, |most, it| most.max(it.min(limit)));
-        let segments = leaf.segments() as f64;
-        let rounding = f64::EPSILON * stiffest * segments * segments / critical.steepness();
-        // Extrapolated to no softening, that of each matrix grows by its weight.
-        let growth: f64 = match rigid {
-            true => UNSOFTENING.iter().map(|weight| weight.abs()).sum(),
-            false => 1.0,
-        };
-        table.rounding = table.rounding.max(growth * rounding);
-        let mut values = match rigid {
-            false => Values::of(&mut equations, &critical.state, critical.fraction)?,
-            true => unsoftened(family, equations.grid(), &critical)?,
-        };
+        let (mut values, growth) = softening.on(family, &mut equations, &critical, &mut table)?;
         if critical.kind == Kind::Branching {
             let across = tips_across(&mut equations, &critical, values.fraction, accuracy);
             if let Some(across) = across {
@@ -91,7 +79,8 @@ pub fn refine_critical(
         table.push(equations.grid().segments(), values);
         // A finer grid would only add rounding.
         let exact = table.fraction_error() < (table.rounding / growth).max(EXACT);
-        let enough = exact || level + 1 >= grids;
+        let noisy = FINER * table.noise > ENOUGH * accuracy;
+        let enough = exact || noisy || level + 1 >= grids;
         if enough && table.error() <= accuracy {
             return Ok(table.refined(critical.state, equations.grid().clone()));
         }
@@ -102,19 +91,108 @@ pub fn refine_critical(
     Err(Doubt::Inaccurate)
 }
 
-/// A critical point of a nearly rigid leaf: by softened matrices, extrapolated to none.
-fn unsoftened(family: &Family, grid: &Grid, critical: &Critical) -> Result<Values, Stuck> {
-    let mut parts = Vec::new();
+/// The compliance by which matrices are softened.
+struct Softening(f64);
+
+/// A critical point without softening.
+struct Unsoftened {
+    values: Values,
+    /// What the extrapolation may have left of it in the points and in the fraction.
+    error: f64,
+    fraction_error: f64,
+}
+
+impl Softening {
+    /// A critical point on a grid, and by how much rounding of its matrix grows; the table
+    /// is told of it, and of what softening leaves.
+    fn on(
+        &mut self,
+        family: &Family,
+        equations: &mut Equations,
+        critical: &Critical,
+        table: &mut Table,
+    ) -> Result<(Values, f64), Stuck> {
+        let leaf = equations.leaves.at(critical.fraction)?;
+        let rigid = leaf.stiffest() * NEARLY_RIGID < 1.0;
+        let condensing = leaf.sections.iter().map(|it| it.condensing.max_element());
+        let mut stiffest = condensing.fold(0.0_f64, f64::max);
+        let segments = leaf.segments() as f64;
+        let fold = critical.kind == Kind::Fold;
+        let mut growth = 1.0;
+        let values = match rigid {
+            false => Values::of(equations, &critical.state, critical.fraction)?,
+            true => {
+                let slope = critical.slope.abs() / (FINER * segments).powi(2);
+                let found = self.unsoftened(family, equations, critical, slope)?;
+                table.softening = table.softening.max(found.fraction_error);
+                if fold {
+                    table.common = table.common.max(found.error);
+                }
+                stiffest = stiffest.min(1.0 / self.0);
+                growth = UNSOFTENING.iter().map(|weight| weight.abs()).sum();
+                found.values
+            }
+        };
+        let rounding = f64::EPSILON * stiffest * segments * segments;
+        let along = rounding / critical.slope.abs();
+        if fold {
+            table.noise = table.noise.max(along);
+        }
+        // Next to a fold the parameter changes with the square of the way.
+        let of_value = (rounding / critical.steepness()).max(growth * along * along);
+        table.rounding = table.rounding.max(growth * of_value);
+        Ok((values, growth))
+    }
+
+    /// A critical point of a nearly rigid leaf: by softened matrices, extrapolated to none.
+    /// They are softened less and less until rounding leaves more than the extrapolation:
+    /// that of the stiffness, over the change of the eigenvalue on the way.
+    fn unsoftened(
+        &mut self,
+        family: &Family,
+        equations: &Equations,
+        critical: &Critical,
+        slope: f64,
+    ) -> Result<Unsoftened, Stuck> {
+        loop {
+            let found = extrapolated(family, equations.grid(), critical, self.0)?;
+            let rounding = f64::EPSILON / self.0 / slope;
+            let less = SOFTENINGS.into_iter().find(|less| *less < self.0);
+            match less {
+                Some(less) if found.error.max(found.fraction_error) > rounding => self.0 = less,
+                _ => return Ok(found),
+            }
+        }
+    }
+}
+
+/// A critical point by four softened matrices.
+fn extrapolated(
+    family: &Family,
+    grid: &Grid,
+    critical: &Critical,
+    softening: f64,
+) -> Result<Unsoftened, Stuck> {
+    let mut found = Vec::new();
     let mut near = critical.clone();
-    for (k, weight) in UNSOFTENING.into_iter().enumerate().rev() {
-        let soft = family.softened(SOFTENING * (k + 1) as f64);
+    for k in (0..UNSOFTENING.len()).rev() {
+        let soft = family.softened(softening * (k + 1) as f64);
         let mut equations = Equations::new(family, grid.clone())?;
         equations.softened = Some(Leaves::new(&soft, grid.clone()));
         near = near.again(&mut equations)?;
-        let values = Values::of(&mut equations, &near.state, near.fraction)?;
-        parts.push((weight, values));
+        found.push(Values::of(&mut equations, &near.state, near.fraction)?);
     }
-    Ok(Values::sum(&parts))
+    found.reverse();
+    let by = |weights: [f64; 4]| {
+        let parts: Vec<_> = weights.into_iter().zip(found.iter().cloned()).collect();
+        Values::sum(&parts)
+    };
+    let (values, parabola) = (by(UNSOFTENING), by(BY_PARABOLA));
+    Ok(Unsoftened {
+        error: values.distance(&parabola),
+        fraction_error: (values.fraction - parabola.fraction).abs(),
+        values,
+    })
 }
 
 /// A branch where it is crossed.

@@ -159,8 +159,11 @@ pub(super) struct Table {
     pub slope: Option<Values>,
     /// What rounding of the matrix may have done to the fraction.
     pub rounding: f64,
-    /// An error of the points that all grids have.
+    /// What softening of the matrix may have left in the fraction.
+    pub softening: f64,
+    /// An error of the points that all grids have, and their rounding.
     pub common: f64,
+    pub noise: f64,
 }
 
 impl Table {
@@ -179,7 +182,7 @@ impl Table {
     /// The points at the fraction of the last grid.
     fn points(&self) -> Richardson {
         let last = self.rows.last().map_or(0.0, |(_, last)| last.fraction);
-        self.of(|values| match &self.slope {
+        let points = self.of(|values| match &self.slope {
             None => values.points.clone(),
             Some(slope) => {
                 let points = values.points.iter().zip(&slope.points);
@@ -187,13 +190,14 @@ impl Table {
                     .map(|(point, slope)| point + slope * (last - values.fraction))
                     .collect()
             }
-        })
+        });
+        points.with_noise(self.noise)
     }
 
     /// Estimate of the error of the points.
     pub fn error(&self) -> f64 {
         let best = self.points().best();
-        best.map_or(f64::INFINITY, |best| best.error + self.common)
+        best.map_or(f64::INFINITY, |best| best.error + self.common + self.noise)
     }
 
     /// Estimate of the error of the fraction of a critical point, but for rounding.
@@ -239,7 +243,7 @@ impl Table {
             tips: tips.map(|tip| [tip[0], tip[1], tip[2]]).collect(),
             reaction,
             error: self.error(),
-            fraction_error: self.fraction_error() + self.rounding,
+            fraction_error: self.fraction_error() + self.softening + self.rounding,
             state,
             grid,
         }

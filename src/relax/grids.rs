@@ -52,7 +52,7 @@ impl Run<'_, '_> {
     }
 
     /// Refines until the tolerance is reached.
-    fn refine(&mut self) -> Result<bool, Stop> {
+    pub fn refine(&mut self) -> Result<bool, Stop> {
         loop {
             if (self.accurate() || self.accurate_with_between()) && self.judge_stability()? {
                 return Ok(true);

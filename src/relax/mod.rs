@@ -14,6 +14,7 @@ mod methods;
 mod modes;
 mod number;
 mod options;
+mod own_motion;
 mod place;
 mod plausible;
 pub(crate) mod predict;

@@ -43,6 +43,8 @@ pub struct Richardson {
     table: Vec<Vec<Vec<f64>>>,
     /// Segments of each grid.
     segments: Vec<usize>,
+    /// Changes below this are rounding, if it is more than [`ROUNDING`].
+    noise: f64,
 }
 
 impl Richardson {
@@ -64,6 +66,11 @@ impl Richardson {
         }
         self.table.push(row);
         self.segments.push(segments);
+    }
+
+    /// The same table, of values that have so much rounding in them.
+    pub fn with_noise(self, noise: f64) -> Self {
+        Richardson { noise, ..self }
     }
 
     /// What one more grid changed the best values by, against a table without it
@@ -98,7 +105,9 @@ impl Richardson {
             let ratio = change / distance(&before[m], &self.table[last - 2][m]);
             let order = self.order(m);
             let least = LEAST_RATIO * order;
-            if change > ROUNDING && (ratio > ORDER_SLACK * order || m == 0 && ratio < least) {
+            if change > self.noise.max(ROUNDING)
+                && (ratio > ORDER_SLACK * order || m == 0 && ratio < least)
+            {
                 columns = m;
                 break;
             }

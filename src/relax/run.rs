@@ -119,6 +119,11 @@ impl<'a, 'o> Run<'a, 'o> {
             self.spent = BUDGET / 2;
         }
         self.by_steps = true;
+        self.begin_anew();
+    }
+
+    /// Forgets all grids and what was found on them.
+    pub fn begin_anew(&mut self) {
         self.moved_softened = false;
         self.saddle = None;
         self.levels.clear();

@@ -134,7 +134,7 @@ impl Run<'_, '_> {
     }
 
     /// Where a leaf starts that nothing is known of.
-    fn start(&self, leaf: &DiscreteLeaf) -> State {
+    pub(super) fn start(&self, leaf: &DiscreteLeaf) -> State {
         if let Some(whole) = self.whole {
             let whole = DiscreteLeaf::new(whole, leaf.grid.clone());
             return half_of(self.leaf, &start(&whole));

@@ -100,6 +100,7 @@ pub(crate) fn relax_on_grids(
     let mut run = Run::new(&leaf, options, tolerance, progress);
     run.work = work;
     let mut end = run.solve(grid.clone());
+    end = run.land_by_own_motion(&grid, end);
     let mut next = Some(grid);
     while end.is_err()
         && run.may_go_by_steps()

@@ -34,10 +34,29 @@ use glam::{DQuat, DVec3};
 /// it cannot resolve. Smaller values damp more of what it can.
 const RHO_INF: f64 = 0.8;
 
-const ALPHA_M: f64 = (2.0 * RHO_INF - 1.0) / (RHO_INF + 1.0);
-const ALPHA_F: f64 = RHO_INF / (RHO_INF + 1.0);
-const GAMMA: f64 = 0.5 + ALPHA_F - ALPHA_M;
-const BETA: f64 = 0.25 * (GAMMA + 0.5) * (GAMMA + 0.5);
+/// Weights of the method.
+#[derive(Clone, Copy, Debug)]
+struct Weights {
+    alpha_m: f64,
+    alpha_f: f64,
+    gamma: f64,
+    beta: f64,
+}
+
+impl Weights {
+    /// For a spectral radius `rho_inf` at infinite frequency.
+    fn of(rho_inf: f64) -> Self {
+        let alpha_m = (2.0 * rho_inf - 1.0) / (rho_inf + 1.0);
+        let alpha_f = rho_inf / (rho_inf + 1.0);
+        let gamma = 0.5 + alpha_f - alpha_m;
+        Weights {
+            alpha_m,
+            alpha_f,
+            gamma,
+            beta: 0.25 * (gamma + 0.5) * (gamma + 0.5),
+        }
+    }
+}
 
 /// Shortest step, and the part of a step that is rounding.
 const SHORTEST_STEP: f64 = 1e-10;
@@ -60,6 +79,32 @@ pub enum Steps {
     /// So that the local error of positions (lengths) and rotations (radians)
     /// stays below this.
     Error(f64),
+    /// The same where only the end of a motion matters: its equations are solved no
+    /// better than that, and of what a step does not resolve a part `rho_inf` remains.
+    ToRest {
+        /// The local error.
+        error: f64,
+        /// Spectral radius at infinite frequency.
+        rho_inf: f64,
+    },
+}
+
+impl Steps {
+    /// The local error allowed, if it decides.
+    fn error(self) -> Option<f64> {
+        match self {
+            Steps::Fixed(_) => None,
+            Steps::Error(error) | Steps::ToRest { error, .. } => Some(error),
+        }
+    }
+
+    /// Spectral radius at infinite frequency.
+    fn rho_inf(self) -> f64 {
+        match self {
+            Steps::ToRest { rho_inf, .. } => rho_inf,
+            _ => RHO_INF,
+        }
+    }
 }
 
 /// Motion of a node: pairs of an angular and a linear vector.
@@ -101,6 +146,9 @@ pub struct SemiImplicit {
     next: State,
     moving: Vec<Moving>,
     next_moving: Vec<Moving>,
+    weights: Weights,
+    /// Size of an iteration over the square of the one before, as last seen.
+    contraction: f64,
     steps: Steps,
     step: f64,
     time: f64,
@@ -129,8 +177,10 @@ impl SemiImplicit {
             next_moving: vec![Moving::default(); state.x.len()],
             step: match steps {
                 Steps::Fixed(h) => h,
-                Steps::Error(error) => 0.1 * error.cbrt(),
+                Steps::Error(error) | Steps::ToRest { error, .. } => 0.1 * error.cbrt(),
             },
+            weights: Weights::of(steps.rho_inf()),
+            contraction: 1.0,
             steps,
             time: 0.0,
             count: 0,
@@ -145,6 +195,58 @@ impl SemiImplicit {
         motion.balance.begin(&start);
         motion
     }
+
+    /// Attempts a step that does not go beyond `until`.
+    ///
+    /// # Errors
+    /// If it would be too short.
+    pub fn step_towards(&mut self, until: f64) -> Result<(), Stopped> {
+        let left = until - self.time;
+        if left < NO_TIME * self.step {
+            self.time = until;
+            return Ok(());
+        }
+        let count = (left / self.step * (1.0 - 1e-12)).ceil().max(1.0);
+        // The last two steps share what is left.
+        let last = count == 1.0;
+        let h = match self.steps {
+            Steps::Fixed(_) => left / count,
+            _ if count <= 2.0 => left / count,
+            _ => self.step,
+        };
+        let error = self.attempt(h);
+        if let (Some(allowed), Some(error)) = (self.steps.error(), error) {
+            let factor = 0.9 * (allowed / error.max(1e-300)).cbrt();
+            let next = h * factor.clamp(GROWTH.0, GROWTH.1);
+            if error > allowed {
+                self.step = next;
+                return Ok(());
+            }
+            // The error of a step cut short by `until` does not limit the next.
+            self.step = if last { next.max(self.step) } else { next };
+        }
+        match error {
+            Some(_) => self.accept(h),
+            None => self.step = 0.25 * h,
+        }
+        if let (Steps::Fixed(longest), Some(_)) = (self.steps, error) {
+            self.step = longest.min(GROWTH.1 * self.step);
+        }
+        if self.step < SHORTEST_STEP {
+            let time = self.time;
+            let started = time > 0.0;
+            let advice = if started {
+                TOO_SHORT
+            } else {
+                TOO_SHORT_AT_THE_START
+            };
+            return Err(Stopped::StepTooShort { time, advice });
+        }
+        if error.is_some() && last {
+            self.time = until;
+        }
+        Ok(())
+    }
 }
 
 impl Method for SemiImplicit {
@@ -158,50 +260,7 @@ impl Method for SemiImplicit {
 
     fn advance(&mut self, until: f64) -> Result<(), Stopped> {
         while self.time < until {
-            let left = until - self.time;
-            if left < NO_TIME * self.step {
-                self.time = until;
-                break;
-            }
-            let count = (left / self.step * (1.0 - 1e-12)).ceil().max(1.0);
-            // The last two steps share what is left.
-            let last = count == 1.0;
-            let h = match self.steps {
-                Steps::Fixed(_) => left / count,
-                Steps::Error(_) if count <= 2.0 => left / count,
-                Steps::Error(_) => self.step,
-            };
-            let error = self.attempt(h);
-            if let (Steps::Error(allowed), Some(error)) = (self.steps, error) {
-                let factor = 0.9 * (allowed / error.max(1e-300)).cbrt();
-                let next = h * factor.clamp(GROWTH.0, GROWTH.1);
-                if error > allowed {
-                    self.step = next;
-                    continue;
-                }
-                // The error of a step cut short by `until` does not limit the next.
-                self.step = if last { next.max(self.step) } else { next };
-            }
-            match error {
-                Some(_) => self.accept(h),
-                None => self.step = 0.25 * h,
-            }
-            if let (Steps::Fixed(longest), Some(_)) = (self.steps, error) {
-                self.step = longest.min(GROWTH.1 * self.step);
-            }
-            if self.step < SHORTEST_STEP {
-                let time = self.time;
-                let started = time > 0.0;
-                let advice = if started {
-                    TOO_SHORT
-                } else {
-                    TOO_SHORT_AT_THE_START
-                };
-                return Err(Stopped::StepTooShort { time, advice });
-            }
-            if error.is_some() && last {
-                self.time = until;
-            }
+            self.step_towards(until)?;
         }
         let now = self.snapshot();
         (self.balance).judge(&self.leaf, &self.physics, &now, self.step, OTHERWISE)

@@ -2,7 +2,7 @@
 
 use super::super::friction::rates;
 use super::super::physics::Inertia;
-use super::{ALPHA_F, ALPHA_M, BETA, GAMMA, SemiImplicit, Steps};
+use super::{SemiImplicit, Steps, Weights};
 use crate::leaf::{State, System};
 use crate::newton::Work;
 use crate::rotation;
@@ -15,14 +15,19 @@ const LAST_ITERATION: f64 = 1e-3;
 const LARGEST_LAST: f64 = 1e-9;
 const FIXED_LAST: f64 = 1e-12;
 
-/// Relative accuracy of the conjugate gradients.
+/// What may be left of the iterations where only the end of the motion matters, as a
+/// part of the error allowed.
+const LAST_TO_REST: f64 = 1e-2;
+
+/// Relative accuracy of the conjugate gradients, and the same where only the end matters.
 const CG_TOLERANCE: f64 = 1e-10;
+const CG_TO_REST: f64 = 1e-3;
+
+/// Least part of the last contraction that is taken for the next.
+const FORGETTING: f64 = 0.5;
 
 /// Largest rotation of a node in a step, radians.
 const LARGEST_TURN: f64 = 0.5;
-
-/// Local error of a step: this times h^2 times the change of acceleration.
-const ERROR: f64 = BETA - 1.0 / 6.0;
 
 /// The stiffness with which the forces of rigid segments are condensed out is
 /// so many times what inertia puts against it, at least: iterations gain as
@@ -34,8 +39,12 @@ impl SemiImplicit {
     pub(super) fn solve(&mut self) -> bool {
         self.factorizations += 1;
         let mut uncounted = Work::default();
+        let accuracy = match self.steps {
+            Steps::ToRest { .. } => CG_TO_REST,
+            _ => CG_TOLERANCE,
+        };
         self.solver
-            .solve(&mut self.system, 0.0, None, CG_TOLERANCE, &mut uncounted)
+            .solve(&mut self.system, 0.0, None, accuracy, &mut uncounted)
     }
 
     /// Moves the trial by the increments that were solved for.
@@ -63,15 +72,21 @@ impl SemiImplicit {
     /// Motion at the end of a step of h that leads from the state to the trial.
     fn update_motion(&mut self, h: f64) {
         let nodes = self.leaf.segments() + 1;
+        let Weights {
+            alpha_m,
+            alpha_f,
+            gamma,
+            beta,
+        } = self.weights;
         for k in (0..self.state.x.len()).filter(|k| !k.is_multiple_of(nodes)) {
             let (m, d) = (self.moving[k], self.increment(k));
             let next = &mut self.next_moving[k];
             for c in 0..2 {
-                let a1 = (d[c] - h * m.v[c] - h * h * (0.5 - BETA) * m.a[c]) / (BETA * h * h);
+                let a1 = (d[c] - h * m.v[c] - h * h * (0.5 - beta) * m.a[c]) / (beta * h * h);
                 next.a[c] = a1;
-                next.v[c] = m.v[c] + h * ((1.0 - GAMMA) * m.a[c] + GAMMA * a1);
+                next.v[c] = m.v[c] + h * ((1.0 - gamma) * m.a[c] + gamma * a1);
                 next.w[c] =
-                    ((1.0 - ALPHA_M) * a1 + ALPHA_M * m.a[c] - ALPHA_F * m.w[c]) / (1.0 - ALPHA_F);
+                    ((1.0 - alpha_m) * a1 + alpha_m * m.a[c] - alpha_f * m.w[c]) / (1.0 - alpha_f);
             }
         }
     }
@@ -79,12 +94,19 @@ impl SemiImplicit {
     /// One step of h; returns its local error, or `None` if it was too long.
     pub(super) fn attempt(&mut self, h: f64) -> Option<f64> {
         let damping = self.physics.damping;
+        let Weights {
+            alpha_m,
+            alpha_f,
+            gamma,
+            beta,
+        } = self.weights;
         let per_mass =
-            (1.0 - ALPHA_M) / ((1.0 - ALPHA_F) * BETA * h * h) + damping * GAMMA / (BETA * h);
+            (1.0 - alpha_m) / ((1.0 - alpha_f) * beta * h * h) + damping * gamma / (beta * h);
         self.apply_loads_and_damping(self.time + h, h, per_mass);
         self.predict(h);
         let last = match self.steps {
             Steps::Fixed(_) => FIXED_LAST,
+            Steps::ToRest { error, .. } => LAST_TO_REST * error,
             Steps::Error(allowed) => (LAST_ITERATION * allowed).min(LARGEST_LAST),
         };
         let mut before = f64::INFINITY;
@@ -108,13 +130,27 @@ impl SemiImplicit {
                 return None;
             }
             self.advance_trial();
-            if size <= last || (size < 1e-11 && size > 0.3 * before) {
+            let remaining = match self.steps {
+                Steps::ToRest { .. } => self.after_iteration(size, before),
+                _ => size,
+            };
+            if remaining <= last || (size < 1e-11 && size > 0.3 * before) {
                 self.update_motion(h);
                 return Some(self.local_error(h));
             }
             before = size;
         }
         None
+    }
+
+    /// What an iteration of this size leaves to the next: iterations are quadratic.
+    fn after_iteration(&mut self, size: f64, before: f64) -> f64 {
+        if !before.is_finite() {
+            return self.contraction * size * size;
+        }
+        let seen = size / (before * before);
+        self.contraction = seen.max(FORGETTING * self.contraction);
+        size * size / before
     }
 
     fn local_error(&self, h: f64) -> f64 {
@@ -124,7 +160,8 @@ impl SemiImplicit {
                 error = error.max((next.a[c] - now.a[c]).length());
             }
         }
-        error * ERROR.abs() * h * h
+        // Local error: this times h^2 times the change of acceleration.
+        error * (self.weights.beta - 1.0 / 6.0).abs() * h * h
     }
 
     /// The trial if accelerations did not change in the step.
