@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::grids::on_finer;
+use super::halt::Halt;
 use super::place::Place;
 use super::refine::{Step, Verified, refine};
 use super::search::Lost;
@@ -53,34 +54,6 @@ pub struct Stride {
     pub accuracy: f64,
 }
 
-/// How a boundary ended, on one of its sides.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Halt {
-    /// At an end of one of the ranges.
-    Reached,
-    /// Where it began.
-    Closed,
-    /// After as many points as were allowed.
-    MostPoints,
-    /// The second number breaks the symmetry by which branches cross.
-    Unfolded,
-    /// Modes that become neutral together do so no longer.
-    Parted,
-    /// No leaf is there.
-    OutOfRange,
-    /// No step however short could be made.
-    Stuck,
-    /// What comes next could not be verified.
-    Unverified(Doubt),
-}
-
-impl Halt {
-    /// Whether the boundary is known as far as was asked.
-    pub fn complete(self) -> bool {
-        matches!(self, Halt::Reached | Halt::Closed)
-    }
-}
-
 /// A boundary on both sides of where it began.
 #[derive(Clone, Debug)]
 pub struct Boundary {
@@ -115,7 +88,7 @@ pub fn follow(
     let first = match begun {
         Ok(first) => first,
         Err(lost) => {
-            boundary.ends = [halt(lost); 2];
+            boundary.ends = [Halt::from(lost); 2];
             return boundary;
         }
     };
@@ -149,15 +122,6 @@ pub fn follow(
     }
     boundary.points.reverse();
     boundary
-}
-
-fn halt(lost: Lost) -> Halt {
-    match lost {
-        Lost::Parted => Halt::Parted,
-        Lost::Unfolded => Halt::Unfolded,
-        Lost::Stuck(Stuck::OutOfRange(_)) => Halt::OutOfRange,
-        Lost::Stuck(_) => Halt::Stuck,
-    }
 }
 
 /// A boundary followed one way.
@@ -283,7 +247,7 @@ impl<'a> Walk<'a, '_> {
                 self.end = end;
             }
             Err(_) if 0.5 * self.step >= SHORTEST * self.how.longest => self.step *= 0.5,
-            Err(lost) => self.end = Some(halt(lost)),
+            Err(lost) => self.end = Some(lost.into()),
         }
     }
 

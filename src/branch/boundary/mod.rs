@@ -29,13 +29,16 @@
 
 mod follow;
 mod grids;
+mod halt;
 mod place;
 mod refine;
 mod search;
 mod sheet;
 mod special;
+mod table;
 
-pub use follow::{Boundary, Halt, Stride, follow};
+pub use follow::{Boundary, Stride, follow};
+pub use halt::Halt;
 pub use refine::Verified;
 pub use sheet::Plane;
 pub use special::Special;
