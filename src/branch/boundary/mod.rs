@@ -27,6 +27,7 @@
 //! along that; in the same plane across the curve, where it goes along neither), and
 //! extrapolated.
 
+mod cells;
 mod follow;
 mod grids;
 mod halt;
@@ -37,8 +38,10 @@ mod sheet;
 mod special;
 mod table;
 
+pub use cells::{AtRest, Way, go, refine_on};
 pub use follow::{Boundary, Stride, follow};
 pub use halt::Halt;
+pub use place::Seed;
 pub use refine::Verified;
-pub use sheet::Plane;
+pub use sheet::{Plane, Spot};
 pub use special::Special;

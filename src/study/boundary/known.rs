@@ -1,47 +1,56 @@
-//! Critical points of branches along the first number, and whether they lie on a curve
-//! that is known.
+//! Critical points of branches through the plane, and whether they lie on a curve that is
+//! known.
 
-use crate::branch::boundary::{Boundary, Verified};
-use crate::branch::{Critical, Refined};
+use crate::branch::boundary::{Boundary, Seed, Verified};
+use crate::branch::{Critical, Point, Refined};
+use crate::leaf::Grid;
 use crate::study::trace::{Trace, TraceError, TraceRequest, trace_seen};
 
-/// A trace along the first number, and what it met.
-pub fn criticals(
+/// A trace along the first number, where it begins, and what it met.
+pub struct Traced {
+    pub trace: Trace,
+    /// The first point, and a grid of which its own is a coarser one; none where there is none.
+    pub first: Option<(Point, Grid)>,
+    pub critical: Vec<(Critical, Refined)>,
+}
+
+/// Makes it.
+pub fn traced(
     request: &TraceRequest,
     progress: &mut dyn FnMut(usize, f64),
-) -> Result<(Trace, Vec<(Critical, Refined)>), TraceError> {
-    let mut found = Vec::new();
+) -> Result<Traced, TraceError> {
+    let (mut first, mut critical) = (None, Vec::new());
     let trace = trace_seen(
         request,
         &mut |_, points, value| progress(points, value),
         &mut |followed| {
-            let critical = followed.branch.critical.iter().zip(&followed.critical);
-            found.extend(
-                critical.map(|((_, critical), refined)| (critical.clone(), refined.clone())),
-            );
+            let begun = followed.branch.points.first().zip(followed.points.first());
+            let begun = begun.map(|(point, refined)| (point.clone(), refined.grid.clone()));
+            first = first.take().or(begun);
+            let found = followed.branch.critical.iter().zip(&followed.critical);
+            critical
+                .extend(found.map(|((_, critical), refined)| (critical.clone(), refined.clone())));
         },
     )?;
-    Ok((trace, found))
+    Ok(Traced {
+        trace,
+        first,
+        critical,
+    })
 }
 
-/// A critical point of a branch along the first number.
+/// A critical point of a branch, without the error of its grid.
 pub struct Start<'a> {
     pub critical: &'a Critical,
     pub refined: &'a Refined,
-    /// Where it is on the second number's range, as a fraction.
-    pub second: f64,
-    /// The unit of its lengths.
-    pub length: f64,
+    /// Both numbers where the branch begins, as fractions, and their change with its
+    /// parameter.
+    pub from: [f64; 2],
+    pub way: [f64; 2],
 }
 
-/// A curve, and the unit of its lengths.
-pub struct Known {
-    pub curve: Boundary,
-    pub length: f64,
-}
-
-/// Both numbers, as fractions, and the tips in units of the start's are the same within
-/// this, besides the errors that both have.
+/// Both numbers, as fractions, and the tips are the same within this, besides the errors that
+/// both have.
 const SAME: f64 = 1e-6;
 
 /// Improvements of the nearest point.
@@ -55,26 +64,43 @@ const APART: f64 = 1e-3;
 const BEYOND: f64 = 0.05;
 
 impl Start<'_> {
+    /// Both numbers at a value of the branch's parameter.
+    fn numbers(&self, parameter: f64) -> [f64; 2] {
+        [0, 1].map(|i| self.from[i] + parameter * self.way[i])
+    }
+
+    /// As the beginning of a curve.
+    pub fn seed(&self) -> Seed<'_> {
+        Seed {
+            critical: self.critical,
+            place: self.numbers(self.critical.fraction),
+            way: self.way,
+        }
+    }
+
+    /// The grid of it, of leaves with these kinks.
+    pub fn grid(&self, kinks: &[f64]) -> Grid {
+        coarsened(&self.refined.grid, self.critical.state.segments(), kinks)
+    }
+
     fn place(&self) -> Vec<f64> {
         let tips = self.refined.tips.iter().flatten();
-        let numbers = [self.refined.fraction, self.second];
+        let numbers = self.numbers(self.refined.fraction);
         numbers.into_iter().chain(tips.copied()).collect()
     }
 
     /// Whether it lies on a curve: beside a polynomial through points of it by no more
     /// than this is off one of lower degree, where it separates the same indices. Where
     /// more modes become neutral than those of the curve, others cross it.
-    pub fn is_on(&self, known: &Known) -> bool {
-        let Known { curve, length } = known;
+    pub fn is_on(&self, curve: &Boundary) -> bool {
         let modes = self.critical.modes.len();
         let crossed = modes > curve.neutral;
         if modes < curve.neutral || !crossed && curve.kind != self.critical.kind {
             return false;
         }
-        let scale = length / self.length;
         let (mut points, mut places) = (Vec::new(), Vec::<Vec<f64>>::new());
         for point in &curve.points {
-            let place = place(point, scale);
+            let place = place(point);
             if (places.last()).is_none_or(|last| distance(last, &place) > APART) {
                 points.push(point);
                 places.push(place);
@@ -82,16 +108,15 @@ impl Start<'_> {
         }
         let target = self.place();
         let sides = sorted(self.critical.indices);
-        let own = self.refined.fraction_error + self.refined.error;
+        let length = self.way[0].hypot(self.way[1]);
+        let own = self.refined.fraction_error * length + self.refined.error;
         if let [only] = &points[..] {
-            let error = own + only.errors[0] + only.error * scale;
+            let error = own + only.errors[0] + only.errors[1] + only.error;
             return distance(&places[0], &target) < SAME + error;
         }
         (1..points.len()).any(|k| {
             let pair = &points[k - 1..=k];
-            let error = pair
-                .iter()
-                .map(|it| it.errors[0] + it.errors[1] + it.error * scale);
+            let error = pair.iter().map(|it| it.errors[0] + it.errors[1] + it.error);
             let error = own + error.fold(0.0, f64::max);
             let same_sides = crossed || pair.iter().any(|it| sorted(it.indices) == sides);
             same_sides && is_between(&places, k, &target, SAME + error)
@@ -99,14 +124,21 @@ impl Start<'_> {
     }
 }
 
+/// The grid of so many segments of which this is a finer one.
+pub fn coarsened(grid: &Grid, segments: usize, kinks: &[f64]) -> Grid {
+    let stations = grid.sigma().iter().copied();
+    let stations: Vec<f64> = stations.step_by(grid.segments() / segments).collect();
+    Grid::through(&stations, kinks)
+}
+
 fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
     [a.min(b), a.max(b)]
 }
 
 /// A point of a curve as one of a space: both numbers, and the tips.
-fn place(point: &Verified, scale: f64) -> Vec<f64> {
-    let tips = point.tips.iter().flatten().map(|x| x * scale);
-    point.place.into_iter().chain(tips).collect()
+fn place(point: &Verified) -> Vec<f64> {
+    let tips = point.tips.iter().flatten();
+    point.place.into_iter().chain(tips.copied()).collect()
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
