@@ -318,8 +318,8 @@ fn crossings_are_where_their_errors_say() {
     }
 }
 
-/// Verifying a point of the undulation boundary takes few matrices, eleven on four or five
-/// grids: work must not grow unnoticed.
+/// Following the undulation boundary and verifying its points takes few matrices, 32 a point,
+/// eleven of them on four or five grids to verify it: work must not grow unnoticed.
 #[test]
 fn points_of_the_undulation_boundary_take_few_factorizations() {
     let text = std::fs::read_to_string(path("study/undulation")).unwrap();
@@ -333,5 +333,5 @@ fn points_of_the_undulation_boundary_take_few_factorizations() {
     let points: usize = found.curves.iter().map(|curve| curve.points.len()).sum();
     println!("{} for {points} points", found.factorizations);
     assert!(points >= 6, "{points}");
-    assert!(found.factorizations <= 12 * points);
+    assert!(found.factorizations <= 34 * points);
 }

@@ -11,6 +11,8 @@ pub enum Halt {
     Reached,
     /// Where it began.
     Closed,
+    /// On a curve that was followed before.
+    Met,
     /// After as many points as were allowed.
     MostPoints,
     /// The second number breaks the symmetry by which branches cross.
@@ -28,7 +30,7 @@ pub enum Halt {
 impl Halt {
     /// Whether the boundary is known as far as was asked.
     pub fn complete(self) -> bool {
-        matches!(self, Halt::Reached | Halt::Closed)
+        matches!(self, Halt::Reached | Halt::Closed | Halt::Met)
     }
 }
 

@@ -1,5 +1,6 @@
 //! What curves say of the index on a straight way through the plane.
 
+use super::known::IMAGES;
 use crate::branch::Kind;
 use crate::branch::boundary::{Boundary, Special, Verified};
 
@@ -119,7 +120,10 @@ impl Edge {
         let between =
             |(a, b): (&[f64; 3], &[f64; 3])| [0, 1, 2].map(|c| a[c] + part * (b[c] - a[c]));
         let tips: Vec<[f64; 3]> = tips.map(between).collect();
-        let off = self.tips.iter().map(|own| distance(own, &tips));
+        // Its image in a plane of the axes has the same index.
+        let images = IMAGES.map(|signs| image(&tips, signs));
+        let own = self.tips.iter();
+        let off = own.flat_map(|own| images.iter().map(|tips| distance(own, tips)));
         let off = off.fold(f64::INFINITY, f64::min);
         let steps = self
             .tips
@@ -127,6 +131,12 @@ impl Edge {
             .map(|pair| distance(&pair[0], &pair[1]));
         off < NEAR + 0.5 * steps.fold(0.0, f64::max)
     }
+}
+
+/// The image of tips, by the signs of y and z.
+fn image(tips: &[[f64; 3]], [y, z]: [f64; 2]) -> Vec<[f64; 3]> {
+    let tips = tips.iter();
+    tips.map(|tip| [tip[0], y * tip[1], z * tip[2]]).collect()
 }
 
 /// The largest distance of tips.

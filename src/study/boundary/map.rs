@@ -163,22 +163,6 @@ impl<'p> Cells<'p> {
             grid: way.grid.unwrap_or_else(|| from.grid.clone()),
             critical: way.critical,
         });
-        if std::env::var("DBG").is_ok() && unexplained.is_some() {
-            let v = edge.ends.map(|e| self.plane.values(e));
-            eprintln!(
-                "edge {:?} -> {:?}: {} -> {:?}; n {} criticals {:?}",
-                v[0],
-                v[1],
-                edge.index,
-                edge.found,
-                unexplained.as_ref().unwrap().grid.segments(),
-                unexplained.as_ref().map(|u| u
-                    .critical
-                    .iter()
-                    .map(|c| (c.fraction, c.indices, c.modes.len(), c.kind))
-                    .collect::<Vec<_>>())
-            );
-        }
         self.edges[cell].push(edge);
         unexplained
     }

@@ -134,6 +134,7 @@ impl CurveEnd {
         match self.0 {
             Halt::Reached => "reached",
             Halt::Closed => "closed",
+            Halt::Met => "met",
             Halt::MostPoints => "most-points",
             Halt::Unfolded => "unfolds",
             Halt::Parted => "parts",
@@ -153,6 +154,7 @@ impl CurveEnd {
         match self.0 {
             Halt::Reached => "the end of a range",
             Halt::Closed => "closed",
+            Halt::Met => "on a curve above",
             Halt::MostPoints => "goes on: allow more points",
             Halt::Unfolded => "the second number breaks the symmetry by which branches cross",
             Halt::Parted => "modes that become neutral together part",

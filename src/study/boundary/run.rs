@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::known::{Start, coarsened, traced};
+use super::known::{Start, coarsened, leave_out_known, traced};
 use super::map::{Cells, Unexplained};
 use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, CurveEnd, word};
 use super::{BoundaryRequest, MOST_CURVES};
@@ -152,8 +152,14 @@ impl Run<'_, '_> {
         let number = boundary.curves.len();
         let mut tell = |points, place| progress(Some(number), points, plane.values(place));
         let grid = start.grid(plane.family.first().kinks());
-        let curve = curves::follow(plane, &grid, &start.seed(), &self.how, &mut tell);
+        let mut curve = curves::follow(plane, &grid, &start.seed(), &self.how, &mut tell);
         boundary.factorizations += curve.factorizations;
+        if !curve.points.is_empty() {
+            leave_out_known(&mut curve, &self.known);
+            if curve.points.is_empty() {
+                return;
+            }
+        }
         (boundary.curves).push(in_units(&plane, boundary.joined, &curve));
         self.known.push(curve);
     }
@@ -175,15 +181,6 @@ impl Run<'_, '_> {
                 let [from, to] = *ends;
                 for critical in critical {
                     let refined = curves::refine_on(&self.plane, *ends, grid, critical, accuracy);
-                    if std::env::var("DBG").is_ok() {
-                        match &refined {
-                            Ok(r) => eprintln!(
-                                "   critical {:?} at {} +- {:.1e} tips {:.1e}",
-                                critical.indices, r.fraction, r.fraction_error, r.error
-                            ),
-                            Err(e) => eprintln!("   critical {:?}: {e}", critical.indices),
-                        }
-                    }
                     if let Ok(refined) = &refined {
                         let way = [0, 1].map(|i| to[i] - from[i]);
                         let start = Start {
