@@ -41,6 +41,8 @@ pub struct Way {
     pub tips: Vec<Vec<[f64; 3]>>,
     /// Where the index changes on that grid; the parameter goes from 0 to 1 along it.
     pub critical: Vec<Critical>,
+    /// Whether the branch turns back before its end.
+    turned: bool,
     /// The equilibrium there; none where the branch turns back before, or is lost.
     pub end: Option<AtRest>,
     /// Matrices factorised on the way.
@@ -62,8 +64,8 @@ fn between<'p>(plane: &'p Plane, [from, to]: [[f64; 2]; 2]) -> Box<Between<'p>> 
 
 /// Follows the branch through an equilibrium along the straight way to another place, by
 /// arclength, as long as it does not turn back; what is there counts if three finer grids
-/// in a row have it with the same index. Where that is not the index on the grid of the
-/// way, this is too coarse, and the way is gone once more on a finer one.
+/// in a row have it with the same index. Where they have none, or that is not the index on
+/// the grid of the way, this is too coarse, and the way is gone once more on a finer one.
 pub fn go(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Way {
     let make = between(plane, [from.spot.place, to]);
     let family = Family::in_units(&*make, (0.0, 1.0), false, plane.family.scale());
@@ -79,26 +81,27 @@ pub fn go(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Way {
     };
     loop {
         let last = follow(&mut equations, &first, &mut way);
-        let Some(last) = last else { return way };
-        let Ok(index) = index_at(&mut equations, &last) else {
-            return way;
-        };
-        if index != last.index
-            && 2 * last.state.segments() <= FINEST
-            && let Ok(finer) = on_finer(&mut equations, &first)
+        let index = last
+            .as_ref()
+            .and_then(|it| index_at(&mut equations, it).ok());
+        let finer = 2 * first.state.segments() <= FINEST;
+        if let (Some(last), Some(index)) = (last, index)
+            && (index == last.index || !finer)
         {
-            (equations, first) = finer;
-            continue;
+            way.end = Some(AtRest {
+                spot: Spot {
+                    state: last.state,
+                    place: to,
+                },
+                grid: equations.grid().clone(),
+                index,
+            });
+            return way;
         }
-        way.end = Some(AtRest {
-            spot: Spot {
-                state: last.state,
-                place: to,
-            },
-            grid: equations.grid().clone(),
-            index,
-        });
-        return way;
+        match on_finer(&mut equations, &first) {
+            Ok(on_finer) if finer && !way.turned => (equations, first) = on_finer,
+            _ => return way,
+        }
     }
 }
 
@@ -117,6 +120,7 @@ fn follow(equations: &mut Equations, first: &Point, way: &mut Way) -> Option<Poi
     way.grid = Some(equations.grid().clone());
     way.tips = branch.points.iter().map(tips).collect();
     way.critical = branch.critical.into_iter().map(|(_, it)| it).collect();
+    way.turned = matches!(branch.end, Some(End::Enough | End::Returned));
     match branch.end {
         Some(End::Reached) if branch.missed.is_empty() => branch.points.last().cloned(),
         _ => None,
