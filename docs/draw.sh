@@ -57,15 +57,22 @@ leafdyn trace scenarios/study/undulation.toml --set 'load.gravity=[0,0,0]' --tol
 leafdyn trace scenarios/study/undulation.toml --set 'load.gravity=[0,0,0]' --tolerance 1e-4 --out out/above \
   --set 'stiffness.bending_2=[0.4,0.4,0.4,0.4,0.4,1000,0.4,0.4,0.4,0.4,0.4]' \
   --vary 'stiffness.torsion=10..0.9:50log' --vary "$K=1..0.01:64log"
+leafdyn trace scenarios/study/undulation.toml --set 'load.gravity=[0,0,0]' --tolerance 1e-4 --map 16x16 --out out/below-map \
+  --vary "$K=1..0.4:50log" --vary 'stiffness.torsion=0.1..1.2:12log'
 leafdyn trace scenarios/study/undulation.toml --set 'load.gravity=[0,0,0]' --tolerance 1e-4 --map 8x8 --out out/growth \
   --vary "$K=1..0.1:50log" --vary 'rest.stretch[0]+rest.stretch[10]=1.35..1.15:40'
+leafdyn trace scenarios/paper/fig10.toml --set 'load.gravity=[0,0,0]' --tolerance 1e-4 --out out/fig10-flat-21 \
+  --vary stiffness.bending_2=1..0.8 --vary 'stiffness.torsion=0.008..0.5:24log'
 leafdyn trace scenarios/paper/fig10.toml --set leaf.rods=5 --set 'load.gravity=[0,0,0]' --tolerance 1e-4 --out out/fig10-flat \
   --vary stiffness.bending_2=1..0.8 --vary 'stiffness.torsion=0.008..0.5:24log'
-# It finds no curve, which is exit status 1.
+# They find no curve, which is exit status 1.
 set +e
 leafdyn trace scenarios/paper/fig10.toml --set leaf.rods=5 --tolerance 1e-4 --map 8x8 --out out/fig10-arched \
-  --vary 'stiffness.torsion=1..0.0005:32log' --vary 'load.gravity[2]=-0.0005..-0.3:16log'
+  --vary 'stiffness.torsion=10..0.0001:32log' --vary 'load.gravity[2]=-0.0001..-3:16log'
+leafdyn trace scenarios/paper/fig10.toml --tolerance 1e-4 --map 4x4 --out out/fig10-arched-21 \
+  --vary 'stiffness.torsion=10..0.0001:32log' --vary 'load.gravity[2]=-0.0001..-3:16log'
 set -e
 leafdyn trace scenarios/study/undulation.toml --set 'load.gravity=[0,0,0]' --tolerance 1e-4 --switch --vary "$K=0.48..0.4:12log" --out out/waves
 cp out/undulation-map/map.svg "$top/docs/maps/undulation.svg"
+cp out/below-map/boundary.svg "$top/docs/maps/undulation_boundary.svg"
 cp out/growth/boundary.svg "$top/docs/maps/undulation_growth.svg"

@@ -118,6 +118,50 @@ fn curves_that_cross_at_the_end_of_a_range_are_followed_once() {
     assert_eq!(found["map"]["disagreeing"].as_array().unwrap().len(), 0);
 }
 
+/// A column that is pushed askew: beyond its folds the branch from the left is gone, but
+/// others are reached round the cusp, where the sheet of equilibria is single.
+#[test]
+fn cells_behind_a_fold_are_reached_round_its_cusp() {
+    let run = Workplace::new().run(
+        "trace leaf.toml --set leaf.rods=1 --set leaf.fan=[0] --set load.gravity=[0,0,0] \
+        --set stiffness.bending_2=1000 --set load.tip_force=[-2.8,0,0] --map 6x6 \
+        --vary load.tip_force[1]=1..-1 --vary load.tip_force[0]=-4..-1 --write none --json",
+    );
+    let found = run.ends(0).json();
+    let map = &found["map"];
+    assert_eq!(map["disagreeing"].as_array().unwrap().len(), 0, "{map:#}");
+    let rows = map["index"].as_array().unwrap();
+    let stable = rows.iter().flat_map(|row| row.as_array().unwrap());
+    assert!(stable.clone().all(|index| index == 0), "{map:#}");
+    assert_eq!(stable.count(), 36);
+}
+
+/// Both modes of the flat undulating leaf become neutral along rows of cells, on a coarse grid
+/// elsewhere than on a fine one.
+#[test]
+fn rows_that_run_along_a_curve_stay_on_its_sheet() {
+    let (veins, weak) = ((0..11).filter(|vein| *vein != 5), 0.07);
+    let keys: Vec<String> = veins
+        .map(|vein| format!("stiffness.bending_2[{vein}]"))
+        .collect();
+    let keys = keys.join("+");
+    let half = vec![format!("{weak}"); 5].join(",");
+    let run = Workplace::new().run(&format!(
+        "trace scenarios/study/undulation.toml --set load.gravity=[0,0,0] --tolerance 1e-4 \
+        --set stiffness.bending_2=[{half},1000,{half}] --map 2x3 --write none --json \
+        --vary stiffness.torsion=9..6 --vary {keys}=0.07..0.06"
+    ));
+    let found = run.ends(0).json();
+    let map = &found["map"];
+    assert_eq!(map["disagreeing"].as_array().unwrap().len(), 0, "{map:#}");
+    let cells = map["index"].as_array().unwrap().iter();
+    let cells: Vec<u64> = cells
+        .flat_map(|row| row.as_array().unwrap())
+        .map(|index| index.as_u64().unwrap())
+        .collect();
+    assert!(cells.contains(&0) && cells.contains(&2), "{cells:?}");
+}
+
 #[test]
 fn maps_that_cannot_be_are_refused() {
     all_refused(

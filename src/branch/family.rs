@@ -39,9 +39,22 @@ impl<'a> Family<'a> {
         (from, to): (f64, f64),
         log: bool,
     ) -> Result<Self, OutOfRange> {
-        let [first, last] = [from, to].map(|value| make(value).map_err(OutOfRange));
-        let first = Leaf::new(&first?);
-        let last = Leaf::in_units(Arc::new(last?), first.scale);
+        let scale = make(from).map_err(OutOfRange)?.scale();
+        Family::in_units(make, (from, to), log, scale)
+    }
+
+    /// The same in given units.
+    pub fn in_units(
+        make: &'a (dyn Fn(f64) -> Result<Scenario, String> + Sync),
+        (from, to): (f64, f64),
+        log: bool,
+        scale: Scale,
+    ) -> Result<Self, OutOfRange> {
+        let leaf = |value: f64| {
+            let scenario = make(value).map_err(OutOfRange)?;
+            Ok(Leaf::in_units(Arc::new(scenario), scale))
+        };
+        let [first, last] = [leaf(from)?, leaf(to)?];
         Ok(Family {
             make,
             from,

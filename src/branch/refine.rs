@@ -26,6 +26,9 @@ const SAME_WAY: f64 = 0.85;
 /// its range, and where the branch goes at least this much along it alone.
 const ALONG: f64 = 0.995;
 
+/// Grids in a row that have the same index, where it alone matters.
+const AGREEING: usize = 3;
+
 /// Where on a branch a point of it is, the same on all grids.
 enum Place {
     /// Where the parameter is what it is.
@@ -145,6 +148,33 @@ pub fn refine_at(
     accuracy: f64,
 ) -> Result<Refined, Doubt> {
     refine_in(family, grid, point, accuracy, false)
+}
+
+/// The Morse index of a point at its parameter, which so many grids in a row have, each with
+/// half of the segments of the one before; on all of them it must be the same point.
+pub fn index_at(equations: &mut Equations, point: &Point) -> Result<usize, Doubt> {
+    let (mut moved, mut same, mut index) = (f64::INFINITY, 1, point.index);
+    let mut finer = in_place(equations, point, &mut Place::Value)?;
+    for _ in 1..GRIDS {
+        let along = finer.equations.along(&finer.point.tangent, &finer.tangent);
+        if along < SAME_WAY || finer.moved > moved.max(STILL) {
+            return Err(Doubt::OtherBranch);
+        }
+        same = if finer.point.index == index {
+            same + 1
+        } else {
+            1
+        };
+        (index, moved) = (finer.point.index, finer.moved);
+        if same == AGREEING {
+            return Ok(index);
+        }
+        if 2 * finer.point.state.segments() > FINEST {
+            break;
+        }
+        finer = in_place(&mut finer.equations, &finer.point, &mut Place::Value)?;
+    }
+    Err(Doubt::OtherIndex)
 }
 
 fn refine_in(

@@ -47,7 +47,7 @@ pub struct Trace {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     show: Vec<TraceShow>,
 
-    /// Of a boundary also a coarse map under the curves: the index in so many cells along both numbers, from a trace along each row
+    /// Of a boundary also a coarse map under the curves: the index in so many cells along both numbers, each reached from one beside it
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = cells)]
     map: Option<[usize; 2]>,
 

@@ -3,12 +3,13 @@
 use rayon::prelude::*;
 
 use super::grids::on_finer;
-use super::place::Place;
+use super::halt::Halt;
+use super::place::{Place, Seed};
 use super::refine::{Step, Verified, refine};
 use super::search::Lost;
 use super::sheet::{Plane, Sheet};
 use super::special::{land, onto, special_between};
-use crate::branch::critical::{Critical, Kind};
+use crate::branch::critical::Kind;
 use crate::branch::equations::Stuck;
 use crate::branch::refined::Doubt;
 use crate::leaf::Grid;
@@ -53,34 +54,6 @@ pub struct Stride {
     pub accuracy: f64,
 }
 
-/// How a boundary ended, on one of its sides.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Halt {
-    /// At an end of one of the ranges.
-    Reached,
-    /// Where it began.
-    Closed,
-    /// After as many points as were allowed.
-    MostPoints,
-    /// The second number breaks the symmetry by which branches cross.
-    Unfolded,
-    /// Modes that become neutral together do so no longer.
-    Parted,
-    /// No leaf is there.
-    OutOfRange,
-    /// No step however short could be made.
-    Stuck,
-    /// What comes next could not be verified.
-    Unverified(Doubt),
-}
-
-impl Halt {
-    /// Whether the boundary is known as far as was asked.
-    pub fn complete(self) -> bool {
-        matches!(self, Halt::Reached | Halt::Closed)
-    }
-}
-
 /// A boundary on both sides of where it began.
 #[derive(Clone, Debug)]
 pub struct Boundary {
@@ -91,31 +64,36 @@ pub struct Boundary {
     pub points: Vec<Verified>,
     /// How it ended, at its first point and at its last.
     pub ends: [Halt; 2],
+    /// Matrices factorised for it, but for those of softened leaves.
+    pub factorizations: usize,
 }
 
-/// Follows the boundary on which a critical point of a branch lies both ways, from a
-/// fraction of the second number's range. `progress` is told of each point: how many
-/// there are, and where.
+/// Follows the boundary on which a critical point of a branch lies both ways. `progress` is
+/// told of each point: how many there are, and where.
 pub fn follow(
     plane: Plane,
     grid: &Grid,
-    critical: &Critical,
-    second: f64,
+    seed: &Seed,
     how: &Stride,
     progress: &mut dyn FnMut(usize, [f64; 2]),
 ) -> Boundary {
     let mut boundary = Boundary {
-        kind: critical.kind,
-        neutral: critical.modes.len(),
+        kind: seed.critical.kind,
+        neutral: seed.critical.modes.len(),
         points: Vec::new(),
         ends: [Halt::Stuck; 2],
+        factorizations: 0,
     };
     let begun = Sheet::new(plane, grid.clone()).map_err(Lost::from);
-    let begun = begun.and_then(|mut sheet| Place::begin(&mut sheet, critical, second));
+    let begun = begun.and_then(|mut sheet| {
+        let begun = Place::begin(&mut sheet, seed);
+        boundary.factorizations += sheet.equations.factorizations;
+        begun
+    });
     let first = match begun {
         Ok(first) => first,
         Err(lost) => {
-            boundary.ends = [halt(lost); 2];
+            boundary.ends = [Halt::from(lost); 2];
             return boundary;
         }
     };
@@ -123,21 +101,23 @@ pub fn follow(
         let mut walk = Walk {
             plane,
             how,
-            second,
+            second: way.spot.place[1],
             first: way.clone(),
             step: FIRST * how.longest,
             steps: vec![Step {
                 place: way,
                 special: None,
-                given: Some(1),
+                given: seed.given(),
             }],
             verified: Vec::new(),
             end: None,
+            factorizations: 0,
         };
         let known = boundary.points.len();
         boundary.ends[side] = walk.run(grid.clone(), &mut |points, place| {
             progress(known + points, place);
         });
+        boundary.factorizations += walk.factorizations;
         boundary.points.reverse();
         // The first point is that of the other side.
         let skip = usize::from(!boundary.points.is_empty());
@@ -149,15 +129,6 @@ pub fn follow(
     }
     boundary.points.reverse();
     boundary
-}
-
-fn halt(lost: Lost) -> Halt {
-    match lost {
-        Lost::Parted => Halt::Parted,
-        Lost::Unfolded => Halt::Unfolded,
-        Lost::Stuck(Stuck::OutOfRange(_)) => Halt::OutOfRange,
-        Lost::Stuck(_) => Halt::Stuck,
-    }
 }
 
 /// A boundary followed one way.
@@ -172,6 +143,8 @@ struct Walk<'a, 'h> {
     steps: Vec<Step>,
     verified: Vec<Verified>,
     end: Option<Halt>,
+    /// Matrices factorised on grids that were left, and to verify points.
+    factorizations: usize,
 }
 
 impl<'a> Walk<'a, '_> {
@@ -181,6 +154,7 @@ impl<'a> Walk<'a, '_> {
             Ok(sheet) => sheet,
             Err(_) => return Halt::OutOfRange,
         };
+        let mut counted = 0;
         loop {
             // The next points are made while those before are verified, side by side.
             let (plane, accuracy, grid) = (self.plane, self.how.accuracy, sheet.grid().clone());
@@ -193,6 +167,8 @@ impl<'a> Walk<'a, '_> {
                 });
                 self.go_on(&mut sheet, AHEAD, progress);
             });
+            self.factorizations += sheet.equations.factorizations - counted;
+            counted = sheet.equations.factorizations;
             let all = new.len() + self.verified.len() == self.steps.len();
             let end = match (self.accept(found), self.end) {
                 (None, Some(end)) if all => match end {
@@ -206,6 +182,7 @@ impl<'a> Walk<'a, '_> {
             if !self.refine(&mut sheet) {
                 return end;
             }
+            counted = 0;
         }
     }
 
@@ -232,7 +209,10 @@ impl<'a> Walk<'a, '_> {
     fn accept(&mut self, found: Vec<Result<Verified, Doubt>>) -> Option<Doubt> {
         for point in found {
             match point {
-                Ok(point) => self.verified.push(point),
+                Ok(point) => {
+                    self.factorizations += point.factorizations;
+                    self.verified.push(point);
+                }
                 Err(doubt) => {
                     self.steps.truncate(self.verified.len().max(1));
                     self.end = None;
@@ -283,7 +263,7 @@ impl<'a> Walk<'a, '_> {
                 self.end = end;
             }
             Err(_) if 0.5 * self.step >= SHORTEST * self.how.longest => self.step *= 0.5,
-            Err(lost) => self.end = Some(halt(lost)),
+            Err(lost) => self.end = Some(lost.into()),
         }
     }
 

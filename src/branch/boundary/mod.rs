@@ -27,15 +27,21 @@
 //! along that; in the same plane across the curve, where it goes along neither), and
 //! extrapolated.
 
+mod cells;
 mod follow;
 mod grids;
+mod halt;
 mod place;
 mod refine;
 mod search;
 mod sheet;
 mod special;
+mod table;
 
-pub use follow::{Boundary, Halt, Stride, follow};
+pub use cells::{AtRest, Way, go, refine_on};
+pub use follow::{Boundary, Stride, follow};
+pub use halt::Halt;
+pub use place::Seed;
 pub use refine::Verified;
-pub use sheet::Plane;
+pub use sheet::{Plane, Spot};
 pub use special::Special;

@@ -50,22 +50,47 @@ pub struct Place {
     pub heading: [f64; 2],
 }
 
+/// A critical point of a branch through the plane.
+#[derive(Clone, Copy)]
+pub struct Seed<'c> {
+    pub critical: &'c Critical,
+    /// Both numbers, as fractions of their ranges,
+    pub place: [f64; 2],
+    /// and their change with the parameter of the branch.
+    pub way: [f64; 2],
+}
+
+impl Seed<'_> {
+    /// The number that does not change along the branch, if there is one.
+    pub fn given(&self) -> Option<usize> {
+        [1, 0].into_iter().find(|&which| self.way[which] == 0.0)
+    }
+}
+
 impl Place {
-    /// The critical point of a branch along the first number, as a point of the sheet at
-    /// a fraction of the second number's range; `onward`: the boundary goes to where the
-    /// second number grows.
-    pub fn begin(sheet: &mut Sheet, critical: &Critical, second: f64) -> Result<Place, Lost> {
+    /// Where a boundary begins: it lies across the branch.
+    pub fn begin(sheet: &mut Sheet, seed: &Seed) -> Result<Place, Lost> {
+        let Seed {
+            critical,
+            place,
+            way,
+        } = seed;
         let modes = critical.modes.iter().chain(&critical.held);
         let held = independent(sheet, modes, critical.held.len());
         let spot = Spot {
             state: critical.state.clone(),
-            place: [critical.fraction, second],
+            place: *place,
         };
         let across = Direction {
             increments: critical.tangent.increments.clone(),
-            place: [critical.tangent.fraction, 0.0],
+            place: way.map(|part| part * critical.tangent.fraction),
         };
-        let along = sheet.number(1);
+        let slope = critical.slope / sheet.along(&across, &across).sqrt();
+        let across = sheet.normalised(across);
+        let along = sheet.normalised(Direction {
+            place: [-way[1], way[0]],
+            ..sheet.number(1)
+        });
         let like = Place {
             spot,
             kind: critical.kind,
@@ -73,7 +98,7 @@ impl Place {
             held,
             tangent: along.clone(),
             normal: across.clone(),
-            slope: critical.slope,
+            slope,
             index: 0,
             others: Vec::new(),
             speed: 0.0,
@@ -82,7 +107,7 @@ impl Place {
         let found = Search {
             spot: &like.spot,
             across: &across,
-            slope: critical.slope,
+            slope,
             along: &along,
             held: &like.held,
             neutral: like.neutral,

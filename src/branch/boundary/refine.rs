@@ -5,13 +5,13 @@ use super::place::Place;
 use super::search::{Found, Lost, Search};
 use super::sheet::{Direction, Plane, Sheet, Spot};
 use super::special::{Special, locate_near};
+use super::table::Table;
 use crate::branch::critical::Kind;
 use crate::branch::refine_critical::NEARLY_RIGID;
 use crate::branch::refined::Doubt;
 use crate::leaf::{Grid, State};
 use crate::newton::Contraction;
 use crate::relax::predict::{predict, weights};
-use crate::relax::richardson::Richardson;
 use crate::relax::run::Level;
 
 /// Grids of a point at least and at most, those of a nearly rigid leaf, and segments of
@@ -32,16 +32,10 @@ const EXACTER: f64 = 1e-2;
 
 /// Compliance by which matrices of nearly rigid leaves are softened, in units of L^2/A,
 /// times one to four: the more, the less rounding; a part of third order is left.
-const SOFTENING: f64 = 1e-3;
+pub const SOFTENING: f64 = 1e-3;
 
-/// What extrapolation to none makes of rounding: the root of the sum of the squares of its
-/// weights.
-const AMPLIFIED: f64 = 8.3;
-
-/// Newton's method leaves at most this part of the error that is allowed, on a grid, of
-/// which extrapolation makes at most so much.
+/// Newton's method leaves at most this part of the error that is allowed, on a grid.
 const LEFT: f64 = 1e-3;
-const KEPT: f64 = 2.0;
 
 /// Numbers within this part of their ranges are exact.
 const EXACT: f64 = 1e-12;
@@ -117,11 +111,7 @@ fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<
     let mut near = step.place.clone();
     let given = step.given.or_else(|| given_at(&sheet, &near));
     let given = given.filter(|_| step.special.is_none());
-    let mut table = Table {
-        given: given.map(|which| (which, near.spot.place[which])),
-        amplified: 1.0,
-        ..Table::default()
-    };
+    let mut table = Table::new(given.map(|which| (which, near.spot.place[which])));
     let mut moved = f64::INFINITY;
     let mut contraction = Contraction::default();
     let (mut levels, mut places) = (Vec::<Level>::new(), Vec::new());
@@ -327,113 +317,6 @@ fn unsoftened(
     // The cubic through values at 1, 2, 3, 4 at zero.
     let [a, b, c, d] = places;
     Ok([0, 1].map(|i| 4.0 * a[i] - 6.0 * b[i] + 4.0 * c[i] - d[i]))
-}
-
-/// What is extrapolated.
-#[derive(Default)]
-struct Table {
-    tips: Richardson,
-    numbers: [Richardson; 2],
-    /// The number that is the same on every grid, if there is one.
-    given: Option<(usize, f64)>,
-    /// What rounding of the matrix may have done to the numbers on a grid, and how many
-    /// times as much to those of no softening.
-    rounding: [f64; 2],
-    amplified: f64,
-    /// What Newton's method may have left on a grid.
-    left: f64,
-}
-
-impl Table {
-    fn push(
-        &mut self,
-        sheet: &mut Sheet,
-        (place, along): (&Place, Option<f64>),
-        numbers: [f64; 2],
-        rigid: bool,
-    ) -> Result<(), Lost> {
-        if rigid {
-            self.amplified = AMPLIFIED;
-        }
-        let (across, slope) = match self.given {
-            Some((which, _)) => place.across_at(sheet, which),
-            None => (place.normal.clone(), place.slope),
-        };
-        let leaf = sheet.leaf(place.spot.place)?;
-        let limit = if rigid {
-            1.0 / SOFTENING
-        } else {
-            f64::INFINITY
-        };
-        let condensing = leaf.sections.iter().map(|it| it.condensing.max_element());
-        let stiffest = condensing.fold(0.0_f64, |most, it| most.max(it.min(limit)));
-        let state = &place.spot.state;
-        let segments = state.segments() as f64;
-        let rounding = f64::EPSILON * stiffest * segments * segments;
-        for i in 0..2 {
-            let own = (rounding / slope * across.place[i]).abs();
-            let along = along.map_or(0.0, |slope| rounding / slope * place.tangent.place[i]);
-            self.rounding[i] = self.rounding[i].max(own + along.abs());
-        }
-        let tips = (0..state.rods()).flat_map(|j| state.tip(j).to_array());
-        self.tips.push(state.segments(), tips.collect());
-        for (table, number) in self.numbers.iter_mut().zip(numbers) {
-            table.push(state.segments(), vec![number]);
-        }
-        Ok(())
-    }
-
-    fn errors(&self) -> [f64; 2] {
-        let error = |i: usize| {
-            self.numbers[i]
-                .best()
-                .map_or(f64::INFINITY, |best| best.error)
-        };
-        [0, 1].map(|i| match self.given {
-            Some((which, _)) if which == i => 0.0,
-            _ => error(i),
-        })
-    }
-
-    fn verified(&self, sheet: &Sheet, place: &Place, special: Option<Special>) -> Verified {
-        let columns = |table: &Richardson| table.best().map_or(0, |best| best.columns);
-        let tips = self.tips.column(columns(&self.tips));
-        let errors = self.errors();
-        let number = |i: usize| match self.given {
-            Some((which, value)) if which == i => value,
-            _ => self.numbers[i].column(columns(&self.numbers[i]))[0],
-        };
-        let free = |i: usize| self.given.is_none_or(|(which, _)| which != i);
-        let (beyond, below) = (place.index, place.index.saturating_sub(place.neutral));
-        let forward = match place.kind {
-            Kind::Branching => {
-                let (across, slope) = place.across_at(sheet, 1);
-                slope * across.place[0] > 0.0
-            }
-            Kind::Fold => true,
-        };
-        Verified {
-            place: [number(0), number(1)],
-            errors: [0, 1].map(|i| match free(i) {
-                true => errors[i] + self.amplified * self.rounding[i] + KEPT * self.left,
-                false => 0.0,
-            }),
-            tips: tips.chunks(3).map(|tip| [tip[0], tip[1], tip[2]]).collect(),
-            // No tip is better than the precision of its numbers.
-            error: (self.tips.best()).map_or(f64::INFINITY, |best| {
-                best.error + KEPT * self.left + f64::EPSILON
-            }),
-            state: place.spot.state.clone(),
-            stations: sheet.grid().sigma().to_vec(),
-            kind: place.kind,
-            special,
-            indices: match forward {
-                true => [below, beyond],
-                false => [beyond, below],
-            },
-            factorizations: 0,
-        }
-    }
 }
 
 impl From<Lost> for Doubt {

@@ -1,47 +1,56 @@
-//! Critical points of branches along the first number, and whether they lie on a curve
-//! that is known.
+//! Critical points of branches through the plane, and whether they lie on a curve that is
+//! known.
 
-use crate::branch::boundary::{Boundary, Verified};
-use crate::branch::{Critical, Refined};
+use crate::branch::boundary::{Boundary, Halt, Seed, Verified};
+use crate::branch::{Critical, Kind, Point, Refined};
+use crate::leaf::Grid;
 use crate::study::trace::{Trace, TraceError, TraceRequest, trace_seen};
 
-/// A trace along the first number, and what it met.
-pub fn criticals(
+/// A trace along the first number, where it begins, and what it met.
+pub struct Traced {
+    pub trace: Trace,
+    /// The first point, and a grid of which its own is a coarser one; none where there is none.
+    pub first: Option<(Point, Grid)>,
+    pub critical: Vec<(Critical, Refined)>,
+}
+
+/// Makes it.
+pub fn traced(
     request: &TraceRequest,
     progress: &mut dyn FnMut(usize, f64),
-) -> Result<(Trace, Vec<(Critical, Refined)>), TraceError> {
-    let mut found = Vec::new();
+) -> Result<Traced, TraceError> {
+    let (mut first, mut critical) = (None, Vec::new());
     let trace = trace_seen(
         request,
         &mut |_, points, value| progress(points, value),
         &mut |followed| {
-            let critical = followed.branch.critical.iter().zip(&followed.critical);
-            found.extend(
-                critical.map(|((_, critical), refined)| (critical.clone(), refined.clone())),
-            );
+            let begun = followed.branch.points.first().zip(followed.points.first());
+            let begun = begun.map(|(point, refined)| (point.clone(), refined.grid.clone()));
+            first = first.take().or(begun);
+            let found = followed.branch.critical.iter().zip(&followed.critical);
+            critical
+                .extend(found.map(|((_, critical), refined)| (critical.clone(), refined.clone())));
         },
     )?;
-    Ok((trace, found))
+    Ok(Traced {
+        trace,
+        first,
+        critical,
+    })
 }
 
-/// A critical point of a branch along the first number.
+/// A critical point of a branch, without the error of its grid.
 pub struct Start<'a> {
     pub critical: &'a Critical,
     pub refined: &'a Refined,
-    /// Where it is on the second number's range, as a fraction.
-    pub second: f64,
-    /// The unit of its lengths.
-    pub length: f64,
+    /// Both numbers where the branch begins, as fractions, and their change with its
+    /// parameter.
+    pub from: [f64; 2],
+    pub way: [f64; 2],
 }
 
-/// A curve, and the unit of its lengths.
-pub struct Known {
-    pub curve: Boundary,
-    pub length: f64,
-}
-
-/// Both numbers, as fractions, and the tips in units of the start's are the same within
-/// this, besides the errors that both have.
+/// Both numbers, as fractions, and the tips are the same within this, besides the errors that
+/// both have.
 const SAME: f64 = 1e-6;
 
 /// Improvements of the nearest point.
@@ -55,48 +64,137 @@ const APART: f64 = 1e-3;
 const BEYOND: f64 = 0.05;
 
 impl Start<'_> {
-    fn place(&self) -> Vec<f64> {
-        let tips = self.refined.tips.iter().flatten();
-        let numbers = [self.refined.fraction, self.second];
-        numbers.into_iter().chain(tips.copied()).collect()
+    /// Both numbers at a value of the branch's parameter.
+    fn numbers(&self, parameter: f64) -> [f64; 2] {
+        [0, 1].map(|i| self.from[i] + parameter * self.way[i])
     }
 
-    /// Whether it lies on a curve: beside a polynomial through points of it by no more
-    /// than this is off one of lower degree, where it separates the same indices. Where
-    /// more modes become neutral than those of the curve, others cross it.
-    pub fn is_on(&self, known: &Known) -> bool {
-        let Known { curve, length } = known;
-        let modes = self.critical.modes.len();
-        let crossed = modes > curve.neutral;
-        if modes < curve.neutral || !crossed && curve.kind != self.critical.kind {
+    /// As the beginning of a curve.
+    pub fn seed(&self) -> Seed<'_> {
+        Seed {
+            critical: self.critical,
+            place: self.numbers(self.critical.fraction),
+            way: self.way,
+        }
+    }
+
+    /// The grid of it, of leaves with these kinks.
+    pub fn grid(&self, kinks: &[f64]) -> Grid {
+        coarsened(&self.refined.grid, self.critical.state.segments(), kinks)
+    }
+
+    /// Whether it lies on a curve.
+    pub fn is_on(&self, curve: &Boundary) -> bool {
+        let tips = self.refined.tips.iter().flatten();
+        let numbers = self.numbers(self.refined.fraction);
+        let length = self.way[0].hypot(self.way[1]);
+        let singular = Singular {
+            place: numbers.into_iter().chain(tips.copied()).collect(),
+            error: self.refined.fraction_error * length + self.refined.error,
+            kind: self.critical.kind,
+            modes: self.critical.modes.len(),
+            sides: sorted(self.critical.indices),
+        };
+        singular.is_on(curve)
+    }
+}
+
+/// Leaves out of a curve what repeats others at its ends; nothing may be left.
+pub fn leave_out_known(curve: &mut Boundary, known: &[Boundary]) {
+    let is_known = |point: &Verified| {
+        let singular = Singular {
+            place: place(point),
+            error: error(point),
+            kind: point.kind,
+            modes: curve.neutral,
+            sides: sorted(point.indices),
+        };
+        known.iter().any(|other| singular.is_on(other))
+    };
+    let repeated: Vec<bool> = curve.points.iter().map(is_known).collect();
+    if repeated.iter().all(|known| *known) {
+        curve.points.clear();
+        return;
+    }
+    // One that is known may be where curves cross; the last of several is where they meet.
+    let first = repeated.iter().take_while(|known| **known).count();
+    let last = repeated.iter().rev().take_while(|known| **known).count();
+    if last > 1 {
+        curve.points.truncate(repeated.len() - last + 1);
+        curve.ends[1] = Halt::Met;
+    }
+    if first > 1 {
+        curve.points.drain(..first - 1);
+        curve.ends[0] = Halt::Met;
+    }
+}
+
+/// A place of the plane and of the tips where a matrix is singular.
+struct Singular {
+    place: Vec<f64>,
+    error: f64,
+    kind: Kind,
+    modes: usize,
+    /// The smaller index beside it and the larger one.
+    sides: [usize; 2],
+}
+
+/// A leaf and its images in the planes of its axes along its length lose their stability
+/// together: signs of y and z.
+pub const IMAGES: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
+
+impl Singular {
+    /// Whether it lies on a curve or on one of its images: beside a polynomial through points
+    /// of it by no more than this is off one of lower degree, where it separates the same
+    /// indices. Where more modes become neutral than those of the curve, others cross it.
+    fn is_on(&self, curve: &Boundary) -> bool {
+        let crossed = self.modes > curve.neutral;
+        if self.modes < curve.neutral || !crossed && curve.kind != self.kind {
             return false;
         }
-        let scale = length / self.length;
         let (mut points, mut places) = (Vec::new(), Vec::<Vec<f64>>::new());
         for point in &curve.points {
-            let place = place(point, scale);
+            let place = place(point);
             if (places.last()).is_none_or(|last| distance(last, &place) > APART) {
                 points.push(point);
                 places.push(place);
             }
         }
-        let target = self.place();
-        let sides = sorted(self.critical.indices);
-        let own = self.refined.fraction_error + self.refined.error;
-        if let [only] = &points[..] {
-            let error = own + only.errors[0] + only.error * scale;
-            return distance(&places[0], &target) < SAME + error;
-        }
-        (1..points.len()).any(|k| {
-            let pair = &points[k - 1..=k];
-            let error = pair
-                .iter()
-                .map(|it| it.errors[0] + it.errors[1] + it.error * scale);
-            let error = own + error.fold(0.0, f64::max);
-            let same_sides = crossed || pair.iter().any(|it| sorted(it.indices) == sides);
-            same_sides && is_between(&places, k, &target, SAME + error)
+        IMAGES.iter().any(|signs| {
+            let target = image(&self.place, *signs);
+            if let [only] = &points[..] {
+                return distance(&places[0], &target) < SAME + self.error + error(only);
+            }
+            (1..points.len()).any(|k| {
+                let pair = &points[k - 1..=k];
+                let within = pair.iter().map(|it| error(it)).fold(0.0, f64::max);
+                let mut sides = pair.iter().map(|it| sorted(it.indices));
+                let same_sides = crossed || sides.any(|sides| sides == self.sides);
+                same_sides && is_between(&places, k, &target, SAME + self.error + within)
+            })
         })
     }
+}
+
+/// The image of a place, by the signs of y and z of its tips.
+fn image(place: &[f64], [y, z]: [f64; 2]) -> Vec<f64> {
+    let (numbers, tips) = place.split_at(2);
+    let tips = tips
+        .chunks(3)
+        .flat_map(|tip| [tip[0], y * tip[1], z * tip[2]]);
+    numbers.iter().copied().chain(tips).collect()
+}
+
+/// Bounds on the errors of a point, added.
+fn error(point: &Verified) -> f64 {
+    point.errors[0] + point.errors[1] + point.error
+}
+
+/// The grid of so many segments of which this is a finer one.
+pub fn coarsened(grid: &Grid, segments: usize, kinks: &[f64]) -> Grid {
+    let stations = grid.sigma().iter().copied();
+    let stations: Vec<f64> = stations.step_by(grid.segments() / segments).collect();
+    Grid::through(&stations, kinks)
 }
 
 fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
@@ -104,9 +202,9 @@ fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
 }
 
 /// A point of a curve as one of a space: both numbers, and the tips.
-fn place(point: &Verified, scale: f64) -> Vec<f64> {
-    let tips = point.tips.iter().flatten().map(|x| x * scale);
-    point.place.into_iter().chain(tips).collect()
+fn place(point: &Verified) -> Vec<f64> {
+    let tips = point.tips.iter().flatten();
+    point.place.into_iter().chain(tips.copied()).collect()
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
@@ -166,4 +264,67 @@ fn through(places: &[Vec<f64>], at: &[f64], t: f64) -> Vec<f64> {
         }
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::leaf::State;
+    use glam::{DQuat, DVec3};
+
+    /// A parabola over the second number, between two values of it, with tips that move.
+    fn curve(from: f64, to: f64, y: f64) -> Boundary {
+        let point = |k: usize| {
+            let at = from + (to - from) * k as f64 / 20.0;
+            Verified {
+                place: [0.3 + 0.2 * at * at, at],
+                errors: [1e-9, 0.0],
+                tips: vec![[1.0 - 0.3 * at, y * at, 0.0]],
+                error: 1e-9,
+                state: State::new(1, vec![DVec3::ZERO; 2], vec![DQuat::IDENTITY; 2]),
+                stations: vec![0.0, 1.0],
+                kind: Kind::Branching,
+                special: None,
+                indices: [0, 1],
+                factorizations: 0,
+            }
+        };
+        Boundary {
+            kind: Kind::Branching,
+            neutral: 1,
+            points: (0..=20).map(point).collect(),
+            ends: [Halt::Reached; 2],
+            factorizations: 0,
+        }
+    }
+
+    #[test]
+    fn a_curve_ends_where_it_meets_another() {
+        let known = [curve(0.0, 0.61, 0.5)];
+        let mut second = curve(0.2, 1.0, 0.5);
+        leave_out_known(&mut second, &known);
+        assert_eq!(second.ends, [Halt::Met, Halt::Reached]);
+        let first = &second.points[0];
+        assert!((first.place[1] - 0.6).abs() < 1e-12, "{:?}", first.place);
+        assert_eq!(second.points.len(), 11);
+    }
+
+    #[test]
+    fn a_curve_that_repeats_another_or_its_image_is_left_out() {
+        for y in [0.5, -0.5] {
+            let mut second = curve(0.1, 0.9, y);
+            leave_out_known(&mut second, &[curve(0.0, 1.0, 0.5)]);
+            assert!(second.points.is_empty());
+        }
+    }
+
+    #[test]
+    fn other_curves_stay_as_they_are() {
+        let mut second = curve(0.0, 1.0, 0.5);
+        let mut other = curve(0.0, 1.0, 0.5);
+        (other.points.iter_mut()).for_each(|point| point.place[0] += 1e-3 * (point.place[1] - 0.5));
+        leave_out_known(&mut second, &[other]);
+        assert_eq!(second.points.len(), 21);
+        assert_eq!(second.ends, [Halt::Reached; 2]);
+    }
 }

@@ -1,204 +1,195 @@
-//! The coarse map under the curves of a boundary: the index in cells of the plane, from
-//! traces along its rows, which know nothing of the curves.
+//! The coarse map under the curves of a boundary: the index of equilibria in the middles of
+//! cells, each reached from one beside it. They know nothing of the curves.
 
 use rayon::prelude::*;
 
-use super::known::criticals;
-use super::result::{Boundary, BoundaryCurve, BoundaryMap};
-use crate::branch::{Critical, Refined};
-use crate::study::Vary;
-use crate::study::trace::{PointKind, TraceBranch, TraceError, TraceRequest};
+use super::compare::Edge;
+use super::result::BoundaryMap;
+use crate::branch::Critical;
+use crate::branch::boundary::{AtRest, Boundary, Plane, Way, go};
+use crate::leaf::Grid;
 
 /// Most cells along a side.
 pub const MOST_CELLS: usize = 256;
 
-/// The middles of so many cells of a range.
-fn middles(vary: &Vary, cells: usize) -> Vec<f64> {
-    let (from, to) = (vary.values[0], vary.values[vary.values.len() - 1]);
-    let part = |k: usize| (k as f64 + 0.5) / cells as f64;
-    let value = |part: f64| match vary.log {
-        true => from * (to / from).powf(part),
-        false => from + (to - from) * part,
-    };
-    (0..cells).map(|k| value(part(k))).collect()
+/// The cells of a map, as far as they are known.
+pub struct Cells<'p> {
+    plane: Plane<'p>,
+    /// Columns and rows.
+    size: [usize; 2],
+    joined: bool,
+    /// Equilibria that were found last, from which others may be reached.
+    front: Vec<Option<AtRest>>,
+    /// Ways that were gone, by the cell to which they lead; the last one found it, if any.
+    edges: Vec<Vec<Edge>>,
+    pub factorizations: usize,
 }
 
-/// A row of the map: a trace along the first number.
-pub struct Row {
-    /// The second number.
-    pub second: f64,
-    /// The index in the cells.
-    index: Vec<Option<usize>>,
-    /// Critical points that the trace met.
-    pub criticals: Vec<(Critical, Refined)>,
+/// A way that is not as the curves say, with the critical points that were met on it.
+pub struct Unexplained {
+    pub ends: [[f64; 2]; 2],
+    pub grid: Grid,
+    pub critical: Vec<Critical>,
 }
 
-/// The rows of a map of so many cells along both numbers.
-pub fn rows(
-    along: &TraceRequest,
-    across: &Vary,
-    cells: [usize; 2],
-) -> Result<Vec<Row>, TraceError> {
-    let first = middles(&along.vary, cells[0]);
-    let row = |&second: &f64| -> Result<Row, TraceError> {
-        let request = TraceRequest {
-            base: along.base.with(&across.keys, second)?,
-            switch: false,
-            ..along.clone()
-        };
-        let (found, criticals) = criticals(&request, &mut |_, _| {})?;
-        let branch = found.branches.first();
-        let index = first.iter();
-        let index = index.map(|value| branch.and_then(|branch| index_at(branch, *value)));
-        Ok(Row {
-            second,
-            index: index.collect(),
-            criticals,
+/// Where the cells beside one are: before it along the first number, behind it, and the same
+/// along the second.
+const BESIDE: [[isize; 2]; 4] = [[-1, 0], [1, 0], [0, -1], [0, 1]];
+
+impl<'p> Cells<'p> {
+    /// A map of so many cells, of which none is known.
+    pub fn new(plane: Plane<'p>, size: [usize; 2], joined: bool) -> Self {
+        let count = size[0] * size[1];
+        Cells {
+            plane,
+            size,
+            joined,
+            front: vec![None; count],
+            edges: (0..count).map(|_| Vec::new()).collect(),
+            factorizations: 0,
+        }
+    }
+
+    /// The middle of a cell.
+    fn middle(&self, cell: usize) -> [f64; 2] {
+        let at = [cell % self.size[0], cell / self.size[0]];
+        [0, 1].map(|i| (at[i] as f64 + 0.5) / self.size[i] as f64)
+    }
+
+    /// The cells beside one.
+    fn beside(&self, cell: usize) -> impl Iterator<Item = usize> + use<> {
+        let [columns, rows] = self.size;
+        let (column, row) = (cell % columns, cell / columns);
+        BESIDE.into_iter().filter_map(move |[right, up]| {
+            let column = column.checked_add_signed(right).filter(|it| *it < columns);
+            let row = row.checked_add_signed(up).filter(|it| *it < rows);
+            Some(row? * columns + column?)
         })
-    };
-    middles(across, cells[1]).par_iter().map(row).collect()
-}
-
-/// The map of these rows, compared with the curves that are known.
-pub fn compared(vary: &Vary, rows: Vec<Row>, boundary: &Boundary) -> BoundaryMap {
-    let mut map = BoundaryMap {
-        first: middles(vary, rows[0].index.len()),
-        second: rows.iter().map(|row| row.second).collect(),
-        index: rows.into_iter().map(|row| row.index).collect(),
-        disagreeing: Vec::new(),
-    };
-    for (r, row) in map.index.iter().enumerate() {
-        let expected = expected(boundary, &map.first, map.second[r], row);
-        let wrong = row.iter().zip(&expected).enumerate();
-        let wrong = wrong.filter(|(_, (found, expected))| found != expected);
-        map.disagreeing.extend(wrong.map(|(c, _)| [c + 1, r + 1]));
     }
-    map
-}
 
-/// The index of a branch where it passes a value for the first time, before it turns.
-fn index_at(branch: &TraceBranch, value: f64) -> Option<usize> {
-    for pair in branch.points.windows(2) {
-        let [a, b] = [pair[0].value, pair[1].value];
-        if (value - a) * (value - b) <= 0.0 {
-            return Some(pair[0].index);
-        }
-        if pair[1].kind == PointKind::Fold {
-            return None;
-        }
+    /// The index in a cell, if its equilibrium is known.
+    fn index(&self, cell: usize) -> Option<usize> {
+        self.edges[cell].last()?.found
     }
-    None
-}
 
-/// What the curves make of a row of which the first index is known: at each of them that
-/// has this index on one side it becomes that on the other; at a fold the branch ends.
-fn expected(
-    boundary: &Boundary,
-    first: &[f64],
-    second: f64,
-    row: &[Option<usize>],
-) -> Vec<Option<usize>> {
-    let forward = boundary.ranges[0][1] > boundary.ranges[0][0];
-    let mut passed: Vec<(f64, bool, [usize; 2])> = (boundary.curves.iter())
-        .flat_map(|curve| crossings(boundary, curve, second))
-        .collect();
-    passed.sort_by(|a, b| match forward {
-        true => a.0.total_cmp(&b.0),
-        false => b.0.total_cmp(&a.0),
-    });
-    let mut passed = passed.into_iter().peekable();
-    let mut now = None;
-    let mut expected = Vec::with_capacity(row.len());
-    for (k, (value, found)) in first.iter().zip(row).enumerate() {
-        let mut crossed = Vec::new();
-        while let Some(next) = passed.next_if(|next| (next.0 < *value) == forward) {
-            crossed.push(next);
-        }
-        if k == 0 {
-            now = *found;
-        } else {
-            for (_, fold, indices) in crossed {
-                now = match (now, fold) {
-                    (Some(index), true) if indices.contains(&index) => None,
-                    (Some(index), false) if index == indices[0] => Some(indices[1]),
-                    (Some(index), false) if index == indices[1] => Some(indices[0]),
-                    (now, _) => now,
-                };
+    /// Goes from an equilibrium to the cell of the first column that is nearest to it, along
+    /// the first number and then along the second; returns the ways that are not as the
+    /// curves say.
+    pub fn begin(&mut self, first: AtRest, curves: &[Boundary]) -> Vec<Unexplained> {
+        let second = first.spot.place[1];
+        let row = ((second * self.size[1] as f64) as usize).min(self.size[1] - 1);
+        let cell = row * self.size[0];
+        let middle = self.middle(cell);
+        let mut unexplained = Vec::new();
+        let mut now = Some(first);
+        for to in [[middle[0], second], middle] {
+            if let Some(from) = now.take_if(|from| from.spot.place != to) {
+                let mut way = go(&self.plane, &from, to);
+                now = way.end.take();
+                unexplained.extend(self.keep((&from, to, now.as_ref()), cell, way, curves));
             }
         }
-        expected.push(now);
+        self.front[cell] = now;
+        unexplained
     }
-    expected
-}
 
-/// Points closer than this part of both ranges are one: polynomials through both would
-/// make slopes of their errors.
-const APART: f64 = 1e-4;
-
-/// Where a curve passes a value of the second number: the first number, whether it is a
-/// fold, and the indices on both sides.
-fn crossings(
-    boundary: &Boundary,
-    curve: &BoundaryCurve,
-    second: f64,
-) -> Vec<(f64, bool, [usize; 2])> {
-    let scaled = |which: usize, value: f64| match boundary.log[which] {
-        true => (value / boundary.ranges[which][0]).ln(),
-        false => value,
-    };
-    let unscaled = |value: f64| match boundary.log[0] {
-        true => boundary.ranges[0][0] * value.exp(),
-        false => value,
-    };
-    let spans = [0, 1].map(|i| {
-        let [from, to] = boundary.ranges[i];
-        (scaled(i, to) - scaled(i, from)).abs()
-    });
-    let (mut kept, mut points) = (Vec::new(), Vec::<[f64; 2]>::new());
-    for point in &curve.points {
-        let place = [0, 1].map(|i| scaled(i, point.values[i]));
-        let far = |i: usize, last: &[f64; 2]| (place[i] - last[i]).abs() > APART * spans[i];
-        if (points.last()).is_none_or(|last| far(0, last) || far(1, last)) {
-            kept.push(point);
-            points.push(place);
+    /// Goes to all cells beside those that were found last, side by side; returns the ways
+    /// that are not as the curves say, or nothing if there are no such cells.
+    pub fn go_on(&mut self, curves: &[Boundary]) -> Option<Vec<Unexplained>> {
+        let next: Vec<(usize, Vec<usize>)> = (0..self.front.len())
+            .filter(|&cell| self.index(cell).is_none())
+            .map(|cell| {
+                let from = self.beside(cell).filter(|&it| self.front[it].is_some());
+                (cell, from.collect())
+            })
+            .filter(|(_, from): &(usize, Vec<usize>)| !from.is_empty())
+            .collect();
+        let gone: Vec<Vec<(usize, Way)>> = (next.par_iter())
+            .map(|(cell, from)| self.reach(*cell, from))
+            .collect();
+        let none = vec![None; self.front.len()];
+        let before = std::mem::replace(&mut self.front, none);
+        let mut unexplained = Vec::new();
+        for ((cell, _), ways) in next.iter().zip(gone) {
+            for (from, mut way) in ways {
+                let (to, end) = (self.middle(*cell), way.end.take());
+                if let Some(from) = &before[from] {
+                    let ends = (from, to, end.as_ref());
+                    unexplained.extend(self.keep(ends, *cell, way, curves));
+                }
+                self.front[*cell] = end;
+            }
         }
+        (!next.is_empty()).then_some(unexplained)
     }
-    let at = scaled(1, second);
-    let mut crossings = Vec::new();
-    for k in 1..points.len() {
-        let [low, high] = [points[k - 1][1], points[k][1]];
-        if (low < at) == (high < at) {
-            continue;
-        }
-        // Through four points where the second number goes one way along them, or two.
-        let few = k.saturating_sub(2)..(k + 2).min(points.len());
-        let rises = |pair: &[[f64; 2]]| (pair[1][1] > pair[0][1]) == (high > low);
-        let near = match points[few.clone()].windows(2).all(rises) {
-            true => &points[few],
-            false => &points[k - 1..=k],
-        };
-        // Where curves cross, other modes count as well.
-        let point = if kept[k].kind == "crossing" {
-            kept[k - 1]
-        } else {
-            kept[k]
-        };
-        let fold = matches!(point.kind, "fold" | "cusp") && curve.multiplicity == 1;
-        let sides = [point.index_before, point.index_behind];
-        crossings.push((unscaled(through(near, at)), fold, sides));
-    }
-    crossings
-}
 
-/// The polynomial through points, at a value of their second coordinate.
-fn through(points: &[[f64; 2]], at: f64) -> f64 {
-    let mut sum = 0.0;
-    for (i, [value, own]) in points.iter().enumerate() {
-        let others = points.iter().enumerate().filter(|(j, _)| *j != i);
-        let weight: f64 = others
-            .map(|(_, [_, other])| (at - other) / (own - other))
-            .product();
-        sum += weight * value;
+    /// Goes to a cell from those beside it in turn, until one way leads there.
+    fn reach(&self, cell: usize, from: &[usize]) -> Vec<(usize, Way)> {
+        let mut ways = Vec::new();
+        for &other in from {
+            let Some(begun) = &self.front[other] else {
+                continue;
+            };
+            let way = go(&self.plane, begun, self.middle(cell));
+            let found = way.end.is_some();
+            ways.push((other, way));
+            if found {
+                break;
+            }
+        }
+        ways
     }
-    sum
+
+    /// Keeps what is to be known of a way to a cell: from where, to where, and what is there.
+    fn keep(
+        &mut self,
+        (from, to, end): (&AtRest, [f64; 2], Option<&AtRest>),
+        cell: usize,
+        mut way: Way,
+        curves: &[Boundary],
+    ) -> Option<Unexplained> {
+        self.factorizations += way.factorizations;
+        if self.joined {
+            way.tips.iter_mut().for_each(|tips| tips.truncate(1));
+        }
+        let edge = Edge {
+            ends: [from.spot.place, to],
+            index: from.index,
+            tips: way.tips,
+            found: end.map(|end| end.index),
+        };
+        let unexplained = (!edge.is_explained(curves)).then(|| Unexplained {
+            ends: edge.ends,
+            grid: way.grid.unwrap_or_else(|| from.grid.clone()),
+            critical: way.critical,
+        });
+        self.edges[cell].push(edge);
+        unexplained
+    }
+
+    /// The map, compared with the curves. A cell is not as they say if its index is not what
+    /// they make of that of the cell from which it was reached, or if no way leads there
+    /// though they have nothing against one.
+    pub fn compared(&self, curves: &[Boundary]) -> BoundaryMap {
+        let [columns, rows] = self.size;
+        let value = |i: usize, cell: usize| self.plane.values(self.middle(cell))[i];
+        let row = |r: usize| (0..columns).map(|c| self.index(r * columns + c)).collect();
+        let mut map = BoundaryMap {
+            first: (0..columns).map(|c| value(0, c)).collect(),
+            second: (0..rows).map(|r| value(1, r * columns)).collect(),
+            index: (0..rows).map(row).collect(),
+            disagreeing: Vec::new(),
+        };
+        for (cell, edges) in self.edges.iter().enumerate() {
+            let explained = match edges.last() {
+                Some(last) if last.found.is_some() => last.is_explained(curves),
+                _ => edges.iter().all(|edge| edge.is_explained(curves)),
+            };
+            if !explained && self.plane.scenario(self.middle(cell)).is_ok() {
+                let (column, row) = (cell % columns + 1, cell / columns + 1);
+                map.disagreeing.push([column, row]);
+            }
+        }
+        map
+    }
 }

@@ -1,5 +1,6 @@
 //! `trace` over two numbers: the boundary of stability as curves in their plane.
 
+mod compare;
 mod known;
 mod map;
 mod result;

@@ -46,8 +46,8 @@ pub struct Boundary {
     /// The map under them, if it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub map: Option<BoundaryMap>,
-    /// Matrices that were factorised to verify its points, but for those of softened leaves.
-    #[serde(skip)]
+    /// Matrices factorised to follow and verify the curves, but for those of softened leaves,
+    /// and to follow the first trace and the ways between the cells of the map.
     pub factorizations: usize,
     /// Time of all, in seconds.
     pub wall_seconds: f64,
@@ -104,9 +104,9 @@ pub struct BoundaryMap {
     pub first: Vec<f64>,
     /// Those of the second.
     pub second: Vec<f64>,
-    /// Morse index of the branch that begins at the start of the first number's range,
-    /// row by row of the second; none where that has turned back before, or could not be
-    /// followed.
+    /// Morse index of equilibria that were reached from cell to cell, beginning with that at
+    /// the start of the first number's range; row by row of the second; none where branches
+    /// turn back before, or could not be followed.
     pub index: Vec<Vec<Option<usize>>>,
     /// Cells that the curves have another index for: numbers of both values, from 1.
     pub disagreeing: Vec<[usize; 2]>,
@@ -134,6 +134,7 @@ impl CurveEnd {
         match self.0 {
             Halt::Reached => "reached",
             Halt::Closed => "closed",
+            Halt::Met => "met",
             Halt::MostPoints => "most-points",
             Halt::Unfolded => "unfolds",
             Halt::Parted => "parts",
@@ -153,6 +154,7 @@ impl CurveEnd {
         match self.0 {
             Halt::Reached => "the end of a range",
             Halt::Closed => "closed",
+            Halt::Met => "on a curve above",
             Halt::MostPoints => "goes on: allow more points",
             Halt::Unfolded => "the second number breaks the symmetry by which branches cross",
             Halt::Parted => "modes that become neutral together part",

@@ -4,13 +4,12 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::known::{Known, Start, criticals};
-use super::map::{compared, rows};
-use super::result::{Boundary, BoundaryCurve, BoundaryPoint, CurveEnd, word};
+use super::known::{Start, coarsened, leave_out_known, traced};
+use super::map::{Cells, Unexplained};
+use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, CurveEnd, word};
 use super::{BoundaryRequest, MOST_CURVES};
-use crate::branch::boundary::{self as curves, Plane, Stride, Verified};
-use crate::branch::{Critical, Family, Refined};
-use crate::leaf::Grid;
+use crate::branch::Family;
+use crate::branch::boundary::{self as curves, AtRest, Plane, Spot, Stride, Verified};
 use crate::scenario::Scenario;
 use crate::study::trace::{TraceError, TraceRequest};
 
@@ -47,9 +46,18 @@ pub fn boundary(
         base: base.with(&across.keys, start)?,
         ..request.trace.clone()
     };
-    let (trace, criticals) = criticals(&along, &mut |points, value| {
+    let begun = traced(&along, &mut |points, value| {
         progress(None, points, [value, start]);
     })?;
+    let (trace, first) = (begun.trace, |value: f64| make([value, start]));
+    let family = Family::new(&first, (ends[0][0], ends[0][1]), vary.log);
+    let family = family.map_err(|out| TraceError::Vary(format!("{}: {out}", vary.keys)))?;
+    let plane = Plane {
+        family: &family,
+        make: &make,
+        range: ends[1],
+        log: across.log,
+    };
     let mut boundary = Boundary {
         scenario: trace.scenario,
         keys: [vary.keys.clone(), across.keys.clone()],
@@ -64,25 +72,40 @@ pub fn boundary(
         remark: trace.remark,
         curves: Vec::new(),
         map: None,
-        factorizations: 0,
+        factorizations: trace.factorizations,
         wall_seconds: 0.0,
     };
     let mut run = Run {
-        request,
-        make: &make,
-        accuracy: trace.tolerance,
+        plane,
+        how: Stride {
+            longest: (1.0 / (across.values.len() - 1) as f64).min(LONGEST),
+            most: request.trace.most_points,
+            accuracy: trace.tolerance,
+        },
         known: Vec::new(),
         tried: 0,
         progress,
     };
-    run.follow_new(start, &criticals, &mut boundary)?;
-    if let Some(cells) = request.map {
-        let rows = rows(&request.trace, across, cells)?;
-        // One after the other, so that it is the same on any number of threads.
-        for row in &rows {
-            run.follow_new(row.second, &row.criticals, &mut boundary)?;
-        }
-        boundary.map = Some(compared(vary, rows, &boundary));
+    for (critical, refined) in &begun.critical {
+        let start = Start {
+            critical,
+            refined,
+            from: [0.0, plane.fraction(start)],
+            way: [1.0, 0.0],
+        };
+        run.follow_new(&start, &mut boundary);
+    }
+    if let (Some(size), Some((point, grid))) = (request.map, begun.first) {
+        let kinks = family.first().kinks();
+        let first = AtRest {
+            grid: coarsened(&grid, point.state.segments(), kinks),
+            index: point.index,
+            spot: Spot {
+                state: point.state,
+                place: [0.0, plane.fraction(start)],
+            },
+        };
+        boundary.map = Some(run.map(size, first, &mut boundary));
     }
     let curves = &boundary.curves;
     let whole = (curves.iter().flat_map(|curve| curve.ends)).all(CurveEnd::complete);
@@ -106,75 +129,74 @@ pub fn boundary(
 
 /// Following curves.
 struct Run<'r, 'p> {
-    request: &'r BoundaryRequest,
-    make: &'r (dyn Fn([f64; 2]) -> Result<Scenario, String> + Sync),
-    accuracy: f64,
-    known: Vec<Known>,
+    plane: Plane<'r>,
+    how: Stride,
+    known: Vec<curves::Boundary>,
     /// Critical points from which curves were followed.
     tried: usize,
     progress: &'p mut dyn FnMut(Option<usize>, usize, [f64; 2]),
 }
 
 impl Run<'_, '_> {
-    /// Follows the curves through critical points at a value of the second number that lie
-    /// on none that is known.
-    fn follow_new(
-        &mut self,
-        second: f64,
-        criticals: &[(Critical, Refined)],
-        boundary: &mut Boundary,
-    ) -> Result<(), TraceError> {
-        if criticals.is_empty() {
-            return Ok(());
+    /// Follows the curve through a critical point, if it lies on none that is known.
+    fn follow_new(&mut self, start: &Start, boundary: &mut Boundary) {
+        if self.known.iter().any(|known| start.is_on(known)) {
+            return;
         }
-        let (vary, across) = (&self.request.trace.vary, &self.request.across);
-        let first = |value: f64| (self.make)([value, second]);
-        let [from, to] = boundary.ranges[0];
-        let family = Family::new(&first, (from, to), vary.log);
-        let family = family.map_err(|out| TraceError::Vary(format!("{}: {out}", vary.keys)))?;
-        let plane = Plane {
-            family: &family,
-            make: self.make,
-            range: boundary.ranges[1],
-            log: across.log,
-        };
-        let how = Stride {
-            longest: (1.0 / (across.values.len() - 1) as f64).min(LONGEST),
-            most: self.request.trace.most_points,
-            accuracy: self.accuracy,
-        };
-        for (critical, refined) in criticals {
-            let start = Start {
+        if self.tried == MOST_CURVES {
+            boundary.remark = Some(format!("there are more than {MOST_CURVES} curves"));
+            return;
+        }
+        self.tried += 1;
+        let (plane, progress) = (self.plane, &mut *self.progress);
+        let number = boundary.curves.len();
+        let mut tell = |points, place| progress(Some(number), points, plane.values(place));
+        let grid = start.grid(plane.family.first().kinks());
+        let mut curve = curves::follow(plane, &grid, &start.seed(), &self.how, &mut tell);
+        boundary.factorizations += curve.factorizations;
+        if !curve.points.is_empty() {
+            leave_out_known(&mut curve, &self.known);
+            if curve.points.is_empty() {
+                return;
+            }
+        }
+        (boundary.curves).push(in_units(&plane, boundary.joined, &curve));
+        self.known.push(curve);
+    }
+
+    /// The map of so many cells, reached from an equilibrium. Critical points on the way that
+    /// lie on no known curve begin new ones; one after the other, so that they are the same on
+    /// any number of threads.
+    fn map(&mut self, size: [usize; 2], first: AtRest, boundary: &mut Boundary) -> BoundaryMap {
+        let accuracy = self.how.accuracy;
+        let mut cells = Cells::new(self.plane, size, boundary.joined);
+        let mut next = Some(cells.begin(first, &self.known));
+        while let Some(unexplained) = next {
+            for Unexplained {
+                ends,
+                grid,
                 critical,
-                refined,
-                second: plane.fraction(second),
-                length: family.scale().length,
-            };
-            if self.known.iter().any(|known| start.is_on(known)) {
-                continue;
+            } in &unexplained
+            {
+                let [from, to] = *ends;
+                for critical in critical {
+                    let refined = curves::refine_on(&self.plane, *ends, grid, critical, accuracy);
+                    if let Ok(refined) = &refined {
+                        let way = [0, 1].map(|i| to[i] - from[i]);
+                        let start = Start {
+                            critical,
+                            refined,
+                            from,
+                            way,
+                        };
+                        self.follow_new(&start, boundary);
+                    }
+                }
             }
-            if self.tried == MOST_CURVES {
-                boundary.remark = Some(format!("there are more than {MOST_CURVES} curves"));
-                break;
-            }
-            self.tried += 1;
-            let number = boundary.curves.len();
-            let finest = start.refined.grid.sigma();
-            let stride = (finest.len() - 1) / start.critical.state.segments();
-            let stations: Vec<f64> = finest.iter().copied().step_by(stride).collect();
-            let grid = Grid::through(&stations, family.first().kinks());
-            let progress = &mut *self.progress;
-            let mut tell = |points, place| progress(Some(number), points, plane.values(place));
-            let curve = curves::follow(plane, &grid, start.critical, start.second, &how, &mut tell);
-            let work = curve.points.iter().map(|point| point.factorizations);
-            boundary.factorizations += work.sum::<usize>();
-            boundary
-                .curves
-                .push(in_units(&plane, boundary.joined, &curve));
-            let length = start.length;
-            self.known.push(Known { curve, length });
+            next = cells.go_on(&self.known);
         }
-        Ok(())
+        boundary.factorizations += cells.factorizations;
+        cells.compared(&self.known)
     }
 }
 

@@ -1,0 +1,132 @@
+//! What grids finer and finer say of a point of a boundary, extrapolated.
+
+use super::place::Place;
+use super::refine::{SOFTENING, Verified};
+use super::search::Lost;
+use super::sheet::Sheet;
+use super::special::Special;
+use crate::branch::critical::Kind;
+use crate::relax::richardson::Richardson;
+
+/// What extrapolation to no softening makes of rounding: the root of the sum of the squares
+/// of its weights.
+const AMPLIFIED: f64 = 8.3;
+
+/// Extrapolation makes of what Newton's method leaves on a grid at most so much.
+const KEPT: f64 = 2.0;
+
+/// What is extrapolated.
+#[derive(Default)]
+pub struct Table {
+    pub tips: Richardson,
+    numbers: [Richardson; 2],
+    /// The number that is the same on every grid, if there is one.
+    given: Option<(usize, f64)>,
+    /// What rounding of the matrix may have done to the numbers on a grid, and how many
+    /// times as much to those of no softening.
+    pub rounding: [f64; 2],
+    amplified: f64,
+    /// What Newton's method may have left on a grid.
+    pub left: f64,
+}
+
+impl Table {
+    /// With nothing in it yet.
+    pub fn new(given: Option<(usize, f64)>) -> Self {
+        Table {
+            given,
+            amplified: 1.0,
+            ..Table::default()
+        }
+    }
+
+    pub fn push(
+        &mut self,
+        sheet: &mut Sheet,
+        (place, along): (&Place, Option<f64>),
+        numbers: [f64; 2],
+        rigid: bool,
+    ) -> Result<(), Lost> {
+        if rigid {
+            self.amplified = AMPLIFIED;
+        }
+        let (across, slope) = match self.given {
+            Some((which, _)) => place.across_at(sheet, which),
+            None => (place.normal.clone(), place.slope),
+        };
+        let leaf = sheet.leaf(place.spot.place)?;
+        let limit = if rigid {
+            1.0 / SOFTENING
+        } else {
+            f64::INFINITY
+        };
+        let condensing = leaf.sections.iter().map(|it| it.condensing.max_element());
+        let stiffest = condensing.fold(0.0_f64, |most, it| most.max(it.min(limit)));
+        let state = &place.spot.state;
+        let segments = state.segments() as f64;
+        let rounding = f64::EPSILON * stiffest * segments * segments;
+        for i in 0..2 {
+            let own = (rounding / slope * across.place[i]).abs();
+            let along = along.map_or(0.0, |slope| rounding / slope * place.tangent.place[i]);
+            self.rounding[i] = self.rounding[i].max(own + along.abs());
+        }
+        let tips = (0..state.rods()).flat_map(|j| state.tip(j).to_array());
+        self.tips.push(state.segments(), tips.collect());
+        for (table, number) in self.numbers.iter_mut().zip(numbers) {
+            table.push(state.segments(), vec![number]);
+        }
+        Ok(())
+    }
+
+    pub fn errors(&self) -> [f64; 2] {
+        let error = |i: usize| {
+            self.numbers[i]
+                .best()
+                .map_or(f64::INFINITY, |best| best.error)
+        };
+        [0, 1].map(|i| match self.given {
+            Some((which, _)) if which == i => 0.0,
+            _ => error(i),
+        })
+    }
+
+    pub fn verified(&self, sheet: &Sheet, place: &Place, special: Option<Special>) -> Verified {
+        let columns = |table: &Richardson| table.best().map_or(0, |best| best.columns);
+        let tips = self.tips.column(columns(&self.tips));
+        let errors = self.errors();
+        let number = |i: usize| match self.given {
+            Some((which, value)) if which == i => value,
+            _ => self.numbers[i].column(columns(&self.numbers[i]))[0],
+        };
+        let free = |i: usize| self.given.is_none_or(|(which, _)| which != i);
+        let (beyond, below) = (place.index, place.index.saturating_sub(place.neutral));
+        let forward = match place.kind {
+            Kind::Branching => {
+                let (across, slope) = place.across_at(sheet, 1);
+                slope * across.place[0] > 0.0
+            }
+            Kind::Fold => true,
+        };
+        Verified {
+            place: [number(0), number(1)],
+            errors: [0, 1].map(|i| match free(i) {
+                true => errors[i] + self.amplified * self.rounding[i] + KEPT * self.left,
+                false => 0.0,
+            }),
+            tips: tips.chunks(3).map(|tip| [tip[0], tip[1], tip[2]]).collect(),
+            // No tip is better than the precision of its numbers.
+            error: (self.tips.best()).map_or(f64::INFINITY, |best| {
+                best.error + KEPT * self.left + f64::EPSILON
+            }),
+            state: place.spot.state.clone(),
+            stations: sheet.grid().sigma().to_vec(),
+            kind: place.kind,
+            special,
+            indices: match forward {
+                true => [below, beyond],
+                false => [beyond, below],
+            },
+            factorizations: 0,
+        }
+    }
+}
