@@ -29,7 +29,7 @@ const FINER: f64 = 4.0;
 
 /// Distances from a crossing (as of arclength) between which the branch is
 /// interpolated, in turn, until tips are within this part of their accuracy.
-const APART: [f64; 6] = [0.03, 0.01, 0.003, 0.001, 3e-4, 1e-4];
+const APART: [f64; 4] = [0.03, 0.01, 0.003, 0.001];
 const ENOUGH: f64 = 0.1;
 
 /// A critical point, to the given accuracy of its tips, on so many `grids` or more.
