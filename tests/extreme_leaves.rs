@@ -26,9 +26,10 @@ fn fan(angles: &[f64], force_stiffness: [f64; 3], weight: f64) -> Scenario {
 fn stable(scenario: &Scenario, tolerance: f64) -> Equilibrium {
     let leaf = settle(scenario, tolerance);
     assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
-    // Most need some tens; nobody waits for ten times the most.
+    // Most need some tens, but thousands where their own motion is followed; nobody waits
+    // for ten times the most.
     let work = leaf.work;
-    assert!(work.force_evaluations < 1000, "{work:?}");
+    assert!(work.force_evaluations < 10_000, "{work:?}");
     leaf
 }
 

@@ -225,3 +225,24 @@ fn the_papers_soft_leaves_are_saddles_when_flat() {
         }
     }
 }
+
+/// Where the flat leaf has just lost its stability, it leaves that saddle on the grid on
+/// which it is told, and is pushed no more than a few times.
+#[test]
+fn a_leaf_that_has_just_buckled_leaves_its_plane_soon() {
+    for (bending, torsion) in [(0.27, 1.46), (0.15, 1.84), (0.37, 1.2)] {
+        let others = [bending; 5].map(|it: f64| it.to_string()).join(", ");
+        let overrides = format!(
+            "load.gravity=[0, 0, 0];stiffness.torsion={torsion};\
+             stiffness.bending_2=[{others}, 1000, {others}]"
+        );
+        let leaf = settle(&scenario("study/undulation", &overrides), 1e-4);
+        assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
+        let left = leaf.stability.saddle.map(|it| it.negative_eigenvalues);
+        assert!(left.is_some_and(|index| index > 0), "{bending}: {left:?}");
+        let height = leaf.tips[0].z.abs();
+        assert!(height > 1e-3, "{bending}: {height}");
+        let factorizations = leaf.work.factorizations;
+        assert!(factorizations < 120, "{bending}: {factorizations}");
+    }
+}

@@ -127,7 +127,7 @@ impl Run<'_, '_> {
                 let stays = !found.moved && !self.moved_softened && found.rest.is_ok();
                 let near = found.level.state.shift_to(&now.state) < SAME_PLACE;
                 settled = (stays && near).then_some(found.level);
-            } else if kinetic < STILL * fastest {
+            } else if kinetic <= STILL * fastest {
                 break;
             }
         }

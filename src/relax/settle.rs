@@ -176,7 +176,8 @@ impl Run<'_, '_> {
         let allowed = (BUDGET.saturating_sub(self.spent) / nodes).max(granted);
         let begun = self.work.force_evaluations;
         let mut moved = false;
-        for pushes in 0..MAX_SADDLES {
+        // Where it was pushed off saddles at rest before, softened it came back to one.
+        for pushes in self.pushes..self.pushes + MAX_SADDLES {
             let mut relaxation = Relaxation {
                 state,
                 accuracy,
