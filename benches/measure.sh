@@ -66,3 +66,4 @@ leafdyn chart scenarios/paper/fig04.toml --set leaf.rods=5 --seconds 20 --peers 
 cp out/fig04/chart.svg docs/chart_fig04_5.svg
 leafdyn chart scenarios/paper/fig04.toml --set leaf.rods=35 --seconds 20 --peers out/peers.csv
 cp out/fig04/chart.svg docs/chart_fig04_35.svg
+python benches/peers/turns.py scenarios/paper/fig04.toml --rods 5,21,35
