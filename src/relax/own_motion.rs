@@ -45,6 +45,11 @@ const BUDGET: usize = 1_000_000;
 /// Largest distance of a node, in lengths, between states in one valley.
 const SAME_PLACE: f64 = 0.02;
 
+/// Whether no node is beside the plane z = 0.
+fn flat(level: &Level) -> bool {
+    level.state.x.iter().all(|x| x.z == 0.0)
+}
+
 impl Run<'_, '_> {
     /// The end of a run, or, where the leaf had to move while softened and its own
     /// motion comes to rest elsewhere, that of a run from there.
@@ -72,6 +77,10 @@ impl Run<'_, '_> {
             let Some(there) = self.follow_own_motion(grid.clone(), steps) else {
                 break;
             };
+            // In its plane a motion stays, stable or not: that decides nothing.
+            if flat(&there) && softened.last().is_some_and(|level| !flat(level)) {
+                break;
+            }
             self.moved_softened = false;
             let elsewhere = |here: &Level| here.state.shift_to(&there.state) > SAME_PLACE;
             landed = softened.last().is_some_and(elsewhere).then_some(there);
