@@ -5,11 +5,11 @@ use super::place::Place;
 use super::search::{Found, Lost, Search};
 use super::sheet::{Direction, Plane, Sheet, Spot};
 use super::special::{Special, locate_near};
-use super::table::Table;
+use super::table::{SOFTENING, Table, Verified};
 use crate::branch::critical::Kind;
 use crate::branch::refine_critical::NEARLY_RIGID;
 use crate::branch::refined::Doubt;
-use crate::leaf::{Grid, State};
+use crate::leaf::Grid;
 use crate::newton::Contraction;
 use crate::relax::predict::{predict, weights};
 use crate::relax::run::Level;
@@ -29,10 +29,6 @@ const NEUTRAL_TIPS: f64 = 1e-3;
 
 /// Numbers are to be so many times as exact as tips: of the part of their ranges.
 const EXACTER: f64 = 1e-2;
-
-/// Compliance by which matrices of nearly rigid leaves are softened, in units of L^2/A,
-/// times one to four: the more, the less rounding; a part of third order is left.
-pub const SOFTENING: f64 = 1e-3;
 
 /// Newton's method leaves at most this part of the error that is allowed, on a grid.
 const LEFT: f64 = 1e-3;
@@ -59,29 +55,6 @@ pub struct Step {
     pub special: Option<Special>,
     /// The number that is given: at the end of a range.
     pub given: Option<usize>,
-}
-
-/// A point of a boundary without the error of its grid.
-#[derive(Clone, Debug)]
-pub struct Verified {
-    /// Both numbers, as fractions of their ranges, and bounds on their errors.
-    pub place: [f64; 2],
-    pub errors: [f64; 2],
-    /// Tips of all rods, in the family's units, and a bound on their error.
-    pub tips: Vec<[f64; 3]>,
-    pub error: f64,
-    /// The state on the finest grid.
-    pub state: State,
-    /// Fractions of the length of its nodes.
-    pub stations: Vec<f64>,
-    /// What it is.
-    pub kind: Kind,
-    pub special: Option<Special>,
-    /// Morse indices where the first number is smaller and where it is larger; of a fold,
-    /// of both branches that meet there.
-    pub indices: [usize; 2],
-    /// Matrices factorised for it, but for those of softened leaves.
-    pub factorizations: usize,
 }
 
 /// A point on as many grids as it takes; on all of them it must be the same. Of a nearly

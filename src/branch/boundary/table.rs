@@ -1,12 +1,16 @@
 //! What grids finer and finer say of a point of a boundary, extrapolated.
 
 use super::place::Place;
-use super::refine::{SOFTENING, Verified};
 use super::search::Lost;
 use super::sheet::Sheet;
 use super::special::Special;
 use crate::branch::critical::Kind;
+use crate::leaf::State;
 use crate::relax::richardson::Richardson;
+
+/// Compliance by which matrices of nearly rigid leaves are softened, in units of L^2/A,
+/// times one to four: the more, the less rounding; a part of third order is left.
+pub const SOFTENING: f64 = 1e-3;
 
 /// What extrapolation to no softening makes of rounding: the root of the sum of the squares
 /// of its weights.
@@ -14,6 +18,29 @@ const AMPLIFIED: f64 = 8.3;
 
 /// Extrapolation makes of what Newton's method leaves on a grid at most so much.
 const KEPT: f64 = 2.0;
+
+/// A point of a boundary without the error of its grid.
+#[derive(Clone, Debug)]
+pub struct Verified {
+    /// Both numbers, as fractions of their ranges, and bounds on their errors.
+    pub place: [f64; 2],
+    pub errors: [f64; 2],
+    /// Tips of all rods, in the family's units, and a bound on their error.
+    pub tips: Vec<[f64; 3]>,
+    pub error: f64,
+    /// The state on the finest grid.
+    pub state: State,
+    /// Fractions of the length of its nodes.
+    pub stations: Vec<f64>,
+    /// What it is.
+    pub kind: Kind,
+    pub special: Option<Special>,
+    /// Morse indices where the first number is smaller and where it is larger; of a fold,
+    /// of both branches that meet there.
+    pub indices: [usize; 2],
+    /// Matrices factorised for it, but for those of softened leaves.
+    pub factorizations: usize,
+}
 
 /// What is extrapolated.
 #[derive(Default)]
