@@ -29,18 +29,14 @@ fn arch(load: f64) -> String {
     )
 }
 
-/// Place, angle and moment at the crown of an arch that leaves its base with this moment
-/// and force: theta' = m - 2 alpha, m' = n_x sin theta - n_y cos theta, n_y' = q, by the
-/// method of Runge and Kutta.
-fn crown(load: f64, [moment, along, across]: [f64; 3]) -> [f64; 4] {
-    let slope = |s: f64, [_, _, theta, m]: [f64; 4]| {
-        let n_y = across + load * s;
-        let (sin, cos) = theta.sin_cos();
-        [cos, sin, m - 2.0 * ALPHA, along * sin - n_y * cos]
-    };
-    let steps = 400;
-    let h = 0.5 / f64::from(steps);
-    let mut y = [0.0, 0.0, ALPHA, moment];
+/// The state at s = `end` of y' = slope(s, y), by the classic Runge-Kutta rule.
+fn runge_kutta(
+    slope: impl Fn(f64, [f64; 4]) -> [f64; 4],
+    mut y: [f64; 4],
+    end: f64,
+    steps: u32,
+) -> [f64; 4] {
+    let h = end / f64::from(steps);
     let ahead = |y: [f64; 4], k: [f64; 4], by: f64| std::array::from_fn(|c| y[c] + by * k[c]);
     for step in 0..steps {
         let s = h * f64::from(step);
@@ -51,6 +47,18 @@ fn crown(load: f64, [moment, along, across]: [f64; 3]) -> [f64; 4] {
         y = std::array::from_fn(|k| y[k] + h / 6.0 * (a[k] + 2.0 * (b[k] + c[k]) + d[k]));
     }
     y
+}
+
+/// Place, angle and moment at the crown of an arch that leaves its base with this moment
+/// and force: theta' = m - 2 alpha, m' = n_x sin theta - n_y cos theta, n_y' = q, by the
+/// method of Runge and Kutta.
+fn crown(load: f64, [moment, along, across]: [f64; 3]) -> [f64; 4] {
+    let slope = |s: f64, [_, _, theta, m]: [f64; 4]| {
+        let n_y = across + load * s;
+        let (sin, cos) = theta.sin_cos();
+        [cos, sin, m - 2.0 * ALPHA, along * sin - n_y * cos]
+    };
+    runge_kutta(slope, [0.0, 0.0, ALPHA, moment], 0.5, 400)
 }
 
 /// Derivatives of two results by two of the three numbers at the base, by differences.
@@ -148,18 +156,7 @@ fn pinned_end(compliance: f64, steps: u32, [moment, along, across, load]: [f64; 
         let (x, y) = (stretch * cos - shear * sin, stretch * sin + shear * cos);
         [x, y, m - 2.0 * SHALLOW, y * along - x * n_y]
     };
-    let h = 1.0 / f64::from(steps);
-    let ahead = |y: [f64; 4], k: [f64; 4], by: f64| std::array::from_fn(|c| y[c] + by * k[c]);
-    let mut y = [0.0, 0.0, SHALLOW, moment];
-    for step in 0..steps {
-        let s = h * f64::from(step);
-        let a = slope(s, y);
-        let b = slope(s + 0.5 * h, ahead(y, a, 0.5 * h));
-        let c = slope(s + 0.5 * h, ahead(y, b, 0.5 * h));
-        let d = slope(s + h, ahead(y, c, h));
-        y = std::array::from_fn(|k| y[k] + h / 6.0 * (a[k] + 2.0 * (b[k] + c[k]) + d[k]));
-    }
-    y
+    runge_kutta(slope, [0.0, 0.0, SHALLOW, moment], 1.0, steps)
 }
 
 /// The load at the fold next to a base and a load: the end is where it is pinned, without

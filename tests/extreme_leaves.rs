@@ -24,12 +24,16 @@ fn fan(angles: &[f64], force_stiffness: [f64; 3], weight: f64) -> Scenario {
 
 #[track_caller]
 fn stable(scenario: &Scenario, tolerance: f64) -> Equilibrium {
+    // Most need some tens; nobody waits for ten times the most.
+    stable_within(1_000, scenario, tolerance)
+}
+
+#[track_caller]
+fn stable_within(evaluations: usize, scenario: &Scenario, tolerance: f64) -> Equilibrium {
     let leaf = settle(scenario, tolerance);
     assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
-    // Most need some tens, but thousands where their own motion is followed; nobody waits
-    // for ten times the most.
     let work = leaf.work;
-    assert!(work.force_evaluations < 10_000, "{work:?}");
+    assert!(work.force_evaluations < evaluations, "{work:?}");
     leaf
 }
 
@@ -185,7 +189,8 @@ fn veins_of_different_kinds() {
         for (rod, length) in leaf.rods.iter_mut().zip(lengths) {
             rod.length = length;
         }
-        stable(&leaf, 1e-6);
+        // Among these is one whose own motion is followed in time.
+        stable_within(10_000, &leaf, 1e-6);
     }
     // Tapered a millionfold; with four kinks, two of them close together.
     let mut leaf = fig04(5);
