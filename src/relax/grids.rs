@@ -60,30 +60,40 @@ impl Run<'_, '_> {
             if self.late() {
                 return Err(Stop::StepLimit);
             }
-            let level = self.levels.last().expect("the leaf has settled");
-            let finer = level.leaf.grid.refined();
-            let (rods, segments) = (self.leaf.rods(), finer.segments());
-            if self.segments().is_some()
-                || segments > FINEST
-                || rods * segments > MAX_NODES
-                || (Request::Grid { rods, segments }).weigh().is_err()
-                || self.beyond_rounding(segments)
-            {
+            let Some(finer) = self.finer() else {
                 self.judge_stability()?;
                 return Ok(false);
-            }
-            let mut state = prolong(&level.leaf, &level.state);
-            let guess = match self.predicting().as_slice() {
-                [_] => InitialGuess::Coarser(state),
-                levels => {
-                    predict(levels, &mut state);
-                    InitialGuess::Predicted(state)
-                }
             };
-            let Settled { level, rest, .. } = self.settle(finer, guess);
-            self.push(level);
-            rest?;
+            self.settle_on(finer)?;
         }
+    }
+
+    /// The next finer grid, if there may be one.
+    pub fn finer(&self) -> Option<Grid> {
+        let grid = self.levels.last()?.leaf.grid.refined();
+        let (rods, segments) = (self.leaf.rods(), grid.segments());
+        let allowed = self.segments().is_none()
+            && segments <= FINEST
+            && rods * segments <= MAX_NODES
+            && (Request::Grid { rods, segments }).weigh().is_ok()
+            && !self.beyond_rounding(segments);
+        allowed.then_some(grid)
+    }
+
+    /// The leaf at rest on the next finer grid, from where it rests on those before.
+    pub fn settle_on(&mut self, finer: Grid) -> Result<(), Stop> {
+        let level = self.levels.last().expect("the leaf has settled");
+        let mut state = prolong(&level.leaf, &level.state);
+        let guess = match self.predicting().as_slice() {
+            [_] => InitialGuess::Coarser(state),
+            levels => {
+                predict(levels, &mut state);
+                InitialGuess::Predicted(state)
+            }
+        };
+        let Settled { level, rest, .. } = self.settle(finer, guess);
+        self.push(level);
+        rest.map(drop)
     }
 
     /// The levels of which the next one can be told: those that the extrapolation

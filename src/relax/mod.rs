@@ -52,7 +52,6 @@ pub use options::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Options, Progress, RelaxError, SMALLEST_TOLERANCE,
     check_tolerance,
 };
-pub(crate) use plausible::doubts;
 pub use request::Relaxation;
 pub(crate) use run::Level;
 pub use saddle::Saddle;

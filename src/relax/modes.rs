@@ -1,7 +1,7 @@
 //! The modes of the settled leaf: from nested grids to the units of the
 //! scenario.
 
-use crate::leaf::{DiscreteLeaf, Increment, System, shift, turn};
+use crate::leaf::{DiscreteLeaf, Grid, Increment, Leaf, System, shift, turn};
 use crate::modes::{self, Eigenpair, Wanted};
 use crate::motion::Physics;
 use crate::newton::{Newton, Work};
@@ -41,6 +41,12 @@ const SMALL: f64 = 1e-3;
 const SAFETY: f64 = 2.0;
 const BY_CHANCE: f64 = 0.1;
 
+/// How much more noise an eigenvalue has on the next grid.
+const FINER_NOISE: f64 = 4.0;
+
+/// An error of no more times that of rounding does not become smaller on finer grids.
+const ZERO: f64 = 4.0;
+
 /// Relative error of an eigenvalue by unfinished iterations, as a part of the tolerance.
 const UNFINISHED: f64 = 2e-3;
 
@@ -58,35 +64,57 @@ const SAME_PLACE: f64 = 0.02;
 /// is one of rotation alone.
 const STILL: f64 = 1e-6;
 
-/// The lowest modes of a settled leaf. `None` where they cannot be found: too
-/// large a leaf, or too many modes on a coarse grid.
-pub fn lowest(run: &Run) -> Option<Vec<Mode>> {
+/// The lowest modes of a settled leaf.
+pub struct Lowest {
+    pub modes: Vec<Mode>,
+    /// How large those are, or their errors, whose signs may not be those that the Morse
+    /// index tells. An eigenvalue that is zero to the accuracy asked for is one of a leaf
+    /// that may move freely.
+    pub undecided: Option<f64>,
+}
+
+/// The lowest modes. `None` where they cannot be found: too large a leaf, unless they are
+/// needed (`anyway`), or too many modes on a coarse grid.
+pub fn lowest(run: &Run, count: usize, anyway: bool) -> Option<Lowest> {
     let options = run.options;
     let finest = run.levels.last()?;
-    let large = unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes;
-    if options.modes == 0 || finest.leaf.tip_moment() != DVec3::ZERO || large {
+    let large = unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes && !anyway;
+    if count == 0 || finest.leaf.tip_moment() != DVec3::ZERO || large {
         return None;
     }
-    let levels = levels(run)?;
-    let finest = levels.last()?;
     let physics = Physics::new(run.leaf);
     let on = |level: &Level, near: &[Eigenpair]| {
         let wanted = Wanted {
-            count: options.modes,
+            count,
             accuracy: (ACCURACY * run.tolerance.sqrt()).max(LEAST_ACCURACY),
             near,
             time: &options.limit,
         };
         modes::lowest(&level.leaf, &physics, &level.state, wanted)
     };
-    let mut series = Series::default();
+    let mut series = Series {
+        index: run.index.unwrap_or(0),
+        grids: Vec::new(),
+        tolerance: run.tolerance,
+        rounding: 0.0,
+    };
     let mut before: Option<(&Level, Vec<Eigenpair>)> = None;
-    for level in &levels[levels.len().saturating_sub(GRIDS)..] {
+    let enough = enough(run);
+    for (k, level) in run
+        .levels
+        .iter()
+        .enumerate()
+        .skip(enough.saturating_sub(GRIDS))
+    {
+        if k >= enough && series.undecided().is_none() {
+            break;
+        }
         let near = |(coarse, pairs): (&Level, Vec<Eigenpair>)| {
             interpolated(&coarse.leaf, &pairs, &level.leaf)
         };
         let near = before.map(near).unwrap_or_default();
         let found = on(level, &near);
+        series.rounding = modes::rounding(&level.leaf);
         match &found {
             Some(pairs) => series.push(pairs),
             // Grids must follow each other.
@@ -94,38 +122,47 @@ pub fn lowest(run: &Run) -> Option<Vec<Mode>> {
         }
         before = found.map(|pairs| (level, pairs));
     }
-    let (_, pairs) = before?;
+    let (finest, pairs) = before?;
     let shapes = shapes(finest, &pairs);
     if options.method.segments().is_none() && options.mode_shapes {
         refine(run, &mut series, pairs, on);
     }
-    let rounding = modes::rounding(&finest.leaf);
     let unit = physics.time.powi(-2);
     let mode =
         |((eigenvalue, error), (displacement, rotation)): ((f64, Option<f64>), Shape)| Mode {
             eigenvalue: eigenvalue * unit,
-            error: error.map(|error| (error + rounding) * unit),
+            error: error.map(|error| error * unit),
             displacement,
             rotation,
         };
-    Some(
-        series
-            .judged(run.tolerance)
-            .into_iter()
-            .zip(shapes)
-            .map(mode)
-            .collect(),
-    )
+    Some(Lowest {
+        modes: series.judged().into_iter().zip(shapes).map(mode).collect(),
+        undecided: series.undecided(),
+    })
 }
 
-/// The grids on which modes are looked for.
-fn levels<'r>(run: &'r Run) -> Option<&'r [Level]> {
+/// Grids that are enough for modes whose signs they tell.
+fn enough(run: &Run) -> usize {
     if run.options.mode_shapes || run.index != Some(0) {
-        return Some(&run.levels);
+        return run.levels.len();
     }
     let few = |level: &&Level| unknowns(&level.leaf) < AT_A_GLANCE;
-    let count = run.levels.iter().take_while(few).count();
-    run.levels.get(..count.max(1))
+    let few = run.levels.iter().take_while(few).count();
+    few.max(2).min(run.levels.len())
+}
+
+/// Whether modes on this grid are worth their time.
+fn within_reach(leaf: &Leaf, grid: &Grid) -> bool {
+    6 * leaf.rods() * grid.segments() <= MANY_MORE_UNKNOWNS
+}
+
+/// The next grid on which signs of the lowest modes may be told that are not yet: not one
+/// whose rounding is larger.
+pub fn telling(run: &Run, lowest: Option<&Lowest>) -> Option<Grid> {
+    let size = lowest?.undecided?;
+    let noise = run.levels.last()?.leaf.neutral_shift();
+    let finer = run.finer().filter(|grid| within_reach(run.leaf, grid))?;
+    (size > FINER_NOISE * noise && !run.late()).then_some(finer)
 }
 
 fn unknowns(leaf: &DiscreteLeaf) -> usize {
@@ -141,10 +178,10 @@ fn refine(
     on: impl Fn(&Level, &[Eigenpair]) -> Option<Vec<Eigenpair>>,
 ) -> Option<()> {
     let mut finer: Vec<Level> = Vec::new();
-    while finer.len() < MORE_GRIDS && !series.accurate(run.tolerance) && !run.late() {
+    while finer.len() < MORE_GRIDS && !series.accurate() && !run.late() {
         let levels: Vec<&Level> = run.levels.iter().chain(&finer).collect();
         let last = levels.last()?;
-        if 2 * unknowns(&last.leaf) > MANY_MORE_UNKNOWNS {
+        if !within_reach(run.leaf, &last.leaf.grid.refined()) {
             break;
         }
         let next = settle(&levels[levels.len().saturating_sub(2)..], run.tolerance)?;
@@ -200,9 +237,13 @@ fn settle(levels: &[&Level], tolerance: f64) -> Option<Level> {
 }
 
 /// Eigenvalues on nested grids, each extrapolated on its own.
-#[derive(Default)]
 struct Series {
+    /// How many are negative on the finest grid.
+    index: usize,
     grids: Vec<Vec<f64>>,
+    tolerance: f64,
+    /// What rounding may do to one on the finest grid.
+    rounding: f64,
 }
 
 impl Series {
@@ -220,7 +261,7 @@ impl Series {
     }
 
     /// Best values, and their errors if there are two grids.
-    fn judged(&self, tolerance: f64) -> Vec<(f64, Option<f64>)> {
+    fn judged(&self) -> Vec<(f64, Option<f64>)> {
         let judge = |k: usize| {
             // A coarse grid may have fewer modes.
             let values = self.grids.iter().filter_map(|grid| grid.get(k));
@@ -242,21 +283,40 @@ impl Series {
             .collect();
         let largest = found.iter().filter_map(|(_, error)| *error);
         let largest = largest.fold(0.0, f64::max);
-        let bound = |error: f64| SAFETY * (error * largest).sqrt() + UNFINISHED * tolerance;
+        let bound = |error: f64| SAFETY * (error * largest).sqrt() + UNFINISHED * self.tolerance;
         let in_units = |(k, (value, error)): (usize, &(f64, Option<f64>))| {
             let unit = self.unit(k);
-            (value * unit, error.map(|error| bound(error) * unit))
+            (
+                value * unit,
+                error.map(|error| bound(error) * unit + self.rounding),
+            )
         };
         found.iter().enumerate().map(in_units).collect()
     }
 
     /// Whether all frequencies are known to this part of them.
-    fn accurate(&self, tolerance: f64) -> bool {
-        let known = |(k, error): (usize, Option<f64>)| {
-            error.is_some_and(|error| error <= 2.0 * tolerance * self.unit(k))
+    fn accurate(&self) -> bool {
+        let known = |(k, (_, error)): (usize, (f64, Option<f64>))| {
+            let wanted = 2.0 * self.tolerance * self.unit(k);
+            error.is_some_and(|error| error <= wanted + self.rounding)
         };
-        let errors = self.judged(tolerance).into_iter().map(|(_, error)| error);
-        errors.enumerate().all(known)
+        self.judged().into_iter().enumerate().all(known)
+    }
+
+    /// Size of the smallest, or of its error, whose sign is not known to be the one on the
+    /// finest grid. One that is zero to the tolerance may have either.
+    fn undecided(&self) -> Option<f64> {
+        let unknown = |(k, (value, error)): (usize, (f64, Option<f64>))| {
+            let (size, error) = (value.abs(), error?);
+            let zero = 2.0 * self.tolerance * self.unit(k).max(SMALL) + ZERO * self.rounding;
+            let decided = match size > error {
+                true => (value < 0.0) == (k < self.index),
+                false => error <= zero,
+            };
+            (!decided).then_some(size.max(error))
+        };
+        let unknown = self.judged().into_iter().enumerate().filter_map(unknown);
+        unknown.reduce(f64::min)
     }
 }
 

@@ -15,7 +15,8 @@ pub struct Options {
     /// Replaces the scenario's tolerance.
     pub tolerance: Option<f64>,
     /// How many of the lowest modes are looked for once the leaf is at rest, at
-    /// most [`MOST_MODES`]; that is no part of the time measured. 0: none.
+    /// most [`MOST_MODES`]; that is no part of the time measured. 0: none. Their signs
+    /// are compared with the Morse index, and finer grids are asked where they differ.
     pub modes: usize,
     /// Whether their shapes are wanted. Without them modes are left out where
     /// the leaf is large, and are known a little less accurately.

@@ -60,6 +60,8 @@ pub struct Run<'a, 'o> {
     pub change: Option<f64>,
     pub table: Richardson,
     pub index: Option<usize>,
+    /// Whether the lowest eigenvalue is clearly positive.
+    pub clearly: bool,
     /// Largest iteration error left on any grid.
     pub remaining: f64,
     /// Of Newton's method on the grids so far.
@@ -102,6 +104,7 @@ impl<'a, 'o> Run<'a, 'o> {
             change: None,
             table: Richardson::default(),
             index: None,
+            clearly: false,
             remaining: 0.0,
             contraction: Contraction::default(),
             spent: 0,
@@ -143,6 +146,7 @@ impl<'a, 'o> Run<'a, 'o> {
         self.levels = self.levels.iter().map(complete).collect();
         self.between = self.between.as_ref().map(complete);
         self.leaf = whole;
+        self.whole = None;
         self.tabulate();
         self
     }

@@ -33,9 +33,7 @@ pub fn relax(
     }
     let intervals = match options.method {
         Method::SemiImplicit(_) | Method::Explicit { .. } => {
-            let (mut found, _) = relax_on_grids(scenario, options, tolerance, progress)?;
-            found.doubts = plausible::doubts(scenario, &found);
-            return Ok(found);
+            return relax_on_grids(scenario, options, tolerance, progress).map(|(found, _)| found);
         }
         Method::SingleShooting => Some(1),
         Method::Shooting { intervals } | Method::ShootingFromRest { intervals } => intervals,
@@ -122,17 +120,44 @@ pub(crate) fn relax_on_grids(
     Ok(finished(run, end, clock))
 }
 
-/// The result of a run, and of a leaf at rest its modes, which are not counted
-/// in the time of the solution.
-fn finished(run: Run, end: Result<bool, Stop>, clock: Instant) -> (Equilibrium, Vec<Level>) {
+/// The result of a run, and of a leaf at rest its modes: those that are asked for are not
+/// counted in the time of the solution.
+fn finished(
+    mut run: Run,
+    mut end: Result<bool, Stop>,
+    clock: Instant,
+) -> (Equilibrium, Vec<Level>) {
+    let asked = run.options.modes;
+    let count = match run.clearly {
+        true => asked,
+        false => asked.max(1),
+    };
+    let mut seconds = clock.elapsed().as_secs_f64();
+    let mut lowest = end.ok().and_then(|_| modes::lowest(&run, count, false));
+    // Next to a bifurcation a grid may count what the leaf has not.
+    while let Some(finer) = modes::telling(&run, lowest.as_ref()) {
+        let clock = Instant::now();
+        end = run.decide_stability(finer);
+        seconds += clock.elapsed().as_secs_f64();
+        lowest = end.ok().and_then(|_| modes::lowest(&run, count, true));
+    }
+    if asked == 0 {
+        seconds = clock.elapsed().as_secs_f64();
+    }
     let (outcome, remark) = result::outcome(&run, end);
-    let seconds = clock.elapsed().as_secs_f64();
-    let modes = end.ok().and_then(|_| modes::lowest(&run));
     let mut found = result::equilibrium(&run, outcome, remark, seconds);
-    found.stability.modes = modes;
+    found.doubts = plausible::doubts(run.leaf.scenario(), &found);
+    if lowest.as_ref().is_some_and(|it| it.undecided.is_some()) {
+        found.doubts.push(UNDECIDED.to_owned());
+    }
+    found.stability.modes = lowest.map(|it| it.modes).filter(|_| asked > 0);
     let mut levels = run.levels;
     if let Some(between) = run.between {
         levels.insert(levels.len() - 1, between);
     }
     (found, levels)
 }
+
+/// Of a leaf with an eigenvalue that may have either sign.
+const UNDECIDED: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
+     whether the leaf is stable is not certain";

@@ -1,17 +1,40 @@
 //! Judging the stability of a leaf at rest, and leaving saddles.
 
-use crate::leaf::System;
+use crate::leaf::{Grid, System};
 use crate::newton::Stop;
 use crate::relax::run::{Level, Run, complete};
 use crate::relax::saddle::{self, saddle_of};
 use crate::relax::settle::{InitialGuess, MAX_SADDLES, Settled};
 use glam::DVec3;
 
-/// A leaf whose lowest eigenvalue (over the masses; that of a clamped rod is 12)
-/// is larger than this one step before rest is stable at rest.
-const CLEARLY: f64 = 1e-2;
+/// A leaf whose lowest eigenvalue (over the masses; that of a clamped rod is 12) is larger
+/// than this on one grid is stable on finer ones: eight segments make a column that is
+/// about to buckle stiffer by 0.04. Next to smaller ones the leaf may be unstable.
+const CLEARLY: f64 = 0.1;
 
 impl Run<'_, '_> {
+    /// Counts the negative eigenvalues of a leaf at rest, with all of its unknowns, anew on
+    /// a `finer` grid.
+    pub fn decide_stability(&mut self, finer: Grid) -> Result<bool, Stop> {
+        (self.solved, self.planar) = (self.leaf.rods(), self.leaf.planar());
+        self.settle_on(finer)?;
+        self.refine()
+    }
+
+    /// Negative eigenvalues on one grid; notes whether they are clearly none.
+    fn count(&mut self, level: &Level, system: &mut System) -> Option<usize> {
+        let mut below = |shift: f64| {
+            let Level { leaf, state } = level;
+            saddle::index(leaf, state, system, shift, &mut self.work)
+        };
+        let clear = below(-CLEARLY);
+        self.clearly = clear == Some(0);
+        match self.clearly {
+            true => clear,
+            false => below(0.0),
+        }
+    }
+
     /// Counts the negative eigenvalues on the finest grid. At a wanted saddle
     /// they must be as many as on the grid before. At one that is not wanted,
     /// the leaf is pushed off and the grids begin anew from where it lands. Returns
@@ -22,9 +45,9 @@ impl Run<'_, '_> {
             return Ok(true);
         }
         if let Some(whole) = self.whole {
-            let Level { leaf, state } = complete(self.leaf, whole, level);
-            let mut system = System::new(&leaf);
-            self.index = saddle::index(&leaf, &state, &mut system, 0.0, &mut self.work);
+            let level = complete(self.leaf, whole, level);
+            let mut system = System::new(&level.leaf);
+            self.index = self.count(&level, &mut system);
             return match self.index {
                 Some(0) => Ok(true),
                 _ => Err(Stop::Saddle),
@@ -36,11 +59,14 @@ impl Run<'_, '_> {
             self.work.factorizations += 1;
             if system.stable_without_coupling(-CLEARLY) {
                 self.index = Some(0);
+                self.clearly = true;
                 return Ok(true);
             }
         }
+        let level = self.levels.pop().expect("the leaf has settled");
         let mut system = System::new(&level.leaf);
-        self.index = saddle::index(&level.leaf, &level.state, &mut system, 0.0, &mut self.work);
+        self.index = self.count(&level, &mut system);
+        self.levels.push(level);
         if !matches!(self.index, Some(1..)) {
             return Ok(true);
         }

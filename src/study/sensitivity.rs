@@ -2,7 +2,7 @@
 
 use super::{Base, Keys, VaryError};
 use crate::relax::{
-    Equilibrium, Number, Options, Progress, RelaxError, check_tolerance, doubts, relax_on_grids,
+    Equilibrium, Number, Options, Progress, RelaxError, check_tolerance, relax_on_grids,
     sensitivities,
 };
 use crate::scenario::Scenario;
@@ -64,7 +64,6 @@ pub fn relax_with_sensitivities(
         .collect();
     let (mut leaf, levels) = relax_on_grids(scenario, options, tolerance, progress)?;
     let at_rest = leaf.accuracy.residual.is_some() && leaf.outcome.is_at_rest();
-    leaf.doubts = doubts(scenario, &leaf);
     leaf.sensitivities = Some(match at_rest {
         true => sensitivities(&levels, &numbers, tolerance, options.modes),
         false => Vec::new(),

@@ -16,7 +16,7 @@ use crate::limit::Limit;
 use crate::memory::Request;
 use crate::relax::{
     Direction, Equilibrium, Level, Margin, Options, Progress, Push, RelaxError, check_tolerance,
-    doubts, relax_on_grids,
+    relax_on_grids,
 };
 use crate::scenario::Scenario;
 
@@ -83,7 +83,6 @@ pub fn relax_with_margin(
     let (mut leaf, levels) = relax_on_grids(scenario, options, tolerance, &mut |step| {
         progress(&MarginProgress::Relaxing(*step));
     })?;
-    leaf.doubts = doubts(scenario, &leaf);
     leaf.margin = Some(match (leaf.outcome.is_at_rest(), leaf.stable()) {
         (true, Some(true)) => margin(scenario, &leaf, &levels, options, progress)?,
         (true, Some(false)) => Margin::none("an unstable leaf has no margin to lose"),
