@@ -128,9 +128,9 @@ fn finished(
     clock: Instant,
 ) -> (Equilibrium, Vec<Level>) {
     let asked = run.options.modes;
-    let count = match run.clearly {
-        true => asked,
-        false => asked.max(1),
+    let count = match run.index {
+        Some(0) if !run.clearly => asked.max(1),
+        _ => asked,
     };
     let mut seconds = clock.elapsed().as_secs_f64();
     let mut lowest = end.ok().and_then(|_| modes::lowest(&run, count, false));
