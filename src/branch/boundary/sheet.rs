@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use crate::branch::deflation::Solved;
+use crate::branch::deflation::{STIFF, Solved};
 use crate::branch::equations::{Equations, ITERATIONS, LARGEST, Stuck, assembled, at_rest};
 use crate::branch::family::{Family, OutOfRange};
 use crate::branch::field::{add, between, dot, is_finite, largest, plus, times};
@@ -359,7 +359,9 @@ impl<'a> Sheet<'a> {
         let mut spot = spot.clone();
         let mut previous = f64::INFINITY;
         let mut finished = false;
-        for _ in 0..=ITERATIONS {
+        // As of a branch: a leaf with stiff segments that rests is corrected once more.
+        let mut corrected = self.leaf(spot.place)?.stiffest() * STIFF > 1.0;
+        for _ in 0..=ITERATIONS + 1 {
             let (sample, noise) = self.sample(spot, border, rates.to_vec(), finished)?;
             if finished {
                 return Ok(sample);
@@ -374,7 +376,9 @@ impl<'a> Sheet<'a> {
             let place = [0, 1].map(|i| sample.spot.place[i] + changes[i]);
             let state = self.advanced(&sample.spot.state, place, &increments, 1.0)?;
             spot = Spot { state, place };
-            finished = at_rest(size, previous);
+            let rests = at_rest(size, previous);
+            finished = rests && corrected;
+            corrected |= rests;
             previous = size;
         }
         Err(Stuck::NotConverged)
