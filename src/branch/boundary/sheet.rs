@@ -14,6 +14,9 @@ use crate::scenario::Scenario;
 /// The part of a mode of mass one over which forces are differenced twice.
 const ALONG_MODE: f64 = 3e-4;
 
+/// Fractions of a range within this are the same.
+const EXACT: f64 = 1e-12;
+
 /// Leaves that differ in two numbers: a family along the first for every value of the
 /// second.
 #[derive(Clone, Copy)]
@@ -32,13 +35,19 @@ impl Plane<'_> {
     /// Both numbers at fractions of their ranges.
     pub fn values(&self, place: [f64; 2]) -> [f64; 2] {
         let [from, to] = self.range;
-        let second = match place[1] {
+        // At an end rounding must not lead beyond: there may be nothing.
+        let [first, second] = place.map(|part| match part {
+            part if part.abs() < EXACT => 0.0,
+            part if (part - 1.0).abs() < EXACT => 1.0,
+            part => part,
+        });
+        let second = match second {
             0.0 => from,
             1.0 => to,
             part if self.log => from * (to / from).powf(part),
             part => from + (to - from) * part,
         };
-        [self.family.value(place[0]), second]
+        [self.family.value(first), second]
     }
 
     /// The fraction of the second number's range at which it has a value.
