@@ -7,6 +7,7 @@ mod common;
 
 use common::branch::{changes_at, follow};
 use common::{parse, settle};
+use leafdyn::study::{Base, BoundaryRequest, TraceRequest, boundary};
 
 /// Half of the opening angle.
 const ALPHA: f64 = 0.9;
@@ -159,9 +160,9 @@ fn pinned_end(compliance: f64, steps: u32, [moment, along, across, load]: [f64; 
     runge_kutta(slope, [0.0, 0.0, SHALLOW, moment], 1.0, steps)
 }
 
-/// The load at the fold next to a base and a load: the end is where it is pinned, without
+/// The base and the load at the fold next to others: the end is where it is pinned, without
 /// a moment, and to first order stays so at this load.
-fn fold(compliance: f64, steps: u32, near: [f64; 4]) -> f64 {
+fn fold(compliance: f64, steps: u32, near: [f64; 4]) -> [f64; 4] {
     type Base = nalgebra::Vector4<f64>;
     let span = SHALLOW.sin() / SHALLOW;
     let off = |base: Base| {
@@ -189,42 +190,91 @@ fn fold(compliance: f64, steps: u32, near: [f64; 4]) -> f64 {
         let matrix = nalgebra::Matrix4::from_columns(&columns);
         base -= matrix.try_inverse().unwrap() * all(base);
     }
-    base[3]
+    base.into()
+}
+
+/// The vertical force per length at that fold; from there to the next one.
+fn extrapolated_fold(compliance: f64, near: &mut [f64; 4]) -> f64 {
+    let [coarse, fine] = [400, 800].map(|steps| fold(compliance, steps, *near));
+    *near = fine;
+    -(fine[3] + (fine[3] - coarse[3]) / 15.0)
+}
+
+/// Near the base and the load of both folds.
+const NEAR: [[f64; 4]; 2] = [
+    [-1.389, -56.789, -30.936, 59.885],
+    [-0.0736, -81.902, -8.415, 16.679],
+];
+
+fn pinned(axial: &str) -> String {
+    let span = SHALLOW.sin() / SHALLOW;
+    format!(
+        r#"
+        name = "arch"
+        leaf = {{ rods = 1, length = 1.0, fan = [{SHALLOW}] }}
+        stiffness = {{ torsion = 50.0, bending_2 = 50.0, bending_3 = 1.0, axial = {axial}, shear_2 = {axial}, shear_3 = {axial} }}
+        rest = {{ bend_3 = {:?} }}
+        tip = {{ held = "pinned", position = [{span:?}, 0.0, 0.0] }}
+        load = {{ gravity = [0.0, 0.0, 0.0] }}
+        "#,
+        -2.0 * SHALLOW
+    )
 }
 
 #[test]
 fn folds_of_stiff_arches_are_within_what_is_told() {
-    let near = [
-        [-1.389, -56.789, -30.936, 59.885],
-        [-0.0736, -81.902, -8.415, 16.679],
-    ];
-    let span = SHALLOW.sin() / SHALLOW;
     for axial in ["1e5", "1e6", "inf"] {
-        let text = format!(
-            r#"
-            name = "arch"
-            leaf = {{ rods = 1, length = 1.0, fan = [{SHALLOW}] }}
-            stiffness = {{ torsion = 50.0, bending_2 = 50.0, bending_3 = 1.0, axial = {axial}, shear_2 = {axial}, shear_3 = {axial} }}
-            rest = {{ bend_3 = {:?} }}
-            tip = {{ held = "pinned", position = [{span:?}, 0.0, 0.0] }}
-            load = {{ gravity = [0.0, 0.0, 0.0] }}
-            "#,
-            -2.0 * SHALLOW
-        );
+        let text = pinned(axial);
         let found = follow(&text, "", "load.gravity[1]=0..-60", false);
         assert!(found.complete, "{axial}: {:?}", found.remark);
         let compliance = axial.parse::<f64>().unwrap().recip();
         let critical: Vec<_> = found.branches[0].critical().collect();
-        assert_eq!(critical.len(), near.len(), "{axial}");
-        for ((_, point), near) in critical.iter().zip(near) {
-            let [coarse, fine] = [400, 800].map(|steps| fold(compliance, steps, near));
-            let wanted = -(fine + (fine - coarse) / 15.0);
+        assert_eq!(critical.len(), NEAR.len(), "{axial}");
+        for ((_, point), near) in critical.iter().zip(NEAR) {
+            let wanted = extrapolated_fold(compliance, &mut near.clone());
             let off = (point.value - wanted).abs();
             let told = point.value_error.unwrap();
             println!("{axial}: {} {off:.1e} off, {told:.1e} told", point.value);
             // What is left of the shooting.
             assert!(off < told + 3e-9, "{axial}: {} {wanted}", point.value);
             assert!(off < 1e-7 && told < 3e-6, "{axial}: {told}");
+        }
+    }
+}
+
+#[test]
+fn boundaries_of_stiff_arches_are_within_what_is_told() {
+    let base = Base::of_text(pinned("1e5"), "test.toml".into(), &[]);
+    let stiffness = "stiffness.axial+stiffness.shear_2+stiffness.shear_3";
+    let request = BoundaryRequest {
+        trace: TraceRequest {
+            base: base.unwrap(),
+            vary: "load.gravity[1]=0..-60".parse().unwrap(),
+            switch: false,
+            keep_unstable: true,
+            segments: None,
+            tolerance: Some(1e-7),
+            most_points: 100,
+            cross_section: None,
+        },
+        across: format!("{stiffness}=2e4..1e6:8log").parse().unwrap(),
+        map: None,
+    };
+    let found = boundary(&request, &mut |_, _, _| {}).unwrap();
+    assert!(found.complete, "{:?}", found.remark);
+    assert_eq!(found.curves.len(), NEAR.len());
+    for (curve, mut near) in found.curves.iter().zip(NEAR) {
+        // From the stiffest on.
+        let exact = curve.points.iter().filter(|point| point.errors[1] == 0.0);
+        for point in exact.rev() {
+            let wanted = extrapolated_fold(point.values[1].recip(), &mut near);
+            let (off, told) = ((point.values[0] - wanted).abs(), point.errors[0]);
+            println!(
+                "{:e}: {} {off:.1e} off, {told:.1e} told",
+                point.values[1], point.values[0]
+            );
+            assert!(off < told + 3e-9, "{:?}: {wanted}", point.values);
+            assert!(told < 1e-5, "{:?}: {told}", point.values);
         }
     }
 }

@@ -224,6 +224,14 @@ fn a_lens_with_a_midrib_over_the_fan() {
     }
 }
 
+/// Coupling begins at zero, beyond which there is no leaf: the curve goes on to there.
+#[test]
+fn a_curve_reaches_an_end_of_a_range_beyond_which_there_is_nothing() {
+    let short = "leaf.length=[1.0, 0.9, 1.0]; coupling.z=0.5";
+    let (along, across) = ("leaf.length[1]=0.88..0.94", "coupling.z=0..1");
+    only(&follow(&text("classic/lens_midrib"), short, along, across));
+}
+
 /// A hanging rod leaves its plane between two weights, if it is curved enough: the curve
 /// turns back where they meet.
 #[test]

@@ -42,6 +42,9 @@ const LARGEST_SHIFT: f64 = 1e6;
 const INVERSE_ITERATIONS: usize = 4;
 const BELOW: f64 = 1.05;
 
+/// Modes among which the softest is sought.
+const SOFT: usize = 3;
+
 /// The valley floor in some direction.
 struct Valley {
     /// Solutions with the bordered matrix.
@@ -111,6 +114,15 @@ impl Equations<'_> {
             }
         }
         None
+    }
+
+    /// The eigenvalue over the masses that is next to zero at a point.
+    pub fn softest(&mut self, point: &Point) -> Result<f64, Stuck> {
+        let modes = self.soft_modes(point, SOFT)?;
+        let linear = self.linearise(&mut point.state.clone(), point.fraction)?;
+        let border = [self.momentum(&modes[0])];
+        let solved = self.solve_shifted(&border, &linear.forces, &[], 0.0)?;
+        Ok(-solved.h[(0, 0)] / self.mass)
     }
 
     /// Where the leaf comes to rest that leaves a saddle along its unstable mode, to the side

@@ -11,7 +11,7 @@ use crate::leaf::{Bordered, Field, SparsePattern, State, System};
 const NEUTRAL: f64 = 1e-7;
 
 /// Stiffness in stretch and shear, in units of A/L^2, from which on segments are stiff.
-const STIFF: f64 = 1e4;
+pub const STIFF: f64 = 1e4;
 
 /// Iterations of the subspace: the wanted modes are far softer than the rest.
 const SUBSPACE_ITERATIONS: usize = 8;

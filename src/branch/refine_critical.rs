@@ -16,16 +16,16 @@ const EXACT: f64 = 1e-12;
 /// Compliances by which matrices of nearly rigid leaves are softened, in units of
 /// L^2/A, times one to four: smaller ones lose more to rounding, larger ones more to their
 /// extrapolation to none. And the stiffness from which on matrices are softened.
-const SOFTENINGS: [f64; 5] = [1e-4, 3e-5, 1e-5, 3e-6, 1e-6];
+pub const SOFTENINGS: [f64; 5] = [1e-4, 3e-5, 1e-5, 3e-6, 1e-6];
 pub const NEARLY_RIGID: f64 = 1.01e5;
 
 /// The cubic through values at softenings of 1, 2, 3, 4 at zero, and the parabola
 /// through the first three.
-const UNSOFTENING: [f64; 4] = [4.0, -6.0, 4.0, -1.0];
-const BY_PARABOLA: [f64; 4] = [3.0, -3.0, 1.0, 0.0];
+pub const UNSOFTENING: [f64; 4] = [4.0, -6.0, 4.0, -1.0];
+pub const BY_PARABOLA: [f64; 4] = [3.0, -3.0, 1.0, 0.0];
 
 /// Of the finest grid of a critical point, over the one it was found on.
-const FINER: f64 = 4.0;
+pub const FINER: f64 = 4.0;
 
 /// Distances from a crossing (as of arclength) between which the branch is
 /// interpolated, in turn, until tips are within this part of their accuracy.

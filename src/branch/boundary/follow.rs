@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::grids::on_finer;
 use super::halt::Halt;
 use super::place::{Place, Seed};
-use super::refine::{Step, refine};
+use super::refine::{Accuracy, Step, refine};
 use super::search::Lost;
 use super::sheet::{Plane, Sheet};
 use super::special::{land, onto, special_between};
@@ -51,8 +51,8 @@ pub struct Stride {
     pub longest: f64,
     /// Most points.
     pub most: usize,
-    /// Wanted accuracy of tips, and of numbers as parts of their ranges.
-    pub accuracy: f64,
+    /// Wanted accuracy.
+    pub accuracy: Accuracy,
 }
 
 /// A boundary on both sides of where it began.

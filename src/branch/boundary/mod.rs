@@ -42,6 +42,7 @@ pub use cells::{AtRest, Way, go, refine_on};
 pub use follow::{Boundary, Stride, follow};
 pub use halt::Halt;
 pub use place::Seed;
+pub use refine::Accuracy;
 pub use sheet::{Plane, Spot};
 pub use special::Special;
 pub use table::Verified;

@@ -141,12 +141,18 @@ impl Place {
         let border: Vec<Field> = held.iter().map(|it| sheet.equations.momentum(it)).collect();
         let mut change = [0.0; 2];
         for (change, direction) in change.iter_mut().zip(&basis) {
-            let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
+            let mut beside = |step: f64| {
                 let spot = sheet.moved(&sample.spot, direction, step)?;
                 let sample = sheet.settle(&spot, [&basis[0], &basis[1]], &border, &sample.rates)?;
-                Ok::<f64, Stuck>(search::eigen(&sample, self.neutral).value)
+                Ok::<_, Stuck>((step, search::eigen(&sample, self.neutral).value))
+            };
+            let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| match beside(step) {
+                // At an end of a range there may be nothing beyond.
+                Err(Stuck::OutOfRange(_)) => Ok((0.0, eigen.value)),
+                found => found,
             });
-            *change = (after? - before?) / (2.0 * DIFFERENCE);
+            let ((after, above), (before, below)) = (after?, before?);
+            *change = (above - below) / (after - before);
         }
         let slope = change[0].hypot(change[1]);
         if !(slope.is_finite() && slope > NEUTRAL) {

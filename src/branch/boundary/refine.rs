@@ -5,9 +5,9 @@ use super::place::Place;
 use super::search::{Found, Lost, Search};
 use super::sheet::{Direction, Plane, Sheet, Spot};
 use super::special::{Special, locate_near};
-use super::table::{SOFTENING, Table, Verified};
+use super::table::{Numbers, Table, Verified};
 use crate::branch::critical::Kind;
-use crate::branch::refine_critical::NEARLY_RIGID;
+use crate::branch::refine_critical::{BY_PARABOLA, FINER, NEARLY_RIGID, SOFTENINGS, UNSOFTENING};
 use crate::branch::refined::Doubt;
 use crate::leaf::Grid;
 use crate::newton::Contraction;
@@ -27,14 +27,16 @@ const STILL: f64 = 1e-4;
 /// Largest error of the tips (lengths) of a point that is known by its numbers.
 const NEUTRAL_TIPS: f64 = 1e-3;
 
-/// Numbers are to be so many times as exact as tips: of the part of their ranges.
-const EXACTER: f64 = 1e-2;
-
 /// Newton's method leaves at most this part of the error that is allowed, on a grid.
 const LEFT: f64 = 1e-3;
 
 /// Numbers within this part of their ranges are exact.
 const EXACT: f64 = 1e-12;
+
+/// Compliance by which matrices of nearly rigid leaves are softened first, and the part of
+/// what this leaves that a smaller one must leave at most.
+const FIRST_SOFTENING: f64 = 1e-3;
+const LESS: f64 = 0.5;
 
 /// Accuracy of a point on its grid, as a part of the ranges, and how far it may lie from
 /// where it is on the grid before.
@@ -45,6 +47,13 @@ const NEAR: f64 = 0.5;
 /// of the numbers changes along the boundary by at least this part of the other.
 const SINE: f64 = 0.3;
 const PART: f64 = 0.1;
+
+/// How accurate points are to be: their tips, and both numbers as parts of their ranges.
+#[derive(Clone, Copy, Debug)]
+pub struct Accuracy {
+    pub tips: f64,
+    pub numbers: f64,
+}
 
 /// A point to be verified.
 #[derive(Clone, Debug)]
@@ -60,7 +69,12 @@ pub struct Step {
 /// A point on as many grids as it takes; on all of them it must be the same. Of a nearly
 /// rigid leaf, of which fine grids know the matrix worse, beginning with coarser ones if
 /// that can be.
-pub fn refine(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<Verified, Doubt> {
+pub fn refine(
+    plane: Plane,
+    grid: &Grid,
+    step: &Step,
+    accuracy: Accuracy,
+) -> Result<Verified, Doubt> {
     let rigid = Sheet::new(plane, grid.clone())?
         .leaf(step.place.spot.place)?
         .stiffest();
@@ -79,17 +93,22 @@ pub fn refine(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<V
 }
 
 /// The same from this grid on.
-fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<Verified, Doubt> {
+fn refine_from(
+    plane: Plane,
+    grid: &Grid,
+    step: &Step,
+    accuracy: Accuracy,
+) -> Result<Verified, Doubt> {
     let mut sheet = Sheet::new(plane, grid.clone())?;
     let mut near = step.place.clone();
     let given = step.given.or_else(|| given_at(&sheet, &near));
     let given = given.filter(|_| step.special.is_none());
     let mut table = Table::new(given.map(|which| (which, near.spot.place[which])));
-    let mut moved = f64::INFINITY;
+    let (mut moved, mut factorizations) = (f64::INFINITY, 0);
     let mut contraction = Contraction::default();
     let (mut levels, mut places) = (Vec::<Level>::new(), Vec::new());
-    let enough = (EXACTER * accuracy).max(EXACT);
-    let mut factorizations = 0;
+    let enough = accuracy.numbers.max(EXACT);
+    let mut softening = None;
     for level in 0..GRIDS {
         if level > 0 {
             (sheet, near) = on_finer(&mut sheet, &near)?;
@@ -125,23 +144,23 @@ fn refine_from(plane: Plane, grid: &Grid, step: &Step, accuracy: f64) -> Result<
             state: near.spot.state.clone(),
         });
         places.push(near.spot.place);
-        let numbers = match rigid {
-            false => near.spot.place,
-            true => unsoftened(&mut sheet, &near, step.special, given)?,
+        let sought = (step.special, given);
+        let numbers = match (rigid, softening) {
+            (false, _) => Numbers::of(near.spot.place),
+            (true, Some(known)) => unsoftened(&mut sheet, &near, sought, known)?,
+            (true, None) => least_softened(&mut sheet, &near, sought, (&table, along))?,
         };
-        table.push(&mut sheet, (&near, along), numbers, rigid)?;
+        softening = rigid.then_some(numbers.softening);
+        table.push(&mut sheet, (&near, along), &numbers)?;
         if level + 1 < FEWEST {
             continue;
         }
-        let errors = table.errors().into_iter().zip(table.rounding);
-        let exact = errors
-            .into_iter()
-            .all(|(error, rounding)| error <= enough.max(rounding));
+        let exact = table.is_exact(enough);
         let last =
             level + 1 == if rigid { RIGID } else { GRIDS } || 2 * sheet.grid().segments() > FINEST;
-        let tips = if last { NEUTRAL_TIPS } else { accuracy };
+        let tips = if last { NEUTRAL_TIPS } else { accuracy.tips };
         let tips = table.tips.best().is_some_and(|best| best.error <= tips);
-        let numbers = table.errors().iter().all(|error| *error <= accuracy);
+        let numbers = table.errors().iter().all(|error| *error <= accuracy.tips);
         if tips && (exact || last && numbers) {
             return Ok(Verified {
                 factorizations,
@@ -267,29 +286,61 @@ impl Owned {
     }
 }
 
-/// The numbers at a point of a nearly rigid leaf: by softened matrices, extrapolated to
-/// none.
+/// The numbers at a point of a nearly rigid leaf on a first grid, by matrices softened less
+/// and less until rounding leaves more than that, here or on a grid that is finer.
+fn least_softened(
+    sheet: &mut Sheet,
+    near: &Place,
+    sought: (Option<Special>, Option<usize>),
+    (table, along): (&Table, Option<f64>),
+) -> Result<Numbers, Lost> {
+    let largest = |[a, b]: [f64; 2]| a.max(b);
+    let mut numbers = unsoftened(sheet, near, sought, FIRST_SOFTENING)?;
+    let finest = FINER * sheet.grid().segments() as f64;
+    for softening in SOFTENINGS {
+        let rounding = table.rounding(sheet, (near, along), softening, finest)?;
+        let left = largest(numbers.left);
+        if largest(rounding) > left {
+            break;
+        }
+        match unsoftened(sheet, near, sought, softening) {
+            Ok(better) if largest(better.left) < LESS * left => numbers = better,
+            _ => break,
+        }
+    }
+    Ok(numbers)
+}
+
+/// The numbers at a point of a nearly rigid leaf: by matrices softened by one to four times
+/// as much, extrapolated to none.
 fn unsoftened(
     sheet: &mut Sheet,
     near: &Place,
-    special: Option<Special>,
-    given: Option<usize>,
-) -> Result<[f64; 2], Lost> {
+    (special, given): (Option<Special>, Option<usize>),
+    softening: f64,
+) -> Result<Numbers, Lost> {
     let grid = sheet.grid().clone();
     let mut places = [[0.0; 2]; 4];
     let mut owned = sought(sheet, near, given);
     for (k, place) in places.iter_mut().enumerate().rev() {
         let mut soft = Sheet::new(sheet.plane, grid.clone())?;
-        soft.soften(SOFTENING * (k + 1) as f64);
+        soft.soften(softening * (k + 1) as f64);
         owned.near.spot = match special {
             Some(special) => locate_near(&mut soft, &owned.near, special)?.0.spot,
             None => owned.run(&mut soft)?.spot().clone(),
         };
         *place = owned.near.spot.place;
     }
-    // The cubic through values at 1, 2, 3, 4 at zero.
-    let [a, b, c, d] = places;
-    Ok([0, 1].map(|i| 4.0 * a[i] - 6.0 * b[i] + 4.0 * c[i] - d[i]))
+    let by = |weights: [f64; 4]| {
+        let sum = |i: usize| weights.iter().zip(&places).map(|(w, at)| w * at[i]).sum();
+        [0, 1].map(sum)
+    };
+    let (values, parabola): ([f64; 2], [f64; 2]) = (by(UNSOFTENING), by(BY_PARABOLA));
+    Ok(Numbers {
+        values,
+        softening,
+        left: [0, 1].map(|i| (values[i] - parabola[i]).abs()),
+    })
 }
 
 impl From<Lost> for Doubt {

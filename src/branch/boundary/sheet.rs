@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use crate::branch::deflation::Solved;
+use crate::branch::deflation::{STIFF, Solved};
 use crate::branch::equations::{Equations, ITERATIONS, LARGEST, Stuck, assembled, at_rest};
 use crate::branch::family::{Family, OutOfRange};
 use crate::branch::field::{add, between, dot, is_finite, largest, plus, times};
@@ -13,6 +13,9 @@ use crate::scenario::Scenario;
 
 /// The part of a mode of mass one over which forces are differenced twice.
 const ALONG_MODE: f64 = 3e-4;
+
+/// Fractions of a range within this are the same.
+const EXACT: f64 = 1e-12;
 
 /// Leaves that differ in two numbers: a family along the first for every value of the
 /// second.
@@ -32,13 +35,19 @@ impl Plane<'_> {
     /// Both numbers at fractions of their ranges.
     pub fn values(&self, place: [f64; 2]) -> [f64; 2] {
         let [from, to] = self.range;
-        let second = match place[1] {
+        // At an end rounding must not lead beyond: there may be nothing.
+        let [first, second] = place.map(|part| match part {
+            part if part.abs() < EXACT => 0.0,
+            part if (part - 1.0).abs() < EXACT => 1.0,
+            part => part,
+        });
+        let second = match second {
             0.0 => from,
             1.0 => to,
             part if self.log => from * (to / from).powf(part),
             part => from + (to - from) * part,
         };
-        [self.family.value(place[0]), second]
+        [self.family.value(first), second]
     }
 
     /// The fraction of the second number's range at which it has a value.
@@ -359,7 +368,9 @@ impl<'a> Sheet<'a> {
         let mut spot = spot.clone();
         let mut previous = f64::INFINITY;
         let mut finished = false;
-        for _ in 0..=ITERATIONS {
+        // As of a branch: a leaf with stiff segments that rests is corrected once more.
+        let mut corrected = self.leaf(spot.place)?.stiffest() * STIFF > 1.0;
+        for _ in 0..=ITERATIONS + 1 {
             let (sample, noise) = self.sample(spot, border, rates.to_vec(), finished)?;
             if finished {
                 return Ok(sample);
@@ -374,7 +385,9 @@ impl<'a> Sheet<'a> {
             let place = [0, 1].map(|i| sample.spot.place[i] + changes[i]);
             let state = self.advanced(&sample.spot.state, place, &increments, 1.0)?;
             spot = Spot { state, place };
-            finished = at_rest(size, previous);
+            let rests = at_rest(size, previous);
+            finished = rests && corrected;
+            corrected |= rests;
             previous = size;
         }
         Err(Stuck::NotConverged)

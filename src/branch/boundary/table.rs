@@ -8,10 +8,6 @@ use crate::branch::critical::Kind;
 use crate::leaf::State;
 use crate::relax::richardson::Richardson;
 
-/// Compliance by which matrices of nearly rigid leaves are softened, in units of L^2/A,
-/// times one to four: the more, the less rounding; a part of third order is left.
-pub const SOFTENING: f64 = 1e-3;
-
 /// What extrapolation to no softening makes of rounding: the root of the sum of the squares
 /// of its weights.
 const AMPLIFIED: f64 = 8.3;
@@ -42,6 +38,26 @@ pub struct Verified {
     pub factorizations: usize,
 }
 
+/// Both numbers at a point on a grid.
+#[derive(Default)]
+pub struct Numbers {
+    pub values: [f64; 2],
+    /// Compliance by which the matrix was softened, in units of L^2/A, and what that may have
+    /// left in the numbers.
+    pub softening: f64,
+    pub left: [f64; 2],
+}
+
+impl Numbers {
+    /// Without softening.
+    pub fn of(values: [f64; 2]) -> Self {
+        Numbers {
+            values,
+            ..Numbers::default()
+        }
+    }
+}
+
 /// What is extrapolated.
 #[derive(Default)]
 pub struct Table {
@@ -51,8 +67,10 @@ pub struct Table {
     given: Option<(usize, f64)>,
     /// What rounding of the matrix may have done to the numbers on a grid, and how many
     /// times as much to those of no softening.
-    pub rounding: [f64; 2],
+    rounded: [f64; 2],
     amplified: f64,
+    /// What softening may have left in the numbers on a grid.
+    softened: [f64; 2],
     /// What Newton's method may have left on a grid.
     pub left: f64,
 }
@@ -67,39 +85,50 @@ impl Table {
         }
     }
 
-    pub fn push(
-        &mut self,
+    /// What rounding of a matrix with so much softening, on so many segments, may do to the
+    /// numbers at a point; `along` is the change of what is zero there along the boundary.
+    pub fn rounding(
+        &self,
         sheet: &mut Sheet,
         (place, along): (&Place, Option<f64>),
-        numbers: [f64; 2],
-        rigid: bool,
-    ) -> Result<(), Lost> {
-        if rigid {
-            self.amplified = AMPLIFIED;
-        }
+        softening: f64,
+        segments: f64,
+    ) -> Result<[f64; 2], Lost> {
         let (across, slope) = match self.given {
             Some((which, _)) => place.across_at(sheet, which),
             None => (place.normal.clone(), place.slope),
         };
         let leaf = sheet.leaf(place.spot.place)?;
-        let limit = if rigid {
-            1.0 / SOFTENING
-        } else {
-            f64::INFINITY
-        };
+        let limit = 1.0 / softening;
         let condensing = leaf.sections.iter().map(|it| it.condensing.max_element());
         let stiffest = condensing.fold(0.0_f64, |most, it| most.max(it.min(limit)));
-        let state = &place.spot.state;
-        let segments = state.segments() as f64;
         let rounding = f64::EPSILON * stiffest * segments * segments;
-        for i in 0..2 {
+        Ok([0, 1].map(|i| {
             let own = (rounding / slope * across.place[i]).abs();
             let along = along.map_or(0.0, |slope| rounding / slope * place.tangent.place[i]);
-            self.rounding[i] = self.rounding[i].max(own + along.abs());
+            own + along.abs()
+        }))
+    }
+
+    pub fn push(
+        &mut self,
+        sheet: &mut Sheet,
+        (place, along): (&Place, Option<f64>),
+        numbers: &Numbers,
+    ) -> Result<(), Lost> {
+        let state = &place.spot.state;
+        let segments = state.segments() as f64;
+        let rounding = self.rounding(sheet, (place, along), numbers.softening, segments)?;
+        if numbers.softening > 0.0 {
+            self.amplified = AMPLIFIED;
+        }
+        for i in 0..2 {
+            self.rounded[i] = self.rounded[i].max(rounding[i]);
+            self.softened[i] = self.softened[i].max(numbers.left[i]);
         }
         let tips = (0..state.rods()).flat_map(|j| state.tip(j).to_array());
         self.tips.push(state.segments(), tips.collect());
-        for (table, number) in self.numbers.iter_mut().zip(numbers) {
+        for (table, number) in self.numbers.iter_mut().zip(numbers.values) {
             table.push(state.segments(), vec![number]);
         }
         Ok(())
@@ -115,6 +144,14 @@ impl Table {
             Some((which, _)) if which == i => 0.0,
             _ => error(i),
         })
+    }
+
+    /// Whether both numbers are known as well, or to rounding.
+    pub fn is_exact(&self, enough: f64) -> bool {
+        let errors = self.errors().into_iter().zip(self.rounded);
+        errors
+            .into_iter()
+            .all(|(error, rounded)| error <= enough.max(rounded))
     }
 
     pub fn verified(&self, sheet: &Sheet, place: &Place, special: Option<Special>) -> Verified {
@@ -137,7 +174,10 @@ impl Table {
         Verified {
             place: [number(0), number(1)],
             errors: [0, 1].map(|i| match free(i) {
-                true => errors[i] + self.amplified * self.rounding[i] + KEPT * self.left,
+                true => {
+                    let rounded = self.amplified * self.rounded[i];
+                    errors[i] + self.softened[i] + rounded + KEPT * self.left
+                }
                 false => 0.0,
             }),
             tips: tips.chunks(3).map(|tip| [tip[0], tip[1], tip[2]]).collect(),

@@ -14,6 +14,10 @@ const SAME: f64 = 1e-3;
 /// Tips of a curve farther than this from those of a branch (lengths) are of another one.
 const NEAR: f64 = 0.02;
 
+/// Curves between larger indices are not followed for a map: what is beyond is judged by the
+/// singular matrices on the way itself.
+pub const MOST_INDEX: usize = 8;
+
 /// A straight way along one of the numbers, on which a branch was followed.
 pub struct Edge {
     /// Both numbers at its ends, as fractions of their ranges.
@@ -22,17 +26,25 @@ pub struct Edge {
     pub index: usize,
     /// Tips along it, in the units of the curves: one if they are joined.
     pub tips: Vec<Vec<[f64; 3]>>,
+    /// Where else matrices are singular on it, beyond the largest index of curves.
+    pub beyond: Vec<Crossing>,
     /// The index where it ends; none if the branch does not come there.
     pub found: Option<usize>,
 }
 
 /// Where a curve is crossed.
-struct Crossing {
+#[derive(Clone)]
+pub struct Crossing {
     /// The number that changes.
-    at: f64,
+    pub at: f64,
     /// Whether the branch ends there.
-    fold: bool,
-    indices: [usize; 2],
+    pub fold: bool,
+    pub indices: [usize; 2],
+}
+
+/// Whether a change of the index is one that is followed for a map.
+pub fn is_followed(indices: [usize; 2]) -> bool {
+    indices.iter().all(|index| *index <= MOST_INDEX)
 }
 
 impl Edge {
@@ -48,6 +60,8 @@ impl Edge {
         let [from, to] = self.ends.map(|end| end[along]);
         let mut crossings: Vec<Crossing> = (curves.iter())
             .flat_map(|curve| self.crossings(curve))
+            .filter(|crossing| is_followed(crossing.indices))
+            .chain(self.beyond.iter().cloned())
             .filter(|crossing| (crossing.at - from) * (crossing.at - to) < 0.0)
             .collect();
         let distance = |crossing: &Crossing| (crossing.at - from).abs();

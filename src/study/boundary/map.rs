@@ -3,10 +3,10 @@
 
 use rayon::prelude::*;
 
-use super::compare::Edge;
+use super::compare::{Crossing, Edge, is_followed};
 use super::result::BoundaryMap;
-use crate::branch::Critical;
 use crate::branch::boundary::{AtRest, Boundary, Plane, Way, go};
+use crate::branch::{Critical, Kind};
 use crate::leaf::Grid;
 
 /// Most cells along a side.
@@ -152,8 +152,17 @@ impl<'p> Cells<'p> {
         if self.joined {
             way.tips.iter_mut().for_each(|tips| tips.truncate(1));
         }
+        let ends = [from.spot.place, to];
+        let along = usize::from(ends[0][0] == ends[1][0]);
+        let beyond = way.critical.extract_if(.., |it| !is_followed(it.indices));
+        let beyond = beyond.map(|critical| Crossing {
+            at: ends[0][along] + critical.fraction * (to[along] - ends[0][along]),
+            fold: critical.kind == Kind::Fold,
+            indices: critical.indices,
+        });
         let edge = Edge {
-            ends: [from.spot.place, to],
+            ends,
+            beyond: beyond.collect(),
             index: from.index,
             tips: way.tips,
             found: end.map(|end| end.index),

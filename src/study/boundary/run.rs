@@ -9,12 +9,19 @@ use super::map::{Cells, Unexplained};
 use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, CurveEnd, word};
 use super::{BoundaryRequest, MOST_CURVES};
 use crate::branch::Family;
-use crate::branch::boundary::{self as curves, AtRest, Plane, Spot, Stride, Verified};
+use crate::branch::boundary::{self as curves, Accuracy, AtRest, Plane, Spot, Stride, Verified};
 use crate::scenario::Scenario;
 use crate::study::trace::{TraceError, TraceRequest};
 
 /// Longest step along a curve where few values are asked for.
 const LONGEST: f64 = 0.1;
+
+/// That of curves that are followed for a map.
+const OF_MAP: f64 = 0.04;
+
+/// Numbers are to be so many times as exact as tips: of the part of their ranges. Not those of
+/// curves that are followed for a map only.
+const EXACTER: f64 = 1e-2;
 
 /// The curves on which the index of a leaf changes in the plane of two numbers, through
 /// the critical points of a trace along the first. `progress` is told of each point: the
@@ -80,7 +87,10 @@ pub fn boundary(
         how: Stride {
             longest: (1.0 / (across.values.len() - 1) as f64).min(LONGEST),
             most: request.trace.most_points,
-            accuracy: trace.tolerance,
+            accuracy: Accuracy {
+                tips: trace.tolerance,
+                numbers: EXACTER * trace.tolerance,
+            },
         },
         known: Vec::new(),
         tried: 0,
@@ -166,9 +176,11 @@ impl Run<'_, '_> {
 
     /// The map of so many cells, reached from an equilibrium. Critical points on the way that
     /// lie on no known curve begin new ones; one after the other, so that they are the same on
-    /// any number of threads.
+    /// any number of threads, and in longer steps than those of the trace, for the map alone.
     fn map(&mut self, size: [usize; 2], first: AtRest, boundary: &mut Boundary) -> BoundaryMap {
-        let accuracy = self.how.accuracy;
+        let accuracy = self.how.accuracy.tips;
+        self.how.longest = self.how.longest.max(OF_MAP);
+        self.how.accuracy.numbers = accuracy;
         let mut cells = Cells::new(self.plane, size, boundary.joined);
         let mut next = Some(cells.begin(first, &self.known));
         while let Some(unexplained) = next {

@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use crate::branch::{Equations, Family};
+use crate::branch::{Equations, Family, Stuck, on_finer};
 use crate::leaf::{Field, Grid, State};
 use crate::limit::Limit;
 use crate::memory::Request;
@@ -61,6 +61,15 @@ pub enum MarginProgress {
         push: Option<(Direction, f64)>,
     },
 }
+
+/// Largest difference of the softest eigenvalue on two grids in a row, as a part of it.
+const ALIKE: f64 = 0.25;
+
+/// Nodes of the finest grid on which that is sought.
+const MOST_NODES: usize = 5_000;
+
+/// Why there is no margin of a leaf without such a grid.
+const UNDECIDED: &str = "its softest eigenvalue cannot be told from zero on any grid tried";
 
 /// Brings a leaf to rest and finds how far it is from losing its stability, as
 /// [`Equilibrium::margin`].
@@ -144,7 +153,10 @@ fn margin(
     progress: &mut (dyn FnMut(&MarginProgress) + Send),
 ) -> Result<Margin, MarginError> {
     let clock = Instant::now();
-    let (grid, state) = walking_grid(scenario, levels);
+    let (grid, state) = match walking_grid(scenario, levels) {
+        Ok(found) => found,
+        Err(why) => return Ok(Margin::none(why)),
+    };
     let (rods, segments) = (scenario.rods.len(), grid.segments());
     (Request::Branches { rods, segments }.weigh()).map_err(RelaxError::Memory)?;
     let weight = weight(scenario);
@@ -201,28 +213,42 @@ fn margin(
     })
 }
 
-/// The leaf on the coarsest grid of its relaxation on which it is stable, as on the
-/// finest.
-fn walking_grid(scenario: &Scenario, levels: &[Level]) -> (Grid, State) {
+/// The leaf on the coarsest grid that has its softest eigenvalue as the next finer one has:
+/// next to a bifurcation a coarse grid has another one. Or why there is none.
+fn walking_grid(scenario: &Scenario, levels: &[Level]) -> Result<(Grid, State), &'static str> {
     let make = |_: f64| Ok(scenario.clone());
-    let family = Family::new(&make, (0.0, 1.0), false);
+    let family = Family::new(&make, (0.0, 1.0), false).map_err(|_| UNDECIDED)?;
     let first = levels[0].leaf.segments();
-    let on = |level: &Level| (level.leaf.grid.clone(), level.state.clone());
-    let stable = |level: &&Level| {
-        let equations = family.as_ref().ok();
-        let equations = equations.map(|family| Equations::new(family, level.leaf.grid.clone()));
-        let Some(Ok(mut equations)) = equations else {
-            return false;
-        };
-        let found = equations.correct(&level.state, 0.0, None);
-        found.is_ok_and(|(point, _)| point.index == 0)
-    };
-    let last = &levels[levels.len() - 1];
     let mut nested = levels.iter().filter(|level| {
         let segments = level.leaf.segments();
         segments.is_multiple_of(first) && (segments / first).is_power_of_two()
     });
-    on(nested.find(stable).unwrap_or(last))
+    let on_level = |level: &Level| {
+        let mut equations = Equations::new(&family, level.leaf.grid.clone())?;
+        let (point, _) = equations.correct(&level.state, 0.0, None)?;
+        Ok::<_, Stuck>((equations, point))
+    };
+    let mut now = on_level(&levels[0]).map_err(|_| UNDECIDED)?;
+    nested.next();
+    loop {
+        let softest = now.0.softest(&now.1).map_err(|_| UNDECIDED)?;
+        let finer = match nested.next() {
+            Some(level) => on_level(level),
+            None => on_finer(&mut now.0, &now.1),
+        };
+        let (mut equations, point) = finer.map_err(|_| UNDECIDED)?;
+        let next = equations.softest(&point).map_err(|_| UNDECIDED)?;
+        if now.1.index == 0 && point.index == 0 && (next - softest).abs() < ALIKE * next {
+            return Ok((now.0.grid().clone(), now.1.state));
+        }
+        if point.state.rods() * point.state.segments() > MOST_NODES {
+            return Err(match point.index {
+                0 => UNDECIDED,
+                _ => "the leaf is unstable on grids finer than those of its relaxation",
+            });
+        }
+        now = (equations, point);
+    }
 }
 
 /// Weight of a leaf.
