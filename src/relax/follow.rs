@@ -135,11 +135,7 @@ impl AtRest {
             }
         }
         let work = run.work;
-        let mut levels = run.levels;
-        if let Some(between) = run.between {
-            levels.insert(levels.len() - 1, between);
-        }
-        Ok(AtRest::on(levels, work))
+        Ok(AtRest::on(run.levels, work))
     }
 
     /// The best value of what is `on` each grid.

@@ -3,6 +3,7 @@
 
 use crate::leaf::{DiscreteLeaf, Leaf, State, System, whole_of};
 use crate::newton::{Contraction, Work};
+use crate::relax::defect::{self, Linear};
 use crate::relax::method::Method;
 use crate::relax::options::{Options, Progress};
 use crate::relax::richardson::Richardson;
@@ -12,14 +13,11 @@ use glam::DVec3;
 /// Segments of the coarsest grid, in two panels or more if profiles have kinks.
 pub const COARSEST: usize = 8;
 
-/// Growth of errors of single grids by extrapolation, sum of the weights at most:
-/// over halved grids, and with one between the finest two.
+/// Growth of errors of single grids by extrapolation, sum of the weights at most.
 const EXTRAPOLATED: f64 = 2.0;
-const EXTRAPOLATED_BETWEEN: f64 = 6.3;
 
-/// Growth of the estimate from two grids of which the coarser is one of a loose
-/// tolerance: it may miss layers that the coupling makes.
-const TWO_COARSE: f64 = 1.5;
+/// Safety factor on the error that the defect of the extrapolated leaf tells.
+const SAFETY: f64 = 2.0;
 
 /// Part of the rounding error that grows with the number of segments.
 const ROUNDING: f64 = 4e-15;
@@ -52,13 +50,11 @@ pub struct Run<'a, 'o> {
     pub work: Work,
     pub saddle: Option<Saddle>,
     pub levels: Vec<Level>,
-    /// The leaf on a grid between the finest two, if their extrapolation has it too.
-    pub between: Option<Level>,
-    /// What that changed, times a safety factor: so near to the finest two, it may
-    /// have gained nothing where layers are thin, and the last correction does
-    /// not tell.
-    pub change: Option<f64>,
     pub table: Richardson,
+    /// The error of the best values as their defect tells it, if that is known, and the
+    /// equations that tell it.
+    pub defect: Option<f64>,
+    pub linear: Option<Linear>,
     pub index: Option<usize>,
     /// Largest iteration error left on any grid.
     pub remaining: f64,
@@ -98,9 +94,9 @@ impl<'a, 'o> Run<'a, 'o> {
             work: Work::default(),
             saddle: None,
             levels: Vec::new(),
-            between: None,
-            change: None,
             table: Richardson::default(),
+            defect: None,
+            linear: None,
             index: None,
             remaining: 0.0,
             contraction: Contraction::default(),
@@ -127,7 +123,7 @@ impl<'a, 'o> Run<'a, 'o> {
         self.moved_softened = false;
         self.saddle = None;
         self.levels.clear();
-        self.drop_between();
+        self.tabulate();
         self.effects = [None; 2];
         self.index = None;
         self.remaining = 0.0;
@@ -141,10 +137,10 @@ impl<'a, 'o> Run<'a, 'o> {
         let reduced = self.leaf;
         let complete = |level: &Level| complete(reduced, whole, level);
         self.levels = self.levels.iter().map(complete).collect();
-        self.between = self.between.as_ref().map(complete);
         self.leaf = whole;
+        let defect = self.defect;
         self.tabulate();
-        self
+        Run { defect, ..self }
     }
 
     /// Segments of the only grid, if there is to be one.
@@ -175,16 +171,19 @@ impl<'a, 'o> Run<'a, 'o> {
     /// of the extrapolation, of unfinished iterations, and of rounding.
     pub fn error(&self) -> Option<f64> {
         let segments = self.levels.last()?.leaf.segments();
-        let best = self.table.best()?;
-        let extrapolation = match self.levels.as_slice() {
-            [first, _] if self.too_coarse(first.leaf.segments()) => TWO_COARSE * best.error,
-            _ => best.error.max(self.change.unwrap_or(0.0)),
+        let extrapolation = match self.defect {
+            Some(error) => SAFETY * error,
+            None => self.table.best()?.error,
         };
-        let growth = match self.between {
-            Some(_) => EXTRAPOLATED_BETWEEN,
-            None => EXTRAPOLATED,
-        };
-        Some(extrapolation + growth * self.remaining + ROUNDING * segments as f64)
+        Some(extrapolation + EXTRAPOLATED * self.remaining + ROUNDING * segments as f64)
+    }
+
+    /// Estimates the error of the best values from their defect.
+    pub fn judge_accuracy(&mut self) {
+        self.defect = self
+            .table
+            .best()
+            .and_then(|best| defect::error(&self.levels, best.columns, &mut self.linear));
     }
 
     /// Whether unfinished iterations and rounding alone are more than the
@@ -202,37 +201,23 @@ impl<'a, 'o> Run<'a, 'o> {
 
     /// Adds the next finer grid.
     pub fn push(&mut self, level: Level) {
-        self.between = None;
-        self.change = None;
         self.levels.push(level);
         self.tabulate();
     }
 
-    /// Leaves the grid between out, as where refinement goes on.
-    pub fn drop_between(&mut self) {
-        self.between = None;
-        self.change = None;
-        self.tabulate();
-    }
-
-    /// The grids that are extrapolated, from coarse to fine.
-    pub fn series(&self) -> Vec<&Level> {
-        let mut series: Vec<_> = self.levels.iter().collect();
-        if let Some(between) = &self.between {
-            series.insert(series.len() - 1, between);
-        }
-        series
-    }
-
+    /// Tabulates the positions on all grids, of which nothing else is known then.
     pub fn tabulate(&mut self) {
         let mut table = Richardson::default();
-        let series = self.series();
-        for level in &series {
+        for level in &self.levels {
             let segments = level.leaf.segments();
-            let stride = segments / series[0].leaf.segments();
+            let stride = segments / self.levels[0].leaf.segments();
             table.push(segments, positions(level, stride));
         }
         self.table = table;
+        self.defect = None;
+        if self.levels.len() <= 2 {
+            self.linear = None;
+        }
     }
 }
 

@@ -130,9 +130,5 @@ fn finished(run: Run, end: Result<bool, Stop>, clock: Instant) -> (Equilibrium, 
     let modes = end.ok().and_then(|_| modes::lowest(&run));
     let mut found = result::equilibrium(&run, outcome, remark, seconds);
     found.stability.modes = modes;
-    let mut levels = run.levels;
-    if let Some(between) = run.between {
-        levels.insert(levels.len() - 1, between);
-    }
-    (found, levels)
+    (found, run.levels)
 }
