@@ -31,6 +31,8 @@ pub struct Flow<'a> {
     stage: Vec<GroupFields>,
     /// Of each stage, and group.
     slopes: Vec<Vec<GroupFields>>,
+    /// Where the slopes are taken.
+    sections: Vec<Section>,
 }
 
 impl<'a> Flow<'a> {
@@ -54,6 +56,7 @@ impl<'a> Flow<'a> {
                 .collect(),
             stage: fields.clone(),
             slopes: vec![fields.clone(); STAGES],
+            sections: Vec::with_capacity(leaf.rods()),
             fields,
         }
     }
@@ -98,19 +101,16 @@ impl<'a> Flow<'a> {
     fn step(&mut self, sigma: f64, h: f64) {
         for i in 0..STAGES {
             self.combine(h, A[i]);
-            let (stage, out) = (&self.stage, &mut self.slopes[i]);
-            let at = sigma + C[i] * h;
-            for (g, out) in out.iter_mut().enumerate() {
-                let rods = rods_of(g, self.leaf.rods());
-                let mut kernel = Slopes {
-                    stage: &stage[g],
-                    loads: self.loads[g],
-                    beside: beside(stage, rods, self.leaf.rods()),
-                    sections: rods.map(|j| self.leaf.leaf.section(j, at, 1.0)),
-                    out,
-                };
-                run(self.arch, &mut kernel);
-            }
+            let (leaf, at) = (&self.leaf.leaf, sigma + C[i] * h);
+            self.sections.clear();
+            (self.sections).extend((0..leaf.rods()).map(|j| leaf.section(j, at, 1.0)));
+            let mut kernel = Slopes {
+                stage: &self.stage,
+                loads: &self.loads,
+                sections: &self.sections,
+                out: &mut self.slopes[i],
+            };
+            run(self.arch, &mut kernel);
         }
         self.combine(h, &B);
         std::mem::swap(&mut self.fields, &mut self.stage);
@@ -129,11 +129,13 @@ impl<'a> Flow<'a> {
 }
 
 /// The rods of a group; lanes without a rod repeat the last.
+#[inline(always)]
 fn rods_of(group: usize, rods: usize) -> [usize; GROUP] {
     std::array::from_fn(|lane| (GROUP * group + lane).min(rods - 1))
 }
 
 /// Positions of the rods before and behind, or their own where there is none.
+#[inline(always)]
 fn beside(stage: &[GroupFields], of: [usize; GROUP], rods: usize) -> [[DVec3; GROUP]; 2] {
     let x = |j: usize| DVec3::from_array([0, 1, 2].map(|c| stage[j / GROUP][c].0[j % GROUP]));
     [
@@ -143,23 +145,27 @@ fn beside(stage: &[GroupFields], of: [usize; GROUP], rods: usize) -> [[DVec3; GR
 }
 
 struct Slopes<'a> {
-    stage: &'a GroupFields,
-    loads: [RodLoad; GROUP],
-    beside: [[DVec3; GROUP]; 2],
-    sections: [Section; GROUP],
-    out: &'a mut GroupFields,
+    stage: &'a [GroupFields],
+    loads: &'a [[RodLoad; GROUP]],
+    sections: &'a [Section],
+    out: &'a mut [GroupFields],
 }
 
 impl Kernel for Slopes<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
-        let fields = Fields::of(simd, self.stage, part);
-        let [before, behind] = self.beside.map(|x| Vectors::gather(simd, x, part));
-        let loads = RodLoads::gather(simd, self.loads, part);
-        let (force, _) = loads.at([before, fields.x, behind], [1.0; 2], false);
-        let [a, b, c, d] = &self.sections;
-        let sections = Sections::gather(simd, [a, b, c, d], part);
-        fields.slopes(&sections, force).put(self.out, part);
+        let count = self.sections.len();
+        for (g, out) in self.out.iter_mut().enumerate() {
+            let rods = rods_of(g, count);
+            let fields = Fields::of(simd, &self.stage[g], part);
+            let [before, behind] =
+                beside(self.stage, rods, count).map(|x| Vectors::gather(simd, x, part));
+            let loads = RodLoads::gather(simd, self.loads[g], part);
+            let (force, _) = loads.at([before, fields.x, behind], [1.0; 2], false);
+            let sections = rods.map(|j| &self.sections[j]);
+            let sections = Sections::gather(simd, sections, part);
+            fields.slopes(&sections, force).put(out, part);
+        }
     }
 }
 

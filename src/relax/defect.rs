@@ -1,55 +1,62 @@
 //! The error of an extrapolated leaf from its defect.
 //!
-//! The equilibrium equations are integrated from neighbouring nodes of the coarsest grid,
-//! where the extrapolated leaf is known best, to the middle between them, by a method of
-//! order 8. Where its two values of position, rotation, force and moment do not agree the
-//! equations are not met; to first order the error is the answer of the leaf to these
-//! jumps. The linear equations are those of the second grid: their own error is one of
-//! second order, of an error.
+//! The equilibrium equations are integrated from the nodes of the coarsest grid, where the
+//! extrapolated leaf is known best, to the middles between them, by a method of order 8.
+//! Where the two values of position, rotation, force or moment do not agree the equations
+//! are not met; to first order the error is the answer of the leaf to these jumps. The linear equations are those of a coarse grid: their own error is one of second
+//! order, of an error.
 
 use crate::leaf::{Flow, Jump, RodFields, Solved, System, shift};
 use crate::relax::fields::nodes;
 use crate::relax::run::Level;
 use crate::rotation;
 
-/// Segments of the finest grid for which the integration makes a step.
-const SEGMENTS_A_STEP: usize = 4;
+/// The linear equations are those of so many grids before the finest, but not of the
+/// coarsest.
+const COARSER: usize = 2;
+
+/// Segments of the finest grid for which the integration makes a step, and the most
+/// steps from a node to the middle.
+const SEGMENTS_A_STEP: usize = 2;
+const MOST_STEPS: usize = 16;
 
 /// Relative accuracy, in the energy norm, of the answer: of a stiff leaf most of that
 /// norm is stretch, and displacements are a small part of it.
 const ACCURACY: f64 = 1e-6;
 
-/// The factorised equations of the second grid.
-pub type Linear = System;
+/// The factorised equations of one of the grids.
+pub struct Linear {
+    grid: usize,
+    system: System,
+}
 
 /// The largest error of a position at the nodes of the coarsest grid of the leaf on
 /// `levels`, from coarse to fine, each with twice the segments of the one before, with
 /// `columns` extrapolations. `None` where the linear equations cannot be solved.
 pub fn error(levels: &[Level], columns: usize, linear: &mut Option<Linear>) -> Option<f64> {
-    let [first, second, ..] = levels else {
-        return None;
-    };
-    let system = match linear {
-        Some(system) => system,
-        None => linear.insert(factorized(second)?),
-    };
-    let jumps = jumps(levels, columns);
-    second.leaf.assemble_jumps(&second.state, &jumps, system);
+    let grid = (levels.len().checked_sub(2)? + 1)
+        .saturating_sub(COARSER)
+        .max(1);
+    if linear.as_ref().is_none_or(|linear| linear.grid != grid) {
+        let system = factorized(&levels[grid])?;
+        *linear = Some(Linear { grid, system });
+    }
+    let (Level { leaf, state }, system) = (&levels[grid], &mut linear.as_mut()?.system);
+    leaf.assemble_jumps(state, &jumps(levels, columns), system);
     let Solved::Yes(_) = system.solve(None, ACCURACY) else {
         return None;
     };
-    let stride = second.leaf.segments() / first.leaf.segments();
-    let error = |rod: &Vec<_>| {
-        let known = rod.iter().skip(stride - 1).step_by(stride);
-        known.map(|node| shift(node).length()).fold(0.0, f64::max)
-    };
-    let errors = system.solution().iter().map(error).collect::<Vec<_>>();
-    // Not f64::max alone, which would hide a NaN.
-    let error = errors.iter().copied().fold(0.0, f64::max);
-    errors
+    let stride = leaf.segments() / levels[0].leaf.segments();
+    let solution = system.solution();
+    let known = solution
         .iter()
-        .all(|error| error.is_finite())
-        .then_some(error)
+        .flat_map(|rod| rod.iter().skip(stride - 1).step_by(stride));
+    // Not f64::max, which would hide a NaN.
+    known
+        .map(|node| shift(node).length())
+        .try_fold(0.0, |largest: f64, error| {
+            error.is_finite().then_some(largest.max(error))
+        })
 }
 
 fn factorized(level: &Level) -> Option<System> {
@@ -64,21 +71,18 @@ fn factorized(level: &Level) -> Option<System> {
 
 /// The jumps in the middles between the nodes of the coarsest grid.
 fn jumps(levels: &[Level], columns: usize) -> Vec<Vec<Jump>> {
-    let (leaf, sigma) = (&levels[1].leaf, levels[1].leaf.grid.sigma());
-    let known = nodes(levels, columns);
-    let panels = levels[0].leaf.segments();
-    let finest = levels[levels.len() - 1].leaf.segments();
-    let steps = (finest / (2 * panels)).div_ceil(SEGMENTS_A_STEP);
-    let mut flow = Flow::new(leaf);
-    let mut jumps = vec![Vec::with_capacity(panels); leaf.rods()];
-    for i in 0..panels {
-        let mut from = |node: usize| {
-            let begin = |j: usize| known[j][node];
-            flow.carry(begin, [sigma[2 * node], sigma[2 * i + 1]], steps)
-        };
-        let (before, behind) = (from(i), from(i + 1));
-        for ((jumps, a), b) in jumps.iter_mut().zip(before).zip(behind) {
-            jumps.push(jump(&a, &b));
+    let (first, finest) = (&levels[0].leaf, &levels[levels.len() - 1].leaf);
+    let (known, grid) = (nodes(levels, columns), &first.grid);
+    let half = finest.segments() / first.segments() / 2;
+    let steps = (half / SEGMENTS_A_STEP).clamp(1, MOST_STEPS);
+    let mut flow = Flow::new(first);
+    let mut jumps = vec![Vec::with_capacity(first.segments()); first.rods()];
+    for i in 0..first.segments() {
+        let mut to_middle =
+            |k: usize| flow.carry(|j| known[j][k], [grid.sigma()[k], grid.middle(i)], steps);
+        let (before, behind) = (to_middle(i), to_middle(i + 1));
+        for ((jumps, before), behind) in jumps.iter_mut().zip(&before).zip(&behind) {
+            jumps.push(jump(before, behind));
         }
     }
     jumps

@@ -19,6 +19,9 @@ const EXTRAPOLATED: f64 = 2.0;
 /// Safety factor on the error that the defect of the extrapolated leaf tells.
 const SAFETY: f64 = 2.0;
 
+/// What the last corrections tell of the error is too large by less than this.
+const HOPELESS: f64 = 3e3;
+
 /// Part of the rounding error that grows with the number of segments.
 const ROUNDING: f64 = 4e-15;
 
@@ -180,10 +183,10 @@ impl<'a, 'o> Run<'a, 'o> {
 
     /// Estimates the error of the best values from their defect.
     pub fn judge_accuracy(&mut self) {
-        self.defect = self
-            .table
-            .best()
-            .and_then(|best| defect::error(&self.levels, best.columns, &mut self.linear));
+        let best = self.table.best();
+        let near = best.filter(|best| best.error <= HOPELESS * self.tolerance);
+        self.defect =
+            near.and_then(|best| defect::error(&self.levels, best.columns, &mut self.linear));
     }
 
     /// Whether unfinished iterations and rounding alone are more than the
@@ -215,7 +218,7 @@ impl<'a, 'o> Run<'a, 'o> {
         }
         self.table = table;
         self.defect = None;
-        if self.levels.len() <= 2 {
+        if self.levels.len() < 2 {
             self.linear = None;
         }
     }

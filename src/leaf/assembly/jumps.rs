@@ -6,42 +6,37 @@ use crate::leaf::state::State;
 use crate::leaf::system::System;
 use glam::DVec3;
 
-/// Jumps of a rod's position, rotation, force and moment: how much larger they are where
-/// they come to, from the base, than where they go on.
+/// Jumps of a rod's position, rotation, force and moment at a node: what they are before
+/// it, seen from the base, less what they are behind it.
 pub type Jump = [DVec3; 4];
 
 impl DiscreteLeaf {
-    /// Writes the right-hand side of the change, to first order, of a leaf that has no
-    /// `jumps`, from one that has them, rod after rod at every second node from 1 on.
-    ///
-    /// The segment before such a node ends in another place than the next begins: seen
-    /// from its end it is the node that jumps back, and what it carries does.
+    /// Writes the right-hand side of the change, to first order, by which a leaf loses
+    /// its `jumps`, rod after rod in the middles of so many equal parts.
     pub fn assemble_jumps(&self, state: &State, jumps: &[Vec<Jump>], system: &mut System) {
         let n = self.segments();
         let mut rhs = vec![vec![[0.0; 6]; n]; self.rods()];
-        for (j, rod) in jumps.iter().enumerate() {
+        for (rhs, (j, rod)) in rhs.iter_mut().zip(jumps.iter().enumerate()) {
             for (k, &[shift, turn, force, moment]) in rod.iter().enumerate() {
-                let i = 2 * k;
+                // The segment behind the node begins where the one before ends.
+                let part = n / rod.len();
+                let i = k * part + part / 2;
                 let section = self.section(j, i);
                 let segment = self.segment(state, j, i, state.n[j * n + i]);
-                let second = segment.hessian(section);
-                let (_, _, end_moment) = segment.gradient(section);
-                let pull = second.xx * shift + second.xb * turn;
-                let at_begin = second.xa.transpose() * shift + second.ab * turn;
-                // The last term: a moment along the lab axes does not turn with its node.
-                let at_end =
-                    second.xb.transpose() * shift + second.bb * turn + 0.5 * turn.cross(end_moment);
+                let (second, (_, held, _)) = (segment.hessian(section), segment.gradient(section));
+                let pull = second.xa * turn - second.xx * shift;
+                // A moment along the lab axes does not turn with its node.
+                let at_begin =
+                    second.aa * turn - second.xa.transpose() * shift + 0.5 * turn.cross(held);
+                let at_end = second.ab.transpose() * turn - second.xb.transpose() * shift;
                 let mut add = |node: usize, moment: DVec3, force: DVec3| {
-                    let Some(node) = node.checked_sub(1) else {
-                        return;
-                    };
                     for c in 0..3 {
-                        rhs[j][node][c] += moment[c];
-                        rhs[j][node][3 + c] += force[c];
+                        rhs[node - 1][c] += moment[c];
+                        rhs[node - 1][3 + c] += force[c];
                     }
                 };
-                add(i, at_begin, -pull);
-                add(i + 1, at_end - moment, pull - force);
+                add(i, -at_begin - moment, pull - force);
+                add(i + 1, -at_end, -pull);
             }
         }
         system.set_rhs(&rhs);
