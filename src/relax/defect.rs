@@ -6,10 +6,11 @@
 //! are not met; to first order the error is the answer of the leaf to these jumps. The linear equations are those of a coarse grid: their own error is one of second
 //! order, of an error.
 
-use crate::leaf::{Flow, Jump, RodFields, Solved, System, shift};
+use crate::leaf::{DiscreteLeaf, Flow, Jump, RodFields, Solved, System, shift};
 use crate::relax::fields::nodes;
 use crate::relax::run::Level;
 use crate::rotation;
+use glam::DVec3;
 
 /// The linear equations are those of so many grids before the finest, but not of the
 /// coarsest.
@@ -72,7 +73,9 @@ fn factorized(level: &Level) -> Option<System> {
 /// The jumps in the middles between the nodes of the coarsest grid.
 fn jumps(levels: &[Level], columns: usize) -> Vec<Vec<Jump>> {
     let (first, finest) = (&levels[0].leaf, &levels[levels.len() - 1].leaf);
-    let (known, grid) = (nodes(levels, columns), &first.grid);
+    let (mut known, grid) = (nodes(levels, columns), &first.grid);
+    let tips = known.iter_mut().filter_map(|rod| rod.last_mut()).collect();
+    balance(first, tips);
     let half = finest.segments() / first.segments() / 2;
     let steps = (half / SEGMENTS_A_STEP).clamp(1, MOST_STEPS);
     let mut flow = Flow::new(first);
@@ -86,6 +89,31 @@ fn jumps(levels: &[Level], columns: usize) -> Vec<Vec<Jump>> {
         }
     }
     jumps
+}
+
+/// Makes forces and moments at the tips meet their conditions, which unfinished
+/// iterations leave open: the equations of the discrete leaf have no other.
+fn balance(leaf: &DiscreteLeaf, mut tips: Vec<&mut RodFields>) {
+    let held = leaf.leaf.held.as_ref();
+    let clamped = held.is_some_and(|held| held.clamps.is_some());
+    let share = 1.0 / tips.len() as f64;
+    let mut missing: DVec3 = (tips.iter().enumerate())
+        .map(|(j, tip)| share * (leaf.tip_force(j) - tip.n))
+        .sum();
+    if leaf.leaf.in_half() {
+        // The image balances what is across the plane.
+        missing.y = 0.0;
+    }
+    for (j, tip) in tips.iter_mut().enumerate() {
+        match held {
+            Some(_) => {}
+            None if leaf.leaf.joined() => tip.n += missing,
+            None => tip.n = leaf.tip_force(j),
+        }
+        if !clamped {
+            tip.m = leaf.tip_moment();
+        }
+    }
 }
 
 fn jump(a: &RodFields, b: &RodFields) -> Jump {

@@ -18,10 +18,6 @@ type Node = [f64; FIELDS];
 /// products of distances, 14.8 to 120.
 const AT_ENDS: f64 = 0.125;
 
-/// Safety factor on the error of interpolation: of 1,000 stated errors none was too low by
-/// more than half of this.
-const SAFETY: f64 = 2.5;
-
 /// Segments of the coarsest grid whose nodes are stations enough.
 const STATIONS: usize = 8;
 
@@ -238,7 +234,7 @@ fn correct(
             }
         }
     }
-    SAFETY * errors.error(AT_ENDS)
+    errors.error(AT_ENDS)
 }
 
 fn minus(a: &Node, b: &Node) -> Node {
