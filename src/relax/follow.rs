@@ -98,7 +98,6 @@ impl AtRest {
         let scale = scenario.scale();
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
         let leaf = Leaf::in_units(scenario, scale);
-        // The grid between two others is found again if it is needed.
         let nested = |level: &&Level| {
             let first = self.levels[0].leaf.segments();
             (level.leaf.segments() / first).is_power_of_two()
