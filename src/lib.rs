@@ -216,6 +216,7 @@ pub mod scenario;
 pub mod shape;
 pub mod simulate;
 pub mod study;
+mod tableau;
 pub mod undulation;
 
 #[cfg(feature = "cli")]

@@ -56,18 +56,21 @@ impl Verdict {
         }
     }
 
-    /// No more than `stray` estimates are wrong, and at least half of the estimates are within 150
-    /// times the error: those that rest on a grid between the finest two are less sharp.
-    fn assert(mut self, what: &str, stray: usize) {
+    /// None is wrong, and at least half of the estimates are within 10 times the error.
+    fn assert(mut self, what: &str) {
         self.ratios.sort_by(f64::total_cmp);
         let count = self.ratios.len();
         let quantile = |part: f64| self.ratios[(part * (count - 1) as f64) as usize];
-        let sharp = self.ratios.iter().filter(|ratio| **ratio <= 150.0).count();
+        let sharp = self.ratios.iter().filter(|ratio| **ratio <= 10.0).count();
         let quantiles = [0.0, 0.25, 0.5, 0.75, 1.0].map(quantile);
-        println!("{what}: {count} estimates / errors: {quantiles:.2?}; {sharp} within 150");
+        println!("{what}: {count} estimates / errors: {quantiles:.2?}; {sharp} within 10");
         let wrong = self.wrong;
-        let few = wrong.len() <= stray && quantiles[0] > 1.0 / 3.0;
-        assert!(few, "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
+        assert!(
+            wrong.is_empty(),
+            "{} wrong:\n{}",
+            wrong.len(),
+            wrong.join("\n")
+        );
         assert!(count > 10 && 2 * sharp >= count, "{sharp} of {count}");
     }
 }
@@ -83,7 +86,7 @@ fn of_the_papers_leaves_with_five_veins() {
     }
     // Its bend near the base is between the nodes of the coarsest grid.
     verdict.judge("undulation", &scenario("study/undulation", ""));
-    verdict.assert("paper", 0);
+    verdict.assert("paper");
 }
 
 #[test]
@@ -93,7 +96,7 @@ fn of_the_classic_problems() {
         let scenario = read(&file, "");
         verdict.judge(&scenario.name, &scenario);
     }
-    verdict.assert("classic", 0);
+    verdict.assert("classic");
 }
 
 /// Strong couplings and strong loads confine the bending to layers near the
@@ -124,7 +127,7 @@ fn of_boundary_layers() {
         leaf.tip_force = [0.1, 0.2, 0.3];
         verdict.judge(&format!("weight {load}"), &leaf);
     }
-    verdict.assert("layers", 0);
+    verdict.assert("layers");
 }
 
 #[test]
@@ -133,13 +136,11 @@ fn of_random_leaves() {
     for (case, leaf) in drawn(leaves(), 200).iter().enumerate() {
         verdict.judge(&format!("leaf {case}"), leaf);
     }
-    // An estimate from three grids can be fooled, but by little, and one time in
-    // hundreds.
-    verdict.assert("random", 5);
+    verdict.assert("random");
 }
 
-/// Where the shape is told only after more grids, as of a saddle that is kept,
-/// a grid between the finest two does not stay among them.
+/// The estimate of a saddle that is kept, whose linear equations conjugate gradients do
+/// not solve.
 #[test]
 fn of_a_saddle_that_is_kept() {
     for (k, tolerance) in (4..9).flat_map(|k| [1e-6, 1e-7, 3e-8, 1e-8].map(|t| (k, t))) {

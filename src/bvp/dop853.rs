@@ -1,7 +1,7 @@
 //! Initial-value problems by the method DOP853 with step control.
 
 use super::equations::{Equations, RodState, STATE};
-use super::tableau::{A, B, C, E3, E5, STAGES};
+use crate::tableau::{A, B, C, E3, E5, STAGES};
 
 /// Steps of one initial-value problem before it is given up.
 const MAX_STEPS: usize = 20_000;

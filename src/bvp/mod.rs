@@ -49,7 +49,6 @@ mod propagate;
 mod solution;
 mod solve;
 mod state;
-mod tableau;
 mod trajectory;
 
 pub use solution::{

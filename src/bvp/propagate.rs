@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use super::dop853::Integrator;
 use super::equations::{Derivatives, Equations, TANGENT};
-use super::tableau::{A, B, C, STAGES};
+use crate::tableau::{A, B, C, STAGES};
 use glam::DMat3;
 
 /// The linearised equations at the stages of one step.

@@ -127,6 +127,11 @@ impl Leaf {
         self.planar
     }
 
+    /// Whether it is half of a leaf that is its own mirror image.
+    pub fn in_half(&self) -> bool {
+        self.mirrored
+    }
+
     /// Part of rod `j` that belongs to the leaf, or to its half.
     pub fn share(&self, j: usize) -> f64 {
         if self.in_plane(j) { 0.5 } else { 1.0 }

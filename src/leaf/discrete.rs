@@ -284,6 +284,11 @@ impl DiscreteLeaf {
         }
     }
 
+    /// Force on the tip of rod `j`: its share if the tips are one.
+    pub fn tip_force(&self, j: usize) -> DVec3 {
+        self.rod_load(j).tip
+    }
+
     /// Dead load and coupling on node `i` of rod `j`, and its share of the
     /// potential energy (a gap's belongs to its lower rod).
     pub fn load(&self, state: &State, j: usize, i: usize) -> (DVec3, f64) {

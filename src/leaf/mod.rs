@@ -5,6 +5,7 @@ mod assembly;
 mod chain;
 mod dimensionless;
 mod discrete;
+mod flow;
 mod grid;
 mod loads;
 mod rate;
@@ -14,8 +15,10 @@ mod state;
 mod system;
 
 pub use crate::scenario::Scale;
+pub use assembly::Jump;
 pub use dimensionless::{Leaf, Loads};
 pub use discrete::DiscreteLeaf;
+pub use flow::{Flow, RodFields};
 pub use grid::Grid;
 pub use rate::{Forces, LeafRate, Response};
 pub use reduce::{half_of, whole_of};

@@ -1,6 +1,6 @@
 //! The fields along the veins, extrapolated over the grids.
 
-use crate::leaf::DiscreteLeaf;
+use crate::leaf::{DiscreteLeaf, RodFields};
 use crate::relax::place::{Measures, Place, Values};
 use crate::relax::richardson::Richardson;
 use crate::relax::run::Level;
@@ -105,6 +105,28 @@ pub fn fields(
         rods: rods.collect(),
         between,
     }
+}
+
+/// What the leaf is, with `columns` extrapolations, at the nodes of the coarsest grid, rod
+/// after rod, dimensionless.
+pub fn nodes(levels: &[Level], columns: usize) -> Vec<Vec<RodFields>> {
+    let (first, finest) = (&levels[0], &levels[levels.len() - 1]);
+    let used: Vec<&Level> = levels[levels.len() - 1 - columns..].iter().collect();
+    let node = |values: &Node| {
+        let vector = |k: usize| DVec3::from_slice(&values[k..]);
+        let q = DQuat::from_slice(&values[3..]).normalize();
+        RodFields {
+            x: vector(0),
+            q,
+            n: q * vector(7),
+            m: q * vector(10),
+        }
+    };
+    let rod = |j: usize| {
+        let nodes = RodNodes::new(&used, finest, j).extrapolated(first.leaf.segments());
+        nodes.iter().map(node).collect()
+    };
+    (0..first.leaf.rods()).map(rod).collect()
 }
 
 /// How many times more the last grid changed the positions at the nodes of the one

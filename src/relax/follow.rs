@@ -98,7 +98,6 @@ impl AtRest {
         let scale = scenario.scale();
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
         let leaf = Leaf::in_units(scenario, scale);
-        // The grid between two others is found again if it is needed.
         let nested = |level: &&Level| {
             let first = self.levels[0].leaf.segments();
             (level.leaf.segments() / first).is_power_of_two()
@@ -135,11 +134,7 @@ impl AtRest {
             }
         }
         let work = run.work;
-        let mut levels = run.levels;
-        if let Some(between) = run.between {
-            levels.insert(levels.len() - 1, between);
-        }
-        Ok(AtRest::on(levels, work))
+        Ok(AtRest::on(run.levels, work))
     }
 
     /// The best value of what is `on` each grid.

@@ -3,14 +3,12 @@
 use crate::leaf::{Grid, State};
 use crate::memory::Request;
 use crate::newton::Stop;
-use crate::relax::method::Method;
 use crate::relax::options::MAX_NODES;
 use crate::relax::predict::predict;
 use crate::relax::prolong::{prolong, restrict};
 use crate::relax::run::{BUDGET, Level, Run, positions};
 use crate::relax::segments::{COARSEST_TURN, FINEST};
 use crate::relax::settle::{InitialGuess, Settled};
-use glam::{DQuat, DVec3};
 
 /// Two grids on which the leaf moved far are said to have settled in the same place
 /// if no coordinate of a station differs by more than this, in lengths.
@@ -21,10 +19,6 @@ const FINEST_LANDING: usize = 256;
 
 /// The finest grid that is tried when coarser ones do not resolve the bending.
 const FINEST_RESOLVING: usize = 2048;
-
-/// Where the error estimate is to become smaller by no more than this, a grid
-/// between the finest two is enough.
-const BETWEEN: f64 = 30.0;
 
 impl Run<'_, '_> {
     /// From the start to rest, on as many grids as the tolerance needs; returns
@@ -54,7 +48,8 @@ impl Run<'_, '_> {
     /// Refines until the tolerance is reached.
     pub fn refine(&mut self) -> Result<bool, Stop> {
         loop {
-            if (self.accurate() || self.accurate_with_between()) && self.judge_stability()? {
+            self.judge_accuracy();
+            if self.accurate() && self.judge_stability()? {
                 return Ok(true);
             }
             if self.late() {
@@ -194,41 +189,6 @@ impl Run<'_, '_> {
         }
         self.last = last;
         self.tabulate();
-    }
-
-    /// Whether a grid between the finest two makes the extrapolation accurate
-    /// enough: it gains about as much as one twice as fine as the finest, for
-    /// three eighths of its segments.
-    fn accurate_with_between(&mut self) -> bool {
-        let [.., coarse, _, _] = self.levels.as_slice() else {
-            return false;
-        };
-        let near = (self.error()).is_some_and(|error| error <= BETWEEN * self.tolerance);
-        let clean = (self.table.best()).is_some_and(|best| best.columns + 1 == self.levels.len());
-        if !near || !clean || !matches!(self.options.method, Method::SemiImplicit(_)) {
-            return false;
-        }
-        let grid = coarse.leaf.grid.tripled();
-        let nodes = self.leaf.rods() * (grid.segments() + 1);
-        let (x, q) = (vec![DVec3::ZERO; nodes], vec![DQuat::IDENTITY; nodes]);
-        let mut state = State::new(grid.segments(), x, q);
-        predict(&self.levels.iter().collect::<Vec<_>>(), &mut state);
-        // Stability is judged on the finest grid.
-        let last = self.last.take();
-        let Settled { level, rest, .. } = self.settle(grid, InitialGuess::Predicted(state));
-        self.last = last;
-        if rest.is_err() {
-            return false;
-        }
-        let without = self.table.clone();
-        self.between = Some(level);
-        self.tabulate();
-        self.change = self.table.judged_by(&without);
-        let accurate = self.accurate();
-        if !accurate {
-            self.drop_between();
-        }
-        accurate
     }
 }
 

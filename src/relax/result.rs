@@ -23,7 +23,7 @@ pub fn equilibrium(
     let (scenario, scale) = (run.leaf.scenario(), run.leaf.scale);
     let best = run.table.best();
     let columns = best.map_or(0, |best| best.columns);
-    let series = run.series();
+    let series: Vec<&Level> = run.levels.iter().collect();
     let error = run.error();
     let Fields {
         stations,

@@ -3,6 +3,7 @@
 
 use crate::leaf::{DiscreteLeaf, Leaf, State, System, whole_of};
 use crate::newton::{Contraction, Work};
+use crate::relax::defect::{self, Linear};
 use crate::relax::method::Method;
 use crate::relax::options::{Options, Progress};
 use crate::relax::richardson::Richardson;
@@ -12,14 +13,14 @@ use glam::DVec3;
 /// Segments of the coarsest grid, in two panels or more if profiles have kinks.
 pub const COARSEST: usize = 8;
 
-/// Growth of errors of single grids by extrapolation, sum of the weights at most:
-/// over halved grids, and with one between the finest two.
+/// Growth of errors of single grids by extrapolation, sum of the weights at most.
 const EXTRAPOLATED: f64 = 2.0;
-const EXTRAPOLATED_BETWEEN: f64 = 6.3;
 
-/// Growth of the estimate from two grids of which the coarser is one of a loose
-/// tolerance: it may miss layers that the coupling makes.
-const TWO_COARSE: f64 = 1.5;
+/// Safety factor on the error that the defect of the extrapolated leaf tells.
+const SAFETY: f64 = 2.0;
+
+/// What the last corrections tell of the error is too large by less than this.
+const HOPELESS: f64 = 3e3;
 
 /// Part of the rounding error that grows with the number of segments.
 const ROUNDING: f64 = 4e-15;
@@ -52,13 +53,11 @@ pub struct Run<'a, 'o> {
     pub work: Work,
     pub saddle: Option<Saddle>,
     pub levels: Vec<Level>,
-    /// The leaf on a grid between the finest two, if their extrapolation has it too.
-    pub between: Option<Level>,
-    /// What that changed, times a safety factor: so near to the finest two, it may
-    /// have gained nothing where layers are thin, and the last correction does
-    /// not tell.
-    pub change: Option<f64>,
     pub table: Richardson,
+    /// The error of the best values as their defect tells it, if that is known, and the
+    /// equations that tell it.
+    pub defect: Option<f64>,
+    pub linear: Option<Linear>,
     pub index: Option<usize>,
     /// Whether the lowest eigenvalue is clearly positive.
     pub clearly: bool,
@@ -100,9 +99,9 @@ impl<'a, 'o> Run<'a, 'o> {
             work: Work::default(),
             saddle: None,
             levels: Vec::new(),
-            between: None,
-            change: None,
             table: Richardson::default(),
+            defect: None,
+            linear: None,
             index: None,
             clearly: false,
             remaining: 0.0,
@@ -130,7 +129,7 @@ impl<'a, 'o> Run<'a, 'o> {
         self.moved_softened = false;
         self.saddle = None;
         self.levels.clear();
-        self.drop_between();
+        self.tabulate();
         self.effects = [None; 2];
         self.index = None;
         self.remaining = 0.0;
@@ -144,11 +143,13 @@ impl<'a, 'o> Run<'a, 'o> {
         let reduced = self.leaf;
         let complete = |level: &Level| complete(reduced, whole, level);
         self.levels = self.levels.iter().map(complete).collect();
-        self.between = self.between.as_ref().map(complete);
         self.leaf = whole;
         self.whole = None;
+        let defect = self.defect;
         self.tabulate();
-        self
+        // The equations are those of the reduced leaf.
+        self.linear = None;
+        Run { defect, ..self }
     }
 
     /// Segments of the only grid, if there is to be one.
@@ -179,16 +180,19 @@ impl<'a, 'o> Run<'a, 'o> {
     /// of the extrapolation, of unfinished iterations, and of rounding.
     pub fn error(&self) -> Option<f64> {
         let segments = self.levels.last()?.leaf.segments();
-        let best = self.table.best()?;
-        let extrapolation = match self.levels.as_slice() {
-            [first, _] if self.too_coarse(first.leaf.segments()) => TWO_COARSE * best.error,
-            _ => best.error.max(self.change.unwrap_or(0.0)),
+        let extrapolation = match self.defect {
+            Some(error) => SAFETY * error,
+            None => self.table.best()?.error,
         };
-        let growth = match self.between {
-            Some(_) => EXTRAPOLATED_BETWEEN,
-            None => EXTRAPOLATED,
-        };
-        Some(extrapolation + growth * self.remaining + ROUNDING * segments as f64)
+        Some(extrapolation + EXTRAPOLATED * self.remaining + ROUNDING * segments as f64)
+    }
+
+    /// Estimates the error of the best values from their defect.
+    pub fn judge_accuracy(&mut self) {
+        let best = self.table.best();
+        let near = best.filter(|best| best.error <= HOPELESS * self.tolerance);
+        self.defect =
+            near.and_then(|best| defect::error(&self.levels, best.columns, &mut self.linear));
     }
 
     /// Whether unfinished iterations and rounding alone are more than the
@@ -206,37 +210,23 @@ impl<'a, 'o> Run<'a, 'o> {
 
     /// Adds the next finer grid.
     pub fn push(&mut self, level: Level) {
-        self.between = None;
-        self.change = None;
         self.levels.push(level);
         self.tabulate();
     }
 
-    /// Leaves the grid between out, as where refinement goes on.
-    pub fn drop_between(&mut self) {
-        self.between = None;
-        self.change = None;
-        self.tabulate();
-    }
-
-    /// The grids that are extrapolated, from coarse to fine.
-    pub fn series(&self) -> Vec<&Level> {
-        let mut series: Vec<_> = self.levels.iter().collect();
-        if let Some(between) = &self.between {
-            series.insert(series.len() - 1, between);
-        }
-        series
-    }
-
+    /// Tabulates the positions on all grids, of which nothing else is known then.
     pub fn tabulate(&mut self) {
         let mut table = Richardson::default();
-        let series = self.series();
-        for level in &series {
+        for level in &self.levels {
             let segments = level.leaf.segments();
-            let stride = segments / series[0].leaf.segments();
+            let stride = segments / self.levels[0].leaf.segments();
             table.push(segments, positions(level, stride));
         }
         self.table = table;
+        self.defect = None;
+        if self.levels.len() < 2 {
+            self.linear = None;
+        }
     }
 }
 

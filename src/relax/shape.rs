@@ -25,8 +25,8 @@ pub fn node(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> NodeState
         let left = leaf.grid.width(i - 1);
         let right = if i < n { leaf.grid.width(i) } else { 0.0 };
         let mut load = leaf.load(state, j, i).0;
-        if i == n && (j == 0 || !leaf.leaf.joined()) {
-            load -= leaf.leaf.loads.tip_force;
+        if i == n {
+            load -= leaf.tip_force(j);
         }
         let force = carried(i - 1) - load * (left / (left + right));
         (force, segment(i - 1).2)

@@ -151,11 +151,7 @@ fn finished(
         found.doubts.push(UNDECIDED.to_owned());
     }
     found.stability.modes = lowest.map(|it| it.modes).filter(|_| asked > 0);
-    let mut levels = run.levels;
-    if let Some(between) = run.between {
-        levels.insert(levels.len() - 1, between);
-    }
-    (found, levels)
+    (found, run.levels)
 }
 
 /// Of a leaf with an eigenvalue that may have either sign.

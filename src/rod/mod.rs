@@ -1,11 +1,13 @@
 //! Segments of rods: their sections, strains, energy and derivatives.
 
+mod balance;
 mod element;
 mod planar;
 mod section;
 mod segment;
 mod spatial;
 
+pub use balance::{FIELDS, Fields, GroupFields};
 pub use element::{Element, Nodes};
 pub use planar::PlanarElement;
 pub use section::{Section, Sections};

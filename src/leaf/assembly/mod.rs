@@ -1,7 +1,10 @@
 //! A discretised leaf's unbalanced forces, its matrix, its energy.
 
 mod held;
+mod jumps;
 mod kernels;
+
+pub use self::jumps::Jump;
 
 use self::kernels::{Advance, Assemble, Rods, Stiffen};
 use super::chain::{GroupMatrix, place};

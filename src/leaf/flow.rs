@@ -1,0 +1,197 @@
+//! The fields of a leaf carried along its rods by the equilibrium equations: by the
+//! explicit Runge-Kutta method of order 8 of Dormand and Prince, in equal steps.
+
+use super::discrete::DiscreteLeaf;
+use super::loads::{RodLoad, RodLoads};
+use crate::lanes::{Four, GROUP, Kernel, Lanes, Vectors, arch, run};
+use crate::rod::{FIELDS, Fields, GroupFields, Section, Sections};
+use crate::tableau::{A, B, C, STAGES};
+use glam::{DQuat, DVec3};
+use pulp::{Arch, Simd};
+
+/// One rod at one sigma, along the lab axes.
+#[derive(Clone, Copy, Debug)]
+pub struct RodFields {
+    /// Position.
+    pub x: DVec3,
+    /// Rotation.
+    pub q: DQuat,
+    /// Force that the part beyond exerts.
+    pub n: DVec3,
+    /// Moment that it exerts.
+    pub m: DVec3,
+}
+
+/// Integrates the equations of all rods of a leaf.
+pub struct Flow<'a> {
+    leaf: &'a DiscreteLeaf,
+    arch: Arch,
+    loads: Vec<[RodLoad; GROUP]>,
+    fields: Vec<GroupFields>,
+    stage: Vec<GroupFields>,
+    /// Of each stage, and group.
+    slopes: Vec<Vec<GroupFields>>,
+    /// Where the slopes are taken.
+    sections: Vec<Section>,
+}
+
+impl<'a> Flow<'a> {
+    /// Of the rods of `leaf`, on any grid.
+    pub fn new(leaf: &'a DiscreteLeaf) -> Self {
+        let load = |j: usize| {
+            let mut load = leaf.rod_load(j);
+            if leaf.leaf.in_plane(j) {
+                // The image of its neighbour pulls it back into the plane.
+                load.before.y = 0.0;
+            }
+            load
+        };
+        let groups = leaf.rods().div_ceil(GROUP);
+        let fields = vec![[Four::default(); FIELDS]; groups];
+        Flow {
+            leaf,
+            arch: arch(),
+            loads: (0..groups)
+                .map(|group| rods_of(group, leaf.rods()).map(load))
+                .collect(),
+            stage: fields.clone(),
+            slopes: vec![fields.clone(); STAGES],
+            sections: Vec::with_capacity(leaf.rods()),
+            fields,
+        }
+    }
+
+    /// The rods, which are as `begin` says at sigma = `from`, at `to`.
+    pub fn carry(
+        &mut self,
+        begin: impl Fn(usize) -> RodFields,
+        [from, to]: [f64; 2],
+        steps: usize,
+    ) -> Vec<RodFields> {
+        let rods = self.leaf.rods();
+        for (g, group) in self.fields.iter_mut().enumerate() {
+            for (lane, j) in rods_of(g, rods).into_iter().enumerate() {
+                let RodFields { x, q, n, m } = begin(j);
+                let vectors = [(0, x), (3, DVec3::new(q.x, q.y, q.z)), (7, n), (10, m)];
+                for (first, vector) in vectors {
+                    for c in 0..3 {
+                        group[first + c].0[lane] = vector[c];
+                    }
+                }
+                group[6].0[lane] = q.w;
+            }
+        }
+        let h = (to - from) / steps as f64;
+        for step in 0..steps {
+            self.step(from + h * step as f64, h);
+        }
+        let rod = |j: usize| {
+            let number = |k: usize| self.fields[j / GROUP][k].0[j % GROUP];
+            let vector = |k: usize| DVec3::new(number(k), number(k + 1), number(k + 2));
+            RodFields {
+                x: vector(0),
+                q: DQuat::from_xyzw(number(3), number(4), number(5), number(6)).normalize(),
+                n: vector(7),
+                m: vector(10),
+            }
+        };
+        (0..rods).map(rod).collect()
+    }
+
+    fn step(&mut self, sigma: f64, h: f64) {
+        for i in 0..STAGES {
+            self.combine(h, A[i]);
+            let (leaf, at) = (&self.leaf.leaf, sigma + C[i] * h);
+            self.sections.clear();
+            (self.sections).extend((0..leaf.rods()).map(|j| leaf.section(j, at, 1.0)));
+            let mut kernel = Slopes {
+                stage: &self.stage,
+                loads: &self.loads,
+                sections: &self.sections,
+                out: &mut self.slopes[i],
+            };
+            run(self.arch, &mut kernel);
+        }
+        self.combine(h, &B);
+        std::mem::swap(&mut self.fields, &mut self.stage);
+    }
+
+    /// Makes the stage the fields plus h times the sum of weights times slopes.
+    fn combine(&mut self, h: f64, weights: &[f64]) {
+        let mut kernel = Combine {
+            fields: &self.fields,
+            slopes: &self.slopes,
+            weights: (h, weights),
+            out: &mut self.stage,
+        };
+        run(self.arch, &mut kernel);
+    }
+}
+
+/// The rods of a group; lanes without a rod repeat the last.
+#[inline(always)]
+fn rods_of(group: usize, rods: usize) -> [usize; GROUP] {
+    std::array::from_fn(|lane| (GROUP * group + lane).min(rods - 1))
+}
+
+/// Positions of the rods before and behind, or their own where there is none.
+#[inline(always)]
+fn beside(stage: &[GroupFields], of: [usize; GROUP], rods: usize) -> [[DVec3; GROUP]; 2] {
+    let x = |j: usize| DVec3::from_array([0, 1, 2].map(|c| stage[j / GROUP][c].0[j % GROUP]));
+    [
+        of.map(|j| x(j.saturating_sub(1))),
+        of.map(|j| x((j + 1).min(rods - 1))),
+    ]
+}
+
+struct Slopes<'a> {
+    stage: &'a [GroupFields],
+    loads: &'a [[RodLoad; GROUP]],
+    sections: &'a [Section],
+    out: &'a mut [GroupFields],
+}
+
+impl Kernel for Slopes<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        let count = self.sections.len();
+        for (g, out) in self.out.iter_mut().enumerate() {
+            let rods = rods_of(g, count);
+            let fields = Fields::of(simd, &self.stage[g], part);
+            let [before, behind] =
+                beside(self.stage, rods, count).map(|x| Vectors::gather(simd, x, part));
+            let loads = RodLoads::gather(simd, self.loads[g], part);
+            let (force, _) = loads.at([before, fields.x, behind], [1.0; 2], false);
+            let sections = rods.map(|j| &self.sections[j]);
+            let sections = Sections::gather(simd, sections, part);
+            fields.slopes(&sections, force).put(out, part);
+        }
+    }
+}
+
+struct Combine<'a> {
+    fields: &'a [GroupFields],
+    slopes: &'a [Vec<GroupFields>],
+    weights: (f64, &'a [f64]),
+    out: &'a mut [GroupFields],
+}
+
+impl Kernel for Combine<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, part: usize) {
+        let (h, weights) = self.weights;
+        for (g, out) in self.out.iter_mut().enumerate() {
+            for (k, out) in out.iter_mut().enumerate() {
+                let mut sum = Lanes::splat(simd, 0.0);
+                for (weight, slopes) in weights.iter().zip(self.slopes) {
+                    if *weight != 0.0 {
+                        let slope = Lanes::of(simd, &slopes[g][k], part);
+                        sum = slope.times(Lanes::splat(simd, *weight), sum);
+                    }
+                }
+                let field = Lanes::of(simd, &self.fields[g][k], part);
+                sum.times(Lanes::splat(simd, h), field).put(out, part);
+            }
+        }
+    }
+}
