@@ -98,13 +98,7 @@ impl AtRest {
         let scale = scenario.scale();
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
         let leaf = Leaf::in_units(scenario, scale);
-        let nested = |level: &&Level| {
-            let first = self.levels[0].leaf.segments();
-            (level.leaf.segments() / first).is_power_of_two()
-                && level.leaf.segments().is_multiple_of(first)
-        };
         let guesses: Vec<_> = (self.levels.iter().enumerate())
-            .filter(|(_, level)| nested(level))
             .map(|(k, level)| {
                 let mut state = moved(level, &leaf, &answer[k]);
                 leaf.hold_tips(&mut state);

@@ -50,6 +50,9 @@ const ZERO: f64 = 4.0;
 /// Relative error of an eigenvalue by unfinished iterations, as a part of the tolerance.
 const UNFINISHED: f64 = 2e-3;
 
+/// The tolerance of modes of which the signs alone are wanted.
+const SIGNS: f64 = 1e-2;
+
 /// Accuracy of eigenvectors, times the root of the tolerance: that of eigenvalues is the
 /// square of it. No better than this.
 const ACCURACY: f64 = 5e-3;
@@ -83,10 +86,14 @@ pub fn lowest(run: &Run, count: usize, anyway: bool) -> Option<Lowest> {
         return None;
     }
     let physics = Physics::new(run.leaf);
+    let tolerance = match options.modes {
+        0 => SIGNS,
+        _ => run.tolerance,
+    };
     let on = |level: &Level, near: &[Eigenpair]| {
         let wanted = Wanted {
             count,
-            accuracy: (ACCURACY * run.tolerance.sqrt()).max(LEAST_ACCURACY),
+            accuracy: (ACCURACY * tolerance.sqrt()).max(LEAST_ACCURACY),
             near,
             time: &options.limit,
         };
@@ -95,7 +102,7 @@ pub fn lowest(run: &Run, count: usize, anyway: bool) -> Option<Lowest> {
     let mut series = Series {
         index: run.index.unwrap_or(0),
         grids: Vec::new(),
-        tolerance: run.tolerance,
+        tolerance,
         rounding: 0.0,
     };
     let mut before: Option<(&Level, Vec<Eigenpair>)> = None;

@@ -13,9 +13,8 @@ const POINTS: usize = 7;
 /// interpolants.
 const SEGMENTS: usize = 4;
 
-/// Predicts the state on another grid, the finest one refined or one between the
-/// finest two: the polynomial in ds^2 through the states on nested `levels`, from
-/// coarse to fine. Along the panels between kinks these are polynomials as well; in
+/// Predicts the state on the finest grid refined: the polynomial in ds^2 through the states
+/// on nested `levels`, from coarse to fine. Along the panels between kinks these are polynomials as well; in
 /// panels of few segments `state`, the finest one prolonged, is kept as the finest
 /// grid's part of it.
 pub fn predict(levels: &[&Level], state: &mut State) {

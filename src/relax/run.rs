@@ -19,7 +19,8 @@ const EXTRAPOLATED: f64 = 2.0;
 /// Safety factor on the error that the defect of the extrapolated leaf tells.
 const SAFETY: f64 = 2.0;
 
-/// What the last corrections tell of the error is too large by less than this.
+/// Where the last correction is so many times the tolerance the defect is not asked: it
+/// would hardly be small enough.
 const HOPELESS: f64 = 3e3;
 
 /// Part of the rounding error that grows with the number of segments.
