@@ -194,7 +194,7 @@ fn the_travel_of_a_grip_is_followed() {
         let key = travel.split('=').next().unwrap();
         for point in &branch.points {
             let there = format!("{arch}; {key}={:?}", point.value);
-            let leaf = settle(&held_rod("clamped", &there), 1e-10);
+            let leaf = settle(&held_rod("clamped", &there), 1e-11);
             let error = point.error.unwrap();
             assert!(error > 0.0 && error < 1e-8, "{error:e}");
             // If its middle is off by the error, forces of some hundred bear it.

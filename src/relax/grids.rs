@@ -3,6 +3,7 @@
 use crate::leaf::{Grid, State};
 use crate::memory::Request;
 use crate::newton::Stop;
+use crate::relax::fields::fields;
 use crate::relax::options::MAX_NODES;
 use crate::relax::predict::predict;
 use crate::relax::prolong::{prolong, restrict};
@@ -49,7 +50,7 @@ impl Run<'_, '_> {
     pub fn refine(&mut self) -> Result<bool, Stop> {
         loop {
             self.judge_accuracy();
-            if self.accurate() && self.judge_stability()? {
+            if self.accurate() && self.judge_stability()? && !self.lacks_nodes() {
                 return Ok(true);
             }
             if self.late() {
@@ -61,6 +62,26 @@ impl Run<'_, '_> {
             };
             self.settle_on(finer)?;
         }
+    }
+
+    /// Whether the nodes of the finest grid are asked for and the leaf is not accurate
+    /// enough at them: that is worth one more grid.
+    fn lacks_nodes(&mut self) -> bool {
+        if !self.options.every_node || self.for_nodes || self.finer().is_none() {
+            return false;
+        }
+        let levels: Vec<&Level> = self.levels.iter().collect();
+        let columns = self.table.best().map_or(0, |best| best.columns);
+        let fields = fields(&levels, columns, self.error(), self.tolerance, true);
+        self.for_nodes = fields.stations.len() <= levels[levels.len() - 1].leaf.segments();
+        self.for_nodes
+    }
+
+    /// Goes on, with all unknowns of a leaf at rest, to a `finer` grid.
+    pub fn go_on(&mut self, finer: Grid) -> Result<bool, Stop> {
+        (self.solved, self.planar) = (self.leaf.rods(), self.leaf.planar());
+        self.settle_on(finer)?;
+        self.refine()
     }
 
     /// The next finer grid, if there may be one.

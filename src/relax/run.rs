@@ -19,6 +19,10 @@ const EXTRAPOLATED: f64 = 2.0;
 /// Safety factor on the error that the defect of the extrapolated leaf tells.
 const SAFETY: f64 = 2.0;
 
+/// The error that the last correction tells, of which it is at most so many times: the answer
+/// of a neutral mode to rounding is no error.
+const LARGEST: f64 = 10.0;
+
 /// Where the last correction is so many times the tolerance the defect is not asked: it
 /// would hardly be small enough.
 const HOPELESS: f64 = 3e3;
@@ -59,6 +63,8 @@ pub struct Run<'a, 'o> {
     /// equations that tell it.
     pub defect: Option<f64>,
     pub linear: Option<Linear>,
+    /// Whether a grid was added for the nodes of the finest one.
+    pub for_nodes: bool,
     pub index: Option<usize>,
     /// Whether the lowest eigenvalue is clearly positive.
     pub clearly: bool,
@@ -103,6 +109,7 @@ impl<'a, 'o> Run<'a, 'o> {
             table: Richardson::default(),
             defect: None,
             linear: None,
+            for_nodes: false,
             index: None,
             clearly: false,
             remaining: 0.0,
@@ -181,9 +188,10 @@ impl<'a, 'o> Run<'a, 'o> {
     /// of the extrapolation, of unfinished iterations, and of rounding.
     pub fn error(&self) -> Option<f64> {
         let segments = self.levels.last()?.leaf.segments();
+        let best = self.table.best()?.error;
         let extrapolation = match self.defect {
-            Some(error) => SAFETY * error,
-            None => self.table.best()?.error,
+            Some(error) => (SAFETY * error).min(LARGEST * best),
+            None => best,
         };
         Some(extrapolation + EXTRAPOLATED * self.remaining + ROUNDING * segments as f64)
     }

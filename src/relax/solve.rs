@@ -132,20 +132,21 @@ fn finished(
         Some(0) if !run.clearly => asked.max(1),
         _ => asked,
     };
-    let mut seconds = clock.elapsed().as_secs_f64();
+    let result = |run: &Run, end: Result<bool, Stop>| {
+        let (outcome, remark) = result::outcome(run, end);
+        result::equilibrium(run, outcome, remark, clock.elapsed().as_secs_f64())
+    };
+    let mut found = result(&run, end);
     let mut lowest = end.ok().and_then(|_| modes::lowest(&run, count, false));
     // Next to a bifurcation a grid may count what the leaf has not.
     while let Some(finer) = modes::telling(&run, lowest.as_ref()) {
-        let clock = Instant::now();
-        end = run.decide_stability(finer);
-        seconds += clock.elapsed().as_secs_f64();
+        end = run.go_on(finer);
+        found = result(&run, end);
         lowest = end.ok().and_then(|_| modes::lowest(&run, count, true));
     }
     if asked == 0 {
-        seconds = clock.elapsed().as_secs_f64();
+        found.wall_seconds = clock.elapsed().as_secs_f64();
     }
-    let (outcome, remark) = result::outcome(&run, end);
-    let mut found = result::equilibrium(&run, outcome, remark, seconds);
     found.doubts = plausible::doubts(run.leaf.scenario(), &found);
     if lowest.as_ref().is_some_and(|it| it.undecided.is_some()) {
         found.doubts.push(UNDECIDED.to_owned());

@@ -1,6 +1,6 @@
 //! Judging the stability of a leaf at rest, and leaving saddles.
 
-use crate::leaf::{Grid, System};
+use crate::leaf::System;
 use crate::newton::Stop;
 use crate::relax::run::{Level, Run, complete};
 use crate::relax::saddle::{self, saddle_of};
@@ -13,14 +13,6 @@ use glam::DVec3;
 const CLEARLY: f64 = 0.1;
 
 impl Run<'_, '_> {
-    /// Counts the negative eigenvalues of a leaf at rest, with all of its unknowns, anew on
-    /// a `finer` grid.
-    pub fn decide_stability(&mut self, finer: Grid) -> Result<bool, Stop> {
-        (self.solved, self.planar) = (self.leaf.rods(), self.leaf.planar());
-        self.settle_on(finer)?;
-        self.refine()
-    }
-
     /// Negative eigenvalues on one grid; notes whether they are clearly none.
     fn count(&mut self, level: &Level, system: &mut System) -> Option<usize> {
         let mut below = |shift: f64| {
