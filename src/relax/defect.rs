@@ -9,7 +9,7 @@
 
 use crate::leaf::{DiscreteLeaf, Flow, Jump, RodFields, Solved, System, shift};
 use crate::relax::fields::nodes;
-use crate::relax::run::Level;
+use crate::relax::level::Level;
 use crate::rotation;
 use glam::DVec3;
 

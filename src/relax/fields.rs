@@ -1,9 +1,9 @@
 //! The fields along the veins, extrapolated over the grids.
 
 use crate::leaf::{DiscreteLeaf, RodFields};
+use crate::relax::level::Level;
 use crate::relax::place::{Measures, Place, Values};
 use crate::relax::richardson::Richardson;
-use crate::relax::run::Level;
 use crate::relax::shape;
 use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};

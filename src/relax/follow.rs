@@ -3,9 +3,10 @@
 
 use crate::leaf::{Leaf, Response, State};
 use crate::newton::{Stop, Work};
+use crate::relax::level::{Level, positions};
 use crate::relax::options::{Options, Progress, RelaxError};
 use crate::relax::richardson::Richardson;
-use crate::relax::run::{Level, Run, positions};
+use crate::relax::run::Run;
 use crate::relax::solve::relax_on_grids;
 use crate::relax::stencil::Stencil;
 use crate::relax::{Equilibrium, Outcome};

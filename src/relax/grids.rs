@@ -4,10 +4,11 @@ use crate::leaf::{Grid, State};
 use crate::memory::Request;
 use crate::newton::Stop;
 use crate::relax::fields::fields;
+use crate::relax::level::{Level, positions};
 use crate::relax::options::MAX_NODES;
 use crate::relax::predict::predict;
 use crate::relax::prolong::{prolong, restrict};
-use crate::relax::run::{BUDGET, Level, Run, positions};
+use crate::relax::run::{BUDGET, Run};
 use crate::relax::segments::{COARSEST_TURN, FINEST};
 use crate::relax::settle::{InitialGuess, Settled};
 

@@ -9,6 +9,7 @@ mod follow;
 mod grids;
 mod grip;
 pub(crate) mod index;
+pub(crate) mod level;
 mod margin;
 mod method;
 mod methods;
@@ -45,6 +46,7 @@ pub use equilibrium::{
 };
 pub(crate) use follow::{AtRest, Grids, Lost, extrapolation};
 pub(crate) use index::{index_near, project};
+pub(crate) use level::Level;
 pub use margin::{Barrier, Direction, Fate, Loss, Margin, Neighbour, Push};
 pub use method::{Method, SemiImplicit, Settings, Unfit, UnknownMethod};
 pub(crate) use methods::shooting::{START as SHOOTING_START, check_intervals};
@@ -54,7 +56,6 @@ pub use options::{
     check_tolerance,
 };
 pub use request::Relaxation;
-pub(crate) use run::Level;
 pub use saddle::Saddle;
 pub(crate) use saddle::polish;
 pub(crate) use segments::check_segments;

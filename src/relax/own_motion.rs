@@ -10,8 +10,9 @@
 use crate::leaf::{DiscreteLeaf, Grid, System};
 use crate::motion::{Method as _, Physics, SemiImplicit, Steps};
 use crate::newton::Stop;
+use crate::relax::level::Level;
 use crate::relax::method::{Method, SemiImplicit as How};
-use crate::relax::run::{Level, Run};
+use crate::relax::run::Run;
 use crate::relax::saddle;
 use crate::relax::settle::InitialGuess;
 

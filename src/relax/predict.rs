@@ -1,8 +1,8 @@
 //! What the leaf at rest on nested grids tells of it on another one.
 
 use crate::leaf::{Grid, State};
+use crate::relax::level::Level;
 use crate::relax::prolong::lagrange;
-use crate::relax::run::Level;
 use crate::rotation;
 use glam::{DQuat, DVec3};
 

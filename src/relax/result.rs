@@ -5,9 +5,10 @@ use crate::relax::equilibrium::{
     Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
 };
 use crate::relax::fields::{Fields, fields};
+use crate::relax::level::Level;
 use crate::relax::method::Method;
 use crate::relax::richardson::Richardson;
-use crate::relax::run::{Level, Run};
+use crate::relax::run::Run;
 use crate::shape::RodShape;
 use crate::undulation::{Centerline, Undulation};
 use glam::DVec3;

@@ -1,9 +1,10 @@
 //! A run over nested grids: what is asked, the grids the leaf has settled on,
 //! and the error estimate of their extrapolation.
 
-use crate::leaf::{DiscreteLeaf, Leaf, State, System, whole_of};
+use crate::leaf::{Leaf, System};
 use crate::newton::{Contraction, Work};
 use crate::relax::defect::{self, Linear};
+use crate::relax::level::{Level, complete, positions};
 use crate::relax::method::Method;
 use crate::relax::options::{Options, Progress};
 use crate::relax::richardson::Richardson;
@@ -33,13 +34,6 @@ const ROUNDING: f64 = 4e-15;
 /// Nodes times force evaluations after which a leaf that has not come to rest
 /// is given up: some seconds.
 pub const BUDGET: usize = 4_000_000;
-
-/// A leaf settled on one grid.
-#[derive(Clone)]
-pub struct Level {
-    pub leaf: DiscreteLeaf,
-    pub state: State,
-}
 
 /// What is asked, and what was found so far.
 pub struct Run<'a, 'o> {
@@ -237,27 +231,4 @@ impl<'a, 'o> Run<'a, 'o> {
             self.linear = None;
         }
     }
-}
-
-/// The leaf with all of its unknowns, of which `reduced` is settled.
-pub fn complete(reduced: &Leaf, whole: &Leaf, level: &Level) -> Level {
-    Level {
-        leaf: match reduced.rods() == whole.rods() {
-            true => level.leaf.with_leaf(whole),
-            false => DiscreteLeaf::new(whole, level.leaf.grid.clone()),
-        },
-        state: whole_of(reduced, &level.state),
-    }
-}
-
-/// Positions of all rods at every `stride`-th node, dimensionless.
-pub fn positions(level: &Level, stride: usize) -> Vec<f64> {
-    let n = level.leaf.segments();
-    let nodes = |j: usize| {
-        (0..=n)
-            .step_by(stride)
-            .map(move |i| level.state.base(j) + i)
-    };
-    let nodes = (0..level.leaf.rods()).flat_map(nodes);
-    nodes.flat_map(|k| level.state.x[k].to_array()).collect()
 }

@@ -2,11 +2,12 @@
 
 use crate::leaf::{DiscreteLeaf, Grid, Solved, State, System, half_of};
 use crate::newton::{Definite, Newton, Stop};
+use crate::relax::level::Level;
 use crate::relax::method::{Method, SemiImplicit};
 use crate::relax::methods::semi_implicit::Relaxation;
 use crate::relax::methods::{explicit, moment};
 use crate::relax::options::Progress;
-use crate::relax::run::{BUDGET, Level, Run};
+use crate::relax::run::{BUDGET, Run};
 use crate::relax::saddle::{self, saddle_of};
 use crate::relax::start::{disturb, start};
 use glam::DVec3;

@@ -2,7 +2,8 @@
 
 use crate::leaf::System;
 use crate::newton::Stop;
-use crate::relax::run::{Level, Run, complete};
+use crate::relax::level::{Level, complete};
+use crate::relax::run::Run;
 use crate::relax::saddle::{self, saddle_of};
 use crate::relax::settle::{InitialGuess, MAX_SADDLES, Settled};
 use glam::DVec3;

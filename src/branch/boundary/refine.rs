@@ -11,8 +11,8 @@ use crate::branch::refine_critical::{BY_PARABOLA, FINER, NEARLY_RIGID, SOFTENING
 use crate::branch::refined::Doubt;
 use crate::leaf::Grid;
 use crate::newton::Contraction;
+use crate::relax::level::Level;
 use crate::relax::predict::{predict, weights};
-use crate::relax::run::Level;
 
 /// Grids of a point at least and at most, those of a nearly rigid leaf, and segments of
 /// the finest.

@@ -4,7 +4,7 @@
 use crate::leaf::{DiscreteLeaf, Leaf, LeafRate, Response, State};
 use crate::modes::{self, LoadedMode};
 use crate::motion::Physics;
-use crate::relax::run::Level;
+use crate::relax::level::Level;
 use crate::relax::sensitivity::response::moved;
 use crate::scenario::Scenario;
 use glam::DVec3;

@@ -4,7 +4,7 @@ use crate::leaf::{
     DiscreteLeaf, Field, Forces, LeafRate, Response, Solved, SparseFactor, SparsePattern, State,
     System,
 };
-use crate::relax::run::Level;
+use crate::relax::level::Level;
 use crate::rod::Segment;
 use crate::rotation;
 use glam::DVec3;

@@ -1,0 +1,33 @@
+//! A leaf at rest on one grid.
+
+use crate::leaf::{DiscreteLeaf, Leaf, State, whole_of};
+
+/// A leaf settled on one grid.
+#[derive(Clone)]
+pub struct Level {
+    pub leaf: DiscreteLeaf,
+    pub state: State,
+}
+
+/// The leaf with all of its unknowns, of which `reduced` is settled.
+pub fn complete(reduced: &Leaf, whole: &Leaf, level: &Level) -> Level {
+    Level {
+        leaf: match reduced.rods() == whole.rods() {
+            true => level.leaf.with_leaf(whole),
+            false => DiscreteLeaf::new(whole, level.leaf.grid.clone()),
+        },
+        state: whole_of(reduced, &level.state),
+    }
+}
+
+/// Positions of all rods at every `stride`-th node, dimensionless.
+pub fn positions(level: &Level, stride: usize) -> Vec<f64> {
+    let n = level.leaf.segments();
+    let nodes = |j: usize| {
+        (0..=n)
+            .step_by(stride)
+            .map(move |i| level.state.base(j) + i)
+    };
+    let nodes = (0..level.leaf.rods()).flat_map(nodes);
+    nodes.flat_map(|k| level.state.x[k].to_array()).collect()
+}
