@@ -70,15 +70,7 @@ impl Leaf {
     /// The same in given units, in which leaves that differ in length or
     /// stiffness can be compared.
     pub fn in_units(scenario: Arc<Scenario>, scale: Scale) -> Self {
-        let rods = scenario.rods.iter();
-        let profiles = rods.flat_map(|rod| {
-            let triples = [
-                &rod.couple_stiffness,
-                &rod.force_stiffness,
-                &rod.rest_curvature,
-            ];
-            triples.into_iter().flatten().chain([&rod.rest_stretch])
-        });
+        let profiles = scenario.rods.iter().flat_map(law);
         // Those of the masses only matter to a leaf that moves.
         let Dynamics {
             density,
@@ -187,6 +179,12 @@ impl Leaf {
         rotation::exp(self.rod(j).angle * DVec3::Z)
     }
 
+    /// Whether sections are the same all along each rod.
+    pub fn uniform(&self) -> bool {
+        let constant = |profile: &Profile| matches!(profile, Profile::Constant(_));
+        self.scenario.rods.iter().flat_map(law).all(constant)
+    }
+
     /// Section of rod `j` at `sigma`, for a segment that is the fraction
     /// `width` of the rod.
     pub fn section(&self, j: usize, sigma: f64, width: f64) -> Section {
@@ -215,4 +213,14 @@ impl Leaf {
     fn rod(&self, j: usize) -> &Rod {
         &self.scenario.rods[j]
     }
+}
+
+/// All that the law of a rod is made of.
+fn law(rod: &Rod) -> impl Iterator<Item = &Profile> {
+    let triples = [
+        &rod.couple_stiffness,
+        &rod.force_stiffness,
+        &rod.rest_curvature,
+    ];
+    triples.into_iter().flatten().chain([&rod.rest_stretch])
 }

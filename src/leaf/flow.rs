@@ -31,8 +31,10 @@ pub struct Flow<'a> {
     stage: Vec<GroupFields>,
     /// Of each stage, and group.
     slopes: Vec<Vec<GroupFields>>,
-    /// Where the slopes are taken.
+    /// Where the slopes are taken, which is at all sigma alike where nothing changes along
+    /// the rods.
     sections: Vec<Section>,
+    uniform: bool,
 }
 
 impl<'a> Flow<'a> {
@@ -56,18 +58,20 @@ impl<'a> Flow<'a> {
                 .collect(),
             stage: fields.clone(),
             slopes: vec![fields.clone(); STAGES],
-            sections: Vec::with_capacity(leaf.rods()),
+            sections: sections(leaf, 0.0).collect(),
+            uniform: leaf.leaf.uniform(),
             fields,
         }
     }
 
-    /// The rods, which are as `begin` says at sigma = `from`, at `to`.
+    /// The rods, which are as `begin` says at sigma = `from`, after each of so many equal
+    /// `steps` to `to`.
     pub fn carry(
         &mut self,
         begin: impl Fn(usize) -> RodFields,
         [from, to]: [f64; 2],
         steps: usize,
-    ) -> Vec<RodFields> {
+    ) -> Vec<Vec<RodFields>> {
         let rods = self.leaf.rods();
         for (g, group) in self.fields.iter_mut().enumerate() {
             for (lane, j) in rods_of(g, rods).into_iter().enumerate() {
@@ -82,28 +86,31 @@ impl<'a> Flow<'a> {
             }
         }
         let h = (to - from) / steps as f64;
-        for step in 0..steps {
+        let after = |step| {
             self.step(from + h * step as f64, h);
-        }
-        let rod = |j: usize| {
-            let number = |k: usize| self.fields[j / GROUP][k].0[j % GROUP];
-            let vector = |k: usize| DVec3::new(number(k), number(k + 1), number(k + 2));
-            RodFields {
-                x: vector(0),
-                q: DQuat::from_xyzw(number(3), number(4), number(5), number(6)).normalize(),
-                n: vector(7),
-                m: vector(10),
-            }
+            (0..rods).map(|j| self.rod(j)).collect()
         };
-        (0..rods).map(rod).collect()
+        (0..steps).map(after).collect()
+    }
+
+    fn rod(&self, j: usize) -> RodFields {
+        let number = |k: usize| self.fields[j / GROUP][k].0[j % GROUP];
+        let vector = |k: usize| DVec3::new(number(k), number(k + 1), number(k + 2));
+        RodFields {
+            x: vector(0),
+            q: DQuat::from_xyzw(number(3), number(4), number(5), number(6)).normalize(),
+            n: vector(7),
+            m: vector(10),
+        }
     }
 
     fn step(&mut self, sigma: f64, h: f64) {
         for i in 0..STAGES {
             self.combine(h, A[i]);
-            let (leaf, at) = (&self.leaf.leaf, sigma + C[i] * h);
-            self.sections.clear();
-            (self.sections).extend((0..leaf.rods()).map(|j| leaf.section(j, at, 1.0)));
+            if !self.uniform {
+                self.sections.clear();
+                (self.sections).extend(sections(self.leaf, sigma + C[i] * h));
+            }
             let mut kernel = Slopes {
                 stage: &self.stage,
                 loads: &self.loads,
@@ -126,6 +133,12 @@ impl<'a> Flow<'a> {
         };
         run(self.arch, &mut kernel);
     }
+}
+
+/// All rods at one sigma.
+fn sections(leaf: &DiscreteLeaf, sigma: f64) -> impl Iterator<Item = Section> {
+    let leaf = &leaf.leaf;
+    (0..leaf.rods()).map(move |j| leaf.section(j, sigma, 1.0))
 }
 
 /// The rods of a group; lanes without a rod repeat the last.

@@ -21,7 +21,7 @@ pub use discrete::DiscreteLeaf;
 pub use flow::{Flow, RodFields};
 pub use grid::Grid;
 pub use rate::{Forces, LeafRate, Response};
-pub use reduce::{half_of, whole_of};
+pub use reduce::{half_of, whole_fields, whole_of};
 pub use sparse::{Bordered, SparseFactor, SparsePattern};
 pub use state::{Field, Increment, State, shift, turn};
 pub use system::{Solved, System};

@@ -8,8 +8,9 @@
 //! an error.
 
 use crate::leaf::{DiscreteLeaf, Flow, Jump, RodFields, Solved, System, shift};
-use crate::relax::fields::nodes;
+use crate::newton::Work;
 use crate::relax::level::Level;
+use crate::relax::nodes::nodes;
 use crate::rotation;
 use glam::DVec3;
 
@@ -17,52 +18,88 @@ use glam::DVec3;
 /// coarsest.
 const COARSER: usize = 2;
 
-/// Segments of the finest grid for which the integration makes a step, and the most
-/// steps from a node to the middle.
-const SEGMENTS_A_STEP: usize = 2;
-const MOST_STEPS: usize = 16;
-
 /// Relative accuracy, in the energy norm, of the answer: of a stiff leaf most of that
 /// norm is stretch, and displacements are a small part of it.
 const ACCURACY: f64 = 1e-6;
 
 /// The factorised equations of one of the grids.
 pub struct Linear {
-    grid: usize,
-    system: System,
+    /// Which, from coarse to fine.
+    pub grid: usize,
+    pub system: System,
 }
 
-/// The largest error of a position at the nodes of the coarsest grid of the leaf on
-/// `levels`, from coarse to fine, each with twice the segments of the one before, with
-/// `columns` extrapolations. `None` where the linear equations cannot be solved.
-pub fn error(levels: &[Level], columns: usize, linear: &mut Option<Linear>) -> Option<f64> {
-    let grid = (levels.len().checked_sub(2)? + 1)
-        .saturating_sub(COARSER)
-        .max(1);
+/// The grid of which the linear equations are taken for so many.
+pub fn linear_grid(levels: usize) -> usize {
+    (levels.saturating_sub(1)).saturating_sub(COARSER).max(1)
+}
+
+/// What the equilibrium equations tell of a leaf on several grids.
+pub struct Told {
+    /// The largest error of a position at the nodes of the coarsest grid.
+    pub error: f64,
+    /// The largest in the middles between them, on either side.
+    pub between: f64,
+    /// The leaf at the nodes of the finest grid, rod after rod, dimensionless.
+    pub rods: Vec<Vec<RodFields>>,
+}
+
+/// What they tell of the leaf on `levels`, from coarse to fine, each with twice the
+/// segments of the one before, with `columns` extrapolations. `None` where the linear
+/// equations cannot be solved, which are factorised, in the room that may be there for
+/// them, if they are not those at hand.
+pub fn told(
+    levels: &[Level],
+    columns: usize,
+    (linear, room): (&mut Option<Linear>, Option<System>),
+    work: &mut Work,
+) -> Option<Told> {
+    let grid = linear_grid(levels.len());
     if linear.as_ref().is_none_or(|linear| linear.grid != grid) {
-        let system = factorized(&levels[grid])?;
+        let system = factorized(&levels[grid], room, work)?;
         *linear = Some(Linear { grid, system });
     }
     let (Level { leaf, state }, system) = (&levels[grid], &mut linear.as_mut()?.system);
-    leaf.assemble_jumps(state, &jumps(levels, columns), system);
+    let (rods, jumps) = carried(levels, columns);
+    leaf.assemble_jumps(state, &jumps, system);
     let Solved::Yes(_) = system.solve(None, ACCURACY) else {
         return None;
     };
-    let stride = leaf.segments() / levels[0].leaf.segments();
+    let half = leaf.segments() / levels[0].leaf.segments() / 2;
     let solution = system.solution();
-    let known = solution
-        .iter()
-        .flat_map(|rod| rod.iter().skip(stride - 1).step_by(stride));
-    // Not f64::max, which would hide a NaN.
-    known
-        .map(|node| shift(node).length())
-        .try_fold(0.0, |largest: f64, error| {
-            error.is_finite().then_some(largest.max(error))
-        })
+    let (mut error, mut between) = (0.0_f64, 0.0_f64);
+    for (rod, jumps) in solution.iter().zip(&jumps) {
+        let nodes = rod.iter().skip(half - 1).step_by(half).map(shift);
+        for (k, wrong) in nodes.enumerate() {
+            match k.is_multiple_of(2) {
+                true => {
+                    between = larger(
+                        between,
+                        larger(wrong.length(), (wrong + jumps[k / 2][0]).length()),
+                    )
+                }
+                false => error = larger(error, wrong.length()),
+            }
+        }
+    }
+    (error + between).is_finite().then_some(Told {
+        error,
+        between,
+        rods,
+    })
 }
 
-fn factorized(level: &Level) -> Option<System> {
-    let mut system = System::new(&level.leaf);
+/// The larger of two, or what is not a number.
+fn larger(a: f64, b: f64) -> f64 {
+    if b <= a { a } else { b }
+}
+
+/// Those at rest: where rods are rigid the last step of Newton's method began with other
+/// forces.
+fn factorized(level: &Level, room: Option<System>, work: &mut Work) -> Option<System> {
+    let mut system = room.unwrap_or_else(|| System::new(&level.leaf));
+    work.force_evaluations += 1;
+    work.factorizations += 1;
     level.leaf.assemble(&level.state, &mut system);
     let regular = match level.leaf.rods() {
         1 => system.factorize_indefinite(),
@@ -71,25 +108,35 @@ fn factorized(level: &Level) -> Option<System> {
     regular.then_some(system)
 }
 
-/// The jumps in the middles between the nodes of the coarsest grid.
-fn jumps(levels: &[Level], columns: usize) -> Vec<Vec<Jump>> {
+/// The leaf at the nodes of the coarsest grid and, carried from there to the middles between
+/// by a step for every segment of the finest, at its nodes; in the middles the mean, and the
+/// jumps.
+fn carried(levels: &[Level], columns: usize) -> (Vec<Vec<RodFields>>, Vec<Vec<Jump>>) {
     let (first, finest) = (&levels[0].leaf, &levels[levels.len() - 1].leaf);
     let (mut known, grid) = (nodes(levels, columns), &first.grid);
     let tips = known.iter_mut().filter_map(|rod| rod.last_mut()).collect();
     balance(first, tips);
-    let half = finest.segments() / first.segments() / 2;
-    let steps = (half / SEGMENTS_A_STEP).clamp(1, MOST_STEPS);
+    let steps = finest.segments() / first.segments() / 2;
     let mut flow = Flow::new(first);
+    let mut rods = vec![Vec::with_capacity(finest.segments() + 1); first.rods()];
     let mut jumps = vec![Vec::with_capacity(first.segments()); first.rods()];
     for i in 0..first.segments() {
         let mut to_middle =
             |k: usize| flow.carry(|j| known[j][k], [grid.sigma()[k], grid.middle(i)], steps);
         let (before, behind) = (to_middle(i), to_middle(i + 1));
-        for ((jumps, before), behind) in jumps.iter_mut().zip(&before).zip(&behind) {
-            jumps.push(jump(before, behind));
+        for (j, (rod, jumps)) in rods.iter_mut().zip(&mut jumps).enumerate() {
+            let [a, b] = [&before, &behind].map(|steps| steps[steps.len() - 1][j]);
+            jumps.push(jump(&a, &b));
+            rod.push(known[j][i]);
+            rod.extend(before[..steps - 1].iter().map(|leaf| leaf[j]));
+            rod.push(mean(&a, &b));
+            rod.extend(behind[..steps - 1].iter().rev().map(|leaf| leaf[j]));
         }
     }
-    jumps
+    for (rod, known) in rods.iter_mut().zip(&known) {
+        rod.extend(known.last());
+    }
+    (rods, jumps)
 }
 
 /// Makes forces and moments at the tips meet their conditions, which unfinished
@@ -120,4 +167,13 @@ fn balance(leaf: &DiscreteLeaf, mut tips: Vec<&mut RodFields>) {
 fn jump(a: &RodFields, b: &RodFields) -> Jump {
     let turn = rotation::log(a.q * b.q.conjugate());
     [a.x - b.x, turn, a.n - b.n, a.m - b.m]
+}
+
+fn mean(a: &RodFields, b: &RodFields) -> RodFields {
+    RodFields {
+        x: 0.5 * (a.x + b.x),
+        q: a.q.lerp(b.q, 0.5),
+        n: 0.5 * (a.n + b.n),
+        m: 0.5 * (a.m + b.m),
+    }
 }

@@ -2,16 +2,11 @@
 
 use crate::leaf::{DiscreteLeaf, RodFields};
 use crate::relax::level::Level;
+use crate::relax::nodes::{Node, RodNodes, alike, numbers, rotations};
 use crate::relax::place::{Measures, Place, Values};
-use crate::relax::richardson::Richardson;
 use crate::relax::shape;
 use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};
-
-/// Values carried per node through the extrapolation: position, quaternion, n, m.
-const FIELDS: usize = 13;
-
-type Node = [f64; FIELDS];
 
 /// In the interval at an end, the error of the polynomial is this part of that at a
 /// known node without its own value, if the difference is smooth: the ratio of the
@@ -30,44 +25,49 @@ pub struct Fields {
     pub between: f64,
 }
 
-/// All nodal fields with `columns` extrapolations, at the nodes of the coarsest grid,
-/// or if these are few of the next; if every node is asked for of the finest that
-/// keeps the tolerance as those of the coarsest do, which have that `error`.
-///
-/// Nodes of the coarsest grid have the whole extrapolation. Those that a finer
-/// grid adds have that of the grids from there on, and the rest of the coarser
+/// All nodal fields with `columns` extrapolations, at the nodes of the coarsest grid, or
+/// if these are few of the next; if every node is asked for of the finest. Where the
+/// equilibrium equations have told them to the tolerance there (with that error) they are
+/// those; else only at nodes that keep the tolerance as those of the coarsest grid do, which
+/// have that `error`: nodes of the coarsest grid have the whole extrapolation, those that a
+/// finer grid adds have that of the grids from there on, and the rest of the coarser
 /// ones' correction, which is small and smooth, interpolated.
 pub fn fields(
     levels: &[&Level],
     columns: usize,
-    error: Option<f64>,
-    tolerance: f64,
+    (error, tolerance): (Option<f64>, f64),
     every_node: bool,
+    told: Option<(&[Vec<RodFields>], f64)>,
 ) -> Fields {
     let (first, finest) = (levels[0], levels[levels.len() - 1]);
+    let few = first.leaf.segments() < STATIONS && levels.len() > 1;
+    let wanted = match every_node {
+        true => finest,
+        false => levels[usize::from(few)],
+    };
+    let known_error = error.unwrap_or(0.0);
+    if let Some((rods, error)) = told {
+        let between = (error - known_error).max(0.0);
+        return Fields::new(wanted, &thinned(rods, finest, wanted), between);
+    }
     let leaf = &first.leaf.leaf;
     let used = &levels[levels.len() - 1 - columns..];
     let rods = 0..first.leaf.rods();
-    let mut known_nodes: Vec<_> = (rods.clone())
-        .map(|j| RodNodes::new(used, finest, j))
-        .collect();
+    let mut known_nodes: Vec<_> = rods.map(|j| RodNodes::new(used, finest, j)).collect();
     let mut on = |grid: &Level| -> Vec<Vec<Node>> {
         let rods = known_nodes.iter_mut();
         rods.map(|rod| rod.extrapolated(grid.leaf.segments()))
             .collect()
     };
-    let (mut reported, mut nodes, mut between) = (first, on(first), 0.0);
-    let known_error = error.unwrap_or(0.0);
-    let most = match every_node {
-        true => levels.len(),
-        false => 1 + usize::from(first.leaf.segments() < STATIONS),
-    };
-    for &finer in levels.iter().take(most).skip(1) {
+    let (mut reported, mut nodes) = (first, on(first));
+    let mut between = 0.0;
+    for &finer in levels {
         let coarse = reported.leaf.segments();
-        if !finer.leaf.segments().is_multiple_of(coarse) {
+        let segments = finer.leaf.segments();
+        if segments <= coarse || segments > wanted.leaf.segments() {
             continue;
         }
-        let stride = finer.leaf.segments() / coarse;
+        let stride = segments / coarse;
         let known = reported.leaf.grid.sigma();
         let place = |at: f64| Place::new(known, leaf.kinks(), at);
         let weights = |(k, at): (usize, &f64)| match k.is_multiple_of(stride) {
@@ -84,7 +84,7 @@ pub fn fields(
         for (added, nodes) in added.iter_mut().zip(&nodes) {
             error = error.max(correct(added, nodes, stride, &weights, &others));
         }
-        let error = match reported.leaf.segments() == first.leaf.segments() {
+        let error = match coarse == first.leaf.segments() {
             true => error + known_error * (hidden(levels) - 1.0),
             false => error,
         };
@@ -93,40 +93,41 @@ pub fn fields(
         }
         (reported, nodes, between) = (finer, added, between + error);
     }
-    let rods = nodes.iter().enumerate().map(|(j, nodes)| {
-        let node = |(i, values)| unpack(&reported.leaf, j, i, values);
-        RodShape {
-            length: leaf.length(j) * leaf.scale.length,
-            nodes: nodes.iter().enumerate().map(node).collect(),
+    Fields::new(reported, &nodes, between)
+}
+
+impl Fields {
+    /// Those at the nodes of a grid.
+    fn new(grid: &Level, nodes: &[Vec<Node>], between: f64) -> Self {
+        let leaf = &grid.leaf.leaf;
+        let rods = nodes.iter().enumerate().map(|(j, nodes)| {
+            let node = |(i, values)| unpack(&grid.leaf, j, i, values);
+            RodShape {
+                length: leaf.length(j) * leaf.scale.length,
+                nodes: nodes.iter().enumerate().map(node).collect(),
+            }
+        });
+        Fields {
+            stations: grid.leaf.grid.sigma().to_vec(),
+            rods: rods.collect(),
+            between,
         }
-    });
-    Fields {
-        stations: reported.leaf.grid.sigma().to_vec(),
-        rods: rods.collect(),
-        between,
     }
 }
 
-/// What the leaf is, with `columns` extrapolations, at the nodes of the coarsest grid, rod
-/// after rod, dimensionless.
-pub fn nodes(levels: &[Level], columns: usize) -> Vec<Vec<RodFields>> {
-    let (first, finest) = (&levels[0], &levels[levels.len() - 1]);
-    let used: Vec<&Level> = levels[levels.len() - 1 - columns..].iter().collect();
-    let node = |values: &Node| {
-        let vector = |k: usize| DVec3::from_slice(&values[k..]);
-        let q = DQuat::from_slice(&values[3..]).normalize();
-        RodFields {
-            x: vector(0),
-            q,
-            n: q * vector(7),
-            m: q * vector(10),
-        }
+/// What is known at the nodes of the finest grid at those that are wanted.
+fn thinned(rods: &[Vec<RodFields>], finest: &Level, wanted: &Level) -> Vec<Vec<Node>> {
+    let stride = finest.leaf.segments() / wanted.leaf.segments();
+    let rod = |(j, rod): (usize, &Vec<RodFields>)| {
+        let signs = rotations(finest, j);
+        let node = |(node, sign): (&RodFields, &DQuat)| {
+            let q = alike(node.q, *sign);
+            let (n, m) = (q.inverse() * node.n, q.inverse() * node.m);
+            numbers(node.x, q, n, m)
+        };
+        rod.iter().zip(&signs).step_by(stride).map(node).collect()
     };
-    let rod = |j: usize| {
-        let nodes = RodNodes::new(&used, finest, j).extrapolated(first.leaf.segments());
-        nodes.iter().map(node).collect()
-    };
-    (0..first.leaf.rods()).map(rod).collect()
+    rods.iter().enumerate().map(rod).collect()
 }
 
 /// How many times more the last grid changed the positions at the nodes of the one
@@ -156,49 +157,6 @@ fn hidden(levels: &[&Level]) -> f64 {
     match most {
         [between, known] if known > 0.0 => (between / known).max(1.0),
         _ => 1.0,
-    }
-}
-
-/// The nodes of a rod on several grids, each computed when it is first asked for: those
-/// that grids have in common are asked for again and again.
-struct RodNodes<'l> {
-    rod: usize,
-    /// Rotations on the finest grid, of a continuous sign.
-    signs: Vec<DQuat>,
-    levels: Vec<(&'l Level, Vec<Option<Node>>)>,
-}
-
-impl<'l> RodNodes<'l> {
-    fn new(levels: &[&'l Level], finest: &Level, rod: usize) -> Self {
-        let none = |level: &&'l Level| (*level, vec![None; level.leaf.segments() + 1]);
-        RodNodes {
-            rod,
-            signs: rotations(finest, rod),
-            levels: levels.iter().map(none).collect(),
-        }
-    }
-
-    /// The fields at the ends of `n` parts, from those grids that have them.
-    fn extrapolated(&mut self, n: usize) -> Vec<Node> {
-        let (rod, signs) = (self.rod, &self.signs);
-        let mut table = Richardson::default();
-        let mut count = 0;
-        for (level, known) in &mut self.levels {
-            let segments = level.leaf.segments();
-            if !segments.is_multiple_of(n) {
-                continue;
-            }
-            let stride = segments / n;
-            let values = (0..=n).flat_map(|i| {
-                *known[i * stride].get_or_insert_with(|| {
-                    let node = shape::node(&level.leaf, &level.state, rod, i * stride);
-                    pack(&node, signs[i * ((signs.len() - 1) / n)])
-                })
-            });
-            table.push(segments, values.collect());
-            count += 1;
-        }
-        table.column(count - 1).as_chunks().0.to_vec()
     }
 }
 
@@ -239,30 +197,6 @@ fn correct(
 
 fn minus(a: &Node, b: &Node) -> Node {
     std::array::from_fn(|k| a[k] - b[k])
-}
-
-/// Rotations of rod `j` at all nodes, of a continuous sign.
-fn rotations(level: &Level, j: usize) -> Vec<DQuat> {
-    let base = level.state.base(j);
-    let mut rotations: Vec<DQuat> = Vec::new();
-    for &q in &level.state.q[base..=base + level.leaf.segments()] {
-        rotations.push(alike(q, rotations.last().copied().unwrap_or(q)));
-    }
-    rotations
-}
-
-fn pack(node: &NodeState, reference: DQuat) -> Node {
-    // A rotation's two quaternions must not be mixed up between grids.
-    let q = alike(node.rotation, reference);
-    let (x, n, m) = (node.position, node.n, node.m);
-    [
-        x.x, x.y, x.z, q.x, q.y, q.z, q.w, n.x, n.y, n.z, m.x, m.y, m.z,
-    ]
-}
-
-/// That quaternion of a rotation which is nearer to another.
-fn alike(q: DQuat, other: DQuat) -> DQuat {
-    if q.dot(other) < 0.0 { -q } else { q }
 }
 
 fn unpack(leaf: &DiscreteLeaf, j: usize, i: usize, values: &Node) -> NodeState {

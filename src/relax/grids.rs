@@ -68,12 +68,13 @@ impl Run<'_, '_> {
     /// Whether the nodes of the finest grid are asked for and the leaf is not accurate
     /// enough at them: that is worth one more grid.
     fn lacks_nodes(&mut self) -> bool {
-        if !self.options.every_node || self.for_nodes || self.finer().is_none() {
+        let enough = !self.options.every_node || self.told().is_some();
+        if enough || self.for_nodes || self.finer().is_none() {
             return false;
         }
         let levels: Vec<&Level> = self.levels.iter().collect();
         let columns = self.table.best().map_or(0, |best| best.columns);
-        let fields = fields(&levels, columns, self.error(), self.tolerance, true);
+        let fields = fields(&levels, columns, (self.error(), self.tolerance), true, None);
         self.for_nodes = fields.stations.len() <= levels[levels.len() - 1].leaf.segments();
         self.for_nodes
     }
@@ -99,6 +100,7 @@ impl Run<'_, '_> {
 
     /// The leaf at rest on the next finer grid, from where it rests on those before.
     pub fn settle_on(&mut self, finer: Grid) -> Result<(), Stop> {
+        self.keep_equations();
         let level = self.levels.last().expect("the leaf has settled");
         let mut state = prolong(&level.leaf, &level.state);
         let guess = match self.predicting().as_slice() {

@@ -33,9 +33,9 @@ pub fn equilibrium(
     } = fields(
         &series,
         columns,
-        error,
-        run.tolerance,
+        (error, run.tolerance),
         run.options.every_node,
+        run.told(),
     );
     let joined = run.leaf.joined();
     let tips = rods.iter().take(if joined { 1 } else { rods.len() });

@@ -1,9 +1,9 @@
 //! A run over nested grids: what is asked, the grids the leaf has settled on,
 //! and the error estimate of their extrapolation.
 
-use crate::leaf::{Leaf, System};
+use crate::leaf::{Leaf, RodFields, System, whole_fields};
 use crate::newton::{Contraction, Work};
-use crate::relax::defect::{self, Linear};
+use crate::relax::defect::{self, Linear, Told, linear_grid};
 use crate::relax::level::{Level, complete, positions};
 use crate::relax::method::Method;
 use crate::relax::options::{Options, Progress};
@@ -53,9 +53,9 @@ pub struct Run<'a, 'o> {
     pub saddle: Option<Saddle>,
     pub levels: Vec<Level>,
     pub table: Richardson,
-    /// The error of the best values as their defect tells it, if that is known, and the
-    /// equations that tell it.
-    pub defect: Option<f64>,
+    /// What the defect of the best values tells, if it is known, and the linear equations
+    /// that tell it.
+    pub defect: Option<Told>,
     pub linear: Option<Linear>,
     /// Whether a grid was added for the nodes of the finest one.
     pub for_nodes: bool,
@@ -147,7 +147,11 @@ impl<'a, 'o> Run<'a, 'o> {
         self.levels = self.levels.iter().map(complete).collect();
         self.leaf = whole;
         self.whole = None;
-        let defect = self.defect;
+        let defect = self.defect.take();
+        let defect = defect.map(|told| Told {
+            rods: whole_fields(reduced, told.rods),
+            ..told
+        });
         self.tabulate();
         // The equations are those of the reduced leaf.
         self.linear = None;
@@ -183,26 +187,60 @@ impl<'a, 'o> Run<'a, 'o> {
     pub fn error(&self) -> Option<f64> {
         let segments = self.levels.last()?.leaf.segments();
         let best = self.table.best()?.error;
-        let extrapolation = match self.defect {
-            Some(error) => (SAFETY * error).min(LARGEST * best),
+        let extrapolation = match &self.defect {
+            Some(told) => (SAFETY * told.error).min(LARGEST * best),
             None => best,
         };
-        Some(extrapolation + EXTRAPOLATED * self.remaining + ROUNDING * segments as f64)
+        Some(extrapolation + self.unfinished(segments))
+    }
+
+    /// Error of unfinished iterations and of rounding on a grid of so many segments.
+    fn unfinished(&self, segments: usize) -> f64 {
+        EXTRAPOLATED * self.remaining + ROUNDING * segments as f64
+    }
+
+    /// The leaf at the nodes of the finest grid as the equilibrium equations tell it, and
+    /// its error, if that is within the tolerance.
+    pub fn told(&self) -> Option<(&[Vec<RodFields>], f64)> {
+        let (told, segments) = (self.defect.as_ref()?, self.levels.last()?.leaf.segments());
+        let error = SAFETY * told.error.max(told.between) + self.unfinished(segments);
+        (error <= self.tolerance).then_some((&told.rods, error))
     }
 
     /// Estimates the error of the best values from their defect.
     pub fn judge_accuracy(&mut self) {
+        self.defect = None;
         let best = self.table.best();
-        let near = best.filter(|best| best.error <= HOPELESS * self.tolerance);
-        self.defect =
-            near.and_then(|best| defect::error(&self.levels, best.columns, &mut self.linear));
+        let Some(best) = best.filter(|best| best.error <= HOPELESS * self.tolerance) else {
+            return;
+        };
+        let of_finest = linear_grid(self.levels.len()) + 1 == self.levels.len();
+        if of_finest {
+            self.linear = None;
+        }
+        let room = of_finest.then(|| self.last.take()).flatten();
+        let (levels, linear, work) = (&self.levels, &mut self.linear, &mut self.work);
+        self.defect = defect::told(levels, best.columns, (linear, room), work);
+        if of_finest {
+            // Stability is judged by them, too.
+            self.last = self.linear.take().map(|linear| linear.system);
+        }
+    }
+
+    /// Keeps the equations of the finest grid if they are those that tell errors on the next.
+    pub fn keep_equations(&mut self) {
+        let grid = self.levels.len() - 1;
+        if self.defect.is_some() && linear_grid(self.levels.len() + 1) == grid {
+            let system = self.last.take();
+            self.linear = system.map(|system| Linear { grid, system });
+        }
     }
 
     /// Whether unfinished iterations and rounding alone are more than the
     /// tolerance on a grid of so many `segments`, and already on the present one
     /// most of the error: no refinement helps then.
     pub fn beyond_rounding(&self, segments: usize) -> bool {
-        let floor = EXTRAPOLATED * self.remaining + ROUNDING * segments as f64;
+        let floor = self.unfinished(segments);
         floor > self.tolerance && self.error().is_some_and(|error| error <= 2.0 * floor)
     }
 

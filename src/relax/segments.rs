@@ -13,7 +13,7 @@ pub const FINEST: usize = 16_384;
 /// Segments of the coarsest grid if the tolerance is loose, that is if it is at
 /// least so large, and the leaf settles in the valley it starts in.
 const COARSEST_OF_LOOSE: usize = 4;
-const LOOSE: f64 = 1e-3;
+const LOOSE: f64 = 1e-6;
 
 /// Rotation per segment (radians) that the coarsest grid must resolve where
 /// rest curvature and tip moment alone tell it, and the most that one of a loose

@@ -7,6 +7,7 @@
 //! across the plane, if N is even, only the coupling along y is ever stretched.
 
 use crate::leaf::dimensionless::Leaf;
+use crate::leaf::flow::RodFields;
 use crate::leaf::state::State;
 use crate::scenario::{Profile, Rod, Scenario};
 use glam::{DQuat, DVec3};
@@ -70,17 +71,42 @@ pub fn whole_of(half: &Leaf, state: &State) -> State {
         let image = own != j;
         let base = state.base(own);
         x.extend(state.x[base..=base + n].iter().map(|&x| reflect(x, image)));
-        q.extend(state.q[base..=base + n].iter().map(|&q| match image {
-            // An axis of rotation changes sign in the mirror, but for its normal.
-            true => DQuat::from_xyzw(-q.x, q.y, -q.z, q.w),
-            false => q,
-        }));
+        q.extend(state.q[base..=base + n].iter().map(|&q| turned(q, image)));
         let own_forces = state.n[own * n..(own + 1) * n].iter();
         forces.extend(own_forces.map(|&f| reflect(f / half.share(own), image)));
     }
     let mut whole = State::new(n, x, q);
     whole.n = forces;
     whole
+}
+
+/// The rods of the whole leaf of which those of a half are `rods`.
+pub fn whole_fields(half: &Leaf, rods: Vec<Vec<RodFields>>) -> Vec<Vec<RodFields>> {
+    if !half.mirrored {
+        return rods;
+    }
+    let count = half.scenario().rods.len();
+    let rod = |j: usize| {
+        let own = j.min(count - 1 - j);
+        let (image, share) = (own != j, half.share(own));
+        let node = |node: &RodFields| RodFields {
+            x: reflect(node.x, image),
+            q: turned(node.q, image),
+            n: reflect(node.n / share, image),
+            // A moment is the axis of a rotation.
+            m: if image { -1.0 } else { 1.0 } * reflect(node.m / share, image),
+        };
+        rods[own].iter().map(node).collect()
+    };
+    (0..count).map(rod).collect()
+}
+
+/// An axis of rotation changes sign in the mirror, but for its normal.
+fn turned(q: DQuat, image: bool) -> DQuat {
+    match image {
+        true => DQuat::from_xyzw(-q.x, q.y, -q.z, q.w),
+        false => q,
+    }
 }
 
 fn reflect(v: DVec3, image: bool) -> DVec3 {

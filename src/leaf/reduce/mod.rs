@@ -4,7 +4,7 @@
 mod mirror;
 mod planar;
 
-pub use mirror::{half_of, whole_of};
+pub use mirror::{half_of, whole_fields, whole_of};
 
 use super::dimensionless::Leaf;
 

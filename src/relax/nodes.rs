@@ -1,0 +1,107 @@
+//! The leaf at the nodes of its grids, extrapolated over them.
+
+use crate::leaf::RodFields;
+use crate::relax::level::Level;
+use crate::relax::richardson::Richardson;
+use crate::relax::shape;
+use crate::shape::NodeState;
+use glam::{DQuat, DVec3};
+
+/// Values carried per node through the extrapolation: position, quaternion, n, m.
+const FIELDS: usize = 13;
+
+pub type Node = [f64; FIELDS];
+
+/// What the leaf is, with `columns` extrapolations, at the nodes of the coarsest grid, rod
+/// after rod, dimensionless.
+pub fn nodes(levels: &[Level], columns: usize) -> Vec<Vec<RodFields>> {
+    let (first, finest) = (&levels[0], &levels[levels.len() - 1]);
+    let used: Vec<&Level> = levels[levels.len() - 1 - columns..].iter().collect();
+    let node = |values: &Node| {
+        let vector = |k: usize| DVec3::from_slice(&values[k..]);
+        let q = DQuat::from_slice(&values[3..]).normalize();
+        RodFields {
+            x: vector(0),
+            q,
+            n: q * vector(7),
+            m: q * vector(10),
+        }
+    };
+    let rod = |j: usize| {
+        let nodes = RodNodes::new(&used, finest, j).extrapolated(first.leaf.segments());
+        nodes.iter().map(node).collect()
+    };
+    (0..first.leaf.rods()).map(rod).collect()
+}
+
+/// The nodes of a rod on several grids, each computed when it is first asked for: those
+/// that grids have in common are asked for again and again.
+pub struct RodNodes<'l> {
+    rod: usize,
+    /// Rotations on the finest grid, of a continuous sign.
+    signs: Vec<DQuat>,
+    levels: Vec<(&'l Level, Vec<Option<Node>>)>,
+}
+
+impl<'l> RodNodes<'l> {
+    /// On `levels`; quaternions have the signs of those on the finest.
+    pub fn new(levels: &[&'l Level], finest: &Level, rod: usize) -> Self {
+        let none = |level: &&'l Level| (*level, vec![None; level.leaf.segments() + 1]);
+        RodNodes {
+            rod,
+            signs: rotations(finest, rod),
+            levels: levels.iter().map(none).collect(),
+        }
+    }
+
+    /// The fields at the ends of `n` parts, from those grids that have them.
+    pub fn extrapolated(&mut self, n: usize) -> Vec<Node> {
+        let (rod, signs) = (self.rod, &self.signs);
+        let mut table = Richardson::default();
+        let mut count = 0;
+        for (level, known) in &mut self.levels {
+            let segments = level.leaf.segments();
+            if !segments.is_multiple_of(n) {
+                continue;
+            }
+            let stride = segments / n;
+            let values = (0..=n).flat_map(|i| {
+                *known[i * stride].get_or_insert_with(|| {
+                    let node = shape::node(&level.leaf, &level.state, rod, i * stride);
+                    pack(&node, signs[i * ((signs.len() - 1) / n)])
+                })
+            });
+            table.push(segments, values.collect());
+            count += 1;
+        }
+        table.column(count - 1).as_chunks().0.to_vec()
+    }
+}
+
+/// Rotations of rod `j` at all nodes, of a continuous sign.
+pub fn rotations(level: &Level, j: usize) -> Vec<DQuat> {
+    let base = level.state.base(j);
+    let mut rotations: Vec<DQuat> = Vec::new();
+    for &q in &level.state.q[base..=base + level.leaf.segments()] {
+        rotations.push(alike(q, rotations.last().copied().unwrap_or(q)));
+    }
+    rotations
+}
+
+fn pack(node: &NodeState, reference: DQuat) -> Node {
+    // A rotation's two quaternions must not be mixed up between grids.
+    let q = alike(node.rotation, reference);
+    numbers(node.position, q, node.n, node.m)
+}
+
+/// The numbers of a node, forces and moments along its directors.
+pub fn numbers(x: DVec3, q: DQuat, n: DVec3, m: DVec3) -> Node {
+    [
+        x.x, x.y, x.z, q.x, q.y, q.z, q.w, n.x, n.y, n.z, m.x, m.y, m.z,
+    ]
+}
+
+/// That quaternion of a rotation which is nearer to another.
+pub fn alike(q: DQuat, other: DQuat) -> DQuat {
+    if q.dot(other) < 0.0 { -q } else { q }
+}
