@@ -71,12 +71,7 @@ fn the_json_has_both_solutions_and_their_differences() {
         let along = along.iter().map(|found| found[quantity].as_f64().unwrap());
         let largest = check["difference"][quantity].as_f64().unwrap();
         assert_eq!(along.fold(0.0, f64::max), largest, "{quantity}");
-        // Forces and moments are known less well than the positions asked for.
-        let bound = match quantity {
-            "position" | "rotation" => 1e-6,
-            _ => 1e-5,
-        };
-        assert!(largest < bound, "{quantity}: {largest}");
+        assert!(largest < 1e-6, "{quantity}: {largest}");
         assert!(check["shooting"]["error_estimate"][quantity].is_number());
     }
     assert_eq!(along.len(), check["stations"].as_array().unwrap().len());

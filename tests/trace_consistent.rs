@@ -23,7 +23,7 @@ fn loaded(leaf: &Scenario, part: f64) -> Scenario {
 }
 
 fn begin(scenario: &Scenario, equations: &mut Equations) -> Option<Point> {
-    let rest = relaxed(scenario, &to(1e-6));
+    let rest = relaxed(scenario, &to(1e-7));
     let leaf = Leaf::new(scenario);
     let grid = Grid::new(rest.shape.stations.len() - 1, leaf.kinks());
     let state = project(&leaf, &DiscreteLeaf::new(&leaf, grid), &rest.shape.rods);

@@ -58,7 +58,7 @@ fn search<'a>(
     any_index: bool,
 ) -> Result<(Grids<'a>, Point), Stuck> {
     let leaf = family.first();
-    let mut grid = Grid::new(rest.shape.stations.len() - 1, leaf.kinks());
+    let mut grid = Grid::through(&rest.shape.stations, leaf.kinks());
     let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
     let mut state = project(leaf, &discrete, &rest.shape.rods);
     let mut found = Err(Stuck::NotConverged);

@@ -208,3 +208,46 @@ impl Kernel for Combine<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::leaf::{Grid, Leaf};
+    use crate::scenario::Scenario;
+
+    const ROD: &str = r#"
+        name = "rod"
+        leaf = { rods = 1, fan = [0.0] }
+        stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = inf, shear_2 = inf, shear_3 = inf }
+    "#;
+
+    /// How far a rod that a moment of 3 A/L bends is from its circle after so many steps.
+    fn off_circle(steps: usize) -> f64 {
+        const CURVATURE: f64 = 3.0;
+        let rod = Scenario::from_toml(ROD).unwrap();
+        let leaf = DiscreteLeaf::new(&Leaf::new(&rod), Grid::new(1, &[]));
+        let begin = |_: usize| RodFields {
+            x: DVec3::ZERO,
+            q: DQuat::IDENTITY,
+            n: DVec3::ZERO,
+            m: CURVATURE * DVec3::Z,
+        };
+        let rods = Flow::new(&leaf).carry(begin, [0.0, 1.0], steps);
+        assert_eq!(rods.len(), steps);
+        let off = |(k, rods): (usize, &Vec<RodFields>)| {
+            let angle = CURVATURE * (k + 1) as f64 / steps as f64;
+            let circle = DVec3::new(angle.sin(), 1.0 - angle.cos(), 0.0) / CURVATURE;
+            (rods[0].x - circle).length()
+        };
+        rods.iter().enumerate().map(off).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_moment_bends_a_rod_to_a_circle_with_order_8() {
+        let errors = [1, 2, 4].map(off_circle);
+        for pair in errors.windows(2) {
+            let order = (pair[0] / pair[1]).log2();
+            assert!((7.5..9.5).contains(&order), "{errors:e?}: {order}");
+        }
+    }
+}

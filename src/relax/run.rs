@@ -188,6 +188,10 @@ impl<'a, 'o> Run<'a, 'o> {
         let segments = self.levels.last()?.leaf.segments();
         let best = self.table.best()?.error;
         let extrapolation = match &self.defect {
+            // Of few nodes those between are stations, too.
+            Some(told) if self.too_coarse(self.levels[0].leaf.segments()) => {
+                (SAFETY * told.error.max(told.between)).min(LARGEST * best)
+            }
             Some(told) => (SAFETY * told.error).min(LARGEST * best),
             None => best,
         };

@@ -34,7 +34,8 @@ pub fn relax(
     }
     let intervals = match options.method {
         Method::SemiImplicit(_) | Method::Explicit { .. } => {
-            return relax_on_grids(scenario, options, tolerance, progress).map(|(found, _)| found);
+            let least = least(options.method, tolerance, options.modes == 0);
+            return on_grids(scenario, options, (tolerance, least), progress).map(|(it, _)| it);
         }
         Method::SingleShooting => Some(1),
         Method::Shooting { intervals } | Method::ShootingFromRest { intervals } => intervals,
@@ -68,11 +69,22 @@ const COARSEST_BY_STEPS: usize = 32;
 const FINEST_BY_STEPS: usize = 512;
 
 /// Relaxes on nested grids; returns also the leaf on each that was extrapolated, from
-/// coarse to fine.
+/// coarse to fine: fine enough for more than its shape.
 pub(crate) fn relax_on_grids(
     scenario: &Scenario,
     options: &Options,
     tolerance: f64,
+    progress: &mut dyn FnMut(&Progress),
+) -> Result<(Equilibrium, Vec<Level>), RelaxError> {
+    let least = least(options.method, tolerance, false);
+    on_grids(scenario, options, (tolerance, least), progress)
+}
+
+/// The same from a grid of so many segments, or more if the leaf needs them.
+fn on_grids(
+    scenario: &Scenario,
+    options: &Options,
+    (tolerance, least): (f64, usize),
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<(Equilibrium, Vec<Level>), RelaxError> {
     let clock = Instant::now();
@@ -81,7 +93,7 @@ pub(crate) fn relax_on_grids(
         explicit::check(&leaf)?;
     }
     let method = options.method;
-    let first = check_segments(&leaf, method.segments(), least(method, tolerance))?;
+    let first = check_segments(&leaf, method.segments(), least)?;
     let reduced = reducible(method).then(|| leaf.reduced()).flatten();
     let grid = Grid::new(first, leaf.kinks());
     let mut work = Work::default();

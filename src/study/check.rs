@@ -237,7 +237,10 @@ pub fn check(
         limit: options.limit.clone(),
         ..Options::default()
     };
-    let relaxed = relax::relax(scenario, &asked, progress)?;
+    let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
+    relax::check_tolerance(tolerance)?;
+    // Forces are compared, too.
+    let (relaxed, _) = relax::relax_on_grids(scenario, &asked, tolerance, progress)?;
     let lost = matches!(relaxed.outcome, Outcome::NotAtRest | Outcome::Diverged);
     let shot = (!lost).then(|| shoot(scenario, &relaxed, options, progress));
     Ok(Check::new(relaxed, shot))

@@ -45,3 +45,73 @@ impl DiscreteLeaf {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::leaf::{Grid, Leaf, Solved, shift};
+    use crate::scenario::Scenario;
+    use glam::DQuat;
+
+    const ROD: &str = r#"
+        name = "rod"
+        leaf = { rods = 1, fan = [0.0] }
+        stiffness = { torsion = 2.0, bending_2 = 1.0, bending_3 = 3.0, axial = 40.0, shear_2 = 50.0, shear_3 = 60.0 }
+    "#;
+    const SEGMENTS: usize = 8;
+
+    /// How a straight rod at rest answers, at its nodes from the first, to a jump in its middle.
+    fn answer(jump: Jump) -> Vec<DVec3> {
+        let rod = Scenario::from_toml(ROD).unwrap();
+        let leaf = DiscreteLeaf::new(&Leaf::new(&rod), Grid::new(SEGMENTS, &[]));
+        let x = leaf.grid.sigma().iter().map(|&sigma| sigma * DVec3::X);
+        let state = State::new(SEGMENTS, x.collect(), vec![DQuat::IDENTITY; SEGMENTS + 1]);
+        let mut system = System::new(&leaf);
+        leaf.assemble(&state, &mut system);
+        assert!(system.factorize(0.0));
+        leaf.assemble_jumps(&state, &[vec![jump]], &mut system);
+        assert!(matches!(system.solve(None, 1e-12), Solved::Yes(_)));
+        system.solution()[0].iter().map(shift).collect()
+    }
+
+    fn assert_answer(jump: Jump, expected: impl Fn(f64) -> DVec3) {
+        for (i, found) in answer(jump).into_iter().enumerate() {
+            let expected = expected((i + 1) as f64 / SEGMENTS as f64);
+            let off = (found - expected).length();
+            assert!(
+                off < 1e-12,
+                "{jump:?}, node {}: {found} for {expected}",
+                i + 1
+            );
+        }
+    }
+
+    /// What is behind moves with its part of the rod, as one piece.
+    #[test]
+    fn behind_a_jump_the_free_part_follows() {
+        let zero = DVec3::ZERO;
+        let jump = DVec3::new(0.1, -0.2, 0.3);
+        let behind = |sigma: f64| if sigma > 0.5 { 1.0 } else { 0.0 };
+        assert_answer([jump, zero, zero, zero], |sigma| behind(sigma) * jump);
+        assert_answer([zero, jump, zero, zero], |sigma| {
+            behind(sigma) * jump.cross((sigma - 0.5) * DVec3::X)
+        });
+    }
+
+    /// Forces and moments that are larger before the middle than behind it leave with a load
+    /// there that is as large.
+    #[test]
+    fn before_a_jump_of_a_force_the_held_part_bends_back() {
+        let zero = DVec3::ZERO;
+        let axial = DVec3::new(0.7, 0.0, 0.0);
+        assert_answer([zero, zero, axial, zero], |sigma| {
+            -sigma.min(0.5) / 40.0 * axial
+        });
+        // A cantilever of half the length under a moment M at its end: M s^2/(2 A).
+        let moment = DVec3::new(0.0, 0.0, 0.6);
+        assert_answer([zero, zero, zero, moment], |sigma| {
+            let s = sigma.min(0.5);
+            -0.6 / 3.0 * (0.5 * s * s + (sigma - s) * s) * DVec3::Y
+        });
+    }
+}
