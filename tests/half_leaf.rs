@@ -74,8 +74,8 @@ fn the_paper_s_firm_leaves_are_found_by_half() {
             assert_eq!(half.shape.rods.len(), rods);
             let whole = rest(&leaf, true, None);
             let apart = Difference::between(&half.shape.rods, &whole.shape.rods);
-            // Both end their iterations a thousandth of the tolerance away.
-            assert!(apart.position < 2e-9, "{figure}, {rods}: {apart:?}");
+            // Both end their iterations five thousandths of the tolerance away.
+            assert!(apart.position < 1e-8, "{figure}, {rods}: {apart:?}");
             let [a, b] = [&half, &whole].map(|leaf| leaf.accuracy.error_estimate.is_some());
             assert_eq!(a, b);
             // The fan of the paper is not symmetric: nothing is left out there.

@@ -217,7 +217,7 @@ mod tests {
 
     const ROD: &str = r#"
         name = "rod"
-        leaf = { rods = 1, fan = [0.0] }
+        leaf = { rods = 1, length = 1.0, fan = [0.0] }
         stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = inf, shear_2 = inf, shear_3 = inf }
     "#;
 
@@ -247,7 +247,7 @@ mod tests {
         let errors = [1, 2, 4].map(off_circle);
         for pair in errors.windows(2) {
             let order = (pair[0] / pair[1]).log2();
-            assert!((7.5..9.5).contains(&order), "{errors:e?}: {order}");
+            assert!((7.5..9.5).contains(&order), "{errors:?}: {order}");
         }
     }
 }

@@ -55,7 +55,7 @@ mod tests {
 
     const ROD: &str = r#"
         name = "rod"
-        leaf = { rods = 1, fan = [0.0] }
+        leaf = { rods = 1, length = 1.0, fan = [0.0] }
         stiffness = { torsion = 2.0, bending_2 = 1.0, bending_3 = 3.0, axial = 40.0, shear_2 = 50.0, shear_3 = 60.0 }
     "#;
     const SEGMENTS: usize = 8;
