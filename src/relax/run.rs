@@ -1,7 +1,7 @@
 //! A run over nested grids: what is asked, the grids the leaf has settled on,
 //! and the error estimate of their extrapolation.
 
-use crate::leaf::{Leaf, System};
+use crate::leaf::Leaf;
 use crate::newton::{Contraction, Work};
 use crate::relax::defect::{self, Linear};
 use crate::relax::level::{Level, complete, positions};
@@ -70,8 +70,6 @@ pub struct Run<'a, 'o> {
     pub spent: usize,
     /// Saddles left that were only noticed by their index.
     pub pushes: i32,
-    /// The matrix with which the last grid came to rest.
-    pub last: Option<System>,
     /// Whether the leaf did not come to rest in a first attempt.
     pub by_steps: bool,
     /// Whether it had to move while it was softer than it is.
@@ -110,7 +108,6 @@ impl<'a, 'o> Run<'a, 'o> {
             contraction: Contraction::default(),
             spent: 0,
             pushes: 0,
-            last: None,
             by_steps: false,
             moved_softened: false,
             part: 0.0,
@@ -137,7 +134,6 @@ impl<'a, 'o> Run<'a, 'o> {
         self.remaining = 0.0;
         self.contraction = Contraction::default();
         self.pushes = 0;
-        self.last = None;
     }
 
     /// The run as if it had been one of the whole leaf.
