@@ -19,7 +19,8 @@ const MAX_STEP: f64 = 0.5;
 /// is 12) is larger than this on one grid: next to a fold it changes with the shape.
 const CLEARLY: f64 = 0.1;
 
-/// So many times the stiffness that the elements may have too much.
+/// So many times the stiffness that the elements may have too much: their forces are those
+/// of the grid.
 const EXCESS: f64 = 3.0;
 
 /// A saddle that was met before rest, and left.

@@ -255,3 +255,40 @@ impl Segment {
         [0.5 * g_mu - g_delta, 0.5 * g_mu + g_delta].map(|g| self.frame * g)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a compressed segment, which a wave of the neutral rod makes so much stiffer; of a
+    /// pulled one nothing.
+    #[test]
+    fn the_excess_is_that_of_a_neutral_wave() {
+        let (ds, stiffness): (f64, f64) = (0.1, 2.0);
+        let section = Section {
+            ds,
+            couple_stiffness: DVec3::new(7.0, 3.0, stiffness),
+            rest_curvature: DVec3::ZERO,
+            rest_strain: DVec3::X,
+            compliance: DVec3::ZERO,
+            condensing: DVec3::ZERO,
+        };
+        let straight = Ends {
+            x: [DVec3::ZERO, ds * DVec3::X],
+            q: [DQuat::IDENTITY; 2],
+        };
+        let excess = |force: f64| {
+            let segment = Segment::new(&section, &straight, force * DVec3::X);
+            segment.excess_stiffness(&section)
+        };
+        for wave_number in [0.5, 1.0, 2.0] {
+            let load = stiffness * wave_number * wave_number;
+            let half = 0.5 * wave_number * ds;
+            let exact = ds * load * ((half.tan() / half).powi(2) - 1.0);
+            let off = excess(-load) / exact - 1.0;
+            // The next term of the series is (17/120) (k ds)^2 of the first.
+            assert!((off / (half * half) + 17.0 / 30.0).abs() < 0.05, "{off}");
+            assert_eq!(excess(load), 0.0);
+        }
+    }
+}
