@@ -40,8 +40,7 @@ impl Run<'_, '_> {
         let before = self.index;
         let level = self.levels.pop().expect("the leaf has settled");
         let mut system = System::new(&level.leaf);
-        let index = self.count(&level, &mut system);
-        self.index = index;
+        self.index = self.count(&level, &mut system);
         self.levels.push(level);
         if !matches!(self.index, Some(1..)) {
             return Ok(true);
