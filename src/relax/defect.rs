@@ -24,14 +24,8 @@ const ACCURACY: f64 = 1e-6;
 
 /// The factorised equations of one of the grids.
 pub struct Linear {
-    /// Which, from coarse to fine.
-    pub grid: usize,
-    pub system: System,
-}
-
-/// The grid of which the linear equations are taken for so many.
-pub fn linear_grid(levels: usize) -> usize {
-    (levels.saturating_sub(1)).saturating_sub(COARSER).max(1)
+    grid: usize,
+    system: System,
 }
 
 /// What the equilibrium equations tell of a leaf on several grids.
@@ -46,17 +40,20 @@ pub struct Told {
 
 /// What they tell of the leaf on `levels`, from coarse to fine, each with twice the
 /// segments of the one before, with `columns` extrapolations. `None` where the linear
-/// equations cannot be solved, which are factorised, in the room that may be there for
-/// them, if they are not those at hand.
+/// equations cannot be solved, which are factorised if they are not those at hand.
 pub fn told(
     levels: &[Level],
     columns: usize,
-    (linear, room): (&mut Option<Linear>, Option<System>),
+    linear: &mut Option<Linear>,
     work: &mut Work,
 ) -> Option<Told> {
-    let grid = linear_grid(levels.len());
+    let grid = levels
+        .len()
+        .checked_sub(2)?
+        .saturating_sub(COARSER - 1)
+        .max(1);
     if linear.as_ref().is_none_or(|linear| linear.grid != grid) {
-        let system = factorized(&levels[grid], room, work)?;
+        let system = factorized(&levels[grid], work)?;
         *linear = Some(Linear { grid, system });
     }
     let (Level { leaf, state }, system) = (&levels[grid], &mut linear.as_mut()?.system);
@@ -96,8 +93,8 @@ fn larger(a: f64, b: f64) -> f64 {
 
 /// Those at rest: where rods are rigid the last step of Newton's method began with other
 /// forces.
-fn factorized(level: &Level, room: Option<System>, work: &mut Work) -> Option<System> {
-    let mut system = room.unwrap_or_else(|| System::new(&level.leaf));
+fn factorized(level: &Level, work: &mut Work) -> Option<System> {
+    let mut system = System::new(&level.leaf);
     work.force_evaluations += 1;
     work.factorizations += 1;
     level.leaf.assemble(&level.state, &mut system);

@@ -100,7 +100,6 @@ impl Run<'_, '_> {
 
     /// The leaf at rest on the next finer grid, from where it rests on those before.
     pub fn settle_on(&mut self, finer: Grid) -> Result<(), Stop> {
-        self.keep_equations();
         let level = self.levels.last().expect("the leaf has settled");
         let mut state = prolong(&level.leaf, &level.state);
         let guess = match self.predicting().as_slice() {
@@ -188,11 +187,9 @@ impl Run<'_, '_> {
     /// Whether the leaf moves to the same place on a grid with three quarters of the
     /// segments.
     fn settles_alike(&mut self, level: &Level, grid: Grid) -> bool {
-        let last = self.last.take();
         let Settled {
             level: other, rest, ..
         } = self.settle(grid, InitialGuess::Start);
-        self.last = last;
         let (a, b) = (positions(level, 4), positions(&other, 3));
         rest.is_ok() && distance(&a, &b) < SAME_PLACE
     }
@@ -200,7 +197,6 @@ impl Run<'_, '_> {
     /// Lets the leaf settle where it did on the only grid on coarser ones, too, on which
     /// it did not get there by itself: up to two, the finest last.
     fn add_coarser(&mut self, grids: &[Grid]) {
-        let last = self.last.take();
         for grid in grids.iter().rev().take(2) {
             let fine = &self.levels[0];
             let (guess, fine) = (restrict(&fine.state), positions(fine, 2));
@@ -211,7 +207,6 @@ impl Run<'_, '_> {
             }
             self.levels.insert(0, settled.level);
         }
-        self.last = last;
         self.tabulate();
     }
 }

@@ -106,11 +106,13 @@ impl Panel {
             let base = from.base(j);
             let first = to.base(j) + self.first(to);
             for (k, node) in nodes.iter().enumerate() {
-                let reference = from.q[base + node.first];
+                // Neighbours are less than half a turn apart, others need not be.
+                let mut before = from.q[base + node.first];
                 let mut sum = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
                 for (i, weight) in node.terms() {
                     let q = from.q[base + i];
-                    sum += q * (weight * q.dot(reference).signum());
+                    before = if q.dot(before) < 0.0 { -q } else { q };
+                    sum += before * weight;
                 }
                 to.x[first + k] = node.value(|i| from.x[base + i]);
                 to.q[first + k] = sum.normalize();

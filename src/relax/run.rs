@@ -1,9 +1,9 @@
 //! A run over nested grids: what is asked, the grids the leaf has settled on,
 //! and the error estimate of their extrapolation.
 
-use crate::leaf::{Leaf, RodFields, System, whole_fields};
+use crate::leaf::{Leaf, RodFields, whole_fields};
 use crate::newton::{Contraction, Work};
-use crate::relax::defect::{self, Linear, Told, linear_grid};
+use crate::relax::defect::{self, Linear, Told};
 use crate::relax::level::{Level, complete, positions};
 use crate::relax::method::Method;
 use crate::relax::options::{Options, Progress};
@@ -70,8 +70,6 @@ pub struct Run<'a, 'o> {
     pub spent: usize,
     /// Saddles left that were only noticed by their index.
     pub pushes: i32,
-    /// The matrix with which the last grid came to rest.
-    pub last: Option<System>,
     /// Whether the leaf did not come to rest in a first attempt.
     pub by_steps: bool,
     /// Whether it had to move while it was softer than it is.
@@ -110,7 +108,6 @@ impl<'a, 'o> Run<'a, 'o> {
             contraction: Contraction::default(),
             spent: 0,
             pushes: 0,
-            last: None,
             by_steps: false,
             moved_softened: false,
             part: 0.0,
@@ -137,7 +134,6 @@ impl<'a, 'o> Run<'a, 'o> {
         self.remaining = 0.0;
         self.contraction = Contraction::default();
         self.pushes = 0;
-        self.last = None;
     }
 
     /// The run as if it had been one of the whole leaf.
@@ -213,31 +209,10 @@ impl<'a, 'o> Run<'a, 'o> {
 
     /// Estimates the error of the best values from their defect.
     pub fn judge_accuracy(&mut self) {
-        self.defect = None;
         let best = self.table.best();
-        let Some(best) = best.filter(|best| best.error <= HOPELESS * self.tolerance) else {
-            return;
-        };
-        let of_finest = linear_grid(self.levels.len()) + 1 == self.levels.len();
-        if of_finest {
-            self.linear = None;
-        }
-        let room = of_finest.then(|| self.last.take()).flatten();
+        let near = best.filter(|best| best.error <= HOPELESS * self.tolerance);
         let (levels, linear, work) = (&self.levels, &mut self.linear, &mut self.work);
-        self.defect = defect::told(levels, best.columns, (linear, room), work);
-        if of_finest {
-            // Stability is judged by them, too.
-            self.last = self.linear.take().map(|linear| linear.system);
-        }
-    }
-
-    /// Keeps the equations of the finest grid if they are those that tell errors on the next.
-    pub fn keep_equations(&mut self) {
-        let grid = self.levels.len() - 1;
-        if self.defect.is_some() && linear_grid(self.levels.len() + 1) == grid {
-            let system = self.last.take();
-            self.linear = system.map(|system| Linear { grid, system });
-        }
+        self.defect = near.and_then(|best| defect::told(levels, best.columns, linear, work));
     }
 
     /// Whether unfinished iterations and rounding alone are more than the

@@ -63,7 +63,6 @@ pub struct Settled {
 impl Run<'_, '_> {
     /// Settles on one grid; leaves saddles unless they are wanted.
     pub fn settle(&mut self, grid: Grid, guess: InitialGuess) -> Settled {
-        self.last = None;
         let mut leaf = DiscreteLeaf::new(self.leaf, grid);
         let mut near_rest = matches!(guess, InitialGuess::Coarser(_) | InitialGuess::Predicted(_));
         let from_start = matches!(guess, InitialGuess::Start);
@@ -218,7 +217,6 @@ impl Run<'_, '_> {
                 }
             }
             if rest != Err(Stop::Saddle) || convex_only {
-                self.last = (!direct && rest.is_ok()).then_some(system);
                 let level = Level { leaf, state };
                 return Settled { level, rest, moved };
             }

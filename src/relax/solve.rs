@@ -142,7 +142,8 @@ fn finished(
 ) -> (Equilibrium, Vec<Level>) {
     let asked = run.options.modes;
     let count = match run.index {
-        Some(0) if !run.clearly => asked.max(1),
+        // A single grid tells no more.
+        Some(0) if !run.clearly && run.segments().is_none() => asked.max(1),
         _ => asked,
     };
     let result = |run: &Run, end: Result<bool, Stop>| {

@@ -8,23 +8,14 @@ use crate::relax::saddle::{self, saddle_of};
 use crate::relax::settle::{InitialGuess, MAX_SADDLES, Settled};
 use glam::DVec3;
 
-/// A leaf whose lowest eigenvalue (over the masses; that of a clamped rod is 12) is larger
-/// than this on one grid is stable on finer ones: eight segments make a column that is
-/// about to buckle stiffer by 0.04. Next to smaller ones the leaf may be unstable.
-const CLEARLY: f64 = 0.1;
-
 impl Run<'_, '_> {
     /// Negative eigenvalues on one grid; notes whether they are clearly none.
     fn count(&mut self, level: &Level, system: &mut System) -> Option<usize> {
-        let mut below = |shift: f64| {
-            let Level { leaf, state } = level;
-            saddle::index(leaf, state, system, shift, &mut self.work)
-        };
-        let clear = below(-CLEARLY);
-        self.clearly = clear == Some(0);
+        let Level { leaf, state } = level;
+        self.clearly = saddle::clearly_stable(leaf, state, system, &mut self.work);
         match self.clearly {
-            true => clear,
-            false => below(0.0),
+            true => Some(0),
+            false => saddle::index(leaf, state, system, 0.0, &mut self.work),
         }
     }
 
@@ -47,15 +38,6 @@ impl Run<'_, '_> {
             };
         }
         let before = self.index;
-        if let Some(mut system) = self.last.take() {
-            // It is that of the leaf at rest, or before a last small step.
-            self.work.factorizations += 1;
-            if system.stable_without_coupling(-CLEARLY) {
-                self.index = Some(0);
-                self.clearly = true;
-                return Ok(true);
-            }
-        }
         let level = self.levels.pop().expect("the leaf has settled");
         let mut system = System::new(&level.leaf);
         self.index = self.count(&level, &mut system);

@@ -12,7 +12,7 @@ use super::discrete::DiscreteLeaf;
 use super::state::State;
 use super::system::{Sums, System, each_group, rods_of};
 use crate::lanes::{GROUP, run};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 impl DiscreteLeaf {
@@ -60,6 +60,27 @@ impl DiscreteLeaf {
         });
         for j in 0..self.rods() {
             self.clear_held_components(j, &mut system.groups[place(j).0].rhs);
+        }
+    }
+
+    /// Takes `times` the stiffness that the elements may have too much, with respect to
+    /// turns of their nodes, from an assembled matrix.
+    pub fn subtract_excess_stiffness(&self, state: &State, system: &mut System, times: f64) {
+        let n = self.segments();
+        let excess = |j: usize, i: usize| {
+            let segment = self.segment(state, j, i, state.n[j * n + i]);
+            0.5 * times * segment.excess_stiffness(self.section(j, i))
+        };
+        for j in 0..self.rods() {
+            let mut before = excess(j, 0);
+            for i in 1..=n {
+                let behind = if i < n { excess(j, i) } else { 0.0 };
+                if self.moves(i)[0] {
+                    let matrix = DMat3::from_diagonal(DVec3::splat(-before - behind));
+                    system.add(j, i, (matrix, 0.0), (DVec3::ZERO, DVec3::ZERO));
+                }
+                before = behind;
+            }
         }
     }
 
