@@ -1,12 +1,13 @@
 //! The boundary of stability: curves in the plane of two numbers, with the index on both
 //! sides, and the leaf at some of their points.
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use std::collections::BTreeSet;
 
 use super::axes::Axes;
 use super::axis::Axis;
 use super::drawing::{Anchor, CURVES, Drawing, INK, NOTE, Stroke};
+use super::indices::write_indices;
 use super::labels::Labels;
 use super::map::{DARKEST_INDEX, fill_index, name};
 use super::markers::Marker;
@@ -17,7 +18,7 @@ use super::veins::Veins;
 use crate::report::numbers::{power_of_ten, short};
 use crate::report::{is_special, sides};
 use crate::scenario::Scenario;
-use crate::study::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint};
+use crate::study::{Boundary, BoundaryMap, BoundaryPoint};
 
 const DIAGRAM: f64 = 400.0;
 /// Right of the panel, for the key.
@@ -25,8 +26,6 @@ const KEY: f64 = 210.0;
 /// Leaves drawn, and curves named.
 const MOST_LEAVES: usize = 8;
 const MOST_NAMED: usize = 7;
-/// From a curve to the index beside it.
-const BESIDE: f64 = 11.0;
 
 pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);
@@ -119,7 +118,6 @@ fn draw_curves(
     axes.draw(page);
     let at = |point: &BoundaryPoint| (point.values[0], point.values[1]);
     let mut labels = Labels::within(cell);
-    let mut indices: Vec<Sides> = Vec::new();
     for (c, curve) in boundary.curves.iter().enumerate() {
         let color = CURVES[c % CURVES.len()];
         let line: Vec<(f64, f64)> = curve.points.iter().map(at).collect();
@@ -128,10 +126,6 @@ fn draw_curves(
         let width = if solid { 2.0 } else { 1.2 };
         axes.curve(page, &line, Stroke::new(color, width).dashed(!solid));
         labels.avoid(&axes, &line);
-        label(page, &axes, boundary, curve, &mut indices);
-    }
-    for sides in &indices {
-        sides.draw(page);
     }
     for (kind, marker) in [("cusp", Marker::Diamond), ("crossing", Marker::Ring)] {
         let special = points().filter(|point| point.kind == kind);
@@ -143,6 +137,7 @@ fn draw_curves(
         }
     }
     labels.draw(page);
+    write_indices(page, &axes, boundary, &mut labels);
     draw_key(page, boundary, cell);
 }
 
@@ -176,74 +171,6 @@ fn draw_cells(page: &mut Drawing, axes: &Axes, boundary: &Boundary, map: &Bounda
         if let Some(at) = axes.at((map.first[c - 1], map.second[r - 1])) {
             page.label(at, "×", TICK_SIZE, Anchor::Middle, INK);
         }
-    }
-}
-
-/// The index on both sides of a curve, or of several that lie close together.
-struct Sides {
-    left: (DVec2, usize),
-    right: (DVec2, usize),
-}
-
-impl Sides {
-    fn draw(&self, page: &mut Drawing) {
-        let level = DVec2::new(BESIDE, 0.35 * TICK_SIZE);
-        for ((place, index), way, anchor) in [
-            (self.left, DVec2::new(-1.0, 1.0), Anchor::End),
-            (self.right, DVec2::ONE, Anchor::Start),
-        ] {
-            let text = format!("index {index}");
-            page.label(place + level * way, &text, TICK_SIZE, anchor, NOTE);
-        }
-    }
-}
-
-/// The index on both sides of a curve, in its middle, unless it lies close to one before:
-/// then what is outside both. Of a fold, where there are equilibria, of both that meet.
-fn label(
-    page: &mut Drawing,
-    axes: &Axes,
-    boundary: &Boundary,
-    curve: &BoundaryCurve,
-    indices: &mut Vec<Sides>,
-) {
-    let middle = curve.points.len() / 2;
-    let Some(point) = curve.points.get(middle) else {
-        return;
-    };
-    let Some(place) = axes.at((point.values[0], point.values[1])) else {
-        return;
-    };
-    let (before, behind) = (point.index_before, point.index_behind);
-    if curve.multiplicity == 1 && matches!(point.kind, "fold" | "cusp") {
-        let beside = place + DVec2::new(BESIDE, 0.35 * TICK_SIZE);
-        let text = format!("{before} and {behind} meet");
-        page.label(beside, &text, TICK_SIZE, Anchor::Start, NOTE);
-        return;
-    }
-    // Along the first number: to the right, unless its axis falls.
-    let rises = axes
-        .across
-        .part(point.values[0] + 1e-6 * point.values[0].abs().max(1e-9));
-    let rises = rises >= axes.across.part(point.values[0]);
-    let [from, to] = boundary.ranges[0];
-    let rises = rises == (to > from);
-    let (left, right) = if rises {
-        (before, behind)
-    } else {
-        (behind, before)
-    };
-    let close = |sides: &&mut Sides| {
-        sides.left.0.distance(place) < TICK_SIZE || sides.right.0.distance(place) < TICK_SIZE
-    };
-    match indices.iter_mut().find(close) {
-        Some(sides) if place.x < sides.left.0.x => sides.left = (place, left),
-        Some(sides) if place.x > sides.right.0.x => sides.right = (place, right),
-        Some(_) => {}
-        None => indices.push(Sides {
-            left: (place, left),
-            right: (place, right),
-        }),
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::axes::Axes;
-use super::drawing::{Anchor, Drawing, INK};
+use super::drawing::{Anchor, Color, Drawing, INK};
 use super::font::Font;
 use super::page::{Cell, TICK_SIZE};
 
@@ -15,7 +15,7 @@ const MOST_PLACES: usize = 20_000;
 const DISTANCES: [f64; 3] = [11.0, 16.0, 24.0];
 const DIRECTIONS: usize = 16;
 /// Clear enough.
-const CLEAR: f64 = 5.0;
+pub const CLEAR: f64 = 5.0;
 /// Points closer than this have one label.
 const CLOSE: f64 = 10.0;
 
@@ -23,6 +23,8 @@ pub struct Labels {
     cell: Cell,
     /// Where curves are.
     taken: Vec<DVec2>,
+    /// Where labels are.
+    drawn: Vec<Cell>,
     /// Points with their texts.
     wanted: Vec<(DVec2, String)>,
 }
@@ -32,6 +34,7 @@ impl Labels {
         Labels {
             cell,
             taken: Vec::new(),
+            drawn: Vec::new(),
             wanted: Vec::new(),
         }
     }
@@ -61,13 +64,11 @@ impl Labels {
         }
     }
 
-    /// Draws them all.
-    pub fn draw(mut self, page: &mut Drawing) {
-        let font = Font::embedded();
-        let mut drawn: Vec<Cell> = Vec::new();
+    /// Draws all that were asked for.
+    pub fn draw(&mut self, page: &mut Drawing) {
         self.taken.extend(self.wanted.iter().map(|(at, _)| *at));
-        for (at, text) in &self.wanted {
-            let size = DVec2::new(font.width(text, TICK_SIZE), TICK_SIZE);
+        for (at, text) in std::mem::take(&mut self.wanted) {
+            let size = size(&text);
             let places = DISTANCES.into_iter().flat_map(|distance| {
                 (0..DIRECTIONS).map(move |k| {
                     let angle = -0.25 * std::f64::consts::PI
@@ -80,10 +81,10 @@ impl Labels {
                 // Wide labels stand farther to the side.
                 let side = DVec2::new(0.5 * (size.x - size.y).max(0.0) * way.normalize().x, 0.0);
                 let cell = Cell {
-                    corner: *at + way + side - 0.5 * size,
+                    corner: at + way + side - 0.5 * size,
                     size,
                 };
-                let clear = self.clearance(&cell, &drawn);
+                let clear = self.clearance(&cell);
                 if best.as_ref().is_none_or(|(least, _)| clear > *least) {
                     best = Some((clear, cell));
                 }
@@ -92,28 +93,38 @@ impl Labels {
                 }
             }
             if let Some((_, cell)) = best {
-                page.beside(cell.middle(), text, TICK_SIZE, Anchor::Middle, INK);
-                drawn.push(cell);
+                self.write(page, cell, &text, INK);
             }
         }
     }
 
+    /// Writes a text where it has its place.
+    pub fn write(&mut self, page: &mut Drawing, cell: Cell, text: &str, color: Color) {
+        page.beside(cell.middle(), text, TICK_SIZE, Anchor::Middle, color);
+        self.drawn.push(cell);
+    }
+
     /// How far a label stays from curves, up to what is clear enough; less than
     /// nothing where it leaves the panel or covers another.
-    fn clearance(&self, label: &Cell, drawn: &[Cell]) -> f64 {
+    pub fn clearance(&self, label: &Cell) -> f64 {
         let inside = label.corner.cmpge(self.cell.corner + 2.0).all()
             && label.end().cmple(self.cell.end() - 2.0).all();
         let apart = |other: &Cell| {
             label.corner.cmpgt(other.end() + 1.0).any()
                 || label.end().cmplt(other.corner - 1.0).any()
         };
-        if !inside || !drawn.iter().all(apart) {
+        if !inside || !self.drawn.iter().all(apart) {
             return -1.0;
         }
         let (middle, half) = (label.middle(), 0.5 * label.size);
         let far = |place: &DVec2| ((*place - middle).abs() - half).max(DVec2::ZERO).length();
         self.taken.iter().map(far).fold(CLEAR, f64::min)
     }
+}
+
+/// The room of a text.
+pub fn size(text: &str) -> DVec2 {
+    DVec2::new(Font::embedded().width(text, TICK_SIZE), TICK_SIZE)
 }
 
 #[cfg(test)]

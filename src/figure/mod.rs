@@ -23,6 +23,7 @@ mod filmstrip;
 mod fit;
 mod font;
 mod gravity;
+mod indices;
 mod labels;
 mod leaf;
 mod map;
