@@ -172,7 +172,7 @@ impl Sides {
             let (mut along, mut index) = (0.0, sides[out]);
             let mut next = |&(at, it, k): &(f64, [usize; 2], usize)| {
                 let step = way * (at - along);
-                if k != c && step >= 0.0 && step < CLOSE && it[1 - out] == index {
+                if k != c && (0.0..CLOSE).contains(&step) && it[1 - out] == index {
                     (along, index) = (at, it[out]);
                     named.push(k);
                 }
