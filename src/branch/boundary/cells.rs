@@ -4,6 +4,7 @@ use super::sheet::{Plane, Spot};
 use crate::branch::Point;
 use crate::branch::critical::Critical;
 use crate::branch::equations::{Equations, Stuck};
+use crate::branch::family::Family;
 use crate::branch::refine::{index_at, on_finer};
 use crate::branch::refine_critical::refine_critical;
 use crate::branch::refined::{Doubt, Refined};
@@ -67,7 +68,7 @@ fn between<'p>(plane: &'p Plane, [from, to]: [[f64; 2]; 2]) -> Box<Between<'p>> 
 /// the grid of the way, this is too coarse, and the way is gone once more on a finer one.
 pub fn go(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Way {
     let make = between(plane, [from.spot.place, to]);
-    let family = plane.family.along(&*make);
+    let family = Family::in_units(&*make, (0.0, 1.0), false, plane.family.scale());
     let mut way = Way::default();
     let Ok(family) = family else { return way };
     let equations = Equations::new(&family, from.grid.clone());
@@ -140,6 +141,6 @@ pub fn refine_on(
     accuracy: f64,
 ) -> Result<Refined, Doubt> {
     let make = between(plane, ends);
-    let family = plane.family.along(&*make)?;
+    let family = Family::in_units(&*make, (0.0, 1.0), false, plane.family.scale())?;
     refine_critical(&family, grid, critical, accuracy, CRITICAL_GRIDS)
 }

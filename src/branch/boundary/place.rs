@@ -5,7 +5,6 @@ use nalgebra::DMatrix;
 use super::search::{self, Eigen, Found, Lost, Search};
 use super::sheet::{Direction, Sample, Sheet, Spot};
 use crate::branch::critical::{Critical, Kind};
-use crate::branch::deflation::STIFF;
 use crate::branch::equations::Stuck;
 use crate::branch::field::{add, combined, dot, plus, times};
 use crate::leaf::Field;
@@ -139,10 +138,22 @@ impl Place {
         let eigen = search::eigen(&sample, self.neutral);
         let basis = self.basis(sheet, &sample, &eigen)?;
         let held = held(sheet, &sample, &eigen);
-        let change = match sheet.leaf(sample.spot.place)?.stiffest() * STIFF > 1.0 {
-            true => self.change(sheet, &sample, &eigen, &basis)?,
-            false => self.difference(sheet, &sample, &eigen, (&basis, &held))?,
-        };
+        let border: Vec<Field> = held.iter().map(|it| sheet.equations.momentum(it)).collect();
+        let mut change = [0.0; 2];
+        for (change, direction) in change.iter_mut().zip(&basis) {
+            let mut beside = |step: f64| {
+                let spot = sheet.moved(&sample.spot, direction, step)?;
+                let sample = sheet.settle(&spot, [&basis[0], &basis[1]], &border, &sample.rates)?;
+                Ok::<_, Stuck>((step, search::eigen(&sample, self.neutral).value))
+            };
+            let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| match beside(step) {
+                // At an end of a range there may be nothing beyond.
+                Err(Stuck::OutOfRange(_)) => Ok((0.0, eigen.value)),
+                found => found,
+            });
+            let ((after, above), (before, below)) = (after?, before?);
+            *change = (above - below) / (after - before);
+        }
         let slope = change[0].hypot(change[1]);
         if !(slope.is_finite() && slope > NEUTRAL) {
             return Err(Lost::Stuck(Stuck::NotConverged));
@@ -178,51 +189,6 @@ impl Place {
             others: eigen.others,
             spot: sample.spot,
         })
-    }
-
-    /// The change of the eigenvalue along directions on the sheet, by how forces change
-    /// along the modes.
-    fn change(
-        &self,
-        sheet: &mut Sheet,
-        sample: &Sample,
-        eigen: &Eigen,
-        basis: &[Direction; 2],
-    ) -> Result<[f64; 2], Lost> {
-        let own = eigen.vectors[..self.neutral].iter();
-        let modes: Vec<Field> = own.map(|it| combined(it, &sample.solved.modes)).collect();
-        let (change, numbers) = sheet.curvature_change(&sample.spot, &modes)?;
-        Ok(basis.each_ref().map(|it| {
-            let place = it.place[0] * numbers[0] + it.place[1] * numbers[1];
-            dot(&change, &it.increments) + place
-        }))
-    }
-
-    /// The same by differences: stiff segments answer a finite way along a mode by forces.
-    fn difference(
-        &self,
-        sheet: &mut Sheet,
-        sample: &Sample,
-        eigen: &Eigen,
-        (basis, held): (&[Direction; 2], &[Field]),
-    ) -> Result<[f64; 2], Lost> {
-        let border: Vec<Field> = held.iter().map(|it| sheet.equations.momentum(it)).collect();
-        let mut change = [0.0; 2];
-        for (change, direction) in change.iter_mut().zip(basis) {
-            let mut beside = |step: f64| {
-                let spot = sheet.moved(&sample.spot, direction, step)?;
-                let sample = sheet.settle(&spot, [&basis[0], &basis[1]], &border, &sample.rates)?;
-                Ok::<_, Stuck>((step, search::eigen(&sample, self.neutral).value))
-            };
-            let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| match beside(step) {
-                // At an end of a range there may be nothing beyond.
-                Err(Stuck::OutOfRange(_)) => Ok((0.0, eigen.value)),
-                found => found,
-            });
-            let ((after, above), (before, below)) = (after?, before?);
-            *change = (above - below) / (after - before);
-        }
-        Ok(change)
     }
 
     /// Two directions of length one, normal to each other, that span the sheet.

@@ -176,9 +176,16 @@ impl Search<'_> {
         let own = &eigen.vectors[..self.neutral];
         let modes = own.iter().map(|it| combined(it, &sample.solved.modes));
         let modes: Vec<Field> = modes.collect();
-        let (change, numbers) = sheet.curvature_change(&sample.spot, &modes)?;
-        let mut all = times(&change, 1.0 / self.slope);
-        let numbers = numbers.map(|change| change / self.slope);
+        let part = 1.0 / (self.slope * self.neutral as f64);
+        let mut all = times(&modes[0], 0.0);
+        let mut numbers = [0.0; 2];
+        for mode in &modes {
+            let (change, rates) = sheet.curvature_change(&sample.spot, mode)?;
+            add(&mut all, part, &change);
+            for (number, rate) in numbers.iter_mut().zip(rates) {
+                *number += part * rate;
+            }
+        }
         if frozen {
             for (vector, mode) in own.iter().zip(&modes) {
                 let along = dot(&all, mode);

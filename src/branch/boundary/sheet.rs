@@ -310,27 +310,24 @@ impl<'a> Sheet<'a> {
         Ok(rates)
     }
 
-    /// How the mean curvature of the energy along modes, with the sign of H, changes with
-    /// all increments and with both numbers.
+    /// How the curvature of the energy along a mode, with the sign of H, changes with all
+    /// increments and with both numbers.
     pub fn curvature_change(
         &mut self,
         spot: &Spot,
-        modes: &[Field],
+        mode: &Field,
     ) -> Result<(Field, [f64; 2]), Stuck> {
+        let way = Direction {
+            increments: mode.clone(),
+            place: [0.0; 2],
+        };
         let mut change = vec![vec![[0.0; 6]; self.grid().segments()]; self.equations.rods()];
         let mut numbers = [0.0; 2];
-        let part = 1.0 / modes.len() as f64;
-        for mode in modes {
-            let way = Direction {
-                increments: mode.clone(),
-                place: [0.0; 2],
-            };
-            for step in [ALONG_MODE, -ALONG_MODE] {
-                let moved = self.moved(spot, &way, step)?;
-                add(&mut change, part, &self.forces(&moved)?);
-                for (number, rate) in numbers.iter_mut().zip(self.rates(&moved)?) {
-                    *number += part * dot(&rate, mode) / (2.0 * step);
-                }
+        for step in [ALONG_MODE, -ALONG_MODE] {
+            let moved = self.moved(spot, &way, step)?;
+            add(&mut change, 1.0, &self.forces(&moved)?);
+            for (number, rate) in numbers.iter_mut().zip(self.rates(&moved)?) {
+                *number += dot(&rate, mode) / (2.0 * step);
             }
         }
         // The last, so that increments are those of the spot again.
