@@ -100,39 +100,37 @@ fn strip(beyond: f64) -> Scenario {
     ))
 }
 
+/// Up to its load a leaf stays in its plane, beyond it does not.
+fn assert_leaves_its_plane_beyond(what: &str, leaf: impl Fn(f64) -> Scenario) {
+    for tolerance in [1e-3, 1e-6] {
+        for beyond in [-1e-2, -1e-3, 1e-3, 3e-3, 1e-2, 2e-2, 6e-2] {
+            let leaf = settle(&leaf(beyond), tolerance);
+            assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
+            let nodes = leaf.shape.rods.iter().flat_map(|rod| &rod.nodes);
+            let aside = nodes.map(|node| node.position.y.abs()).fold(0.0, f64::max);
+            assert_eq!(
+                aside > 1e-9,
+                beyond > 0.0,
+                "{what} {tolerance} {beyond}: {aside}"
+            );
+        }
+    }
+}
+
 /// Eight segments bear 11 % more than a column clamped at both ends, 5 % more than one that
 /// is pinned at its tip. No modes are asked for.
 #[test]
 fn short_waves_are_not_taken_for_stable_columns() {
-    let columns = [
+    for (how, other) in [
         ("clamped", 3.0),
         ("clamped", 1e3),
         ("pinned", 3.0),
         ("pinned", 1e3),
-    ];
-    let mut leaves: Vec<(String, Box<dyn Fn(f64) -> Scenario>)> = Vec::new();
-    for (how, other) in columns {
-        leaves.push((
-            format!("{how} {other}"),
-            Box::new(move |beyond| held(how, other, beyond)),
-        ));
+    ] {
+        let column = |beyond| held(how, other, beyond);
+        assert_leaves_its_plane_beyond(&format!("{how} {other}"), column);
     }
-    leaves.push(("strip".into(), Box::new(strip)));
-    for (what, leaf) in leaves {
-        for tolerance in [1e-3, 1e-6] {
-            for beyond in [-1e-2, -1e-3, 1e-3, 3e-3, 1e-2, 2e-2, 6e-2] {
-                let leaf = settle(&leaf(beyond), tolerance);
-                assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
-                let nodes = leaf.shape.rods.iter().flat_map(|rod| &rod.nodes);
-                let aside = nodes.map(|node| node.position.y.abs()).fold(0.0, f64::max);
-                assert_eq!(
-                    aside > 1e-9,
-                    beyond > 0.0,
-                    "{what} {tolerance} {beyond}: {aside}"
-                );
-            }
-        }
-    }
+    assert_leaves_its_plane_beyond("strip", strip);
 }
 
 /// A leaf far from any bifurcation is proved stable by one factorisation; another one tells
