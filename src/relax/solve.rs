@@ -34,8 +34,9 @@ pub fn relax(
     }
     let intervals = match options.method {
         Method::SemiImplicit(_) | Method::Explicit { .. } => {
-            let least = least(options.method, tolerance, options.modes == 0);
-            return on_grids(scenario, options, (tolerance, least), progress).map(|(it, _)| it);
+            let shape_alone = options.modes == 0;
+            let found = on_grids(scenario, options, (tolerance, shape_alone), progress);
+            return found.map(|(found, _)| found);
         }
         Method::SingleShooting => Some(1),
         Method::Shooting { intervals } | Method::ShootingFromRest { intervals } => intervals,
@@ -76,15 +77,14 @@ pub(crate) fn relax_on_grids(
     tolerance: f64,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<(Equilibrium, Vec<Level>), RelaxError> {
-    let least = least(options.method, tolerance, false);
-    on_grids(scenario, options, (tolerance, least), progress)
+    on_grids(scenario, options, (tolerance, false), progress)
 }
 
-/// The same from a grid of so many segments, or more if the leaf needs them.
+/// The same, or fine enough for its shape alone.
 fn on_grids(
     scenario: &Scenario,
     options: &Options,
-    (tolerance, least): (f64, usize),
+    (tolerance, shape_alone): (f64, bool),
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<(Equilibrium, Vec<Level>), RelaxError> {
     let clock = Instant::now();
@@ -93,6 +93,8 @@ fn on_grids(
         explicit::check(&leaf)?;
     }
     let method = options.method;
+    // Four segments are too few to be shared out among panels.
+    let least = least(method, tolerance, shape_alone && leaf.kinks().is_empty());
     let first = check_segments(&leaf, method.segments(), least)?;
     let reduced = reducible(method).then(|| leaf.reduced()).flatten();
     let grid = Grid::new(first, leaf.kinks());
