@@ -1,9 +1,9 @@
 //! The whole matrix of the leaf as one sparse symmetric indefinite
 //! factorisation: for the Morse index, and for Newton's method at a saddle.
 
-use super::chain::place;
 use super::state::{Field, Increment};
 use super::system::System;
+use super::unknowns::{Unknowns, entries, lower_triangle};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::PermRef;
 use faer::sparse::linalg::SupernodalThreshold;
@@ -11,18 +11,15 @@ use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky, supernodal,
 };
-use faer::sparse::{Argsort, Pair, SparseColMat, SymbolicSparseColMat};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
-
-/// Blocks of the grid of rods and nodes no larger than this are not dissected.
-const DISSECTION_LEAF: usize = 4;
 
 /// The pattern of a leaf's matrix: ordering and symbolic factorisation.
 pub struct SparsePattern {
     symbolic: SymbolicCholesky<usize>,
-    /// Of the lower triangle, where its [`entries`] stand, and how many there are.
-    lower: (SymbolicSparseColMat<usize>, Argsort<usize>),
-    entries: usize,
+    /// Of the lower triangle, and where each of its [`entries`] stands.
+    lower: SymbolicSparseColMat<usize>,
+    places: Vec<usize>,
     unknowns: Unknowns,
     /// First of the rows that border the matrix, behind all others.
     border: usize,
@@ -62,39 +59,18 @@ impl SparsePattern {
 
     /// The same with so many dense rows and columns at the end.
     pub fn bordered(system: &System, rows: usize) -> Result<Self, SparseError> {
+        let unknowns = Unknowns::new(system);
+        let border = unknowns.count;
+        let size = border + rows;
         let (rods, n) = (system.rods(), system.segments);
-        let mut nodes = Vec::with_capacity(rods * n);
-        dissect((0, rods), (0, n), &mut nodes);
-        let mut first = vec![0; rods * n];
-        let mut size = 0;
-        for (j, i) in nodes {
-            first[j * n + i] = size;
-            size += if system.joined && i + 1 == n { 3 } else { 6 };
-        }
-        let tip = system.joined.then_some(size);
-        size += if system.joined { 3 } else { 0 };
-        let border = size;
-        size += rows;
-        let unknowns = Unknowns {
-            first,
-            tip,
-            segments: n,
-        };
         let ones = vec![vec![vec![[1.0; 6]; n]; rods]; rows];
         let mut pairs = Vec::new();
         entries(system, &unknowns, &ones, border, 0.0, |a, b, _| {
-            let (row, col) = (a.max(b), a.min(b));
-            pairs.push(Pair { row, col });
+            pairs.push([a.min(b), a.max(b)]);
         });
-        let placed = |pairs: &[Pair<usize, usize>]| {
-            SymbolicSparseColMat::try_new_from_indices(size, size, pairs).map_err(|_| SparseError)
-        };
-        let lower = placed(&pairs)?;
-        for pair in &mut pairs {
-            std::mem::swap(&mut pair.row, &mut pair.col);
-        }
+        let (lower, places) = lower_triangle(size, &pairs);
         // With its ordering given, faer reads the pattern of the upper triangle.
-        let (upper, _) = placed(&pairs)?;
+        let upper = lower.transpose().to_col_major().map_err(|_| SparseError)?;
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
@@ -109,7 +85,7 @@ impl SparsePattern {
         Ok(SparsePattern {
             symbolic,
             lower,
-            entries: pairs.len(),
+            places,
             unknowns,
             border,
             size,
@@ -143,9 +119,9 @@ impl SparsePattern {
         let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
             return Err(SparseError);
         };
-        let (pattern, order) = &self.lower;
-        let mut values = Vec::with_capacity(self.entries);
+        let mut values = vec![0.0; self.lower.compute_nnz()];
         let (unknowns, first_border) = (&self.unknowns, self.border);
+        let mut places = self.places.iter();
         entries(
             system,
             unknowns,
@@ -153,11 +129,11 @@ impl SparsePattern {
             first_border,
             shift,
             |_, _, value| {
-                values.push(value);
+                if let Some(&place) = places.next() {
+                    values[place] += value;
+                }
             },
         );
-        let matrix = SparseColMat::new_from_argsort(pattern.clone(), order, &values);
-        let matrix = matrix.map_err(|_| SparseError)?;
         let scratch =
             supernodal::factorize_supernodal_numeric_intranode_lblt_scratch::<usize, f64>(
                 symbolic,
@@ -178,7 +154,7 @@ impl SparsePattern {
             &mut factor.subdiagonal,
             &mut factor.forward,
             &mut factor.inverse,
-            matrix.as_ref(),
+            SparseColMatRef::new(self.lower.as_ref(), &values),
             symbolic,
             Par::Seq,
             MemStack::new(&mut factor.memory),
@@ -285,106 +261,5 @@ impl SparseFactor<'_> {
         let rods = unknowns.first.chunks_exact(unknowns.segments).enumerate();
         let nodes = |j: usize| (0..unknowns.segments).map(move |i| unknowns.scatter(j, i, all));
         rods.map(|(j, _)| nodes(j).collect()).collect()
-    }
-}
-
-/// Where the unknowns of the nodes stand.
-struct Unknowns {
-    /// First unknown of node i (from 0) of rod j, at j n + i.
-    first: Vec<usize>,
-    /// First unknown of the joint tip.
-    tip: Option<usize>,
-    segments: usize,
-}
-
-impl Unknowns {
-    /// Component `c` of node `i` (from 0) of rod `j`.
-    fn at(&self, j: usize, i: usize, c: usize) -> usize {
-        match self.tip {
-            Some(tip) if i + 1 == self.segments && c >= 3 => tip + c - 3,
-            _ => self.first[j * self.segments + i] + c,
-        }
-    }
-
-    /// Adds the forces on a node.
-    fn gather(&self, j: usize, i: usize, forces: &Increment, all: &mut [f64]) {
-        for c in 0..6 {
-            all[self.at(j, i, c)] += forces[c];
-        }
-    }
-
-    /// The increments of a node.
-    fn scatter(&self, j: usize, i: usize, all: &[f64]) -> Increment {
-        std::array::from_fn(|c| all[self.at(j, i, c)])
-    }
-}
-
-/// Nested dissection of the nodes `nodes` of the rods `rods`: both halves
-/// first, then the line between them.
-fn dissect(rods: (usize, usize), nodes: (usize, usize), order: &mut Vec<(usize, usize)>) {
-    let (width, length) = (rods.1 - rods.0, nodes.1 - nodes.0);
-    if width == 0 || length == 0 {
-        return;
-    }
-    if width * length <= DISSECTION_LEAF {
-        order.extend((rods.0..rods.1).flat_map(|j| (nodes.0..nodes.1).map(move |i| (j, i))));
-    } else if width > length {
-        let middle = rods.0 + width / 2;
-        dissect((rods.0, middle), nodes, order);
-        dissect((middle + 1, rods.1), nodes, order);
-        order.extend((nodes.0..nodes.1).map(|i| (middle, i)));
-    } else {
-        let middle = nodes.0 + length / 2;
-        dissect(rods, (nodes.0, middle), order);
-        dissect(rods, (middle + 1, nodes.1), order);
-        order.extend((rods.0..rods.1).map(|j| (j, middle)));
-    }
-}
-
-/// Tells where one triangle of K and its border has entries, some in several parts, and
-/// how large they are: the same places in the same order for all systems of a pattern.
-fn entries(
-    system: &System,
-    unknowns: &Unknowns,
-    border: &[Field],
-    first_border: usize,
-    shift: f64,
-    mut add: impl FnMut(usize, usize, f64),
-) {
-    let n = system.segments;
-    for j in 0..system.rods() {
-        let at = |i: usize, c: usize| unknowns.at(j, i, c);
-        let (group, lane) = place(j);
-        let chain = system.groups[group].matrix.spatial();
-        for i in 0..n {
-            let (own, next) = chain.blocks(i, lane);
-            let mass = system.mass(j, i);
-            for r in 0..6 {
-                add(at(i, r), at(i, r), shift * mass[r / 3]);
-                for c in r..6 {
-                    add(at(i, r), at(i, c), own[r][c]);
-                }
-                for c in 0..if i + 1 < n { 6 } else { 0 } {
-                    add(at(i, r), at(i + 1, c), next[r][c]);
-                }
-            }
-            if let Some(spring) = system.spring(j, i)
-                && (unknowns.tip.is_none() || i + 1 < n)
-            {
-                for c in 0..3 {
-                    add(at(i, 3 + c), unknowns.at(j + 1, i, 3 + c), -spring[c]);
-                }
-            }
-        }
-        for (k, row) in border.iter().enumerate() {
-            for (i, forces) in row[j].iter().enumerate() {
-                for c in 0..6 {
-                    add(at(i, c), first_border + k, forces[c]);
-                }
-            }
-        }
-    }
-    for k in 0..border.len() {
-        add(first_border + k, first_border + k, 0.0);
     }
 }
