@@ -64,14 +64,15 @@ impl<'a> Flow<'a> {
         }
     }
 
-    /// The rods, which are as `begin` says at sigma = `from`, after each of so many equal
-    /// `steps` to `to`.
+    /// Writes down what each rod, which is as `begin` says at sigma = `from`, is after every
+    /// one of so many equal `steps` to `to`.
     pub fn carry(
         &mut self,
         begin: impl Fn(usize) -> RodFields,
         [from, to]: [f64; 2],
         steps: usize,
-    ) -> Vec<Vec<RodFields>> {
+        after: &mut [Vec<RodFields>],
+    ) {
         let rods = self.leaf.rods();
         for (g, group) in self.fields.iter_mut().enumerate() {
             for (lane, j) in rods_of(g, rods).into_iter().enumerate() {
@@ -86,11 +87,13 @@ impl<'a> Flow<'a> {
             }
         }
         let h = (to - from) / steps as f64;
-        let after = |step| {
+        after.iter_mut().for_each(Vec::clear);
+        for step in 0..steps {
             self.step(from + h * step as f64, h);
-            (0..rods).map(|j| self.rod(j)).collect()
-        };
-        (0..steps).map(after).collect()
+            for (j, after) in after.iter_mut().enumerate() {
+                after.push(self.rod(j));
+            }
+        }
     }
 
     fn rod(&self, j: usize) -> RodFields {
@@ -193,17 +196,20 @@ impl Kernel for Combine<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         let (h, weights) = self.weights;
+        let h = Lanes::splat(simd, h);
         for (g, out) in self.out.iter_mut().enumerate() {
-            for (k, out) in out.iter_mut().enumerate() {
-                let mut sum = Lanes::splat(simd, 0.0);
-                for (weight, slopes) in weights.iter().zip(self.slopes) {
-                    if *weight != 0.0 {
-                        let slope = Lanes::of(simd, &slopes[g][k], part);
-                        sum = slope.times(Lanes::splat(simd, *weight), sum);
+            let mut sums = [Lanes::splat(simd, 0.0); FIELDS];
+            for (weight, slopes) in weights.iter().zip(self.slopes) {
+                if *weight != 0.0 {
+                    let weight = Lanes::splat(simd, *weight);
+                    for (sum, slope) in sums.iter_mut().zip(&slopes[g]) {
+                        *sum = Lanes::of(simd, slope, part).times(weight, *sum);
                     }
                 }
-                let field = Lanes::of(simd, &self.fields[g][k], part);
-                sum.times(Lanes::splat(simd, h), field).put(out, part);
+            }
+            for ((out, sum), field) in out.iter_mut().zip(sums).zip(&self.fields[g]) {
+                let field = Lanes::of(simd, field, part);
+                sum.times(h, field).put(out, part);
             }
         }
     }
@@ -232,14 +238,15 @@ mod tests {
             n: DVec3::ZERO,
             m: CURVATURE * DVec3::Z,
         };
-        let rods = Flow::new(&leaf).carry(begin, [0.0, 1.0], steps);
-        assert_eq!(rods.len(), steps);
-        let off = |(k, rods): (usize, &Vec<RodFields>)| {
+        let mut after = [Vec::new()];
+        Flow::new(&leaf).carry(begin, [0.0, 1.0], steps, &mut after);
+        assert_eq!(after[0].len(), steps);
+        let off = |(k, rod): (usize, &RodFields)| {
             let angle = CURVATURE * (k + 1) as f64 / steps as f64;
             let circle = DVec3::new(angle.sin(), 1.0 - angle.cos(), 0.0) / CURVATURE;
-            (rods[0].x - circle).length()
+            (rod.x - circle).length()
         };
-        rods.iter().enumerate().map(off).fold(0.0, f64::max)
+        after[0].iter().enumerate().map(off).fold(0.0, f64::max)
     }
 
     #[test]

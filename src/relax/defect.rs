@@ -117,17 +117,23 @@ fn carried(levels: &[Level], columns: usize) -> (Vec<Vec<RodFields>>, Vec<Vec<Ju
     let mut flow = Flow::new(first);
     let mut rods = vec![Vec::with_capacity(finest.segments() + 1); first.rods()];
     let mut jumps = vec![Vec::with_capacity(first.segments()); first.rods()];
+    let room = || vec![Vec::with_capacity(steps); first.rods()];
+    let (mut before, mut behind) = (room(), room());
     for i in 0..first.segments() {
-        let mut to_middle =
-            |k: usize| flow.carry(|j| known[j][k], [grid.sigma()[k], grid.middle(i)], steps);
-        let (before, behind) = (to_middle(i), to_middle(i + 1));
+        for (k, after) in [(i, &mut before), (i + 1, &mut behind)] {
+            let way = [grid.sigma()[k], grid.middle(i)];
+            flow.carry(|j| known[j][k], way, steps, after);
+        }
         for (j, (rod, jumps)) in rods.iter_mut().zip(&mut jumps).enumerate() {
-            let [a, b] = [&before, &behind].map(|steps| steps[steps.len() - 1][j]);
-            jumps.push(jump(&a, &b));
+            let [(a, before), (b, behind)] = [&before[j], &behind[j]].map(|after| {
+                let (middle, before) = after.split_last().expect("a step at least");
+                (middle, before)
+            });
+            jumps.push(jump(a, b));
             rod.push(known[j][i]);
-            rod.extend(before[..steps - 1].iter().map(|leaf| leaf[j]));
-            rod.push(mean(&a, &b));
-            rod.extend(behind[..steps - 1].iter().rev().map(|leaf| leaf[j]));
+            rod.extend(before);
+            rod.push(mean(a, b));
+            rod.extend(behind.iter().rev());
         }
     }
     for (rod, known) in rods.iter_mut().zip(&known) {

@@ -1,7 +1,7 @@
 //! A run over nested grids: what is asked, the grids the leaf has settled on,
 //! and the error estimate of their extrapolation.
 
-use crate::leaf::{Leaf, RodFields, whole_fields};
+use crate::leaf::{Leaf, RodFields, System, whole_fields};
 use crate::newton::{Contraction, Work};
 use crate::relax::defect::{self, Linear, Told};
 use crate::relax::level::{Level, complete, positions};
@@ -57,6 +57,8 @@ pub struct Run<'a, 'o> {
     /// that tell it.
     pub defect: Option<Told>,
     pub linear: Option<Linear>,
+    /// Room for the equations of the grid that was settled on last.
+    pub room: Option<System>,
     /// Whether a grid was added for the nodes of the finest one.
     pub for_nodes: bool,
     pub index: Option<usize>,
@@ -101,6 +103,7 @@ impl<'a, 'o> Run<'a, 'o> {
             table: Richardson::default(),
             defect: None,
             linear: None,
+            room: None,
             for_nodes: false,
             index: None,
             clearly: false,
@@ -150,7 +153,7 @@ impl<'a, 'o> Run<'a, 'o> {
         });
         self.tabulate();
         // The equations are those of the reduced leaf.
-        self.linear = None;
+        (self.linear, self.room) = (None, None);
         Run { defect, ..self }
     }
 

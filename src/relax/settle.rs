@@ -90,7 +90,10 @@ impl Run<'_, '_> {
         if !explicit && !follows && !self.keeps_unstable() {
             let by_steps = self.by_steps && from_start;
             let how = (near_rest, by_steps, cg_tolerance);
-            let settled = self.settle_in_a_valley(leaf, state, how);
+            self.room = None;
+            let mut system = System::new(&leaf);
+            let settled = self.settle_in_a_valley(leaf, state, &mut system, how);
+            self.room = Some(system);
             return Settled {
                 moved: moved || settled.moved,
                 ..settled
@@ -165,11 +168,11 @@ impl Run<'_, '_> {
         &mut self,
         leaf: DiscreteLeaf,
         mut state: State,
+        system: &mut System,
         (mut near_rest, mut by_steps, mut cg_tolerance): (bool, bool, f64),
     ) -> Settled {
         let accuracy = self.accuracy(&leaf);
         let convex_only = self.whole.is_some() || self.too_coarse(leaf.segments());
-        let mut system = System::new(&leaf);
         let nodes = leaf.rods() * leaf.segments();
         let (most, least) = LEAST_EVALUATIONS;
         let granted = (most * COARSE / leaf.segments()).clamp(least, most);
@@ -201,7 +204,7 @@ impl Run<'_, '_> {
                 part: 0.0,
             };
             let before = relaxation.work.force_evaluations;
-            let rest = relaxation.settle(&leaf, &mut system);
+            let rest = relaxation.settle(&leaf, system);
             let spent = relaxation.work.force_evaluations - before;
             moved |= relaxation.moved;
             let direct = relaxation.solver.direct.is_some();
@@ -213,14 +216,14 @@ impl Run<'_, '_> {
             if let Ok(remaining) = rest {
                 self.remaining = self.remaining.max(remaining);
                 if self.levels.is_empty() && !direct {
-                    self.effects = effects(&leaf, &state, &mut system);
+                    self.effects = effects(&leaf, &state, system);
                 }
             }
             if rest != Err(Stop::Saddle) || convex_only {
                 let level = Level { leaf, state };
                 return Settled { level, rest, moved };
             }
-            match saddle::polish(&leaf, &mut state, &mut system, &mut self.work) {
+            match saddle::polish(&leaf, &mut state, system, &mut self.work) {
                 Some(0) => {
                     let (level, rest) = (Level { leaf, state }, Ok(accuracy));
                     return Settled { level, rest, moved };
@@ -228,7 +231,7 @@ impl Run<'_, '_> {
                 Some(index) => self.saddle = Some(saddle_of(&leaf, &state, index)),
                 None => {}
             }
-            saddle::push_off(&leaf, &mut state, &mut system, &mut self.work);
+            saddle::push_off(&leaf, &mut state, system, &mut self.work);
             (near_rest, cg_tolerance, by_steps) = (false, FAR_FROM_REST, false);
         }
         let (level, rest) = (Level { leaf, state }, Err(Stop::StepLimit));

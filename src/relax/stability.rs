@@ -39,7 +39,9 @@ impl Run<'_, '_> {
         }
         let before = self.index;
         let level = self.levels.pop().expect("the leaf has settled");
-        let mut system = System::new(&level.leaf);
+        let room = self.room.take();
+        let room = room.filter(|room| room.is_for(&level.leaf));
+        let mut system = room.unwrap_or_else(|| System::new(&level.leaf));
         self.index = self.count(&level, &mut system);
         self.levels.push(level);
         if !matches!(self.index, Some(1..)) {

@@ -139,6 +139,11 @@ impl System {
         }
     }
 
+    /// Whether it is for as many rods and segments as `leaf` has.
+    pub fn is_for(&self, leaf: &DiscreteLeaf) -> bool {
+        (self.rods, self.segments) == (leaf.rods(), leaf.segments())
+    }
+
     /// Number of rods.
     pub fn rods(&self) -> usize {
         self.rods
