@@ -17,15 +17,15 @@ import tempfile
 
 # Operations of one processor in a cycle: two fused multiply-adds of four lanes.
 PER_CYCLE = 16
-RUNS = 300
+RUNS = 60
 
 # What a function is for, by its name or, of a vectorised one, by that of its caller.
 PARTS = [
-    ("assembly", "assemb|Segment|load|residual|excess"),
+    ("integration for the error", "[Ff]low|jumps|defect"),
     ("factorisation", "factorize"),
-    ("solves", "GroupMatrix.*(forward|backward)|System|solve"),
-    ("integration for the error", "[Ff]low|jumps"),
-    ("modes", "faer|gemm|lanczos|sparse"),
+    ("solves", "GroupMatrix.*(forward|backward)|System.*(solve|advance|multiply|turn_direction|precondition)"),
+    ("assembly and update", "assembl|advance|excess|Segment|DiscreteLeaf.*(load|energy|segment|residual)"),
+    ("grids and fields", "relax"),
 ]
 
 
@@ -104,11 +104,8 @@ def sample(command):
 
 
 def part_of(name, callers):
-    if "vectorize" in name or "fastcall" in name:
-        above = callers.get(name)
-        while above and "vectorize" in above.most_common(1)[0][0]:
-            above = callers.get(above.most_common(1)[0][0])
-        name = above.most_common(1)[0][0] if above else name
+    while re.search("vectorize|fastcall|lanes6number3run", name) and callers[name]:
+        name = callers[name].most_common(1)[0][0]
     return next((part for part, pattern in PARTS if re.search(pattern, name)), "the rest")
 
 
@@ -123,7 +120,7 @@ def main():
             parts["system" if name == "the kernel" else part_of(name, callers)][k] += value
     if "-v" in os.environ.get("ROOFLINE", ""):
         for name, value in operations.most_common(20):
-            print(value, part_of(name, callers), name, callers.get(name, collections.Counter()).most_common(2))
+            print(value, part_of(name, callers), name, callers[name].most_common(2))
     clock = float(re.search(r"cpu MHz\s*: ([\d.]+)", open("/proc/cpuinfo").read())[1]) * 1e6
     peak = PER_CYCLE * clock
     parts["all"] = [sum(column) for column in zip(*parts.values())]
