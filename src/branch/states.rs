@@ -26,7 +26,7 @@ pub fn rate(mut forces: impl FnMut(f64) -> Result<Field, OutOfRange>) -> Result<
 pub fn forces_on(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> Field {
     let mut moved = state.clone();
     clamp(leaf, &mut moved);
-    leaf.assemble(&moved, system);
+    leaf.assemble_forces(&moved, system);
     system.rhs()
 }
 

@@ -13,6 +13,7 @@ mod reduce;
 mod sparse;
 mod state;
 mod system;
+mod unknowns;
 
 pub use crate::scenario::Scale;
 pub use assembly::Jump;

@@ -1,9 +1,9 @@
 //! The whole matrix of the leaf as one sparse symmetric indefinite
 //! factorisation: for the Morse index, and for Newton's method at a saddle.
 
-use super::chain::place;
 use super::state::{Field, Increment};
 use super::system::System;
+use super::unknowns::{Unknowns, dissect, entries};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::PermRef;
 use faer::sparse::linalg::SupernodalThreshold;
@@ -13,9 +13,6 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{Argsort, Pair, SparseColMat, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
-
-/// Blocks of the grid of rods and nodes no larger than this are not dissected.
-const DISSECTION_LEAF: usize = 4;
 
 /// The pattern of a leaf's matrix: ordering and symbolic factorisation.
 pub struct SparsePattern {
@@ -125,6 +122,24 @@ impl SparsePattern {
     /// `j`. A joint tip has one shift for all rods.
     pub fn unknowns(&self, j: usize, i: usize) -> [usize; 2] {
         [0, 3].map(|c| self.unknowns.at(j, i - 1, c))
+    }
+
+    /// x . K x of increments x and the matrix K assembled in `system`.
+    pub fn curvature(&self, system: &System, increments: &Field) -> f64 {
+        let mut x = vec![0.0; self.size];
+        for (j, rod) in increments.iter().enumerate() {
+            for (i, node) in rod.iter().enumerate() {
+                for (c, part) in node.iter().enumerate() {
+                    x[self.unknowns.at(j, i, c)] = *part;
+                }
+            }
+        }
+        let mut sum = 0.0;
+        entries(system, &self.unknowns, &[], self.border, 0.0, |a, b, k| {
+            let times = if a == b { 1.0 } else { 2.0 };
+            sum += times * k * x[a] * x[b];
+        });
+        sum
     }
 
     /// Factorises the matrix assembled in `system`, of the same leaf, plus
@@ -285,106 +300,5 @@ impl SparseFactor<'_> {
         let rods = unknowns.first.chunks_exact(unknowns.segments).enumerate();
         let nodes = |j: usize| (0..unknowns.segments).map(move |i| unknowns.scatter(j, i, all));
         rods.map(|(j, _)| nodes(j).collect()).collect()
-    }
-}
-
-/// Where the unknowns of the nodes stand.
-struct Unknowns {
-    /// First unknown of node i (from 0) of rod j, at j n + i.
-    first: Vec<usize>,
-    /// First unknown of the joint tip.
-    tip: Option<usize>,
-    segments: usize,
-}
-
-impl Unknowns {
-    /// Component `c` of node `i` (from 0) of rod `j`.
-    fn at(&self, j: usize, i: usize, c: usize) -> usize {
-        match self.tip {
-            Some(tip) if i + 1 == self.segments && c >= 3 => tip + c - 3,
-            _ => self.first[j * self.segments + i] + c,
-        }
-    }
-
-    /// Adds the forces on a node.
-    fn gather(&self, j: usize, i: usize, forces: &Increment, all: &mut [f64]) {
-        for c in 0..6 {
-            all[self.at(j, i, c)] += forces[c];
-        }
-    }
-
-    /// The increments of a node.
-    fn scatter(&self, j: usize, i: usize, all: &[f64]) -> Increment {
-        std::array::from_fn(|c| all[self.at(j, i, c)])
-    }
-}
-
-/// Nested dissection of the nodes `nodes` of the rods `rods`: both halves
-/// first, then the line between them.
-fn dissect(rods: (usize, usize), nodes: (usize, usize), order: &mut Vec<(usize, usize)>) {
-    let (width, length) = (rods.1 - rods.0, nodes.1 - nodes.0);
-    if width == 0 || length == 0 {
-        return;
-    }
-    if width * length <= DISSECTION_LEAF {
-        order.extend((rods.0..rods.1).flat_map(|j| (nodes.0..nodes.1).map(move |i| (j, i))));
-    } else if width > length {
-        let middle = rods.0 + width / 2;
-        dissect((rods.0, middle), nodes, order);
-        dissect((middle + 1, rods.1), nodes, order);
-        order.extend((nodes.0..nodes.1).map(|i| (middle, i)));
-    } else {
-        let middle = nodes.0 + length / 2;
-        dissect(rods, (nodes.0, middle), order);
-        dissect(rods, (middle + 1, nodes.1), order);
-        order.extend((rods.0..rods.1).map(|j| (j, middle)));
-    }
-}
-
-/// Tells where one triangle of K and its border has entries, some in several parts, and
-/// how large they are: the same places in the same order for all systems of a pattern.
-fn entries(
-    system: &System,
-    unknowns: &Unknowns,
-    border: &[Field],
-    first_border: usize,
-    shift: f64,
-    mut add: impl FnMut(usize, usize, f64),
-) {
-    let n = system.segments;
-    for j in 0..system.rods() {
-        let at = |i: usize, c: usize| unknowns.at(j, i, c);
-        let (group, lane) = place(j);
-        let chain = system.groups[group].matrix.spatial();
-        for i in 0..n {
-            let (own, next) = chain.blocks(i, lane);
-            let mass = system.mass(j, i);
-            for r in 0..6 {
-                add(at(i, r), at(i, r), shift * mass[r / 3]);
-                for c in r..6 {
-                    add(at(i, r), at(i, c), own[r][c]);
-                }
-                for c in 0..if i + 1 < n { 6 } else { 0 } {
-                    add(at(i, r), at(i + 1, c), next[r][c]);
-                }
-            }
-            if let Some(spring) = system.spring(j, i)
-                && (unknowns.tip.is_none() || i + 1 < n)
-            {
-                for c in 0..3 {
-                    add(at(i, 3 + c), unknowns.at(j + 1, i, 3 + c), -spring[c]);
-                }
-            }
-        }
-        for (k, row) in border.iter().enumerate() {
-            for (i, forces) in row[j].iter().enumerate() {
-                for c in 0..6 {
-                    add(at(i, c), first_border + k, forces[c]);
-                }
-            }
-        }
-    }
-    for k in 0..border.len() {
-        add(first_border + k, first_border + k, 0.0);
     }
 }

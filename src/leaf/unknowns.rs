@@ -1,0 +1,109 @@
+//! The unknowns of a leaf's sparse matrix: their order, and where it has entries.
+
+use super::chain::place;
+use super::state::{Field, Increment};
+use super::system::System;
+
+/// Blocks of the grid of rods and nodes no larger than this are not dissected.
+const DISSECTION_LEAF: usize = 4;
+
+/// Where the unknowns of the nodes stand.
+pub struct Unknowns {
+    /// First unknown of node i (from 0) of rod j, at j n + i.
+    pub first: Vec<usize>,
+    /// First unknown of the joint tip.
+    pub tip: Option<usize>,
+    pub segments: usize,
+}
+
+impl Unknowns {
+    /// Component `c` of node `i` (from 0) of rod `j`.
+    pub fn at(&self, j: usize, i: usize, c: usize) -> usize {
+        match self.tip {
+            Some(tip) if i + 1 == self.segments && c >= 3 => tip + c - 3,
+            _ => self.first[j * self.segments + i] + c,
+        }
+    }
+
+    /// Adds the forces on a node.
+    pub fn gather(&self, j: usize, i: usize, forces: &Increment, all: &mut [f64]) {
+        for c in 0..6 {
+            all[self.at(j, i, c)] += forces[c];
+        }
+    }
+
+    /// The increments of a node.
+    pub fn scatter(&self, j: usize, i: usize, all: &[f64]) -> Increment {
+        std::array::from_fn(|c| all[self.at(j, i, c)])
+    }
+}
+
+/// Nested dissection of the nodes `nodes` of the rods `rods`: both halves
+/// first, then the line between them.
+pub fn dissect(rods: (usize, usize), nodes: (usize, usize), order: &mut Vec<(usize, usize)>) {
+    let (width, length) = (rods.1 - rods.0, nodes.1 - nodes.0);
+    if width == 0 || length == 0 {
+        return;
+    }
+    if width * length <= DISSECTION_LEAF {
+        order.extend((rods.0..rods.1).flat_map(|j| (nodes.0..nodes.1).map(move |i| (j, i))));
+    } else if width > length {
+        let middle = rods.0 + width / 2;
+        dissect((rods.0, middle), nodes, order);
+        dissect((middle + 1, rods.1), nodes, order);
+        order.extend((nodes.0..nodes.1).map(|i| (middle, i)));
+    } else {
+        let middle = nodes.0 + length / 2;
+        dissect(rods, (nodes.0, middle), order);
+        dissect(rods, (middle + 1, nodes.1), order);
+        order.extend((rods.0..rods.1).map(|j| (j, middle)));
+    }
+}
+
+/// Tells where one triangle of K and its border has entries, some in several parts, and
+/// how large they are: the same places in the same order for all systems of a pattern.
+pub fn entries(
+    system: &System,
+    unknowns: &Unknowns,
+    border: &[Field],
+    first_border: usize,
+    shift: f64,
+    mut add: impl FnMut(usize, usize, f64),
+) {
+    let n = system.segments;
+    for j in 0..system.rods() {
+        let at = |i: usize, c: usize| unknowns.at(j, i, c);
+        let (group, lane) = place(j);
+        let chain = system.groups[group].matrix.spatial();
+        for i in 0..n {
+            let (own, next) = chain.blocks(i, lane);
+            let mass = system.mass(j, i);
+            for r in 0..6 {
+                add(at(i, r), at(i, r), shift * mass[r / 3]);
+                for c in r..6 {
+                    add(at(i, r), at(i, c), own[r][c]);
+                }
+                for c in 0..if i + 1 < n { 6 } else { 0 } {
+                    add(at(i, r), at(i + 1, c), next[r][c]);
+                }
+            }
+            if let Some(spring) = system.spring(j, i)
+                && (unknowns.tip.is_none() || i + 1 < n)
+            {
+                for c in 0..3 {
+                    add(at(i, 3 + c), unknowns.at(j + 1, i, 3 + c), -spring[c]);
+                }
+            }
+        }
+        for (k, row) in border.iter().enumerate() {
+            for (i, forces) in row[j].iter().enumerate() {
+                for c in 0..6 {
+                    add(at(i, c), first_border + k, forces[c]);
+                }
+            }
+        }
+    }
+    for k in 0..border.len() {
+        add(first_border + k, first_border + k, 0.0);
+    }
+}
