@@ -327,7 +327,7 @@ fn linearise(
 ) -> Result<Linear, Stuck> {
     let rate = rate(|step| {
         let leaf = leaves.at(fraction + step)?;
-        Ok(forces_on(leaf, state, system))
+        Ok::<_, OutOfRange>(forces_on(leaf, state, system))
     })?;
     let leaf = leaves.at(fraction)?;
     let (forces, noise) = assembled(leaf, system, state)?;

@@ -124,22 +124,31 @@ impl SparsePattern {
         [0, 3].map(|c| self.unknowns.at(j, i - 1, c))
     }
 
-    /// x . K x of increments x and the matrix K assembled in `system`.
-    pub fn curvature(&self, system: &System, increments: &Field) -> f64 {
+    /// The matrix assembled in `system` times increments: forces, those on a joint tip all
+    /// on the first rod's.
+    pub fn product(&self, system: &System, increments: &Field) -> Field {
+        let unknowns = &self.unknowns;
         let mut x = vec![0.0; self.size];
         for (j, rod) in increments.iter().enumerate() {
             for (i, node) in rod.iter().enumerate() {
                 for (c, part) in node.iter().enumerate() {
-                    x[self.unknowns.at(j, i, c)] = *part;
+                    x[unknowns.at(j, i, c)] = *part;
                 }
             }
         }
-        let mut sum = 0.0;
-        entries(system, &self.unknowns, &[], self.border, 0.0, |a, b, k| {
-            let times = if a == b { 1.0 } else { 2.0 };
-            sum += times * k * x[a] * x[b];
+        let mut y = vec![0.0; self.size];
+        entries(system, unknowns, &[], self.border, 0.0, |a, b, k| {
+            y[a] += k * x[b];
+            if a != b {
+                y[b] += k * x[a];
+            }
         });
-        sum
+        let mut forces = self.unknowns.field(&y);
+        if unknowns.tip.is_some() {
+            let others = forces.iter_mut().skip(1);
+            others.for_each(|rod| rod[unknowns.segments - 1][3..].fill(0.0));
+        }
+        forces
     }
 
     /// Factorises the matrix assembled in `system`, of the same leaf, plus
@@ -273,7 +282,7 @@ impl SparseFactor<'_> {
             }
         }
         self.solve_vector(&mut b);
-        system.set_solution(&self.increments(&b));
+        system.set_solution(&self.pattern.unknowns.field(&b));
     }
 
     /// Solves the bordered system for forces `rhs`, and `below` in the rows of
@@ -289,16 +298,8 @@ impl SparseFactor<'_> {
         b[self.pattern.border..].copy_from_slice(below);
         self.solve_vector(&mut b);
         Bordered {
-            increments: self.increments(&b),
+            increments: self.pattern.unknowns.field(&b),
             multipliers: b[self.pattern.border..].to_vec(),
         }
-    }
-
-    /// The increments of all nodes.
-    fn increments(&self, all: &[f64]) -> Field {
-        let unknowns = &self.pattern.unknowns;
-        let rods = unknowns.first.chunks_exact(unknowns.segments).enumerate();
-        let nodes = |j: usize| (0..unknowns.segments).map(move |i| unknowns.scatter(j, i, all));
-        rods.map(|(j, _)| nodes(j).collect()).collect()
     }
 }

@@ -32,9 +32,12 @@ impl Unknowns {
         }
     }
 
-    /// The increments of a node.
-    pub fn scatter(&self, j: usize, i: usize, all: &[f64]) -> Increment {
-        std::array::from_fn(|c| all[self.at(j, i, c)])
+    /// What stands at all nodes.
+    pub fn field(&self, all: &[f64]) -> Field {
+        let node = |j: usize, i: usize| std::array::from_fn(|c| all[self.at(j, i, c)]);
+        let rods = self.first.chunks_exact(self.segments).enumerate();
+        rods.map(|(j, rod)| (0..rod.len()).map(|i| node(j, i)).collect())
+            .collect()
     }
 }
 

@@ -8,8 +8,8 @@ use crate::branch::field::{add, between, dot, is_finite, largest, plus, times};
 use crate::branch::states::{advanced, forces_on, rate};
 use crate::leaf::{DiscreteLeaf, Field, Grid, State, System};
 
-/// The part of a mode of mass one over which forces are differenced twice.
-const ALONG_MODE: f64 = 3e-4;
+/// The part of a mode of mass one over which the matrix is differenced.
+const ALONG_MODE: f64 = 1e-5;
 
 /// An equilibrium, or what comes near one.
 #[derive(Clone, Debug)]
@@ -215,13 +215,16 @@ impl<'a> Sheet<'a> {
         assembled(leaf, &mut equations.system, &mut spot.state)
     }
 
-    /// The mean curvature of the energy along modes at a spot.
-    pub fn curvature(&mut self, mut spot: Spot, modes: &[Field]) -> Result<f64, Stuck> {
+    /// The matrix at a spot times a mode.
+    fn product(&mut self, mut spot: Spot, mode: &Field) -> Result<Field, Stuck> {
         self.assemble(&mut spot, true)?;
         let pattern = self.equations.pattern(0)?;
-        let system = &self.equations.system;
-        let sum: f64 = modes.iter().map(|it| pattern.curvature(system, it)).sum();
-        Ok(sum / modes.len() as f64)
+        Ok(pattern.product(&self.equations.system, mode))
+    }
+
+    /// The curvature of the energy along a mode at a spot.
+    pub fn curvature(&mut self, spot: Spot, mode: &Field) -> Result<f64, Stuck> {
+        Ok(dot(&self.product(spot, mode)?, mode))
     }
 
     /// The same at a spot at rest, with its own rates.
@@ -245,14 +248,15 @@ impl<'a> Sheet<'a> {
                 let mut place = spot.place;
                 place[which] += step;
                 let leaf = kept.at(plane, plane.family, &grid, place)?;
-                Ok(forces_on(leaf, &spot.state, &mut equations.system))
+                Ok::<_, OutOfRange>(forces_on(leaf, &spot.state, &mut equations.system))
             })?);
         }
         Ok(rates)
     }
 
     /// How the curvature of the energy along a mode, with the sign of H, changes with all
-    /// increments and with both numbers.
+    /// increments and with both numbers: third derivatives of the energy do not depend on
+    /// the order in which they are taken where a mode is neutral.
     pub fn curvature_change(
         &mut self,
         spot: &Spot,
@@ -262,18 +266,23 @@ impl<'a> Sheet<'a> {
             increments: mode.clone(),
             place: [0.0; 2],
         };
-        let mut change = vec![vec![[0.0; 6]; self.grid().segments()]; self.equations.rods()];
-        let mut numbers = [0.0; 2];
+        let mut change = times(mode, 0.0);
         for step in [ALONG_MODE, -ALONG_MODE] {
             let moved = self.moved(spot, &way, step)?;
-            add(&mut change, 1.0, &self.forces(&moved)?);
-            for (number, rate) in numbers.iter_mut().zip(self.rates(&moved)?) {
-                *number += dot(&rate, mode) / (2.0 * step);
-            }
+            add(&mut change, -0.5 / step, &self.product(moved, mode)?);
+        }
+        let mut numbers = [0.0; 2];
+        for (which, number) in numbers.iter_mut().enumerate() {
+            let alone = self.number(which);
+            let changed = rate(|step| {
+                let beside = self.beside(spot, &alone, step)?;
+                self.product(beside, mode)
+            })?;
+            *number = -dot(&changed, mode);
         }
         // The last, so that increments are those of the spot again.
-        add(&mut change, -2.0, &self.forces(spot)?);
-        Ok((times(&change, ALONG_MODE.powi(-2)), numbers))
+        self.forces(spot)?;
+        Ok((change, numbers))
     }
 
     /// A spot with the forces in the segments that their strains say.

@@ -31,7 +31,7 @@ const BENT: f64 = 0.85;
 const DRIFT: f64 = 0.3;
 
 /// Accuracy of points on the way, and of those that are given a number.
-const ACCURACY: f64 = 1e-9;
+const ACCURACY: f64 = 1e-8;
 const EXACT: f64 = 1e-12;
 
 /// Points that are made before they are verified, side by side.
