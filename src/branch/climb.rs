@@ -228,17 +228,17 @@ impl Equations<'_> {
     /// The mode of the lowest eigenvalue of the matrix that is assembled, near `way` and
     /// to its side; by inverse iteration, the second time with a shift near that value.
     fn lowest_mode(&mut self, way: &Field) -> Option<Field> {
-        let mut pattern = self.pattern.take();
+        let pattern = self.pattern(0).ok()?;
         let mut mode = way.clone();
         let mut shift = FIRST_SHIFT;
         for _ in 0..2 {
-            let mut factor = factorized(&mut pattern, &self.system, shift).ok()?;
+            let mut factor = factorized(&pattern, &self.system, shift).ok()?;
             while factor.negative() > 0 {
                 shift *= 2.0;
                 if shift > LARGEST_SHIFT {
                     return None;
                 }
-                factor = factorized(&mut pattern, &self.system, shift).ok()?;
+                factor = factorized(&pattern, &self.system, shift).ok()?;
             }
             let mut eigenvalue = 0.0;
             for _ in 0..INVERSE_ITERATIONS {
@@ -248,7 +248,6 @@ impl Equations<'_> {
             }
             shift = BELOW * eigenvalue.abs();
         }
-        self.pattern = pattern;
         let same = self.product(&mode, way) >= 0.0;
         Some(if same { mode } else { times(&mode, -1.0) })
     }

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::equations::{Equations, ITERATIONS, LARGEST, Stuck, at_rest, factorized};
 use super::field::{add, combined, dot, is_finite, largest, times};
 use super::{Point, Tangent};
-use crate::leaf::{Bordered, Field, SparsePattern, State, System};
+use crate::leaf::{Bordered, Field, State, System};
 
 /// What of a singular matrix of the border counts as zero, relative to the rest.
 const NEUTRAL: f64 = 1e-7;
@@ -105,11 +105,7 @@ impl Equations<'_> {
         shift: f64,
     ) -> Result<Solved, Stuck> {
         let p = border.len();
-        if self.bordered.as_ref().is_none_or(|(held, _)| *held != p) {
-            let pattern = SparsePattern::bordered(&self.system, p);
-            self.bordered = Some((p, pattern.map_err(|_| Stuck::TooLarge)?));
-        }
-        let (_, pattern) = self.bordered.as_ref().ok_or(Stuck::TooLarge)?;
+        let pattern = self.pattern(p)?;
         self.factorizations += 1;
         let factor = pattern.factorize_bordered(&self.system, shift, border);
         let mut factor = factor.map_err(|_| Stuck::TooLarge)?;
@@ -140,8 +136,8 @@ impl Equations<'_> {
         let count = count
             .min(6 * self.rods() * self.grid().segments() / 2)
             .max(1);
-        let mut pattern = self.pattern.take();
-        let mut factor = factorized(&mut pattern, &self.system, SHIFT)?;
+        let pattern = self.pattern(0)?;
+        let mut factor = factorized(&pattern, &self.system, SHIFT)?;
         let mut modes: Vec<Field> = (0..count).map(|k| seed(&mut self.system, k)).collect();
         for _ in 0..SUBSPACE_ITERATIONS {
             for mode in &mut modes {
@@ -182,7 +178,6 @@ impl Equations<'_> {
             times(&mode, 1.0 / norm)
         });
         let modes = modes.collect();
-        self.pattern = pattern;
         Ok(modes)
     }
 }

@@ -1,5 +1,7 @@
 //! The equations of a branch on one grid, linearised and solved.
 
+use std::sync::Arc;
+
 use super::family::{Family, Leaves, OutOfRange, clamp};
 use super::field::{add, between, dot, is_finite, largest, plus, times};
 use super::states::{advanced, forces_on, rate};
@@ -57,8 +59,6 @@ pub struct Equations<'a> {
     /// The mass of the leaf but for its base.
     pub(super) mass: f64,
     pub(super) system: System,
-    pub(super) pattern: Option<SparsePattern>,
-    pub(super) bordered: Option<(usize, SparsePattern)>,
     /// Whether rods are solved one by one, as can be in a valley.
     rodwise: bool,
     /// Matrices factorised so far.
@@ -112,8 +112,6 @@ impl<'a> Equations<'a> {
             softened: None,
             mass: dot(&system.momentum(&ones), &ones),
             system,
-            pattern: None,
-            bordered: None,
             rodwise: true,
             factorizations: 0,
         })
@@ -217,7 +215,8 @@ impl<'a> Equations<'a> {
             self.rodwise = false;
             self.factorizations += 1;
         }
-        let mut factor = factorized(&mut self.pattern, &self.system, shift)?;
+        let pattern = self.pattern(0)?;
+        let mut factor = factorized(&pattern, &self.system, shift)?;
         let forces = factor.solve_bordered(&linear.forces, &[]).increments;
         let rate = factor.solve_bordered(&linear.rate, &[]).increments;
         Ok((forces, rate, Some(factor.negative())))
@@ -309,7 +308,13 @@ impl<'a> Equations<'a> {
         }
         leaf.assemble(state, system);
         self.factorizations += 1;
-        Ok(factorized(&mut self.pattern, system, shift)?.negative())
+        let pattern = self.pattern(0)?;
+        Ok(factorized(&pattern, &self.system, shift)?.negative())
+    }
+
+    /// The pattern of the matrix with so many rows at its border.
+    pub(super) fn pattern(&self, border: usize) -> Result<Arc<SparsePattern>, Stuck> {
+        self.leaves.family.patterns.of(&self.system, border)
     }
 }
 
@@ -322,7 +327,7 @@ fn linearise(
 ) -> Result<Linear, Stuck> {
     let rate = rate(|step| {
         let leaf = leaves.at(fraction + step)?;
-        Ok(forces_on(leaf, state, system))
+        Ok::<_, OutOfRange>(forces_on(leaf, state, system))
     })?;
     let leaf = leaves.at(fraction)?;
     let (forces, noise) = assembled(leaf, system, state)?;
@@ -353,14 +358,10 @@ pub(super) fn assembled(
 
 /// A direct factorisation of the assembled matrix K + `shift` M.
 pub(super) fn factorized<'p>(
-    pattern: &'p mut Option<SparsePattern>,
+    pattern: &'p SparsePattern,
     system: &System,
     shift: f64,
 ) -> Result<SparseFactor<'p>, Stuck> {
-    let pattern = match pattern {
-        Some(pattern) => pattern,
-        none => none.insert(SparsePattern::new(system).map_err(|_| Stuck::TooLarge)?),
-    };
     (pattern.factorize(system, shift)).map_err(|_| Stuck::TooLarge)
 }
 

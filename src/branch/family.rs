@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::patterns::Patterns;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, Scale, State};
 use crate::scenario::Scenario;
 
@@ -24,6 +25,8 @@ pub struct Family<'a> {
     /// The leaves there.
     ends: [Leaf; 2],
     softening: Option<f64>,
+    /// Of their matrices.
+    pub patterns: Arc<Patterns>,
 }
 
 /// A value of the parameter that no leaf can have; what the scenario says of it.
@@ -44,7 +47,7 @@ impl<'a> Family<'a> {
     }
 
     /// The same in given units.
-    pub fn in_units(
+    fn in_units(
         make: &'a (dyn Fn(f64) -> Result<Scenario, String> + Sync),
         (from, to): (f64, f64),
         log: bool,
@@ -62,6 +65,19 @@ impl<'a> Family<'a> {
             log,
             ends: [first, last],
             softening: None,
+            patterns: Arc::default(),
+        })
+    }
+
+    /// Leaves of the same kind, in the same units, along another way.
+    pub fn along<'b>(
+        &self,
+        make: &'b (dyn Fn(f64) -> Result<Scenario, String> + Sync),
+    ) -> Result<Family<'b>, OutOfRange> {
+        let family = Family::in_units(make, (0.0, 1.0), false, self.scale())?;
+        Ok(Family {
+            patterns: self.patterns.clone(),
+            ..family
         })
     }
 

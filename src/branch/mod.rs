@@ -33,6 +33,7 @@ mod equations;
 mod family;
 mod field;
 mod follow;
+mod patterns;
 mod refine;
 mod refine_critical;
 mod refined;

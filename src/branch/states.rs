@@ -1,7 +1,7 @@
 //! States of leaves that vary: forces on them, how these change, and where increments
 //! lead them.
 
-use super::family::{OutOfRange, clamp};
+use super::family::clamp;
 use super::field::{plus, times};
 use crate::leaf::{DiscreteLeaf, Field, State, System};
 
@@ -11,11 +11,11 @@ pub const DIFFERENCE: f64 = 1e-5;
 
 /// The change of forces with a number of which `forces` are given at some distance
 /// from where it is.
-pub fn rate(mut forces: impl FnMut(f64) -> Result<Field, OutOfRange>) -> Result<Field, OutOfRange> {
+pub fn rate<E>(mut forces: impl FnMut(f64) -> Result<Field, E>) -> Result<Field, E> {
     let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
         // At an end of the range there may be nothing beyond.
         let mut at = |step: f64| Ok((step, forces(step)?));
-        at(step).or_else(|_: OutOfRange| at(0.0))
+        at(step).or_else(|_: E| at(0.0))
     });
     let ((after, forces_after), (before, forces_before)) = (after?, before?);
     let rate = plus(&forces_after, -1.0, &forces_before);
@@ -26,7 +26,7 @@ pub fn rate(mut forces: impl FnMut(f64) -> Result<Field, OutOfRange>) -> Result<
 pub fn forces_on(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> Field {
     let mut moved = state.clone();
     clamp(leaf, &mut moved);
-    leaf.assemble(&moved, system);
+    leaf.assemble_forces(&moved, system);
     system.rhs()
 }
 

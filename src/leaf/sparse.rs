@@ -103,6 +103,33 @@ impl SparsePattern {
         [0, 3].map(|c| self.unknowns.at(j, i - 1, c))
     }
 
+    /// The matrix assembled in `system` times increments: forces, those on a joint tip all
+    /// on the first rod's.
+    pub fn product(&self, system: &System, increments: &Field) -> Field {
+        let unknowns = &self.unknowns;
+        let mut x = vec![0.0; self.size];
+        for (j, rod) in increments.iter().enumerate() {
+            for (i, node) in rod.iter().enumerate() {
+                for (c, part) in node.iter().enumerate() {
+                    x[unknowns.at(j, i, c)] = *part;
+                }
+            }
+        }
+        let mut y = vec![0.0; self.size];
+        entries(system, unknowns, &[], self.border, 0.0, |a, b, k| {
+            y[a] += k * x[b];
+            if a != b {
+                y[b] += k * x[a];
+            }
+        });
+        let mut forces = self.unknowns.field(&y);
+        if unknowns.tip.is_some() {
+            let others = forces.iter_mut().skip(1);
+            others.for_each(|rod| rod[unknowns.segments - 1][3..].fill(0.0));
+        }
+        forces
+    }
+
     /// Factorises the matrix assembled in `system`, of the same leaf, plus
     /// `shift` times its mass matrix.
     pub fn factorize(&self, system: &System, shift: f64) -> Result<SparseFactor<'_>, SparseError> {
@@ -234,7 +261,7 @@ impl SparseFactor<'_> {
             }
         }
         self.solve_vector(&mut b);
-        system.set_solution(&self.increments(&b));
+        system.set_solution(&self.pattern.unknowns.field(&b));
     }
 
     /// Solves the bordered system for forces `rhs`, and `below` in the rows of
@@ -250,16 +277,8 @@ impl SparseFactor<'_> {
         b[self.pattern.border..].copy_from_slice(below);
         self.solve_vector(&mut b);
         Bordered {
-            increments: self.increments(&b),
+            increments: self.pattern.unknowns.field(&b),
             multipliers: b[self.pattern.border..].to_vec(),
         }
-    }
-
-    /// The increments of all nodes.
-    fn increments(&self, all: &[f64]) -> Field {
-        let unknowns = &self.pattern.unknowns;
-        let rods = unknowns.first.chunks_exact(unknowns.segments).enumerate();
-        let nodes = |j: usize| (0..unknowns.segments).map(move |i| unknowns.scatter(j, i, all));
-        rods.map(|(j, _)| nodes(j).collect()).collect()
     }
 }

@@ -12,9 +12,9 @@ const DISSECTION_LEAF: usize = 4;
 /// Where the unknowns of the nodes stand.
 pub struct Unknowns {
     /// First unknown of node i (from 0) of rod j, at j n + i.
-    pub first: Vec<usize>,
+    first: Vec<usize>,
     /// First unknown of the joint tip.
-    tip: Option<usize>,
+    pub tip: Option<usize>,
     pub segments: usize,
     /// How many there are.
     pub count: usize,
@@ -57,9 +57,12 @@ impl Unknowns {
         }
     }
 
-    /// The increments of a node.
-    pub fn scatter(&self, j: usize, i: usize, all: &[f64]) -> Increment {
-        std::array::from_fn(|c| all[self.at(j, i, c)])
+    /// What stands at all nodes.
+    pub fn field(&self, all: &[f64]) -> Field {
+        let node = |j: usize, i: usize| std::array::from_fn(|c| all[self.at(j, i, c)]);
+        let rods = self.first.chunks_exact(self.segments).enumerate();
+        rods.map(|(j, rod)| (0..rod.len()).map(|i| node(j, i)).collect())
+            .collect()
     }
 }
 

@@ -1,10 +1,10 @@
 //! Equilibria at places of a plane, each reached from another one beside it.
 
-use super::sheet::{Plane, Spot};
+use super::plane::Plane;
+use super::sheet::Spot;
 use crate::branch::Point;
 use crate::branch::critical::Critical;
 use crate::branch::equations::{Equations, Stuck};
-use crate::branch::family::Family;
 use crate::branch::refine::{index_at, on_finer};
 use crate::branch::refine_critical::refine_critical;
 use crate::branch::refined::{Doubt, Refined};
@@ -68,7 +68,7 @@ fn between<'p>(plane: &'p Plane, [from, to]: [[f64; 2]; 2]) -> Box<Between<'p>> 
 /// the grid of the way, this is too coarse, and the way is gone once more on a finer one.
 pub fn go(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Way {
     let make = between(plane, [from.spot.place, to]);
-    let family = Family::in_units(&*make, (0.0, 1.0), false, plane.family.scale());
+    let family = plane.family.along(&*make);
     let mut way = Way::default();
     let Ok(family) = family else { return way };
     let equations = Equations::new(&family, from.grid.clone());
@@ -141,6 +141,6 @@ pub fn refine_on(
     accuracy: f64,
 ) -> Result<Refined, Doubt> {
     let make = between(plane, ends);
-    let family = Family::in_units(&*make, (0.0, 1.0), false, plane.family.scale())?;
+    let family = plane.family.along(&*make)?;
     refine_critical(&family, grid, critical, accuracy, CRITICAL_GRIDS)
 }

@@ -1,8 +1,9 @@
 //! Points of a boundary taken to finer grids and to coarser ones.
 
 use super::place::Place;
+use super::plane::Plane;
 use super::search::Lost;
-use super::sheet::{Direction, Plane, Sheet, Spot};
+use super::sheet::{Direction, Sheet, Spot};
 use crate::branch::field::prolong as prolong_field;
 use crate::leaf::{Field, Grid, State};
 use crate::relax::prolong::prolong;

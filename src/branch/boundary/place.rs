@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use super::search::{self, Eigen, Found, Lost, Search};
 use super::sheet::{Direction, Sample, Sheet, Spot};
 use crate::branch::critical::{Critical, Kind};
+use crate::branch::deflation::STIFF;
 use crate::branch::equations::Stuck;
 use crate::branch::field::{add, combined, dot, plus, times};
 use crate::leaf::Field;
@@ -138,22 +139,7 @@ impl Place {
         let eigen = search::eigen(&sample, self.neutral);
         let basis = self.basis(sheet, &sample, &eigen)?;
         let held = held(sheet, &sample, &eigen);
-        let border: Vec<Field> = held.iter().map(|it| sheet.equations.momentum(it)).collect();
-        let mut change = [0.0; 2];
-        for (change, direction) in change.iter_mut().zip(&basis) {
-            let mut beside = |step: f64| {
-                let spot = sheet.moved(&sample.spot, direction, step)?;
-                let sample = sheet.settle(&spot, [&basis[0], &basis[1]], &border, &sample.rates)?;
-                Ok::<_, Stuck>((step, search::eigen(&sample, self.neutral).value))
-            };
-            let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| match beside(step) {
-                // At an end of a range there may be nothing beyond.
-                Err(Stuck::OutOfRange(_)) => Ok((0.0, eigen.value)),
-                found => found,
-            });
-            let ((after, above), (before, below)) = (after?, before?);
-            *change = (above - below) / (after - before);
-        }
+        let change = self.change(sheet, &sample, &basis, &held)?;
         let slope = change[0].hypot(change[1]);
         if !(slope.is_finite() && slope > NEUTRAL) {
             return Err(Lost::Stuck(Stuck::NotConverged));
@@ -189,6 +175,44 @@ impl Place {
             others: eigen.others,
             spot: sample.spot,
         })
+    }
+
+    /// The change of the eigenvalue along both directions on the sheet: with K X + B H = 0
+    /// and B^T X = 1 that of H is -X^T dK X. How far off the sheet a straight way leads does
+    /// not count in central differences, but for stiff segments, which feel it.
+    fn change(
+        &self,
+        sheet: &mut Sheet,
+        sample: &Sample,
+        basis: &[Direction; 2],
+        held: &[Field],
+    ) -> Result<[f64; 2], Lost> {
+        let modes = &held[..self.neutral.min(held.len())];
+        let border: Vec<Field> = held.iter().map(|it| sheet.equations.momentum(it)).collect();
+        let stiff = sheet.leaf(sample.spot.place)?.stiffest() * STIFF <= 1.0;
+        let mut change = [0.0; 2];
+        for (change, direction) in change.iter_mut().zip(basis) {
+            let mut at = |step: f64| {
+                let mut spot = sheet.beside(&sample.spot, direction, step)?;
+                if stiff {
+                    let normals = [&basis[0], &basis[1]];
+                    spot = sheet.settle(&spot, normals, &border, &sample.rates)?.spot;
+                }
+                let mut sum = 0.0;
+                for mode in modes {
+                    sum += sheet.curvature(spot.clone(), mode)?;
+                }
+                Ok::<_, Stuck>((step, sum / modes.len() as f64))
+            };
+            let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| match at(step) {
+                // At an end of a range there may be nothing beyond.
+                Err(Stuck::OutOfRange(_)) => at(0.0),
+                found => found,
+            });
+            let ((after, above), (before, below)) = (after?, before?);
+            *change = (below - above) / (after - before);
+        }
+        Ok(change)
     }
 
     /// Two directions of length one, normal to each other, that span the sheet.

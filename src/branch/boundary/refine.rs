@@ -2,8 +2,9 @@
 
 use super::grids::{on_coarser, on_finer};
 use super::place::Place;
+use super::plane::Plane;
 use super::search::{Found, Lost, Search};
-use super::sheet::{Direction, Plane, Sheet, Spot};
+use super::sheet::{Direction, Sheet, Spot};
 use super::special::{Special, locate_near};
 use super::table::{Numbers, Table, Verified};
 use crate::branch::critical::Kind;

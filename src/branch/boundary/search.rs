@@ -149,7 +149,9 @@ impl Search<'_> {
             contraction.learn(size, previous);
             let first = contraction.after_first(size, 0.0);
             let accuracy = (self.accuracy, ROUNDED);
-            if let Some(left) = converged(size, previous, [SLOPES; 2], accuracy, first) {
+            // Where slopes are known worse, increments shrink no faster than these are known.
+            let slopes = SLOPES.max(size / previous);
+            if let Some(left) = converged(size, previous, [slopes; 2], accuracy, first) {
                 let distance = sheet.along(&sheet.way(self.spot, &spot), self.across);
                 sample.spot = spot;
                 let found = Found {

@@ -1,98 +1,15 @@
 //! The equilibria of leaves that differ in two numbers, a sheet, on one grid.
 
-use std::collections::VecDeque;
-use std::sync::Arc;
-
+use super::plane::{Kept, Plane};
 use crate::branch::deflation::{STIFF, Solved};
 use crate::branch::equations::{Equations, ITERATIONS, LARGEST, Stuck, assembled, at_rest};
 use crate::branch::family::{Family, OutOfRange};
 use crate::branch::field::{add, between, dot, is_finite, largest, plus, times};
 use crate::branch::states::{advanced, forces_on, rate};
-use crate::leaf::{DiscreteLeaf, Field, Grid, Leaf, State, System};
-use crate::scenario::Scenario;
+use crate::leaf::{DiscreteLeaf, Field, Grid, State, System};
 
-/// The part of a mode of mass one over which forces are differenced twice.
-const ALONG_MODE: f64 = 3e-4;
-
-/// Fractions of a range within this are the same.
-const EXACT: f64 = 1e-12;
-
-/// Leaves that differ in two numbers: a family along the first for every value of the
-/// second.
-#[derive(Clone, Copy)]
-pub struct Plane<'a> {
-    /// Along the first number, at some value of the second: range and units.
-    pub family: &'a Family<'a>,
-    /// The scenario at values of both.
-    pub make: &'a (dyn Fn([f64; 2]) -> Result<Scenario, String> + Sync),
-    /// The second number at the ends of its range.
-    pub range: [f64; 2],
-    /// Whether equal steps of its fraction are equal quotients of its value.
-    pub log: bool,
-}
-
-impl Plane<'_> {
-    /// Both numbers at fractions of their ranges.
-    pub fn values(&self, place: [f64; 2]) -> [f64; 2] {
-        let [from, to] = self.range;
-        // At an end rounding must not lead beyond: there may be nothing.
-        let [first, second] = place.map(|part| match part {
-            part if part.abs() < EXACT => 0.0,
-            part if (part - 1.0).abs() < EXACT => 1.0,
-            part => part,
-        });
-        let second = match second {
-            0.0 => from,
-            1.0 => to,
-            part if self.log => from * (to / from).powf(part),
-            part => from + (to - from) * part,
-        };
-        [self.family.value(first), second]
-    }
-
-    /// The fraction of the second number's range at which it has a value.
-    pub fn fraction(&self, value: f64) -> f64 {
-        let [from, to] = self.range;
-        match self.log {
-            true => (value / from).ln() / (to / from).ln(),
-            false => (value - from) / (to - from),
-        }
-    }
-
-    /// The scenario at fractions of both ranges.
-    pub fn scenario(&self, place: [f64; 2]) -> Result<Scenario, OutOfRange> {
-        (self.make)(self.values(place)).map_err(OutOfRange)
-    }
-}
-
-/// The last few leaves of a plane, as in [`crate::branch::family::Leaves`].
-#[derive(Default)]
-struct Kept(VecDeque<([f64; 2], DiscreteLeaf)>);
-
-/// Of differences over both numbers, and one more.
-const KEPT: usize = 6;
-
-impl Kept {
-    fn at(
-        &mut self,
-        plane: &Plane,
-        family: &Family,
-        grid: &Grid,
-        place: [f64; 2],
-    ) -> Result<&DiscreteLeaf, OutOfRange> {
-        let known = self.0.iter().position(|(at, _)| *at == place);
-        let leaf = match known.and_then(|index| self.0.remove(index)) {
-            Some((_, leaf)) => leaf,
-            None => {
-                let scenario = Arc::new(plane.scenario(place)?);
-                family.discretised(&Leaf::in_units(scenario, family.scale()), grid)
-            }
-        };
-        self.0.truncate(KEPT - 1);
-        self.0.push_front((place, leaf));
-        Ok(&self.0[0].1)
-    }
-}
+/// The part of a mode of mass one over which the matrix is differenced.
+const ALONG_MODE: f64 = 1e-5;
 
 /// An equilibrium, or what comes near one.
 #[derive(Clone, Debug)]
@@ -237,6 +154,15 @@ impl<'a> Sheet<'a> {
         Ok(Spot { state, place })
     }
 
+    /// The same from a spot at rest: the numbers change first, and forces in the segments
+    /// feel all of it, however short the step.
+    pub fn beside(&mut self, spot: &Spot, to: &Direction, step: f64) -> Result<Spot, OutOfRange> {
+        let place = [0, 1].map(|i| spot.place[i] + step * to.place[i]);
+        let state = self.advanced(&spot.state, place, &self.number(0).increments, 1.0)?;
+        let state = self.advanced(&state, place, &to.increments, step)?;
+        Ok(Spot { state, place })
+    }
+
     /// A state after `step` times these increments, at the place that is then reached.
     pub fn advanced(
         &mut self,
@@ -261,26 +187,44 @@ impl<'a> Sheet<'a> {
         rates: Vec<Field>,
         soft: bool,
     ) -> Result<(Sample, f64), Stuck> {
-        let Sheet {
-            plane,
-            equations,
-            kept,
-            softened,
-        } = self;
-        let grid = equations.leaves.grid.clone();
-        let leaf = match softened {
-            Some((family, kept)) if soft => kept.at(plane, family, &grid, spot.place)?,
-            _ => kept.at(plane, plane.family, &grid, spot.place)?,
-        };
-        let (forces, noise) = assembled(leaf, &mut equations.system, &mut spot.state)?;
+        let (forces, noise) = self.assemble(&mut spot, soft)?;
         let each: Vec<&Field> = rates.iter().collect();
-        let solved = equations.solve_bordered(border, &forces, &each)?;
+        let solved = self.equations.solve_bordered(border, &forces, &each)?;
         let sample = Sample {
             spot,
             solved,
             rates,
         };
         Ok((sample, noise))
+    }
+
+    /// The forces at a spot and their rounding; the matrix, of the softened leaf if there is
+    /// one and it is to decide, is left in the system.
+    fn assemble(&mut self, spot: &mut Spot, soft: bool) -> Result<(Field, f64), Stuck> {
+        let Sheet {
+            plane,
+            equations,
+            kept,
+            softened,
+        } = self;
+        let grid = &equations.leaves.grid;
+        let leaf = match softened {
+            Some((family, kept)) if soft => kept.at(plane, family, grid, spot.place)?,
+            _ => kept.at(plane, plane.family, grid, spot.place)?,
+        };
+        assembled(leaf, &mut equations.system, &mut spot.state)
+    }
+
+    /// The matrix at a spot times a mode.
+    fn product(&mut self, mut spot: Spot, mode: &Field) -> Result<Field, Stuck> {
+        self.assemble(&mut spot, true)?;
+        let pattern = self.equations.pattern(0)?;
+        Ok(pattern.product(&self.equations.system, mode))
+    }
+
+    /// The curvature of the energy along a mode at a spot.
+    pub fn curvature(&mut self, spot: Spot, mode: &Field) -> Result<f64, Stuck> {
+        Ok(dot(&self.product(spot, mode)?, mode))
     }
 
     /// The same at a spot at rest, with its own rates.
@@ -304,14 +248,15 @@ impl<'a> Sheet<'a> {
                 let mut place = spot.place;
                 place[which] += step;
                 let leaf = kept.at(plane, plane.family, &grid, place)?;
-                Ok(forces_on(leaf, &spot.state, &mut equations.system))
+                Ok::<_, OutOfRange>(forces_on(leaf, &spot.state, &mut equations.system))
             })?);
         }
         Ok(rates)
     }
 
     /// How the curvature of the energy along a mode, with the sign of H, changes with all
-    /// increments and with both numbers.
+    /// increments and with both numbers: third derivatives of the energy do not depend on
+    /// the order in which they are taken where a mode is neutral.
     pub fn curvature_change(
         &mut self,
         spot: &Spot,
@@ -321,18 +266,23 @@ impl<'a> Sheet<'a> {
             increments: mode.clone(),
             place: [0.0; 2],
         };
-        let mut change = vec![vec![[0.0; 6]; self.grid().segments()]; self.equations.rods()];
-        let mut numbers = [0.0; 2];
+        let mut change = times(mode, 0.0);
         for step in [ALONG_MODE, -ALONG_MODE] {
             let moved = self.moved(spot, &way, step)?;
-            add(&mut change, 1.0, &self.forces(&moved)?);
-            for (number, rate) in numbers.iter_mut().zip(self.rates(&moved)?) {
-                *number += dot(&rate, mode) / (2.0 * step);
-            }
+            add(&mut change, -0.5 / step, &self.product(moved, mode)?);
+        }
+        let mut numbers = [0.0; 2];
+        for (which, number) in numbers.iter_mut().enumerate() {
+            let alone = self.number(which);
+            let changed = rate(|step| {
+                let beside = self.beside(spot, &alone, step)?;
+                self.product(beside, mode)
+            })?;
+            *number = -dot(&changed, mode);
         }
         // The last, so that increments are those of the spot again.
-        add(&mut change, -2.0, &self.forces(spot)?);
-        Ok((times(&change, ALONG_MODE.powi(-2)), numbers))
+        self.forces(spot)?;
+        Ok((change, numbers))
     }
 
     /// A spot with the forces in the segments that their strains say.

@@ -47,15 +47,9 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Replaces the equations of the held components of rod `j` by ones of their
+    /// Replaces the rows of the held components of rod `j` in the matrix by ones of their
     /// own, which make them zero.
-    pub(super) fn hold_components<const B: usize>(
-        &self,
-        j: usize,
-        chain: &mut Chain<B>,
-        rhs: &mut [Increments],
-    ) {
-        self.clear_held_components(j, rhs);
+    pub(super) fn hold_components<const B: usize>(&self, j: usize, chain: &mut Chain<B>) {
         let set = |four: &mut Four, value: f64| four.0[place(j).1] = value;
         for i in self.first_held()..self.segments() {
             for &held in self.held_components(j, i + 1) {

@@ -94,13 +94,13 @@ impl<'a> Rods<'a> {
     }
 }
 
-/// Matrix, right-hand side and energy.
-pub struct Assemble<'a> {
+/// Right-hand side and energy, and the matrix if it is wanted.
+pub struct Assemble<'a, const MATRIX: bool> {
     pub rods: Rods<'a>,
     pub group: &'a mut Group,
 }
 
-impl Kernel for Assemble<'_> {
+impl<const MATRIX: bool> Kernel for Assemble<'_, MATRIX> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         let Group {
@@ -113,10 +113,10 @@ impl Kernel for Assemble<'_> {
         let active = Lanes::of(simd, active, part);
         let of_lanes = match matrix {
             GroupMatrix::Spatial(chain) => {
-                assemble::<S, SpatialElement<S>, _>(&self.rods, chain, rhs, (active, part))
+                assemble::<S, SpatialElement<S>, _, MATRIX>(&self.rods, chain, rhs, (active, part))
             }
             GroupMatrix::Planar(chain) => {
-                assemble::<S, PlanarElement<S>, _>(&self.rods, chain, rhs, (active, part))
+                assemble::<S, PlanarElement<S>, _, MATRIX>(&self.rods, chain, rhs, (active, part))
             }
         };
         if part == 0 {
@@ -128,7 +128,7 @@ impl Kernel for Assemble<'_> {
 }
 
 #[inline(always)]
-fn assemble<S: Simd, E: Element<S, B>, const B: usize>(
+fn assemble<S: Simd, E: Element<S, B>, const B: usize, const MATRIX: bool>(
     rods: &Rods,
     chain: &mut Chain<B>,
     rhs: &mut [Increments],
@@ -146,18 +146,24 @@ fn assemble<S: Simd, E: Element<S, B>, const B: usize>(
         energy = energy + element.strain_energy(&sections);
         squared_turn = squared_turn.max(element.squared_turn());
         let gradient = element.condensed_gradient(&sections);
-        let hessian = element.hessian(&sections);
         if i > 0 {
             for r in 0..B {
-                for c in r..B {
-                    own[r][c] = own[r][c] + hessian.own[0][r][c];
-                }
                 let force = active * (force[r] - gradient[0][r]);
                 force.put(&mut rhs[i - 1][first(B) + r], part);
             }
-            chain.put(i - 1, &own, Some(&hessian.across), (active, part));
         }
-        own = hessian.own[1];
+        if MATRIX {
+            let hessian = element.hessian(&sections);
+            if i > 0 {
+                for r in 0..B {
+                    for c in r..B {
+                        own[r][c] = own[r][c] + hessian.own[0][r][c];
+                    }
+                }
+                chain.put(i - 1, &own, Some(&hessian.across), (active, part));
+            }
+            own = hessian.own[1];
+        }
         let tip = i + 1 == n;
         let weights = [rods.leaf.weight(i + 1), rods.leaf.coupling_weight(i + 1)];
         let x = [
@@ -181,7 +187,9 @@ fn assemble<S: Simd, E: Element<S, B>, const B: usize>(
     for r in 0..B {
         (active * force[r]).put(&mut rhs[n - 1][first(B) + r], part);
     }
-    chain.put(n - 1, &own, None, (active, part));
+    if MATRIX {
+        chain.put(n - 1, &own, None, (active, part));
+    }
     Sums {
         energy: energy.where_positive(active, zero).sum(),
         turn: squared_turn.largest().sqrt(),

@@ -19,16 +19,31 @@ impl DiscreteLeaf {
     /// Assembles matrix and right-hand side of Newton's equations into
     /// `system`.
     pub fn assemble(&self, state: &State, system: &mut System) -> Sums {
+        let sums = self.assemble_with::<true>(state, system);
+        for (g, group) in system.groups.iter_mut().enumerate() {
+            for j in rods_of(g, self.rods()) {
+                match &mut group.matrix {
+                    GroupMatrix::Spatial(chain) => self.hold_components(j, chain),
+                    GroupMatrix::Planar(chain) => self.hold_components(j, chain),
+                }
+            }
+        }
+        sums
+    }
+
+    /// The right-hand side alone; the matrix is left as it is.
+    pub fn assemble_forces(&self, state: &State, system: &mut System) -> Sums {
+        self.assemble_with::<false>(state, system)
+    }
+
+    fn assemble_with<const MATRIX: bool>(&self, state: &State, system: &mut System) -> Sums {
         system.moment = self.tip_moment();
         let (arch, moment) = (system.arch, system.moment);
         each_group(system.parallel, &mut system.groups, |g, group| {
             let rods = Rods::new(self, state, g);
-            run(arch, &mut Assemble { rods, group });
+            run(arch, &mut Assemble::<MATRIX> { rods, group });
             for j in rods_of(g, self.rods()) {
-                match &mut group.matrix {
-                    GroupMatrix::Spatial(chain) => self.hold_components(j, chain, &mut group.rhs),
-                    GroupMatrix::Planar(chain) => self.hold_components(j, chain, &mut group.rhs),
-                }
+                self.clear_held_components(j, &mut group.rhs);
             }
         });
         if moment != DVec3::ZERO {

@@ -149,6 +149,11 @@ impl System {
         self.rods
     }
 
+    /// Segments of a rod.
+    pub fn segments(&self) -> usize {
+        self.segments
+    }
+
     /// Whether neighbours are coupled, so that conjugate gradients solve it.
     pub fn coupled(&self) -> bool {
         self.coupled

@@ -31,7 +31,7 @@ const EXACTER: f64 = 1e-2;
 /// Requests that cannot be met; all that happens on the way is in the result.
 pub fn boundary(
     request: &BoundaryRequest,
-    progress: &mut dyn FnMut(Option<usize>, usize, [f64; 2]),
+    progress: &mut (dyn FnMut(Option<usize>, usize, [f64; 2]) + Send),
 ) -> Result<Boundary, TraceError> {
     request.check()?;
     let clock = Instant::now();
@@ -144,7 +144,7 @@ struct Run<'r, 'p> {
     known: Vec<curves::Boundary>,
     /// Critical points from which curves were followed.
     tried: usize,
-    progress: &'p mut dyn FnMut(Option<usize>, usize, [f64; 2]),
+    progress: &'p mut (dyn FnMut(Option<usize>, usize, [f64; 2]) + Send),
 }
 
 impl Run<'_, '_> {
