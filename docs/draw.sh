@@ -57,6 +57,9 @@ leafdyn trace scenarios/study/undulation.toml --set 'load.gravity=[0,0,0]' --tol
 leafdyn trace scenarios/study/undulation.toml --set 'load.gravity=[0,0,0]' --tolerance 1e-4 --out out/above \
   --set 'stiffness.bending_2=[0.4,0.4,0.4,0.4,0.4,1000,0.4,0.4,0.4,0.4,0.4]' \
   --vary 'stiffness.torsion=10..0.9:50log' --vary "$K=1..0.01:64log"
+leafdyn trace scenarios/study/undulation.toml --set 'load.gravity=[0,0,0]' --tolerance 1e-4 --map 16x16 --out out/above-map \
+  --set 'stiffness.bending_2=[0.4,0.4,0.4,0.4,0.4,1000,0.4,0.4,0.4,0.4,0.4]' \
+  --vary 'stiffness.torsion=10..0.9:50log' --vary "$K=1..0.01:64log"
 leafdyn trace scenarios/study/undulation.toml --set 'load.gravity=[0,0,0]' --tolerance 1e-4 --map 16x16 --out out/below-map \
   --vary "$K=1..0.4:50log" --vary 'stiffness.torsion=0.1..1.2:12log'
 leafdyn trace scenarios/study/undulation.toml --set 'load.gravity=[0,0,0]' --tolerance 1e-4 --map 8x8 --out out/growth \
@@ -75,4 +78,5 @@ set -e
 leafdyn trace scenarios/study/undulation.toml --set 'load.gravity=[0,0,0]' --tolerance 1e-4 --switch --vary "$K=0.48..0.4:12log" --out out/waves
 cp out/undulation-map/map.svg "$top/docs/maps/undulation.svg"
 cp out/below-map/boundary.svg "$top/docs/maps/undulation_boundary.svg"
+cp out/above-map/boundary.svg "$top/docs/maps/undulation_boundary_above.svg"
 cp out/growth/boundary.svg "$top/docs/maps/undulation_growth.svg"

@@ -77,7 +77,7 @@ pub fn follow(
         rayon::join(|| walk(1, first.clone()), || walk(0, first.turned()));
     boundary.factorizations += ahead.factorizations;
     boundary.ends = [beginning, end];
-    boundary.points = ahead.verified;
+    boundary.points = ahead.in_order();
     if end == Halt::Closed {
         boundary.ends[0] = end;
         return boundary;
@@ -85,7 +85,7 @@ pub fn follow(
     boundary.factorizations += behind.factorizations;
     // The first point is that of the other way.
     let skip = usize::from(!boundary.points.is_empty());
-    let before = behind.verified.into_iter().skip(skip).rev();
+    let before = behind.in_order().into_iter().skip(skip).rev();
     boundary.points.splice(..0, before);
     boundary
 }

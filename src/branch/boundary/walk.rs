@@ -65,7 +65,7 @@ pub struct Walk<'a, 'h> {
     /// Length of the next step.
     step: f64,
     steps: Vec<Step>,
-    pub verified: Vec<Verified>,
+    verified: Vec<Verified>,
     end: Option<Halt>,
     /// Matrices factorised on grids that were left, and to verify points.
     pub factorizations: usize,
@@ -135,6 +135,32 @@ impl<'a, 'h> Walk<'a, 'h> {
             }
             counted = 0;
         }
+    }
+
+    /// Its points, verified. Grids move them at a given value of one number or of the other:
+    /// where that changes a point may come to lie before the one before it, and is left out,
+    /// unless it is the last or a special one.
+    pub fn in_order(self) -> Vec<Verified> {
+        let mut kept: Vec<(Step, Verified)> = Vec::new();
+        let last = self.verified.len().saturating_sub(1);
+        for (k, (step, point)) in self.steps.into_iter().zip(self.verified).enumerate() {
+            let needed = k == last || step.special.is_some();
+            if needed {
+                while kept.len() > 1
+                    && let Some((before, found)) = kept.last()
+                    && before.special.is_none()
+                    && goes_back([before, &step], [found, &point])
+                {
+                    kept.pop();
+                }
+            }
+            let back =
+                |(before, found): &(Step, Verified)| goes_back([before, &step], [found, &point]);
+            if needed || !kept.last().is_some_and(back) {
+                kept.push((step, point));
+            }
+        }
+        kept.into_iter().map(|(_, point)| point).collect()
     }
 
     /// Makes so many further points, unless it comes to an end.
@@ -329,6 +355,16 @@ impl<'a, 'h> Walk<'a, 'h> {
             && first.spot.state.shift_to(&place.spot.state) < SAME[1]
             && sheet.along(&first.tangent, &place.tangent) > BENT
     }
+}
+
+/// Whether the verified points of two steps follow each other the other way.
+fn goes_back(steps: [&Step; 2], found: [&Verified; 2]) -> bool {
+    let way = |[a, b]: [[f64; 2]; 2]| [0, 1].map(|i| b[i] - a[i]);
+    let [a, b] = [
+        way(steps.map(|step| step.place.spot.place)),
+        way(found.map(|point| point.place)),
+    ];
+    a[0] * b[0] + a[1] * b[1] < 0.0
 }
 
 /// Whether a point is at an end of a range, and the boundary goes on beyond.
