@@ -14,6 +14,11 @@ use leafdyn::study::{
 /// The boundary of the scenario of a text with entries replaced, along the first number
 /// and across it.
 fn follow(text: &str, overrides: &str, along: &str, across: &str) -> Boundary {
+    follow_to(1e-7, text, overrides, [along, across])
+}
+
+/// The same to a tolerance.
+fn follow_to(tolerance: f64, text: &str, overrides: &str, [along, across]: [&str; 2]) -> Boundary {
     let base = Base::of_text(text.into(), "test.toml".into(), &entries(overrides));
     let request = BoundaryRequest {
         trace: TraceRequest {
@@ -22,7 +27,7 @@ fn follow(text: &str, overrides: &str, along: &str, across: &str) -> Boundary {
             switch: false,
             keep_unstable: true,
             segments: None,
-            tolerance: Some(1e-7),
+            tolerance: Some(tolerance),
             most_points: 200,
             cross_section: None,
         },
@@ -342,4 +347,35 @@ fn points_of_the_undulation_boundary_take_few_factorizations() {
     println!("{} for {points} points", found.factorizations);
     assert!(points >= 6, "{points}");
     assert!(found.factorizations <= 25 * points);
+}
+
+/// Over ranges so wide that grids move points at a given value of the second number, then of the
+/// first, a curve does not go back: from point to point it turns by less than a right angle.
+#[test]
+fn points_stand_in_order_where_the_given_number_changes() {
+    let text = std::fs::read_to_string(path("study/undulation")).unwrap();
+    let weak = (0..11).filter(|vein| *vein != 5);
+    let weak: Vec<String> = weak
+        .map(|vein| format!("stiffness.bending_2[{vein}]"))
+        .collect();
+    let across = format!("{}=0.08..0.016:16log", weak.join("+"));
+    let along = "stiffness.torsion=10..0.9:50log";
+    let found = follow_to(1e-4, &text, "load.gravity=[0,0,0]", [along, &across]);
+    assert!(!found.curves.is_empty());
+    let fraction = |point: &BoundaryPoint| {
+        [0, 1].map(|i| {
+            let [from, to] = found.ranges[i];
+            (point.values[i] / from).ln() / (to / from).ln()
+        })
+    };
+    for curve in &found.curves {
+        let places: Vec<[f64; 2]> = curve.points.iter().map(fraction).collect();
+        let ways: Vec<[f64; 2]> = (places.windows(2))
+            .map(|pair| [0, 1].map(|i| pair[1][i] - pair[0][i]))
+            .collect();
+        for (k, pair) in ways.windows(2).enumerate() {
+            let turn = pair[0][0] * pair[1][0] + pair[0][1] * pair[1][1];
+            assert!(turn > 0.0, "point {}: {pair:?}", k + 2);
+        }
+    }
 }
