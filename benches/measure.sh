@@ -34,6 +34,8 @@ done
 
 # PyElastica and exudyn.
 cargo build --release
+# Needs valgrind, perf and objdump besides.
+python benches/roofline.py target/release/leafdyn scenarios/paper/fig04.toml --set leaf.rods=35
 export OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 leafdyn relax scenarios/paper/fig04.toml --set leaf.rods=5 --tolerance 1e-10 --out out/fig04-5
 python benches/peers/pyelastica.py scenarios/paper/fig04.toml --leafdyn target/release/leafdyn

@@ -17,7 +17,7 @@ import tempfile
 
 # Operations of one processor in a cycle: two fused multiply-adds of four lanes.
 PER_CYCLE = 16
-RUNS = 60
+RUNS = 300
 
 # What a function is for, by its name or, of a vectorised one, by that of its caller.
 PARTS = [
@@ -118,9 +118,6 @@ def main():
     for k, column in enumerate([operations, moved, seconds]):
         for name, value in column.items():
             parts["system" if name == "the kernel" else part_of(name, callers)][k] += value
-    if "-v" in os.environ.get("ROOFLINE", ""):
-        for name, value in operations.most_common(20):
-            print(value, part_of(name, callers), name, callers[name].most_common(2))
     clock = float(re.search(r"cpu MHz\s*: ([\d.]+)", open("/proc/cpuinfo").read())[1]) * 1e6
     peak = PER_CYCLE * clock
     parts["all"] = [sum(column) for column in zip(*parts.values())]

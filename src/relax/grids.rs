@@ -19,11 +19,6 @@ const SAME_PLACE: f64 = 0.05;
 /// The finest grid on which such places are compared.
 const FINEST_LANDING: usize = 256;
 
-/// Of a leaf with more nodes than this the linear equations of a coarser grid are factorised
-/// again rather than kept while the next one is solved: a quarter of the memory of all, for a
-/// thirtieth of the time.
-const MANY_NODES: usize = 50_000;
-
 /// The finest grid that is tried when coarser ones do not resolve the bending.
 const FINEST_RESOLVING: usize = 2048;
 
@@ -105,9 +100,6 @@ impl Run<'_, '_> {
 
     /// The leaf at rest on the next finer grid, from where it rests on those before.
     pub fn settle_on(&mut self, finer: Grid) -> Result<(), Stop> {
-        if self.leaf.rods() * finer.segments() > MANY_NODES {
-            self.linear = None;
-        }
         let level = self.levels.last().expect("the leaf has settled");
         let mut state = prolong(&level.leaf, &level.state);
         let guess = match self.predicting().as_slice() {

@@ -1,7 +1,7 @@
 //! A run over nested grids: what is asked, the grids the leaf has settled on,
 //! and the error estimate of their extrapolation.
 
-use crate::leaf::{Leaf, RodFields, System, whole_fields};
+use crate::leaf::{DiscreteLeaf, Leaf, RodFields, System, whole_fields};
 use crate::newton::{Contraction, Work};
 use crate::relax::defect::{self, Linear, Told};
 use crate::relax::level::{Level, complete, positions};
@@ -27,6 +27,10 @@ const LARGEST: f64 = 10.0;
 /// Where the last correction is so many times the tolerance the defect is not asked: it
 /// would hardly be small enough.
 const HOPELESS: f64 = 3e3;
+
+/// Of a leaf with more nodes than this no equations are kept while others are solved: less
+/// memory for a factorisation more of a coarse grid.
+const MANY_NODES: usize = 50_000;
 
 /// Part of the rounding error that grows with the number of segments.
 const ROUNDING: f64 = 4e-15;
@@ -216,6 +220,9 @@ impl<'a, 'o> Run<'a, 'o> {
         let near = best.filter(|best| best.error <= HOPELESS * self.tolerance);
         let (levels, linear, work) = (&self.levels, &mut self.linear, &mut self.work);
         self.defect = near.and_then(|best| defect::told(levels, best.columns, linear, work));
+        if (self.levels.last()).is_some_and(|level| is_large(&level.leaf)) {
+            self.linear = None;
+        }
     }
 
     /// Whether unfinished iterations and rounding alone are more than the
@@ -251,4 +258,9 @@ impl<'a, 'o> Run<'a, 'o> {
             self.linear = None;
         }
     }
+}
+
+/// Whether the equations of a leaf fill much of the memory.
+pub fn is_large(leaf: &DiscreteLeaf) -> bool {
+    leaf.rods() * leaf.segments() > MANY_NODES
 }

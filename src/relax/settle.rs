@@ -7,7 +7,7 @@ use crate::relax::method::{Method, SemiImplicit};
 use crate::relax::methods::semi_implicit::Relaxation;
 use crate::relax::methods::{explicit, moment};
 use crate::relax::options::Progress;
-use crate::relax::run::{BUDGET, Run};
+use crate::relax::run::{BUDGET, Run, is_large};
 use crate::relax::saddle::{self, saddle_of};
 use crate::relax::start::{disturb, start};
 use glam::DVec3;
@@ -93,7 +93,7 @@ impl Run<'_, '_> {
             self.room = None;
             let mut system = System::new(&leaf);
             let settled = self.settle_in_a_valley(leaf, state, &mut system, how);
-            self.room = Some(system);
+            self.room = (!is_large(&settled.level.leaf)).then_some(system);
             return Settled {
                 moved: moved || settled.moved,
                 ..settled
