@@ -314,7 +314,8 @@ impl<'a> Equations<'a> {
 
     /// The pattern of the matrix with so many rows at its border.
     pub(super) fn pattern(&self, border: usize) -> Result<Arc<SparsePattern>, Stuck> {
-        self.leaves.family.patterns.of(&self.system, border)
+        let pattern = self.leaves.family.patterns.of(&self.system, border);
+        pattern.ok_or(Stuck::TooLarge)
     }
 }
 

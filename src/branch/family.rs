@@ -1,11 +1,11 @@
 //! Leaves that differ in one parameter.
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::patterns::Patterns;
+use super::recent::Recent;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, Scale, State};
 use crate::scenario::Scenario;
 
@@ -154,7 +154,7 @@ impl<'a> Family<'a> {
 pub struct Leaves<'a> {
     pub family: &'a Family<'a>,
     pub grid: Grid,
-    kept: VecDeque<(f64, DiscreteLeaf)>,
+    kept: Recent<f64, DiscreteLeaf, KEPT>,
 }
 
 /// Leaves that are kept: of a difference over the parameter, and one more.
@@ -165,17 +165,16 @@ impl<'a> Leaves<'a> {
         Leaves {
             family,
             grid,
-            kept: VecDeque::new(),
+            kept: Recent::default(),
         }
     }
 
     /// The same on the grid with all segments halved.
     pub fn refined(&self) -> Self {
         let grid = self.grid.refined();
-        let kept = self.kept.iter();
         let finer = |leaf: &DiscreteLeaf| self.family.discretised(&leaf.leaf, &grid);
         Leaves {
-            kept: kept.map(|(at, leaf)| (*at, finer(leaf))).collect(),
+            kept: self.kept.map(finer),
             family: self.family,
             grid,
         }
@@ -183,14 +182,10 @@ impl<'a> Leaves<'a> {
 
     /// The leaf at a fraction of the range.
     pub fn at(&mut self, fraction: f64) -> Result<&DiscreteLeaf, OutOfRange> {
-        let known = self.kept.iter().position(|(at, _)| *at == fraction);
-        let leaf = match known.and_then(|index| self.kept.remove(index)) {
-            Some((_, leaf)) => leaf,
-            None => (self.family).discretised(&self.family.leaf(fraction)?, &self.grid),
-        };
-        self.kept.truncate(KEPT - 1);
-        self.kept.push_front((fraction, leaf));
-        Ok(&self.kept[0].1)
+        let (family, grid) = (self.family, &self.grid);
+        self.kept.at(fraction, || {
+            Ok(family.discretised(&family.leaf(fraction)?, grid))
+        })
     }
 }
 

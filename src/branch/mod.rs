@@ -34,6 +34,7 @@ mod family;
 mod field;
 mod follow;
 mod patterns;
+mod recent;
 mod refine;
 mod refine_critical;
 mod refined;

@@ -1,9 +1,9 @@
 //! Leaves that differ in two numbers.
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 
 use crate::branch::family::{Family, OutOfRange};
+use crate::branch::recent::Recent;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::scenario::Scenario;
 
@@ -58,9 +58,9 @@ impl Plane<'_> {
     }
 }
 
-/// The last few leaves of a plane, as in [`crate::branch::family::Leaves`].
+/// The last few leaves of a plane on a grid, as in [`crate::branch::family::Leaves`].
 #[derive(Default)]
-pub struct Kept(VecDeque<([f64; 2], DiscreteLeaf)>);
+pub struct Kept(Recent<[f64; 2], DiscreteLeaf, KEPT>);
 
 /// Of differences over both numbers, and one more.
 const KEPT: usize = 6;
@@ -73,16 +73,9 @@ impl Kept {
         grid: &Grid,
         place: [f64; 2],
     ) -> Result<&DiscreteLeaf, OutOfRange> {
-        let known = self.0.iter().position(|(at, _)| *at == place);
-        let leaf = match known.and_then(|index| self.0.remove(index)) {
-            Some((_, leaf)) => leaf,
-            None => {
-                let scenario = Arc::new(plane.scenario(place)?);
-                family.discretised(&Leaf::in_units(scenario, family.scale()), grid)
-            }
-        };
-        self.0.truncate(KEPT - 1);
-        self.0.push_front((place, leaf));
-        Ok(&self.0[0].1)
+        self.0.at(place, || {
+            let scenario = Arc::new(plane.scenario(place)?);
+            Ok(family.discretised(&Leaf::in_units(scenario, family.scale()), grid))
+        })
     }
 }
