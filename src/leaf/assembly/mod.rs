@@ -19,16 +19,7 @@ impl DiscreteLeaf {
     /// Assembles matrix and right-hand side of Newton's equations into
     /// `system`.
     pub fn assemble(&self, state: &State, system: &mut System) -> Sums {
-        let sums = self.assemble_with::<true>(state, system);
-        for (g, group) in system.groups.iter_mut().enumerate() {
-            for j in rods_of(g, self.rods()) {
-                match &mut group.matrix {
-                    GroupMatrix::Spatial(chain) => self.hold_components(j, chain),
-                    GroupMatrix::Planar(chain) => self.hold_components(j, chain),
-                }
-            }
-        }
-        sums
+        self.assemble_with::<true>(state, system)
     }
 
     /// The right-hand side alone; the matrix is left as it is.
@@ -44,6 +35,11 @@ impl DiscreteLeaf {
             run(arch, &mut Assemble::<MATRIX> { rods, group });
             for j in rods_of(g, self.rods()) {
                 self.clear_held_components(j, &mut group.rhs);
+                match &mut group.matrix {
+                    _ if !MATRIX => {}
+                    GroupMatrix::Spatial(chain) => self.hold_components(j, chain),
+                    GroupMatrix::Planar(chain) => self.hold_components(j, chain),
+                }
             }
         });
         if moment != DVec3::ZERO {
