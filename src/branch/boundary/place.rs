@@ -198,11 +198,7 @@ impl Place {
                     let normals = [&basis[0], &basis[1]];
                     spot = sheet.settle(&spot, normals, &border, &sample.rates)?.spot;
                 }
-                let mut sum = 0.0;
-                for mode in modes {
-                    sum += sheet.curvature(spot.clone(), mode)?;
-                }
-                Ok::<_, Stuck>((step, sum / modes.len() as f64))
+                Ok::<_, Stuck>((step, sheet.curvature(spot, modes)?))
             };
             let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| match at(step) {
                 // At an end of a range there may be nothing beyond.

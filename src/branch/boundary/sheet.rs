@@ -222,9 +222,12 @@ impl<'a> Sheet<'a> {
         Ok(pattern.product(&self.equations.system, mode))
     }
 
-    /// The curvature of the energy along a mode at a spot.
-    pub fn curvature(&mut self, spot: Spot, mode: &Field) -> Result<f64, Stuck> {
-        Ok(dot(&self.product(spot, mode)?, mode))
+    /// The mean curvature of the energy along modes at a spot.
+    pub fn curvature(&mut self, mut spot: Spot, modes: &[Field]) -> Result<f64, Stuck> {
+        self.assemble(&mut spot, true)?;
+        let pattern = self.equations.pattern(0)?;
+        let along = |mode: &Field| dot(&pattern.product(&self.equations.system, mode), mode);
+        Ok(modes.iter().map(along).sum::<f64>() / modes.len() as f64)
     }
 
     /// The same at a spot at rest, with its own rates.
