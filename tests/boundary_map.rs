@@ -164,6 +164,23 @@ fn rows_that_run_along_a_curve_stay_on_its_sheet() {
     assert!(cells.contains(&0) && cells.contains(&2), "{cells:?}");
 }
 
+/// A column with 2·10⁻⁵ more than its load: grids of 16, 32 and 64 segments still bear it.
+#[test]
+fn a_cell_close_beyond_a_curve_is_counted_on_finer_grids() {
+    let place = Workplace::new();
+    let column = "trace leaf.toml --set leaf.rods=1 --set leaf.fan=[0] --set load.gravity=[0,0,0] \
+        --set stiffness.bending_2=1000 --write none --json --vary load.tip_force[0]=0..";
+    let trace = place.run(&format!("{column}-6")).ends(0).json();
+    let load = &trace["branches"][0]["critical"][0]["value"];
+    let end = load.as_f64().unwrap() * (1.0 + 2e-5) / 0.75;
+    let run = place.run(&format!(
+        "{column}{end} --vary stiffness.torsion=1..2 --map 2x2"
+    ));
+    let map = &run.ends(0).json()["map"];
+    assert_eq!(map["index"], serde_json::json!([[0, 1], [0, 1]]), "{map:#}");
+    assert_eq!(map["disagreeing"].as_array().unwrap().len(), 0);
+}
+
 #[test]
 fn maps_that_cannot_be_are_refused() {
     all_refused(

@@ -17,7 +17,10 @@ const LONGEST: f64 = 1.0;
 const MOST: usize = 100;
 
 /// The finest grid to go on, in segments.
-const FINEST: usize = 256;
+const FINEST: usize = 1024;
+
+/// The grid from which on an index is counted once more.
+const RECOUNTED: usize = 256;
 
 /// Grids of a critical point at least.
 const CRITICAL_GRIDS: usize = 4;
@@ -103,6 +106,19 @@ pub fn go(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Way {
             _ => return way,
         }
     }
+}
+
+/// The index of an equilibrium counted once more, on fine grids alone; none if they do not have
+/// it, or do not agree.
+pub fn recount(plane: &Plane, at: &AtRest) -> Option<usize> {
+    let make = between(plane, [at.spot.place; 2]);
+    let family = plane.family.along(&*make).ok()?;
+    let mut equations = Equations::new(&family, at.grid.clone()).ok()?;
+    let (mut point, _) = equations.correct(&at.spot.state, 0.0, None).ok()?;
+    while point.state.segments() < RECOUNTED {
+        (equations, point) = on_finer(&mut equations, &point).ok()?;
+    }
+    index_at(&mut equations, &point).ok()
 }
 
 /// The point at the end of the way on this grid, if the branch comes there.

@@ -40,7 +40,7 @@ mod special;
 mod table;
 mod walk;
 
-pub use cells::{AtRest, Way, go, refine_on};
+pub use cells::{AtRest, Way, go, recount, refine_on};
 pub use follow::{Boundary, follow};
 pub use halt::Halt;
 pub use place::Seed;

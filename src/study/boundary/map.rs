@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::compare::{Crossing, Edge, is_followed};
 use super::result::BoundaryMap;
-use crate::branch::boundary::{AtRest, Boundary, Plane, Way, go};
+use crate::branch::boundary::{AtRest, Boundary, Plane, Way, go, recount};
 use crate::branch::{Critical, Kind};
 use crate::leaf::Grid;
 
@@ -93,9 +93,30 @@ impl<'p> Cells<'p> {
         unexplained
     }
 
+    /// Counts the index once more, on finer grids, in those of the cells found last where it
+    /// is not what the curves say: close beside a curve, grids of a way may be too coarse.
+    fn recount(&mut self, curves: &[Boundary]) {
+        let counted: Vec<(usize, usize)> = (self.front.par_iter().enumerate())
+            .filter_map(|(cell, at)| {
+                let (at, edge) = (at.as_ref()?, self.edges[cell].last()?);
+                if edge.is_explained(curves) {
+                    return None;
+                }
+                Some((cell, recount(&self.plane, at)?))
+            })
+            .collect();
+        for (cell, index) in counted {
+            if let (Some(at), Some(edge)) = (&mut self.front[cell], self.edges[cell].last_mut()) {
+                at.index = index;
+                edge.found = Some(index);
+            }
+        }
+    }
+
     /// Goes to all cells beside those that were found last, side by side; returns the ways
     /// that are not as the curves say, or nothing if there are no such cells.
     pub fn go_on(&mut self, curves: &[Boundary]) -> Option<Vec<Unexplained>> {
+        self.recount(curves);
         let next: Vec<(usize, Vec<usize>)> = (0..self.front.len())
             .filter(|&cell| self.index(cell).is_none())
             .map(|cell| {
