@@ -6,36 +6,9 @@ mod common;
 use std::f64::consts::PI;
 
 use common::branch::text;
-use common::{RIGID, ROD, entries, path};
-use leafdyn::study::{
-    Base, Boundary, BoundaryCurve, BoundaryPoint, BoundaryRequest, TraceRequest, boundary,
-};
-
-/// The boundary of the scenario of a text with entries replaced, along the first number
-/// and across it.
-fn follow(text: &str, overrides: &str, along: &str, across: &str) -> Boundary {
-    follow_to(1e-7, text, overrides, [along, across])
-}
-
-/// The same to a tolerance.
-fn follow_to(tolerance: f64, text: &str, overrides: &str, [along, across]: [&str; 2]) -> Boundary {
-    let base = Base::of_text(text.into(), "test.toml".into(), &entries(overrides));
-    let request = BoundaryRequest {
-        trace: TraceRequest {
-            base: base.unwrap(),
-            vary: along.parse().unwrap(),
-            switch: false,
-            keep_unstable: true,
-            segments: None,
-            tolerance: Some(tolerance),
-            most_points: 200,
-            cross_section: None,
-        },
-        across: across.parse().unwrap(),
-        map: None,
-    };
-    boundary(&request, &mut |_, _, _| {}).unwrap()
-}
+use common::plane::{follow, follow_to};
+use common::{RIGID, ROD, path};
+use leafdyn::study::{Boundary, BoundaryCurve, BoundaryPoint};
 
 /// The only curve, which goes from one end of the second range to the other.
 #[track_caller]

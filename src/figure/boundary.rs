@@ -1,5 +1,5 @@
 //! The boundary of stability: curves in the plane of two numbers, with the index on both
-//! sides, and the leaf at some of their points.
+//! sides, and leaves of either side.
 
 use glam::DVec3;
 use std::collections::BTreeSet;
@@ -16,24 +16,23 @@ use super::setting::Setting;
 use super::small::SmallPanels;
 use super::veins::Veins;
 use crate::report::numbers::{power_of_ten, short};
-use crate::report::{is_special, sides};
+use crate::report::sides;
 use crate::scenario::Scenario;
-use crate::study::{Boundary, BoundaryMap, BoundaryPoint};
+use crate::study::{Boundary, BoundaryMap, BoundaryPoint, LeafBeside};
 
 const DIAGRAM: f64 = 400.0;
 /// Right of the panel, for the key.
 const KEY: f64 = 210.0;
-/// Leaves drawn, and curves named.
-const MOST_LEAVES: usize = 8;
+/// Curves named.
 const MOST_NAMED: usize = 7;
 
 pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);
-    let shown = shown(boundary);
-    let longest = shown.iter().flat_map(|(_, point)| &point.curves);
+    let shown: Vec<&LeafBeside> = boundary.curves.iter().flat_map(|it| &it.beside).collect();
+    let longest = shown.iter().flat_map(|leaf| &leaf.curves);
     let longest = longest.map(|curve| length(curve)).fold(0.0, f64::max);
     let shapes: Vec<Veins> = (shown.iter())
-        .map(|(_, point)| Veins::through(&point.curves, &point.tips, longest))
+        .map(|leaf| Veins::through(&leaf.curves, &leaf.tips, longest))
         .collect();
     let diagram = Cell::beside_key(HEADER + PANEL_TITLE, DIAGRAM, KEY);
     let below = diagram.end().y + PANEL_AXIS;
@@ -45,14 +44,29 @@ pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
         draw_curves(page, boundary, &shown, diagram)
     });
     drawing.group("leaves", |page| {
-        for (index, (veins, (_, point))) in shapes.iter().zip(&shown).enumerate() {
-            let [first, second] = point.values.map(short);
-            let text = format!("{}, ({first}, {second})", point.kind.replace('-', " "));
-            let number = (index + 1).to_string();
-            panels.draw(page, index, veins, (&number, &text, NOTE), |_, _, _| ());
+        for (number, (veins, leaf)) in shapes.iter().zip(&shown).enumerate() {
+            let [first, second] = leaf.values.map(short);
+            let what = match (leaf.fallen, leaf.index) {
+                (true, _) => "comes to rest".into(),
+                (false, 0) => "stable".into(),
+                (false, index) => format!("index {index}"),
+            };
+            let text = format!("{what}, ({first}, {second})");
+            panels.draw(
+                page,
+                number,
+                veins,
+                (&letter(number), &text, NOTE),
+                |_, _, _| (),
+            );
         }
     });
     drawing
+}
+
+/// What a leaf is called in the diagram.
+fn letter(number: usize) -> String {
+    char::from(b'a' + number as u8).into()
 }
 
 fn length(curve: &[DVec3]) -> f64 {
@@ -79,32 +93,7 @@ fn notes(boundary: &Boundary) -> Vec<String> {
     notes
 }
 
-/// The points whose leaves are drawn: first special ones, then ends.
-fn shown(boundary: &Boundary) -> Vec<(usize, &BoundaryPoint)> {
-    let curves = || boundary.curves.iter().enumerate();
-    let special = curves().flat_map(|(c, curve)| {
-        let special = curve.points.iter().filter(|point| is_special(point));
-        special.map(move |point| (c, point))
-    });
-    let ends = curves().flat_map(|(c, curve)| {
-        let ends = [curve.points.first(), curve.points.last()];
-        let count = curve.points.len().min(2);
-        ends.into_iter()
-            .flatten()
-            .take(count)
-            .map(move |point| (c, point))
-    });
-    let mut shown: Vec<_> = special.chain(ends).take(MOST_LEAVES).collect();
-    shown.sort_by_key(|(c, point)| (*c, point.point));
-    shown
-}
-
-fn draw_curves(
-    page: &mut Drawing,
-    boundary: &Boundary,
-    shown: &[(usize, &BoundaryPoint)],
-    cell: Cell,
-) {
+fn draw_curves(page: &mut Drawing, boundary: &Boundary, shown: &[&LeafBeside], cell: Cell) {
     let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
     let axes = Axes {
         cell,
@@ -131,9 +120,11 @@ fn draw_curves(
         let special = points().filter(|point| point.kind == kind);
         axes.markers(page, special.map(at), marker, INK);
     }
-    for (index, (_, point)) in shown.iter().enumerate() {
-        if let Some(place) = axes.at(at(point)) {
-            labels.add(place, &(index + 1).to_string());
+    let places = || shown.iter().map(|leaf| (leaf.values[0], leaf.values[1]));
+    axes.markers(page, places(), Marker::Dot, INK);
+    for (number, place) in places().enumerate() {
+        if let Some(place) = axes.at(place) {
+            labels.add(place, &letter(number));
         }
     }
     labels.draw(page);

@@ -15,8 +15,8 @@ mod words;
 
 pub use all::{All, Found, IN_VAIN, all};
 pub use boundary::{
-    Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, BoundaryRequest, CurveEnd, MOST_CURVES,
-    boundary,
+    Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, BoundaryRequest, CurveEnd, LeafBeside,
+    MOST_CURVES, boundary,
 };
 pub use chart::{
     Chart, ChartError, ChartOptions, Contender, Decade, Ending, Peer, PeerRow, Reference, Row,

@@ -6,6 +6,7 @@
 pub mod branch;
 pub mod fit;
 pub mod motion;
+pub mod plane;
 pub mod random;
 mod shot;
 pub mod valid;

@@ -37,9 +37,29 @@ pub fn on_finer<'a>(sheet: &mut Sheet<'a>, place: &Place) -> Result<(Sheet<'a>, 
 
 /// The point on the grid with every second node: where it would be.
 pub fn on_coarser(plane: Plane, grid: &Grid, place: &Place) -> Option<(Grid, Place)> {
+    let (coarse, state) = state_on_coarser(plane, grid, &place.spot.state)?;
+    let direction = |it: &Direction| Direction {
+        increments: every_second(&it.increments),
+        place: it.place,
+    };
+    let place = Place {
+        spot: Spot {
+            state,
+            ..place.spot
+        },
+        held: place.held.iter().map(every_second).collect(),
+        tangent: direction(&place.tangent),
+        normal: direction(&place.normal),
+        ..place.clone()
+    };
+    Some((coarse, place))
+}
+
+/// A state on the grid with every second node; none if this would be too coarse, or not the
+/// one of which `grid` is the next finer.
+pub fn state_on_coarser(plane: Plane, grid: &Grid, state: &State) -> Option<(Grid, State)> {
     let stations: Vec<f64> = grid.sigma().iter().copied().step_by(2).collect();
     let coarse = Grid::through(&stations, plane.family.first().kinks());
-    let state = &place.spot.state;
     let (n, rods) = (state.segments(), state.rods());
     if n % 2 != 0 || n / 2 < COARSEST || coarse.refined() != *grid {
         return None;
@@ -52,24 +72,12 @@ pub fn on_coarser(plane: Plane, grid: &Grid, place: &Place) -> Option<(Grid, Pla
         .chunks(2)
         .map(|pair| 0.5 * (pair[0] + pair[1]))
         .collect();
-    let every_second = |field: &Field| -> Field {
-        let rods = field.iter();
-        rods.map(|rod| rod.iter().copied().skip(1).step_by(2).collect())
-            .collect()
-    };
-    let direction = |it: &Direction| Direction {
-        increments: every_second(&it.increments),
-        place: it.place,
-    };
-    let place = Place {
-        spot: Spot {
-            state: fewer,
-            ..place.spot
-        },
-        held: place.held.iter().map(every_second).collect(),
-        tangent: direction(&place.tangent),
-        normal: direction(&place.normal),
-        ..place.clone()
-    };
-    Some((coarse, place))
+    Some((coarse, fewer))
+}
+
+/// A field at every second node.
+pub fn every_second(field: &Field) -> Field {
+    let rods = field.iter();
+    rods.map(|rod| rod.iter().copied().skip(1).step_by(2).collect())
+        .collect()
 }

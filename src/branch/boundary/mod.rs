@@ -27,6 +27,7 @@
 //! along that; in the same plane across the curve, where it goes along neither), and
 //! extrapolated.
 
+mod beside;
 mod cells;
 mod follow;
 mod grids;
@@ -40,12 +41,15 @@ mod special;
 mod table;
 mod walk;
 
+pub use beside::{Beside, beside};
 pub use cells::{AtRest, Way, go, recount, refine_on};
 pub use follow::{Boundary, follow};
 pub use halt::Halt;
 pub use place::Seed;
 pub use plane::Plane;
 pub use refine::Accuracy;
+#[cfg(test)]
+pub use sheet::Direction;
 pub use sheet::Spot;
 pub use special::Special;
 pub use table::Verified;

@@ -2,7 +2,7 @@
 
 use super::place::Place;
 use super::search::Lost;
-use super::sheet::Sheet;
+use super::sheet::{Direction, Sheet};
 use super::special::Special;
 use crate::branch::critical::Kind;
 use crate::leaf::State;
@@ -26,6 +26,8 @@ pub struct Verified {
     pub error: f64,
     /// The state on the finest grid.
     pub state: State,
+    /// The way across the boundary on the sheet, to where there are more negative eigenvalues.
+    pub across: Direction,
     /// Fractions of the length of its nodes.
     pub stations: Vec<f64>,
     /// What it is.
@@ -186,6 +188,7 @@ impl Table {
                 best.error + KEPT * self.left + f64::EPSILON
             }),
             state: place.spot.state.clone(),
+            across: place.normal.clone(),
             stations: sheet.grid().sigma().to_vec(),
             kind: place.kind,
             special,

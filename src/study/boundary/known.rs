@@ -269,6 +269,7 @@ fn through(places: &[Vec<f64>], at: &[f64], t: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::branch::boundary::Direction;
     use crate::leaf::State;
     use glam::{DQuat, DVec3};
 
@@ -282,6 +283,10 @@ mod tests {
                 tips: vec![[1.0 - 0.3 * at, y * at, 0.0]],
                 error: 1e-9,
                 state: State::new(1, vec![DVec3::ZERO; 2], vec![DQuat::IDENTITY; 2]),
+                across: Direction {
+                    increments: Vec::new(),
+                    place: [1.0, 0.0],
+                },
                 stations: vec![0.0, 1.0],
                 kind: Kind::Branching,
                 special: None,

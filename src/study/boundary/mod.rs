@@ -1,12 +1,13 @@
 //! `trace` over two numbers: the boundary of stability as curves in their plane.
 
+mod beside;
 mod compare;
 mod known;
 mod map;
 mod result;
 mod run;
 
-pub use result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, CurveEnd};
+pub use result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, CurveEnd, LeafBeside};
 pub use run::boundary;
 
 use super::trace::{TraceError, TraceRequest};

@@ -66,6 +66,26 @@ pub struct BoundaryCurve {
     /// Its points in order: the second number grows from the first point or, where that
     /// is also the last, has grown.
     pub points: Vec<BoundaryPoint>,
+    /// Leaves on either side of it, for pictures: of four curves at most, first of those that
+    /// bound stable leaves.
+    #[serde(skip)]
+    pub beside: Vec<LeafBeside>,
+}
+
+/// A leaf beside a curve, in the scenario's units, without the error of its grid told.
+#[derive(Clone, Debug)]
+pub struct LeafBeside {
+    /// Both numbers.
+    pub values: [f64; 2],
+    /// Morse index.
+    pub index: usize,
+    /// Whether it is what the stable leaf of the other side comes to rest as, once beyond the
+    /// curve.
+    pub fallen: bool,
+    /// The joint tip alone, or every tip.
+    pub tips: Vec<DVec3>,
+    /// Centerlines, one per rod.
+    pub curves: Vec<Vec<DVec3>>,
 }
 
 /// A point of a curve, in the scenario's units.

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+use super::beside::add_leaves;
 use super::known::{Start, coarsened, leave_out_known, traced};
 use super::map::{Cells, Unexplained};
 use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, CurveEnd, word};
@@ -117,6 +118,7 @@ pub fn boundary(
         };
         boundary.map = Some(run.map(size, first, &mut boundary));
     }
+    add_leaves(plane, &run.known, &mut boundary);
     let curves = &boundary.curves;
     let whole = (curves.iter().flat_map(|curve| curve.ends)).all(CurveEnd::complete);
     if curves.is_empty() && boundary.remark.is_none() {
@@ -221,6 +223,7 @@ fn in_units(plane: &Plane, joined: bool, curve: &curves::Boundary) -> BoundaryCu
         points: (curve.points.iter().enumerate())
             .map(|(k, point)| point_in_units(plane, joined, k + 1, point))
             .collect(),
+        beside: Vec::new(),
     }
 }
 

@@ -1,0 +1,59 @@
+//! Leaves on either side of the curves of a boundary.
+
+use glam::DVec3;
+
+use super::result::{Boundary, LeafBeside};
+use crate::branch::boundary::{self as curves, Beside, Plane, Verified, beside};
+
+/// Curves that have leaves beside them.
+const MOST: usize = 4;
+
+/// Finds leaves on either side of a few curves: of those that bound stable leaves, then of
+/// others.
+pub fn add_leaves(plane: Plane, known: &[curves::Boundary], boundary: &mut Boundary) {
+    let index = |point: &Verified| point.indices[0].min(point.indices[1]);
+    let mut order: Vec<(usize, usize)> = Vec::new();
+    for (number, curve) in known.iter().enumerate() {
+        let least = curve.points.iter().map(index).min();
+        order.extend(least.map(|least| (least, number)));
+    }
+    order.sort_unstable();
+    let found = order.into_iter().filter_map(|(least, number)| {
+        let points = &known[number].points;
+        // In the middle between ends and special points.
+        let special = |&k: &usize| points[k].special.is_some();
+        let special: Vec<usize> = (0..points.len()).filter(special).collect();
+        let off = |&k: &usize| {
+            let off = special.iter().map(|other| other.abs_diff(k));
+            off.fold(k.min(points.len() - 1 - k), usize::min)
+        };
+        let same = (0..points.len()).filter(|&k| index(&points[k]) == least);
+        let at = same.max_by_key(off)?;
+        let before = &points[at.saturating_sub(1)];
+        let behind = points.get(at + 1).unwrap_or(&points[at]);
+        let along = [0, 1].map(|i| behind.place[i] - before.place[i]);
+        Some((number, beside(plane, &points[at], along)?))
+    });
+    let joined = boundary.joined;
+    for (number, pair) in found.take(MOST) {
+        let leaves = pair.map(|leaf| in_units(&plane, joined, leaf));
+        boundary.curves[number].beside = leaves.into();
+    }
+}
+
+fn in_units(plane: &Plane, joined: bool, leaf: Beside) -> LeafBeside {
+    let length = plane.family.scale().length;
+    let state = &leaf.spot.state;
+    let curves = state.x.chunks(state.segments() + 1);
+    let curves: Vec<Vec<DVec3>> = curves
+        .map(|rod| rod.iter().map(|x| *x * length).collect())
+        .collect();
+    let tips = (0..state.rods()).map(|j| state.tip(j) * length);
+    LeafBeside {
+        values: plane.values(leaf.spot.place),
+        index: leaf.index,
+        fallen: leaf.fallen,
+        tips: tips.take(if joined { 1 } else { usize::MAX }).collect(),
+        curves,
+    }
+}
