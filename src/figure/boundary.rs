@@ -12,9 +12,11 @@ use super::labels::Labels;
 use super::map::{DARKEST_INDEX, fill_index, name};
 use super::markers::Marker;
 use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, new_page, title};
+use super::round::round_step;
 use super::setting::Setting;
 use super::small::SmallPanels;
 use super::veins::Veins;
+use crate::branch::Kind;
 use crate::report::numbers::{power_of_ten, short};
 use crate::report::sides;
 use crate::scenario::Scenario;
@@ -23,16 +25,20 @@ use crate::study::{Boundary, BoundaryMap, BoundaryPoint, LeafBeside};
 const DIAGRAM: f64 = 400.0;
 /// Right of the panel, for the key.
 const KEY: f64 = 210.0;
+/// A leaf that buckles by less than this part of its length is drawn enlarged.
+const VISIBLE: f64 = 0.1;
 /// Curves named.
 const MOST_NAMED: usize = 7;
 
 pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);
-    let shown: Vec<&LeafBeside> = boundary.curves.iter().flat_map(|it| &it.beside).collect();
-    let longest = shown.iter().flat_map(|leaf| &leaf.curves);
+    let shown: Vec<Shown> = (boundary.curves.iter())
+        .flat_map(|curve| curve.beside.iter().map(|leaf| Shown::of(curve.kind, leaf)))
+        .collect();
+    let longest = shown.iter().flat_map(|it| &it.leaf.curves);
     let longest = longest.map(|curve| length(curve)).fold(0.0, f64::max);
     let shapes: Vec<Veins> = (shown.iter())
-        .map(|leaf| Veins::through(&leaf.curves, &leaf.tips, longest))
+        .map(|it| Veins::through(&it.curves, &it.tips, longest))
         .collect();
     let diagram = Cell::beside_key(HEADER + PANEL_TITLE, DIAGRAM, KEY);
     let below = diagram.end().y + PANEL_AXIS;
@@ -44,14 +50,9 @@ pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
         draw_curves(page, boundary, &shown, diagram)
     });
     drawing.group("leaves", |page| {
-        for (number, (veins, leaf)) in shapes.iter().zip(&shown).enumerate() {
-            let [first, second] = leaf.values.map(short);
-            let what = match (leaf.fallen, leaf.index) {
-                (true, _) => "comes to rest".into(),
-                (false, 0) => "stable".into(),
-                (false, index) => format!("index {index}"),
-            };
-            let text = format!("{what}, ({first}, {second})");
+        for (number, (veins, shown)) in shapes.iter().zip(&shown).enumerate() {
+            let [first, second] = shown.leaf.values.map(short);
+            let text = format!("{}, ({first}, {second})", shown.what);
             panels.draw(
                 page,
                 number,
@@ -62,6 +63,57 @@ pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
         }
     });
     drawing
+}
+
+/// A leaf beside a curve, as it is drawn.
+struct Shown<'b> {
+    leaf: &'b LeafBeside,
+    what: String,
+    curves: Vec<Vec<DVec3>>,
+    tips: Vec<DVec3>,
+}
+
+impl<'b> Shown<'b> {
+    fn of(kind: Kind, leaf: &'b LeafBeside) -> Self {
+        let what = match (&leaf.fallen_from, kind, leaf.index) {
+            (None, _, 0) => "stable".into(),
+            (None, _, index) => format!("index {index}"),
+            (Some(_), Kind::Fold, _) => "snapped".into(),
+            (Some(from), Kind::Branching, _) => return Shown::buckled(leaf, from),
+        };
+        Shown {
+            leaf,
+            what,
+            curves: leaf.curves.clone(),
+            tips: leaf.tips.clone(),
+        }
+    }
+
+    /// Next to a crossing of branches a leaf buckles little: that is drawn enlarged until it
+    /// can be seen.
+    fn buckled(leaf: &'b LeafBeside, from: &[Vec<DVec3>]) -> Self {
+        let mut curves = leaf.curves.clone();
+        let largest = curves.iter().flatten().zip(from.iter().flatten());
+        let largest = largest.map(|(x, y)| x.distance(*y)).fold(0.0, f64::max);
+        let longest = curves.iter().map(|curve| length(curve));
+        let visible = VISIBLE * longest.fold(0.0, f64::max);
+        let mut what = "buckled".to_string();
+        if 0.0 < largest && largest < visible {
+            let times = round_step(visible / largest);
+            for (x, from) in curves.iter_mut().flatten().zip(from.iter().flatten()) {
+                *x = *from + times * (*x - *from);
+            }
+            what += &format!(" ×{}", short(times));
+        }
+        let ends = curves.iter().take(leaf.tips.len());
+        let tips = ends.filter_map(|curve| curve.last().copied()).collect();
+        Shown {
+            leaf,
+            what,
+            curves,
+            tips,
+        }
+    }
 }
 
 /// What a leaf is called in the diagram.
@@ -93,7 +145,7 @@ fn notes(boundary: &Boundary) -> Vec<String> {
     notes
 }
 
-fn draw_curves(page: &mut Drawing, boundary: &Boundary, shown: &[&LeafBeside], cell: Cell) {
+fn draw_curves(page: &mut Drawing, boundary: &Boundary, shown: &[Shown], cell: Cell) {
     let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
     let axes = Axes {
         cell,
@@ -120,7 +172,7 @@ fn draw_curves(page: &mut Drawing, boundary: &Boundary, shown: &[&LeafBeside], c
         let special = points().filter(|point| point.kind == kind);
         axes.markers(page, special.map(at), marker, INK);
     }
-    let places = || shown.iter().map(|leaf| (leaf.values[0], leaf.values[1]));
+    let places = || (shown.iter()).map(|it| (it.leaf.values[0], it.leaf.values[1]));
     axes.markers(page, places(), Marker::Dot, INK);
     for (number, place) in places().enumerate() {
         if let Some(place) = axes.at(place) {

@@ -9,7 +9,7 @@ use super::search::Lost;
 use super::sheet::{Direction, Sheet, Spot};
 use super::table::Verified;
 use crate::branch::critical::Kind;
-use crate::leaf::{Grid, Leaf};
+use crate::leaf::{Grid, Leaf, State};
 use crate::limit::Limit;
 use crate::relax::fall::settle_from;
 
@@ -25,9 +25,9 @@ pub struct Beside {
     pub spot: Spot,
     /// Its Morse index.
     pub index: usize,
-    /// Whether it is what the leaf of the other side comes to rest as, where that side is the
-    /// stable one: it need not be near.
-    pub fallen: bool,
+    /// Where it began to fall, if it is what the leaf of the other, stable side comes to rest
+    /// as: at the equilibrium beyond a branch point, or at the fold.
+    pub fallen_from: Option<State>,
 }
 
 /// The leaves on both sides of a point of a boundary that goes `along` this way in the plane:
@@ -88,7 +88,7 @@ fn on_sheet(
         Ok(Beside {
             spot: sample.spot,
             index: sample.solved.negative,
-            fallen: false,
+            fallen_from: None,
         })
     };
     let found = found().ok()?;
@@ -118,14 +118,14 @@ fn beyond(point: &Verified, stable: &Spot, along: [f64; 2]) -> Option<Spot> {
 fn at_rest(plane: Plane, grid: &Grid, from: Spot) -> Option<Beside> {
     let scenario = Arc::new(plane.scenario(from.place).ok()?);
     let leaf = Leaf::in_units(scenario, plane.family.scale());
-    let state = settle_from(&leaf, grid, from.state, &Limit::default())?;
+    let state = settle_from(&leaf, grid, from.state.clone(), &Limit::default())?;
     Some(Beside {
         spot: Spot {
             state,
             place: from.place,
         },
         index: 0,
-        fallen: true,
+        fallen_from: Some(from.state),
     })
 }
 

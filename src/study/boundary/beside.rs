@@ -4,12 +4,13 @@ use glam::DVec3;
 
 use super::result::{Boundary, LeafBeside};
 use crate::branch::boundary::{self as curves, Beside, Plane, Verified, beside};
+use crate::leaf::State;
 
 /// Curves that have leaves beside them.
 const MOST: usize = 4;
 
-/// Finds leaves on either side of a few curves: of those that bound stable leaves, then of
-/// others.
+/// Finds leaves on either side of a few curves: of those that bound stable leaves or, if there
+/// are none, of those with the smallest index beside them.
 pub fn add_leaves(plane: Plane, known: &[curves::Boundary], boundary: &mut Boundary) {
     let index = |point: &Verified| point.indices[0].min(point.indices[1]);
     let mut order: Vec<(usize, usize)> = Vec::new();
@@ -18,6 +19,8 @@ pub fn add_leaves(plane: Plane, known: &[curves::Boundary], boundary: &mut Bound
         order.extend(least.map(|least| (least, number)));
     }
     order.sort_unstable();
+    let smallest = order.first().map(|first| first.0);
+    order.retain(|curve| Some(curve.0) == smallest);
     let found = order.into_iter().filter_map(|(least, number)| {
         let points = &known[number].points;
         // In the middle between ends and special points.
@@ -43,17 +46,18 @@ pub fn add_leaves(plane: Plane, known: &[curves::Boundary], boundary: &mut Bound
 
 fn in_units(plane: &Plane, joined: bool, leaf: Beside) -> LeafBeside {
     let length = plane.family.scale().length;
+    let curves = |state: &State| -> Vec<Vec<DVec3>> {
+        let rods = state.x.chunks(state.segments() + 1);
+        rods.map(|rod| rod.iter().map(|x| *x * length).collect())
+            .collect()
+    };
     let state = &leaf.spot.state;
-    let curves = state.x.chunks(state.segments() + 1);
-    let curves: Vec<Vec<DVec3>> = curves
-        .map(|rod| rod.iter().map(|x| *x * length).collect())
-        .collect();
     let tips = (0..state.rods()).map(|j| state.tip(j) * length);
     LeafBeside {
         values: plane.values(leaf.spot.place),
         index: leaf.index,
-        fallen: leaf.fallen,
         tips: tips.take(if joined { 1 } else { usize::MAX }).collect(),
-        curves,
+        curves: curves(state),
+        fallen_from: leaf.fallen_from.as_ref().map(curves),
     }
 }

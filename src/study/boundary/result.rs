@@ -66,8 +66,8 @@ pub struct BoundaryCurve {
     /// Its points in order: the second number grows from the first point or, where that
     /// is also the last, has grown.
     pub points: Vec<BoundaryPoint>,
-    /// Leaves on either side of it, for pictures: of four curves at most, first of those that
-    /// bound stable leaves.
+    /// Leaves on either side of it, for pictures: of a few curves, those that bound stable
+    /// leaves if there are any.
     #[serde(skip)]
     pub beside: Vec<LeafBeside>,
 }
@@ -79,13 +79,13 @@ pub struct LeafBeside {
     pub values: [f64; 2],
     /// Morse index.
     pub index: usize,
-    /// Whether it is what the stable leaf of the other side comes to rest as, once beyond the
-    /// curve.
-    pub fallen: bool,
     /// The joint tip alone, or every tip.
     pub tips: Vec<DVec3>,
     /// Centerlines, one per rod.
     pub curves: Vec<Vec<DVec3>>,
+    /// If it is what the stable leaf of the other side comes to rest as, the centerlines from
+    /// where it fell: of the equilibrium at the same numbers or, of a fold, at the curve.
+    pub fallen_from: Option<Vec<Vec<DVec3>>>,
 }
 
 /// A point of a curve, in the scenario's units.
