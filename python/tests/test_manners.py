@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +46,14 @@ LONG: dict[str, Callable[[], Any]] = {
         "scenarios/measured/pull.toml", ["scenarios/measured/pull.csv"] * 40, "stiffness.axial", set={"leaf.rods": 41}
     ),
 }
+
+
+@pytest.fixture(autouse=True)
+def ctrl_c() -> Iterator[None]:
+    # A shell's job in the background ignores it from birth.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def time_to_stop(run: Callable[[], Any]) -> float:

@@ -9,8 +9,8 @@ use crate::relax::settle::InitialGuess;
 /// Accuracy to which it comes to rest.
 const TOLERANCE: f64 = 1e-6;
 
-/// Where a leaf comes to rest that sets out from a state on a grid, with no motion; none
-/// if it does not.
+/// Where a leaf comes to rest that sets out from a state on a grid, with no motion: at a
+/// saddle it does not stay. None if it does not come to rest.
 pub fn settle_from(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -> Option<State> {
     let options = Options {
         limit: limit.clone(),
@@ -19,5 +19,8 @@ pub fn settle_from(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -> Opt
     let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
     let mut run = Run::new(leaf, &options, TOLERANCE, ignored);
     let settled = run.settle(grid.clone(), InitialGuess::Pushed(state));
-    settled.rest.ok().map(|_| settled.level.state)
+    settled.rest.ok()?;
+    run.push(settled.level);
+    while !run.judge_stability().ok()? {}
+    run.levels.pop().map(|level| level.state)
 }

@@ -37,16 +37,20 @@ pub fn beside(plane: Plane, point: &Verified, along: [f64; 2]) -> Option<[Beside
     let (grid, point) = &for_pictures(plane, point);
     let [a, b] = point.indices;
     let (fewer, more) = (a.min(b), a.max(b));
-    let side = |sign: f64, indices: RangeInclusive<usize>| {
-        let mut away = AWAY.iter().map(|away| sign * away);
-        away.find_map(|away| on_sheet(plane, grid, point, along, (away, &indices)))
+    let at = |away: f64, indices: RangeInclusive<usize>| {
+        on_sheet(plane, grid, point, along, (away, &indices))
     };
-    let low = side(-1.0, fewer..=fewer)?;
+    let low = AWAY.iter().find_map(|away| at(-away, fewer..=fewer))?;
+    let mut high = AWAY.iter().filter_map(|away| at(*away, more..=more));
     let high = match (fewer, point.kind) {
-        // Another boundary may be close behind this one.
-        (0, Kind::Branching) => at_rest(plane, grid, side(1.0, more..=usize::MAX)?.spot)?,
+        (0, Kind::Branching) => {
+            // Another boundary may be close behind this one: then as near as can be.
+            let mut near = AWAY.iter().rev();
+            let crossed = || near.find_map(|away| at(*away, more..=usize::MAX));
+            at_rest(plane, grid, high.next().or_else(crossed)?.spot)?
+        }
         (0, Kind::Fold) => at_rest(plane, grid, beyond(point, &low.spot, along)?)?,
-        _ => side(1.0, more..=more)?,
+        _ => high.next()?,
     };
     Some([low, high])
 }
