@@ -41,16 +41,14 @@ pub fn beside(plane: Plane, point: &Verified, along: [f64; 2]) -> Option<[Beside
         on_sheet(plane, grid, point, along, (away, &indices))
     };
     let low = AWAY.iter().find_map(|away| at(-away, fewer..=fewer))?;
-    let mut high = AWAY.iter().filter_map(|away| at(*away, more..=more));
     let high = match (fewer, point.kind) {
         (0, Kind::Branching) => {
-            // Another boundary may be close behind this one: then as near as can be.
-            let mut near = AWAY.iter().rev();
-            let crossed = || near.find_map(|away| at(*away, more..=usize::MAX));
-            at_rest(plane, grid, high.next().or_else(crossed)?.spot)?
+            // Another boundary may be close behind this one: across as few as can be.
+            let found = AWAY.iter().filter_map(|away| at(*away, more..=usize::MAX));
+            at_rest(plane, grid, found.min_by_key(|found| found.index)?.spot)?
         }
         (0, Kind::Fold) => at_rest(plane, grid, beyond(point, &low.spot, along)?)?,
-        _ => high.next()?,
+        _ => AWAY.iter().find_map(|away| at(*away, more..=more))?,
     };
     Some([low, high])
 }
