@@ -50,6 +50,11 @@ impl Unknowns {
         }
     }
 
+    /// All six of a node.
+    fn of(&self, j: usize, i: usize) -> [usize; 6] {
+        std::array::from_fn(|c| self.at(j, i, c))
+    }
+
     /// Adds the forces on a node.
     pub fn gather(&self, j: usize, i: usize, forces: &Increment, all: &mut [f64]) {
         for c in 0..6 {
@@ -100,33 +105,33 @@ pub fn entries(
 ) {
     let n = system.segments;
     for j in 0..system.rods() {
-        let at = |i: usize, c: usize| unknowns.at(j, i, c);
         let (group, lane) = place(j);
         let chain = system.groups[group].matrix.spatial();
         for i in 0..n {
             let (own, next) = chain.blocks(i, lane);
             let mass = system.mass(j, i);
+            let (here, ahead) = (unknowns.of(j, i), unknowns.of(j, (i + 1).min(n - 1)));
             for r in 0..6 {
-                add(at(i, r), at(i, r), shift * mass[r / 3]);
+                add(here[r], here[r], shift * mass[r / 3]);
                 for c in r..6 {
-                    add(at(i, r), at(i, c), own[r][c]);
+                    add(here[r], here[c], own[r][c]);
                 }
                 for c in 0..if i + 1 < n { 6 } else { 0 } {
-                    add(at(i, r), at(i + 1, c), next[r][c]);
+                    add(here[r], ahead[c], next[r][c]);
                 }
             }
             if let Some(spring) = system.spring(j, i)
                 && (unknowns.tip.is_none() || i + 1 < n)
             {
                 for c in 0..3 {
-                    add(at(i, 3 + c), unknowns.at(j + 1, i, 3 + c), -spring[c]);
+                    add(here[3 + c], unknowns.at(j + 1, i, 3 + c), -spring[c]);
                 }
             }
         }
         for (k, row) in border.iter().enumerate() {
             for (i, forces) in row[j].iter().enumerate() {
-                for c in 0..6 {
-                    add(at(i, c), first_border + k, forces[c]);
+                for (at, force) in unknowns.of(j, i).into_iter().zip(forces) {
+                    add(at, first_border + k, *force);
                 }
             }
         }
