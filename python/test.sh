@@ -1,16 +1,25 @@
 #!/usr/bin/env bash
 # The package for Python: built as one wheel, installed as users do it, and tested.
+# With `build` or `run` the one or the other alone.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-python3 -m venv --clear target/venv
+part=${1-all}
+if test "$part" != run; then
+    python3 -m venv --clear target/venv
+fi
 PATH="$PWD/target/venv/bin:$PATH"
-pip install --quiet ./python
-pip install --quiet maturin pytest mypy matplotlib tqdm pandas "dask[distributed]" nbmake ipykernel
-# The wheel is one for all versions of Python.
-rm -rf target/wheels
-maturin build --release --locked --quiet --manifest-path python/Cargo.toml --out target/wheels
-test "$(ls target/wheels/*cp310-abi3*.whl | wc -l)" = 1
+if test "$part" != run; then
+    pip install --quiet ./python
+    pip install --quiet maturin pytest mypy matplotlib tqdm pandas "dask[distributed]" nbmake ipykernel
+    # The wheel is one for all versions of Python.
+    rm -rf target/wheels
+    maturin build --release --locked --quiet --manifest-path python/Cargo.toml --out target/wheels
+    test "$(ls target/wheels/*cp310-abi3*.whl | wc -l)" = 1
+fi
+if test "$part" = build; then
+    exit
+fi
 
 cd python
 # Comparisons of times are for a quiet machine: pytest tests/test_cost.py
