@@ -22,7 +22,7 @@ fn every_station_lies_on_the_arc() {
             let leaf = Both::solve("classic/rollup", &entries);
             let what = format!("M = {moment}, EA = {axial}");
             let estimate = leaf.relaxed.accuracy.error_estimate.unwrap();
-            let relaxed = (estimate.min(1e-11), 1e-12);
+            let relaxed = (estimate.min(1e-11), 1e-11);
             let shapes = leaf.shapes().into_iter().zip([relaxed, (TIGHT, TIGHT)]);
             for (rods, (within, turned)) in shapes {
                 for (&sigma, node) in leaf.relaxed.shape.stations.iter().zip(&rods[0].nodes) {
@@ -30,7 +30,8 @@ fn every_station_lies_on_the_arc() {
                     let arc = DVec3::new(angle.sin(), 1.0 - angle.cos(), 0.0) / moment;
                     let error = (node.position - arc).length();
                     assert!(error <= within, "{what}: {error:.1e} at {sigma}");
-                    // The angles are exact on any grid of the relaxed leaf, full turns included.
+                    // The angles are exact on any grid, full turns included; what is integrated
+                    // between them is as good as the steps.
                     let tangent = node.rotation * DVec3::X;
                     let exact = DVec3::new(angle.cos(), angle.sin(), 0.0);
                     assert!((tangent - exact).length() < turned, "{what}");

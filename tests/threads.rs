@@ -12,15 +12,15 @@ fn bits_of(numbers: impl IntoIterator<Item = f64>) -> Vec<u64> {
     numbers.into_iter().map(f64::to_bits).collect()
 }
 
-/// 300 veins: from the second grid on they are shared out among threads. The
+/// 600 veins: from the second grid on they are shared out among threads. The
 /// softer leaf has to move far, and more threads than cores change nothing.
 #[test]
 fn large_leaves_are_relaxed_equally_on_one_two_and_five_threads() {
-    let mut soft = fig04(150);
+    let mut soft = fig04(300);
     for rod in &mut soft.rods {
         rod.couple_stiffness[1] = Profile::Constant(0.05);
     }
-    for leaf in [fig04(300), soft] {
+    for leaf in [fig04(600), soft] {
         let on = |threads| on_threads(threads, || settle(&leaf, 1e-8));
         let bits = |leaf: &Equilibrium| {
             let numbers = [leaf.energy, leaf.accuracy.residual].map(Option::unwrap);

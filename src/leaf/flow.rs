@@ -84,6 +84,7 @@ impl<'a> Flow<'a> {
                     }
                 }
                 group[6].0[lane] = q.w;
+                group[13].0[lane] = 0.0;
             }
         }
         let h = (to - from) / steps as f64;
@@ -94,6 +95,13 @@ impl<'a> Flow<'a> {
                 after.push(self.rod(j));
             }
         }
+    }
+
+    /// The potential energy of all rods between where they were carried from last and to,
+    /// without that of loads on the tips.
+    pub fn energy(&self) -> f64 {
+        let energy = |j: usize| self.fields[j / GROUP][13].0[j % GROUP];
+        (0..self.leaf.rods()).map(energy).sum()
     }
 
     fn rod(&self, j: usize) -> RodFields {
@@ -177,10 +185,10 @@ impl Kernel for Slopes<'_> {
             let [before, behind] =
                 beside(self.stage, rods, count).map(|x| Vectors::gather(simd, x, part));
             let loads = RodLoads::gather(simd, self.loads[g], part);
-            let (force, _) = loads.at([before, fields.x, behind], [1.0; 2], false);
+            let load = loads.at([before, fields.x, behind], [1.0; 2], false);
             let sections = rods.map(|j| &self.sections[j]);
             let sections = Sections::gather(simd, sections, part);
-            fields.slopes(&sections, force).put(out, part);
+            fields.slopes(&sections, load).put(out, part);
         }
     }
 }

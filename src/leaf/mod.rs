@@ -16,7 +16,7 @@ mod system;
 mod unknowns;
 
 pub use crate::scenario::Scale;
-pub use assembly::Jump;
+pub use assembly::{Jump, Tangent};
 pub use dimensionless::{Leaf, Loads};
 pub use discrete::DiscreteLeaf;
 pub use flow::{Flow, RodFields};

@@ -1,8 +1,9 @@
 //! The fields along the veins, extrapolated over the grids.
 
-use crate::leaf::{DiscreteLeaf, RodFields};
+use crate::leaf::{Grid, Leaf, RodFields};
+use crate::relax::defect::Told;
 use crate::relax::level::Level;
-use crate::relax::nodes::{Node, RodNodes, alike, numbers, rotations};
+use crate::relax::nodes::{Node, RodNodes, alike, numbers};
 use crate::relax::place::{Measures, Place, Values};
 use crate::relax::shape;
 use crate::shape::{NodeState, RodShape};
@@ -27,8 +28,8 @@ pub struct Fields {
 
 /// All nodal fields with `columns` extrapolations, at the nodes of the coarsest grid, or
 /// if these are few of the next; if every node is asked for of the finest. Where the
-/// equilibrium equations have told them to the tolerance there (with that error) they are
-/// those; else only at nodes that keep the tolerance as those of the coarsest grid do, which
+/// equilibrium equations have told them to the tolerance (with that error) they are
+/// those, of a corrected leaf at every node of the grid that these tell; else only at nodes that keep the tolerance as those of the coarsest grid do, which
 /// have that `error`: nodes of the coarsest grid have the whole extrapolation, those that a
 /// finer grid adds have that of the grids from there on, and the rest of the coarser
 /// ones' correction, which is small and smooth, interpolated.
@@ -37,7 +38,7 @@ pub fn fields(
     columns: usize,
     (error, tolerance): (Option<f64>, f64),
     every_node: bool,
-    told: Option<(&[Vec<RodFields>], f64)>,
+    told: Option<(&Told, f64)>,
 ) -> Fields {
     let (first, finest) = (levels[0], levels[levels.len() - 1]);
     let few = first.leaf.segments() < STATIONS && levels.len() > 1;
@@ -46,11 +47,15 @@ pub fn fields(
         false => levels[usize::from(few)],
     };
     let known_error = error.unwrap_or(0.0);
-    if let Some((rods, error)) = told {
-        let between = (error - known_error).max(0.0);
-        return Fields::new(wanted, &thinned(rods, finest, wanted), between);
-    }
     let leaf = &first.leaf.leaf;
+    if let Some((told, error)) = told {
+        let between = (error - known_error).max(0.0);
+        let wanted = match every_node {
+            true => &told.grid,
+            false => &wanted.leaf.grid,
+        };
+        return Fields::new(leaf, wanted, &thinned(told, wanted, finest), between);
+    }
     let used = &levels[levels.len() - 1 - columns..];
     let rods = 0..first.leaf.rods();
     let mut known_nodes: Vec<_> = rods.map(|j| RodNodes::new(used, finest, j)).collect();
@@ -93,41 +98,42 @@ pub fn fields(
         }
         (reported, nodes, between) = (finer, added, between + error);
     }
-    Fields::new(reported, &nodes, between)
+    Fields::new(leaf, &reported.leaf.grid, &nodes, between)
 }
 
 impl Fields {
     /// Those at the nodes of a grid.
-    fn new(grid: &Level, nodes: &[Vec<Node>], between: f64) -> Self {
-        let leaf = &grid.leaf.leaf;
+    fn new(leaf: &Leaf, grid: &Grid, nodes: &[Vec<Node>], between: f64) -> Self {
         let rods = nodes.iter().enumerate().map(|(j, nodes)| {
-            let node = |(i, values)| unpack(&grid.leaf, j, i, values);
+            let stations = nodes.iter().zip(grid.sigma());
             RodShape {
                 length: leaf.length(j) * leaf.scale.length,
-                nodes: nodes.iter().enumerate().map(node).collect(),
+                nodes: stations
+                    .map(|(values, sigma)| unpack(leaf, j, *sigma, values))
+                    .collect(),
             }
         });
         Fields {
-            stations: grid.leaf.grid.sigma().to_vec(),
+            stations: grid.sigma().to_vec(),
             rods: rods.collect(),
             between,
         }
     }
 }
 
-/// What is known at the nodes of the finest grid at those that are wanted.
-fn thinned(rods: &[Vec<RodFields>], finest: &Level, wanted: &Level) -> Vec<Vec<Node>> {
-    let stride = finest.leaf.segments() / wanted.leaf.segments();
+/// What is told, at the nodes that are wanted; rotations have the signs of the `finest` grid.
+fn thinned(told: &Told, wanted: &Grid, finest: &Level) -> Vec<Vec<Node>> {
+    let stride = told.grid.segments() / wanted.segments();
     let rod = |(j, rod): (usize, &Vec<RodFields>)| {
-        let signs = rotations(finest, j);
-        let node = |(node, sign): (&RodFields, &DQuat)| {
-            let q = alike(node.q, *sign);
-            let (n, m) = (q.inverse() * node.n, q.inverse() * node.m);
-            numbers(node.x, q, n, m)
+        let mut sign = finest.state.q[finest.state.base(j)];
+        let node = |node: &RodFields| {
+            sign = alike(node.q, sign);
+            let (n, m) = (sign.inverse() * node.n, sign.inverse() * node.m);
+            numbers(node.x, sign, n, m)
         };
-        rod.iter().zip(&signs).step_by(stride).map(node).collect()
+        rod.iter().step_by(stride).map(node).collect()
     };
-    rods.iter().enumerate().map(rod).collect()
+    told.rods.iter().enumerate().map(rod).collect()
 }
 
 /// How many times more the last grid changed the positions at the nodes of the one
@@ -199,7 +205,7 @@ fn minus(a: &Node, b: &Node) -> Node {
     std::array::from_fn(|k| a[k] - b[k])
 }
 
-fn unpack(leaf: &DiscreteLeaf, j: usize, i: usize, values: &Node) -> NodeState {
+fn unpack(leaf: &Leaf, j: usize, sigma: f64, values: &Node) -> NodeState {
     let vector = |k: usize| DVec3::new(values[k], values[k + 1], values[k + 2]);
     let mut node = NodeState {
         position: vector(0),
@@ -209,8 +215,8 @@ fn unpack(leaf: &DiscreteLeaf, j: usize, i: usize, values: &Node) -> NodeState {
         n: vector(7),
         m: vector(10),
     };
-    shape::strains(leaf, j, leaf.grid.sigma()[i], &mut node);
-    let scale = leaf.leaf.scale;
+    shape::strains(leaf, j, sigma, &mut node);
+    let scale = leaf.scale;
     node.position *= scale.length;
     node.u /= scale.length;
     node.n *= scale.force();

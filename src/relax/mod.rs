@@ -1,6 +1,7 @@
 //! How a leaf comes to rest: the start, the semi-implicit motion on one grid,
 //! the nested grids with their extrapolation, saddles, modes, and the result.
 
+mod correction;
 mod defect;
 mod equilibrium;
 pub(crate) mod fall;

@@ -79,7 +79,7 @@ impl<'l> RodNodes<'l> {
 }
 
 /// Rotations of rod `j` at all nodes, of a continuous sign.
-pub fn rotations(level: &Level, j: usize) -> Vec<DQuat> {
+fn rotations(level: &Level, j: usize) -> Vec<DQuat> {
     let base = level.state.base(j);
     let mut rotations: Vec<DQuat> = Vec::with_capacity(level.leaf.segments() + 1);
     for &q in &level.state.q[base..=base + level.leaf.segments()] {

@@ -1,5 +1,6 @@
 //! From the settled grids to the result in the units of the scenario.
 
+use crate::leaf::{Grid, RodFields};
 use crate::newton::Stop;
 use crate::relax::equilibrium::{
     Accuracy, Equilibrium, Model, Outcome, Reaction, Shape, Stability,
@@ -40,12 +41,8 @@ pub fn equilibrium(
     let joined = run.leaf.joined();
     let tips = rods.iter().take(if joined { 1 } else { rods.len() });
     let tips = tips.filter_map(|rod| rod.nodes.last());
-    let mut energies = Richardson::default();
-    for level in &series {
-        energies.push(level.leaf.segments(), vec![level.leaf.energy(&level.state)]);
-    }
     let error_estimate = error.map(|error| (error + between) * scale.length);
-    let lines = centerlines(finest);
+    let (grid, lines) = centerlines(run, finest);
     let tip_force = |rod: &RodShape| rod.nodes.last().map_or(DVec3::ZERO, |n| n.rotation * n.n);
     let segments: Vec<usize> = series.iter().map(|level| level.leaf.segments()).collect();
     Equilibrium {
@@ -55,7 +52,7 @@ pub fn equilibrium(
         remark,
         doubts: Vec::new(),
         rod_count: rods.len(),
-        energy: Some(energies.column(columns)[0] * scale.moment()),
+        energy: Some(potential(run, columns) * scale.moment()),
         tips: tips.map(|node| node.position).collect(),
         tip_force_sum: rods.iter().map(tip_force).sum(),
         reaction: reaction(&series, columns),
@@ -90,7 +87,7 @@ pub fn equilibrium(
             curves: (lines.iter())
                 .map(|line| line.iter().map(|(x, _)| *x).collect())
                 .collect(),
-            curve_stations: finest.leaf.grid.sigma().to_vec(),
+            curve_stations: grid.sigma().to_vec(),
         },
     }
 }
@@ -122,14 +119,32 @@ fn reaction(levels: &[&Level], columns: usize) -> Option<Reaction> {
     })
 }
 
-/// All nodes of a level, in units of the scenario.
-fn centerlines(level: &Level) -> Vec<Centerline> {
-    let (n, length) = (level.leaf.segments(), level.leaf.leaf.scale.length);
-    let node = |k: usize| (level.state.x[k] * length, level.state.q[k]);
-    let bases = (0..level.leaf.rods()).map(|j| level.state.base(j));
-    bases
-        .map(|base| (base..=base + n).map(node).collect())
-        .collect()
+/// The potential energy: along the leaf that the equations tell, whose errors it has only
+/// to second order, or with `columns` extrapolations.
+fn potential(run: &Run, columns: usize) -> f64 {
+    if let Some(told) = &run.defect {
+        return told.energy;
+    }
+    let mut energies = Richardson::default();
+    for level in &run.levels {
+        energies.push(level.leaf.segments(), vec![level.leaf.energy(&level.state)]);
+    }
+    energies.column(columns)[0]
+}
+
+/// The centerlines at all nodes of the finest grid or, of a corrected leaf, of the grid
+/// that tells it, in units of the scenario.
+fn centerlines<'r>(run: &'r Run, finest: &'r Level) -> (&'r Grid, Vec<Centerline>) {
+    let length = run.leaf.scale.length;
+    if let Some(told) = run.corrected() {
+        let line = |rod: &Vec<RodFields>| rod.iter().map(|it| (it.x * length, it.q)).collect();
+        return (&told.grid, told.rods.iter().map(line).collect());
+    }
+    let n = finest.leaf.segments();
+    let node = |k: usize| (finest.state.x[k] * length, finest.state.q[k]);
+    let bases = (0..finest.leaf.rods()).map(|j| finest.state.base(j));
+    let lines = bases.map(|base| (base..=base + n).map(node).collect());
+    (&finest.leaf.grid, lines.collect())
 }
 
 /// Of a leaf that moved far while it was softer than it is.

@@ -1,7 +1,7 @@
 //! A run over nested grids: what is asked, the grids the leaf has settled on,
 //! and the error estimate of their extrapolation.
 
-use crate::leaf::{DiscreteLeaf, Leaf, RodFields, System, whole_fields};
+use crate::leaf::{DiscreteLeaf, Leaf, System, whole_fields};
 use crate::newton::{Contraction, Work};
 use crate::relax::defect::{self, Linear, Told};
 use crate::relax::level::{Level, complete, positions};
@@ -28,6 +28,11 @@ const LARGEST: f64 = 10.0;
 /// would hardly be small enough.
 const HOPELESS: f64 = 3e3;
 
+/// How often the error that the defect tells is taken off, at most, and what that leaves of
+/// it at best.
+const CORRECTIONS: usize = 4;
+const CORRECTED: f64 = 1e-2;
+
 /// Of a leaf with more nodes than this no equations are kept while others are solved: less
 /// memory for a factorisation more of a coarse grid.
 const MANY_NODES: usize = 50_000;
@@ -52,6 +57,9 @@ pub struct Run<'a, 'o> {
     pub effects: [Option<f64>; 2],
     pub options: &'o Options,
     pub tolerance: f64,
+    /// Whether nothing but the shape and its stability is asked for: forces on the grids,
+    /// eigenvalues and derivatives are not.
+    pub shape_alone: bool,
     pub progress: &'o mut dyn FnMut(&Progress),
     pub work: Work,
     pub saddle: Option<Saddle>,
@@ -100,6 +108,7 @@ impl<'a, 'o> Run<'a, 'o> {
             effects: [None; 2],
             options,
             tolerance,
+            shape_alone: false,
             progress,
             work: Work::default(),
             saddle: None,
@@ -153,6 +162,7 @@ impl<'a, 'o> Run<'a, 'o> {
         let defect = self.defect.take();
         let defect = defect.map(|told| Told {
             rods: whole_fields(reduced, told.rods),
+            energy: told.energy * if reduced.in_half() { 2.0 } else { 1.0 },
             ..told
         });
         self.tabulate();
@@ -191,6 +201,11 @@ impl<'a, 'o> Run<'a, 'o> {
         let segments = self.levels.last()?.leaf.segments();
         let best = self.table.best()?.error;
         let extrapolation = match &self.defect {
+            // Of what iterations left undone nothing is left.
+            Some(told) if told.corrections > 0 => {
+                let segments = self.levels[0].leaf.segments() as f64;
+                return Some(SAFETY * told.largest() + ROUNDING * segments);
+            }
             // Of few nodes those between are stations, too.
             Some(told) if self.too_coarse(self.levels[0].leaf.segments()) => {
                 (SAFETY * told.error.max(told.between)).min(LARGEST * best)
@@ -206,20 +221,43 @@ impl<'a, 'o> Run<'a, 'o> {
         EXTRAPOLATED * self.remaining + ROUNDING * segments as f64
     }
 
-    /// The leaf at the nodes of the finest grid as the equilibrium equations tell it, and
-    /// its error, if that is within the tolerance.
-    pub fn told(&self) -> Option<(&[Vec<RodFields>], f64)> {
+    /// The leaf at the nodes of the finest grid, or of a finer one if it was corrected, as
+    /// the equilibrium equations tell it, and its error, if that is within the tolerance.
+    pub fn told(&self) -> Option<(&Told, f64)> {
         let (told, segments) = (self.defect.as_ref()?, self.levels.last()?.leaf.segments());
-        let error = SAFETY * told.error.max(told.between) + self.unfinished(segments);
-        (error <= self.tolerance).then_some((&told.rods, error))
+        let error = match told.corrections {
+            0 => SAFETY * told.largest() + self.unfinished(segments),
+            _ => self.error()?,
+        };
+        (error <= self.tolerance || told.corrections > 0).then_some((told, error))
     }
 
-    /// Estimates the error of the best values from their defect.
+    /// The leaf as the equations tell it, if the errors of the grids were taken off it.
+    pub fn corrected(&self) -> Option<&Told> {
+        self.defect.as_ref().filter(|told| told.corrections > 0)
+    }
+
+    /// How often errors may be taken off.
+    fn corrections(&self) -> usize {
+        let grids = matches!(self.options.method, Method::SemiImplicit(_));
+        let free = self.leaf.held.is_none() && self.segments().is_none();
+        match grids && free && self.shape_alone {
+            true => CORRECTIONS,
+            false => 0,
+        }
+    }
+
+    /// Estimates the error of the best values from their defect, and takes it off them if
+    /// that makes them accurate enough.
     pub fn judge_accuracy(&mut self) {
+        let most = self.corrections();
+        let hopeless = HOPELESS * CORRECTED.powi(-(most as i32));
         let best = self.table.best();
-        let near = best.filter(|best| best.error <= HOPELESS * self.tolerance);
+        let near = best.filter(|best| best.error <= hopeless * self.tolerance);
+        let enough = (self.tolerance / SAFETY - ROUNDING * COARSEST as f64, most);
         let (levels, linear, work) = (&self.levels, &mut self.linear, &mut self.work);
-        self.defect = near.and_then(|best| defect::told(levels, best.columns, linear, work));
+        self.defect =
+            near.and_then(|best| defect::told(levels, best.columns, enough, linear, work));
         if (self.levels.last()).is_some_and(|level| is_large(&level.leaf)) {
             self.linear = None;
         }

@@ -11,13 +11,10 @@ use crate::relax::run::COARSEST;
 pub const FINEST: usize = 16_384;
 
 /// Segments of the coarsest grid if the tolerance is loose, that is if it is at
-/// least so large, and the leaf settles in the valley it starts in.
+/// least so large, or positions are all that is asked for (forces and eigenvalues have
+/// larger errors), and the leaf settles in the valley it starts in.
 const COARSEST_OF_LOOSE: usize = 4;
 const LOOSE: f64 = 1e-3;
-
-/// The same where positions are all that is asked for: forces and eigenvalues have larger
-/// errors than these.
-const LOOSE_FOR_SHAPE: f64 = 1e-6;
 
 /// Rotation per segment (radians) that the coarsest grid must resolve where
 /// rest curvature and tip moment alone tell it, and the most that one of a loose
@@ -39,8 +36,8 @@ pub fn reducible(method: Method) -> bool {
 
 /// Segments of the coarsest grid, unless a leaf needs more.
 pub fn least(method: Method, tolerance: f64, shape_alone: bool) -> usize {
-    let loose = if shape_alone { LOOSE_FOR_SHAPE } else { LOOSE };
-    match settles_where_it_starts(method) && tolerance >= loose {
+    let loose = shape_alone || tolerance >= LOOSE;
+    match settles_where_it_starts(method) && loose {
         true => COARSEST_OF_LOOSE,
         false => COARSEST,
     }

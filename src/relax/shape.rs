@@ -1,6 +1,6 @@
 //! Strains and stress resultants at the nodes of a state.
 
-use crate::leaf::{DiscreteLeaf, State};
+use crate::leaf::{DiscreteLeaf, Leaf, State};
 use crate::shape::NodeState;
 use glam::DVec3;
 
@@ -39,13 +39,13 @@ pub fn node(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> NodeState
         n: to_directors * force,
         m: to_directors * moment,
     };
-    strains(leaf, j, leaf.grid.sigma()[i], &mut node);
+    strains(&leaf.leaf, j, leaf.grid.sigma()[i], &mut node);
     node
 }
 
 /// Sets v and u of a node from its n and m by the constitutive law.
-pub fn strains(leaf: &DiscreteLeaf, j: usize, sigma: f64, node: &mut NodeState) {
-    let section = leaf.leaf.section(j, sigma, 1.0);
+pub fn strains(leaf: &Leaf, j: usize, sigma: f64, node: &mut NodeState) {
+    let section = leaf.section(j, sigma, 1.0);
     node.v = section.rest_strain + section.compliance * node.n;
     node.u = section.rest_curvature + node.m / section.couple_stiffness;
 }

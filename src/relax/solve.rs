@@ -102,6 +102,7 @@ fn on_grids(
     if let Some(reduced) = &reduced {
         let mut run = Run::new(reduced, options, tolerance, progress);
         run.whole = Some(&leaf);
+        run.shape_alone = shape_alone;
         let end = run.solve(grid.clone());
         if end.is_ok() && run.index == Some(0) {
             return Ok(finished(run.completed(&leaf), end, clock));
@@ -112,6 +113,7 @@ fn on_grids(
     }
     let mut run = Run::new(&leaf, options, tolerance, progress);
     run.work = work;
+    run.shape_alone = shape_alone;
     let mut end = run.solve(grid.clone());
     end = run.land_by_own_motion(&grid, end);
     let mut next = Some(grid);

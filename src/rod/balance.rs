@@ -3,7 +3,10 @@
 //! x' = L R v,   q' = L/2 (R u) q,   n' = -f,   m' = n x x'          eqs (1) (2)
 //!
 //! with v = v0 + c R^T n and u = u0 + R^T m / A by eqs (5) and (6), n and m along the
-//! lab axes and f the force that acts per unit of sigma.
+//! lab axes and f the force that acts per unit of sigma; and the potential energy of
+//! everything up to sigma,
+//!
+//! E' = L/2 (n.c n + m.m/A) + that of the loads.
 
 use super::section::Sections;
 use crate::lanes::{Four, Lanes, Vectors};
@@ -11,10 +14,10 @@ use crate::rotation::{Quaternions, directors};
 use pulp::Simd;
 
 /// Numbers that describe a rod at one sigma.
-pub const FIELDS: usize = 13;
+pub const FIELDS: usize = 14;
 
 /// What describes the rods of a group at one sigma: positions, quaternions, forces and
-/// moments along the lab axes.
+/// moments along the lab axes, energies.
 pub type GroupFields = [Four; FIELDS];
 
 /// The same of several rods.
@@ -28,6 +31,8 @@ pub struct Fields<S: Simd> {
     pub n: Vectors<S>,
     /// Moments.
     pub m: Vectors<S>,
+    /// Energies.
+    pub energy: Lanes<S>,
 }
 
 impl<S: Simd> Fields<S> {
@@ -41,6 +46,7 @@ impl<S: Simd> Fields<S> {
             q: (vector(3), number(6)),
             n: vector(7),
             m: vector(10),
+            energy: number(13),
         }
     }
 
@@ -53,17 +59,26 @@ impl<S: Simd> Fields<S> {
             }
         }
         self.q.1.put(&mut group[6], part);
+        self.energy.put(&mut group[13], part);
     }
 
-    /// Their slopes where `force` acts, `sections` being as long as the rods.
+    /// Their slopes where a force acts, with its potential, `sections` being as long as the
+    /// rods.
     #[inline(always)]
-    pub fn slopes(&self, sections: &Sections<S>, force: Vectors<S>) -> Self {
+    pub fn slopes(
+        &self,
+        sections: &Sections<S>,
+        (force, potential): (Vectors<S>, Lanes<S>),
+    ) -> Self {
         let (q, w) = self.q;
         let [half, two] = [0.5, 2.0].map(|number| Lanes::splat(w.simd, number));
         let frame = directors(self.q, two / w.times(w, q.dot(q)));
         let (n, m) = (self.n.onto(frame), self.m.onto(frame));
-        let v = sections.rest_strain + sections.compliance * n;
-        let u = sections.rest_curvature + m.over(sections.couple_stiffness);
+        let (strain, bend) = (sections.compliance * n, m.over(sections.couple_stiffness));
+        let (v, u) = (
+            sections.rest_strain + strain,
+            sections.rest_curvature + bend,
+        );
         let tangent = v.along(frame).scale(sections.ds);
         let turn = u.along(frame).scale(sections.ds * half);
         Fields {
@@ -71,6 +86,7 @@ impl<S: Simd> Fields<S> {
             q: (turn.scale(w) + turn.cross(q), -turn.dot(q)),
             n: -force,
             m: self.n.cross(tangent),
+            energy: half * sections.ds * (n.dot(strain) + m.dot(bend)) + potential,
         }
     }
 }

@@ -11,7 +11,7 @@ pub use balance::{FIELDS, Fields, GroupFields};
 pub use element::{Element, Nodes};
 pub use planar::PlanarElement;
 pub use section::{Section, Sections};
-pub use segment::{Ends, SectionRate, Segment};
+pub use segment::{Blocks, Ends, SectionRate, Segment};
 pub use spatial::SpatialElement;
 
 /// A segment that is bent by more than this (radians) is not resolved by its grid.

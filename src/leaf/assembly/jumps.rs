@@ -4,26 +4,53 @@ use crate::leaf::chain::place;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::State;
 use crate::leaf::system::System;
+use crate::rod::{Blocks, Segment};
 use glam::DVec3;
 
 /// Jumps of a rod's position, rotation, force and moment at a node: what they are before
 /// it, seen from the base, less what they are behind it.
 pub type Jump = [DVec3; 4];
 
+/// A segment with its derivatives.
+pub struct Tangent {
+    /// The segment.
+    pub segment: Segment,
+    /// Derivatives of Pi with respect to its end and the turns of both nodes.
+    pub first: (DVec3, DVec3, DVec3),
+    /// Second derivatives, the force condensed out.
+    pub second: Blocks,
+}
+
 impl DiscreteLeaf {
+    /// Segment `i` of rod `j` with its derivatives.
+    pub fn tangent(&self, state: &State, j: usize, i: usize) -> Tangent {
+        let section = self.section(j, i);
+        let segment = self.segment(state, j, i, state.n[j * self.segments() + i]);
+        Tangent {
+            first: segment.gradient(section),
+            second: segment.hessian(section),
+            segment,
+        }
+    }
+
     /// Writes the right-hand side of the change, to first order, by which a leaf loses
-    /// its `jumps`, rod after rod in the middles of so many equal parts.
-    pub fn assemble_jumps(&self, state: &State, jumps: &[Vec<Jump>], system: &mut System) {
+    /// its `jumps`, rod after rod in the middles of so many equal parts; `behind` are the
+    /// segments that begin there.
+    pub fn assemble_jumps(
+        &self,
+        behind: &[Vec<Tangent>],
+        jumps: &[Vec<Jump>],
+        system: &mut System,
+    ) {
         let n = self.segments();
         let mut rhs = vec![vec![[0.0; 6]; n]; self.rods()];
-        for (rhs, (j, rod)) in rhs.iter_mut().zip(jumps.iter().enumerate()) {
-            for (k, &[shift, turn, force, moment]) in rod.iter().enumerate() {
+        for ((rhs, rod), behind) in rhs.iter_mut().zip(jumps).zip(behind) {
+            let part = n / rod.len();
+            for (k, (&[shift, turn, force, moment], tangent)) in rod.iter().zip(behind).enumerate()
+            {
                 // The segment behind the node begins where the one before ends.
-                let part = n / rod.len();
                 let i = k * part + part / 2;
-                let section = self.section(j, i);
-                let segment = self.segment(state, j, i, state.n[j * n + i]);
-                let (second, (_, held, _)) = (segment.hessian(section), segment.gradient(section));
+                let (second, (_, held, _)) = (&tangent.second, tangent.first);
                 let pull = second.xa * turn - second.xx * shift;
                 // A moment along the lab axes does not turn with its node.
                 let at_begin =
@@ -69,7 +96,8 @@ mod tests {
         let mut system = System::new(&leaf);
         leaf.assemble(&state, &mut system);
         assert!(system.factorize(0.0));
-        leaf.assemble_jumps(&state, &[vec![jump]], &mut system);
+        let behind = leaf.tangent(&state, 0, SEGMENTS / 2);
+        leaf.assemble_jumps(&[vec![behind]], &[vec![jump]], &mut system);
         assert!(matches!(system.solve(None, 1e-12), Solved::Yes(_)));
         system.solution()[0].iter().map(shift).collect()
     }

@@ -4,7 +4,7 @@ mod held;
 mod jumps;
 mod kernels;
 
-pub use self::jumps::Jump;
+pub use self::jumps::{Jump, Tangent};
 
 use self::kernels::{Advance, Assemble, Rods, Stiffen};
 use super::chain::{GroupMatrix, place};

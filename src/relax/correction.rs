@@ -1,0 +1,187 @@
+//! How a leaf answers to the jumps of its fields, to first order, and the answer taken in.
+
+use crate::leaf::{Field, Jump, RodFields, Solved, State, System, Tangent, shift, turn};
+use crate::relax::level::Level;
+use crate::rotation;
+use glam::DVec3;
+
+/// Relative accuracy, in the energy norm, of the answer: of a stiff leaf most of that
+/// norm is stretch, and displacements are a small part of it.
+const ACCURACY: f64 = 1e-6;
+
+/// Changes of position, rotation, force and moment.
+pub type Change = [DVec3; 4];
+
+/// The linear equations of a leaf on a grid of so many segments in each of some equal parts,
+/// in the middles of which its fields jump.
+pub struct Tangents<'a> {
+    level: &'a Level,
+    part: usize,
+    /// The segments that begin in the middles, rod after rod.
+    behind: Vec<Vec<Tangent>>,
+    /// The first segment, and those that end where parts do: once they are asked for.
+    at_ends: Vec<Vec<Tangent>>,
+}
+
+/// The first-order answer to jumps.
+pub struct Correction {
+    /// Displacements and turns of all nodes but the bases.
+    solution: Field,
+    error: f64,
+    between: f64,
+}
+
+impl<'a> Tangents<'a> {
+    /// Of the leaf of `level`, in so many parts.
+    pub fn new(level: &'a Level, parts: usize) -> Self {
+        let Level { leaf, state } = level;
+        let part = leaf.segments() / parts;
+        let middles = |j: usize| {
+            let segments = (0..parts).map(|k| k * part + part / 2);
+            segments.map(|i| leaf.tangent(state, j, i)).collect()
+        };
+        Tangents {
+            level,
+            part,
+            behind: (0..leaf.rods()).map(middles).collect(),
+            at_ends: Vec::new(),
+        }
+    }
+
+    /// The answer to `jumps`; `system` holds the factorised equations. `None` where these
+    /// cannot be solved.
+    pub fn answer(&self, system: &mut System, jumps: &[Vec<Jump>]) -> Option<Correction> {
+        let leaf = &self.level.leaf;
+        leaf.assemble_jumps(&self.behind, jumps, system);
+        let Solved::Yes(_) = system.solve(None, ACCURACY) else {
+            return None;
+        };
+        let (mut error, mut between) = (0.0_f64, 0.0_f64);
+        let solution = system.solution();
+        for (rod, jumps) in solution.iter().zip(jumps) {
+            for (nodes, jump) in rod.chunks(self.part).zip(jumps) {
+                let before = shift(&nodes[self.part / 2 - 1]);
+                let middle = larger(before.length(), (before + jump[0]).length());
+                between = larger(between, middle);
+                error = larger(error, shift(&nodes[self.part - 1]).length());
+            }
+        }
+        Some(Correction {
+            solution,
+            error,
+            between,
+        })
+    }
+
+    /// The changes that go with an answer, at the ends of the parts.
+    pub fn changes(&mut self, correction: &Correction, jumps: &[Vec<Jump>]) -> Vec<Vec<Change>> {
+        let Level { leaf, state } = self.level;
+        if self.at_ends.is_empty() {
+            let ends = |j: usize| {
+                let segments = (0..=jumps[0].len()).map(|k| (k * self.part).saturating_sub(1));
+                segments.map(|i| leaf.tangent(state, j, i)).collect()
+            };
+            self.at_ends = (0..leaf.rods()).map(ends).collect();
+        }
+        let moved = moved(state, correction);
+        let ends = |(j, jumps): (usize, &Vec<Jump>)| {
+            let end = |k: usize| self.change(correction, &moved, (j, jumps), k);
+            (0..=jumps.len()).map(end).collect()
+        };
+        jumps.iter().enumerate().map(ends).collect()
+    }
+
+    /// At the beginning of part `k` of rod `j`, as [`node`](crate::relax::shape::node) takes
+    /// forces and moments: from the segment before it.
+    fn change(
+        &self,
+        correction: &Correction,
+        moved: &State,
+        (j, jumps): (usize, &[Jump]),
+        k: usize,
+    ) -> Change {
+        let Level { leaf, state } = self.level;
+        let (n, i) = (leaf.segments(), k * self.part);
+        let s = i.saturating_sub(1);
+        let ([begin, mut a], [end, b]) = (correction.at(j, s), correction.at(j, s + 1));
+        let mut across = end - begin;
+        if s % self.part == self.part / 2 {
+            // That segment begins behind the jump in the middle.
+            let [shift, turn, ..] = jumps[s / self.part];
+            a += turn;
+            across -= shift;
+        }
+        let tangent = &self.at_ends[j][k];
+        let (segment, second, (_, g_a, g_b)) = (&tangent.segment, &tangent.second, tangent.first);
+        let (section, zero) = (leaf.section(j, s), DVec3::ZERO);
+        // Without what closes the gap of a segment that is not quite as long as it says.
+        let force = segment.force_increment(section, across, a, b)
+            - segment.force_increment(section, zero, zero, zero);
+        // A moment along the lab axes does not turn with its node.
+        if i == 0 {
+            let moment = second.xa.transpose() * across + second.aa * a + second.ab * b;
+            return [zero, zero, force, -moment - 0.5 * a.cross(g_a)];
+        }
+        let moment = second.xb.transpose() * across + second.ab.transpose() * a + second.bb * b;
+        let left = leaf.grid.width(i - 1);
+        let right = if i < n { leaf.grid.width(i) } else { 0.0 };
+        let load = leaf.load(moved, j, i).0 - leaf.load(state, j, i).0;
+        [
+            end,
+            b,
+            force - load * (left / (left + right)),
+            moment + 0.5 * b.cross(g_b),
+        ]
+    }
+}
+
+impl Correction {
+    /// The largest displacements at the ends of the parts, and in the middles on either side.
+    pub fn largest(&self) -> [f64; 2] {
+        [self.error, self.between]
+    }
+
+    /// Displacement and turn of node `i` of rod `j`.
+    fn at(&self, j: usize, i: usize) -> [DVec3; 2] {
+        match i {
+            0 => [DVec3::ZERO; 2],
+            _ => [shift, turn].map(|of| of(&self.solution[j][i - 1])),
+        }
+    }
+}
+
+/// The largest turn, and the largest change of a force or moment.
+pub fn largest_others(changes: &[Vec<Change>]) -> [f64; 2] {
+    let most = |of: fn(&Change) -> f64| changes.iter().flatten().map(of).fold(0.0, larger);
+    [
+        most(|[_, turn, ..]| turn.length()),
+        most(|[.., force, moment]| larger(force.length(), moment.length())),
+    ]
+}
+
+/// Takes changes in.
+pub fn apply(changes: &[Vec<Change>], known: &mut [Vec<RodFields>]) {
+    let changes = changes.iter().flatten();
+    for (node, [shift, turn, force, moment]) in known.iter_mut().flatten().zip(changes) {
+        node.x += shift;
+        node.q = (rotation::exp(*turn) * node.q).normalize();
+        node.n += force;
+        node.m += moment;
+    }
+}
+
+/// The larger of two, or what is not a number.
+pub fn larger(a: f64, b: f64) -> f64 {
+    if b <= a { a } else { b }
+}
+
+/// The state with its nodes displaced.
+fn moved(state: &State, correction: &Correction) -> State {
+    let mut moved = state.clone();
+    for j in 0..state.rods() {
+        for i in 1..=state.segments() {
+            moved.x[state.base(j) + i] += correction.at(j, i)[0];
+        }
+    }
+    moved
+}
