@@ -21,8 +21,8 @@ import leafdyn
 FIG10 = "scenarios/paper/fig10.toml"
 
 LONG: dict[str, Callable[[], Any]] = {
-    "relax": lambda: leafdyn.relax(fan(3000), tolerance=1e-9),
-    "explicit": lambda: leafdyn.relax(fan(50), tolerance=1e-10, method="explicit"),
+    "relax": lambda: leafdyn.relax(fan(20_000), tolerance=1e-9),
+    "explicit": lambda: leafdyn.relax(fan(400), tolerance=1e-10, method="explicit"),
     "shooting": lambda: leafdyn.relax(fan(60), tolerance=1e-10, method="shooting"),
     "small": lambda: [leafdyn.relax(fan(5), tolerance=1e-8) for _ in range(100_000)],
     "small but fine": lambda: leafdyn.relax(fan(8), segments=16_000, tolerance=1e-12),
@@ -41,7 +41,7 @@ LONG: dict[str, Callable[[], Any]] = {
     "simulate": lambda: leafdyn.simulate(fan(20), set={"dynamics.duration": 1e5, "dynamics.output_interval": 1.0}),
     "map": lambda: leafdyn.map(fan(9), ["load.gravity[2]=-1..-9:40", "stiffness.torsion=0.01..1:40"]),
     "chart": lambda: leafdyn.chart(fan(21), seconds=60.0),
-    "sensitivities": lambda: leafdyn.sensitivities(fan(3000), "stiffness.axial", tolerance=1e-9, modes=0),
+    "sensitivities": lambda: leafdyn.sensitivities(fan(10_000), "stiffness.axial", tolerance=1e-9, modes=0),
     "fit": lambda: leafdyn.fit(
         "scenarios/measured/pull.toml", ["scenarios/measured/pull.csv"] * 40, "stiffness.axial", set={"leaf.rods": 41}
     ),
@@ -180,8 +180,8 @@ def test_every_verb_tells_how_far_it_is(verb: str, capfd: pytest.CaptureFixture[
 @pytest.mark.parametrize(
     "ends",
     [
-        lambda: leafdyn.relax(fan(3), tolerance=1e-12, set={"load.gravity": [0, 0, -1000.0]}),
-        lambda: leafdyn.relax_many([fan(3)], tolerance=1e-12, set={"load.gravity": [0, 0, -1000.0]}),
+        lambda: leafdyn.relax(fan(3), tolerance=1e-12, set={"load.gravity": [0, 0, -10_000.0]}),
+        lambda: leafdyn.relax_many([fan(3)], tolerance=1e-12, set={"load.gravity": [0, 0, -10_000.0]}),
         lambda: leafdyn.trace(fan(2), "load.gravity[2]=-1..-60", points=3),
         lambda: leafdyn.trace(fan(2), ["load.gravity[2]=-1..-1.1", "stiffness.torsion=1..2"]),
         lambda: leafdyn.fit(
