@@ -19,10 +19,7 @@ use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Between two looks for signals and at how far a run has come.
-const LOOK: Duration = Duration::from_millis(20);
-
-/// How long a run that was cancelled is waited for. It ends by itself later if this is too short.
-const FAREWELL: Duration = Duration::from_millis(50);
+const LOOK: Duration = Duration::from_millis(10);
 
 /// Most threads that can be asked for.
 const MOST_THREADS: usize = 1024;
@@ -252,10 +249,8 @@ pub fn run<T: Send + 'static>(
             Err(RecvTimeoutError::Disconnected) => return Err(panicked(&"a thread ended")),
         }
         if let Err(stop) = py.check_signals().and_then(|()| monitor.tell(progress)) {
+            // It ends soon by itself, and may have much to free: nobody waits for that.
             monitor.cancel();
-            py.detach(move || {
-                let _ = result.recv_timeout(FAREWELL);
-            });
             return Err(stop);
         }
     }
