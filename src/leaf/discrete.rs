@@ -2,7 +2,7 @@
 
 use super::dimensionless::{Leaf, Loads};
 use super::grid::Grid;
-use super::loads::{RodLoad, RodLoads};
+use super::loads::{RodLoad, RodLoads, group_loads};
 use super::state::State;
 use crate::lanes::{GROUP, Vectors};
 use crate::rod::{Ends, Section, Segment};
@@ -300,7 +300,7 @@ impl DiscreteLeaf {
             state.x[k],
             x(!last, k + nodes),
         ];
-        let load = RodLoads::gather(Scalar, [self.rod_load(j); GROUP], 0);
+        let load = RodLoads::of(Scalar, &group_loads([self.rod_load(j); GROUP]), 0);
         let weights = [self.weights[i], self.coupling_weight(i)];
         let (force, energy) = load.at(x.map(Vectors::from), weights, i == self.segments());
         (force.into(), energy.into())

@@ -2,9 +2,9 @@
 //! explicit Runge-Kutta method of order 8 of Dormand and Prince, in equal steps.
 
 use super::discrete::DiscreteLeaf;
-use super::loads::{RodLoad, RodLoads};
+use super::loads::{GroupLoads, RodLoads, group_loads};
 use crate::lanes::{Four, GROUP, Kernel, Lanes, Vectors, arch, run};
-use crate::rod::{FIELDS, Fields, GroupFields, Section, Sections};
+use crate::rod::{FIELDS, Fields, GroupFields, GroupLaws, laws};
 use crate::tableau::{A, B, C, STAGES};
 use glam::{DQuat, DVec3};
 use pulp::{Arch, Simd};
@@ -22,19 +22,45 @@ pub struct RodFields {
     pub m: DVec3,
 }
 
+/// All rods at one sigma, four at a time.
+#[derive(Clone, Debug, Default)]
+pub struct Slice(Vec<GroupFields>);
+
+impl Slice {
+    /// Rod `j`.
+    pub fn rod(&self, j: usize) -> RodFields {
+        let number = |k: usize| self.0[j / GROUP][k].0[j % GROUP];
+        let vector = |k: usize| DVec3::new(number(k), number(k + 1), number(k + 2));
+        RodFields {
+            x: vector(0),
+            q: DQuat::from_xyzw(number(3), number(4), number(5), number(6)).normalize(),
+            n: vector(7),
+            m: vector(10),
+        }
+    }
+}
+
 /// Integrates the equations of all rods of a leaf.
 pub struct Flow<'a> {
     leaf: &'a DiscreteLeaf,
     arch: Arch,
-    loads: Vec<[RodLoad; GROUP]>,
+    loads: Vec<GroupLoads>,
     fields: Vec<GroupFields>,
-    stage: Vec<GroupFields>,
+    stage: Stage,
     /// Of each stage, and group.
     slopes: Vec<Vec<GroupFields>>,
     /// Where the slopes are taken, which is at all sigma alike where nothing changes along
     /// the rods.
-    sections: Vec<Section>,
+    laws: Vec<GroupLaws>,
     uniform: bool,
+}
+
+/// Where slopes are taken.
+struct Stage {
+    fields: Vec<GroupFields>,
+    /// Positions once more, each axis in a row, one place before the first rod and one
+    /// behind the last: those of neighbours stand beside them.
+    x: [Vec<f64>; 3],
 }
 
 impl<'a> Flow<'a> {
@@ -50,28 +76,32 @@ impl<'a> Flow<'a> {
         };
         let groups = leaf.rods().div_ceil(GROUP);
         let fields = vec![[Four::default(); FIELDS]; groups];
-        Flow {
+        let mut flow = Flow {
             leaf,
             arch: arch(),
             loads: (0..groups)
-                .map(|group| rods_of(group, leaf.rods()).map(load))
+                .map(|group| group_loads(rods_of(group, leaf.rods()).map(load)))
                 .collect(),
-            stage: fields.clone(),
+            stage: Stage {
+                fields: fields.clone(),
+                x: std::array::from_fn(|_| vec![0.0; GROUP * groups + 2]),
+            },
             slopes: vec![fields.clone(); STAGES],
-            sections: sections(leaf, 0.0).collect(),
+            laws: Vec::with_capacity(groups),
             uniform: leaf.leaf.uniform(),
             fields,
-        }
+        };
+        flow.look_up_laws(0.0);
+        flow
     }
 
     /// Writes down what each rod, which is as `begin` says at sigma = `from`, is after every
-    /// one of so many equal `steps` to `to`.
+    /// one of so many equal steps to `to` as there are slices.
     pub fn carry(
         &mut self,
         begin: impl Fn(usize) -> RodFields,
         [from, to]: [f64; 2],
-        steps: usize,
-        after: &mut [Vec<RodFields>],
+        after: &mut [Slice],
     ) {
         let rods = self.leaf.rods();
         for (g, group) in self.fields.iter_mut().enumerate() {
@@ -87,13 +117,10 @@ impl<'a> Flow<'a> {
                 group[13].0[lane] = 0.0;
             }
         }
-        let h = (to - from) / steps as f64;
-        after.iter_mut().for_each(Vec::clear);
-        for step in 0..steps {
+        let h = (to - from) / after.len() as f64;
+        for (step, Slice(after)) in after.iter_mut().enumerate() {
             self.step(from + h * step as f64, h);
-            for (j, after) in after.iter_mut().enumerate() {
-                after.push(self.rod(j));
-            }
+            after.clone_from(&self.fields);
         }
     }
 
@@ -104,34 +131,22 @@ impl<'a> Flow<'a> {
         (0..self.leaf.rods()).map(energy).sum()
     }
 
-    fn rod(&self, j: usize) -> RodFields {
-        let number = |k: usize| self.fields[j / GROUP][k].0[j % GROUP];
-        let vector = |k: usize| DVec3::new(number(k), number(k + 1), number(k + 2));
-        RodFields {
-            x: vector(0),
-            q: DQuat::from_xyzw(number(3), number(4), number(5), number(6)).normalize(),
-            n: vector(7),
-            m: vector(10),
-        }
-    }
-
     fn step(&mut self, sigma: f64, h: f64) {
         for i in 0..STAGES {
             self.combine(h, A[i]);
             if !self.uniform {
-                self.sections.clear();
-                (self.sections).extend(sections(self.leaf, sigma + C[i] * h));
+                self.look_up_laws(sigma + C[i] * h);
             }
             let mut kernel = Slopes {
                 stage: &self.stage,
                 loads: &self.loads,
-                sections: &self.sections,
+                laws: &self.laws,
                 out: &mut self.slopes[i],
             };
             run(self.arch, &mut kernel);
         }
         self.combine(h, &B);
-        std::mem::swap(&mut self.fields, &mut self.stage);
+        std::mem::swap(&mut self.fields, &mut self.stage.fields);
     }
 
     /// Makes the stage the fields plus h times the sum of weights times slopes.
@@ -144,12 +159,17 @@ impl<'a> Flow<'a> {
         };
         run(self.arch, &mut kernel);
     }
-}
 
-/// All rods at one sigma.
-fn sections(leaf: &DiscreteLeaf, sigma: f64) -> impl Iterator<Item = Section> {
-    let leaf = &leaf.leaf;
-    (0..leaf.rods()).map(move |j| leaf.section(j, sigma, 1.0))
+    /// What all rods are made of at one sigma.
+    fn look_up_laws(&mut self, sigma: f64) {
+        let (leaf, rods) = (&self.leaf.leaf, self.leaf.rods());
+        let group = |g: usize| {
+            let sections = rods_of(g, rods).map(|j| leaf.section(j, sigma, 1.0));
+            laws(sections.each_ref())
+        };
+        self.laws.clear();
+        self.laws.extend((0..rods.div_ceil(GROUP)).map(group));
+    }
 }
 
 /// The rods of a group; lanes without a rod repeat the last.
@@ -158,37 +178,24 @@ fn rods_of(group: usize, rods: usize) -> [usize; GROUP] {
     std::array::from_fn(|lane| (GROUP * group + lane).min(rods - 1))
 }
 
-/// Positions of the rods before and behind, or their own where there is none.
-#[inline(always)]
-fn beside(stage: &[GroupFields], of: [usize; GROUP], rods: usize) -> [[DVec3; GROUP]; 2] {
-    let x = |j: usize| DVec3::from_array([0, 1, 2].map(|c| stage[j / GROUP][c].0[j % GROUP]));
-    [
-        of.map(|j| x(j.saturating_sub(1))),
-        of.map(|j| x((j + 1).min(rods - 1))),
-    ]
-}
-
 struct Slopes<'a> {
-    stage: &'a [GroupFields],
-    loads: &'a [[RodLoad; GROUP]],
-    sections: &'a [Section],
+    stage: &'a Stage,
+    loads: &'a [GroupLoads],
+    laws: &'a [GroupLaws],
     out: &'a mut [GroupFields],
 }
 
 impl Kernel for Slopes<'_> {
     #[inline(always)]
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
-        let count = self.sections.len();
         for (g, out) in self.out.iter_mut().enumerate() {
-            let rods = rods_of(g, count);
-            let fields = Fields::of(simd, &self.stage[g], part);
+            let fields = Fields::of(simd, &self.stage.fields[g], part);
+            let first = GROUP * g + part;
             let [before, behind] =
-                beside(self.stage, rods, count).map(|x| Vectors::gather(simd, x, part));
-            let loads = RodLoads::gather(simd, self.loads[g], part);
+                [first, first + 2].map(|at| Vectors::load(simd, &self.stage.x, at));
+            let loads = RodLoads::of(simd, &self.loads[g], part);
             let load = loads.at([before, fields.x, behind], [1.0; 2], false);
-            let sections = rods.map(|j| &self.sections[j]);
-            let sections = Sections::gather(simd, sections, part);
-            fields.slopes(&sections, load).put(out, part);
+            fields.slopes(&self.laws[g], load, part).put(out, part);
         }
     }
 }
@@ -197,7 +204,7 @@ struct Combine<'a> {
     fields: &'a [GroupFields],
     slopes: &'a [Vec<GroupFields>],
     weights: (f64, &'a [f64]),
-    out: &'a mut [GroupFields],
+    out: &'a mut Stage,
 }
 
 impl Kernel for Combine<'_> {
@@ -205,7 +212,7 @@ impl Kernel for Combine<'_> {
     fn run<S: Simd>(&mut self, simd: S, part: usize) {
         let (h, weights) = self.weights;
         let h = Lanes::splat(simd, h);
-        for (g, out) in self.out.iter_mut().enumerate() {
+        for (g, out) in self.out.fields.iter_mut().enumerate() {
             let mut sums = [Lanes::splat(simd, 0.0); FIELDS];
             for (weight, slopes) in weights.iter().zip(self.slopes) {
                 if *weight != 0.0 {
@@ -215,9 +222,13 @@ impl Kernel for Combine<'_> {
                     }
                 }
             }
-            for ((out, sum), field) in out.iter_mut().zip(sums).zip(&self.fields[g]) {
+            for ((out, sum), field) in out.iter_mut().zip(&mut sums).zip(&self.fields[g]) {
                 let field = Lanes::of(simd, field, part);
-                sum.times(h, field).put(out, part);
+                *sum = sum.times(h, field);
+                sum.put(out, part);
+            }
+            for (x, sum) in self.out.x.iter_mut().zip(sums) {
+                sum.store(x, GROUP * g + part + 1);
             }
         }
     }
@@ -246,15 +257,14 @@ mod tests {
             n: DVec3::ZERO,
             m: CURVATURE * DVec3::Z,
         };
-        let mut after = [Vec::new()];
-        Flow::new(&leaf).carry(begin, [0.0, 1.0], steps, &mut after);
-        assert_eq!(after[0].len(), steps);
-        let off = |(k, rod): (usize, &RodFields)| {
+        let mut after = vec![Slice::default(); steps];
+        Flow::new(&leaf).carry(begin, [0.0, 1.0], &mut after);
+        let off = |(k, slice): (usize, &Slice)| {
             let angle = CURVATURE * (k + 1) as f64 / steps as f64;
             let circle = DVec3::new(angle.sin(), 1.0 - angle.cos(), 0.0) / CURVATURE;
-            (rod.x - circle).length()
+            (slice.rod(0).x - circle).length()
         };
-        after[0].iter().enumerate().map(off).fold(0.0, f64::max)
+        after.iter().enumerate().map(off).fold(0.0, f64::max)
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What acts on the nodes of several rods: dead loads, and the coupling with their
 //! neighbours.
 
-use crate::lanes::{GROUP, Lanes, Vectors};
+use crate::lanes::{Four, GROUP, Lanes, Vectors};
 use glam::DVec3;
 use pulp::Simd;
 
@@ -18,6 +18,29 @@ pub struct RodLoad {
     pub image: DVec3,
 }
 
+/// The same of a group of rods, number by number.
+pub type GroupLoads = [[Four; 3]; 5];
+
+/// What acts on the rods of a group.
+#[inline(always)]
+pub fn group_loads(of: [RodLoad; GROUP]) -> GroupLoads {
+    let vectors = |of_load: fn(&RodLoad) -> DVec3| {
+        let [a, b, c, d] = of.each_ref().map(of_load);
+        [
+            Four([a.x, b.x, c.x, d.x]),
+            Four([a.y, b.y, c.y, d.y]),
+            Four([a.z, b.z, c.z, d.z]),
+        ]
+    };
+    [
+        vectors(|load| load.dead),
+        vectors(|load| load.tip),
+        vectors(|load| load.before),
+        vectors(|load| load.behind),
+        vectors(|load| load.image),
+    ]
+}
+
 /// The same of several rods.
 #[derive(Clone, Copy)]
 pub struct RodLoads<S: Simd> {
@@ -31,17 +54,17 @@ pub struct RodLoads<S: Simd> {
 impl<S: Simd> RodLoads<S> {
     /// Those of the lanes from `part` on.
     #[inline(always)]
-    pub fn gather(simd: S, of: [RodLoad; GROUP], part: usize) -> Self {
-        let [a, b, c, d] = of;
-        let vectors = |of: fn(&RodLoad) -> DVec3| {
-            Vectors::gather(simd, [of(&a), of(&b), of(&c), of(&d)], part)
+    pub fn of(simd: S, group: &GroupLoads, part: usize) -> Self {
+        let vectors = |k: usize| {
+            let [x, y, z] = [0, 1, 2].map(|c| Lanes::of(simd, &group[k][c], part));
+            Vectors::new(x, y, z)
         };
         RodLoads {
-            dead: vectors(|load| load.dead),
-            tip: vectors(|load| load.tip),
-            before: vectors(|load| load.before),
-            behind: vectors(|load| load.behind),
-            image: vectors(|load| load.image),
+            dead: vectors(0),
+            tip: vectors(1),
+            before: vectors(2),
+            behind: vectors(3),
+            image: vectors(4),
         }
     }
 

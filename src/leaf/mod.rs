@@ -19,7 +19,7 @@ pub use crate::scenario::Scale;
 pub use assembly::{Jump, Tangent};
 pub use dimensionless::{Leaf, Loads};
 pub use discrete::DiscreteLeaf;
-pub use flow::{Flow, RodFields};
+pub use flow::{Flow, RodFields, Slice};
 pub use grid::Grid;
 pub use rate::{Forces, LeafRate, Response};
 pub use reduce::{half_of, whole_fields, whole_of};

@@ -12,7 +12,7 @@
 //! coarse grid, to the solution of the equations themselves, by a factor a round that is
 //! the error of the linear equations: about a hundredth.
 
-use crate::leaf::{DiscreteLeaf, Flow, Grid, Jump, RodFields, System};
+use crate::leaf::{DiscreteLeaf, Flow, Grid, Jump, RodFields, Slice, System};
 use crate::newton::Work;
 use crate::relax::correction::{Tangents, apply, larger, largest_others};
 use crate::relax::level::Level;
@@ -87,18 +87,23 @@ pub fn told(
     let (first, finest) = (&levels[0].leaf, levels.last()?.leaf.segments());
     let (mut known, mut flow) = (nodes(levels, columns), Flow::new(first));
     let mut tangents = Tangents::new(level, first.segments());
+    let finest_grid = &levels.last()?.leaf.grid;
+    let tell = |round: &Round, corrections: usize, halvings: usize| Told {
+        error: round.largest[0],
+        between: round.largest[1],
+        rods: round.carried.rods(&round.known),
+        energy: round.carried.energy,
+        grid: (0..halvings).fold(finest_grid.clone(), |grid, _| grid.refined()),
+        corrections,
+    };
     let mut uncorrected = None;
     let mut before = 0.0;
     let (mut halvings, mut halved) = (0, false);
     for corrections in 0..=most {
         balance(first, &mut known);
         let steps = (finest / first.segments() / 2) << halvings;
-        let Carried {
-            rods,
-            jumps,
-            energy,
-        } = carried(first, &mut flow, &known, steps);
-        let Some(correction) = tangents.answer(system, &jumps) else {
+        let carried = carried(first, &mut flow, &known, steps);
+        let Some(correction) = tangents.answer(system, &carried.jumps) else {
             break;
         };
         let [error, between] = correction.largest();
@@ -112,32 +117,31 @@ pub fn told(
         if !largest.is_finite() || left > SLOW {
             break;
         }
-        let told = Told {
-            error,
-            between,
-            rods,
-            energy,
-            grid: (0..halvings).fold(levels[levels.len() - 1].leaf.grid.clone(), |grid, _| {
-                grid.refined()
-            }),
-            corrections,
-        };
         let to_come = i32::try_from(most - corrections).unwrap_or(0);
         let hopeless = largest * left.powi(to_come) > enough;
-        if corrections == 0 && (largest <= enough || hopeless) {
-            return Some(told);
-        }
-        if hopeless {
+        let last = corrections == 0 && (largest <= enough || hopeless);
+        if hopeless && !last {
             break;
         }
-        let changes = tangents.changes(&correction, &jumps);
+        let changes = match last {
+            true => Vec::new(),
+            false => tangents.changes(&correction, &carried.jumps),
+        };
+        let round = Round {
+            known: known.clone(),
+            carried,
+            largest: [error, between],
+        };
+        if last {
+            return Some(tell(&round, corrections, halvings));
+        }
         if corrections == 0 {
-            uncorrected = Some(told);
+            uncorrected = Some(round);
         } else if largest <= enough && halved {
             // Shorter steps told the error of those before, too.
             let [turn, stress] = largest_others(&changes);
             if larger(turn / TURNS, stress / FORCES) <= enough {
-                return Some(told);
+                return Some(tell(&round, corrections, halvings));
             }
         }
         apply(&changes, &mut known);
@@ -145,7 +149,15 @@ pub fn told(
         halved = largest * left <= enough;
         halvings += usize::from(halved);
     }
-    uncorrected
+    uncorrected.map(|round| tell(&round, 0, 0))
+}
+
+/// A leaf at the nodes of the coarsest grid, carried along its rods, and its largest
+/// errors at these nodes and in the middles between.
+struct Round {
+    known: Vec<Vec<RodFields>>,
+    carried: Carried,
+    largest: [f64; 2],
 }
 
 /// Those at rest: where rods are rigid the last step of Newton's method began with other
@@ -164,13 +176,14 @@ fn factorized(level: &Level, work: &mut Work) -> Option<System> {
 
 /// A leaf along its rods.
 struct Carried {
-    rods: Vec<Vec<RodFields>>,
+    /// After every step from the two ends of a part to its middle, part after part.
+    slices: Vec<[Vec<Slice>; 2]>,
     jumps: Vec<Vec<Jump>>,
     energy: f64,
 }
 
-/// The leaf `known` at the nodes of the coarsest grid and, carried from there to the middles
-/// between by so many `steps`, after each; in the middles the mean, and the jumps.
+/// The leaf `known` at the nodes of the coarsest grid carried from there to the middles
+/// between by so many `steps`, and the jumps there.
 fn carried(
     first: &DiscreteLeaf,
     flow: &mut Flow,
@@ -178,42 +191,59 @@ fn carried(
     steps: usize,
 ) -> Carried {
     let (grid, n) = (&first.grid, first.segments());
-    let mut rods = vec![Vec::with_capacity(2 * steps * n + 1); first.rods()];
+    let mut slices = vec![[(); 2].map(|()| vec![Slice::default(); steps]); n];
     let mut jumps = vec![Vec::with_capacity(n); first.rods()];
-    let room = || vec![Vec::with_capacity(steps); first.rods()];
-    let (mut before, mut behind) = (room(), room());
     let mut energy = 0.0;
-    for i in 0..n {
-        for (k, after, sign) in [(i, &mut before, 1.0), (i + 1, &mut behind, -1.0)] {
-            let way = [grid.sigma()[k], grid.middle(i)];
-            flow.carry(|j| known[j][k], way, steps, after);
+    for (i, ends) in slices.iter_mut().enumerate() {
+        let [before, behind] = &mut *ends;
+        for (k, after, sign) in [(i, before, 1.0), (i + 1, behind, -1.0)] {
+            flow.carry(|j| known[j][k], [grid.sigma()[k], grid.middle(i)], after);
             energy += sign * flow.energy();
         }
-        for (j, (rod, jumps)) in rods.iter_mut().zip(&mut jumps).enumerate() {
-            let [(a, before), (b, behind)] = [&before[j], &behind[j]].map(|after| {
-                let (middle, before) = after.split_last().expect("a step at least");
-                (middle, before)
-            });
-            let jump = jump(a, b);
+        for (j, jumps) in jumps.iter_mut().enumerate() {
+            let [a, b] = in_middle(ends, j);
+            let jump = jump(&a, &b);
             // The work that closing it takes: errors of fields are of second order then.
             energy -= a.n.dot(jump[0]) + a.m.dot(jump[1]);
             jumps.push(jump);
-            rod.push(known[j][i]);
-            rod.extend(before);
-            rod.push(mean(a, b));
-            rod.extend(behind.iter().rev());
         }
     }
-    for (j, (rod, known)) in rods.iter_mut().zip(known).enumerate() {
-        rod.extend(known.last());
+    for (j, known) in known.iter().enumerate() {
         energy -= known
             .last()
             .map_or(0.0, |tip| first.tip_force(j).dot(tip.x));
     }
     Carried {
-        rods,
+        slices,
         jumps,
         energy,
+    }
+}
+
+/// Rod `j` in the middle of a part, as told from either end.
+fn in_middle(ends: &[Vec<Slice>; 2], j: usize) -> [RodFields; 2] {
+    ends.each_ref()
+        .map(|slices| slices.last().expect("a step at least").rod(j))
+}
+
+impl Carried {
+    /// All rods at the ends of all steps from `known`; in the middles the mean.
+    fn rods(&self, known: &[Vec<RodFields>]) -> Vec<Vec<RodFields>> {
+        let rod = |(j, known): (usize, &Vec<RodFields>)| {
+            let steps = self.slices.first().map_or(0, |[before, _]| before.len());
+            let mut rod = Vec::with_capacity(2 * steps * self.slices.len() + 1);
+            for (begin, ends) in known.iter().zip(&self.slices) {
+                let [before, behind] = ends.each_ref().map(|it| &it[..steps - 1]);
+                let [a, b] = in_middle(ends, j);
+                rod.push(*begin);
+                rod.extend(before.iter().map(|slice| slice.rod(j)));
+                rod.push(mean(&a, &b));
+                rod.extend(behind.iter().rev().map(|slice| slice.rod(j)));
+            }
+            rod.extend(known.last());
+            rod
+        };
+        known.iter().enumerate().map(rod).collect()
     }
 }
 

@@ -8,8 +8,8 @@
 //!
 //! E' = L/2 (n.c n + m.m/A) + that of the loads.
 
-use super::section::Sections;
-use crate::lanes::{Four, Lanes, Vectors};
+use super::section::Section;
+use crate::lanes::{Four, GROUP, Lanes, Vectors};
 use crate::rotation::{Quaternions, directors};
 use pulp::Simd;
 
@@ -33,6 +33,24 @@ pub struct Fields<S: Simd> {
     pub m: Vectors<S>,
     /// Energies.
     pub energy: Lanes<S>,
+}
+
+/// What the equations take from the sections of a group of rods: lengths, v0, u0, c, 1/A.
+pub type GroupLaws = [Four; 13];
+
+/// The laws of sections that are as long as their rods.
+pub fn laws(sections: [&Section; GROUP]) -> GroupLaws {
+    let number = |k: usize| {
+        let of = |section: &Section| match k {
+            0 => section.ds,
+            1..4 => section.rest_strain[k - 1],
+            4..7 => section.rest_curvature[k - 4],
+            7..10 => section.compliance[k - 7],
+            _ => 1.0 / section.couple_stiffness[k - 10],
+        };
+        Four(sections.map(of))
+    };
+    std::array::from_fn(number)
 }
 
 impl<S: Simd> Fields<S> {
@@ -62,31 +80,30 @@ impl<S: Simd> Fields<S> {
         self.energy.put(&mut group[13], part);
     }
 
-    /// Their slopes where a force acts, with its potential, `sections` being as long as the
-    /// rods.
+    /// Their slopes where a force acts, with its potential, of the lanes from `part` on.
     #[inline(always)]
     pub fn slopes(
         &self,
-        sections: &Sections<S>,
+        laws: &GroupLaws,
         (force, potential): (Vectors<S>, Lanes<S>),
+        part: usize,
     ) -> Self {
         let (q, w) = self.q;
+        let law = |k: usize| Lanes::of(w.simd, &laws[k], part);
+        let laws = |k: usize| Vectors::new(law(k), law(k + 1), law(k + 2));
         let [half, two] = [0.5, 2.0].map(|number| Lanes::splat(w.simd, number));
         let frame = directors(self.q, two / w.times(w, q.dot(q)));
         let (n, m) = (self.n.onto(frame), self.m.onto(frame));
-        let (strain, bend) = (sections.compliance * n, m.over(sections.couple_stiffness));
-        let (v, u) = (
-            sections.rest_strain + strain,
-            sections.rest_curvature + bend,
-        );
-        let tangent = v.along(frame).scale(sections.ds);
-        let turn = u.along(frame).scale(sections.ds * half);
+        let (length, strain, bend) = (law(0), laws(7) * n, laws(10) * m);
+        let (v, u) = (laws(1) + strain, laws(4) + bend);
+        let tangent = v.along(frame).scale(length);
+        let turn = u.along(frame).scale(length * half);
         Fields {
             x: tangent,
             q: (turn.scale(w) + turn.cross(q), -turn.dot(q)),
             n: -force,
             m: self.n.cross(tangent),
-            energy: half * sections.ds * (n.dot(strain) + m.dot(bend)) + potential,
+            energy: half * length * (n.dot(strain) + m.dot(bend)) + potential,
         }
     }
 }

@@ -7,7 +7,7 @@ mod section;
 mod segment;
 mod spatial;
 
-pub use balance::{FIELDS, Fields, GroupFields};
+pub use balance::{FIELDS, Fields, GroupFields, GroupLaws, laws};
 pub use element::{Element, Nodes};
 pub use planar::PlanarElement;
 pub use section::{Section, Sections};

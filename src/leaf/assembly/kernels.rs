@@ -3,7 +3,7 @@
 use crate::lanes::{Four, GROUP, Kernel, Lanes, Vectors};
 use crate::leaf::chain::{Chain, GroupMatrix, Increments, first, turns};
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::loads::{RodLoad, RodLoads};
+use crate::leaf::loads::{GroupLoads, RodLoads, group_loads};
 use crate::leaf::state::State;
 use crate::leaf::system::{Group, Sums, rods_of};
 use crate::rod::{Element, Nodes, PlanarElement, Section, Sections, SpatialElement};
@@ -21,7 +21,7 @@ pub struct Rods<'a> {
     n: [&'a [DVec3]; GROUP],
     /// Positions of the rods before and behind, or their own where there is none.
     beside: [[&'a [DVec3]; GROUP]; 2],
-    loads: [RodLoad; GROUP],
+    loads: GroupLoads,
 }
 
 impl<'a> Rods<'a> {
@@ -40,7 +40,7 @@ impl<'a> Rods<'a> {
                 rods.map(|j| x(j.saturating_sub(1))),
                 rods.map(|j| x((j + 1).min(last))),
             ],
-            loads: rods.map(|j| leaf.rod_load(j)),
+            loads: group_loads(rods.map(|j| leaf.rod_load(j))),
         }
     }
 
@@ -136,7 +136,7 @@ fn assemble<S: Simd, E: Element<S, B>, const B: usize, const MATRIX: bool>(
 ) -> Sums {
     let simd = active.simd;
     let zero = Lanes::splat(simd, 0.0);
-    let loads = RodLoads::gather(simd, rods.loads, part);
+    let loads = RodLoads::of(simd, &rods.loads, part);
     let stiffness = loads.stiffness().array();
     let (mut energy, mut squared_turn) = (zero, zero);
     let (mut own, mut force) = ([[zero; B]; B], [zero; B]);
