@@ -118,13 +118,15 @@
 //!
 //! **Grids and the error** ([`relax::relax`]). The element is symmetric and its
 //! conditions hold exactly at nodes, so that its error is a series in even
-//! powers of ds. The leaf settles on 8 segments a rod (to 1e-3 and coarser on 4, if
-//! it need not move far), then on twice as many, and so on, each
-//! started from what those before it tell, and Richardson extrapolation removes one term
-//! of the series with every grid. The last correction, times a safety factor
-//! that falls as the corrections do, is the error estimate
-//! ([`relax::Accuracy::error_estimate`]); what is left of unfinished
-//! iterations and of rounding is added. Grids are refined until it is below the
+//! powers of ds. The leaf settles on 8 segments a rod (on 4 where that is enough), then
+//! on twice as many, and so on, each started from a prediction by those before
+//! it, and Richardson extrapolation removes one term
+//! of the series with every grid. The error of the extrapolated leaf is estimated from
+//! its defect in the equations: these are integrated along the rods by a method of
+//! order 8, and the linear response of the leaf to the jumps that are left, times two, is
+//! the bound ([`relax::Accuracy::error_estimate`]); unfinished iterations and
+//! rounding are added. Where only the shape is asked for the response is also
+//! subtracted (iterated defect correction). Grids are refined until the bound is below the
 //! tolerance. A column of the table that does not show its order is not
 //! extrapolated. Kinks of a profile are nodes of every grid.
 //!
@@ -143,7 +145,7 @@
 //! **Modes** (`modes`). The lowest eigenvalues of K x = lambda M x with that
 //! Hessian and the masses of the leaf in motion: squared frequencies, or negative
 //! where the leaf is unstable. A Lanczos method finds them from one factorisation,
-//! and the pivots of a second one tell whether any was missed. Over the grids they
+//! and the pivots of a second one show whether any was missed. Over the grids they
 //! are extrapolated as positions are ([`relax::Stability::modes`]).
 //!
 //! **The independent road** (`bvp`). The same equations (1) to (6) with (a) to

@@ -194,7 +194,7 @@ pub struct Newton<'a> {
     pub accuracy: f64,
     pub iterations: usize,
     pub work: &'a mut Work,
-    /// Told the size of every step.
+    /// Receives the size of every step.
     pub progress: &'a mut dyn FnMut(usize, f64),
 }
 

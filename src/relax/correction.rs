@@ -1,33 +1,33 @@
-//! How a leaf answers to the jumps of its fields, to first order, and the answer taken in.
+//! The first-order response of a leaf to jumps of its fields, and its subtraction.
 
 use crate::leaf::{Field, Jump, RodFields, Solved, State, System, Tangent, shift, turn};
 use crate::relax::level::Level;
 use crate::rotation;
 use glam::DVec3;
 
-/// Relative accuracy, in the energy norm, of the answer: of a stiff leaf most of that
+/// Relative accuracy, in the energy norm, of the response: in a stiff leaf most of that
 /// norm is stretch, and displacements are a small part of it.
 const ACCURACY: f64 = 1e-6;
 
 /// Changes of position, rotation, force and moment.
 pub type Change = [DVec3; 4];
 
-/// The linear equations of a leaf on a grid of so many segments in each of some equal parts,
-/// in the middles of which its fields jump.
+/// The linear equations of a leaf on a grid that is divided into equal parts of `part`
+/// segments, at the midpoints of which its fields jump.
 pub struct Tangents<'a> {
     level: &'a Level,
     part: usize,
-    /// The segments that begin in the middles, rod after rod.
+    /// The segments that begin at the midpoints, rod after rod.
     behind: Vec<Vec<Tangent>>,
     /// The first segment, and those that end where parts do: once they are asked for.
     at_ends: Vec<Vec<Tangent>>,
 }
 
-/// The first-order answer to jumps.
-pub struct Correction {
+/// The first-order response to jumps.
+pub struct Response {
     /// Displacements and turns of all nodes but the bases.
     solution: Field,
-    error: f64,
+    at_ends: f64,
     between: f64,
 }
 
@@ -48,33 +48,33 @@ impl<'a> Tangents<'a> {
         }
     }
 
-    /// The answer to `jumps`; `system` holds the factorised equations. `None` where these
+    /// The response to `jumps`; `system` holds the factorised equations. `None` where these
     /// cannot be solved.
-    pub fn answer(&self, system: &mut System, jumps: &[Vec<Jump>]) -> Option<Correction> {
+    pub fn response(&self, system: &mut System, jumps: &[Vec<Jump>]) -> Option<Response> {
         let leaf = &self.level.leaf;
         leaf.assemble_jumps(&self.behind, jumps, system);
         let Solved::Yes(_) = system.solve(None, ACCURACY) else {
             return None;
         };
-        let (mut error, mut between) = (0.0_f64, 0.0_f64);
+        let (mut at_ends, mut between) = (0.0_f64, 0.0_f64);
         let solution = system.solution();
         for (rod, jumps) in solution.iter().zip(jumps) {
             for (nodes, jump) in rod.chunks(self.part).zip(jumps) {
                 let before = shift(&nodes[self.part / 2 - 1]);
                 let middle = larger(before.length(), (before + jump[0]).length());
                 between = larger(between, middle);
-                error = larger(error, shift(&nodes[self.part - 1]).length());
+                at_ends = larger(at_ends, shift(&nodes[self.part - 1]).length());
             }
         }
-        Some(Correction {
+        Some(Response {
             solution,
-            error,
+            at_ends,
             between,
         })
     }
 
-    /// The changes that go with an answer, at the ends of the parts.
-    pub fn changes(&mut self, correction: &Correction, jumps: &[Vec<Jump>]) -> Vec<Vec<Change>> {
+    /// The changes of all fields that belong to a response, at the ends of the parts.
+    pub fn changes(&mut self, response: &Response, jumps: &[Vec<Jump>]) -> Vec<Vec<Change>> {
         let Level { leaf, state } = self.level;
         if self.at_ends.is_empty() {
             let ends = |j: usize| {
@@ -83,9 +83,9 @@ impl<'a> Tangents<'a> {
             };
             self.at_ends = (0..leaf.rods()).map(ends).collect();
         }
-        let moved = moved(state, correction);
+        let moved = moved(state, response);
         let ends = |(j, jumps): (usize, &Vec<Jump>)| {
-            let end = |k: usize| self.change(correction, &moved, (j, jumps), k);
+            let end = |k: usize| self.change(response, &moved, (j, jumps), k);
             (0..=jumps.len()).map(end).collect()
         };
         jumps.iter().enumerate().map(ends).collect()
@@ -95,7 +95,7 @@ impl<'a> Tangents<'a> {
     /// forces and moments: from the segment before it.
     fn change(
         &self,
-        correction: &Correction,
+        response: &Response,
         moved: &State,
         (j, jumps): (usize, &[Jump]),
         k: usize,
@@ -103,10 +103,10 @@ impl<'a> Tangents<'a> {
         let Level { leaf, state } = self.level;
         let (n, i) = (leaf.segments(), k * self.part);
         let s = i.saturating_sub(1);
-        let ([begin, mut a], [end, b]) = (correction.at(j, s), correction.at(j, s + 1));
+        let ([begin, mut a], [end, b]) = (response.at(j, s), response.at(j, s + 1));
         let mut across = end - begin;
         if s % self.part == self.part / 2 {
-            // That segment begins behind the jump in the middle.
+            // That segment begins behind the jump at the midpoint.
             let [shift, turn, ..] = jumps[s / self.part];
             a += turn;
             across -= shift;
@@ -114,7 +114,7 @@ impl<'a> Tangents<'a> {
         let tangent = &self.at_ends[j][k];
         let (segment, second, (_, g_a, g_b)) = (&tangent.segment, &tangent.second, tangent.first);
         let (section, zero) = (leaf.section(j, s), DVec3::ZERO);
-        // Without what closes the gap of a segment that is not quite as long as it says.
+        // Without the part that closes the remaining gap of the segment.
         let force = segment.force_increment(section, across, a, b)
             - segment.force_increment(section, zero, zero, zero);
         // A moment along the lab axes does not turn with its node.
@@ -135,10 +135,10 @@ impl<'a> Tangents<'a> {
     }
 }
 
-impl Correction {
-    /// The largest displacements at the ends of the parts, and in the middles on either side.
+impl Response {
+    /// The largest displacements at the ends of the parts, and at the midpoints on either side.
     pub fn largest(&self) -> [f64; 2] {
-        [self.error, self.between]
+        [self.at_ends, self.between]
     }
 
     /// Displacement and turn of node `i` of rod `j`.
@@ -159,7 +159,7 @@ pub fn largest_others(changes: &[Vec<Change>]) -> [f64; 2] {
     ]
 }
 
-/// Takes changes in.
+/// Applies the changes.
 pub fn apply(changes: &[Vec<Change>], known: &mut [Vec<RodFields>]) {
     let changes = changes.iter().flatten();
     for (node, [shift, turn, force, moment]) in known.iter_mut().flatten().zip(changes) {
@@ -170,17 +170,17 @@ pub fn apply(changes: &[Vec<Change>], known: &mut [Vec<RodFields>]) {
     }
 }
 
-/// The larger of two, or what is not a number.
+/// The larger of two; NaN if one is.
 pub fn larger(a: f64, b: f64) -> f64 {
     if b <= a { a } else { b }
 }
 
 /// The state with its nodes displaced.
-fn moved(state: &State, correction: &Correction) -> State {
+fn moved(state: &State, response: &Response) -> State {
     let mut moved = state.clone();
     for j in 0..state.rods() {
         for i in 1..=state.segments() {
-            moved.x[state.base(j) + i] += correction.at(j, i)[0];
+            moved.x[state.base(j) + i] += response.at(j, i)[0];
         }
     }
     moved

@@ -1,16 +1,16 @@
-//! The error of an extrapolated leaf from its defect, and the leaf without it.
+//! Defect correction: the error of an extrapolated leaf estimated from its defect, and
+//! subtracted.
 //!
 //! The equilibrium equations are integrated from the nodes of the coarsest grid, where the
-//! extrapolated leaf is known best, to the middles between them, by a method of order 8.
-//! Where the two values of position, rotation, force or moment do not agree the equations
-//! are not met; to first order the error is the answer of the leaf to these jumps. The
-//! linear equations are those of a coarse grid: their own error is one of second order, of
-//! an error.
+//! extrapolated leaf is most accurate, to the midpoints between them, by a method of order 8.
+//! The jumps of position, rotation, force and moment there are the defect; to first order
+//! the error is the response of the leaf to these jumps. The linear equations are those of
+//! a coarse grid: the relative error of the response is of second order.
 //!
-//! That answer may be taken in, and what is left told again: iterated defect correction
-//! (Stetter, Numer. Math. 29 (1978) 425). The leaf then converges, on the nodes of that
-//! coarse grid, to the solution of the equations themselves, by a factor a round that is
-//! the error of the linear equations: about a hundredth.
+//! The response may be subtracted and the remaining error estimated again: iterated defect
+//! correction (Stetter, Numer. Math. 29 (1978) 425). The leaf then converges, on the nodes
+//! of the coarsest grid, to the solution of the equations themselves, in each round by the
+//! relative error of the linear equations: about a hundredth.
 
 use crate::leaf::{DiscreteLeaf, Flow, Grid, Jump, RodFields, Slice, System};
 use crate::newton::Work;
@@ -24,10 +24,10 @@ use glam::DVec3;
 /// coarsest.
 const COARSER: usize = 2;
 
-/// What a correction leaves of the error, before it is known; and what it may leave: of a
-/// leaf that answers otherwise than told no more are tried.
-const LEFT: f64 = 0.01;
-const SLOW: f64 = 0.2;
+/// The part of the error that remains after a correction, before it has been measured; and
+/// the largest part with which corrections go on.
+const CONTRACTION: f64 = 0.01;
+const SLOWEST: f64 = 0.2;
 
 /// So many times the error of the positions may be that of rotations, and of forces and
 /// moments, of a corrected leaf, dimensionless: as it is of one that is extrapolated.
@@ -40,11 +40,11 @@ pub struct Linear {
     system: System,
 }
 
-/// What the equilibrium equations tell of a leaf on several grids.
-pub struct Told {
+/// A leaf on several grids, with its error estimated from the equilibrium equations.
+pub struct Estimate {
     /// The largest error of a position at the nodes of the coarsest grid.
-    pub error: f64,
-    /// The largest in the middles between them, on either side.
+    pub at_nodes: f64,
+    /// The largest at the midpoints between them, on either side.
     pub between: f64,
     /// The leaf at the nodes of `grid`, rod after rod, dimensionless.
     pub rods: Vec<Vec<RodFields>>,
@@ -56,24 +56,25 @@ pub struct Told {
     pub corrections: usize,
 }
 
-impl Told {
+impl Estimate {
     /// The largest error of a position.
     pub fn largest(&self) -> f64 {
-        self.error.max(self.between)
+        self.at_nodes.max(self.between)
     }
 }
 
-/// What they tell of the leaf on `levels`, from coarse to fine, each with twice the
+/// Estimates the error of the leaf on `levels`, from coarse to fine, each with twice the
 /// segments of the one before, with `columns` extrapolations. If the error is more than
-/// `enough` the leaf is corrected, up to `most` times, if that makes it less. `None` where
-/// the linear equations cannot be solved, which are factorised if they are not those at hand.
-pub fn told(
+/// `enough` the leaf is corrected, up to `most` times, provided that this reduces it below.
+/// `None` where the linear equations cannot be solved; they are factorised unless `linear`
+/// has them already.
+pub fn estimate(
     levels: &[Level],
     columns: usize,
     (enough, most): (f64, usize),
     linear: &mut Option<Linear>,
     work: &mut Work,
-) -> Option<Told> {
+) -> Option<Estimate> {
     let grid = levels
         .len()
         .checked_sub(2)?
@@ -88,8 +89,8 @@ pub fn told(
     let (mut known, mut flow) = (nodes(levels, columns), Flow::new(first));
     let mut tangents = Tangents::new(level, first.segments());
     let finest_grid = &levels.last()?.leaf.grid;
-    let tell = |round: &Round, corrections: usize, halvings: usize| Told {
-        error: round.largest[0],
+    let estimate = |round: &Round, corrections: usize, halvings: usize| Estimate {
+        at_nodes: round.largest[0],
         between: round.largest[1],
         rods: round.carried.rods(&round.known),
         energy: round.carried.energy,
@@ -100,56 +101,56 @@ pub fn told(
     let mut before = 0.0;
     let (mut halvings, mut halved) = (0, false);
     for corrections in 0..=most {
-        balance(first, &mut known);
+        satisfy_tip_conditions(first, &mut known);
         let steps = (finest / first.segments() / 2) << halvings;
         let carried = carried(first, &mut flow, &known, steps);
-        let Some(correction) = tangents.answer(system, &carried.jumps) else {
+        let Some(response) = tangents.response(system, &carried.jumps) else {
             break;
         };
-        let [error, between] = correction.largest();
-        let largest = larger(error, between);
-        // Shorter steps show an error of those before, which tells nothing of what
-        // corrections leave.
-        let left = match corrections == 0 || halved {
-            true => LEFT,
+        let [at_nodes, between] = response.largest();
+        let largest = larger(at_nodes, between);
+        // Halved steps reveal the error of the integration before, which says nothing about
+        // the contraction.
+        let contraction = match corrections == 0 || halved {
+            true => CONTRACTION,
             false => largest / before,
         };
-        if !largest.is_finite() || left > SLOW {
+        if !largest.is_finite() || contraction > SLOWEST {
             break;
         }
-        let to_come = i32::try_from(most - corrections).unwrap_or(0);
-        let hopeless = largest * left.powi(to_come) > enough;
-        let last = corrections == 0 && (largest <= enough || hopeless);
-        if hopeless && !last {
+        let rounds_left = i32::try_from(most - corrections).unwrap_or(0);
+        let out_of_reach = largest * contraction.powi(rounds_left) > enough;
+        let last = corrections == 0 && (largest <= enough || out_of_reach);
+        if out_of_reach && !last {
             break;
         }
         let changes = match last {
             true => Vec::new(),
-            false => tangents.changes(&correction, &carried.jumps),
+            false => tangents.changes(&response, &carried.jumps),
         };
         let round = Round {
             known: known.clone(),
             carried,
-            largest: [error, between],
+            largest: [at_nodes, between],
         };
         if last {
-            return Some(tell(&round, corrections, halvings));
+            return Some(estimate(&round, corrections, halvings));
         }
         if corrections == 0 {
             uncorrected = Some(round);
         } else if largest <= enough && halved {
-            // Shorter steps told the error of those before, too.
+            // Halved steps have revealed the error of the integration, too.
             let [turn, stress] = largest_others(&changes);
             if larger(turn / TURNS, stress / FORCES) <= enough {
-                return Some(tell(&round, corrections, halvings));
+                return Some(estimate(&round, corrections, halvings));
             }
         }
         apply(&changes, &mut known);
         before = largest;
-        halved = largest * left <= enough;
+        halved = largest * contraction <= enough;
         halvings += usize::from(halved);
     }
-    uncorrected.map(|round| tell(&round, 0, 0))
+    uncorrected.map(|round| estimate(&round, 0, 0))
 }
 
 /// A leaf at the nodes of the coarsest grid, carried along its rods, and its largest
@@ -160,8 +161,8 @@ struct Round {
     largest: [f64; 2],
 }
 
-/// Those at rest: where rods are rigid the last step of Newton's method began with other
-/// forces.
+/// The equations at rest: those of the last Newton step have the forces before it, which
+/// differ where rods are rigid.
 fn factorized(level: &Level, work: &mut Work) -> Option<System> {
     let mut system = System::new(&level.leaf);
     work.force_evaluations += 1;
@@ -176,14 +177,14 @@ fn factorized(level: &Level, work: &mut Work) -> Option<System> {
 
 /// A leaf along its rods.
 struct Carried {
-    /// After every step from the two ends of a part to its middle, part after part.
+    /// After every step from the two ends of a part to its midpoint, part after part.
     slices: Vec<[Vec<Slice>; 2]>,
     jumps: Vec<Vec<Jump>>,
     energy: f64,
 }
 
-/// The leaf `known` at the nodes of the coarsest grid carried from there to the middles
-/// between by so many `steps`, and the jumps there.
+/// The leaf `known` at the nodes of the coarsest grid carried from there to the midpoints
+/// between them in so many `steps`, and the jumps there.
 fn carried(
     first: &DiscreteLeaf,
     flow: &mut Flow,
@@ -201,9 +202,9 @@ fn carried(
             energy += sign * flow.energy();
         }
         for (j, jumps) in jumps.iter_mut().enumerate() {
-            let [a, b] = in_middle(ends, j);
+            let [a, b] = at_midpoint(ends, j);
             let jump = jump(&a, &b);
-            // The work that closing it takes: errors of fields are of second order then.
+            // Less the work of closing the jump: the energy then has a second-order error only.
             energy -= a.n.dot(jump[0]) + a.m.dot(jump[1]);
             jumps.push(jump);
         }
@@ -220,21 +221,21 @@ fn carried(
     }
 }
 
-/// Rod `j` in the middle of a part, as told from either end.
-fn in_middle(ends: &[Vec<Slice>; 2], j: usize) -> [RodFields; 2] {
+/// Rod `j` at the midpoint of a part, carried there from either end.
+fn at_midpoint(ends: &[Vec<Slice>; 2], j: usize) -> [RodFields; 2] {
     ends.each_ref()
         .map(|slices| slices.last().expect("a step at least").rod(j))
 }
 
 impl Carried {
-    /// All rods at the ends of all steps from `known`; in the middles the mean.
+    /// All rods at the ends of all steps from `known`; at midpoints the mean of both sides.
     fn rods(&self, known: &[Vec<RodFields>]) -> Vec<Vec<RodFields>> {
         let rod = |(j, known): (usize, &Vec<RodFields>)| {
             let steps = self.slices.first().map_or(0, |[before, _]| before.len());
             let mut rod = Vec::with_capacity(2 * steps * self.slices.len() + 1);
             for (begin, ends) in known.iter().zip(&self.slices) {
                 let [before, behind] = ends.each_ref().map(|it| &it[..steps - 1]);
-                let [a, b] = in_middle(ends, j);
+                let [a, b] = at_midpoint(ends, j);
                 rod.push(*begin);
                 rod.extend(before.iter().map(|slice| slice.rod(j)));
                 rod.push(mean(&a, &b));
@@ -247,10 +248,10 @@ impl Carried {
     }
 }
 
-/// Makes forces and moments at the tips meet their conditions, which unfinished
-/// iterations leave open: the equations of the discrete leaf have no other. Of a rod in the
-/// plane of the mirror they keep it there.
-fn balance(leaf: &DiscreteLeaf, known: &mut [Vec<RodFields>]) {
+/// Makes forces and moments at the tips satisfy the end conditions, which unfinished
+/// iterations violate slightly: the linear equations take them for satisfied. Those of a rod
+/// in the mirror plane are made to keep it there.
+fn satisfy_tip_conditions(leaf: &DiscreteLeaf, known: &mut [Vec<RodFields>]) {
     for (j, rod) in known.iter_mut().enumerate() {
         for node in rod.iter_mut().filter(|_| leaf.leaf.in_plane(j)) {
             node.n.y = 0.0;
@@ -265,7 +266,7 @@ fn balance(leaf: &DiscreteLeaf, known: &mut [Vec<RodFields>]) {
         .map(|(j, tip)| share * (leaf.tip_force(j) - tip.n))
         .sum();
     if leaf.leaf.in_half() {
-        // The image balances what is across the plane.
+        // The mirror image balances the component across the plane.
         missing.y = 0.0;
     }
     for (j, tip) in tips.iter_mut().enumerate() {
@@ -316,16 +317,17 @@ mod tests {
             let (_, levels) =
                 relax_on_grids(&leaf, &Options::default(), 1e-3, &mut |_| {}).unwrap();
             let (mut linear, mut work) = (None, Work::default());
-            let mut told_to =
-                |enough, most| told(&levels, 1, (enough, most), &mut linear, &mut work).unwrap();
-            let first = told_to(0.0, 0).largest();
+            let mut estimated = |enough, most| {
+                estimate(&levels, 1, (enough, most), &mut linear, &mut work).unwrap()
+            };
+            let first = estimated(0.0, 0).largest();
             // The last is the one that verifies.
             for most in 2..=4_usize {
                 let enough = first * 30.0_f64.powi(1 - most as i32);
-                let told = told_to(enough, most);
-                let what = format!("{axial}, {most}: {} of {first}", told.largest());
-                assert!((1..=most).contains(&told.corrections), "{what}");
-                assert!(told.largest() <= enough, "{what}");
+                let estimate = estimated(enough, most);
+                let what = format!("{axial}, {most}: {} of {first}", estimate.largest());
+                assert!((1..=most).contains(&estimate.corrections), "{what}");
+                assert!(estimate.largest() <= enough, "{what}");
             }
             assert_eq!(work.factorizations, 1);
         }

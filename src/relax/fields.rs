@@ -1,7 +1,7 @@
 //! The fields along the veins, extrapolated over the grids.
 
 use crate::leaf::{Grid, Leaf, RodFields};
-use crate::relax::defect::Told;
+use crate::relax::defect::Estimate;
 use crate::relax::level::Level;
 use crate::relax::nodes::{Node, RodNodes, alike, numbers};
 use crate::relax::place::{Measures, Place, Values};
@@ -28,17 +28,18 @@ pub struct Fields {
 
 /// All nodal fields with `columns` extrapolations, at the nodes of the coarsest grid, or
 /// if these are few of the next; if every node is asked for of the finest. Where the
-/// equilibrium equations have told them to the tolerance (with that error) they are
-/// those, of a corrected leaf at every node of the grid that these tell; else only at nodes that keep the tolerance as those of the coarsest grid do, which
-/// have that `error`: nodes of the coarsest grid have the whole extrapolation, those that a
-/// finer grid adds have that of the grids from there on, and the rest of the coarser
-/// ones' correction, which is small and smooth, interpolated.
+/// leaf was `integrated` to the tolerance (with that error) the fields are those of the
+/// integration, of a corrected leaf at every node of its grid. Otherwise they are returned
+/// only at nodes that keep the tolerance as those of the coarsest grid do, which have that
+/// `error`: nodes of the coarsest grid have the whole extrapolation, those that a finer grid
+/// adds have that of the grids from there on, and the remainder of the coarser ones'
+/// correction, which is small and smooth, interpolated.
 pub fn fields(
     levels: &[&Level],
     columns: usize,
     (error, tolerance): (Option<f64>, f64),
     every_node: bool,
-    told: Option<(&Told, f64)>,
+    integrated: Option<(&Estimate, f64)>,
 ) -> Fields {
     let (first, finest) = (levels[0], levels[levels.len() - 1]);
     let few = first.leaf.segments() < STATIONS && levels.len() > 1;
@@ -48,13 +49,13 @@ pub fn fields(
     };
     let known_error = error.unwrap_or(0.0);
     let leaf = &first.leaf.leaf;
-    if let Some((told, error)) = told {
+    if let Some((estimate, error)) = integrated {
         let between = (error - known_error).max(0.0);
         let wanted = match every_node {
-            true => &told.grid,
+            true => &estimate.grid,
             false => &wanted.leaf.grid,
         };
-        return Fields::new(leaf, wanted, &thinned(told, wanted, finest), between);
+        return Fields::new(leaf, wanted, &thinned(estimate, wanted, finest), between);
     }
     let used = &levels[levels.len() - 1 - columns..];
     let rods = 0..first.leaf.rods();
@@ -121,9 +122,9 @@ impl Fields {
     }
 }
 
-/// What is told, at the nodes that are wanted; rotations have the signs of the `finest` grid.
-fn thinned(told: &Told, wanted: &Grid, finest: &Level) -> Vec<Vec<Node>> {
-    let stride = told.grid.segments() / wanted.segments();
+/// The integrated leaf at the nodes that are wanted; rotations have the signs of the `finest` grid.
+fn thinned(estimate: &Estimate, wanted: &Grid, finest: &Level) -> Vec<Vec<Node>> {
+    let stride = estimate.grid.segments() / wanted.segments();
     let rod = |(j, rod): (usize, &Vec<RodFields>)| {
         let mut sign = finest.state.q[finest.state.base(j)];
         let node = |node: &RodFields| {
@@ -133,7 +134,7 @@ fn thinned(told: &Told, wanted: &Grid, finest: &Level) -> Vec<Vec<Node>> {
         };
         rod.iter().step_by(stride).map(node).collect()
     };
-    told.rods.iter().enumerate().map(rod).collect()
+    estimate.rods.iter().enumerate().map(rod).collect()
 }
 
 /// How many times more the last grid changed the positions at the nodes of the one
@@ -181,10 +182,10 @@ fn correct(
     let corrections: Vec<Node> = known.iter().zip(own).map(|(a, b)| minus(a, b)).collect();
     let position = |node: &Node| DVec3::from_slice(node);
     let term = |&(i, weight): &(usize, f64)| weight * position(&corrections[i]);
-    let told = |weights: &Values| -> DVec3 { weights.iter().map(term).sum() };
+    let interpolated = |weights: &Values| -> DVec3 { weights.iter().map(term).sum() };
     let mut errors = Measures::new(known.len());
     for (correction, (first, others)) in corrections.iter().zip(others) {
-        let off = |weights: &Values| (told(weights) - position(correction)).length();
+        let off = |weights: &Values| (interpolated(weights) - position(correction)).length();
         errors.add(*first, others.each_ref().map(off));
     }
     for (k, (node, weights)) in nodes.iter_mut().zip(weights).enumerate() {

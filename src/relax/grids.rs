@@ -51,7 +51,7 @@ impl Run<'_, '_> {
     pub fn refine(&mut self) -> Result<bool, Stop> {
         loop {
             self.judge_accuracy();
-            if self.accurate() && self.judge_stability()? && !self.lacks_nodes() {
+            if self.accurate() && self.judge_stability()? && !self.needs_another_grid() {
                 return Ok(true);
             }
             if self.late() {
@@ -65,10 +65,10 @@ impl Run<'_, '_> {
         }
     }
 
-    /// Whether the nodes of the finest grid are asked for and the leaf is not accurate
-    /// enough at them: that is worth one more grid.
-    fn lacks_nodes(&mut self) -> bool {
-        let enough = !self.options.every_node || self.told().is_some();
+    /// Whether the nodes of the finest grid are requested and the leaf is not accurate
+    /// enough there: one more grid is added for them.
+    fn needs_another_grid(&mut self) -> bool {
+        let enough = !self.options.every_node || self.integrated().is_some();
         if enough || self.for_nodes || self.finer().is_none() {
             return false;
         }
@@ -114,8 +114,8 @@ impl Run<'_, '_> {
         rest.map(drop)
     }
 
-    /// The levels of which the next one can be told: those that the extrapolation
-    /// believes, but the finest two at least.
+    /// The levels from which the next one is predicted: those used by the extrapolation,
+    /// but at least the finest two.
     fn predicting(&self) -> Vec<&Level> {
         let columns = self.table.best().map_or(0, |best| best.columns);
         let count = (columns + 1).max(2).min(self.levels.len());

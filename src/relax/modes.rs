@@ -71,9 +71,9 @@ const STILL: f64 = 1e-6;
 /// The lowest modes of a settled leaf.
 pub struct Lowest {
     pub modes: Vec<Mode>,
-    /// How large those are, or their errors, whose signs may not be those that the Morse
-    /// index tells. An eigenvalue that is zero to the accuracy asked for is one of a leaf
-    /// that may move freely.
+    /// The size, or error, of eigenvalues whose signs may contradict the Morse index. An
+    /// eigenvalue that is zero to the accuracy asked for belongs to a leaf that may move
+    /// freely.
     pub undecided: Option<f64>,
 }
 
@@ -149,7 +149,7 @@ pub fn lowest(run: &Run, count: usize, anyway: bool) -> Option<Lowest> {
     })
 }
 
-/// Grids that are enough for modes whose signs they tell.
+/// Number of grids that suffice for modes whose signs they determine.
 fn enough(run: &Run) -> usize {
     if run.options.mode_shapes || run.index != Some(0) {
         return run.levels.len();
@@ -164,9 +164,9 @@ fn within_reach(leaf: &Leaf, grid: &Grid) -> bool {
     6 * leaf.rods() * grid.segments() <= MANY_MORE_UNKNOWNS
 }
 
-/// The next grid on which signs of the lowest modes may be told that are not yet: not one
-/// whose rounding is larger.
-pub fn telling(run: &Run, lowest: Option<&Lowest>) -> Option<Grid> {
+/// The next grid, which may determine the signs of lowest modes that are still undecided:
+/// not one whose rounding is larger.
+pub fn deciding_grid(run: &Run, lowest: Option<&Lowest>) -> Option<Grid> {
     let size = lowest?.undecided?;
     let noise = run.levels.last()?.leaf.neutral_shift();
     let finer = run.finer().filter(|grid| within_reach(run.leaf, grid))?;

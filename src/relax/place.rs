@@ -127,7 +127,7 @@ struct Panel {
 }
 
 impl Differences {
-    /// Adds those at a place, of values that weights tell.
+    /// Adds those at a place, of values interpolated with weights.
     pub fn add(&mut self, place: &Place, value: impl Fn(&Slopes) -> DVec3) {
         let panel = self.panels.entry(place.first).or_default();
         let [best, second, third] = [0, 1, 2].map(|fewer| value(&place.fewer(fewer)));

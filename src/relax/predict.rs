@@ -1,4 +1,4 @@
-//! What the leaf at rest on nested grids tells of it on another one.
+//! The leaf at rest on a finer grid predicted from those on nested coarser grids.
 
 use crate::leaf::{Grid, State};
 use crate::relax::level::Level;

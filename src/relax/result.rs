@@ -36,7 +36,7 @@ pub fn equilibrium(
         columns,
         (error, run.tolerance),
         run.options.every_node,
-        run.told(),
+        run.integrated(),
     );
     let joined = run.leaf.joined();
     let tips = rods.iter().take(if joined { 1 } else { rods.len() });
@@ -119,11 +119,11 @@ fn reaction(levels: &[&Level], columns: usize) -> Option<Reaction> {
     })
 }
 
-/// The potential energy: along the leaf that the equations tell, whose errors it has only
-/// to second order, or with `columns` extrapolations.
+/// The potential energy: integrated along the leaf, with an error of second order, or with
+/// `columns` extrapolations.
 fn potential(run: &Run, columns: usize) -> f64 {
-    if let Some(told) = &run.defect {
-        return told.energy;
+    if let Some(estimate) = &run.estimate {
+        return estimate.energy;
     }
     let mut energies = Richardson::default();
     for level in &run.levels {
@@ -133,12 +133,12 @@ fn potential(run: &Run, columns: usize) -> f64 {
 }
 
 /// The centerlines at all nodes of the finest grid or, of a corrected leaf, of the grid
-/// that tells it, in units of the scenario.
+/// of the integration, in units of the scenario.
 fn centerlines<'r>(run: &'r Run, finest: &'r Level) -> (&'r Grid, Vec<Centerline>) {
     let length = run.leaf.scale.length;
-    if let Some(told) = run.corrected() {
+    if let Some(estimate) = run.corrected() {
         let line = |rod: &Vec<RodFields>| rod.iter().map(|it| (it.x * length, it.q)).collect();
-        return (&told.grid, told.rods.iter().map(line).collect());
+        return (&estimate.grid, estimate.rods.iter().map(line).collect());
     }
     let n = finest.leaf.segments();
     let node = |k: usize| (finest.state.x[k] * length, finest.state.q[k]);

@@ -3,7 +3,7 @@
 
 use crate::leaf::{DiscreteLeaf, Leaf, System, whole_fields};
 use crate::newton::{Contraction, Work};
-use crate::relax::defect::{self, Linear, Told};
+use crate::relax::defect::{self, Estimate, Linear};
 use crate::relax::level::{Level, complete, positions};
 use crate::relax::method::Method;
 use crate::relax::options::{Options, Progress};
@@ -17,19 +17,18 @@ pub const COARSEST: usize = 8;
 /// Growth of errors of single grids by extrapolation, sum of the weights at most.
 const EXTRAPOLATED: f64 = 2.0;
 
-/// Safety factor on the error that the defect of the extrapolated leaf tells.
+/// Safety factor on the error estimated from the defect of the extrapolated leaf.
 const SAFETY: f64 = 2.0;
 
-/// The error that the last correction tells, of which it is at most so many times: the answer
+/// It is at most so many times the error estimated from the last extrapolation: the response
 /// of a neutral mode to rounding is no error.
 const LARGEST: f64 = 10.0;
 
-/// Where the last correction is so many times the tolerance the defect is not asked: it
-/// would hardly be small enough.
-const HOPELESS: f64 = 3e3;
+/// Where the last extrapolation changed the leaf by so many times the tolerance the defect is
+/// not computed: it would hardly be small enough.
+const OUT_OF_REACH: f64 = 3e3;
 
-/// How often the error that the defect tells is taken off, at most, and what that leaves of
-/// it at best.
+/// How often the estimated error is subtracted, at most, and the part that remains at best.
 const CORRECTIONS: usize = 4;
 const CORRECTED: f64 = 1e-2;
 
@@ -65,9 +64,9 @@ pub struct Run<'a, 'o> {
     pub saddle: Option<Saddle>,
     pub levels: Vec<Level>,
     pub table: Richardson,
-    /// What the defect of the best values tells, if it is known, and the linear equations
-    /// that tell it.
-    pub defect: Option<Told>,
+    /// The error estimated from the defect of the best values, if it is known, and the linear
+    /// equations for it.
+    pub estimate: Option<Estimate>,
     pub linear: Option<Linear>,
     /// Room for the equations of the grid that was settled on last.
     pub room: Option<System>,
@@ -114,7 +113,7 @@ impl<'a, 'o> Run<'a, 'o> {
             saddle: None,
             levels: Vec::new(),
             table: Richardson::default(),
-            defect: None,
+            estimate: None,
             linear: None,
             room: None,
             for_nodes: false,
@@ -159,16 +158,16 @@ impl<'a, 'o> Run<'a, 'o> {
         self.levels = self.levels.iter().map(complete).collect();
         self.leaf = whole;
         self.whole = None;
-        let defect = self.defect.take();
-        let defect = defect.map(|told| Told {
-            rods: whole_fields(reduced, told.rods),
-            energy: told.energy * if reduced.in_half() { 2.0 } else { 1.0 },
-            ..told
+        let estimate = self.estimate.take();
+        let estimate = estimate.map(|half| Estimate {
+            rods: whole_fields(reduced, half.rods),
+            energy: half.energy * if reduced.in_half() { 2.0 } else { 1.0 },
+            ..half
         });
         self.tabulate();
         // The equations are those of the reduced leaf.
         (self.linear, self.room) = (None, None);
-        Run { defect, ..self }
+        Run { estimate, ..self }
     }
 
     /// Segments of the only grid, if there is to be one.
@@ -200,17 +199,17 @@ impl<'a, 'o> Run<'a, 'o> {
     pub fn error(&self) -> Option<f64> {
         let segments = self.levels.last()?.leaf.segments();
         let best = self.table.best()?.error;
-        let extrapolation = match &self.defect {
-            // Of what iterations left undone nothing is left.
-            Some(told) if told.corrections > 0 => {
+        let extrapolation = match &self.estimate {
+            // The errors of unfinished iterations are corrected with the others.
+            Some(estimate) if estimate.corrections > 0 => {
                 let segments = self.levels[0].leaf.segments() as f64;
-                return Some(SAFETY * told.largest() + ROUNDING * segments);
+                return Some(SAFETY * estimate.largest() + ROUNDING * segments);
             }
-            // Of few nodes those between are stations, too.
-            Some(told) if self.too_coarse(self.levels[0].leaf.segments()) => {
-                (SAFETY * told.error.max(told.between)).min(LARGEST * best)
+            // Where nodes are few the midpoints are stations, too.
+            Some(estimate) if self.too_coarse(self.levels[0].leaf.segments()) => {
+                (SAFETY * estimate.largest()).min(LARGEST * best)
             }
-            Some(told) => (SAFETY * told.error).min(LARGEST * best),
+            Some(estimate) => (SAFETY * estimate.at_nodes).min(LARGEST * best),
             None => best,
         };
         Some(extrapolation + self.unfinished(segments))
@@ -221,23 +220,25 @@ impl<'a, 'o> Run<'a, 'o> {
         EXTRAPOLATED * self.remaining + ROUNDING * segments as f64
     }
 
-    /// The leaf at the nodes of the finest grid, or of a finer one if it was corrected, as
-    /// the equilibrium equations tell it, and its error, if that is within the tolerance.
-    pub fn told(&self) -> Option<(&Told, f64)> {
-        let (told, segments) = (self.defect.as_ref()?, self.levels.last()?.leaf.segments());
-        let error = match told.corrections {
-            0 => SAFETY * told.largest() + self.unfinished(segments),
+    /// The leaf integrated to the nodes of the finest grid, or of a finer one if it was
+    /// corrected, and its error, if that is within the tolerance.
+    pub fn integrated(&self) -> Option<(&Estimate, f64)> {
+        let (estimate, segments) = (self.estimate.as_ref()?, self.levels.last()?.leaf.segments());
+        let error = match estimate.corrections {
+            0 => SAFETY * estimate.largest() + self.unfinished(segments),
             _ => self.error()?,
         };
-        (error <= self.tolerance || told.corrections > 0).then_some((told, error))
+        (error <= self.tolerance || estimate.corrections > 0).then_some((estimate, error))
     }
 
-    /// The leaf as the equations tell it, if the errors of the grids were taken off it.
-    pub fn corrected(&self) -> Option<&Told> {
-        self.defect.as_ref().filter(|told| told.corrections > 0)
+    /// The integrated leaf, if its error was corrected.
+    pub fn corrected(&self) -> Option<&Estimate> {
+        self.estimate
+            .as_ref()
+            .filter(|estimate| estimate.corrections > 0)
     }
 
-    /// How often errors may be taken off.
+    /// How often the error may be corrected.
     fn corrections(&self) -> usize {
         let grids = matches!(self.options.method, Method::SemiImplicit(_));
         let free = self.leaf.held.is_none() && self.segments().is_none();
@@ -247,17 +248,17 @@ impl<'a, 'o> Run<'a, 'o> {
         }
     }
 
-    /// Estimates the error of the best values from their defect, and takes it off them if
-    /// that makes them accurate enough.
+    /// Estimates the error of the best values from their defect, and corrects it if that
+    /// makes them accurate enough.
     pub fn judge_accuracy(&mut self) {
         let most = self.corrections();
-        let hopeless = HOPELESS * CORRECTED.powi(-(most as i32));
+        let farthest = OUT_OF_REACH * CORRECTED.powi(-(most as i32));
         let best = self.table.best();
-        let near = best.filter(|best| best.error <= hopeless * self.tolerance);
+        let near = best.filter(|best| best.error <= farthest * self.tolerance);
         let enough = (self.tolerance / SAFETY - ROUNDING * COARSEST as f64, most);
         let (levels, linear, work) = (&self.levels, &mut self.linear, &mut self.work);
-        self.defect =
-            near.and_then(|best| defect::told(levels, best.columns, enough, linear, work));
+        self.estimate =
+            near.and_then(|best| defect::estimate(levels, best.columns, enough, linear, work));
         if (self.levels.last()).is_some_and(|level| is_large(&level.leaf)) {
             self.linear = None;
         }
@@ -282,7 +283,7 @@ impl<'a, 'o> Run<'a, 'o> {
         self.tabulate();
     }
 
-    /// Tabulates the positions on all grids, of which nothing else is known then.
+    /// Tabulates the positions on all grids, and forgets estimates made before.
     pub fn tabulate(&mut self) {
         let mut table = Richardson::default();
         for level in &self.levels {
@@ -291,7 +292,7 @@ impl<'a, 'o> Run<'a, 'o> {
             table.push(segments, positions(level, stride));
         }
         self.table = table;
-        self.defect = None;
+        self.estimate = None;
         if self.levels.len() < 2 {
             self.linear = None;
         }

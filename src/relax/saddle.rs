@@ -65,9 +65,9 @@ fn negative(system: &System, shift: f64) -> Option<usize> {
     Some(pattern.factorize(system, shift).ok()?.negative())
 }
 
-/// Whether a state at rest on a grid is stable on finer ones as well, for all that this one
-/// tells: its Hessian is positive definite less [`EXCESS`] times what the elements may be
-/// stiffer than the rods and [`CLEARLY`] times the mass matrix.
+/// Whether a state at rest on a grid may be expected to be stable on finer ones as well: its
+/// Hessian is positive definite less [`EXCESS`] times the stiffness by which elements may
+/// exceed the rods and [`CLEARLY`] times the mass matrix.
 pub fn clearly_stable(
     leaf: &DiscreteLeaf,
     state: &State,

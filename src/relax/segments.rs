@@ -17,7 +17,7 @@ const COARSEST_OF_LOOSE: usize = 4;
 const LOOSE: f64 = 1e-3;
 
 /// Rotation per segment (radians) that the coarsest grid must resolve where
-/// rest curvature and tip moment alone tell it, and the most that one of a loose
+/// rest curvature and tip moment alone determine it, and the most that one of a loose
 /// tolerance may come to.
 pub const COARSEST_TURN: f64 = 0.8;
 

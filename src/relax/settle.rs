@@ -45,7 +45,7 @@ pub enum InitialGuess {
     Start,
     /// The equilibrium of the next coarser grid, prolonged.
     Coarser(State),
-    /// What equilibria on several grids tell of that on this one.
+    /// The equilibrium predicted from those on several coarser grids.
     Predicted(State),
     /// A saddle the leaf was pushed off.
     Pushed(State),

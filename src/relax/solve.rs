@@ -146,7 +146,7 @@ fn finished(
 ) -> (Equilibrium, Vec<Level>) {
     let asked = run.options.modes;
     let count = match run.index {
-        // A single grid tells no more.
+        // On a single grid nothing can be compared.
         Some(0) if !run.clearly && run.segments().is_none() => asked.max(1),
         _ => asked,
     };
@@ -157,7 +157,7 @@ fn finished(
     let mut found = result(&run, end);
     let mut lowest = end.ok().and_then(|_| modes::lowest(&run, count, false));
     // Next to a bifurcation a grid may count what the leaf has not.
-    while let Some(finer) = modes::telling(&run, lowest.as_ref()) {
+    while let Some(finer) = modes::deciding_grid(&run, lowest.as_ref()) {
         end = run.go_on(finer);
         found = result(&run, end);
         lowest = end.ok().and_then(|_| modes::lowest(&run, count, true));

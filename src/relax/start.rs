@@ -85,7 +85,7 @@ const ALONG: usize = 3;
 const ACROSS: usize = 3;
 
 /// Lifts the nodes of a start out of the plane of the fan, and turns them as
-/// the lift tells: a smooth pattern that is another for every number but the
+/// the lift requires: a smooth pattern that is another for every number but the
 /// sign, which alternates, and the same on all grids. A joint tip stays joint.
 pub fn disturb(leaf: &DiscreteLeaf, number: usize, state: &mut State) {
     let (pattern, sign) = (number / 2, [1.0, -1.0][number % 2]);

@@ -67,7 +67,7 @@ pub struct Request<'a> {
     /// Whether the state only has to be corrected.
     pub near_rest: bool,
     pub work: &'a mut Work,
-    /// Told steps and the largest unbalanced force or moment.
+    /// Receives steps and the largest unbalanced force or moment.
     pub progress: &'a mut dyn FnMut(usize, f64),
     /// Whether the leaf's energy was not convex where it moved.
     pub moved: bool,

@@ -41,7 +41,7 @@ const MAX_TURN: f64 = 1.0;
 const MAX_SHIFT: f64 = 1.0;
 
 /// A last step of Newton's method that is smaller than this (radians, lengths) is not
-/// judged by the energy: that tells it from none by rounding only.
+/// judged by the energy, of which it changes no more than rounding does.
 const SMALL: f64 = 1e-3;
 
 /// Steps on one grid before the run is given up.
@@ -78,7 +78,7 @@ pub struct Relaxation<'a> {
     /// Of positions and rotations.
     pub accuracy: f64,
     pub work: &'a mut Work,
-    /// Told the size of every step.
+    /// Receives the size of every step.
     pub progress: &'a mut dyn FnMut(usize, f64),
     /// Whether the state is one that only has to be corrected: a stiff leaf is
     /// then not softened first.
