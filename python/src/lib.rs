@@ -14,6 +14,11 @@ mod run;
 mod scenario;
 mod verbs;
 
+/// As in the program: a leaf needs many small arrays for a short time, and a list of scenarios,
+/// each of many parts, has to be freed quickly after Ctrl-C.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// What `leafdyn` for Python computes with.
 #[pymodule]
 mod _leafdyn {

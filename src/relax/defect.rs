@@ -14,7 +14,7 @@
 
 use crate::leaf::{DiscreteLeaf, Flow, Grid, Jump, RodFields, Slice, System};
 use crate::newton::Work;
-use crate::relax::correction::{Tangents, apply, larger, largest_others};
+use crate::relax::correction::{Response, Tangents, apply, larger, largest_others};
 use crate::relax::level::Level;
 use crate::relax::nodes::nodes;
 use crate::rotation;
@@ -103,12 +103,11 @@ pub fn estimate(
     for corrections in 0..=most {
         satisfy_tip_conditions(first, &mut known);
         let steps = (finest / first.segments() / 2) << halvings;
-        let carried = carried(first, &mut flow, &known, steps);
-        let Some(response) = tangents.response(system, &carried.jumps) else {
+        let Some((response, round)) = round(first, &mut flow, &known, steps, (&tangents, system))
+        else {
             break;
         };
-        let [at_nodes, between] = response.largest();
-        let largest = larger(at_nodes, between);
+        let largest = larger(round.largest[0], round.largest[1]);
         // Halved steps reveal the error of the integration before, which says nothing about
         // the contraction.
         let contraction = match corrections == 0 || halved {
@@ -126,12 +125,7 @@ pub fn estimate(
         }
         let changes = match last {
             true => Vec::new(),
-            false => tangents.changes(&response, &carried.jumps),
-        };
-        let round = Round {
-            known: known.clone(),
-            carried,
-            largest: [at_nodes, between],
+            false => tangents.changes(&response, &round.carried.jumps),
         };
         if last {
             return Some(estimate(&round, corrections, halvings));
@@ -154,11 +148,30 @@ pub fn estimate(
 }
 
 /// A leaf at the nodes of the coarsest grid, carried along its rods, and its largest
-/// errors at these nodes and in the middles between.
+/// errors at these nodes and at the midpoints between them.
 struct Round {
     known: Vec<Vec<RodFields>>,
     carried: Carried,
     largest: [f64; 2],
+}
+
+/// The leaf `known`, carried in so many `steps` from every node to the midpoints, and its
+/// response to the jumps there. `None` where the linear equations cannot be solved.
+fn round(
+    first: &DiscreteLeaf,
+    flow: &mut Flow,
+    known: &[Vec<RodFields>],
+    steps: usize,
+    (tangents, system): (&Tangents, &mut System),
+) -> Option<(Response, Round)> {
+    let carried = carried(first, flow, known, steps);
+    let response = tangents.response(system, &carried.jumps)?;
+    let round = Round {
+        known: known.to_vec(),
+        carried,
+        largest: response.largest(),
+    };
+    Some((response, round))
 }
 
 /// The equations at rest: those of the last Newton step have the forces before it, which

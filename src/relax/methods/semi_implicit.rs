@@ -179,15 +179,8 @@ impl Relaxation<'_> {
         accuracy: f64,
     ) -> Result<f64, Stop> {
         let mut trial = self.state.clone();
-        let mut velocity = vec![vec![[0.0; 6]; leaf.segments()]; leaf.rods()];
-        let mut next_velocity = velocity.clone();
-        let mut pace = Pace {
-            dt: f64::INFINITY,
-            growth: MAX_GROWTH,
-        };
+        let mut motion = Motion::new(leaf);
         let mut resting = false;
-        // Size of the last step if it was one of Newton's method.
-        let mut newton = f64::INFINITY;
         let (mut previous, mut previous_tolerance) = (f64::INFINITY, f64::INFINITY);
         let space = self.solver.space.is_some().then(|| leaf.in_space());
         let mut sums = leaf.assemble(&self.state, system);
@@ -200,12 +193,12 @@ impl Relaxation<'_> {
             // A positive definite matrix and its solution, with as long a time
             // step as it takes.
             let tolerance = cg_tolerance(previous, self.cg_tolerance);
-            while !self.solve(leaf, space.as_ref(), system, pace.dt, &velocity, tolerance) {
+            while !self.solve(leaf, space.as_ref(), system, &motion, tolerance) {
                 if resting {
                     return Err(Stop::Saddle);
                 }
                 self.moved = true;
-                if self.convex_only || !pace.shorten() {
+                if self.convex_only || !motion.pace.shorten() {
                     return Err(Stop::Stuck);
                 }
             }
@@ -214,15 +207,15 @@ impl Relaxation<'_> {
             let part = (MAX_TURN / turn).min(MAX_SHIFT / shift).min(1.0);
             leaf.advance(&self.state, system, part, &mut trial);
             let mut rest = None;
-            if pace.dt.is_infinite() && part == 1.0 {
+            if motion.is_newton() && part == 1.0 {
                 let contraction = &mut self.solver.contraction;
-                contraction.learn(size, newton);
-                newton = size;
+                contraction.learn(size, motion.newton);
+                motion.newton = size;
                 let first = contraction.after_first(size, trial.force_change(&self.state));
                 let tolerances = [previous_tolerance, tolerance];
                 rest = converged(size, previous, tolerances, (accuracy, ROUNDING), first);
             } else {
-                newton = f64::INFINITY;
+                motion.newton = f64::INFINITY;
             }
             if let Some(remaining) = rest
                 && size < SMALL
@@ -239,15 +232,8 @@ impl Relaxation<'_> {
             let next = leaf.assemble(&trial, system);
             self.work.force_evaluations += 1;
             (self.progress)(step, size);
-            let (mut energy, mut next_energy) = (sums.energy, next.energy);
-            if pace.dt.is_finite() {
-                energy += system.kinetic_energy(&velocity);
-                system.velocity(part, pace.dt, &mut next_velocity);
-                next_energy += system.kinetic_energy(&next_velocity);
-            }
-            let slack = ENERGY_SLACK * (1.0 + energy.abs());
-            if !next_energy.is_finite() || next_energy > energy + slack {
-                if !pace.shorten() {
+            if !motion.loses_energy(system, part, [sums.energy, next.energy]) {
+                if !motion.pace.shorten() {
                     return Err(Stop::Stuck);
                 }
                 sums = leaf.assemble(&self.state, system);
@@ -260,22 +246,15 @@ impl Relaxation<'_> {
             std::mem::swap(&mut self.state, &mut trial);
             sums = next;
             self.work.steps += 1;
-            if pace.dt.is_finite() {
-                std::mem::swap(&mut velocity, &mut next_velocity);
-                if at_saddle(leaf, &self.state, size) {
-                    // With neither inertia nor damping it falls, or it rests.
-                    resting = true;
-                    pace.dt = f64::INFINITY;
-                } else if part == 1.0 {
-                    pace.lengthen();
-                }
-            } else {
+            if motion.is_newton() {
                 resting = false;
                 if let Some(remaining) = rest
                     && closes(leaf, &self.state, accuracy)
                 {
                     return Ok(remaining);
                 }
+            } else {
+                resting = motion.goes_on(at_saddle(leaf, &self.state, size), part) || resting;
             }
             previous = size;
             if system.coupled() {
@@ -285,7 +264,7 @@ impl Relaxation<'_> {
         Err(Stop::StepLimit)
     }
 
-    /// Factorises and solves for a time step of `dt`; false if the matrix is
+    /// Factorises and solves for the next time step of a motion; false if the matrix is
     /// not positive definite. A mode that is neutral up to rounding is left
     /// where it is by a shift of that size.
     fn solve(
@@ -293,10 +272,10 @@ impl Relaxation<'_> {
         leaf: &DiscreteLeaf,
         space: Option<&DiscreteLeaf>,
         system: &mut System,
-        dt: f64,
-        velocity: &[Vec<Increment>],
+        motion: &Motion,
         tolerance: f64,
     ) -> bool {
+        let (dt, velocity) = (motion.pace.dt, motion.velocity.as_slice());
         let inertia = dt.is_finite().then_some((velocity, 1.0 / dt));
         let shift = match dt.is_finite() {
             true => (1.0 / dt + DAMPING) / dt,
@@ -305,6 +284,60 @@ impl Relaxation<'_> {
         let (solver, work) = (&mut self.solver, &mut *self.work);
         solver.convex_in_space(space, &self.state, shift, work)
             && solver.solve(system, shift, inertia, tolerance, work)
+    }
+}
+
+/// Velocities, and the time step; an infinite one is a step of Newton's method.
+struct Motion {
+    pace: Pace,
+    velocity: Vec<Vec<Increment>>,
+    next_velocity: Vec<Vec<Increment>>,
+    /// Size of the last step if it was one of Newton's method.
+    newton: f64,
+}
+
+impl Motion {
+    /// At rest, with the longest step.
+    fn new(leaf: &DiscreteLeaf) -> Self {
+        let velocity = vec![vec![[0.0; 6]; leaf.segments()]; leaf.rods()];
+        Motion {
+            pace: Pace {
+                dt: f64::INFINITY,
+                growth: MAX_GROWTH,
+            },
+            next_velocity: velocity.clone(),
+            velocity,
+            newton: f64::INFINITY,
+        }
+    }
+
+    fn is_newton(&self) -> bool {
+        self.pace.dt.is_infinite()
+    }
+
+    /// Whether the total energy does not grow in a step, of which so great a `part` is taken,
+    /// between these potential energies.
+    fn loses_energy(&mut self, system: &System, part: f64, potential: [f64; 2]) -> bool {
+        let [mut energy, mut next_energy] = potential;
+        if !self.is_newton() {
+            energy += system.kinetic_energy(&self.velocity);
+            system.velocity(part, self.pace.dt, &mut self.next_velocity);
+            next_energy += system.kinetic_energy(&self.next_velocity);
+        }
+        let slack = ENERGY_SLACK * (1.0 + energy.abs());
+        next_energy.is_finite() && next_energy <= energy + slack
+    }
+
+    /// After a good step; returns whether the leaf, which may be at a saddle, goes on with
+    /// neither inertia nor damping: it then falls, or rests.
+    fn goes_on(&mut self, at_saddle: bool, part: f64) -> bool {
+        std::mem::swap(&mut self.velocity, &mut self.next_velocity);
+        if at_saddle {
+            self.pace.dt = f64::INFINITY;
+        } else if part == 1.0 {
+            self.pace.lengthen();
+        }
+        at_saddle
     }
 }
 
