@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::result::{Boundary, LeafBeside};
-use crate::branch::boundary::{self as curves, Beside, Plane, Verified, beside};
+use crate::branch::boundary::{self as curves, Neighbour, Plane, Verified, beside};
 use crate::leaf::State;
 
 /// Curves that have leaves beside them.
@@ -34,7 +34,7 @@ pub fn add_leaves(plane: Plane, known: &[curves::Boundary], boundary: &mut Bound
         let at = same.max_by_key(off)?;
         let before = &points[at.saturating_sub(1)];
         let behind = points.get(at + 1).unwrap_or(&points[at]);
-        let along = [0, 1].map(|i| behind.place[i] - before.place[i]);
+        let along = [0, 1].map(|i| behind.params[i] - before.params[i]);
         Some((number, beside(plane, &points[at], along)?))
     });
     let joined = boundary.joined;
@@ -44,17 +44,17 @@ pub fn add_leaves(plane: Plane, known: &[curves::Boundary], boundary: &mut Bound
     }
 }
 
-fn in_units(plane: &Plane, joined: bool, leaf: Beside) -> LeafBeside {
+fn in_units(plane: &Plane, joined: bool, leaf: Neighbour) -> LeafBeside {
     let length = plane.family.scale().length;
     let curves = |state: &State| -> Vec<Vec<DVec3>> {
         let rods = state.x.chunks(state.segments() + 1);
         rods.map(|rod| rod.iter().map(|x| *x * length).collect())
             .collect()
     };
-    let state = &leaf.spot.state;
+    let state = &leaf.solution.state;
     let tips = (0..state.rods()).map(|j| state.tip(j) * length);
     LeafBeside {
-        values: plane.values(leaf.spot.place),
+        values: plane.values(leaf.solution.params),
         index: leaf.index,
         tips: tips.take(if joined { 1 } else { usize::MAX }).collect(),
         curves: curves(state),

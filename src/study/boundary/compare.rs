@@ -90,14 +90,14 @@ impl Edge {
         let mut points: Vec<&Verified> = Vec::new();
         for point in &curve.points {
             let far =
-                |last: &&Verified| (0..2).any(|i| (point.place[i] - last.place[i]).abs() > APART);
+                |last: &&Verified| (0..2).any(|i| (point.params[i] - last.params[i]).abs() > APART);
             if points.last().is_none_or(far) {
                 points.push(point);
             }
         }
         let places = points
             .iter()
-            .map(|it| [it.place[along], it.place[1 - along]]);
+            .map(|it| [it.params[along], it.params[1 - along]]);
         let places: Vec<[f64; 2]> = places.collect();
         let mut crossings = Vec::new();
         for k in 1..places.len() {

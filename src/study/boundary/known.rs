@@ -46,7 +46,7 @@ pub struct Start<'a> {
     /// Both numbers where the branch begins, as fractions, and their change with its
     /// parameter.
     pub from: [f64; 2],
-    pub way: [f64; 2],
+    pub direction: [f64; 2],
 }
 
 /// Both numbers, as fractions, and the tips are the same within this, besides the errors that
@@ -66,15 +66,15 @@ const BEYOND: f64 = 0.05;
 impl Start<'_> {
     /// Both numbers at a value of the branch's parameter.
     fn numbers(&self, parameter: f64) -> [f64; 2] {
-        [0, 1].map(|i| self.from[i] + parameter * self.way[i])
+        [0, 1].map(|i| self.from[i] + parameter * self.direction[i])
     }
 
     /// As the beginning of a curve.
     pub fn seed(&self) -> Seed<'_> {
         Seed {
             critical: self.critical,
-            place: self.numbers(self.critical.fraction),
-            way: self.way,
+            params: self.numbers(self.critical.fraction),
+            direction: self.direction,
         }
     }
 
@@ -87,7 +87,7 @@ impl Start<'_> {
     pub fn is_on(&self, curve: &Boundary) -> bool {
         let tips = self.refined.tips.iter().flatten();
         let numbers = self.numbers(self.refined.fraction);
-        let length = self.way[0].hypot(self.way[1]);
+        let length = self.direction[0].hypot(self.direction[1]);
         let singular = Singular {
             place: numbers.into_iter().chain(tips.copied()).collect(),
             error: self.refined.fraction_error * length + self.refined.error,
@@ -204,7 +204,7 @@ fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
 /// A point of a curve as one of a space: both numbers, and the tips.
 fn place(point: &Verified) -> Vec<f64> {
     let tips = point.tips.iter().flatten();
-    point.place.into_iter().chain(tips.copied()).collect()
+    point.params.into_iter().chain(tips.copied()).collect()
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
@@ -278,14 +278,14 @@ mod tests {
         let point = |k: usize| {
             let at = from + (to - from) * k as f64 / 20.0;
             Verified {
-                place: [0.3 + 0.2 * at * at, at],
+                params: [0.3 + 0.2 * at * at, at],
                 errors: [1e-9, 0.0],
                 tips: vec![[1.0 - 0.3 * at, y * at, 0.0]],
                 error: 1e-9,
                 state: State::new(1, vec![DVec3::ZERO; 2], vec![DQuat::IDENTITY; 2]),
                 across: Direction {
                     increments: Vec::new(),
-                    place: [1.0, 0.0],
+                    params: [1.0, 0.0],
                 },
                 stations: vec![0.0, 1.0],
                 kind: Kind::Branching,
@@ -310,7 +310,7 @@ mod tests {
         leave_out_known(&mut second, &known);
         assert_eq!(second.ends, [Halt::Met, Halt::Reached]);
         let first = &second.points[0];
-        assert!((first.place[1] - 0.6).abs() < 1e-12, "{:?}", first.place);
+        assert!((first.params[1] - 0.6).abs() < 1e-12, "{:?}", first.params);
         assert_eq!(second.points.len(), 11);
     }
 
@@ -327,7 +327,8 @@ mod tests {
     fn other_curves_stay_as_they_are() {
         let mut second = curve(0.0, 1.0, 0.5);
         let mut other = curve(0.0, 1.0, 0.5);
-        (other.points.iter_mut()).for_each(|point| point.place[0] += 1e-3 * (point.place[1] - 0.5));
+        (other.points.iter_mut())
+            .for_each(|point| point.params[0] += 1e-3 * (point.params[1] - 0.5));
         leave_out_known(&mut second, &[other]);
         assert_eq!(second.points.len(), 21);
         assert_eq!(second.ends, [Halt::Reached; 2]);

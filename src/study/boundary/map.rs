@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::compare::{Crossing, Edge, is_followed};
 use super::result::BoundaryMap;
-use crate::branch::boundary::{AtRest, Boundary, Plane, Way, go, recount};
+use crate::branch::boundary::{AtRest, Boundary, Path, Plane, follow_path, recount};
 use crate::branch::{Critical, Kind};
 use crate::leaf::Grid;
 
@@ -76,17 +76,17 @@ impl<'p> Cells<'p> {
     /// the first number and then along the second; returns the ways that are not as the
     /// curves say.
     pub fn begin(&mut self, first: AtRest, curves: &[Boundary]) -> Vec<Unexplained> {
-        let second = first.spot.place[1];
+        let second = first.solution.params[1];
         let row = ((second * self.size[1] as f64) as usize).min(self.size[1] - 1);
         let cell = row * self.size[0];
         let middle = self.middle(cell);
         let mut unexplained = Vec::new();
         let mut now = Some(first);
         for to in [[middle[0], second], middle] {
-            if let Some(from) = now.take_if(|from| from.spot.place != to) {
-                let mut way = go(&self.plane, &from, to);
-                now = way.end.take();
-                unexplained.extend(self.keep((&from, to, now.as_ref()), cell, way, curves));
+            if let Some(from) = now.take_if(|from| from.solution.params != to) {
+                let mut path = follow_path(&self.plane, &from, to);
+                now = path.end.take();
+                unexplained.extend(self.keep((&from, to, now.as_ref()), cell, path, curves));
             }
         }
         self.front[cell] = now;
@@ -125,18 +125,18 @@ impl<'p> Cells<'p> {
             })
             .filter(|(_, from): &(usize, Vec<usize>)| !from.is_empty())
             .collect();
-        let gone: Vec<Vec<(usize, Way)>> = (next.par_iter())
+        let gone: Vec<Vec<(usize, Path)>> = (next.par_iter())
             .map(|(cell, from)| self.reach(*cell, from))
             .collect();
         let none = vec![None; self.front.len()];
         let before = std::mem::replace(&mut self.front, none);
         let mut unexplained = Vec::new();
         for ((cell, _), ways) in next.iter().zip(gone) {
-            for (from, mut way) in ways {
-                let (to, end) = (self.middle(*cell), way.end.take());
+            for (from, mut path) in ways {
+                let (to, end) = (self.middle(*cell), path.end.take());
                 if let Some(from) = &before[from] {
                     let ends = (from, to, end.as_ref());
-                    unexplained.extend(self.keep(ends, *cell, way, curves));
+                    unexplained.extend(self.keep(ends, *cell, path, curves));
                 }
                 self.front[*cell] = end;
             }
@@ -145,15 +145,15 @@ impl<'p> Cells<'p> {
     }
 
     /// Goes to a cell from those beside it in turn, until one way leads there.
-    fn reach(&self, cell: usize, from: &[usize]) -> Vec<(usize, Way)> {
+    fn reach(&self, cell: usize, from: &[usize]) -> Vec<(usize, Path)> {
         let mut ways = Vec::new();
         for &other in from {
             let Some(begun) = &self.front[other] else {
                 continue;
             };
-            let way = go(&self.plane, begun, self.middle(cell));
-            let found = way.end.is_some();
-            ways.push((other, way));
+            let path = follow_path(&self.plane, begun, self.middle(cell));
+            let found = path.end.is_some();
+            ways.push((other, path));
             if found {
                 break;
             }
@@ -166,16 +166,16 @@ impl<'p> Cells<'p> {
         &mut self,
         (from, to, end): (&AtRest, [f64; 2], Option<&AtRest>),
         cell: usize,
-        mut way: Way,
+        mut path: Path,
         curves: &[Boundary],
     ) -> Option<Unexplained> {
-        self.factorizations += way.factorizations;
+        self.factorizations += path.factorizations;
         if self.joined {
-            way.tips.iter_mut().for_each(|tips| tips.truncate(1));
+            path.tips.iter_mut().for_each(|tips| tips.truncate(1));
         }
-        let ends = [from.spot.place, to];
+        let ends = [from.solution.params, to];
         let along = usize::from(ends[0][0] == ends[1][0]);
-        let beyond = way.critical.extract_if(.., |it| !is_followed(it.indices));
+        let beyond = path.critical.extract_if(.., |it| !is_followed(it.indices));
         let beyond = beyond.map(|critical| Crossing {
             at: ends[0][along] + critical.fraction * (to[along] - ends[0][along]),
             fold: critical.kind == Kind::Fold,
@@ -185,13 +185,13 @@ impl<'p> Cells<'p> {
             ends,
             beyond: beyond.collect(),
             index: from.index,
-            tips: way.tips,
+            tips: path.tips,
             found: end.map(|end| end.index),
         };
         let unexplained = (!edge.is_explained(curves)).then(|| Unexplained {
             ends: edge.ends,
-            grid: way.grid.unwrap_or_else(|| from.grid.clone()),
-            critical: way.critical,
+            grid: path.grid.unwrap_or_else(|| from.grid.clone()),
+            critical: path.critical,
         });
         self.edges[cell].push(edge);
         unexplained

@@ -10,7 +10,9 @@ use super::map::{Cells, Unexplained};
 use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, CurveEnd, word};
 use super::{BoundaryRequest, MOST_CURVES};
 use crate::branch::Family;
-use crate::branch::boundary::{self as curves, Accuracy, AtRest, Plane, Spot, Stride, Verified};
+use crate::branch::boundary::{
+    self as curves, Accuracy, AtRest, Plane, Solution, Stride, Verified,
+};
 use crate::scenario::Scenario;
 use crate::study::trace::{TraceError, TraceRequest};
 
@@ -102,7 +104,7 @@ pub fn boundary(
             critical,
             refined,
             from: [0.0, plane.fraction(start)],
-            way: [1.0, 0.0],
+            direction: [1.0, 0.0],
         };
         run.follow_new(&start, &mut boundary);
     }
@@ -111,9 +113,9 @@ pub fn boundary(
         let first = AtRest {
             grid: coarsened(&grid, point.state.segments(), kinks),
             index: point.index,
-            spot: Spot {
+            solution: Solution {
                 state: point.state,
-                place: [0.0, plane.fraction(start)],
+                params: [0.0, plane.fraction(start)],
             },
         };
         boundary.map = Some(run.map(size, first, &mut boundary));
@@ -162,7 +164,7 @@ impl Run<'_, '_> {
         self.tried += 1;
         let (plane, progress) = (self.plane, &mut *self.progress);
         let number = boundary.curves.len();
-        let mut tell = |points, place| progress(Some(number), points, plane.values(place));
+        let mut tell = |points, params| progress(Some(number), points, plane.values(params));
         let grid = start.grid(plane.family.first().kinks());
         let mut curve = curves::follow(plane, &grid, &start.seed(), &self.how, &mut tell);
         boundary.factorizations += curve.factorizations;
@@ -194,14 +196,15 @@ impl Run<'_, '_> {
             {
                 let [from, to] = *ends;
                 for critical in critical {
-                    let refined = curves::refine_on(&self.plane, *ends, grid, critical, accuracy);
+                    let refined =
+                        curves::refine_on_path(&self.plane, *ends, grid, critical, accuracy);
                     if let Ok(refined) = &refined {
-                        let way = [0, 1].map(|i| to[i] - from[i]);
+                        let direction = [0, 1].map(|i| to[i] - from[i]);
                         let start = Start {
                             critical,
                             refined,
                             from,
-                            way,
+                            direction,
                         };
                         self.follow_new(&start, boundary);
                     }
@@ -230,8 +233,8 @@ fn in_units(plane: &Plane, joined: bool, curve: &curves::Boundary) -> BoundaryCu
 /// A point in the scenario's units.
 fn point_in_units(plane: &Plane, joined: bool, number: usize, point: &Verified) -> BoundaryPoint {
     let length = plane.family.scale().length;
-    let values = plane.values(point.place);
-    let beyond = plane.values([0, 1].map(|i| point.place[i] + point.errors[i]));
+    let values = plane.values(point.params);
+    let beyond = plane.values([0, 1].map(|i| point.params[i] + point.errors[i]));
     let tips = (point.tips.iter()).map(|tip| DVec3::from_array(*tip) * length);
     let nodes = point.state.segments() + 1;
     BoundaryPoint {
