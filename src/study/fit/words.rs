@@ -1,24 +1,24 @@
-//! What the data say, in words.
+//! The results in words.
 
 use std::collections::BTreeMap;
 
 use super::result::FitParameter;
 
-/// A combination along which the numbers could be others: coordinates and their parts.
+/// An undetermined combination: coordinates and their coefficients.
 pub(super) struct Open {
-    /// Index of the free number, and its part; the largest is one.
+    /// Index of the free number, and its coefficient; the largest is one.
     pub parts: Vec<(usize, f64)>,
-    /// Whether the data say nothing at all about it, or only little.
+    /// Whether the data are completely insensitive to it, or only weakly sensitive.
     pub exactly: bool,
 }
 
-/// The combination as the result has it.
+/// The combination in the form of the result.
 pub(super) fn map(open: &Open, keys: &[String], units: &[f64]) -> BTreeMap<String, f64> {
     let part = |(k, part): &(usize, f64)| (keys[*k].clone(), rounded(part * units[*k]));
     open.parts.iter().map(part).collect()
 }
 
-/// Without what rounding makes of a simple number.
+/// Removes rounding errors from a simple number.
 fn rounded(value: f64) -> f64 {
     let digits = (value * 1e4).round() / 1e4;
     if (digits - value).abs() < 1e-4 * value.abs().max(1e-3) {
@@ -28,8 +28,8 @@ fn rounded(value: f64) -> f64 {
     }
 }
 
-/// A sentence about each number and each open combination. `logs` says of which
-/// numbers the coordinate is a logarithm.
+/// A sentence for each number and each undetermined combination. `logs` are the numbers
+/// whose coordinate is a logarithm.
 pub(super) fn says(parameters: &[FitParameter], open: &[Open], logs: &[bool]) -> Vec<String> {
     let mut said = Vec::new();
     for (k, parameter) in parameters.iter().enumerate() {
