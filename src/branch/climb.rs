@@ -49,14 +49,12 @@ const SOFT: usize = 3;
 struct Valley {
     /// Solutions with the bordered matrix.
     solved: Solved,
-    /// Shift of the matrix.
     shift: f64,
-    /// Curvature of the floor.
     curvature: f64,
 }
 
 impl Equations<'_> {
-    /// A saddle of index one that is reached from `state` uphill, initially in the direction
+    /// A saddle of index one that is reached from `state` uphill, initially along
     /// `direction`; none if none is reached, or if `stop` returns true.
     pub fn climb(
         &mut self,
@@ -142,7 +140,7 @@ impl Equations<'_> {
     }
 
     /// The stable equilibrium reached downhill from a state at most marginally in equilibrium,
-    /// initially in the direction `direction`; if none is reached, the last state.
+    /// initially along `direction`; if none is reached, the last state.
     pub fn descend(
         &mut self,
         state: &State,
@@ -206,7 +204,7 @@ impl Equations<'_> {
         Some((next, newton && size < NEAR))
     }
 
-    /// The valley in the direction `direction`, from the assembled matrix.
+    /// The valley along `direction`, from the assembled matrix.
     fn valley(&mut self, direction: &Field, linear: &Linear) -> Option<Valley> {
         let border = [self.momentum(direction)];
         let mut shift = linear.shift;

@@ -85,7 +85,6 @@ impl Plane {
 
 /// Forces and their derivatives at a state.
 pub(super) struct Linear {
-    /// Unbalanced forces.
     pub forces: Field,
     /// Their derivative with respect to the parameter.
     pub rate: Field,
@@ -365,7 +364,6 @@ pub(super) fn factorized<'p>(
     (pattern.factorize(system, shift)).map_err(|_| Stuck::TooLarge)
 }
 
-/// The opposite direction.
 pub fn reversed(t: Tangent) -> Tangent {
     Tangent {
         increments: times(&t.increments, -1.0),

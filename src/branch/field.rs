@@ -44,7 +44,6 @@ pub fn combined(parts: &[f64], fields: &[Field]) -> Field {
     sum
 }
 
-/// The largest absolute component.
 pub fn largest(a: &Field) -> f64 {
     let all = a.iter().flatten().flatten();
     all.fold(0.0, |m, v| m.max(v.abs()))

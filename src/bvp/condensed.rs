@@ -17,7 +17,6 @@ pub const SINGULAR: f64 = 1e-10;
 
 /// The condensed equations, factorised.
 pub struct Condensed {
-    /// Sensitivities of the intervals.
     maps: Vec<Mat<f64>>,
     /// Orthonormal bases of the free perturbations at the inner nodes.
     bases: Vec<Mat<f64>>,

@@ -26,11 +26,9 @@ const MOST_INTERVALS: usize = 256;
 
 /// A continuation that ended before the scenario's leaf was reached.
 pub struct Interrupted {
-    /// Why.
     pub reason: Reason,
     /// Part of the change that was made.
     pub part: f64,
-    /// The last solution.
     pub near: Trajectory,
 }
 

@@ -28,9 +28,7 @@ pub struct Unbounded {
 pub struct Integrator<'e, 'a> {
     equations: &'e Equations<'a>,
     tolerance: f64,
-    /// Present position.
     pub sigma: f64,
-    /// The state there.
     pub y: Vec<f64>,
     /// Proposed size of the next step.
     step: f64,
@@ -41,7 +39,6 @@ pub struct Integrator<'e, 'a> {
     slopes: Vec<Vec<f64>>,
     next: Vec<f64>,
     steps: usize,
-    /// Number of slope evaluations.
     pub evaluations: usize,
 }
 

@@ -29,7 +29,6 @@ pub struct Equations<'a> {
     pub length: f64,
     /// Unit of force, A/L^2, with A the geometric mean of A2 and A3 mid-rod.
     pub force: f64,
-    /// Lengths of the rods.
     pub lengths: Vec<f64>,
     coupling: Vec<DVec3>,
     gravity: DVec3,
@@ -100,7 +99,6 @@ struct Material {
 }
 
 impl<'a> Equations<'a> {
-    /// For a checked scenario.
     pub fn new(scenario: &'a Scenario) -> Self {
         let rods = &scenario.rods;
         let length = longest(rods);
@@ -163,7 +161,6 @@ impl<'a> Equations<'a> {
         }
     }
 
-    /// Number of rods.
     pub fn rods(&self) -> usize {
         self.lengths.len()
     }

@@ -99,9 +99,7 @@ pub struct Integrated {
     pub end: Vec<f64>,
     /// The linearised equations along it, if requested.
     steps: Vec<LinearStep>,
-    /// Number of steps.
     pub count: usize,
-    /// Number of slope evaluations.
     pub evaluations: usize,
 }
 

@@ -14,10 +14,8 @@ use super::solution::{Correction, Log, Reason};
 use super::trajectory::{Nodes, Trajectory};
 use crate::memory::Request;
 
-/// Largest number of iterations.
 const MAX_ITERATIONS: usize = 60;
 
-/// Smallest damping factor.
 const LEAST_FACTOR: f64 = 1e-3;
 
 /// Contraction below which a start counts as near its solution.
@@ -44,11 +42,8 @@ pub enum Stuck {
 
 /// The state of a run; its linearisation is kept between calls.
 pub struct Newton<'e, 'a, 'p> {
-    /// The equations.
     pub equations: &'e Equations<'a>,
-    /// Units of the unknowns.
     pub units: Units,
-    /// The unknowns.
     pub nodes: Nodes,
     /// Whether to solve without damping, only if the start is near the solution.
     pub only_near: bool,
@@ -58,17 +53,14 @@ pub struct Newton<'e, 'a, 'p> {
     pub growth: Vec<f64>,
     /// Largest defect at the last evaluation, in the units.
     pub defect: f64,
-    /// Progress.
     now: Correction,
     /// Counts work and reports progress.
     log: &'e mut Log<'p>,
 }
 
-/// Residuals of the equations.
 struct Residuals {
     /// End of each interval minus the beginning of the next.
     defects: Vec<Vec<f64>>,
-    /// The tip's conditions.
     conditions: Vec<f64>,
 }
 

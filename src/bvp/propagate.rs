@@ -36,9 +36,7 @@ impl LinearStep {
 /// fixed: [`TANGENT`] rows of `W` numbers per rod.
 #[derive(Clone, Debug)]
 pub struct Perturbations<const W: usize> {
-    /// The rods perturbed.
     pub rods: Range<usize>,
-    /// Rows.
     pub rows: Vec<[f64; W]>,
     stage: Vec<[f64; W]>,
     slopes: Vec<Vec<[f64; W]>>,

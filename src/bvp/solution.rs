@@ -52,7 +52,6 @@ pub struct Correction {
 
 /// Counts the work of a shooting and reports its progress.
 pub(super) struct Log<'p> {
-    /// Work so far.
     pub work: Work,
     /// Part of the present change of the leaf of arcs that is done.
     pub part: f64,

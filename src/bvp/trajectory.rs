@@ -147,7 +147,6 @@ impl Trajectory {
         self.sigma.iter().copied().rfind(|s| *s <= sigma)
     }
 
-    /// The state at `sigma`.
     pub fn at(&self, sigma: f64) -> Vec<f64> {
         let last = self.sigma.len() - 1;
         let i = self.sigma.partition_point(|&s| s <= sigma).clamp(1, last);

@@ -168,7 +168,6 @@ impl EnergyBalance {
         [dissipated, work, self.balance, self.potential, self.largest]
     }
 
-    /// Restores saved numbers.
     pub fn restore(&mut self, next: &mut impl FnMut() -> f64) {
         let [dissipated, work, balance, potential, largest] = [(); 5].map(|()| next());
         *self = EnergyBalance {

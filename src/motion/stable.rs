@@ -9,7 +9,6 @@
 //! that it alone moves fast. With the rate of internal friction from three
 //! strains (see [`super::friction::rates`]) a mode with the part K of its squared frequency
 //! from strains and C from coupling satisfies
-//! from strains and C from coupling goes like
 //!
 //! ```text
 //! z^3 + (a + 3 b/2 - 2) z^2 + (1 - 2 b) z + b/2 = 0,   a = h^2 (K + C),   b = eta h K

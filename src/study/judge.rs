@@ -35,7 +35,6 @@ pub struct Answer {
     pub stations: Vec<f64>,
     /// The shape there, one per rod.
     pub rods: Vec<RodShape>,
-    /// Energy.
     pub energy: f64,
     /// Number of negative eigenvalues.
     pub index: Option<usize>,

@@ -23,7 +23,6 @@ const FINEST: usize = 64;
 /// A leaf next to a boundary.
 pub struct Neighbour {
     pub solution: Solution,
-    /// Its Morse index.
     pub index: usize,
     /// If it is where the leaf of the other, stable side comes to rest beyond the boundary, the
     /// initial state of that fall: the unstable equilibrium at a branch point, or the fold.

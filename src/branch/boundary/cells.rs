@@ -48,7 +48,6 @@ pub struct Path {
     turned: bool,
     /// The equilibrium at the end; none if the branch turns back before, or is lost.
     pub end: Option<AtRest>,
-    /// Matrices factorised for it.
     pub factorizations: usize,
 }
 

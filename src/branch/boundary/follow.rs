@@ -19,7 +19,6 @@ pub struct Boundary {
     /// The kind of its critical points along the first parameter, and how many modes are neutral.
     pub kind: Kind,
     pub neutral: usize,
-    /// Its verified points.
     pub points: Vec<Verified>,
     /// How it ended at its first point and at its last.
     pub ends: [Halt; 2],

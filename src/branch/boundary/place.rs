@@ -26,7 +26,6 @@ const NEUTRAL: f64 = 1e-7;
 /// A point of a boundary on one grid.
 #[derive(Clone, Debug)]
 pub struct SingularPoint {
-    /// State and parameters.
     pub solution: Solution,
     /// The kind of critical point, along the first parameter.
     pub kind: Kind,

@@ -30,7 +30,6 @@ pub struct Eigen {
 /// Why no point of a boundary is found.
 #[derive(Clone, Debug)]
 pub enum NotFound {
-    /// No solution was found.
     Stuck(Stuck),
     /// The modes do not become neutral together.
     Separated,
@@ -70,7 +69,6 @@ pub struct Found {
 }
 
 impl Found {
-    /// Where it is.
     pub fn solution(&self) -> &Solution {
         &self.sample.solution
     }

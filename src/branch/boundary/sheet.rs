@@ -23,9 +23,7 @@ pub struct Solution {
 /// A direction on the solution manifold.
 #[derive(Clone, Debug)]
 pub struct Direction {
-    /// Increments of the nodes.
     pub increments: Field,
-    /// Changes of the parameters.
     pub params: [f64; 2],
 }
 
@@ -39,7 +37,6 @@ impl Direction {
         }
     }
 
-    /// The opposite direction.
     pub fn reversed(&self) -> Direction {
         Direction {
             increments: times(&self.increments, -1.0),
@@ -102,7 +99,6 @@ impl<'a> Manifold<'a> {
         self.softened = Some((family, LeafCache::default()));
     }
 
-    /// The grid.
     pub fn grid(&self) -> &Grid {
         self.equations.grid()
     }

@@ -30,7 +30,6 @@ pub struct Verified {
     pub across: Direction,
     /// The nodes as fractions of the length.
     pub stations: Vec<f64>,
-    /// Its kind.
     pub kind: Kind,
     pub special: Option<Special>,
     /// Morse indices where the first parameter is smaller and where it is larger; at a fold,
@@ -78,7 +77,6 @@ pub struct Table {
 }
 
 impl Table {
-    /// An empty table.
     pub fn new(given: Option<(usize, f64)>) -> Self {
         Table {
             given,

@@ -49,9 +49,7 @@ pub struct Stride {
     /// The longest step; the range of each parameter has length one, and so has a turn of all
     /// nodes by ten radians or a shift by one length.
     pub longest: f64,
-    /// Largest number of points.
     pub most: usize,
-    /// Required accuracy.
     pub accuracy: Accuracy,
 }
 

@@ -45,7 +45,6 @@ impl Explicit {
         state
     }
 
-    /// Positions and rotations.
     pub(super) fn state(&self) -> State {
         let n = self.leaf.segments();
         let nodes = || self.leaf.each(GROUP..=GROUP + n);

@@ -15,7 +15,6 @@ pub struct Array {
 }
 
 impl Array {
-    /// An array of zeros.
     pub fn zeros(length: usize) -> Self {
         let room = vec![0.0; length + LINE];
         let first = room.as_ptr().align_offset(LINE * size_of::<f64>());

@@ -130,7 +130,6 @@ pub struct Step<'a> {
     /// Whether quaternions are normalised; rounding and truncated series slowly change their
     /// length.
     pub normalise: bool,
-    /// Workspace.
     pub block: &'a mut Block,
 }
 

@@ -45,7 +45,6 @@ fn rate<S: Simd>(
     before.times(rates[2], last.times(rates[1], now.scale(rates[0])))
 }
 
-/// Nodes of a rod.
 #[derive(Clone, Copy)]
 pub struct Nodes<'a> {
     /// Index of the first, count.

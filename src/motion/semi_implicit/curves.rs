@@ -166,7 +166,6 @@ impl Rod {
         turns.fold(0.0, |largest, (turn, _)| largest.max(turn.abs()))
     }
 
-    /// Appends the nodes.
     fn append_nodes(&self, parameters: [f64; 2], x: &mut Vec<DVec3>, q: &mut Vec<DQuat>) {
         let frame = |part| rotation::exp(self.direction(parameters, part) * DVec3::Z);
         let mut node = DVec3::ZERO;

@@ -13,7 +13,6 @@ pub struct Traced {
     pub critical: Vec<(Critical, Refined)>,
 }
 
-/// Runs the trace.
 pub fn traced(
     request: &TraceRequest,
     progress: &mut dyn FnMut(usize, f64),

@@ -169,7 +169,6 @@ pub fn remarks(
     remarks
 }
 
-/// Remarks on one contender.
 fn remarks_on(contender: Contender, rows: &[Row], floor: f64, neutral: bool) -> Vec<String> {
     let mut remarks = Vec::new();
     let of_it = || rows.iter().filter(|row| row.contender == contender);

@@ -40,7 +40,6 @@ pub(super) struct Case {
 /// One scalar datum.
 #[derive(Clone, Debug)]
 pub(super) struct Component {
-    /// The experiment.
     pub case: usize,
     pub what: What,
     pub observed: f64,
@@ -66,7 +65,6 @@ pub(super) enum What {
 }
 
 impl What {
-    /// Its kind.
     pub fn kind(self) -> Kind {
         match self {
             What::Result(quantity) => quantity.kind(),

@@ -108,7 +108,6 @@ impl Addition {
         Some(Addition { parts })
     }
 
-    /// Adds `times` the increments.
     pub fn add(&self, scenario: &mut Scenario, times: f64) {
         for (slot, part) in &self.parts {
             let values = numbers_mut(scenario, *slot).iter_mut();

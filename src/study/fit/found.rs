@@ -17,7 +17,6 @@ use crate::study::Keys;
 /// largest are left out.
 const NEGLIGIBLE: f64 = 0.1;
 
-/// The result.
 pub(super) fn fit(
     stats: &Statistics,
     end: &End,

@@ -119,7 +119,6 @@ pub(super) enum End {
     Stuck(Option<Lost>),
 }
 
-/// A least-squares iteration.
 pub(super) struct Iteration<'m, 'a> {
     pub model: &'m Model<'a>,
     pub weighting: Weighting,

@@ -50,7 +50,6 @@ impl<'j, 'm, 'a> Neighbourhood<'j, 'm, 'a> {
         })
     }
 
-    /// Derivatives at the minimum.
     pub fn slopes(&self) -> Slopes {
         self.slopes_of(self.stats.jacobian.clone())
     }

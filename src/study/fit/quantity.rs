@@ -36,7 +36,6 @@ pub(super) enum Kind {
     Frequency,
 }
 
-/// Names of the axes.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 impl FromStr for Quantity {

@@ -146,7 +146,6 @@ impl<'a> Cell<'a> {
         })
     }
 
-    /// Solves the boundary-value problem.
     fn shoot(&self, start: Start, accuracy: f64, intervals: Option<usize>, limit: &Limit) -> Found {
         let segments = match &self.relaxed.0 {
             Ok(relaxed) => relaxed.stations.len() - 1,

@@ -106,7 +106,6 @@ struct Stable<'a> {
     grid: Grid,
     state: State,
     accuracy: f64,
-    /// The largest push.
     largest: f64,
     limit: &'a Limit,
     searches: Searches<'a>,
@@ -250,7 +249,6 @@ fn continuation_grid(scenario: &Scenario, levels: &[Level]) -> Result<(Grid, Sta
     }
 }
 
-/// Weight of a leaf.
 fn weight(scenario: &Scenario) -> f64 {
     let lengths: f64 = scenario.rods.iter().map(|rod| rod.length).sum();
     let [x, y, z] = scenario.gravity;

@@ -116,8 +116,8 @@ impl Base {
 
     /// The scenario with these values.
     ///
+    /// # Errors
     /// If it is invalid, or has no such entry.
-    /// If it is refused, or has no such entry.
     pub fn at(&self, values: &[(&Keys, f64)]) -> Result<Varied, VaryError> {
         let mut knobs = self.knobs;
         for (keys, value) in values {
