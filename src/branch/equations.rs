@@ -141,13 +141,13 @@ impl<'a> Equations<'a> {
     }
 
     /// Inner product of two directions.
-    pub fn along(&self, a: &Tangent, b: &Tangent) -> f64 {
+    pub fn inner(&self, a: &Tangent, b: &Tangent) -> f64 {
         self.product(&a.increments, &b.increments) + a.fraction * b.fraction
     }
 
     /// Scales a direction to length one.
     pub fn normalised(&self, t: Tangent) -> Tangent {
-        let length = self.along(&t, &t).sqrt();
+        let length = self.inner(&t, &t).sqrt();
         Tangent {
             increments: times(&t.increments, 1.0 / length),
             fraction: t.fraction / length,
@@ -236,7 +236,7 @@ impl<'a> Equations<'a> {
             through: None,
         });
         let (mut point, iterations) = self.correct_within(state, fraction, plane.as_ref())?;
-        if normal.is_some_and(|normal| self.along(&point.tangent, normal) < 0.0) {
+        if normal.is_some_and(|normal| self.inner(&point.tangent, normal) < 0.0) {
             point.tangent = reversed(point.tangent);
         }
         Ok((point, iterations))

@@ -70,7 +70,7 @@ impl<'a> Family<'a> {
     }
 
     /// Leaves of the same kind, in the same units, along another path with the parameter 0 to 1.
-    pub fn along<'b>(
+    pub fn along_path<'b>(
         &self,
         make: &'b (dyn Fn(f64) -> Result<Scenario, String> + Sync),
     ) -> Result<Family<'b>, OutOfRange> {

@@ -113,7 +113,7 @@ fn on_next_grid<'a>(
     });
     let found = equations.correct_within(&guess, point.fraction, condition.as_plane())?;
     let (mut found, _) = found;
-    if equations.along(&found.tangent, &tangent) < 0.0 {
+    if equations.inner(&found.tangent, &tangent) < 0.0 {
         found.tangent = reversed(found.tangent);
     }
     Ok(Finer {
@@ -155,7 +155,7 @@ pub fn index_at(equations: &mut Equations, point: &Point) -> Result<usize, Doubt
     let (mut moved, mut same, mut index) = (f64::INFINITY, 1, point.index);
     let mut finer = on_next_grid(equations, point, &mut Condition::Value)?;
     for _ in 1..GRIDS {
-        let along = finer.equations.along(&finer.point.tangent, &finer.tangent);
+        let along = finer.equations.inner(&finer.point.tangent, &finer.tangent);
         if along < SAME_BRANCH || finer.moved > moved.max(STILL) {
             return Err(Doubt::OtherBranch);
         }
@@ -199,7 +199,7 @@ fn refine_in(
         }
         let finer = on_next_grid(&mut equations, &now, &mut condition)?;
         equations = finer.equations;
-        let same = equations.along(&finer.point.tangent, &finer.tangent);
+        let same = equations.inner(&finer.point.tangent, &finer.tangent);
         if same < SAME_BRANCH || finer.moved > moved.max(STILL) {
             return Err(Doubt::OtherBranch);
         }

@@ -94,7 +94,7 @@ fn at_edge(
     let increments = &now.tangent.increments;
     let state = equations.moved(&now.state, edge, increments, length)?;
     let (mut point, iterations) = equations.correct(&state, edge, None)?;
-    if equations.along(&point.tangent, &now.tangent) < 0.0 {
+    if equations.inner(&point.tangent, &now.tangent) < 0.0 {
         point.tangent = reversed(point.tangent);
     }
     Ok((point, iterations))

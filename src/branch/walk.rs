@@ -242,7 +242,7 @@ impl Branch {
             }
             Err(stuck) => return Err(stuck),
         };
-        let turn = equations.along(&now.tangent, &next.point.tangent);
+        let turn = equations.inner(&now.tangent, &next.point.tangent);
         let mut end = next.stop_at_edge(equations, now, step)?.map(End::at_edge);
         if let Some(first) = &self.first
             && end.is_none()
@@ -256,7 +256,7 @@ impl Branch {
         let turned = now.tangent.fraction * next.point.tangent.fraction < 0.0;
         if next.point.index != now.index || turned {
             let after = self.points.len() - 1;
-            let distance = equations.along(&chord(now, &next.point), &now.tangent);
+            let distance = equations.inner(&chord(now, &next.point), &now.tangent);
             let found = locate(equations, now, &next.point, distance);
             // If the branch turns back and no eigenvalue changes sign, it touches another one
             // where that crosses: the vertex of a pitchfork.
@@ -296,7 +296,7 @@ impl Walk<'_> {
     /// Whether a step has presumably stayed on the branch.
     fn accepts(&self, equations: &Equations, now: &Point, found: &Found, step: f64) -> bool {
         let changes = found.point.index.abs_diff(now.index);
-        equations.along(&now.tangent, &found.point.tangent) > BENT
+        equations.inner(&now.tangent, &found.point.tangent) > BENT
             && found.drift < DRIFT * step
             && (changes <= MOST_CHANGES || step < SHORT_ENOUGH * self.longest)
             && transverse_part(equations, now, &found.point) < ACROSS
@@ -319,11 +319,11 @@ fn transverse_part(equations: &Equations, a: &Point, b: &Point) -> f64 {
         fraction: a.tangent.fraction + b.tangent.fraction,
     });
     let mut rest = chord(a, b);
-    let length = equations.along(&rest, &rest).sqrt();
-    let along = equations.along(&rest, &mean);
+    let length = equations.inner(&rest, &rest).sqrt();
+    let along = equations.inner(&rest, &mean);
     add(&mut rest.increments, -along, &mean.increments);
     rest.fraction -= along * mean.fraction;
-    equations.along(&rest, &rest).sqrt() / length
+    equations.inner(&rest, &rest).sqrt() / length
 }
 
 /// Corrects a point near the first one until both agree in parameter, shape, tangent and
@@ -331,14 +331,14 @@ fn transverse_part(equations: &Equations, a: &Point, b: &Point) -> f64 {
 fn closed_at(equations: &mut Equations, first: &Point, near: &Point, step: f64) -> Option<Point> {
     let mut near = near.clone();
     for _ in 0..CLOSING {
-        let same = equations.along(&near.tangent, &first.tangent);
+        let same = equations.inner(&near.tangent, &first.tangent);
         if same < BENT || near.index != first.index {
             return None;
         }
         if distance(&near, first) < SAME {
             return Some(near);
         }
-        let shift = equations.along(&chord(&near, first), &first.tangent) / same;
+        let shift = equations.inner(&chord(&near, first), &first.tangent) / same;
         if shift.abs() > 2.0 * step {
             return None;
         }

@@ -138,7 +138,7 @@ impl Strategy {
             let turns = (near.turn(equations) / TURN).ceil() as usize;
             turns.clamp(LEAST_INTERVALS, MOST_INTERVALS)
         });
-        let mut newton = Newton::near(equations, near, Some(count), log)?;
+        let mut newton = Newton::from_trajectory(equations, near, Some(count), log)?;
         newton.only_near = self != Strategy::Far;
         newton.solve(ROUGH)?;
         let stations = STATIONS * count.max(LEAST_INTERVALS);

@@ -222,7 +222,7 @@ fn responses_of<const W: usize>(
 /// Growth is measured separately for positions, rotations, forces and moments, which makes it
 /// independent of units, for every rod with its neighbours held.
 /// Fails if too many intervals would be needed.
-pub fn choose(equations: &Equations, near: &Trajectory) -> Result<Nodes, Unbounded> {
+pub fn choose_intervals(equations: &Equations, near: &Trajectory) -> Result<Nodes, Unbounded> {
     let mut sigma = vec![0.0];
     'intervals: loop {
         let begin = sigma[sigma.len() - 1];

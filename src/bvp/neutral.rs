@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::intervals::GROWTH;
-use super::newton::{Newton, Stuck, largest};
+use super::newton::{Newton, NewtonFailure, largest};
 use super::solution::{Neutral, Reason};
 use super::trajectory::{Nodes, Trajectory};
 
@@ -30,10 +30,10 @@ impl Newton<'_, '_, '_> {
     }
 
     /// The reason that corresponds to a failure of Newton's method.
-    pub fn reason(&self, stuck: Stuck) -> Reason {
+    pub fn reason(&self, stuck: NewtonFailure) -> Reason {
         let correction = match stuck {
-            Stuck::Unbounded(unbounded) => return unbounded.into(),
-            Stuck::NoProgress(correction) => correction,
+            NewtonFailure::Unbounded(unbounded) => return unbounded.into(),
+            NewtonFailure::NoProgress(correction) => correction,
         };
         match self.neutral(&STATIONS) {
             Some(neutral) => Reason::Singular(neutral),

@@ -9,7 +9,7 @@
 use super::condensed::Condensed;
 use super::dop853::Unbounded;
 use super::equations::{Equations, RodState};
-use super::intervals::{Integrated, Units, choose, integrate, responses, sensitivities};
+use super::intervals::{Integrated, Units, choose_intervals, integrate, responses, sensitivities};
 use super::solution::{Correction, Log, Reason};
 use super::trajectory::{Nodes, Trajectory};
 use crate::memory::Request;
@@ -33,7 +33,7 @@ const KEEP: f64 = 0.1;
 const NOISE: f64 = 1e3;
 
 /// Why Newton's method did not converge.
-pub enum Stuck {
+pub enum NewtonFailure {
     /// An initial-value problem has no bounded solution at the start.
     Unbounded(Unbounded),
     /// Corrections do not decrease; the last one, relative.
@@ -68,7 +68,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
     /// Sets up the unknowns from a trajectory, over so many intervals; `None`:
     /// as many as the growth of perturbations needs, if that is possible and
     /// memory allows it.
-    pub fn near(
+    pub fn from_trajectory(
         equations: &'e Equations<'a>,
         near: &Trajectory,
         intervals: Option<usize>,
@@ -80,7 +80,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
                 let states = sigma[..count].iter().map(|&sigma| near.at(sigma)).collect();
                 Nodes { sigma, states }
             }
-            None => choose(equations, near)?,
+            None => choose_intervals(equations, near)?,
         };
         let (rods, intervals) = (equations.rods(), nodes.states.len());
         Request::Shooting { rods, intervals }.weigh()?;
@@ -113,7 +113,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         self.iterate(tolerance).map_err(|stuck| self.reason(stuck))
     }
 
-    fn iterate(&mut self, tolerance: f64) -> Result<(), Stuck> {
+    fn iterate(&mut self, tolerance: f64) -> Result<(), NewtonFailure> {
         self.now.wanted = tolerance;
         let mut factor: f64 = 1.0;
         let mut fresh = self.condensed.is_none();
@@ -165,7 +165,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
                 }
                 return match self.defect <= LARGEST_DEFECT.max(NOISE * tolerance) {
                     true => Ok(()),
-                    false => Err(Stuck::NoProgress(size)),
+                    false => Err(NewtonFailure::NoProgress(size)),
                 };
             }
             if self.only_near && ratio > NEAR {
@@ -179,11 +179,11 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             };
             fresh = !keep;
         }
-        Err(Stuck::NoProgress(size))
+        Err(NewtonFailure::NoProgress(size))
     }
 
     /// Linearises at the present unknowns.
-    fn linearize(&mut self, tolerance: f64) -> Result<Residuals, Stuck> {
+    fn linearize(&mut self, tolerance: f64) -> Result<Residuals, NewtonFailure> {
         let integrated = self.integrate(&self.nodes.clone(), tolerance, true)?;
         let residuals = self.residuals(&self.nodes, &integrated);
         self.growth.clear();
@@ -192,14 +192,14 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             !self.equations.limit.reached()
         });
         let Some(responses) = responses else {
-            return Err(Stuck::NoProgress(f64::INFINITY));
+            return Err(NewtonFailure::NoProgress(f64::INFINITY));
         };
         let maps = sensitivities(self.equations, &self.units, &responses, &mut self.growth);
         self.log.work.linearizations += 1;
         self.condensed = Condensed::new(self.equations, &self.units, maps);
         match self.condensed {
             Some(_) => Ok(residuals),
-            None => Err(Stuck::NoProgress(f64::INFINITY)),
+            None => Err(NewtonFailure::NoProgress(f64::INFINITY)),
         }
     }
 
@@ -209,7 +209,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         (self.log.progress)(&self.now);
     }
 
-    fn residuals_at(&mut self, nodes: &Nodes, tolerance: f64) -> Result<Residuals, Stuck> {
+    fn residuals_at(&mut self, nodes: &Nodes, tolerance: f64) -> Result<Residuals, NewtonFailure> {
         let integrated = self.integrate(nodes, tolerance, false)?;
         Ok(self.residuals(nodes, &integrated))
     }
@@ -219,12 +219,12 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         nodes: &Nodes,
         tolerance: f64,
         linear: bool,
-    ) -> Result<Vec<Integrated>, Stuck> {
+    ) -> Result<Vec<Integrated>, NewtonFailure> {
         if self.equations.limit.reached() {
-            return Err(Stuck::NoProgress(f64::INFINITY));
+            return Err(NewtonFailure::NoProgress(f64::INFINITY));
         }
-        let integrated =
-            integrate(self.equations, nodes, tolerance, linear).map_err(Stuck::Unbounded)?;
+        let integrated = integrate(self.equations, nodes, tolerance, linear)
+            .map_err(NewtonFailure::Unbounded)?;
         for interval in &integrated {
             self.log.work.steps += interval.count;
             self.log.work.slopes += interval.evaluations;

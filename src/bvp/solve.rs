@@ -105,7 +105,7 @@ fn solve_near(
     log: &mut Log,
 ) -> Result<Solution, Reason> {
     let stations = options.stations;
-    let mut newton = Newton::near(equations, near, options.intervals, log)?;
+    let mut newton = Newton::from_trajectory(equations, near, options.intervals, log)?;
     let mut at = |tolerance: f64| -> Result<Trajectory, Reason> {
         newton.solve(tolerance)?;
         let sampled = Trajectory::sampled(equations, &newton.nodes, stations, tolerance);

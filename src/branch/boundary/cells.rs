@@ -70,7 +70,7 @@ fn between<'p>(plane: &'p Plane, [from, to]: [[f64; 2]; 2]) -> Box<Between<'p>> 
 /// on the grid of the path, that grid is too coarse, and a finer one is tried.
 pub fn follow_path(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Path {
     let make = between(plane, [from.solution.params, to]);
-    let family = plane.family.along(&*make);
+    let family = plane.family.along_path(&*make);
     let mut path = Path::default();
     let Ok(family) = family else { return path };
     let equations = Equations::new(&family, from.grid.clone());
@@ -111,7 +111,7 @@ pub fn follow_path(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Path {
 /// it, or do not agree.
 pub fn recount(plane: &Plane, at: &AtRest) -> Option<usize> {
     let make = between(plane, [at.solution.params; 2]);
-    let family = plane.family.along(&*make).ok()?;
+    let family = plane.family.along_path(&*make).ok()?;
     let mut equations = Equations::new(&family, at.grid.clone()).ok()?;
     let (mut point, _) = equations.correct(&at.solution.state, 0.0, None).ok()?;
     while point.state.segments() < RECOUNTED {
@@ -156,6 +156,6 @@ pub fn refine_on_path(
     accuracy: f64,
 ) -> Result<Refined, Doubt> {
     let make = between(plane, ends);
-    let family = plane.family.along(&*make)?;
+    let family = plane.family.along_path(&*make)?;
     refine_critical(&family, grid, critical, accuracy, CRITICAL_GRIDS)
 }

@@ -9,7 +9,7 @@ use super::plane::Plane;
 use super::search::NotFound;
 use super::sheet::Manifold;
 use super::table::Verified;
-use super::walk::{Stride, Walk};
+use super::walk::{Walk, WalkOptions};
 use crate::branch::critical::Kind;
 use crate::leaf::Grid;
 
@@ -34,7 +34,7 @@ pub fn follow(
     plane: Plane,
     grid: &Grid,
     seed: &Seed,
-    how: &Stride,
+    how: &WalkOptions,
     progress: &mut Progress,
 ) -> Boundary {
     let mut boundary = Boundary {

@@ -53,4 +53,4 @@ pub use sheet::Direction;
 pub use sheet::Solution;
 pub use special::Special;
 pub use table::Verified;
-pub use walk::Stride;
+pub use walk::WalkOptions;

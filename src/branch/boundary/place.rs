@@ -87,7 +87,7 @@ impl SingularPoint {
             increments: critical.tangent.increments.clone(),
             params: direction.map(|part| part * critical.tangent.fraction),
         };
-        let slope = critical.slope / manifold.along(&across, &across).sqrt();
+        let slope = critical.slope / manifold.inner(&across, &across).sqrt();
         let across = manifold.normalised(across);
         let along = manifold.normalised(Direction {
             params: [-direction[1], direction[0]],
@@ -116,8 +116,8 @@ impl SingularPoint {
             accuracy: 1e-11,
             furthest: 0.1,
         };
-        let found = found.run(manifold)?;
-        like.at(manifold, found)
+        let found = found.secant(manifold)?;
+        like.completed(manifold, found)
     }
 
     /// The boundary point that was found from this one, with the directions of this one.
@@ -133,7 +133,11 @@ impl SingularPoint {
     }
 
     /// The same with its own directions; the tangent is oriented as here.
-    pub fn at(&self, manifold: &mut Manifold, found: Found) -> Result<SingularPoint, NotFound> {
+    pub fn completed(
+        &self,
+        manifold: &mut Manifold,
+        found: Found,
+    ) -> Result<SingularPoint, NotFound> {
         let border = self
             .soft
             .iter()
@@ -154,7 +158,7 @@ impl SingularPoint {
         let [a, b] = change.map(|part| part / slope);
         let normal = Direction::mixed([a, b], &basis);
         let mut tangent = Direction::mixed([-b, a], &basis);
-        if manifold.along(&tangent, &self.tangent) < 0.0 {
+        if manifold.inner(&tangent, &self.tangent) < 0.0 {
             tangent = tangent.reversed();
         }
         let forcing = self.forcing(&sample, &eigen, slope);
@@ -269,7 +273,7 @@ impl SingularPoint {
         };
         let first = manifold.normalised(direction(order[0]));
         let second = direction(order[1]);
-        let part = manifold.along(&first, &second);
+        let part = manifold.inner(&first, &second);
         let second = Direction {
             increments: plus(&second.increments, -part, &first.increments),
             params: [0, 1].map(|i| second.params[i] - part * first.params[i]),
@@ -307,7 +311,7 @@ impl SingularPoint {
         let parts = [self.tangent.params[which], -self.normal.params[which]];
         let both = [self.normal.clone(), self.tangent.clone()];
         let across = manifold.normalised(Direction::mixed(parts, &both));
-        let slope = self.slope * manifold.along(&across, &self.normal);
+        let slope = self.slope * manifold.inner(&across, &self.normal);
         (across, slope)
     }
 

@@ -122,7 +122,7 @@ fn refine_from(
             (None, false) => {
                 let left = LEFT * enough;
                 let from = (&near, &start);
-                let found = from_near(&mut manifold, from, given, left, &mut contraction)?;
+                let found = newton_or_secant(&mut manifold, from, given, left, &mut contraction)?;
                 table.iteration_error = table.iteration_error.max(found.1);
                 (found.0, None)
             }
@@ -181,7 +181,7 @@ fn given_at(manifold: &Manifold, point: &SingularPoint) -> Option<usize> {
     let [first, second] = point.tangent.params.map(f64::abs);
     let sine = |which: usize| {
         let (across, _) = point.across_at(manifold, which);
-        manifold.along(&across, &point.normal).abs()
+        manifold.inner(&across, &point.normal).abs()
     };
     let order = if second >= PART * first {
         [1, 0]
@@ -205,7 +205,7 @@ fn relocated(
         let (point, slope) = locate_near(manifold, near, special)?;
         return Ok((point, (special == Special::Crossing).then_some(slope)));
     }
-    let found = sought(manifold, near, given).run(manifold)?;
+    let found = sought(manifold, near, given).secant(manifold)?;
     Ok((near.moved(manifold, found), None))
 }
 
@@ -226,26 +226,28 @@ fn predict_spot(levels: &[Level], params: &[[f64; 2]], believed: usize, solution
 
 /// The point on this grid by Newton's method from its prediction, or by the secant method if
 /// that fails; and the estimated iteration error.
-fn from_near(
+fn newton_or_secant(
     manifold: &mut Manifold,
     (near, start): (&SingularPoint, &Solution),
     given: Option<usize>,
     accuracy: f64,
     contraction: &mut Contraction,
 ) -> Result<(SingularPoint, f64), NotFound> {
-    let mut owned = sought(manifold, near, given);
-    let own = std::mem::replace(&mut owned.near.solution, start.clone());
+    let mut search = sought(manifold, near, given);
+    let own = std::mem::replace(&mut search.near.solution, start.clone());
     let frozen = near.kind == Kind::Branching;
-    let found = owned.search(accuracy).near(manifold, frozen, contraction);
+    let found = search
+        .search(accuracy)
+        .newton(manifold, frozen, contraction);
     let (found, left) = found.or_else(|_| {
-        owned.near.solution = own;
-        owned.run(manifold).map(|found| (found, 0.0))
+        search.near.solution = own;
+        search.secant(manifold).map(|found| (found, 0.0))
     })?;
     Ok((near.moved(manifold, found), left))
 }
 
 /// The search for the point, starting from that on the previous grid.
-fn sought(manifold: &Manifold, near: &SingularPoint, given: Option<usize>) -> Owned {
+fn sought(manifold: &Manifold, near: &SingularPoint, given: Option<usize>) -> PointSearch {
     let (across, slope, along) = match given {
         Some(which) => {
             let (across, slope) = near.across_at(manifold, which);
@@ -253,7 +255,7 @@ fn sought(manifold: &Manifold, near: &SingularPoint, given: Option<usize>) -> Ow
         }
         None => (near.normal.clone(), near.slope, near.tangent.clone()),
     };
-    Owned {
+    PointSearch {
         near: near.clone(),
         across,
         slope,
@@ -262,16 +264,16 @@ fn sought(manifold: &Manifold, near: &SingularPoint, given: Option<usize>) -> Ow
 }
 
 /// A search that owns its directions.
-struct Owned {
+struct PointSearch {
     near: SingularPoint,
     across: Direction,
     slope: f64,
     along: Direction,
 }
 
-impl Owned {
-    fn run(&self, manifold: &mut Manifold) -> Result<Found, NotFound> {
-        self.search(ACCURACY).run(manifold)
+impl PointSearch {
+    fn secant(&self, manifold: &mut Manifold) -> Result<Found, NotFound> {
+        self.search(ACCURACY).secant(manifold)
     }
 
     fn search(&self, accuracy: f64) -> Search<'_> {
@@ -323,15 +325,15 @@ fn unsoftened(
 ) -> Result<Parameters, NotFound> {
     let grid = manifold.grid().clone();
     let mut values_by_softening = [[0.0; 2]; 4];
-    let mut owned = sought(manifold, near, given);
+    let mut search = sought(manifold, near, given);
     for (k, params) in values_by_softening.iter_mut().enumerate().rev() {
         let mut soft = Manifold::new(manifold.plane, grid.clone())?;
         soft.soften(softening * (k + 1) as f64);
-        owned.near.solution = match special {
-            Some(special) => locate_near(&mut soft, &owned.near, special)?.0.solution,
-            None => owned.run(&mut soft)?.solution().clone(),
+        search.near.solution = match special {
+            Some(special) => locate_near(&mut soft, &search.near, special)?.0.solution,
+            None => search.secant(&mut soft)?.solution().clone(),
         };
-        *params = owned.near.solution.params;
+        *params = search.near.solution.params;
     }
     let by = |weights: [f64; 4]| {
         let sum = |i: usize| {

@@ -104,7 +104,7 @@ impl Search<'_> {
     /// points the modes are `frozen`: the manifold is that of a symmetric branch, whose forces do
     /// not excite them. For an asymmetric branch this does not find the point: with a singular
     /// matrix, the amplitude of the mode is undetermined.
-    pub fn near(
+    pub fn newton(
         &self,
         manifold: &mut Manifold,
         frozen: bool,
@@ -150,7 +150,8 @@ impl Search<'_> {
             // With less accurate derivatives, increments cannot shrink faster than these are known.
             let slopes = SLOPES.max(size / previous);
             if let Some(left) = converged(size, previous, [slopes; 2], accuracy, first) {
-                let distance = manifold.along(&manifold.way(self.solution, &solution), self.across);
+                let distance =
+                    manifold.inner(&manifold.difference(self.solution, &solution), self.across);
                 sample.solution = solution;
                 let found = Found {
                     sample,
@@ -196,7 +197,7 @@ impl Search<'_> {
     }
 
     /// The zero of the eigenvalue by a secant method.
-    pub fn run(&self, manifold: &mut Manifold) -> Result<Found, NotFound> {
+    pub fn secant(&self, manifold: &mut Manifold) -> Result<Found, NotFound> {
         let border: Vec<Field> = (self.soft.iter())
             .map(|mode| manifold.equations.momentum(mode))
             .collect();

@@ -110,14 +110,14 @@ impl<'a> Manifold<'a> {
     }
 
     /// Inner product of two directions.
-    pub fn along(&self, a: &Direction, b: &Direction) -> f64 {
+    pub fn inner(&self, a: &Direction, b: &Direction) -> f64 {
         let numbers = a.params[0] * b.params[0] + a.params[1] * b.params[1];
         self.equations.product(&a.increments, &b.increments) + numbers
     }
 
     /// Scales a direction to length one.
     pub fn normalised(&self, direction: Direction) -> Direction {
-        let length = self.along(&direction, &direction).sqrt();
+        let length = self.inner(&direction, &direction).sqrt();
         Direction {
             increments: times(&direction.increments, 1.0 / length),
             params: direction.params.map(|part| part / length),
@@ -136,7 +136,7 @@ impl<'a> Manifold<'a> {
     }
 
     /// The difference of two solutions.
-    pub fn way(&self, a: &Solution, b: &Solution) -> Direction {
+    pub fn difference(&self, a: &Solution, b: &Solution) -> Direction {
         Direction {
             increments: between(&a.state, &b.state),
             params: [0, 1].map(|i| b.params[i] - a.params[i]),

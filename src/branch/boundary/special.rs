@@ -67,9 +67,9 @@ pub fn at_distance(
         accuracy,
         furthest,
     };
-    let found = search.run(manifold)?;
+    let found = search.secant(manifold)?;
     let off = found.distance.abs();
-    Ok((now.at(manifold, found)?, off))
+    Ok((now.completed(manifold, found)?, off))
 }
 
 /// The special point between two points of a boundary, the second `step` along the tangent of
@@ -155,8 +155,8 @@ pub fn at_value(
         accuracy: GIVEN,
         furthest: 0.5,
     };
-    let found = search.run(manifold)?;
-    let mut point = now.at(manifold, found)?;
+    let found = search.secant(manifold)?;
+    let mut point = now.completed(manifold, found)?;
     point.solution.params[which] = value;
     Ok(point)
 }

@@ -45,7 +45,7 @@ const SAME: [f64; 2] = [1e-6, 1e-4];
 
 /// How to follow a boundary: step control and accuracy.
 #[derive(Clone, Copy, Debug)]
-pub struct Stride {
+pub struct WalkOptions {
     /// The longest step; the range of each parameter has length one, and so has a turn of all
     /// nodes by ten radians or a shift by one length.
     pub longest: f64,
@@ -56,7 +56,7 @@ pub struct Stride {
 /// A boundary followed in one direction.
 pub struct Walk<'a, 'h> {
     plane: Plane<'a>,
-    how: &'h Stride,
+    how: &'h WalkOptions,
     /// The second parameter at the starting point.
     second: f64,
     first: SingularPoint,
@@ -73,7 +73,7 @@ impl<'a, 'h> Walk<'a, 'h> {
     /// From its first point, at which one of the parameters may be given.
     pub fn new(
         plane: Plane<'a>,
-        how: &'h Stride,
+        how: &'h WalkOptions,
         first: SingularPoint,
         given: Option<usize>,
     ) -> Self {
@@ -284,9 +284,9 @@ impl<'a, 'h> Walk<'a, 'h> {
         };
         step = part;
         let next = at_value(manifold, now, step, which, value)?;
-        let off = manifold.way(&now.solution, &next.solution);
-        let along = manifold.along(&off, &now.tangent);
-        let off = (manifold.along(&off, &off) - along * along).max(0.0).sqrt();
+        let off = manifold.difference(&now.solution, &next.solution);
+        let along = manifold.inner(&off, &now.tangent);
+        let off = (manifold.inner(&off, &off) - along * along).max(0.0).sqrt();
         self.accepts(manifold, [now, &next], off, step)?;
         let edge = value == 0.0 || value == 1.0;
         let mut steps = self.between(manifold, [now, &next], step)?;
@@ -333,8 +333,8 @@ impl<'a, 'h> Walk<'a, 'h> {
         off: f64,
         step: f64,
     ) -> Result<f64, NotFound> {
-        let turn = manifold.along(&now.tangent, &next.tangent);
-        let tilt = manifold.along(&now.normal, &next.normal);
+        let turn = manifold.inner(&now.tangent, &next.tangent);
+        let tilt = manifold.inner(&now.normal, &next.normal);
         match off <= DRIFT * step && turn > BENT && tilt > BENT {
             true => Ok(turn),
             false => Err(NotFound::Stuck(Stuck::NotConverged)),
@@ -361,7 +361,7 @@ impl<'a, 'h> Walk<'a, 'h> {
         let first = &self.first;
         (first.solution.params[0] - point.solution.params[0]).abs() < SAME[0]
             && first.solution.state.shift_to(&point.solution.state) < SAME[1]
-            && manifold.along(&first.tangent, &point.tangent) > BENT
+            && manifold.inner(&first.tangent, &point.tangent) > BENT
     }
 }
 

@@ -11,7 +11,7 @@ use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, CurveEn
 use super::{BoundaryRequest, MOST_CURVES};
 use crate::branch::Family;
 use crate::branch::boundary::{
-    self as curves, Accuracy, AtRest, Plane, Solution, Stride, Verified,
+    self as curves, Accuracy, AtRest, Plane, Solution, Verified, WalkOptions,
 };
 use crate::scenario::Scenario;
 use crate::study::trace::{TraceError, TraceRequest};
@@ -87,7 +87,7 @@ pub fn boundary(
     };
     let mut run = Run {
         plane,
-        how: Stride {
+        how: WalkOptions {
             longest: (1.0 / (across.values.len() - 1) as f64).min(LONGEST),
             most: request.trace.most_points,
             accuracy: Accuracy {
@@ -144,7 +144,7 @@ pub fn boundary(
 /// The run that follows the curves.
 struct Run<'r, 'p> {
     plane: Plane<'r>,
-    how: Stride,
+    how: WalkOptions,
     known: Vec<curves::Boundary>,
     /// Number of critical points from which curves were started.
     tried: usize,

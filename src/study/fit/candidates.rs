@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::FitError;
-use super::case::{Component, What};
+use super::case::{Compared, Component};
 use super::data::{Data, Experiment};
 use super::model::Model;
 use super::result::FitCandidate;
@@ -60,8 +60,8 @@ fn added(stats: &Statistics, model: &Model) -> Result<DMatrix<f64>, String> {
     let (mut point, _) = found.map_err(|refused| refused.to_string())?;
     (model.differentiate(&mut point)).map_err(|_| "its equilibrium is singular".to_string())?;
     let sd = |component: &Component| match component.what {
-        What::Result(quantity) => component.sd.or(stats.assumed(quantity.kind())),
-        What::Vein { .. } => component.sd,
+        Compared::Result(quantity) => component.sd.or(stats.assumed(quantity.kind())),
+        Compared::Vein { .. } => component.sd,
     };
     let sd: Option<Vec<f64>> = point.components().map(sd).collect();
     let sd = sd.ok_or("its standard deviation must be given (sd_frequency_1, sd_tip_x, ...)")?;

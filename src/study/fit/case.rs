@@ -41,7 +41,7 @@ pub(super) struct Case {
 #[derive(Clone, Debug)]
 pub(super) struct Component {
     pub case: usize,
-    pub what: What,
+    pub what: Compared,
     pub observed: f64,
     pub model: f64,
     /// Its standard deviation, if known.
@@ -54,7 +54,7 @@ pub(super) struct Component {
 
 /// The quantity compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum What {
+pub(super) enum Compared {
     Result(Quantity),
     /// A coordinate of a point on a rod, at this fraction of its length.
     Vein {
@@ -64,11 +64,11 @@ pub(super) enum What {
     },
 }
 
-impl What {
+impl Compared {
     pub fn kind(self) -> Kind {
         match self {
-            What::Result(quantity) => quantity.kind(),
-            What::Vein { .. } => Kind::Length,
+            Compared::Result(quantity) => quantity.kind(),
+            Compared::Vein { .. } => Kind::Length,
         }
     }
 }
@@ -146,7 +146,7 @@ impl CaseAt {
         for measured in &of.measured {
             found.components.push(Component {
                 case,
-                what: What::Result(measured.quantity),
+                what: Compared::Result(measured.quantity),
                 observed: measured.value.unwrap_or(f64::NAN),
                 model: found.result(measured.quantity),
                 sd: measured.sd,
@@ -168,7 +168,7 @@ impl CaseAt {
             for (number, (axis, observed)) in seen.enumerate() {
                 found.components.push(Component {
                     case,
-                    what: What::Vein {
+                    what: Compared::Vein {
                         rod: traced.rod,
                         axis,
                         sigma,
@@ -191,7 +191,7 @@ impl CaseAt {
         let leaf = &self.at.levels[0].leaf;
         let symmetric = leaf.leaf.held.is_none() && leaf.tip_moment() == DVec3::ZERO;
         let tip = |component: &Component| match component.what {
-            What::Result(Quantity::Tip(axis)) => Some(axis),
+            Compared::Result(Quantity::Tip(axis)) => Some(axis),
             _ => None,
         };
         let mut axes: Vec<usize> = self.components.iter().map(tip).collect::<Option<_>>()?;
@@ -223,7 +223,7 @@ impl CaseAt {
             }
         }
         let row = |component: &Component| match component.what {
-            What::Result(Quantity::Tip(axis)) => sums[axis].clone(),
+            Compared::Result(Quantity::Tip(axis)) => sums[axis].clone(),
             _ => Vec::new(),
         };
         Ok(self.components.iter().map(row).collect())
@@ -322,8 +322,8 @@ impl CaseAt {
         let stencils = self.at.stencils(sigma);
         let axes: Vec<usize> = (point.iter())
             .map(|component| match component.what {
-                What::Vein { axis, .. } => axis,
-                What::Result(_) => 0,
+                Compared::Vein { axis, .. } => axis,
+                Compared::Result(_) => 0,
             })
             .collect();
         let mut along = DVec3::ZERO;

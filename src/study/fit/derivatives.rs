@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
-use super::case::{CaseAt, Component, What};
+use super::case::{CaseAt, Compared, Component};
 use super::change::Change;
 use super::model::{Model, Point};
 use super::responses::Responses;
@@ -121,7 +121,7 @@ impl CaseAt {
         while index < self.components.len() {
             let component = &self.components[index];
             match component.what {
-                What::Result(quantity) => {
+                Compared::Result(quantity) => {
                     let by = |k: usize| {
                         let of = (&numbers[k], &rates[k], responses.each[k].as_slice());
                         slopes[k] * self.result_rate(quantity, of)
@@ -129,11 +129,11 @@ impl CaseAt {
                     gradients.push((0..numbers.len()).map(by).collect());
                     index += 1;
                 }
-                What::Vein { rod, sigma, .. } => {
+                Compared::Vein { rod, sigma, .. } => {
                     // All coordinates of the point.
                     let same = |other: &&Component| match other.what {
-                        What::Vein { .. } => other.origin == component.origin,
-                        What::Result(_) => false,
+                        Compared::Vein { .. } => other.origin == component.origin,
+                        Compared::Result(_) => false,
                     };
                     let point: Vec<&Component> =
                         self.components[index..].iter().take_while(same).collect();

@@ -1,7 +1,7 @@
 //! The result of a fit: the minimum and its neighbourhood.
 
 use super::candidates;
-use super::case::What;
+use super::case::Compared;
 use super::data::Experiment;
 use super::directions::sparse;
 use super::free::Coordinate;
@@ -9,7 +9,7 @@ use super::least_squares::End;
 use super::model::Model;
 use super::result::{Fit, FitLeaf, FitOutcome, FitParameter, FitResidual, FitWork};
 use super::statistics::{OPEN, Statistics};
-use super::words::{self, Open};
+use super::words::{self, Undetermined};
 use crate::relax::Lost;
 use crate::study::Keys;
 
@@ -63,7 +63,7 @@ pub(super) fn fit(
             .iter()
             .map(|open| words::map(open, &keys, &units))
             .collect(),
-        says: words::says(&parameters, &open, &logs),
+        says: words::sentences(&parameters, &open, &logs),
         parameters,
         chi_squared: match stats.known {
             true => stats.residuals.norm_squared(),
@@ -75,7 +75,7 @@ pub(super) fn fit(
         residuals: compared(stats),
         candidates,
         work: FitWork {
-            evaluations: stats.evaluations.rough + stats.evaluations.accurate,
+            evaluations: stats.evaluations.coarse + stats.evaluations.accurate,
             accurate: stats.evaluations.accurate,
             last: Model::work(stats.point),
         },
@@ -129,14 +129,15 @@ fn remarks(stats: &Statistics, end: &End) -> Vec<String> {
 
 /// Undetermined combinations: those to which the data are insensitive, in their sparsest form,
 /// and those with an uncertainty of more than a factor of ten.
-fn open(stats: &Statistics, parameters: &[FitParameter]) -> Vec<Open> {
-    let mut open: Vec<Open> = sparse(&stats.directions.columns(0, stats.insensitive).into_owned())
-        .into_iter()
-        .map(|parts| Open {
-            parts,
-            exactly: true,
-        })
-        .collect();
+fn open(stats: &Statistics, parameters: &[FitParameter]) -> Vec<Undetermined> {
+    let mut open: Vec<Undetermined> =
+        sparse(&stats.directions.columns(0, stats.insensitive).into_owned())
+            .into_iter()
+            .map(|parts| Undetermined {
+                parts,
+                exactly: true,
+            })
+            .collect();
     for direction in stats.insensitive..stats.values.len() {
         if stats.quantile * stats.spread / stats.values[direction] > OPEN {
             let v = stats.directions.column(direction);
@@ -147,7 +148,7 @@ fn open(stats: &Statistics, parameters: &[FitParameter]) -> Vec<Open> {
                 .map_or(1.0, |p| p.signum());
             let parts = v.iter().map(|part| sign * part / largest).enumerate();
             let parts = parts.filter(|(_, part)| part.abs() > NEGLIGIBLE);
-            open.push(Open {
+            open.push(Undetermined {
                 parts: parts.collect(),
                 exactly: false,
             });
@@ -155,9 +156,9 @@ fn open(stats: &Statistics, parameters: &[FitParameter]) -> Vec<Open> {
     }
     // A number whose profile alone has no end.
     for (k, parameter) in parameters.iter().enumerate() {
-        let named = |open: &Open| open.parts.iter().any(|(part, _)| *part == k);
+        let named = |open: &Undetermined| open.parts.iter().any(|(part, _)| *part == k);
         if !parameter.determined && !open.iter().any(named) {
-            open.push(Open {
+            open.push(Undetermined {
                 parts: vec![(k, 1.0)],
                 exactly: false,
             });
@@ -172,8 +173,8 @@ fn compared(stats: &Statistics) -> Vec<FitResidual> {
         .map(|(component, band)| {
             let sd = stats.sd(component);
             let (what, rod, sigma) = match component.what {
-                What::Result(quantity) => (quantity.to_string(), None, None),
-                What::Vein { rod, axis, sigma } => {
+                Compared::Result(quantity) => (quantity.to_string(), None, None),
+                Compared::Vein { rod, axis, sigma } => {
                     (["x", "y", "z"][axis].into(), Some(rod + 1), Some(sigma))
                 }
             };

@@ -8,6 +8,7 @@
 mod candidates;
 mod case;
 mod change;
+mod coarse;
 mod data;
 mod derivatives;
 mod directions;
@@ -21,7 +22,6 @@ mod neighbourhood;
 mod quantity;
 mod responses;
 mod result;
-mod rough;
 mod statistics;
 mod vein;
 mod words;
@@ -125,7 +125,7 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
     let model = Model::new(base, &coordinates, &options, request.data.clone())?;
     let start: Vec<f64> = coordinates.iter().map(|free| free.start).collect();
     let assumed = ASSUMED * model.unit();
-    let (first, _) = model.loose(assumed).find(&start)?;
+    let (first, _) = model.with_loose_tolerance(assumed).find(&start)?;
     let known = model.check_deviations(&first)?;
     let measured = first.components().filter(|component| !component.free);
     check_count(coordinates.len(), measured.count(), known)?;
@@ -133,7 +133,7 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
         assumed,
         robust: request.robust,
     };
-    let (mut rough, mut point) = model.rough(&first, weighting)?;
+    let (mut coarse, mut point) = model.coarse(&first, weighting)?;
     let mut evaluations = Evaluations::default();
     let mut attempts = 0;
     let mut jumps = 0;
@@ -143,9 +143,9 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
             let known = None;
             progress(&FitStep { step, sum, known });
         };
-        let mut search = Iteration::new(&rough, weighting, &mut searching);
+        let mut search = Iteration::new(&coarse, weighting, &mut searching);
         let (near, searched, more) = search.run(point);
-        evaluations.rough += more;
+        evaluations.coarse += more;
         attempts += 1;
         let there = model.refined(&near).or_else(|_| {
             let found = model.find(&near.theta);
@@ -163,10 +163,10 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
         {
             jumps += 1;
             attempts -= 1;
-            (rough, point) = model.rough(&there, weighting)?;
+            (coarse, point) = model.coarse(&there, weighting)?;
             continue;
         }
-        let of_search = Statistics::new(&rough, weighting, known, &near, evaluations);
+        let of_search = Statistics::new(&coarse, weighting, known, &near, evaluations);
         let spread = Statistics::new(&model, weighting, known, &least, evaluations).spread;
         let same = searched == End::Converged && of_search.spread < SAME_SPREAD * spread;
         if !same && end == End::Converged {

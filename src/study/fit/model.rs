@@ -286,7 +286,7 @@ impl<'a> Model<'a> {
 
     /// The same model with leaves only as accurate as the resolution of its data, all of which are
     /// lengths.
-    pub fn loose(&self, assumed: f64) -> Model<'a> {
+    pub fn with_loose_tolerance(&self, assumed: f64) -> Model<'a> {
         let length = self.base.scenario().scale().length;
         let sd = |sd: Option<f64>| sd.unwrap_or(assumed) / length;
         let mut tolerance = f64::INFINITY;

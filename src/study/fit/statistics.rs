@@ -20,7 +20,7 @@ const INSENSITIVE: f64 = 1e-3;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Evaluations {
     /// With the accuracy of a search.
-    pub rough: usize,
+    pub coarse: usize,
     /// With the required accuracy.
     pub accurate: usize,
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::result::FitParameter;
 
 /// An undetermined combination: coordinates and their coefficients.
-pub(super) struct Open {
+pub(super) struct Undetermined {
     /// Index of the free number, and its coefficient; the largest is one.
     pub parts: Vec<(usize, f64)>,
     /// Whether the data are completely insensitive to it, or only weakly sensitive.
@@ -13,7 +13,7 @@ pub(super) struct Open {
 }
 
 /// The combination in the form of the result.
-pub(super) fn map(open: &Open, keys: &[String], units: &[f64]) -> BTreeMap<String, f64> {
+pub(super) fn map(open: &Undetermined, keys: &[String], units: &[f64]) -> BTreeMap<String, f64> {
     let part = |(k, part): &(usize, f64)| (keys[*k].clone(), rounded(part * units[*k]));
     open.parts.iter().map(part).collect()
 }
@@ -30,7 +30,11 @@ fn rounded(value: f64) -> f64 {
 
 /// A sentence for each number and each undetermined combination. `logs` are the numbers
 /// whose coordinate is a logarithm.
-pub(super) fn says(parameters: &[FitParameter], open: &[Open], logs: &[bool]) -> Vec<String> {
+pub(super) fn sentences(
+    parameters: &[FitParameter],
+    open: &[Undetermined],
+    logs: &[bool],
+) -> Vec<String> {
     let mut said = Vec::new();
     for (k, parameter) in parameters.iter().enumerate() {
         let (low, high) = match (parameter.low, parameter.high) {
@@ -58,7 +62,7 @@ fn percent(part: f64) -> String {
     }
 }
 
-fn sentence(open: &Open, parameters: &[FitParameter], logs: &[bool]) -> String {
+fn sentence(open: &Undetermined, parameters: &[FitParameter], logs: &[bool]) -> String {
     let key = |k: usize| parameters[k].key.as_str();
     let all_logs = open.parts.iter().all(|(k, _)| logs[*k]);
     match open.parts.as_slice() {
@@ -74,7 +78,7 @@ fn sentence(open: &Open, parameters: &[FitParameter], logs: &[bool]) -> String {
                 "{} and {}: {}only as their {only}",
                 key(*a),
                 key(*b),
-                hardly(open)
+                how_weakly(open)
             )
         }
         parts => {
@@ -93,7 +97,7 @@ fn sentence(open: &Open, parameters: &[FitParameter], logs: &[bool]) -> String {
     }
 }
 
-fn hardly(open: &Open) -> &'static str {
+fn how_weakly(open: &Undetermined) -> &'static str {
     if open.exactly { "" } else { "nearly " }
 }
 

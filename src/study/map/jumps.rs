@@ -154,7 +154,7 @@ fn jump(request: &MapRequest, pair: &Pair) -> Option<MapJump> {
         }
         let part = 0.5 * (low.0 + high.0);
         let middle = at(part)?;
-        if half == 0 && off_middle(&low.1, &middle, &high.1)? < NEAR_MIDDLE * distance {
+        if half == 0 && distance_from_middle(&low.1, &middle, &high.1)? < NEAR_MIDDLE * distance {
             return None;
         }
         let [below, above] = [low.1.distance(&middle)?, middle.distance(&high.1)?];
@@ -187,7 +187,7 @@ fn answer(request: &MapRequest, pair: &Pair, value: f64) -> Option<Answer> {
 }
 
 /// Largest distance of a leaf from the mean of two others.
-fn off_middle(low: &Answer, middle: &Answer, high: &Answer) -> Option<f64> {
+fn distance_from_middle(low: &Answer, middle: &Answer, high: &Answer) -> Option<f64> {
     let common = |sigma: f64, of: &Answer| of.stations.iter().position(|it| *it == sigma);
     let mut most: f64 = 0.0;
     for (i, &sigma) in middle.stations.iter().enumerate() {

@@ -68,7 +68,7 @@ pub(super) fn barrier(
         if found.is_some() || stable.limit.reached() {
             return (found, count);
         }
-        let finer: Option<_> = starts.iter().map(|it| on_halved(&family, it)).collect();
+        let finer: Option<_> = starts.iter().map(|it| on_refined(&family, it)).collect();
         match finer {
             Some(finer) => starts = finer,
             None => return (None, count),
@@ -97,7 +97,7 @@ fn lowest(stable: &Stable, family: &Family, starts: &[StartPoint], weight: f64) 
 }
 
 /// The same start point on the grid with all segments halved; none if it has too many nodes.
-fn on_halved(family: &Family, start: &StartPoint) -> Option<StartPoint> {
+fn on_refined(family: &Family, start: &StartPoint) -> Option<StartPoint> {
     let mut equations = Equations::new(family, start.grid.clone()).ok()?;
     let leaf = equations.leaves.at(0.0).ok()?;
     (2 * leaf.rods() * leaf.segments() <= FEW_NODES).then(|| StartPoint {

@@ -20,7 +20,7 @@ const MOST_GRIDS: usize = 2;
 impl<'a> Model<'a> {
     /// The same model on a few coarse grids, and its leaves there, started from those of
     /// this one.
-    pub fn rough(
+    pub fn coarse(
         &self,
         accurate: &Point,
         weighting: Weighting,
