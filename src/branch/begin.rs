@@ -1,4 +1,4 @@
-//! Where a branch begins: at the equilibrium that a relaxation found.
+//! The first point of a branch: the equilibrium that a relaxation found.
 
 use super::equations::Stuck;
 use super::family::Family;
@@ -10,17 +10,17 @@ use crate::relax::{Equilibrium, Options, Work, polish, project, relax};
 /// The finest grid on which the first point is sought.
 const FINEST: usize = 512;
 
-/// By how much the tips of one grid may differ from the extrapolated ones, relative to
-/// the leaf.
+/// Largest distance between the tips of one grid and the extrapolated ones, relative to
+/// the length.
 const SAME_LEAF: f64 = 0.02;
 
-/// The first point of a branch with its grid: the equilibrium `rest`, found with these
-/// `options`, at the fraction 0; on a grid of so many segments or more, or on one twice
-/// as fine as the coarsest of the relaxation or finer on which the index is that of the
-/// finest.
+/// The first point of a branch and its grid: the equilibrium `rest`, found with these
+/// `options`, at fraction 0; on a grid of at least `segments` segments, or, if none is given, on
+/// the first one, at least twice as fine as the coarsest of the relaxation, on which the index
+/// is that of `rest`.
 ///
 /// # Errors
-/// If Newton's method finds it on no grid, what it says on the finest.
+/// The failure on the finest grid, if Newton's method converges on none.
 pub fn begin<'a>(
     family: &'a Family<'a>,
     rest: &Equilibrium,
@@ -29,8 +29,8 @@ pub fn begin<'a>(
 ) -> Result<(Grids<'a>, Point), Stuck> {
     let least = segments.unwrap_or(2 * (rest.shape.stations.len() - 1));
     search(family, rest, least, segments.is_some()).or_else(|stuck| {
-        // Between the stations too little is known: relax it once more, on the finest
-        // grid alone, and begin there.
+        // Interpolation between the stations may be too inaccurate: relax once more, on the
+        // finest grid alone, and begin there.
         let finest = rest.accuracy.segments.iter().max().copied();
         let options = Options {
             method: options.method.on_grid(finest),
@@ -49,8 +49,8 @@ pub fn begin<'a>(
     })
 }
 
-/// The first point on a grid of at least so many segments; of any index, or on one that
-/// is fine enough for that of `rest`.
+/// The first point on a grid of at least `least` segments; of any index, or on the first grid
+/// with the index of `rest`.
 fn search<'a>(
     family: &'a Family<'a>,
     rest: &Equilibrium,

@@ -1,4 +1,4 @@
-//! Where the index changes: folds and points where branches cross.
+//! Critical points, at which the index changes: folds and branch points.
 
 use super::deflation::Deflated;
 use super::equations::{Equations, Stuck};
@@ -6,32 +6,32 @@ use super::field::{combined, dot, plus, times};
 use super::{Point, Tangent};
 use crate::leaf::{Field, State};
 
-/// Modes held besides those that change their sign: neutral ones may be there.
+/// Additional modes in the border: others may be nearly neutral.
 const MORE: usize = 2;
 
-/// Evaluations in the search for a zero.
+/// Largest number of evaluations in the search for a zero.
 const EVALUATIONS: usize = 40;
 
-/// Accuracy of a zero, as a part of the step in which it lies.
+/// Accuracy of a zero, as a part of the step that contains it.
 const ACCURACY: f64 = 1e-13;
 
-/// A slope from points nearer than this part of a step is rounding.
+/// Differences over less than this part of a step do not give a reliable slope.
 const LOCAL: f64 = 1e-6;
 
-/// Eigenvalues that change less than this are neutral, not changing sign.
+/// Sign changes of eigenvalues smaller than this are ignored: the mode stays neutral.
 const NEUTRAL: f64 = 1e-6;
 
-/// Zeros within this part of a step are one.
+/// Zeros closer than this part of a step are the same.
 const SAME: f64 = 1e-6;
 
-/// The search arrives where the step did to within this part of the step, if both
+/// The search ends within this part of the step from the point that the step reached, if both
 /// are on the same branch.
 const ARRIVES: f64 = 0.05;
 
-/// What a critical point is.
+/// Kind of a critical point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// The branch turns round in the parameter.
+    /// The branch turns back in the parameter.
     Fold,
     /// Other branches cross.
     Branching,
@@ -49,16 +49,16 @@ pub struct Critical {
     pub indices: [usize; 2],
     /// The neutral modes, of mass one.
     pub modes: Vec<Field>,
-    /// All modes of the border.
-    pub held: Vec<Field>,
-    /// Which of the sorted eigenvalues of H is zero, and its change with the
-    /// distance along the tangent.
+    /// All modes used for the border.
+    pub soft: Vec<Field>,
+    /// Position of the vanishing one among the sorted eigenvalues of H, and its derivative with
+    /// respect to arclength along the tangent.
     pub which: usize,
     pub slope: f64,
 }
 
-/// The critical points between two points of a branch, the second of them so
-/// far from the first along its tangent.
+/// The critical points between two points of a branch, the second of them `step` along the
+/// tangent of the first.
 pub fn locate(
     equations: &mut Equations,
     a: &Point,
@@ -66,11 +66,11 @@ pub fn locate(
     step: f64,
 ) -> Result<Vec<Critical>, Stuck> {
     let count = a.index.abs_diff(b.index) + MORE;
-    let held = equations.soft_modes(a, count)?;
+    let soft = equations.soft_modes(a, count)?;
     let mut search = Search {
         equations,
         from: a,
-        held: &held,
+        soft: &soft,
     };
     let ends = [search.at(0.0)?, search.at(step)?];
     if ends[1].deflated.state.shift_to(&b.state) > ARRIVES * step {
@@ -89,7 +89,7 @@ pub fn locate(
         }
     }
     found.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-    // Each takes its own share of the change, in their order along the branch.
+    // Each accounts for its part of the change of the index, in their order along the branch.
     let mut before = a.index;
     for (_, critical) in &mut found {
         let change = critical.modes.len();
@@ -106,14 +106,14 @@ pub fn locate(
     Ok(found.into_iter().map(|(_, critical)| critical).collect())
 }
 
-/// Points along the tangent of one, and the eigenvalues of H there.
+/// Evaluates points along the tangent of one, and the eigenvalues of H there.
 struct Search<'s, 'a> {
     equations: &'s mut Equations<'a>,
     from: &'s Point,
-    held: &'s [Field],
+    soft: &'s [Field],
 }
 
-/// What is found at one of them.
+/// Result of an evaluation.
 struct Sample {
     deflated: Deflated,
     eigenvalues: Vec<f64>,
@@ -121,9 +121,8 @@ struct Sample {
     vectors: Vec<Vec<f64>>,
 }
 
-/// Below this part of what a mode could feel of the parameter, it feels
-/// nothing but rounding.
-const DRIVEN: f64 = 1e-6;
+/// A parameter's work on a mode, relative to the largest possible, below which it is rounding.
+const FORCED: f64 = 1e-6;
 
 impl Search<'_, '_> {
     fn at(&mut self, distance: f64) -> Result<Sample, Stuck> {
@@ -131,7 +130,7 @@ impl Search<'_, '_> {
         let (state, fraction) = (&self.from.state, self.from.fraction);
         let fraction = fraction + distance * t.fraction;
         let moved = (self.equations).moved(state, fraction, &t.increments, distance)?;
-        let deflated = (self.equations).deflated(&moved, fraction, t, self.held)?;
+        let deflated = (self.equations).deflated(&moved, fraction, t, self.soft)?;
         let eigen = deflated.h.clone().symmetric_eigen();
         let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
         order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
@@ -143,7 +142,7 @@ impl Search<'_, '_> {
         })
     }
 
-    /// The zero of one eigenvalue by the method of Anderson and Bjorck.
+    /// The zero of one eigenvalue by the Anderson-Bjorck method.
     fn zero(
         &mut self,
         which: usize,
@@ -183,16 +182,16 @@ impl Search<'_, '_> {
         Ok((at, self.critical(sample, which, slope)))
     }
 
-    /// What a sample at a zero says.
+    /// The critical point from a sample at a zero.
     fn critical(&self, sample: Sample, which: usize, slope: f64) -> Critical {
         let (vector, deflated) = (&sample.vectors[which], sample.deflated);
         let mode = combined(vector, &deflated.modes);
         let norm = self.equations.product(&mode, &mode).sqrt();
-        let parts = vector.iter().zip(deflated.drive.iter());
-        let drive: f64 = parts.map(|(v, d)| v * d).sum();
+        let parts = vector.iter().zip(deflated.forcing.iter());
+        let forcing: f64 = parts.map(|(v, d)| v * d).sum();
         let most = (dot(&deflated.rate, &deflated.rate) * dot(&mode, &mode)).sqrt();
         Critical {
-            kind: match drive.abs() > DRIVEN * most.max(slope.abs()) {
+            kind: match forcing.abs() > FORCED * most.max(slope.abs()) {
                 true => Kind::Fold,
                 false => Kind::Branching,
             },
@@ -201,7 +200,7 @@ impl Search<'_, '_> {
             tangent: self.from.tangent.clone(),
             indices: [self.from.index; 2],
             modes: vec![times(&mode, 1.0 / norm)],
-            held: self.held.to_vec(),
+            soft: self.soft.to_vec(),
             which,
             slope,
         }
@@ -209,9 +208,9 @@ impl Search<'_, '_> {
 }
 
 impl Critical {
-    /// The same point on another grid or of a softened matrix, near the given
-    /// state, by the secant method.
-    pub fn again(&self, equations: &mut Equations) -> Result<Critical, Stuck> {
+    /// The same critical point on another grid or of a softened matrix, by a secant method from
+    /// the known state.
+    pub fn relocated(&self, equations: &mut Equations) -> Result<Critical, Stuck> {
         let from = Point {
             state: self.state.clone(),
             fraction: self.fraction,
@@ -221,7 +220,7 @@ impl Critical {
         let mut search = Search {
             equations,
             from: &from,
-            held: &self.held,
+            soft: &self.soft,
         };
         let (mut distance, mut slope) = (0.0, self.slope);
         let mut best = search.at(distance)?;
@@ -253,8 +252,8 @@ impl Critical {
         })
     }
 
-    /// Change of the eigenvalue with the parameter, but at a fold, where it is
-    /// infinite and the parameter as exact as it can be.
+    /// Derivative of the eigenvalue with respect to the parameter; infinite at a fold, where the
+    /// parameter has no first-order error.
     pub fn steepness(&self) -> f64 {
         match self.kind {
             Kind::Fold => f64::INFINITY,
@@ -263,7 +262,7 @@ impl Critical {
     }
 
     /// A direction along which another branch may leave: a neutral mode
-    /// without its part along this branch.
+    /// orthogonalised against this branch.
     pub fn across(&self, equations: &Equations, mode: usize) -> Tangent {
         let mode = &self.modes[mode];
         let part = equations.product(&self.tangent.increments, mode);

@@ -1,4 +1,4 @@
-//! The equations of a branch where the matrix is singular, or nearly so.
+//! Bordered equations of a branch: where the matrix is singular, or nearly so.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,37 +7,37 @@ use super::field::{add, combined, dot, is_finite, largest, times};
 use super::{Point, Tangent};
 use crate::leaf::{Bordered, Field, State, System};
 
-/// What of a singular matrix of the border counts as zero, relative to the rest.
+/// Singular values below this, relative to the largest, count as zero.
 const NEUTRAL: f64 = 1e-7;
 
-/// Stiffness in stretch and shear, in units of A/L^2, from which on segments are stiff.
+/// Stiffness in stretch and shear, in units of A/L^2, above which segments count as stiff.
 pub const STIFF: f64 = 1e4;
 
-/// Iterations of the subspace: the wanted modes are far softer than the rest.
+/// Subspace iterations: few suffice, since the wanted modes are far softer than the rest.
 const SUBSPACE_ITERATIONS: usize = 8;
 
-/// Shift of the matrix (times the masses) in the inverse iteration: it keeps the
-/// pivots from zero.
+/// Shift of the matrix (times the mass matrix) in inverse iteration: it keeps
+/// pivots away from zero.
 const SHIFT: f64 = 1e-9;
 
-/// A point found in the presence of modes that are nearly neutral.
+/// A point computed with nearly neutral modes in the border.
 pub struct Deflated {
     pub state: State,
     pub fraction: f64,
-    /// H of the border: minus the eigenvalues, in the limit, on its diagonal.
+    /// H of the border: its eigenvalues tend to minus those of the matrix.
     pub h: DMatrix<f64>,
     /// X of the border: the modes.
     pub modes: Vec<Field>,
-    /// The forces that the parameter exerts on the modes: zero at a bifurcation, not at a fold.
-    pub drive: DVector<f64>,
-    /// How the forces change with it.
+    /// Work of the parameter's force rates on the modes: zero at a bifurcation, not at a fold.
+    pub forcing: DVector<f64>,
+    /// Derivative of the forces with respect to the parameter.
     pub rate: Field,
 }
 
 impl Equations<'_> {
     /// The point of the branch in a plane, where the matrix may be singular:
-    /// it is bordered by the masses times `modes`, and what these cannot decide
-    /// is left as it is.
+    /// it is bordered by the mass matrix times `modes`; components that remain
+    /// undetermined are left unchanged.
     pub fn deflated(
         &mut self,
         state: &State,
@@ -50,8 +50,8 @@ impl Equations<'_> {
         let (dual, own) = (self.momentum(&normal.increments), normal.fraction);
         let mut previous = f64::INFINITY;
         let mut finished = false;
-        // Stiff segments answer an error of their length by a force: a leaf of such that
-        // rests is corrected once more.
+        // An error in the length of a stiff segment causes a large force: a converged
+        // state with such segments is corrected once more.
         let mut corrected = self.leaves.at(fraction)?.stiffest() * STIFF > 1.0;
         for _ in 0..=ITERATIONS + 1 {
             let linear = match finished {
@@ -65,7 +65,7 @@ impl Equations<'_> {
                     state,
                     fraction,
                     h: solved.h,
-                    drive: DVector::from_vec(rate.multipliers),
+                    forcing: DVector::from_vec(rate.multipliers),
                     rate: linear.rate,
                     modes: solved.modes,
                 });
@@ -85,8 +85,8 @@ impl Equations<'_> {
         Err(Stuck::NotConverged)
     }
 
-    /// Solves with the matrix of the system, bordered, for forces, their rates, and the
-    /// units of the border.
+    /// Solves the bordered equations with the assembled matrix: for the forces, their rates, and
+    /// the unit vectors of the border.
     pub(super) fn solve_bordered(
         &mut self,
         border: &[Field],
@@ -128,8 +128,8 @@ impl Equations<'_> {
         })
     }
 
-    /// The `count` modes whose eigenvalues are next to zero at a point, by
-    /// inverse iteration of a subspace; of mass one, the next to zero first.
+    /// The `count` modes whose eigenvalues are nearest to zero at a point, by
+    /// subspace inverse iteration; of mass one, in the order of these eigenvalues.
     pub fn soft_modes(&mut self, point: &Point, count: usize) -> Result<Vec<Field>, Stuck> {
         let mut state = point.state.clone();
         self.linearise(&mut state, point.fraction)?;
@@ -143,8 +143,8 @@ impl Equations<'_> {
             for mode in &mut modes {
                 *mode = factor.solve_bordered(mode, &[]).increments;
             }
-            // Gram and Schmidt over the masses, then Ritz: the operator is
-            // K^-1 M, whose largest values belong to the softest modes.
+            // Gram-Schmidt in the mass product, then Rayleigh-Ritz: the operator is
+            // K^-1 M, whose largest eigenvalues belong to the softest modes.
             for k in 0..count {
                 for l in 0..k {
                     let part = self.product(&modes[l], &modes[k]);
@@ -166,7 +166,7 @@ impl Equations<'_> {
             order.sort_by(|&a, &b| size(b).total_cmp(&size(a)));
             let mode = |&k: &usize| combined(eigen.eigenvectors.column(k).as_slice(), &modes);
             modes = order.iter().map(mode).collect();
-            // Forces again, for the next inverse iteration.
+            // Back to forces, for the next inverse iteration.
             if !modes.iter().all(is_finite) {
                 return Err(Stuck::NotConverged);
             }
@@ -184,22 +184,22 @@ impl Equations<'_> {
 
 /// Solutions of the bordered equations at some state.
 pub(super) struct Solved {
-    /// For the forces, and for the rates at which they change with each number.
+    /// For the forces, and for their rates with respect to each parameter.
     pub forces: Bordered,
     pub rates: Vec<Bordered>,
     /// H and X of the border.
     pub h: DMatrix<f64>,
     pub modes: Vec<Field>,
-    /// Negative eigenvalues of the bordered matrix: those of the matrix alone and of H
+    /// Negative eigenvalues of the bordered matrix: those of the matrix and those of H
     /// together.
     pub negative: usize,
 }
 
 impl Solved {
-    /// Newton's increments and changes of the numbers by which as many further functions
-    /// become zero: each by its change with the increments and with the numbers, and its
-    /// value. Within the plane normal to a direction these are its momentum, its own
-    /// changes of the numbers, and zero.
+    /// Newton increments and changes of the parameters by which as many additional functions
+    /// become zero. Each function is given by its derivatives with respect to the increments and
+    /// to the parameters, and its value: for the plane normal to a direction, the momentum of that
+    /// direction, its parameter components, and zero.
     pub fn step(
         &self,
         functions: &[(&Field, &[f64], f64)],
@@ -215,7 +215,7 @@ impl Solved {
             for (k, (dual, _, _)) in functions.iter().enumerate() {
                 matrix[(p + k, r)] = dot(dual, &self.modes[r]);
             }
-            // What is below rounding decides nothing.
+            // Forces below rounding are ignored.
             right[r] = match -self.forces.multipliers[r] {
                 force if force.abs() < noise => -0.0,
                 force => force,
@@ -242,7 +242,7 @@ impl Solved {
     }
 }
 
-/// Forces that excite many modes, each `k` with another pattern along the rods.
+/// Forces that excite many modes, with a different pattern along the rods for each `k`.
 fn seed(system: &mut System, k: usize) -> Field {
     system.seed_mode();
     let mut seed = system.rhs();

@@ -10,10 +10,10 @@ use crate::leaf::{DiscreteLeaf, Field, Grid, Solved, SparseFactor, SparsePattern
 use crate::newton::{Contraction, converged};
 use crate::rod::RESOLVED_TURN;
 
-/// Newton iterations that lead back to a branch.
+/// Largest number of Newton iterations of a corrector.
 pub(super) const ITERATIONS: usize = 10;
 
-/// Largest increment (radians, lengths, fractions) on the way.
+/// Largest increment (radians, lengths, fractions) of an iteration.
 pub(super) const LARGEST: f64 = 1.0;
 
 /// Relative accuracy of the conjugate gradients.
@@ -22,16 +22,16 @@ const CG_TOLERANCE: f64 = 1e-11;
 /// Accuracy of a point (radians, lengths).
 const ACCURACY: f64 = 1e-10;
 
-/// An increment below this that does not shrink is rounding.
+/// Increments below this that do not shrink are due to rounding.
 const ROUNDED: f64 = 1e-8;
 
-/// A step by which no eigenvalue, not even a neutral one, changes its sign.
+/// A step too small to change the sign of any eigenvalue, even of a nearly neutral one.
 const SAME_INDEX: f64 = 1e-9;
 
-/// Rounding of a force, in units of that of the stiffest segment.
+/// Rounding error of a force, in units of epsilon times the largest stiffness.
 const ROUNDING: f64 = 10.0;
 
-/// Why there is no point.
+/// Why no point is found.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum Stuck {
     /// The parameter has left its range.
@@ -48,55 +48,54 @@ pub enum Stuck {
     TooLarge,
 }
 
-/// The equations of a family of leaves on a grid, with the memory to solve them.
+/// The equations of a family of leaves on a grid, with workspace.
 pub struct Equations<'a> {
     /// The leaves.
     pub leaves: Leaves<'a>,
-    /// The same with softened matrices, where these decide what is critical.
+    /// The same with softened matrices, if these determine what is critical.
     /// Newton's method needs the true ones: near singular points of the softened it
     /// would not converge.
     pub softened: Option<Leaves<'a>>,
-    /// The mass of the leaf but for its base.
+    /// The mass of the leaf without its base.
     pub(super) mass: f64,
     pub(super) system: System,
-    /// Whether rods are solved one by one, as can be in a valley.
+    /// Whether the equations are solved rod by rod, which needs a positive definite matrix.
     rodwise: bool,
     /// Matrices factorised so far.
     pub factorizations: usize,
 }
 
-/// A plane in which a point is sought.
+/// A hyperplane in which a point is sought.
 pub(super) struct Plane {
-    /// Its normal, times the masses per unit of the leaf's mass; and that of the
-    /// parameter.
+    /// Its normal: the increments times the mass matrix, per unit of the leaf's mass, and the
+    /// component along the parameter.
     pub dual: Field,
     pub own: f64,
-    /// A state of it; none: that from which the search sets out.
+    /// A state in it; if none, the initial state of the search.
     pub through: Option<State>,
 }
 
 impl Plane {
-    /// How far from it a state is, the parameter aside.
+    /// Signed distance of a state from it, without the parameter.
     fn distance(&self, state: &State) -> f64 {
         let through = self.through.as_ref();
         through.map_or(0.0, |through| dot(&self.dual, &between(through, state)))
     }
 }
 
-/// Forces and their derivative at some state.
+/// Forces and their derivatives at a state.
 pub(super) struct Linear {
-    /// Unbalanced forces.
     pub forces: Field,
-    /// Their change with the parameter.
+    /// Their derivative with respect to the parameter.
     pub rate: Field,
-    /// The shift that leaves neutral modes where they are.
+    /// The shift that keeps neutral modes from counting as unstable.
     pub(super) shift: f64,
-    /// Rounding of the forces.
+    /// Rounding error of the forces.
     pub noise: f64,
 }
 
 impl<'a> Equations<'a> {
-    /// Room for the equations of `family` on `grid`.
+    /// Allocates the equations of `family` on `grid`.
     pub fn new(family: &'a Family<'a>, grid: Grid) -> Result<Self, OutOfRange> {
         Equations::of(Leaves::new(family, grid))
     }
@@ -127,7 +126,7 @@ impl<'a> Equations<'a> {
         &self.leaves.grid
     }
 
-    /// Product of two increments over the masses, per unit of the leaf's mass.
+    /// Inner product of two increments over the mass matrix, per unit of the leaf's mass.
     pub fn product(&self, a: &Field, b: &Field) -> f64 {
         dot(&self.system.momentum(a), b) / self.mass
     }
@@ -141,21 +140,21 @@ impl<'a> Equations<'a> {
         self.system.rods()
     }
 
-    /// Product of two directions.
-    pub fn along(&self, a: &Tangent, b: &Tangent) -> f64 {
+    /// Inner product of two directions.
+    pub fn inner(&self, a: &Tangent, b: &Tangent) -> f64 {
         self.product(&a.increments, &b.increments) + a.fraction * b.fraction
     }
 
-    /// A direction of length one.
+    /// Scales a direction to length one.
     pub fn normalised(&self, t: Tangent) -> Tangent {
-        let length = self.along(&t, &t).sqrt();
+        let length = self.inner(&t, &t).sqrt();
         Tangent {
             increments: times(&t.increments, 1.0 / length),
             fraction: t.fraction / length,
         }
     }
 
-    /// The state that lies `step` further along a direction, at the fraction there.
+    /// The state `step` further along a direction, for the leaf at this fraction.
     pub fn moved(
         &mut self,
         state: &State,
@@ -167,8 +166,8 @@ impl<'a> Equations<'a> {
         Ok(advanced(leaf, state, &mut self.system, increments, step))
     }
 
-    /// How nodes that the leaf holds away from its bases move with the parameter, which
-    /// no forces say; none if it holds none.
+    /// Derivative, with respect to the parameter, of the positions of nodes held away from the
+    /// bases, which the forces do not contain; `None` if there are none.
     fn held_rate(&mut self, state: &State, fraction: f64) -> Result<Option<Field>, OutOfRange> {
         if self.leaves.at(fraction)?.leaf.held.is_none() {
             return Ok(None);
@@ -181,7 +180,7 @@ impl<'a> Equations<'a> {
         rate(held).map(Some)
     }
 
-    /// The forces, their rates, and the matrix (left in the system).
+    /// Returns the forces and their rates; the matrix is left in the system.
     pub(super) fn linearise(&mut self, state: &mut State, fraction: f64) -> Result<Linear, Stuck> {
         linearise(&mut self.leaves, &mut self.system, state, fraction)
     }
@@ -196,8 +195,8 @@ impl<'a> Equations<'a> {
         linearise(leaves, &mut self.system, state, fraction)
     }
 
-    /// Solves for the forces and their rate with K + shift M: rod by rod if that
-    /// goes, or directly, which counts the negative eigenvalues, too.
+    /// Solves for the forces and their rate with K + shift M: rod by rod if possible,
+    /// else by a direct factorisation, which also counts the negative eigenvalues.
     fn solve(&mut self, linear: &Linear) -> Result<(Field, Field, Option<usize>), Stuck> {
         let shift = linear.shift;
         self.factorizations += 1;
@@ -222,10 +221,9 @@ impl<'a> Equations<'a> {
         Ok((forces, rate, Some(factor.negative())))
     }
 
-    /// Newton's method back to the branch within the plane normal to `normal`
-    /// through the given state; with no normal, at the given parameter. Returns
-    /// the point, with its tangent so that it goes on along `normal`, and the
-    /// number of iterations.
+    /// Newton corrector: back to the branch within the plane normal to `normal`
+    /// through the given state; without a normal, at the given parameter. Returns
+    /// the point, its tangent oriented along `normal`, and the number of iterations.
     pub fn correct(
         &mut self,
         state: &State,
@@ -238,14 +236,14 @@ impl<'a> Equations<'a> {
             through: None,
         });
         let (mut point, iterations) = self.correct_within(state, fraction, plane.as_ref())?;
-        if normal.is_some_and(|normal| self.along(&point.tangent, normal) < 0.0) {
+        if normal.is_some_and(|normal| self.inner(&point.tangent, normal) < 0.0) {
             point.tangent = reversed(point.tangent);
         }
         Ok((point, iterations))
     }
 
-    /// As [`Equations::correct`], within a plane however it is given; the parameter
-    /// grows along the tangent.
+    /// As [`Equations::correct`], within any plane; the tangent points to growing
+    /// values of the parameter.
     pub(super) fn correct_within(
         &mut self,
         state: &State,
@@ -277,7 +275,7 @@ impl<'a> Equations<'a> {
                     increments: rate,
                     fraction: 1.0,
                 });
-                // The matrix at hand is that of the state before.
+                // The factorised matrix is that of the previous state.
                 let index = match counted {
                     Some(index) if size < SAME_INDEX => index,
                     _ => self.index(&state, fraction)?,
@@ -295,7 +293,7 @@ impl<'a> Equations<'a> {
         Err(Stuck::NotConverged)
     }
 
-    /// Morse index of a state at rest, neutral modes not counting.
+    /// Morse index of an equilibrium, without neutral modes.
     fn index(&mut self, state: &State, fraction: f64) -> Result<usize, Stuck> {
         let leaf = self.leaves.at(fraction)?;
         let system = &mut self.system;
@@ -312,14 +310,14 @@ impl<'a> Equations<'a> {
         Ok(factorized(&pattern, &self.system, shift)?.negative())
     }
 
-    /// The pattern of the matrix with so many rows at its border.
+    /// The sparsity pattern of the matrix with so many border rows.
     pub(super) fn pattern(&self, border: usize) -> Result<Arc<SparsePattern>, Stuck> {
         let pattern = self.leaves.family.patterns.of(&self.system, border);
         pattern.ok_or(Stuck::TooLarge)
     }
 }
 
-/// The forces on a state, their rates, and the matrix (left in the system).
+/// Returns the forces and their rates; the matrix is left in the system.
 fn linearise(
     leaves: &mut Leaves,
     system: &mut System,
@@ -340,7 +338,7 @@ fn linearise(
     })
 }
 
-/// The forces and their rounding; the matrix is left in the system.
+/// Returns the forces and their rounding error; the matrix is left in the system.
 pub(super) fn assembled(
     leaf: &DiscreteLeaf,
     system: &mut System,
@@ -366,7 +364,6 @@ pub(super) fn factorized<'p>(
     (pattern.factorize(system, shift)).map_err(|_| Stuck::TooLarge)
 }
 
-/// The same direction, backwards.
 pub fn reversed(t: Tangent) -> Tangent {
     Tangent {
         increments: times(&t.increments, -1.0),
@@ -374,7 +371,7 @@ pub fn reversed(t: Tangent) -> Tangent {
     }
 }
 
-/// Whether a Newton step of this size after one of size `previous` ends it.
+/// Whether the iteration has converged with a Newton step of this size after `previous`.
 pub(super) fn at_rest(size: f64, previous: f64) -> bool {
     let first = Contraction::default().after_first(size, 0.0);
     converged(size, previous, [0.0; 2], (ACCURACY, ROUNDED), first).is_some()

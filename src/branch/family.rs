@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::lru_cache::LruCache;
 use super::patterns::Patterns;
-use super::recent::Recent;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, Scale, State};
 use crate::scenario::Scenario;
 
-/// Stiffness in stretch and shear, in units of A/L^2, with which forces are
-/// condensed out at most: near singular points a larger stiffness loses digits.
+/// Largest stiffness in stretch and shear, in units of A/L^2, with which the segment forces are
+/// condensed out: near singular points a larger stiffness loses digits.
 const STIFFEST: f64 = 1e5;
 
 /// A leaf for every value of a parameter.
@@ -20,23 +20,23 @@ pub struct Family<'a> {
     /// Values of the parameter at the fractions 0 and 1.
     from: f64,
     to: f64,
-    /// Whether equal steps of the fraction are equal quotients of the value.
+    /// Whether fractions are those of the logarithm of the value.
     log: bool,
-    /// The leaves there.
+    /// The leaves at the fractions 0 and 1.
     ends: [Leaf; 2],
     softening: Option<f64>,
-    /// Of their matrices.
+    /// Sparsity patterns of their matrices.
     pub patterns: Arc<Patterns>,
 }
 
-/// A value of the parameter that no leaf can have; what the scenario says of it.
+/// A value of the parameter that no leaf can have, with the message of the scenario.
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct OutOfRange(pub String);
 
 impl<'a> Family<'a> {
-    /// The leaves `make` gives, from one value of the parameter to another (in
-    /// equal quotients if `log`), in the units of the first.
+    /// The leaves given by `make`, for values of the parameter in this range (divided
+    /// logarithmically if `log`), in the units of the first.
     pub fn new(
         make: &'a (dyn Fn(f64) -> Result<Scenario, String> + Sync),
         (from, to): (f64, f64),
@@ -69,8 +69,8 @@ impl<'a> Family<'a> {
         })
     }
 
-    /// Leaves of the same kind, in the same units, along another way.
-    pub fn along<'b>(
+    /// Leaves of the same kind, in the same units, along another path with the parameter 0 to 1.
+    pub fn along_path<'b>(
         &self,
         make: &'b (dyn Fn(f64) -> Result<Scenario, String> + Sync),
     ) -> Result<Family<'b>, OutOfRange> {
@@ -81,11 +81,11 @@ impl<'a> Family<'a> {
         })
     }
 
-    /// The same family whose matrices are those of leaves with so much more
-    /// compliance in stretch and shear (in units of L^2/A), while the equilibria
-    /// stay. A matrix of a nearly rigid leaf loses its soft modes to rounding;
-    /// where these become neutral is analytic in the softening, and can be
-    /// extrapolated to none.
+    /// The same family, its matrices those of leaves with this additional
+    /// compliance in stretch and shear (in units of L^2/A), its equilibria
+    /// unchanged. The soft modes of a nearly rigid leaf are lost to rounding in its matrix;
+    /// the point at which they become neutral is analytic in the softening, and can be
+    /// extrapolated to zero softening.
     pub fn softened(&self, softening: f64) -> Self {
         Family {
             softening: Some(softening),
@@ -112,12 +112,12 @@ impl<'a> Family<'a> {
         }
     }
 
-    /// The scenario there.
+    /// The scenario at a fraction.
     pub fn scenario(&self, fraction: f64) -> Result<Scenario, OutOfRange> {
         (self.make)(self.value(fraction)).map_err(OutOfRange)
     }
 
-    /// The leaf there.
+    /// The leaf at a fraction.
     pub fn leaf(&self, fraction: f64) -> Result<Leaf, OutOfRange> {
         Ok(match fraction {
             0.0 => self.ends[0].clone(),
@@ -126,7 +126,7 @@ impl<'a> Family<'a> {
         })
     }
 
-    /// A leaf in its units, on a grid.
+    /// A leaf of the family on a grid.
     pub(super) fn discretised(&self, leaf: &Leaf, grid: &Grid) -> DiscreteLeaf {
         let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
         for section in &mut discrete.sections {
@@ -138,7 +138,7 @@ impl<'a> Family<'a> {
         discrete
     }
 
-    /// Does something with the leaf there, on a grid.
+    /// Calls `act` with the leaf at a fraction, on a grid.
     pub fn with<R>(
         &self,
         fraction: f64,
@@ -149,23 +149,23 @@ impl<'a> Family<'a> {
     }
 }
 
-/// Leaves of a family on one grid. The last few are kept: an iteration comes
-/// back to them, and to make a scenario costs more than to assemble a small leaf.
+/// Leaves of a family on one grid. The last few are cached: iterations
+/// return to them, and making a scenario costs more than assembling a small leaf.
 pub struct Leaves<'a> {
     pub family: &'a Family<'a>,
     pub grid: Grid,
-    kept: Recent<f64, DiscreteLeaf, KEPT>,
+    cache: LruCache<f64, DiscreteLeaf, CACHED>,
 }
 
-/// Leaves that are kept: of a difference over the parameter, and one more.
-const KEPT: usize = 4;
+/// Number of cached leaves: those of a difference over the parameter, and one more.
+const CACHED: usize = 4;
 
 impl<'a> Leaves<'a> {
     pub fn new(family: &'a Family<'a>, grid: Grid) -> Self {
         Leaves {
             family,
             grid,
-            kept: Recent::default(),
+            cache: LruCache::default(),
         }
     }
 
@@ -174,7 +174,7 @@ impl<'a> Leaves<'a> {
         let grid = self.grid.refined();
         let finer = |leaf: &DiscreteLeaf| self.family.discretised(&leaf.leaf, &grid);
         Leaves {
-            kept: self.kept.map(finer),
+            cache: self.cache.map(finer),
             family: self.family,
             grid,
         }
@@ -183,14 +183,13 @@ impl<'a> Leaves<'a> {
     /// The leaf at a fraction of the range.
     pub fn at(&mut self, fraction: f64) -> Result<&DiscreteLeaf, OutOfRange> {
         let (family, grid) = (self.family, &self.grid);
-        self.kept.at(fraction, || {
+        self.cache.at(fraction, || {
             Ok(family.discretised(&family.leaf(fraction)?, grid))
         })
     }
 }
 
-/// Puts the bases of all rods where the leaf clamps them, and tips where they are
-/// held.
+/// Puts the bases of all rods where the leaf clamps them, and held tips where it holds them.
 pub fn clamp(leaf: &DiscreteLeaf, state: &mut State) {
     leaf.hold_tips(state);
     for j in 0..leaf.rods() {

@@ -1,4 +1,4 @@
-//! Sums over the increments of a leaf.
+//! Linear algebra on fields of nodal increments and forces.
 
 use crate::leaf::{Field, Increment, State};
 use crate::relax::prolong::lagrange;
@@ -35,7 +35,7 @@ pub fn times(a: &Field, factor: f64) -> Field {
     a.iter().map(|rod| rod.iter().map(of).collect()).collect()
 }
 
-/// The sum of fields, each times its part.
+/// The linear combination of fields with these coefficients.
 pub fn combined(parts: &[f64], fields: &[Field]) -> Field {
     let mut sum = times(&fields[0], 0.0);
     for (part, field) in parts.iter().zip(fields) {
@@ -44,13 +44,12 @@ pub fn combined(parts: &[f64], fields: &[Field]) -> Field {
     sum
 }
 
-/// The largest component.
 pub fn largest(a: &Field) -> f64 {
     let all = a.iter().flatten().flatten();
     all.fold(0.0, |m, v| m.max(v.abs()))
 }
 
-/// The increments that lead from a state to another on the same grid.
+/// The increments that lead from one state to another on the same grid.
 pub fn between(a: &State, b: &State) -> Field {
     let node = |k: usize| {
         let (turn, shift) = (rotation::log(b.q[k] * a.q[k].conjugate()), b.x[k] - a.x[k]);
@@ -65,14 +64,13 @@ pub fn is_finite(a: &Field) -> bool {
     a.iter().flatten().flatten().all(|v| v.is_finite())
 }
 
-/// Increments of the grid on which every segment is halved: cubic between the nodes,
-/// zero at the bases.
+/// Increments on the grid with all segments halved: cubic interpolation, zero at the bases.
 pub fn prolong(a: &Field) -> Field {
     a.iter().map(|rod| prolong_rod(rod)).collect()
 }
 
-/// Forces at the nodes of the grid with half of the segments, at the nodes of this one:
-/// those between have none.
+/// Nodal forces on the grid with all segments halved: the given ones at the nodes of this grid,
+/// zero at the new ones.
 pub fn at_same_nodes(a: &Field) -> Field {
     let rod = |rod: &Vec<Increment>| rod.iter().flat_map(|f| [[0.0; 6], *f]).collect();
     a.iter().map(rod).collect()
@@ -84,7 +82,7 @@ fn prolong_rod(rod: &[Increment]) -> Vec<Increment> {
         0 => [0.0; 6],
         _ => rod[i - 1],
     };
-    // Four neighbouring nodes, shifted inwards at the ends.
+    // Four neighbouring nodes; at the ends, the nearest four.
     let count = 4.min(n + 1);
     (1..=2 * n)
         .map(|k| {

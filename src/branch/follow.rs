@@ -16,44 +16,44 @@ use crate::leaf::{Grid, State};
 const FINEST: usize = 512;
 const MOST_NODES: usize = 20_000;
 
-/// Points that are made before they are verified, side by side.
+/// Least and largest number of points computed before they are verified in parallel.
 const FEWEST: usize = 2;
 const MOST: usize = 16;
 
-/// Tries to get past a point with shorter steps on the finest grid.
+/// Attempts to pass a point on the finest grid, and the factor by which each shortens the step.
 const TRIES: usize = 4;
 const SHORTER: f64 = 0.4;
 
-/// Points in a row that are left out next to a critical point, which on every grid
-/// lies elsewhere: they may be before it on one and behind it on another.
-const LEFT_OUT: usize = 4;
+/// Largest number of consecutive points dropped next to a critical point: that lies elsewhere
+/// on every grid, so that a point may be before it on one grid and beyond it on another.
+const DROPPED: usize = 4;
 
-/// A point and the next one move by the same from the grid on which they were found to
-/// the finest, but for this part of the way between them and of the larger move, and
-/// for this distance; not by less, since they do so in planes that differ.
+/// From the grid on which they were found to the finest, neighbouring points move alike: the
+/// difference is at most this part of their distance plus this part of the larger displacement,
+/// plus `SMALL`. The part is large, since they are sought in different planes.
 const ALIKE: f64 = 0.8;
 const SMALL: f64 = 1e-6;
 
-/// The equations of a family on a grid and on finer ones, each with half of the
+/// The equations of a family on successively refined grids, each of which halves the
 /// segments of the one before.
 pub struct Grids<'a> {
     equations: Vec<Equations<'a>>,
 }
 
-/// A branch with all of its points verified.
+/// A branch with only verified points.
 pub struct Followed {
     /// The branch as found on its grids.
     pub branch: Branch,
     /// How it ended.
     pub end: End,
-    /// Its points without the error of their grids.
+    /// Its points, extrapolated over grids.
     pub points: Vec<Refined>,
     /// Its critical points, likewise.
     pub critical: Vec<Refined>,
 }
 
 impl<'a> Grids<'a> {
-    /// Begins with one grid.
+    /// Starts with one grid.
     pub fn new(family: &'a Family<'a>, grid: Grid) -> Result<Self, OutOfRange> {
         Ok(Grids {
             equations: vec![Equations::new(family, grid)?],
@@ -66,7 +66,7 @@ impl<'a> Grids<'a> {
         &mut self.equations[level as usize]
     }
 
-    /// Makes sure of the next finer grid; false where that is too fine.
+    /// Creates the next finer grid if needed; false if that is too fine.
     fn refine(&mut self, state: &State) -> Result<bool, OutOfRange> {
         let finer = 2 * state.segments();
         if finer > FINEST || finer * state.rods() > MOST_NODES {
@@ -80,15 +80,15 @@ impl<'a> Grids<'a> {
         Ok(true)
     }
 
-    /// Matrices factorised so far.
+    /// Number of matrices factorised so far.
     pub fn factorizations(&self) -> usize {
         self.equations.iter().map(|it| it.factorizations).sum()
     }
 
     /// Follows a branch from its first point in the direction of its tangent. Where a
-    /// point is not verified, the branch goes on from the last one that is: with a shorter
-    /// step, or on a finer grid. `progress` is told of each point: how many there are, and
-    /// the parameter.
+    /// point cannot be verified, the branch is continued from the last one that was: with a shorter
+    /// step, or on a finer grid. `progress` is called after each point with the number of points
+    /// and the parameter.
     pub fn follow(
         &mut self,
         first: Point,
@@ -107,7 +107,7 @@ impl<'a> Grids<'a> {
             let now = &known.branch.points[known.branch.points.len() - 1];
             let (before, now) = (known.points.len(), now.state.clone());
             let equations = self.of(&now);
-            (known.branch).go_on(equations, how, before + ahead, progress);
+            (known.branch).extend_to(equations, how, before + ahead, progress);
             let leaves = &equations.leaves;
             let doubt = known.verify(leaves.family, &leaves.grid, (accuracy, how.critical_grids));
             if known.points.len() > before {
@@ -129,7 +129,7 @@ impl<'a> Grids<'a> {
             ahead = FEWEST;
             tries += 1;
             let last = known.points.len().saturating_sub(1);
-            known.branch.go_back(last);
+            known.branch.truncate_at(last);
             let here = known.branch.points[last].state.clone();
             let refined = matches!(self.refine(&here), Ok(true))
                 && known.branch.refine(self.of(&here)).is_ok();
@@ -146,8 +146,8 @@ impl<'a> Grids<'a> {
 }
 
 impl Followed {
-    /// Verifies the points that are not yet, all on one grid; ends with the first that
-    /// cannot be, and says why.
+    /// Verifies the remaining points, all on one grid; stops at the first that
+    /// fails, and returns why.
     fn verify(
         &mut self,
         family: &Family,
@@ -156,7 +156,7 @@ impl Followed {
     ) -> Option<Doubt> {
         let critical = &self.branch.critical[self.critical.len()..];
         let points = &self.branch.points[self.points.len()..];
-        // One list, so that all threads have work.
+        // Points and critical points in one list, to keep all threads busy.
         let mut found: Vec<Result<Refined, Doubt>> = (0..points.len() + critical.len())
             .into_par_iter()
             .map(|k| match points.get(k) {
@@ -168,26 +168,26 @@ impl Followed {
             })
             .collect();
         let mut critical = found.split_off(points.len()).into_iter();
-        let mut left_out = 0;
+        let mut dropped = 0;
         for point in found {
             let number = self.points.len();
             let near = number > 0 && self.branch.is_near_critical(number);
             let near = near && matches!(point, Err(Doubt::OtherIndex));
-            if near && left_out < LEFT_OUT {
+            if near && dropped < DROPPED {
                 if number + 1 < self.branch.points.len() {
-                    self.branch.leave_out(number);
-                    left_out += 1;
+                    self.branch.drop_point(number);
+                    dropped += 1;
                     continue;
                 } else if self.branch.end.is_none() {
-                    // Perhaps; as soon as there is a point behind it.
+                    // Decided once there is a point after it.
                     return None;
                 }
             }
-            left_out = 0;
+            dropped = 0;
             let known = self.critical.len();
             let count = number
                 .checked_sub(1)
-                .map_or(0, |before| self.critical_behind(before));
+                .map_or(0, |before| self.critical_after(before));
             let singular: Result<Vec<Refined>, Doubt> = critical.by_ref().take(count).collect();
             if let Err(doubt) = self.add(point, singular) {
                 self.points.truncate(number);
@@ -198,8 +198,8 @@ impl Followed {
         None
     }
 
-    /// Number of critical points between a point and the next.
-    fn critical_behind(&self, point: usize) -> usize {
+    /// Number of critical points between this point and the next.
+    fn critical_after(&self, point: usize) -> usize {
         let critical = self.branch.critical.iter();
         critical.filter(|(after, _)| *after == point).count()
     }
@@ -216,29 +216,33 @@ impl Followed {
         }
         self.critical.extend(critical?);
         self.points.push(point?);
-        match number == 0 || self.alike(number) {
+        match number == 0 || self.displaced_alike(number) {
             true => Ok(()),
             false => Err(Doubt::OtherBranch),
         }
     }
 
-    /// Whether a point and the one before it moved alike, to the finest grids.
-    fn alike(&self, number: usize) -> bool {
+    /// Whether a point and its predecessor are displaced alike on the finest grids.
+    fn displaced_alike(&self, number: usize) -> bool {
         let [before, now] = [number - 1, number].map(|k| {
             let (coarse, fine) = (&self.branch.points[k].state, &self.points[k].state);
-            (coarse, moves(coarse, fine))
+            (coarse, displacements(coarse, fine))
         });
-        let largest = |moves: &[DVec3]| moves.iter().fold(0.0, |m: f64, d| m.max(d.length()));
+        let largest = |displacements: &[DVec3]| {
+            displacements
+                .iter()
+                .fold(0.0, |m: f64, d| m.max(d.length()))
+        };
         let differences = before.1.iter().zip(&now.1).map(|(a, b)| *b - *a);
         let differences: Vec<DVec3> = differences.collect();
-        let way = before.0.shift_to(now.0);
+        let distance = before.0.shift_to(now.0);
         largest(&differences)
-            <= ALIKE * way + ALIKE * largest(&before.1).max(largest(&now.1)) + SMALL
+            <= ALIKE * distance + ALIKE * largest(&before.1).max(largest(&now.1)) + SMALL
     }
 }
 
-/// By how much the nodes of a state move to those of one on a grid as fine or finer.
-fn moves(coarse: &State, fine: &State) -> Vec<DVec3> {
+/// Displacements of the nodes of a state to those of one on the same grid or a refinement.
+fn displacements(coarse: &State, fine: &State) -> Vec<DVec3> {
     let stride = fine.segments() / coarse.segments();
     let node =
         |j: usize, i: usize| fine.x[fine.base(j) + stride * i] - coarse.x[coarse.base(j) + i];

@@ -1,14 +1,14 @@
 //! A branch: an equilibrium followed through a parameter, through folds, with
-//! its Morse index, and the points at which that changes.
+//! its Morse index and the points at which this changes.
 //!
 //! With the unbalanced forces g(z, l) of a leaf in the state z at the parameter
-//! l, a branch is a curve g = 0. It is followed by arclength (Keller, in:
+//! l, a branch is a curve g = 0. It is followed by pseudo-arclength continuation (Keller, in:
 //! Applications of Bifurcation Theory, 1977): from a point with tangent t a step
-//! is predicted along t, and Newton's method goes back to the curve within the
+//! is predicted along t, and Newton's method corrects it within the
 //! plane normal to t. Matrices are those of the relaxation.
 //!
 //! Where the index changes, the matrix K is singular. There it is bordered by
-//! the modes that become neutral, the masses times them as P,
+//! P, the mass matrix times the modes that become neutral,
 //!
 //! ```text
 //! [ K   P ] [ X ]   [ 0 ]
@@ -16,13 +16,13 @@
 //! ```
 //!
 //! which is regular (Govaerts, Numerical Methods for Bifurcations of Dynamical
-//! Equilibria, 2000). An eigenvalue of H is zero where one of K is, and smooth,
+//! Equilibria, 2000). An eigenvalue of H vanishes where one of K does, and is smooth,
 //! so that a secant method finds its zero to rounding.
 //!
-//! All that holds on one grid. A point counts once finer grids have it too: the
-//! same branch, going the same way with the same index, its tips known to the
-//! accuracy asked for. Where they have not, the branch goes on over a finer grid
-//! from the last point that counts.
+//! All this holds on one grid. A point counts as verified once finer grids have it too: on
+//! the same branch, with the same orientation and index, its tips known to the
+//! accuracy asked for. Otherwise the branch is continued on a finer grid
+//! from the last verified point.
 
 mod begin;
 pub mod boundary;
@@ -33,8 +33,8 @@ mod equations;
 mod family;
 mod field;
 mod follow;
+mod lru_cache;
 mod patterns;
-mod recent;
 mod refine;
 mod refine_critical;
 mod refined;
@@ -66,13 +66,13 @@ pub struct Point {
     pub state: State,
     /// The parameter, as a fraction of its range.
     pub fraction: f64,
-    /// The direction of the branch.
+    /// The unit tangent of the branch.
     pub tangent: Tangent,
     /// Morse index.
     pub index: usize,
 }
 
-/// A direction in which a branch may go, of length one.
+/// A direction along a branch, of length one.
 #[derive(Clone, Debug)]
 pub struct Tangent {
     /// Increments of the nodes.

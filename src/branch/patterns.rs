@@ -1,28 +1,28 @@
-//! Patterns of the matrices of a family's leaves.
+//! Sparsity patterns of the matrices of a family of leaves.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::recent::Recent;
+use super::lru_cache::LruCache;
 use crate::leaf::{SparsePattern, System};
 
-/// Patterns that are kept: of five grids, with a border and without.
-const KEPT: usize = 10;
+/// Number of cached patterns: five grids, bordered and unbordered.
+const CACHED: usize = 10;
 
-/// The last few that were needed. All leaves of a family have the same pattern on grids of
-/// as many segments, and to order it takes as long as to factorise a matrix.
+/// Cache of sparsity patterns. All leaves of a family have the same pattern on grids with
+/// equally many segments, and ordering it takes as long as factorising a matrix.
 #[derive(Default)]
-pub struct Patterns(Mutex<Recent<Shape, Arc<SparsePattern>, KEPT>>);
+pub struct Patterns(Mutex<LruCache<Shape, Arc<SparsePattern>, CACHED>>);
 
-/// What of a system tells its pattern: segments, whether rods are coupled, and rows of the
-/// border.
+/// What determines the pattern of a system: its segments, whether its rods are coupled, and
+/// the number of border rows.
 type Shape = (usize, bool, usize);
 
 impl Patterns {
-    /// That of a system with so many rows at its border; `None` where memory is short.
+    /// The pattern of a system with `border` border rows; `None` if memory is short.
     pub fn of(&self, system: &System, border: usize) -> Option<Arc<SparsePattern>> {
         let shape = (system.segments(), system.coupled(), border);
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut cache = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let made = || SparsePattern::bordered(system, border).map(Arc::new);
-        kept.at(shape, made).ok().cloned()
+        cache.at(shape, made).ok().cloned()
     }
 }

@@ -3,50 +3,49 @@
 use super::equations::{Equations, Plane, Stuck, reversed};
 use super::family::Family;
 use super::field::{at_same_nodes, prolong as prolong_field};
-use super::refined::{Doubt, Refined, Table, Values, looked_at};
+use super::refined::{Doubt, Refined, Table, Values, observed_nodes};
 use super::states::DIFFERENCE;
 use super::{Point, Tangent};
 use crate::leaf::{DiscreteLeaf, Grid};
 use crate::relax::prolong::prolong;
 use glam::DVec3;
 
-/// Grids of a point at most, and segments of the finest.
+/// Largest number of grids of a point, and of segments of the finest.
 pub(super) const GRIDS: usize = 6;
 pub(super) const FINEST: usize = 4096;
 
-/// From grid to grid a point moves by less and less, if by more than this (lengths).
+/// Displacements from grid to grid must decrease, unless below this (lengths).
 pub(super) const STILL: f64 = 1e-4;
 
-/// Tangents on two grids that differ by more than this (cosine) are those of two
+/// If the cosine between the tangents on two grids is below this, they belong to different
 /// branches.
-const SAME_WAY: f64 = 0.85;
+const SAME_BRANCH: f64 = 0.85;
 
-/// A point is sought where the leaf has gone the same way on all grids, since
-/// each has its own critical parameters. But at the same parameter at the ends of
-/// its range, and where the branch goes at least this much along it alone.
+/// Each grid has its own critical parameters: a point is sought at the same displacement of
+/// the leaf on all grids. But at the same parameter at the ends of its range, and
+/// where the parameter's component of the tangent is at least this.
 const ALONG: f64 = 0.995;
 
-/// Grids in a row that have the same index, where it alone matters.
+/// Number of consecutive grids with the same index, if only the index is wanted.
 const AGREEING: usize = 3;
 
-/// Where on a branch a point of it is, the same on all grids.
-enum Place {
-    /// Where the parameter is what it is.
+/// The condition that fixes a point on a branch, the same on all grids.
+enum Condition {
+    /// A given value of the parameter.
     Value,
-    /// Where the leaf has gone so far along the branch: the shifts and turns of the
-    /// nodes of the grid on which it was found, and of no others, lest the distance
-    /// depend on how states are interpolated.
+    /// A given displacement along the branch, measured by the shifts and turns of the
+    /// nodes of the original grid only, lest it depend on how states are interpolated.
     Plane(Plane),
 }
 
-impl Place {
+impl Condition {
     fn plane(equations: &Equations, point: &Point) -> Self {
-        let way = equations.normalised(Tangent {
+        let direction = equations.normalised(Tangent {
             increments: point.tangent.increments.clone(),
             fraction: 0.0,
         });
-        Place::Plane(Plane {
-            dual: equations.momentum(&way.increments),
+        Condition::Plane(Plane {
+            dual: equations.momentum(&direction.increments),
             own: 0.0,
             through: Some(point.state.clone()),
         })
@@ -54,7 +53,7 @@ impl Place {
 
     /// The same on the grid with all segments halved.
     fn refine(&mut self, leaf: &DiscreteLeaf) {
-        if let Place::Plane(plane) = self {
+        if let Condition::Plane(plane) = self {
             plane.dual = at_same_nodes(&plane.dual);
             plane.through = plane.through.as_ref().map(|state| prolong(leaf, state));
         }
@@ -62,29 +61,29 @@ impl Place {
 
     fn as_plane(&self) -> Option<&Plane> {
         match self {
-            Place::Value => None,
-            Place::Plane(plane) => Some(plane),
+            Condition::Value => None,
+            Condition::Plane(plane) => Some(plane),
         }
     }
 }
 
-/// Whether the branch goes along the parameter alone, or may not leave it.
-fn goes_along(point: &Point) -> bool {
+/// Whether the branch goes along the parameter alone, or the point is at an end of its range.
+fn along_parameter(point: &Point) -> bool {
     let inside = point.fraction != 0.0 && point.fraction != 1.0;
     !inside || point.tangent.fraction.abs() >= ALONG
 }
 
 /// A point on the grid with all segments halved, with the equations there: in the same
-/// plane, unless the branch goes along the parameter alone.
+/// plane, or, where the branch goes along the parameter alone, at the same parameter.
 pub fn on_finer<'a>(
     equations: &mut Equations<'a>,
     point: &Point,
 ) -> Result<(Equations<'a>, Point), Stuck> {
-    let mut place = match goes_along(point) {
-        true => Place::Value,
-        false => Place::plane(equations, point),
+    let mut condition = match along_parameter(point) {
+        true => Condition::Value,
+        false => Condition::plane(equations, point),
     };
-    let finer = in_place(equations, point, &mut place)?;
+    let finer = on_next_grid(equations, point, &mut condition)?;
     Ok((finer.equations, finer.point))
 }
 
@@ -92,29 +91,29 @@ pub fn on_finer<'a>(
 struct Finer<'a> {
     equations: Equations<'a>,
     point: Point,
-    /// The tangent on the grid before, on this one.
+    /// The tangent of the previous grid, interpolated to this one.
     tangent: Tangent,
-    /// By how much it moved.
+    /// Displacement from the interpolated state.
     moved: f64,
 }
 
-/// A point in its place on the grid with all segments halved.
-fn in_place<'a>(
+/// The point under the same condition on the grid with all segments halved.
+fn on_next_grid<'a>(
     equations: &mut Equations<'a>,
     point: &Point,
-    place: &mut Place,
+    condition: &mut Condition,
 ) -> Result<Finer<'a>, Stuck> {
     let leaf = equations.leaves.at(point.fraction)?;
     let guess = prolong(leaf, &point.state);
-    place.refine(leaf);
+    condition.refine(leaf);
     let mut equations = equations.refined()?;
     let tangent = equations.normalised(Tangent {
         increments: prolong_field(&point.tangent.increments),
         ..point.tangent
     });
-    let found = equations.correct_within(&guess, point.fraction, place.as_plane())?;
+    let found = equations.correct_within(&guess, point.fraction, condition.as_plane())?;
     let (mut found, _) = found;
-    if equations.along(&found.tangent, &tangent) < 0.0 {
+    if equations.inner(&found.tangent, &tangent) < 0.0 {
         found.tangent = reversed(found.tangent);
     }
     Ok(Finer {
@@ -125,22 +124,22 @@ fn in_place<'a>(
     })
 }
 
-/// A regular point to the given accuracy of its tips, on as many grids as it takes;
-/// on all of them it must be the same.
+/// A regular point with the given accuracy of its tips, on as many grids as necessary;
+/// they must agree on branch and index.
 pub fn refine(
     family: &Family,
     grid: &Grid,
     point: &Point,
     accuracy: f64,
 ) -> Result<Refined, Doubt> {
-    match goes_along(point) {
+    match along_parameter(point) {
         true => refine_in(family, grid, point, accuracy, false),
         false => refine_in(family, grid, point, accuracy, true)
             .or_else(|_| refine_in(family, grid, point, accuracy, false)),
     }
 }
 
-/// The same where the parameter is what it is.
+/// The same at a given parameter.
 pub fn refine_at(
     family: &Family,
     grid: &Grid,
@@ -150,14 +149,14 @@ pub fn refine_at(
     refine_in(family, grid, point, accuracy, false)
 }
 
-/// The Morse index of a point at its parameter, which so many grids in a row have, each with
-/// half of the segments of the one before; on all of them it must be the same point.
+/// The Morse index at a given parameter on which enough successively refined grids in a row
+/// agree; on all of them the point must be on the same branch.
 pub fn index_at(equations: &mut Equations, point: &Point) -> Result<usize, Doubt> {
     let (mut moved, mut same, mut index) = (f64::INFINITY, 1, point.index);
-    let mut finer = in_place(equations, point, &mut Place::Value)?;
+    let mut finer = on_next_grid(equations, point, &mut Condition::Value)?;
     for _ in 1..GRIDS {
-        let along = finer.equations.along(&finer.point.tangent, &finer.tangent);
-        if along < SAME_WAY || finer.moved > moved.max(STILL) {
+        let along = finer.equations.inner(&finer.point.tangent, &finer.tangent);
+        if along < SAME_BRANCH || finer.moved > moved.max(STILL) {
             return Err(Doubt::OtherBranch);
         }
         same = if finer.point.index == index {
@@ -172,7 +171,7 @@ pub fn index_at(equations: &mut Equations, point: &Point) -> Result<usize, Doubt
         if 2 * finer.point.state.segments() > FINEST {
             break;
         }
-        finer = in_place(&mut finer.equations, &finer.point, &mut Place::Value)?;
+        finer = on_next_grid(&mut finer.equations, &finer.point, &mut Condition::Value)?;
     }
     Err(Doubt::OtherIndex)
 }
@@ -186,9 +185,9 @@ fn refine_in(
 ) -> Result<Refined, Doubt> {
     let mut table = Table::default();
     let mut equations = Equations::new(family, grid.clone())?;
-    let mut place = match in_plane {
-        true => Place::plane(&equations, point),
-        false => Place::Value,
+    let mut condition = match in_plane {
+        true => Condition::plane(&equations, point),
+        false => Condition::Value,
     };
     let values = Values::of(&mut equations, &point.state, point.fraction)?;
     table.push(grid.segments(), values);
@@ -198,10 +197,10 @@ fn refine_in(
         if 2 * equations.grid().segments() > FINEST {
             break;
         }
-        let finer = in_place(&mut equations, &now, &mut place)?;
+        let finer = on_next_grid(&mut equations, &now, &mut condition)?;
         equations = finer.equations;
-        let same = equations.along(&finer.point.tangent, &finer.tangent);
-        if same < SAME_WAY || finer.moved > moved.max(STILL) {
+        let same = equations.inner(&finer.point.tangent, &finer.tangent);
+        if same < SAME_BRANCH || finer.moved > moved.max(STILL) {
             return Err(Doubt::OtherBranch);
         }
         if finer.point.index != point.index {
@@ -219,9 +218,9 @@ fn refine_in(
     Err(Doubt::Inaccurate)
 }
 
-/// Change of a point's values with the parameter: points go as the tangent; the energy,
-/// stationary in the state, as the work of what varies; the reaction as on the states
-/// beside it.
+/// Derivatives of a point's values with respect to the parameter: of points from the tangent;
+/// of the energy, stationary in the state, from that of the loads; of the reaction from
+/// neighbouring states.
 fn slope(equations: &mut Equations, point: &Point) -> Result<Values, Stuck> {
     let tangent = &point.tangent;
     let mut energy = |step: f64| {
@@ -232,17 +231,17 @@ fn slope(equations: &mut Equations, point: &Point) -> Result<Values, Stuck> {
             .map(|leaf| (at, leaf.energy(&point.state)));
         leaf.ok()
     };
-    // At an end of the range there may be nothing beyond.
+    // At an end of the range there may be no leaf beyond.
     let here = energy(0.0);
     let (after, before) = (energy(DIFFERENCE).or(here), energy(-DIFFERENCE).or(here));
     let (after, before) = after.zip(before).ok_or(Stuck::NotConverged)?;
     let reaction = reaction_rate(equations, point)?;
     let leaf = equations.leaves.at(point.fraction)?;
-    let nodes = looked_at(leaf, leaf.segments());
-    let ways = nodes.flat_map(|i| tangent.increments.iter().map(move |rod| &rod[i - 1]));
+    let nodes = observed_nodes(leaf, leaf.segments());
+    let displacements = nodes.flat_map(|i| tangent.increments.iter().map(move |rod| &rod[i - 1]));
     Ok(Values {
-        points: ways
-            .flat_map(|way| [3, 4, 5].map(|c| way[c] / tangent.fraction))
+        points: displacements
+            .flat_map(|node| [3, 4, 5].map(|c| node[c] / tangent.fraction))
             .collect(),
         fraction: 1.0,
         energy: (after.1 - before.1) / (after.0 - before.0),
@@ -250,21 +249,21 @@ fn slope(equations: &mut Equations, point: &Point) -> Result<Values, Stuck> {
     })
 }
 
-/// Change of the force that the holder of the tips feels with the parameter.
+/// Derivative of the reaction at held tips with respect to the parameter.
 fn reaction_rate(equations: &mut Equations, point: &Point) -> Result<DVec3, Stuck> {
     if equations.leaves.at(point.fraction)?.leaf.held.is_none() {
         return Ok(DVec3::ZERO);
     }
     let tangent = &point.tangent;
-    let mut beside = |step: f64| {
+    let mut reaction_at = |step: f64| {
         let at = point.fraction + step;
-        let way = step / tangent.fraction;
-        let state = equations.moved(&point.state, at, &tangent.increments, way)?;
+        let length = step / tangent.fraction;
+        let state = equations.moved(&point.state, at, &tangent.increments, length)?;
         Ok((at, equations.leaves.at(at)?.reaction(&state).0))
     };
     let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
-        // At an end of the range there may be nothing beyond.
-        beside(step).or_else(|_: Stuck| beside(0.0))
+        // At an end of the range there may be no leaf beyond.
+        reaction_at(step).or_else(|_: Stuck| reaction_at(0.0))
     });
     let ((after, force), (before, force_before)) = (after?, before?);
     Ok((force - force_before) / (after - before))

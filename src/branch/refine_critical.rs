@@ -10,29 +10,29 @@ use super::refined::{Doubt, Refined, Table, Values};
 use crate::leaf::Grid;
 use crate::relax::prolong::prolong;
 
-/// A critical parameter within this part of its range is exact.
+/// Critical parameters with errors below this part of the range are exact.
 const EXACT: f64 = 1e-12;
 
-/// Compliances by which matrices of nearly rigid leaves are softened, in units of
-/// L^2/A, times one to four: smaller ones lose more to rounding, larger ones more to their
-/// extrapolation to none. And the stiffness from which on matrices are softened.
+/// Compliances by which the matrices of nearly rigid leaves are softened, in units of
+/// L^2/A, used one to four times: smaller ones increase rounding errors, larger ones the error
+/// of extrapolation to zero. And the stiffness above which matrices are softened.
 pub const SOFTENINGS: [f64; 5] = [1e-4, 3e-5, 1e-5, 3e-6, 1e-6];
 pub const NEARLY_RIGID: f64 = 1.01e5;
 
-/// The cubic through values at softenings of 1, 2, 3, 4 at zero, and the parabola
-/// through the first three.
-pub const UNSOFTENING: [f64; 4] = [4.0, -6.0, 4.0, -1.0];
-pub const BY_PARABOLA: [f64; 4] = [3.0, -3.0, 1.0, 0.0];
+/// Weights of the values at softenings of 1, 2, 3, 4 for extrapolation to zero: by the cubic
+/// through all of them, and by the parabola through the first three.
+pub const CUBIC: [f64; 4] = [4.0, -6.0, 4.0, -1.0];
+pub const PARABOLA: [f64; 4] = [3.0, -3.0, 1.0, 0.0];
 
-/// Of the finest grid of a critical point, over the one it was found on.
+/// Refinement of the finest grid of a critical point over the one it was found on.
 pub const FINER: f64 = 4.0;
 
-/// Distances from a crossing (as of arclength) between which the branch is
-/// interpolated, in turn, until tips are within this part of their accuracy.
+/// Spacings (in arclength) of the points from which a branch is interpolated across a branch
+/// point, in this order, until the error of the tips is below `ENOUGH` times their accuracy.
 const APART: [f64; 4] = [0.03, 0.01, 0.003, 0.001];
 const ENOUGH: f64 = 0.1;
 
-/// A critical point, to the given accuracy of its tips, on so many `grids` or more.
+/// A critical point with the given accuracy of its tips, on at least so many `grids`.
 pub fn refine_critical(
     family: &Family,
     grid: &Grid,
@@ -57,19 +57,19 @@ pub fn refine_critical(
             let finer = Critical {
                 state,
                 tangent,
-                held: critical.held.iter().map(prolong_field).collect(),
+                soft: critical.soft.iter().map(prolong_field).collect(),
                 ..critical.clone()
             };
-            critical = finer.again(&mut equations)?;
-            let way = finer.state.shift_to(&critical.state);
-            if way > moved.max(STILL) {
+            critical = finer.relocated(&mut equations)?;
+            let shift = finer.state.shift_to(&critical.state);
+            if shift > moved.max(STILL) {
                 return Err(Doubt::OtherBranch);
             }
-            moved = way;
+            moved = shift;
         }
         let (mut values, growth) = softening.on(family, &mut equations, &critical, &mut table)?;
         if critical.kind == Kind::Branching {
-            let across = tips_across(&mut equations, &critical, values.fraction, accuracy);
+            let across = interpolate_across(&mut equations, &critical, values.fraction, accuracy);
             if let Some(across) = across {
                 table.common = table.common.max(across.error);
                 table.slope = Some(across.slope);
@@ -77,7 +77,7 @@ pub fn refine_critical(
             }
         }
         table.push(equations.grid().segments(), values);
-        // A finer grid would only add rounding.
+        // If so, a finer grid would only add rounding errors.
         let exact = table.fraction_error() < (table.rounding / growth).max(EXACT);
         let noisy = FINER * table.noise > ENOUGH * accuracy;
         let enough = exact || noisy || level + 1 >= grids;
@@ -94,17 +94,17 @@ pub fn refine_critical(
 /// The compliance by which matrices are softened.
 struct Softening(f64);
 
-/// A critical point without softening.
+/// A critical point extrapolated to zero softening.
 struct Unsoftened {
     values: Values,
-    /// What the extrapolation may have left of it in the points and in the fraction.
+    /// Error of the extrapolation, for the points and for the fraction.
     error: f64,
     fraction_error: f64,
 }
 
 impl Softening {
-    /// A critical point on a grid, and by how much rounding of its matrix grows; the table
-    /// is told of it, and of what softening leaves.
+    /// A critical point on a grid, and the factor by which extrapolation amplifies rounding;
+    /// records both errors in the table.
     fn on(
         &mut self,
         family: &Family,
@@ -129,7 +129,7 @@ impl Softening {
                     table.common = table.common.max(found.error);
                 }
                 stiffest = stiffest.min(1.0 / self.0);
-                growth = UNSOFTENING.iter().map(|weight| weight.abs()).sum();
+                growth = CUBIC.iter().map(|weight| weight.abs()).sum();
                 found.values
             }
         };
@@ -138,15 +138,15 @@ impl Softening {
         if fold {
             table.noise = table.noise.max(along);
         }
-        // Next to a fold the parameter changes with the square of the way.
+        // Near a fold the parameter depends quadratically on arclength.
         let of_value = (rounding / critical.steepness()).max(growth * along * along);
         table.rounding = table.rounding.max(growth * of_value);
         Ok((values, growth))
     }
 
-    /// A critical point of a nearly rigid leaf: by softened matrices, extrapolated to none.
-    /// They are softened less and less until rounding leaves more than the extrapolation:
-    /// that of the stiffness, over the change of the eigenvalue on the way.
+    /// A critical point of a nearly rigid leaf, from softened matrices, extrapolated to zero.
+    /// The softening is reduced until the rounding error, that of the stiffness over the
+    /// derivative of the eigenvalue, exceeds the error of the extrapolation.
     fn unsoftened(
         &mut self,
         family: &Family,
@@ -166,7 +166,7 @@ impl Softening {
     }
 }
 
-/// A critical point by four softened matrices.
+/// A critical point from four softened matrices.
 fn extrapolated(
     family: &Family,
     grid: &Grid,
@@ -175,11 +175,11 @@ fn extrapolated(
 ) -> Result<Unsoftened, Stuck> {
     let mut found = Vec::new();
     let mut near = critical.clone();
-    for k in (0..UNSOFTENING.len()).rev() {
+    for k in (0..CUBIC.len()).rev() {
         let soft = family.softened(softening * (k + 1) as f64);
         let mut equations = Equations::new(family, grid.clone())?;
         equations.softened = Some(Leaves::new(&soft, grid.clone()));
-        near = near.again(&mut equations)?;
+        near = near.relocated(&mut equations)?;
         found.push(Values::of(&mut equations, &near.state, near.fraction)?);
     }
     found.reverse();
@@ -187,7 +187,7 @@ fn extrapolated(
         let parts: Vec<_> = weights.into_iter().zip(found.iter().cloned()).collect();
         Values::sum(&parts)
     };
-    let (values, parabola) = (by(UNSOFTENING), by(BY_PARABOLA));
+    let (values, parabola) = (by(CUBIC), by(PARABOLA));
     Ok(Unsoftened {
         error: values.distance(&parabola),
         fraction_error: (values.fraction - parabola.fraction).abs(),
@@ -195,34 +195,34 @@ fn extrapolated(
     })
 }
 
-/// A branch where it is crossed.
-struct Across {
+/// A branch at a branch point.
+struct Interpolated {
     values: Values,
     /// A bound on the error of the tips.
     error: f64,
-    /// Change of the values with the fraction.
+    /// Derivatives of the values with respect to the fraction.
     slope: Values,
 }
 
-/// A branch where it is crossed at this fraction. Along the neutral mode the singular
-/// matrix leaves a leaf as rounding has it; but the branch is smooth through the
-/// crossing, and points beside it are known. None where there are none on both sides:
-/// at an end of the range, or next to a fold.
-fn tips_across(
+/// Interpolates a branch across a branch point at this fraction. There the singular matrix
+/// leaves the component along the neutral mode undetermined to rounding; but the branch is
+/// smooth, and points on both sides are well determined. None if there is no point on one side:
+/// at an end of the range, or near a fold.
+fn interpolate_across(
     equations: &mut Equations,
     critical: &Critical,
     fraction: f64,
     accuracy: f64,
-) -> Option<Across> {
-    // From values at -3, -2, -1, 1, 2, 3 that at 0 and the slope to sixth order; from
-    // four of them that at 0 to fourth.
+) -> Option<Interpolated> {
+    // Weights of values at -3, -2, -1, 1, 2, 3: for the value at 0 and the slope to sixth
+    // order, and, from four of them, for the value at 0 to fourth order.
     const SIXTH: [f64; 3] = [0.75, -0.3, 0.05];
     const FOURTH: [f64; 3] = [2.0 / 3.0, -1.0 / 6.0, 0.0];
     const SLOPE: [f64; 3] = [0.75, -0.15, 1.0 / 60.0];
-    let mut best: Option<Across> = None;
+    let mut best: Option<Interpolated> = None;
     for apart in APART {
         let unit = apart * critical.tangent.fraction;
-        let mut beside = |side: f64| {
+        let mut values_at = |side: f64| {
             let increments = &critical.tangent.increments;
             let at = fraction + side * unit;
             let moved = equations.moved(&critical.state, at, increments, side * apart);
@@ -230,15 +230,16 @@ fn tips_across(
             Values::of(equations, &point.state, at).ok()
         };
         let pairs = [1.0, 2.0, 3.0].into_iter();
-        let pairs: Option<Vec<[Values; 2]>> =
-            pairs.map(|k| Some([beside(-k)?, beside(k)?])).collect();
+        let pairs: Option<Vec<[Values; 2]>> = pairs
+            .map(|k| Some([values_at(-k)?, values_at(k)?]))
+            .collect();
         let Some(pairs) = pairs else {
             continue;
         };
         let sum = |weights: [f64; 3], sign: f64| {
             let parts = pairs.iter().zip(weights);
-            let parts = parts.flat_map(|([before, behind], weight)| {
-                [(sign * weight, before.clone()), (weight, behind.clone())]
+            let parts = parts.flat_map(|([before, after], weight)| {
+                [(sign * weight, before.clone()), (weight, after.clone())]
             });
             Values::sum(&parts.collect::<Vec<_>>())
         };
@@ -248,7 +249,7 @@ fn tips_across(
         };
         let error = values.distance(&sum(FOURTH, 1.0));
         if best.as_ref().is_none_or(|best| error < best.error) {
-            best = Some(Across {
+            best = Some(Interpolated {
                 values,
                 error,
                 slope: sum(SLOPE.map(|weight| weight / unit), -1.0),

@@ -1,4 +1,4 @@
-//! What finer and finer grids say of a point of a branch, extrapolated.
+//! A point of a branch, extrapolated over finer and finer grids.
 
 use super::equations::{Equations, Stuck};
 use super::family::{Family, OutOfRange};
@@ -8,11 +8,11 @@ use crate::relax::richardson::Richardson;
 use crate::shape::RodShape;
 use glam::DVec3;
 
-/// A term of fourth order falls to this part from grid to grid: a change that falls to
-/// less is zero by chance.
+/// Smallest ratio of successive changes: that of a fourth-order term from grid to grid. A
+/// smaller change is small by chance.
 const LEAST_FALL: f64 = 1.0 / 16.0;
 
-/// A point without the error of its grid.
+/// A point extrapolated to zero segment length.
 #[derive(Clone, Debug)]
 pub struct Refined {
     /// The parameter, as a fraction of its range.
@@ -21,10 +21,10 @@ pub struct Refined {
     pub energy: f64,
     /// Tips of all rods, likewise.
     pub tips: Vec<[f64; 3]>,
-    /// The force that the holder of the tips feels, likewise; zero of free ones.
+    /// The reaction at held tips, likewise; zero if they are free.
     pub reaction: DVec3,
-    /// Bound on the error of the tips, or if they are held of the middles of the rods, as
-    /// those of the branch at this parameter; at a fold, as those of the fold.
+    /// Bound on the error of the tips, or of the rods' midpoints if the tips are held: of the
+    /// branch at this parameter, or, at a fold, of the fold itself.
     pub error: f64,
     /// Bound on the error of the parameter, as a fraction of its range.
     pub fraction_error: f64,
@@ -65,16 +65,16 @@ pub enum Doubt {
     /// Finer grids have no solution near it.
     #[error("finer grids have no solution there")]
     Unsolved,
-    /// They have one of another branch: far away, or going another way.
+    /// They have a point of another branch: far away, or with another tangent.
     #[error("finer grids have another branch there")]
     OtherBranch,
-    /// They have one with another index.
+    /// They have a point with another index.
     #[error("finer grids have another index there")]
     OtherIndex,
-    /// The index changes, and no singular matrix explains it.
+    /// The index changes without a singular matrix that explains it.
     #[error("the index changes there without a singular matrix")]
     Unexplained,
-    /// The error of the tips, or of what is looked at in their place, stays above the
+    /// The error of the tips, or of the points used instead, stays above the
     /// accuracy.
     #[error("the tolerance is not reached there on any grid")]
     Inaccurate,
@@ -92,20 +92,20 @@ impl From<OutOfRange> for Doubt {
     }
 }
 
-/// What is known of a point on one grid.
+/// Quantities of a point on one grid.
 #[derive(Clone)]
 pub(super) struct Values {
-    /// Three coordinates of every tip, then of the middle of every rod if its tip is held
-    /// and says nothing.
+    /// The coordinates of every tip; then, if the tips are held, those of the midpoint of
+    /// every rod.
     pub points: Vec<f64>,
     pub fraction: f64,
     pub energy: f64,
-    /// What the holder of the tips feels; zero of free ones.
+    /// The reaction at held tips; zero if they are free.
     pub reaction: DVec3,
 }
 
-/// The nodes of each rod at which values are taken.
-pub(super) fn looked_at(leaf: &DiscreteLeaf, segments: usize) -> impl Iterator<Item = usize> {
+/// The nodes of each rod whose positions are used.
+pub(super) fn observed_nodes(leaf: &DiscreteLeaf, segments: usize) -> impl Iterator<Item = usize> {
     let middle = leaf.leaf.held.is_some().then_some(segments / 2);
     [segments].into_iter().chain(middle)
 }
@@ -113,7 +113,7 @@ pub(super) fn looked_at(leaf: &DiscreteLeaf, segments: usize) -> impl Iterator<I
 impl Values {
     pub fn of(equations: &mut Equations, state: &State, fraction: f64) -> Result<Self, Stuck> {
         let leaf = equations.leaves.at(fraction)?;
-        let nodes = looked_at(leaf, state.segments());
+        let nodes = observed_nodes(leaf, state.segments());
         let reaction = match leaf.leaf.held {
             Some(_) => leaf.reaction(state).0,
             None => DVec3::ZERO,
@@ -127,7 +127,7 @@ impl Values {
         })
     }
 
-    /// The sum of values, each times its weight.
+    /// The weighted sum of values.
     pub fn sum(parts: &[(f64, Values)]) -> Self {
         let sum = |of: &dyn Fn(&Values) -> f64| parts.iter().map(|(w, v)| w * of(v)).sum();
         let points = parts.first().map_or(0, |(_, values)| values.points.len());
@@ -141,7 +141,7 @@ impl Values {
         }
     }
 
-    /// The largest distance between points.
+    /// The largest distance between corresponding points.
     pub fn distance(&self, other: &Values) -> f64 {
         let points = self.points.chunks(3).zip(other.points.chunks(3));
         let squares = points.map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum());
@@ -149,19 +149,19 @@ impl Values {
     }
 }
 
-/// The values of a point on ever finer grids.
+/// The values of a point on finer and finer grids.
 #[derive(Default)]
 pub(super) struct Table {
     rows: Vec<(usize, Values)>,
-    /// Change of the values with the fraction along the branch. Points are those of the
-    /// branch at the fraction that is stated, whatever the error of that; where there is
-    /// no such change, at a fold, they are those of the point itself.
+    /// Derivatives of the values with respect to the fraction, along the branch. With them the
+    /// points are those of the branch at the stated fraction, whatever its error; without, at
+    /// a fold, they are those of the critical point itself.
     pub slope: Option<Values>,
-    /// What rounding of the matrix may have done to the fraction.
+    /// Error of the fraction due to rounding of the matrix.
     pub rounding: f64,
-    /// What softening of the matrix may have left in the fraction.
+    /// Error of the fraction due to softening of the matrix.
     pub softening: f64,
-    /// An error of the points that all grids have, and their rounding.
+    /// An error of the points common to all grids, and their rounding error.
     pub common: f64,
     pub noise: f64,
 }
@@ -179,7 +179,7 @@ impl Table {
         table
     }
 
-    /// The points at the fraction of the last grid.
+    /// The points, moved along the branch to the fraction of the last grid.
     fn points(&self) -> Richardson {
         let last = self.rows.last().map_or(0.0, |(_, last)| last.fraction);
         let points = self.of(|values| match &self.slope {
@@ -200,7 +200,7 @@ impl Table {
         best.map_or(f64::INFINITY, |best| best.error + self.common + self.noise)
     }
 
-    /// Estimate of the error of the fraction of a critical point, but for rounding.
+    /// Estimate of the error of the fraction of a critical point, without rounding.
     pub fn fraction_error(&self) -> f64 {
         let Some(best) = self.of(|values| vec![values.fraction]).best() else {
             return f64::INFINITY;
@@ -219,7 +219,7 @@ impl Table {
         }
     }
 
-    /// The point, with its state on the finest grid.
+    /// The extrapolated point, with its state on the finest grid.
     pub fn refined(&self, state: State, grid: Grid) -> Refined {
         let columns = |table: &Richardson| table.best().map_or(0, |best| best.columns);
         let own = columns(&self.points());
@@ -230,11 +230,11 @@ impl Table {
         let reaction = self.of(|values| values.reaction.to_array().to_vec());
         let mut reaction = DVec3::from_slice(reaction.column(own));
         if let Some(slope) = &self.slope {
-            let way = fraction - fractions.column(own)[0];
+            let correction = fraction - fractions.column(own)[0];
             let moved = points.iter_mut().zip(&slope.points);
-            moved.for_each(|(point, slope)| *point += way * slope);
-            energy += way * slope.energy;
-            reaction += way * slope.reaction;
+            moved.for_each(|(point, slope)| *point += correction * slope);
+            energy += correction * slope.energy;
+            reaction += correction * slope.reaction;
         }
         let tips = points.chunks(3).take(state.rods());
         Refined {

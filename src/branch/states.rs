@@ -1,19 +1,19 @@
-//! States of leaves that vary: forces on them, how these change, and where increments
-//! lead them.
+//! States of leaves that vary: the forces on them, the derivatives of these, and the states
+//! to which increments lead.
 
 use super::family::clamp;
 use super::field::{plus, times};
 use crate::leaf::{DiscreteLeaf, Field, State, System};
 
-/// Part of the parameter's range over which forces are differenced: the error
-/// is a ten-thousand-millionth, and what rounding makes of it no larger.
+/// Step of central differences of forces, as a part of the parameter's range: truncation
+/// error and rounding error are both about 1e-10.
 pub const DIFFERENCE: f64 = 1e-5;
 
-/// The change of forces with a number of which `forces` are given at some distance
-/// from where it is.
+/// Derivative of the forces with respect to a parameter, by central differences; `forces` takes
+/// the distance from the present value of the parameter.
 pub fn rate<E>(mut forces: impl FnMut(f64) -> Result<Field, E>) -> Result<Field, E> {
     let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
-        // At an end of the range there may be nothing beyond.
+        // At an end of the range there may be no leaf beyond.
         let mut at = |step: f64| Ok((step, forces(step)?));
         at(step).or_else(|_: E| at(0.0))
     });
@@ -22,7 +22,7 @@ pub fn rate<E>(mut forces: impl FnMut(f64) -> Result<Field, E>) -> Result<Field,
     Ok(times(&rate, 1.0 / (after - before)))
 }
 
-/// The unbalanced forces of a leaf in a state, but for its clamps, which are its own.
+/// The unbalanced forces on a leaf in a state whose clamped nodes are put where it clamps them.
 pub fn forces_on(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> Field {
     let mut moved = state.clone();
     clamp(leaf, &mut moved);
@@ -30,8 +30,8 @@ pub fn forces_on(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> Fie
     system.rhs()
 }
 
-/// A state after `step` times these increments. What the leaf clamps goes there first:
-/// the forces of the segments at a clamp feel all of its motion, however long the step.
+/// A state after `step` times these increments. Clamped nodes are moved first: the forces of the
+/// segments at a clamp depend on all of its displacement, however short the step.
 pub fn advanced(
     leaf: &DiscreteLeaf,
     state: &State,
@@ -43,8 +43,8 @@ pub fn advanced(
     clamp(leaf, &mut clamped);
     let mut next = clamped.clone();
     if clamped.x == state.x && clamped.q == state.q {
-        // Rounding of what nearly rigid segments have for their lengths counts as little
-        // as the step is long.
+        // The rounding error in the lengths of nearly rigid segments is scaled down
+        // with the step.
         system.set_solution(increments);
         leaf.advance(state, system, step, &mut next);
         return next;

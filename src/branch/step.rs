@@ -8,15 +8,15 @@ use super::family::OutOfRange;
 pub struct Found {
     pub point: Point,
     pub iterations: usize,
-    /// Length of the step, along the tangent it was made from.
+    /// Length of the step along the tangent at its start.
     pub step: f64,
-    /// By how much Newton moved the prediction.
+    /// Distance between the predicted and the corrected point.
     pub drift: f64,
 }
 
 impl Found {
-    /// By a step of this length, or a shorter one that ends where the range does: behind
-    /// the end there may be no leaf, and at it one.
+    /// Makes a step of this length, or a shorter one to the end of the range: beyond the end there
+    /// may be no leaf.
     pub fn by_step(equations: &mut Equations, now: &Point, step: f64) -> Result<Self, Stuck> {
         match advance(equations, now, step) {
             Err(Stuck::OutOfRange(out)) => advance_to_edge(equations, now, step, out),
@@ -24,9 +24,9 @@ impl Found {
         }
     }
 
-    /// Shortens a step of this length that leaves the range to end where the range does;
-    /// returns where that is.
-    pub fn arrive_at_edge(
+    /// If a step of this length leaves the range, shortens it to the end of the range;
+    /// returns that end.
+    pub fn stop_at_edge(
         &mut self,
         equations: &mut Equations,
         now: &Point,
@@ -61,7 +61,7 @@ fn advance(equations: &mut Equations, now: &Point, step: f64) -> Result<Found, S
     })
 }
 
-/// A step that ends where the range does, if one of this length would leave it.
+/// A step to the end of the range, if one of this length would leave it.
 fn advance_to_edge(
     equations: &mut Equations,
     now: &Point,
@@ -69,32 +69,32 @@ fn advance_to_edge(
     out: OutOfRange,
 ) -> Result<Found, Stuck> {
     let edge = if now.tangent.fraction > 0.0 { 1.0 } else { 0.0 };
-    let way = (edge - now.fraction) / now.tangent.fraction;
-    if way <= 0.0 || way > step {
+    let length = (edge - now.fraction) / now.tangent.fraction;
+    if length <= 0.0 || length > step {
         return Err(out.into());
     }
-    let (point, iterations) = at_edge(equations, now, edge, way)?;
-    let part = way / step;
-    let state = equations.moved(&now.state, edge, &now.tangent.increments, way)?;
+    let (point, iterations) = at_edge(equations, now, edge, length)?;
+    let part = length / step;
+    let state = equations.moved(&now.state, edge, &now.tangent.increments, length)?;
     Ok(Found {
         drift: state.shift_to(&point.state) / part,
         point,
         iterations,
-        step: way,
+        step: length,
     })
 }
 
-/// The point at an end of the range, about so far along the tangent.
+/// The point at an end of the range, predicted `length` along the tangent.
 fn at_edge(
     equations: &mut Equations,
     now: &Point,
     edge: f64,
-    way: f64,
+    length: f64,
 ) -> Result<(Point, usize), Stuck> {
     let increments = &now.tangent.increments;
-    let state = equations.moved(&now.state, edge, increments, way)?;
+    let state = equations.moved(&now.state, edge, increments, length)?;
     let (mut point, iterations) = equations.correct(&state, edge, None)?;
-    if equations.along(&point.tangent, &now.tangent) < 0.0 {
+    if equations.inner(&point.tangent, &now.tangent) < 0.0 {
         point.tangent = reversed(point.tangent);
     }
     Ok((point, iterations))

@@ -1,16 +1,16 @@
-//! From a point where branches cross to another of them.
+//! Branch switching at a branch point.
 
 use super::critical::Critical;
 use super::equations::{Equations, Stuck, reversed};
 use super::refine::refine;
 use super::{Point, Tangent};
 
-/// How far from the crossing the other branch is looked for, in turn.
+/// Distances from the branch point at which the other branch is sought, in this order.
 const AWAY: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
 
 /// The first points of the branches that cross at `critical` in the plane of
-/// one of its neutral modes, one to either side: next to the crossing, but so far from
-/// it that finer grids have them, too, to this accuracy of their tips.
+/// one of its neutral modes, one on either side: as near as possible, but so far from the
+/// branch point that finer grids have them too, with this accuracy of their tips.
 pub fn switch(
     equations: &mut Equations,
     critical: &Critical,
@@ -24,7 +24,7 @@ pub fn switch(
         .filter_map(|direction| {
             let mut nearest = None;
             for away in AWAY {
-                let Ok(point) = leave(equations, critical, direction, away) else {
+                let Ok(point) = first_point(equations, critical, direction, away) else {
                     continue;
                 };
                 if refine(family, &grid, &point, accuracy).is_ok() {
@@ -37,7 +37,7 @@ pub fn switch(
         .collect()
 }
 
-fn leave(
+fn first_point(
     equations: &mut Equations,
     critical: &Critical,
     direction: &Tangent,

@@ -8,67 +8,66 @@ use super::refined::Doubt;
 use super::step::Found;
 use super::{Point, Tangent};
 
-/// First step as a part of the longest, and the shortest.
+/// First step and shortest step, as parts of the longest.
 const FIRST: f64 = 0.25;
 const SHORTEST: f64 = 1e-5;
 
-/// Growth of the step where Newton's method needs at most so many iterations
-/// and the branch turns little.
+/// Growth factor of the step, if Newton's method needs at most `FEW` iterations
+/// and the cosine of the branch's turn exceeds `STRAIGHT`.
 const GROWTH: f64 = 1.5;
 const FEW: usize = 4;
 const STRAIGHT: f64 = 0.97;
 
-/// A branch that turns by more than this (cosine) in a step is not trusted to
-/// be the same.
+/// A step in which the cosine of the branch's turn is below this is rejected.
 const BENT: f64 = 0.85;
 
-/// Newton may move a predicted point by this part of the step.
+/// Largest distance of a point from its prediction, as a part of the step.
 const DRIFT: f64 = 0.5;
 
-/// A step goes along the mean of the tangents at its ends but for a part of third
-/// order. One with more than this part of it across them leads to another branch.
+/// A chord is parallel to the mean of the tangents at its ends up to third order. If a larger
+/// part of it than this is transverse, the step has led to another branch.
 const ACROSS: f64 = 0.1;
 
-/// More eigenvalues than this do not change their sign in one step, if it can
-/// be shortened to this part of the longest.
+/// A step with more sign changes of eigenvalues than this is rejected, until it
+/// is as short as this part of the longest.
 const MOST_CHANGES: usize = 2;
 const SHORT_ENOUGH: f64 = 0.02;
 
-/// A change of the index that is not explained is taken as it is where steps
+/// An unexplained change of the index is accepted if steps
 /// are shorter than this part of the longest.
 const UNEXPLAINED: f64 = 1e-3;
 
 /// A branch that comes to within this part of a step of its first point is
-/// tried for being closed, after so many points: by so many steps into the plane
-/// through that point which is normal to the branch. There the two must be the
-/// same within `SAME` (radians, lengths, fractions).
+/// tested for closure, after so many points: in at most `CLOSING` corrections to the plane
+/// through the first point normal to the branch. The two must then agree
+/// within `SAME` (radians, lengths, fractions).
 const CLOSED: f64 = 1.0;
 const CLOSED_AFTER: usize = 8;
 const CLOSING: usize = 5;
 const SAME: f64 = 1e-7;
 
-/// Grids of a critical point, unless its tips need more.
+/// Least number of grids for a critical point.
 const CRITICAL_GRIDS: usize = 4;
 
-/// Whether these points are enough.
+/// Predicate on the points so far: whether to stop.
 type Enough<'a> = dyn Fn(&[Point]) -> bool + 'a;
 
-/// How to follow a branch.
+/// How to follow a branch: step control and stopping.
 #[derive(Clone, Copy)]
 pub struct Walk<'a> {
-    /// The longest step; the parameter's range is one, and so is a turn of all
+    /// The longest step; the range of the parameter has length one, and so has a turn of all
     /// nodes by ten radians or a shift by one length.
     pub longest: f64,
-    /// Most points.
+    /// Largest number of points.
     pub most: usize,
-    /// Grids on which a critical point is found at least.
+    /// Least number of grids for a critical point.
     pub critical_grids: usize,
-    /// Whether enough is known once there are these points.
+    /// Stops the branch once it returns true.
     pub enough: Option<&'a Enough<'a>>,
 }
 
 impl Walk<'_> {
-    /// To wherever the branch ends.
+    /// Without a stopping criterion.
     pub fn new(longest: f64, most: usize) -> Self {
         Walk {
             longest,
@@ -90,16 +89,16 @@ pub enum End {
     Closed,
     /// After as many points as were allowed.
     MostPoints,
-    /// Where enough was known.
+    /// Where the stopping criterion was met.
     Enough,
-    /// No step however short could be made.
+    /// The step could not be made however short.
     Stuck(Stuck),
-    /// What comes next is another thing on every grid up to the finest.
+    /// The next point is not verified on any grid up to the finest.
     Unverified(Doubt),
 }
 
 impl End {
-    /// That of a branch that has come to this end of the range.
+    /// That of a branch which has reached this end of the range.
     fn at_edge(edge: f64) -> Self {
         match edge {
             1.0 => End::Reached,
@@ -113,22 +112,22 @@ impl End {
 pub struct Branch {
     /// Its points, in order.
     pub points: Vec<Point>,
-    /// Where its index changes: after which point, and what is there.
+    /// Critical points, each with the number of the point before it.
     pub critical: Vec<(usize, Critical)>,
-    /// Changes of the index that could not be located: after which point.
+    /// Changes of the index that could not be located, by the number of the point before.
     pub missed: Vec<usize>,
-    /// How it ended, if it has.
+    /// How it ended, once it has.
     pub end: Option<End>,
-    /// The first point on the present grid, if it is known there.
+    /// The first point on the present grid, if it was found there.
     first: Option<Point>,
-    /// Length of the next step, and of those that were made.
+    /// Length of the next step, and of all previous ones.
     step: f64,
     steps: Vec<f64>,
 }
 
 /// Follows a branch on one grid from its first point in the direction of its
-/// tangent, as long as the parameter is within its range. `progress` is told of
-/// each point: how many there are, and the parameter.
+/// tangent, as long as the parameter is within its range. `progress` is called after
+/// each point with the number of points and the parameter.
 pub fn walk(
     equations: &mut Equations,
     first: Point,
@@ -136,12 +135,12 @@ pub fn walk(
     progress: &mut dyn FnMut(usize, f64),
 ) -> Branch {
     let mut branch = Branch::new(first, how);
-    branch.go_on(equations, how, how.most, progress);
+    branch.extend_to(equations, how, how.most, progress);
     branch
 }
 
 impl Branch {
-    /// A branch of which the first point is known.
+    /// A branch with one point.
     pub fn new(first: Point, how: &Walk) -> Self {
         Branch {
             points: vec![first.clone()],
@@ -154,8 +153,8 @@ impl Branch {
         }
     }
 
-    /// Goes on until there are so many points, or it ends.
-    pub fn go_on(
+    /// Continues until there are `until` points, or the branch ends.
+    pub fn extend_to(
         &mut self,
         equations: &mut Equations,
         how: &Walk,
@@ -178,9 +177,9 @@ impl Branch {
         }
     }
 
-    /// Forgets all behind the given point, and the end; the next step from it will be
-    /// as long as the last one from it, or to it.
-    pub fn go_back(&mut self, to: usize) {
+    /// Discards everything after the given point, and the end; the next step is
+    /// as long as the previous one from that point, or to it.
+    pub fn truncate_at(&mut self, to: usize) {
         let made = self.steps.get(to).or(self.steps.last());
         self.step = *made.unwrap_or(&self.step);
         self.points.truncate(to + 1);
@@ -190,13 +189,13 @@ impl Branch {
         self.end = None;
     }
 
-    /// Makes the next step so much shorter.
+    /// Multiplies the next step by `part`.
     pub fn shorten(&mut self, part: f64) {
         self.step *= part;
     }
 
-    /// Leaves out a point between two others.
-    pub fn leave_out(&mut self, number: usize) {
+    /// Drops a point between two others.
+    pub fn drop_point(&mut self, number: usize) {
         self.points.remove(number);
         self.steps[number - 1] += self.steps.remove(number);
         let after = self.critical.iter_mut().map(|(after, _)| after);
@@ -205,13 +204,13 @@ impl Branch {
         }
     }
 
-    /// Whether there is a critical point right before or behind a point.
+    /// Whether there is a critical point right before or after a point.
     pub fn is_near_critical(&self, number: usize) -> bool {
         let mut critical = self.critical.iter();
         critical.any(|(after, _)| *after == number || after + 1 == number)
     }
 
-    /// Takes its last point to the grid with all segments halved.
+    /// Transfers the last point to the grid with all segments halved.
     pub fn refine(&mut self, equations: &mut Equations) -> Result<(), Stuck> {
         let last = self.points.len() - 1;
         let (_, finer) = on_finer(equations, &self.points[last])?;
@@ -224,8 +223,8 @@ impl Branch {
         Ok(())
     }
 
-    /// Makes a step from the last point, or shortens the next try. Fails where that is
-    /// too short.
+    /// Makes a step from the last point, or shortens the next attempt. Fails if that
+    /// is too short.
     fn try_step(&mut self, equations: &mut Equations, how: &Walk) -> Result<(), Stuck> {
         let now = &self.points[self.points.len() - 1];
         let step = self.step;
@@ -243,13 +242,13 @@ impl Branch {
             }
             Err(stuck) => return Err(stuck),
         };
-        let turn = equations.along(&now.tangent, &next.point.tangent);
-        let mut end = next.arrive_at_edge(equations, now, step)?.map(End::at_edge);
+        let turn = equations.inner(&now.tangent, &next.point.tangent);
+        let mut end = next.stop_at_edge(equations, now, step)?.map(End::at_edge);
         if let Some(first) = &self.first
             && end.is_none()
             && self.points.len() > CLOSED_AFTER
             && distance(first, &next.point) < CLOSED * step
-            && let Some(point) = closing(equations, first, &next.point, step)
+            && let Some(point) = closed_at(equations, first, &next.point, step)
         {
             next.point = point;
             end = Some(End::Closed);
@@ -257,10 +256,10 @@ impl Branch {
         let turned = now.tangent.fraction * next.point.tangent.fraction < 0.0;
         if next.point.index != now.index || turned {
             let after = self.points.len() - 1;
-            let way = equations.along(&chord(now, &next.point), &now.tangent);
-            let found = locate(equations, now, &next.point, way);
-            // A branch that turns round with no eigenvalue changing its sign touches
-            // another where that one crosses: the vertex of a pitchfork.
+            let distance = equations.inner(&chord(now, &next.point), &now.tangent);
+            let found = locate(equations, now, &next.point, distance);
+            // If the branch turns back and no eigenvalue changes sign, it touches another one
+            // where that crosses: the vertex of a pitchfork.
             let vertex = turned
                 && next.point.index == now.index
                 && found.as_ref().is_ok_and(|found| found.is_empty());
@@ -270,8 +269,8 @@ impl Branch {
             let explained = changes == next.point.index.abs_diff(now.index)
                 && (folds.count() % 2 == 1) == turned;
             if !explained {
-                // A change that nothing in between explains: this is another
-                // branch, passing nearby.
+                // An unexplained change of the index: the step has led to another branch
+                // nearby.
                 if next.step > UNEXPLAINED * how.longest {
                     self.step = 0.5 * next.step;
                     return Ok(());
@@ -294,17 +293,17 @@ impl Branch {
 }
 
 impl Walk<'_> {
-    /// Whether a step may be believed to have stayed on the branch.
+    /// Whether a step has presumably stayed on the branch.
     fn accepts(&self, equations: &Equations, now: &Point, found: &Found, step: f64) -> bool {
         let changes = found.point.index.abs_diff(now.index);
-        equations.along(&now.tangent, &found.point.tangent) > BENT
+        equations.inner(&now.tangent, &found.point.tangent) > BENT
             && found.drift < DRIFT * step
             && (changes <= MOST_CHANGES || step < SHORT_ENOUGH * self.longest)
-            && across(equations, now, &found.point) < ACROSS
+            && transverse_part(equations, now, &found.point) < ACROSS
     }
 }
 
-/// The straight way from a point to another.
+/// The difference of two points.
 fn chord(a: &Point, b: &Point) -> Tangent {
     Tangent {
         increments: between(&a.state, &b.state),
@@ -312,52 +311,52 @@ fn chord(a: &Point, b: &Point) -> Tangent {
     }
 }
 
-/// The part of the way from a point to another that lies across the mean of their
+/// The part of the chord between two points that is transverse to the mean of their
 /// tangents.
-fn across(equations: &Equations, a: &Point, b: &Point) -> f64 {
+fn transverse_part(equations: &Equations, a: &Point, b: &Point) -> f64 {
     let mean = equations.normalised(Tangent {
         increments: plus(&a.tangent.increments, 1.0, &b.tangent.increments),
         fraction: a.tangent.fraction + b.tangent.fraction,
     });
-    let mut way = chord(a, b);
-    let length = equations.along(&way, &way).sqrt();
-    let along = equations.along(&way, &mean);
-    add(&mut way.increments, -along, &mean.increments);
-    way.fraction -= along * mean.fraction;
-    equations.along(&way, &way).sqrt() / length
+    let mut rest = chord(a, b);
+    let length = equations.inner(&rest, &rest).sqrt();
+    let along = equations.inner(&rest, &mean);
+    add(&mut rest.increments, -along, &mean.increments);
+    rest.fraction -= along * mean.fraction;
+    equations.inner(&rest, &rest).sqrt() / length
 }
 
-/// The point of the branch of `near` that is the branch's first again: in value,
-/// shape, tangent and index.
-fn closing(equations: &mut Equations, first: &Point, near: &Point, step: f64) -> Option<Point> {
+/// Corrects a point near the first one until both agree in parameter, shape, tangent and
+/// index; none if they do not.
+fn closed_at(equations: &mut Equations, first: &Point, near: &Point, step: f64) -> Option<Point> {
     let mut near = near.clone();
     for _ in 0..CLOSING {
-        let same = equations.along(&near.tangent, &first.tangent);
+        let same = equations.inner(&near.tangent, &first.tangent);
         if same < BENT || near.index != first.index {
             return None;
         }
         if distance(&near, first) < SAME {
             return Some(near);
         }
-        let way = equations.along(&chord(&near, first), &first.tangent) / same;
-        if way.abs() > 2.0 * step {
+        let shift = equations.inner(&chord(&near, first), &first.tangent) / same;
+        if shift.abs() > 2.0 * step {
             return None;
         }
         let increments = &near.tangent.increments;
-        let fraction = near.fraction + way * near.tangent.fraction;
-        let state = (equations.moved(&near.state, fraction, increments, way)).ok()?;
+        let fraction = near.fraction + shift * near.tangent.fraction;
+        let state = (equations.moved(&near.state, fraction, increments, shift)).ok()?;
         (near, _) = (equations.correct(&state, fraction, Some(&first.tangent))).ok()?;
     }
     None
 }
 
-/// Distance of two points: of the shapes, or in the parameter.
+/// Distance of two points: the larger of those of shape and parameter.
 fn distance(a: &Point, b: &Point) -> f64 {
     (a.state.shift_to(&b.state)).max((a.fraction - b.fraction).abs())
 }
 
 impl Tangent {
-    /// The direction in which the parameter grows, or shrinks.
+    /// The direction in which the parameter grows, or decreases.
     pub fn towards(self, growing: bool) -> Self {
         match (self.fraction >= 0.0) == growing {
             true => self,

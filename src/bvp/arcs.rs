@@ -1,12 +1,12 @@
 //! The leaf whose rest shape is known: stretched circular arcs from the fan at
-//! the base to one common tip. Free rods are at rest in their own shapes.
+//! the base to one common tip. Free rods have their own rest shapes.
 
 use std::f64::consts::PI;
 
 use crate::scenario::Scenario;
 
-/// Chords of arcs that turn by nearly a full circle vanish; they are taken as
-/// at least this part of the arc.
+/// Lower bound on the ratio of chord to arc length, which vanishes for arcs that turn by
+/// nearly a full circle.
 const SHORTEST_CHORD: f64 = 0.05;
 
 /// Rest shape of one rod of that leaf: stretch v1, and bend about d3.
@@ -16,7 +16,7 @@ pub struct Arc {
     pub bend: f64,
 }
 
-/// One arc per rod, of the given dimensionless lengths before any growth; none
+/// One arc per rod, for these dimensionless lengths without growth; none
 /// for free rods.
 pub fn arcs(scenario: &Scenario, lengths: &[f64]) -> Vec<Arc> {
     if !scenario.joined || lengths.len() == 1 {

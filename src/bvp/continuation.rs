@@ -1,57 +1,53 @@
-//! A boundary-value solution without a start from elsewhere: from the leaf
-//! that rests in arcs, whose solution is known, by continuation to the
-//! scenario's.
+//! A boundary-value solution without a given start: by continuation from the leaf
+//! that rests in arcs, whose solution is known, to the scenario's.
 
 use super::equations::Equations;
 use super::newton::Newton;
 use super::solution::{Log, Reason};
 use super::trajectory::Trajectory;
 
-/// Accuracy of the solutions on the way.
+/// Accuracy of intermediate solutions.
 const ROUGH: f64 = 1e-6;
 
 /// Smallest step, as a part of the whole change.
 const LEAST_STEP: f64 = 1e-4;
 
-/// Slopes of single rods evaluated before a strategy is given up: some seconds.
+/// Evaluations of slopes of single rods before a strategy is abandoned: some seconds.
 const BUDGET: usize = 4_000_000;
 
-/// Stations at which a solution is kept for the next one to start from, per
-/// interval.
+/// Stations per interval at which a solution is stored as the start of the next one.
 const STATIONS: usize = 4;
 
-/// Over many short intervals, Newton's method converges from further away.
-/// Rotation over one of them, in radians, and how many there are.
+/// Over many short intervals, Newton's method has a larger region of convergence.
+/// Rotation over one of them, in radians, and their largest number.
 const TURN: f64 = 0.3;
 const LEAST_INTERVALS: usize = 8;
 const MOST_INTERVALS: usize = 256;
 
 /// A continuation that ended before the scenario's leaf was reached.
 pub struct Interrupted {
-    /// Why.
     pub reason: Reason,
-    /// How much of the change was made.
+    /// Part of the change that was made.
     pub part: f64,
-    /// The last solution.
     pub near: Trajectory,
 }
 
-/// How the arcs' leaf is changed into the scenario's, in the order they are tried.
-/// The last one may end far from where it began.
+/// How the leaf of arcs is changed into the scenario's, in the order of attempts.
+/// The last one may end far from its start.
 const STRATEGIES: [Strategy; 3] = [Strategy::Near, Strategy::Stiff, Strategy::Far];
 
 #[derive(Clone, Copy, PartialEq)]
 enum Strategy {
-    /// Newton's method goes not far in one step.
+    /// Newton's steps are limited to solutions nearby.
     Near,
-    /// Nor does it here, over rods that are at first as stiff in all
-    /// directions as in the stiffest.
+    /// The same, with rods that initially have their largest stiffness in all
+    /// directions.
     Stiff,
-    /// It may go far.
+    /// Newton's steps are not limited.
     Far,
 }
 
-/// Follows the equilibrium from the arcs' leaf to the scenario's. Returns a
+/// Follows the equilibrium from the leaf of arcs to the scenario's. Returns a
 /// trajectory near the solution.
 pub fn from_arcs(
     equations: &mut Equations,
@@ -93,7 +89,7 @@ impl Strategy {
         self.follow_stage(soften, equations, near, intervals, log)
     }
 
-    /// Changes the equations by one stage, all of it at first.
+    /// Changes the equations by one stage; the first attempt is the whole change.
     fn follow_stage(
         self,
         stage: Stage,
@@ -106,7 +102,7 @@ impl Strategy {
         let mut before: Option<(Trajectory, f64)> = None;
         let (begun, rods) = (log.work.slopes, equations.rods());
         while part < 1.0 {
-            log.way = part;
+            log.part = part;
             let spent = |log: &Log| (log.work.slopes - begun) * rods;
             let next = if step >= 1.0 - part { 1.0 } else { part + step };
             *stage(equations) = next;
@@ -126,7 +122,7 @@ impl Strategy {
                 }
             }
         }
-        log.way = 1.0;
+        log.part = 1.0;
         Ok(near)
     }
 
@@ -142,7 +138,7 @@ impl Strategy {
             let turns = (near.turn(equations) / TURN).ceil() as usize;
             turns.clamp(LEAST_INTERVALS, MOST_INTERVALS)
         });
-        let mut newton = Newton::near(equations, near, Some(count), log)?;
+        let mut newton = Newton::from_trajectory(equations, near, Some(count), log)?;
         newton.only_near = self != Strategy::Far;
         newton.solve(ROUGH)?;
         let stations = STATIONS * count.max(LEAST_INTERVALS);
@@ -156,5 +152,5 @@ impl Strategy {
     }
 }
 
-/// What is changed from 0 to 1 along a stage.
+/// The parameter that varies from 0 to 1 along a stage.
 type Stage = for<'e> fn(&'e mut Equations) -> &'e mut f64;

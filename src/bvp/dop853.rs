@@ -3,36 +3,34 @@
 use super::equations::{Equations, RodState, STATE};
 use crate::tableau::{A, B, C, E3, E5, STAGES};
 
-/// Steps of one initial-value problem before it is given up.
+/// Largest number of steps of an initial-value problem.
 const MAX_STEPS: usize = 20_000;
 
-/// A solution that has grown beyond this is not bounded.
+/// Solutions larger than this count as unbounded.
 const MAX_STATE: f64 = 1e9;
 
 /// Longest step at the tolerance 1e-13, in units of the length over which a
 /// perturbation grows or turns. Where the leaf is straight its own error would
-/// allow any step, and the sensitivities, integrated by the same steps, would
-/// suffer. As all steps do it grows with the tolerance, or else solutions at
+/// allow any step, and the sensitivities, integrated with the same steps, would
+/// be inaccurate. Like all steps it grows with the tolerance, since otherwise solutions at
 /// two tolerances would share their errors, but not beyond the last number.
 const LONGEST_STEP: [f64; 2] = [0.4, 2.25];
 
 /// The solution of an initial-value problem could not be continued beyond
-/// `sigma`: it grows out of all bounds.
+/// `sigma`: it grows without bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unbounded {
     /// How far it went.
     pub sigma: f64,
 }
 
-/// An initial-value problem on its way from one sigma to the next.
+/// Integration of an initial-value problem from one sigma to the next.
 pub struct Integrator<'e, 'a> {
     equations: &'e Equations<'a>,
     tolerance: f64,
-    /// Where it is.
     pub sigma: f64,
-    /// The state there.
     pub y: Vec<f64>,
-    /// Size of the next step.
+    /// Proposed size of the next step.
     step: f64,
     /// Width of the last step.
     pub width: f64,
@@ -41,7 +39,6 @@ pub struct Integrator<'e, 'a> {
     slopes: Vec<Vec<f64>>,
     next: Vec<f64>,
     steps: usize,
-    /// Slopes evaluated so far.
     pub evaluations: usize,
 }
 
@@ -68,12 +65,12 @@ impl<'e, 'a> Integrator<'e, 'a> {
         integrator
     }
 
-    /// Largest slope relative to the size of its unknown.
+    /// Largest slope relative to the magnitude of its unknown.
     fn slope(&self) -> f64 {
         norm(self.equations, &self.y, &self.y, |i| self.slopes[0][i])
     }
 
-    /// Bound on the step by what perturbations do.
+    /// Bound on the step due to the growth of perturbations.
     fn longest_step(&self) -> f64 {
         let force = |j| RodState::read(&self.y, j).n.length();
         let rate = (0..self.equations.rods())
@@ -83,11 +80,11 @@ impl<'e, 'a> Integrator<'e, 'a> {
         longest.min(LONGEST_STEP[1]) / rate
     }
 
-    /// All steps to `end`; what they are is told after each.
-    pub fn run(&mut self, end: f64, mut told: impl FnMut(&Self)) -> Result<(), Unbounded> {
+    /// Integrates to `end`; `after_step` is called after each step.
+    pub fn run(&mut self, end: f64, mut after_step: impl FnMut(&Self)) -> Result<(), Unbounded> {
         while self.sigma < end {
             self.step(end)?;
-            told(self);
+            after_step(self);
         }
         Ok(())
     }
@@ -98,11 +95,11 @@ impl<'e, 'a> Integrator<'e, 'a> {
         loop {
             self.steps += 1;
             let left = until - self.sigma;
-            // A rest too small for a step of its own is joined to this one.
+            // A remainder too small for a step of its own is added to this one.
             let step = self.step.min(self.longest_step());
             let last = step > 0.99 * left;
             let h = if last { left } else { step };
-            // Two stops may lie a rounding error apart: that is no small step.
+            // Two stops may differ by a rounding error: that is not a failure of step control.
             if self.steps > MAX_STEPS || (!last && h < 1e-13) {
                 return Err(failed);
             }
@@ -119,7 +116,7 @@ impl<'e, 'a> Integrator<'e, 'a> {
                 continue;
             }
             let proposed = h * factor.clamp(0.2, 5.0);
-            // A step cut short by `until` says little about the next.
+            // A step cut short by `until` does not limit the next.
             self.step = proposed.max(if last { self.step } else { 0.0 });
             self.width = h;
             self.sigma = if last { until } else { self.sigma + h };
@@ -141,7 +138,7 @@ impl<'e, 'a> Integrator<'e, 'a> {
         combine(&self.y, h, &B, &self.slopes, &mut self.next);
     }
 
-    /// Error of the attempted step over the tolerance.
+    /// Error of the attempted step relative to the tolerance.
     fn error(&self, h: f64) -> f64 {
         let weighted = |weights: &[f64; STAGES]| {
             norm(self.equations, &self.y, &self.next, |i| {
@@ -156,7 +153,7 @@ impl<'e, 'a> Integrator<'e, 'a> {
         fifth * fifth / (fifth * fifth + 0.01 * third * third).sqrt() / self.tolerance
     }
 
-    /// Moves on, with the quaternions at unit length again.
+    /// Accepts the step and normalises the quaternions.
     fn accept(&mut self) {
         std::mem::swap(&mut self.y, &mut self.next);
         for j in 0..self.equations.rods() {
@@ -180,8 +177,8 @@ fn combine(y: &[f64], h: f64, weights: &[f64], slopes: &[Vec<f64>], result: &mut
     }
 }
 
-/// Root mean square of a rod's numbers, the largest of all rods. Positions and
-/// rotations count as they are; moments in units of what bends the softest
+/// Root mean square of a rod's numbers, the maximum over all rods. Positions and
+/// rotations are not scaled; moments are in units of what bends the softest
 /// direction by one radian, unless they are larger; forces likewise.
 fn norm(equations: &Equations, y: &[f64], next: &[f64], value: impl Fn(usize) -> f64) -> f64 {
     let mut largest: f64 = 0.0;
@@ -200,7 +197,7 @@ fn norm(equations: &Equations, y: &[f64], next: &[f64], value: impl Fn(usize) ->
                 (value(STATE * j + i) / scale).powi(2)
             })
             .sum();
-        // Not f64::max, which would hide a NaN.
+        // Not f64::max, which would ignore a NaN.
         let rms = (sum / STATE as f64).sqrt();
         if rms.is_nan() || rms > largest {
             largest = rms;
@@ -231,7 +228,7 @@ mod tests {
         Scenario::from_toml(text).unwrap()
     }
 
-    /// Some state at the clamp, nowhere near an equilibrium.
+    /// A state at the clamp that is far from equilibrium.
     fn clamped(equations: &Equations, strength: f64) -> Vec<f64> {
         let mut y = vec![0.0; equations.size()];
         for (j, side) in [1.0, -0.7].into_iter().enumerate() {
@@ -247,7 +244,7 @@ mod tests {
         pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     }
 
-    /// The end of so many equal steps.
+    /// The result of so many equal steps.
     fn in_steps(equations: &Equations, strength: f64, count: usize) -> Vec<f64> {
         let begin = clamped(equations, strength);
         let mut integrator = Integrator::new(equations, 0.0, begin, 1e-10);
@@ -277,7 +274,7 @@ mod tests {
         assert!((order - 8.0).abs() < 0.5, "{errors:?}: order {order}");
     }
 
-    /// Step control keeps the error near the tolerance, for work that grows no
+    /// Step control keeps the error near the tolerance, with work that grows no
     /// faster than its power -1/8, and quaternions stay at unit length.
     #[test]
     fn the_error_follows_the_tolerance() {
@@ -299,7 +296,7 @@ mod tests {
         assert!((0.07..0.14).contains(&growth), "{work:?}");
     }
 
-    /// A stop a rounding error away is reached by a step as small.
+    /// A stop at the distance of a rounding error is reached by a step as small.
     #[test]
     fn stops_may_lie_a_rounding_error_apart() {
         let scenario = pair();
@@ -313,7 +310,7 @@ mod tests {
         assert!(apart(&integrator.y, &straight) < 1e-8);
     }
 
-    /// Strongly coupled rods that begin to part.
+    /// Strongly coupled rods that begin to separate.
     #[test]
     fn what_grows_out_of_bounds_is_given_up() {
         let mut scenario = pair();

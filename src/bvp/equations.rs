@@ -29,41 +29,40 @@ pub struct Equations<'a> {
     pub length: f64,
     /// Unit of force, A/L^2, with A the geometric mean of A2 and A3 mid-rod.
     pub force: f64,
-    /// Of the rods.
     pub lengths: Vec<f64>,
     coupling: Vec<DVec3>,
     gravity: DVec3,
     tip_force: DVec3,
     tip_moment: DVec3,
-    /// Where the tips of the rods are held, and in which rotation.
+    /// Positions and rotations at which the tips of the rods are held.
     held: Vec<(DVec3, DQuat)>,
     /// The smallest couple stiffness along each rod.
     pub softest: Vec<f64>,
-    /// Rate per sigma at which the coupling makes perturbations of each rod grow.
+    /// Growth rate per sigma of perturbations of each rod due to coupling.
     coupled_rate: Vec<f64>,
     arcs: Vec<Arc>,
     /// Fractions of the length where a profile has a kink, ascending.
     kinks: Vec<f64>,
-    /// Between 0, a leaf without loads that rests in the shape of arcs with a
+    /// Homotopy parameter between 0, a leaf without loads that rests in the shape of arcs with a
     /// common tip, and 1, the leaf of the scenario.
     pub part: f64,
-    /// Between 0, rods as stiff in every direction as in the stiffest, and 1,
+    /// Homotopy parameter between 0, rods with their largest stiffness in every direction, and 1,
     /// the rods of the scenario.
     pub softened: f64,
-    /// When to give up solving them.
+    /// Time limit of their solution.
     pub limit: Limit,
 }
 
-/// What the tips are bound to.
+/// Constraint on the tips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tip {
-    /// Nothing.
+    /// None.
     Free,
-    /// Each other.
+    /// A common position.
     Joint,
-    /// A point that is given.
+    /// A given position.
     Pinned,
-    /// A point, and directions there.
+    /// A given position and given directors.
     Clamped,
 }
 
@@ -74,20 +73,20 @@ pub fn difference(a: DQuat, b: DQuat) -> DVec3 {
     sign * DVec3::new(turn.x, turn.y, turn.z)
 }
 
-/// Derivatives of one rod's slopes by its own state, in blocks of three.
+/// Derivatives of one rod's slopes with respect to its own state, in blocks of three.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Derivatives {
-    /// Of r' by the rotation.
+    /// Of r' with respect to the rotation.
     pub r_theta: DMat3,
-    /// Of r' by n.
+    /// Of r' with respect to n.
     pub r_n: DMat3,
-    /// Of the rotation by the rotation.
+    /// Of the rotation rate with respect to the rotation.
     pub theta_theta: DMat3,
-    /// Of the rotation by m.
+    /// Of the rotation rate with respect to m.
     pub theta_m: DMat3,
-    /// Of m' by the rotation.
+    /// Of m' with respect to the rotation.
     pub m_theta: DMat3,
-    /// Of m' by n.
+    /// Of m' with respect to n.
     pub m_n: DMat3,
 }
 
@@ -100,7 +99,6 @@ struct Material {
 }
 
 impl<'a> Equations<'a> {
-    /// Of a checked scenario.
     pub fn new(scenario: &'a Scenario) -> Self {
         let rods = &scenario.rods;
         let length = longest(rods);
@@ -126,12 +124,12 @@ impl<'a> Equations<'a> {
                 let of = |gap: Option<usize>| gap.and_then(|gap| coupling.get(gap).copied());
                 let gaps = [of(j.checked_sub(1)), of(Some(j))];
                 let pull: DVec3 = gaps.into_iter().flatten().sum();
-                // Neighbours that move the other way double the pull; against
+                // Neighbours that move in the opposite direction double the pull; against
                 // it a rod bends, r'''' = -pull r, or stretches, r'' = pull r.
                 let pull = 2.0 * lengths[j] * pull.max_element();
                 let stiffness = least(&rods[j].force_stiffness) / force;
                 let bend = (pull * lengths[j] * lengths[j] / softest[j]).sqrt().sqrt();
-                // Forces have the longer arms of a vein that has grown.
+                // In a vein that has grown, forces have longer arms.
                 let grown = rods[j].rest_stretch.max_abs().sqrt();
                 (grown * bend).max((pull / stiffness).sqrt())
             })
@@ -163,7 +161,6 @@ impl<'a> Equations<'a> {
         }
     }
 
-    /// Number of rods.
     pub fn rods(&self) -> usize {
         self.lengths.len()
     }
@@ -181,7 +178,7 @@ impl<'a> Equations<'a> {
         tension.max(self.coupled_rate[j])
     }
 
-    /// Length at rest of rod `j` from the base up to `sigma`, with its growth.
+    /// Rest length of rod `j` from the base up to `sigma`, with its growth.
     pub fn grown(&self, j: usize, sigma: f64) -> f64 {
         self.lengths[j] * self.scenario.rods[j].rest_stretch.integral(sigma)
     }
@@ -192,12 +189,12 @@ impl<'a> Equations<'a> {
         self.part * self.coupling[g]
     }
 
-    /// Whether a force acts across gap `g`.
+    /// Whether gap `g` has any coupling.
     pub fn coupled(&self, g: usize) -> bool {
         self.coupling[g] != DVec3::ZERO
     }
 
-    /// Where an integration ends a step: at the kinks on the way, and at `to`.
+    /// Where integration steps must end: at kinks in between, and at `to`.
     pub fn stops(&self, from: f64, to: f64) -> impl Iterator<Item = f64> {
         let kinks = self.kinks.iter().copied();
         kinks.filter(move |s| *s > from && *s < to).chain([to])
@@ -232,7 +229,7 @@ impl<'a> Equations<'a> {
         }
         let (arc, part) = (self.arcs.get(j), self.part);
         let stretch = rod.rest_stretch.at(sigma);
-        // Where it is the scenario's, the law is not to be rounded.
+        // The scenario's own law without rounding errors.
         let (rest_strain, rest_curvature) = match part == 1.0 {
             true => (DVec3::X * stretch, at(&rod.rest_curvature) * self.length),
             false => {
@@ -295,7 +292,7 @@ impl<'a> Equations<'a> {
         slopes[STATE * self.rods()] = energy;
     }
 
-    /// Derivatives of the slopes of rod `j` by its own state: with the frame
+    /// Derivatives of the slopes of rod `j` with respect to its own state: with the frame
     /// turned by theta, R^T n changes by R^T (dn - theta x n).
     pub fn derivatives(&self, j: usize, sigma: f64, y: &[f64]) -> Derivatives {
         let rod = RodState::read(y, j);
@@ -316,10 +313,10 @@ impl<'a> Equations<'a> {
         }
     }
 
-    /// What the state at the tip misses of conditions (b), (d) and (e): six
-    /// numbers per rod. Joint tips: the distance of tip j from tip 0, for rod 0
-    /// the force; free tips: the force; tips that are held: the distance from
-    /// their holder. Then the moment, or of a clamped tip the rotation.
+    /// Residuals of conditions (b), (d) and (e) in the state at the tip: six
+    /// numbers per rod. Joined tips: the distance of tip j from tip 0, for rod 0
+    /// the force; free tips: the force; held tips: the distance from
+    /// their given position. Then the moment, or for a clamped tip the rotation.
     pub fn tip_conditions(&self, y: &[f64]) -> Vec<f64> {
         let rods: Vec<RodState> = (0..self.rods()).map(|j| RodState::read(y, j)).collect();
         let force: DVec3 = rods.iter().map(|rod| rod.n).sum();
@@ -340,7 +337,7 @@ impl<'a> Equations<'a> {
             .collect()
     }
 
-    /// What the tips are bound to.
+    /// The constraint on the tips.
     pub fn tip(&self) -> Tip {
         match &self.scenario.held_tip {
             Some(held) if held.clamps.is_some() => Tip::Clamped,
@@ -350,7 +347,7 @@ impl<'a> Equations<'a> {
         }
     }
 
-    /// Potential of the dead tip force in the state at the tip.
+    /// Potential of the dead tip force at the tip.
     pub fn tip_potential(&self, y: &[f64]) -> f64 {
         let tips = if self.scenario.joined { 1 } else { self.rods() };
         let work: f64 = (0..tips)

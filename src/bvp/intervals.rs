@@ -14,17 +14,17 @@ use super::trajectory::{Nodes, Trajectory};
 /// Largest growth of a perturbation over one interval.
 pub const GROWTH: f64 = 1e3;
 
-/// Most intervals, all rods together, that are chosen: they take most of a gigabyte.
+/// Most intervals chosen automatically, summed over rods: they take most of a gigabyte.
 const MOST_PIECES: usize = 4096;
 
-/// Accuracy to which growth is measured; it need not be.
+/// Accuracy of the integration that measures growth.
 const ROUGH: f64 = 1e-4;
 
-/// Accuracy to which a start is continued beyond the stations it is known at.
+/// Accuracy to which a start is continued beyond its stations.
 const START: f64 = 1e-8;
 
-/// Units in which perturbations are measured, so that none outweighs the
-/// others: lengths and angles as they are, forces and moments of a rod in
+/// Units of perturbations, so that none dominates the
+/// others: lengths and angles are not scaled, forces and moments of a rod are in
 /// units of the larger of what it carries and what bends it.
 #[derive(Clone, Debug)]
 pub struct Units {
@@ -33,7 +33,7 @@ pub struct Units {
 }
 
 impl Units {
-    /// For a leaf near a trajectory.
+    /// Units for a leaf near a trajectory.
     pub fn new(equations: &Equations, near: &Trajectory) -> Self {
         let (force, moment) = (0..equations.rods())
             .map(|j| {
@@ -44,7 +44,7 @@ impl Units {
         Units { force, moment }
     }
 
-    /// The unit of the `k`-th number of a leaf's perturbation.
+    /// The unit of the `k`-th component of a leaf's perturbation.
     pub fn of(&self, k: usize) -> f64 {
         match k % TANGENT {
             0..6 => 1.0,
@@ -79,7 +79,7 @@ impl Units {
             .collect()
     }
 
-    /// Moves a flat state by `step` times an increment.
+    /// Adds `step` times an increment to a flat state.
     pub fn advance(&self, y: &mut [f64], increment: &[f64], step: f64) {
         for j in 0..self.force.len() {
             let mut rod = RodState::read(y, j);
@@ -93,15 +93,13 @@ impl Units {
     }
 }
 
-/// An interval that was integrated over.
+/// Result of the integration over an interval.
 pub struct Integrated {
     /// The state at its end.
     pub end: Vec<f64>,
-    /// The linearised equations along it, if asked for.
+    /// The linearised equations along it, if requested.
     steps: Vec<LinearStep>,
-    /// Steps made.
     pub count: usize,
-    /// Slopes evaluated.
     pub evaluations: usize,
 }
 
@@ -137,34 +135,34 @@ pub fn integrate(
         .collect()
 }
 
-/// What the perturbations of one rod do at the end of an interval, without units: the
-/// first rod that feels them, and rows of numbers from there on.
-type Effects = (usize, Vec<f64>);
+/// Response of a group of rods at the end of an interval to perturbations of one rod,
+/// dimensionless: its first rod, and rows of numbers from there on.
+type Responses = (usize, Vec<f64>);
 
-/// Intervals and rods a thread takes before it is told how far that is.
-const TOGETHER: usize = 4;
+/// Pairs of interval and rod that a thread processes between progress reports.
+const CHUNK: usize = 4;
 
-/// The effects of all rods over all intervals, in parallel. `go_on` is told which part
-/// of them is known, and says whether to.
-pub fn effects(
+/// The responses of all rods over all intervals, in parallel. `proceed` is called with the part
+/// that is done, and returns whether to continue.
+pub fn responses(
     equations: &Equations,
     integrated: &[Integrated],
-    go_on: &mut dyn FnMut(f64) -> bool,
-) -> Option<Vec<Effects>> {
+    proceed: &mut dyn FnMut(f64) -> bool,
+) -> Option<Vec<Responses>> {
     let rods = equations.rods();
     let all = integrated.len() * rods;
-    let together = TOGETHER * rayon::current_num_threads();
+    let together = CHUNK * rayon::current_num_threads();
     let mut found = Vec::with_capacity(all);
     while found.len() < all {
-        if !go_on(found.len() as f64 / all as f64) {
+        if !proceed(found.len() as f64 / all as f64) {
             return None;
         }
         let some = found.len()..all.min(found.len() + together);
         let some = some.into_par_iter().map(|task| {
             let (steps, j) = (&integrated[task / rods].steps, task % rods);
             match task < rods {
-                true => effects_of::<6>(equations, steps, j),
-                false => effects_of::<TANGENT>(equations, steps, j),
+                true => responses_of::<6>(equations, steps, j),
+                false => responses_of::<TANGENT>(equations, steps, j),
             }
         });
         found.par_extend(some);
@@ -173,16 +171,16 @@ pub fn effects(
 }
 
 /// The sensitivities of the ends of all intervals to their beginnings, in the
-/// given units: square, but in the first interval, which begins at the clamp,
-/// only to forces and moments.
+/// given units: square, except in the first interval, which begins at the clamp,
+/// where only forces and moments are perturbed.
 pub fn sensitivities(
     equations: &Equations,
     units: &Units,
-    effects: &[Effects],
+    responses: &[Responses],
     growth: &mut Vec<f64>,
 ) -> Vec<Mat<f64>> {
     let rods = equations.rods();
-    (effects.chunks(rods).enumerate())
+    (responses.chunks(rods).enumerate())
         .map(|(k, columns)| {
             let kinds = if k == 0 { 6 } else { TANGENT };
             let mut matrix = Mat::zeros(TANGENT * rods, kinds * rods);
@@ -206,8 +204,12 @@ pub fn sensitivities(
         .collect()
 }
 
-/// Effects of the perturbations of rod `j`.
-fn effects_of<const W: usize>(equations: &Equations, steps: &[LinearStep], j: usize) -> Effects {
+/// Responses to the perturbations of rod `j`.
+fn responses_of<const W: usize>(
+    equations: &Equations,
+    steps: &[LinearStep],
+    j: usize,
+) -> Responses {
     let mut perturbations = Perturbations::<W>::unit(group(equations, j), j);
     for step in steps {
         perturbations.advance(equations, step);
@@ -217,10 +219,10 @@ fn effects_of<const W: usize>(equations: &Equations, steps: &[LinearStep], j: us
 
 /// Chooses intervals over which no perturbation grows by more than [`GROWTH`].
 ///
-/// Growth is that of positions, rotations, forces, moments each within its own
-/// kind, which depends on no units, for every rod with its neighbours held.
-/// Fails where so many intervals would be needed that it is hopeless.
-pub fn choose(equations: &Equations, near: &Trajectory) -> Result<Nodes, Unbounded> {
+/// Growth is measured separately for positions, rotations, forces and moments, which makes it
+/// independent of units, for every rod with its neighbours held.
+/// Fails if too many intervals would be needed.
+pub fn choose_intervals(equations: &Equations, near: &Trajectory) -> Result<Nodes, Unbounded> {
     let mut sigma = vec![0.0];
     'intervals: loop {
         let begin = sigma[sigma.len() - 1];
@@ -248,7 +250,7 @@ pub fn choose(equations: &Equations, near: &Trajectory) -> Result<Nodes, Unbound
                     if end <= begin || end >= 1.0 {
                         break 'intervals;
                     }
-                    // At a station the start is known, elsewhere interpolated.
+                    // At a station the start is known; elsewhere it is interpolated.
                     let known = near.last_station(end).filter(|s| *s > begin);
                     sigma.push(known.unwrap_or(end));
                     continue 'intervals;
@@ -262,8 +264,8 @@ pub fn choose(equations: &Equations, near: &Trajectory) -> Result<Nodes, Unbound
     Ok(Nodes { sigma, states })
 }
 
-/// States at the beginnings of intervals. What is interpolated far from
-/// stations may start Newton's method towards another solution.
+/// States at the beginnings of intervals. Interpolation far from
+/// stations may lead Newton's method to another solution.
 fn begin(equations: &Equations, near: &Trajectory, sigma: &[f64]) -> Vec<Vec<f64>> {
     let known = |sigma: f64| near.last_station(sigma) == Some(sigma);
     let at = |k: usize| {
@@ -283,7 +285,7 @@ fn begin(equations: &Equations, near: &Trajectory, sigma: &[f64]) -> Vec<Vec<f64
     (0..sigma.len() - 1).map(at).collect()
 }
 
-/// Largest sensitivity within one kind.
+/// Largest sensitivity within one kind of quantity.
 fn own_growth(rows: &[[f64; TANGENT]]) -> f64 {
     (0..TANGENT)
         .flat_map(|i| (0..3).map(move |c| (i, i / 3 * 3 + c)))

@@ -1,9 +1,9 @@
-//! Where the equations are singular: what that means for the leaf.
+//! Neutral directions: where the equations are singular.
 
 use glam::DVec3;
 
 use super::intervals::GROWTH;
-use super::newton::{Newton, Stuck, largest};
+use super::newton::{Newton, NewtonFailure, largest};
 use super::solution::{Neutral, Reason};
 use super::trajectory::{Nodes, Trajectory};
 
@@ -11,27 +11,29 @@ use super::trajectory::{Nodes, Trajectory};
 /// reported as a bifurcation nearby.
 const NEARLY_SINGULAR: f64 = 1e-7;
 
-/// But not where perturbations grow more than this over an interval: that
+/// Unless perturbations grow by more than this over an interval, which
 /// alone makes the equations nearly singular.
 const LARGEST_GROWTH: f64 = 100.0 * GROWTH;
 
-/// Size of the perturbation by which a neutral direction is made visible.
+/// Size of the perturbation along a neutral direction whose effect is computed.
 const NUDGE: f64 = 1e-5;
 
-/// Stations at which that is done.
+/// Stations at which it is computed.
 const STATIONS: [f64; 9] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
 
 impl Newton<'_, '_, '_> {
     /// Smallest singular value of the condensed equations over the largest.
     pub fn condition(&self) -> f64 {
-        self.march.as_ref().map_or(1.0, |march| march.condition())
+        self.condensed
+            .as_ref()
+            .map_or(1.0, |condensed| condensed.condition())
     }
 
-    /// What being stuck means.
-    pub fn reason(&self, stuck: Stuck) -> Reason {
+    /// The reason that corresponds to a failure of Newton's method.
+    pub fn reason(&self, stuck: NewtonFailure) -> Reason {
         let correction = match stuck {
-            Stuck::Unbounded(unbounded) => return unbounded.into(),
-            Stuck::NoProgress(correction) => correction,
+            NewtonFailure::Unbounded(unbounded) => return unbounded.into(),
+            NewtonFailure::NoProgress(correction) => correction,
         };
         match self.neutral(&STATIONS) {
             Some(neutral) => Reason::Singular(neutral),
@@ -43,23 +45,23 @@ impl Newton<'_, '_, '_> {
         }
     }
 
-    /// The neutral direction, if the equations are nearly singular: what a
-    /// small perturbation along it does to the rods.
+    /// The neutral direction, if the equations are nearly singular: the effect on the rods of a
+    /// small perturbation along it.
     pub fn neutral(&self, stations: &[f64]) -> Option<Neutral> {
         let trusted = self.growth.iter().all(|growth| *growth < LARGEST_GROWTH);
-        let march = self.march.as_ref()?;
-        if !trusted || march.condition() > NEARLY_SINGULAR {
+        let condensed = self.condensed.as_ref()?;
+        if !trusted || condensed.condition() > NEARLY_SINGULAR {
             return None;
         }
-        let direction = march.null();
+        let direction = condensed.null();
         let nudged = self.moved(&direction, NUDGE / largest(&direction));
         let sampled =
             |nodes: &Nodes| Trajectory::sampled(self.equations, nodes, stations, NUDGE * NUDGE);
-        let (at, beside) = (sampled(&self.nodes).ok()?, sampled(&nudged).ok()?);
-        let (at, beside) = (at.shape(self.equations), beside.shape(self.equations));
-        let mut displacement: Vec<Vec<DVec3>> = (at.iter().zip(&beside))
-            .map(|(at, beside)| {
-                let nodes = at.nodes.iter().zip(&beside.nodes);
+        let (at, perturbed) = (sampled(&self.nodes).ok()?, sampled(&nudged).ok()?);
+        let (at, perturbed) = (at.shape(self.equations), perturbed.shape(self.equations));
+        let mut displacement: Vec<Vec<DVec3>> = (at.iter().zip(&perturbed))
+            .map(|(at, perturbed)| {
+                let nodes = at.nodes.iter().zip(&perturbed.nodes);
                 nodes.map(|(a, b)| b.position - a.position).collect()
             })
             .collect();

@@ -1,74 +1,66 @@
 //! Newton's method on the unknowns of multiple shooting.
 //!
-//! Steps are damped by the natural monotonicity test: the next correction with
-//! the same linearisation must be smaller than this one (P. Deuflhard, Newton
+//! Steps are damped by the natural monotonicity test: the next simplified correction,
+//! with the same linearisation, must be smaller than this one (P. Deuflhard, Newton
 //! Methods for Nonlinear Problems, Springer 2004, section 3.3). It compares
-//! corrections with corrections, so that neither the scaling of the equations
-//! nor their conditioning enters.
+//! corrections with corrections, and is therefore independent of the scaling of the
+//! equations and of their conditioning.
 
+use super::condensed::Condensed;
 use super::dop853::Unbounded;
 use super::equations::{Equations, RodState};
-use super::intervals::{Integrated, Units, choose, effects, integrate, sensitivities};
-use super::march::March;
+use super::intervals::{Integrated, Units, choose_intervals, integrate, responses, sensitivities};
 use super::solution::{Correction, Log, Reason};
 use super::trajectory::{Nodes, Trajectory};
 use crate::memory::Request;
 
-/// Iterations before a solution is given up.
 const MAX_ITERATIONS: usize = 60;
 
-/// Smallest damping factor.
 const LEAST_FACTOR: f64 = 1e-3;
 
-/// Contraction that tells that a start is near its solution.
+/// Contraction below which a start counts as near its solution.
 const NEAR: f64 = 0.3;
 
-/// Largest defect of a solution, in its units. Corrections cannot tell where
+/// Largest defect of a solution, in its units. Corrections are no measure of it where
 /// the linearised equations are singular.
 const LARGEST_DEFECT: f64 = 1e-6;
 
-/// A linearisation is kept while it reduces corrections at least to this part.
+/// A linearisation is kept while it reduces corrections at least by this factor.
 const KEEP: f64 = 0.1;
 
-/// Corrections may stop shrinking at this multiple of the integration's
-/// tolerance, which is where its step control makes noise.
+/// Corrections below this multiple of the integration's tolerance need not decrease
+/// further: they are noise of its step control.
 const NOISE: f64 = 1e3;
 
 /// Why Newton's method did not converge.
-pub enum Stuck {
-    /// An initial-value problem has no bounded solution from the start on.
+pub enum NewtonFailure {
+    /// An initial-value problem has no bounded solution at the start.
     Unbounded(Unbounded),
-    /// Corrections do not shrink: the last one, relative.
+    /// Corrections do not decrease; the last one, relative.
     NoProgress(f64),
 }
 
-/// The state of a run: its linearisation is kept from one call to the next.
+/// The state of a run; its linearisation is kept between calls.
 pub struct Newton<'e, 'a, 'p> {
-    /// The equations.
     pub equations: &'e Equations<'a>,
-    /// Units of the unknowns.
     pub units: Units,
-    /// The unknowns.
     pub nodes: Nodes,
-    /// Whether to solve only if the start is near the solution: without damping.
+    /// Whether to solve without damping, only if the start is near the solution.
     pub only_near: bool,
     /// The last linearisation.
-    pub march: Option<March>,
+    pub condensed: Option<Condensed>,
     /// Growth of perturbations over each interval, at that linearisation.
     pub growth: Vec<f64>,
     /// Largest defect at the last evaluation, in the units.
     pub defect: f64,
-    /// How far it has come.
     now: Correction,
-    /// What is done.
+    /// Counts work and reports progress.
     log: &'e mut Log<'p>,
 }
 
-/// By how much the unknowns do not solve the equations.
 struct Residuals {
     /// End of each interval minus the beginning of the next.
     defects: Vec<Vec<f64>>,
-    /// The tip's conditions.
     conditions: Vec<f64>,
 }
 
@@ -76,7 +68,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
     /// Sets up the unknowns from a trajectory, over so many intervals; `None`:
     /// as many as the growth of perturbations needs, if that is possible and
     /// memory allows it.
-    pub fn near(
+    pub fn from_trajectory(
         equations: &'e Equations<'a>,
         near: &Trajectory,
         intervals: Option<usize>,
@@ -88,7 +80,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
                 let states = sigma[..count].iter().map(|&sigma| near.at(sigma)).collect();
                 Nodes { sigma, states }
             }
-            None => choose(equations, near)?,
+            None => choose_intervals(equations, near)?,
         };
         let (rods, intervals) = (equations.rods(), nodes.states.len());
         Request::Shooting { rods, intervals }.weigh()?;
@@ -102,11 +94,11 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             units: Units::new(equations, near),
             nodes,
             only_near: false,
-            march: None,
+            condensed: None,
             growth: Vec::new(),
             defect: f64::INFINITY,
             now: Correction {
-                way: log.way,
+                way: log.part,
                 iteration: 0,
                 linearized: 0.0,
                 size: f64::INFINITY,
@@ -121,10 +113,10 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         self.iterate(tolerance).map_err(|stuck| self.reason(stuck))
     }
 
-    fn iterate(&mut self, tolerance: f64) -> Result<(), Stuck> {
+    fn iterate(&mut self, tolerance: f64) -> Result<(), NewtonFailure> {
         self.now.wanted = tolerance;
         let mut factor: f64 = 1.0;
-        let mut fresh = self.march.is_none();
+        let mut fresh = self.condensed.is_none();
         let mut residuals = match fresh {
             false => self.residuals_at(&self.nodes.clone(), tolerance)?,
             true => self.linearize(tolerance)?,
@@ -138,7 +130,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
                 break;
             }
             self.now.size = size;
-            self.tell(1.0);
+            self.report(1.0);
             factor = if fresh { (2.0 * factor).min(1.0) } else { 1.0 };
             let (trial, next, ratio) = loop {
                 let trial = self.moved(&step, factor);
@@ -147,7 +139,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
                     if remaining <= (1.0 - 0.25 * factor) * size || remaining <= tolerance {
                         break (trial, next, remaining / size);
                     }
-                    // Too small to shrink: nothing but the integrator's noise.
+                    // Below the noise of the integrator corrections do not decrease.
                     if size <= NOISE * tolerance && remaining <= NOISE * tolerance {
                         break (trial, next, 0.0);
                     }
@@ -164,7 +156,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             };
             self.log.work.iterations += 1;
             self.nodes = trial;
-            self.defect = next.largest(self.march.as_ref());
+            self.defect = next.largest(self.condensed.as_ref());
             let remaining = ratio * size;
             if factor == 1.0 && (remaining <= tolerance || size <= NOISE * tolerance) {
                 let last = self.correction(&next);
@@ -173,7 +165,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
                 }
                 return match self.defect <= LARGEST_DEFECT.max(NOISE * tolerance) {
                     true => Ok(()),
-                    false => Err(Stuck::NoProgress(size)),
+                    false => Err(NewtonFailure::NoProgress(size)),
                 };
             }
             if self.only_near && ratio > NEAR {
@@ -187,37 +179,37 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
             };
             fresh = !keep;
         }
-        Err(Stuck::NoProgress(size))
+        Err(NewtonFailure::NoProgress(size))
     }
 
     /// Linearises at the present unknowns.
-    fn linearize(&mut self, tolerance: f64) -> Result<Residuals, Stuck> {
+    fn linearize(&mut self, tolerance: f64) -> Result<Residuals, NewtonFailure> {
         let integrated = self.integrate(&self.nodes.clone(), tolerance, true)?;
         let residuals = self.residuals(&self.nodes, &integrated);
         self.growth.clear();
-        let effects = effects(self.equations, &integrated, &mut |part| {
-            self.tell(part);
+        let responses = responses(self.equations, &integrated, &mut |part| {
+            self.report(part);
             !self.equations.limit.reached()
         });
-        let Some(effects) = effects else {
-            return Err(Stuck::NoProgress(f64::INFINITY));
+        let Some(responses) = responses else {
+            return Err(NewtonFailure::NoProgress(f64::INFINITY));
         };
-        let maps = sensitivities(self.equations, &self.units, &effects, &mut self.growth);
+        let maps = sensitivities(self.equations, &self.units, &responses, &mut self.growth);
         self.log.work.linearizations += 1;
-        self.march = March::new(self.equations, &self.units, maps);
-        match self.march {
+        self.condensed = Condensed::new(self.equations, &self.units, maps);
+        match self.condensed {
             Some(_) => Ok(residuals),
-            None => Err(Stuck::NoProgress(f64::INFINITY)),
+            None => Err(NewtonFailure::NoProgress(f64::INFINITY)),
         }
     }
 
-    /// Tells how far it has come with this part of its linearisation.
-    fn tell(&mut self, linearized: f64) {
+    /// Reports progress, with this part of the linearisation done.
+    fn report(&mut self, linearized: f64) {
         self.now.linearized = linearized;
         (self.log.progress)(&self.now);
     }
 
-    fn residuals_at(&mut self, nodes: &Nodes, tolerance: f64) -> Result<Residuals, Stuck> {
+    fn residuals_at(&mut self, nodes: &Nodes, tolerance: f64) -> Result<Residuals, NewtonFailure> {
         let integrated = self.integrate(nodes, tolerance, false)?;
         Ok(self.residuals(nodes, &integrated))
     }
@@ -227,12 +219,12 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         nodes: &Nodes,
         tolerance: f64,
         linear: bool,
-    ) -> Result<Vec<Integrated>, Stuck> {
+    ) -> Result<Vec<Integrated>, NewtonFailure> {
         if self.equations.limit.reached() {
-            return Err(Stuck::NoProgress(f64::INFINITY));
+            return Err(NewtonFailure::NoProgress(f64::INFINITY));
         }
-        let integrated =
-            integrate(self.equations, nodes, tolerance, linear).map_err(Stuck::Unbounded)?;
+        let integrated = integrate(self.equations, nodes, tolerance, linear)
+            .map_err(NewtonFailure::Unbounded)?;
         for interval in &integrated {
             self.log.work.steps += interval.count;
             self.log.work.slopes += interval.evaluations;
@@ -251,11 +243,11 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
     }
 
     fn correction(&self, residuals: &Residuals) -> Vec<Vec<f64>> {
-        let march = self.march.as_ref().expect("linearised before");
-        march.solve(&residuals.defects, &march.scaled(&residuals.conditions))
+        let condensed = self.condensed.as_ref().expect("linearised before");
+        condensed.solve(&residuals.defects, &condensed.scaled(&residuals.conditions))
     }
 
-    /// The unknowns moved by `factor` times a step.
+    /// The unknowns plus `factor` times a step.
     pub fn moved(&self, step: &[Vec<f64>], factor: f64) -> Nodes {
         let mut nodes = self.nodes.clone();
         for (y, increment) in nodes.states.iter_mut().zip(step) {
@@ -266,14 +258,14 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
 }
 
 impl Residuals {
-    fn largest(&self, march: Option<&March>) -> f64 {
-        let tip = march.map(|march| march.scaled(&self.conditions));
+    fn largest(&self, condensed: Option<&Condensed>) -> f64 {
+        let tip = condensed.map(|condensed| condensed.scaled(&self.conditions));
         let defects = self.defects.iter().chain(&tip).flatten();
         defects.fold(0.0, |m, value| value.abs().max(m))
     }
 }
 
-/// The largest number of an increment.
+/// The largest component of an increment.
 pub fn largest(step: &[Vec<f64>]) -> f64 {
     step.iter()
         .flatten()

@@ -1,6 +1,6 @@
-//! Exact sensitivities: how a perturbation of one rod travels through the
-//! leaf. The linearised equations are integrated by the steps the solution
-//! itself was integrated by.
+//! Exact sensitivities: the propagation of a perturbation of one rod through the
+//! leaf. The linearised equations are integrated with the steps of the solution
+//! itself.
 
 use std::ops::Range;
 
@@ -12,12 +12,12 @@ use glam::DMat3;
 /// The linearised equations at the stages of one step.
 pub struct LinearStep {
     width: f64,
-    /// Stage after stage, rod after rod.
+    /// Stage by stage, rod by rod.
     derivatives: Vec<Derivatives>,
 }
 
 impl LinearStep {
-    /// Of the step the integrator has just made.
+    /// For the last step of the integrator.
     pub fn of(equations: &Equations, integrator: &Integrator) -> Self {
         let (width, begin) = (integrator.width, integrator.sigma - integrator.width);
         LinearStep {
@@ -33,19 +33,17 @@ impl LinearStep {
 }
 
 /// Perturbations of `W` different kinds of a range of rods, all others being
-/// held: [`TANGENT`] rows of `W` numbers per rod.
+/// fixed: [`TANGENT`] rows of `W` numbers per rod.
 #[derive(Clone, Debug)]
 pub struct Perturbations<const W: usize> {
-    /// The rods perturbed.
     pub rods: Range<usize>,
-    /// Rows.
     pub rows: Vec<[f64; W]>,
     stage: Vec<[f64; W]>,
     slopes: Vec<Vec<[f64; W]>>,
 }
 
 impl<const W: usize> Perturbations<W> {
-    /// Unit perturbations of the last `W` numbers of rod `j`.
+    /// Unit perturbations of the last `W` components of rod `j`.
     pub fn unit(rods: Range<usize>, j: usize) -> Self {
         let mut rows = vec![[0.0; W]; TANGENT * rods.len()];
         for k in 0..W {
@@ -59,7 +57,7 @@ impl<const W: usize> Perturbations<W> {
         }
     }
 
-    /// Carries them through a step.
+    /// Propagates them through a step.
     pub fn advance(&mut self, equations: &Equations, step: &LinearStep) {
         for i in 0..STAGES {
             let (rows, stage) = (&self.rows, &mut self.stage);
@@ -91,7 +89,7 @@ fn slopes<const W: usize>(
         products(&mut out[9..12], [(&d.m_theta, theta), (&d.m_n, n)]);
         for k in 0..3 {
             let mut force = [0.0; W];
-            // A rod outside the range is held, but pulls all the same.
+            // A rod outside the range is fixed, but its coupling still acts.
             let mut pull = |gap: usize, neighbour: Option<usize>| {
                 let kappa = equations.coupling(gap)[k];
                 if kappa == 0.0 {
@@ -152,7 +150,7 @@ fn combine<const W: usize>(
     }
 }
 
-/// The rods that rod `j` is coupled with, directly or through others.
+/// The rods coupled with rod `j`, directly or through others.
 pub fn group(equations: &Equations, j: usize) -> Range<usize> {
     let mut group = j..j + 1;
     while group.start > 0 && equations.coupled(group.start - 1) {
@@ -174,7 +172,7 @@ mod tests {
 
     const END: f64 = 0.8;
 
-    /// Two veins coupled, a third on its own; everything differs.
+    /// Two coupled veins and a third one, all with different properties.
     fn three() -> Scenario {
         let text = r#"
             name = "three"
@@ -187,7 +185,7 @@ mod tests {
         Scenario::from_toml(text).unwrap()
     }
 
-    /// Some state of all rods, not at the clamp.
+    /// An arbitrary state of all rods, not at the clamp.
     fn begin(equations: &Equations) -> Vec<f64> {
         let mut y = vec![0.0; equations.size()];
         for j in 0..3 {
@@ -203,7 +201,7 @@ mod tests {
         y
     }
 
-    /// The state with the `k`-th number of rod `j` perturbed.
+    /// The state with the `k`-th component of rod `j` perturbed.
     fn perturbed(y: &[f64], j: usize, k: usize, by: f64) -> Vec<f64> {
         let mut y = y.to_vec();
         let mut rod = RodState::read(&y, j);
@@ -235,7 +233,7 @@ mod tests {
             .collect()
     }
 
-    /// Effects of unit perturbations of rod `j` on its group.
+    /// Responses of its group to unit perturbations of rod `j`.
     fn linear<const W: usize>(equations: &Equations, j: usize) -> Perturbations<W> {
         let mut perturbations = Perturbations::<W>::unit(group(equations, j), j);
         let mut integrator = Integrator::new(equations, 0.0, begin(equations), 1e-12);

@@ -1,4 +1,4 @@
-//! What is asked of the boundary-value solver, and what it answers.
+//! Requests to the boundary-value solver, and its results.
 
 use std::fmt;
 
@@ -10,10 +10,10 @@ use crate::limit::Limit;
 use crate::memory::TooMuch;
 use crate::shape::{Difference, RodShape};
 
-/// Work done by the shooting, counted so that tests can pin it.
+/// Work of the shooting, counted so that tests can check it exactly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Work {
-    /// Corrections made.
+    /// Number of corrections.
     pub iterations: usize,
     /// Linearisations: sensitivities of all intervals, and their factorisation.
     pub linearizations: usize,
@@ -24,7 +24,7 @@ pub struct Work {
 }
 
 impl Work {
-    /// Adds what another run did.
+    /// Adds the work of another run.
     pub fn add(&mut self, other: Work) {
         self.iterations += other.iterations;
         self.linearizations += other.linearizations;
@@ -33,40 +33,39 @@ impl Work {
     }
 }
 
-/// How far a shooting has come.
+/// Progress of a shooting.
 #[derive(Clone, Copy, Debug)]
 pub struct Correction {
-    /// From arcs: how much is made of the change that leads to the scenario's leaf (of its
-    /// loads, or of its stiffness), from 0 to 1; 1 where it starts near the leaf.
+    /// From arcs: the part of the present change towards the scenario's leaf (of its
+    /// loads, or of its stiffness) that is done, from 0 to 1; 1 for a start near the leaf.
     pub way: f64,
-    /// How many corrections were made since the present solution was begun.
+    /// Number of corrections for the present solution.
     pub iteration: usize,
-    /// How much is made of the linearisation that the next one needs, from 0 to 1.
+    /// Part of the linearisation for the next correction that is done, from 0 to 1.
     pub linearized: f64,
-    /// The largest number of the last correction found, in the units of the unknowns;
+    /// The largest component of the last correction, in the units of the unknowns;
     /// infinite before the first.
     pub size: f64,
-    /// What corrections are to shrink to.
+    /// The size below which corrections have converged.
     pub wanted: f64,
 }
 
-/// What a shooting does is counted, and told step by step.
+/// Counts the work of a shooting and reports its progress.
 pub(super) struct Log<'p> {
-    /// Counted so far.
     pub work: Work,
-    /// How much of the present change of the leaf of arcs is made.
-    pub way: f64,
-    /// Told of each correction.
+    /// Part of the present change of the leaf of arcs that is done.
+    pub part: f64,
+    /// Called for each correction.
     pub progress: &'p mut dyn FnMut(&Correction),
 }
 
-/// Displacements below this part of the largest are not worth telling.
+/// Displacements below this part of the largest are not mentioned.
 const MOVES: f64 = 0.2;
 
-/// Where a solution starts from.
+/// The start of a solution.
 #[derive(Clone, Copy, Debug)]
 pub enum Start<'s> {
-    /// On its own: from arcs by continuation.
+    /// Without a given start: from arcs by continuation.
     Arcs,
     /// From the shape of the leaf at some stations, in the scenario's units.
     Leaf {
@@ -77,33 +76,33 @@ pub enum Start<'s> {
     },
 }
 
-/// How precise a solution is to be.
+/// Required precision of a solution.
 #[derive(Clone, Copy, Debug)]
 pub enum Precision {
-    /// Estimated error of the positions relative to the longest rod, or as far
-    /// as double precision allows: see [`Solution::error`].
+    /// Estimated error of the positions relative to the longest rod, or the best that
+    /// double precision allows: see [`Solution::error`].
     Error(f64),
     /// Local error allowed per integration step, in dimensionless form.
     LocalError(f64),
 }
 
-/// What is asked of the shooting.
+/// Options of the shooting.
 #[derive(Clone, Debug)]
 pub struct Options<'s> {
-    /// Where it starts from.
+    /// The start.
     pub start: Start<'s>,
-    /// Fractions of the length at which the solution is wanted, from 0 to 1.
+    /// Fractions of the length at which the solution is returned, from 0 to 1.
     pub stations: &'s [f64],
-    /// How precise it is to be.
+    /// The required precision.
     pub precision: Precision,
     /// Number of intervals; `None`: as many as the growth of perturbations needs.
     pub intervals: Option<usize>,
-    /// When Newton's method gives up.
+    /// Time limit of Newton's method.
     pub limit: Limit,
 }
 
 impl<'s> Options<'s> {
-    /// Over as many intervals as needed, without a limit.
+    /// With automatic intervals and without a time limit.
     pub fn new(start: Start<'s>, stations: &'s [f64], precision: Precision) -> Self {
         Options {
             start,
@@ -121,8 +120,8 @@ impl<'s> Options<'s> {
 pub struct Neutral {
     /// Smallest singular value of the condensed equations over the largest.
     pub ratio: f64,
-    /// Displacement of every rod along it at the stations, the largest of
-    /// all displacements being 1.
+    /// Displacement of every rod along it at the stations, scaled so that the largest
+    /// is 1.
     pub displacement: Vec<Vec<DVec3>>,
 }
 
@@ -133,9 +132,9 @@ pub struct Solution {
     pub stations: Vec<f64>,
     /// The shape there, one per rod.
     pub rods: Vec<RodShape>,
-    /// Total potential energy (that of a dead moment does not exist).
+    /// Total potential energy (a dead moment has none).
     pub energy: f64,
-    /// Estimated global error: the difference to a solution with local errors
+    /// Estimated global error: the difference from a solution with local errors
     /// larger by two orders of magnitude, plus one local error.
     pub error: Difference,
     /// Largest jump between intervals or violation of a condition at the tip,
@@ -148,21 +147,21 @@ pub struct Solution {
     pub growth: f64,
     /// Smallest singular value of the condensed equations over the largest.
     pub condition: f64,
-    /// The direction that belongs to it, where the equations are nearly singular.
+    /// The corresponding direction, where the equations are nearly singular.
     pub neutral: Option<Neutral>,
     /// Work done.
     pub work: Work,
 }
 
-/// Growth over an interval that is blamed for a failure, as a power of ten.
+/// Growth over an interval to which a failure is attributed, as a power of ten.
 const TOO_MUCH_GROWTH: f64 = 5.0;
 
 /// Why there is no solution.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Reason {
-    /// An initial-value problem grows out of all bounds before its interval ends.
+    /// An initial-value problem grows without bound before its interval ends.
     Unbounded {
-        /// How far it went.
+        /// The sigma it reached.
         sigma: f64,
     },
     /// Newton's method does not converge.
@@ -174,7 +173,7 @@ pub enum Reason {
     },
     /// The equations are singular.
     Singular(Neutral),
-    /// So many intervals as are needed take too much memory.
+    /// The necessary number of intervals takes too much memory.
     TooMuch(TooMuch),
 }
 
@@ -215,7 +214,7 @@ impl fmt::Display for Reason {
     }
 }
 
-/// What the direction means, in words.
+/// The meaning of the direction, in words.
 impl fmt::Display for Neutral {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let longer = |a: DVec3, b: &DVec3| if b.length() > a.length() { *b } else { a };
@@ -240,14 +239,14 @@ impl fmt::Display for Neutral {
     }
 }
 
-/// A solution that was not found.
+/// Why no solution was found.
 #[derive(Clone, Debug)]
 pub struct Failure {
-    /// Why.
+    /// The reason.
     pub reason: Reason,
-    /// How much of the change from the arcs' leaf to the scenario's was made.
+    /// Part of the change from the leaf of arcs to the scenario's that was made.
     pub part: f64,
-    /// The last shape that was reached, at the stations.
+    /// The last shape computed, at the stations.
     pub rods: Vec<RodShape>,
     /// Work done.
     pub work: Work,

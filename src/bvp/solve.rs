@@ -10,13 +10,13 @@ use super::trajectory::Trajectory;
 use crate::scenario::{Scenario, longest};
 use crate::shape::Difference;
 
-/// The error is estimated by comparing with a solution whose local errors may
+/// The error is estimated by comparison with a solution whose local errors may
 /// be larger by this factor.
 const COARSER: f64 = 100.0;
 
-/// Local error allowed per step of the integration, as a part of the accuracy
-/// wanted, and its bounds: beyond them rounding rules, or step control loses
-/// its ground.
+/// Local error allowed per step of the integration, as a part of the required
+/// accuracy, and its bounds: below them rounding dominates, above them step control
+/// becomes unreliable.
 const LOCAL_PART: f64 = 1e-4;
 const LEAST_LOCAL: f64 = 1e-13;
 const MOST_LOCAL: f64 = 1e-9;
@@ -24,11 +24,11 @@ const MOST_LOCAL: f64 = 1e-9;
 /// Factor between attempts to reach the accuracy.
 const SHARPER: f64 = 1e-2;
 
-/// Solves the boundary-value problem of a scenario. `progress` is told of each
+/// Solves the boundary-value problem of a scenario. `progress` is called for each
 /// correction.
 ///
 /// # Errors
-/// If no solution is found: why, and how far it came.
+/// If no solution is found: the reason, and the last shape.
 pub fn solve(
     scenario: &Scenario,
     options: &Options,
@@ -54,7 +54,7 @@ pub fn solve(
     Ok(solution)
 }
 
-/// Solves with one tolerance, and a coarser one to compare with.
+/// Solves with one tolerance, and with a coarser one for comparison.
 fn solve_once(
     scenario: &Scenario,
     start: Start,
@@ -66,7 +66,7 @@ fn solve_once(
     equations.limit = options.limit.clone();
     let mut log = Log {
         work: Work::default(),
-        way: 1.0,
+        part: 1.0,
         progress,
     };
     let found = match start {
@@ -105,7 +105,7 @@ fn solve_near(
     log: &mut Log,
 ) -> Result<Solution, Reason> {
     let stations = options.stations;
-    let mut newton = Newton::near(equations, near, options.intervals, log)?;
+    let mut newton = Newton::from_trajectory(equations, near, options.intervals, log)?;
     let mut at = |tolerance: f64| -> Result<Trajectory, Reason> {
         newton.solve(tolerance)?;
         let sampled = Trajectory::sampled(equations, &newton.nodes, stations, tolerance);
@@ -114,8 +114,8 @@ fn solve_near(
     let (coarse, fine) = (at(COARSER * tolerance)?, at(tolerance)?);
     let (rods, tip) = (fine.shape(equations), fine.tip());
     let energy = tip[tip.len() - 1] + equations.tip_potential(tip);
-    // Steps that end at the same stations share their errors, which the
-    // difference then does not show: it is not less than a local error.
+    // Steps that end at the same stations share errors, which the
+    // difference does not show: it is at least one local error.
     let difference = Difference::between(&coarse.shape(equations), &rods);
     let (length, force) = (equations.length, equations.force);
     let error = Difference {

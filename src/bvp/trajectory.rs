@@ -1,5 +1,5 @@
-//! A leaf along sigma: where a boundary-value solution starts from, and what
-//! it returns.
+//! A leaf along sigma: the start or the result of a boundary-value
+//! solution.
 
 use glam::DVec3;
 
@@ -7,7 +7,7 @@ use super::dop853::{Integrator, Unbounded};
 use super::equations::{Equations, RodState};
 use crate::shape::{NodeState, RodShape};
 
-/// Where the intervals begin and end: 0 = sigma_0 < ... < sigma_K = 1, the
+/// Ends of the intervals: 0 = sigma_0 < ... < sigma_K = 1, and the
 /// states at the K beginnings.
 #[derive(Clone, Debug)]
 pub struct Nodes {
@@ -26,14 +26,14 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// From states of the equations as they are now.
+    /// From states of the equations in their present form.
     pub fn new(equations: &Equations, sigma: Vec<f64>, mut states: Vec<Vec<f64>>) -> Self {
         for i in 1..states.len() {
             let (before, after) = states.split_at_mut(i);
             for j in 0..equations.rods() {
                 let a = RodState::read(&before[i - 1], j);
                 let mut b = RodState::read(&after[0], j);
-                // Of a rotation's two quaternions the one nearer to the last.
+                // The sign of a quaternion is chosen by continuity.
                 if a.q.dot(b.q) < 0.0 {
                     b.q = -b.q;
                     b.write(&mut after[0], j);
@@ -142,12 +142,11 @@ impl Trajectory {
         &self.states[self.states.len() - 1]
     }
 
-    /// The last of the sigmas it is known at that is not beyond `sigma`.
+    /// The last of its stations that is not beyond `sigma`.
     pub fn last_station(&self, sigma: f64) -> Option<f64> {
         self.sigma.iter().copied().rfind(|s| *s <= sigma)
     }
 
-    /// The state at `sigma`.
     pub fn at(&self, sigma: f64) -> Vec<f64> {
         let last = self.sigma.len() - 1;
         let i = self.sigma.partition_point(|&s| s <= sigma).clamp(1, last);
@@ -162,7 +161,7 @@ impl Trajectory {
             .collect()
     }
 
-    /// This trajectory moved on by `step` times its difference to an earlier one.
+    /// Extrapolates this trajectory by `step` times its difference from an earlier one.
     pub fn beyond(&self, equations: &Equations, earlier: &Trajectory, step: f64) -> Self {
         let states = (self.sigma.iter().zip(&self.states))
             .map(|(&sigma, now)| {
@@ -182,7 +181,7 @@ impl Trajectory {
         })
     }
 
-    /// Angle by which directors turn along the rod that turns most.
+    /// Largest angle by which the directors of a rod turn along it.
     pub fn turn(&self, equations: &Equations) -> f64 {
         (0..equations.rods())
             .map(|j| {
@@ -193,7 +192,7 @@ impl Trajectory {
             .fold(0.0, f64::max)
     }
 
-    /// The shape in the units of the scenario, at the sigmas it is known at.
+    /// The shape in the units of the scenario, at its stations.
     pub fn shape(&self, equations: &Equations) -> Vec<RodShape> {
         (0..equations.rods())
             .map(|j| RodShape {

@@ -1,25 +1,24 @@
-//! The Lanczos method for (K - sigma M)^-1 M, in the inner product of M, every
-//! new direction made orthogonal to all others (C. Lanczos, J. Res. Nat. Bur.
-//! Standards 45, 1950; T. Ericsson and A. Ruhe, Math. Comp. 35, 1980, for the
-//! inverse).
+//! The Lanczos method for (K - sigma M)^-1 M, in the inner product of M, with full
+//! reorthogonalisation (C. Lanczos, J. Res. Nat. Bur. Standards 45, 1950;
+//! T. Ericsson and A. Ruhe, Math. Comp. 35, 1980, for the inverse).
 
 use super::masses::Masses;
 use crate::limit::Limit;
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// Accuracy of an eigenvector relative to the largest eigenvalue: rounding.
+/// Best possible accuracy of an eigenvector relative to the largest eigenvalue: rounding.
 const LEAST_ACCURACY: f64 = 1e-13;
 
-/// Directions after which a run ends, and those more for every pair wanted.
+/// Largest dimension of the Krylov space, and its increase for every pair wanted.
 const MOST: usize = 40;
 const MOST_A_PAIR: usize = 4;
 
-/// Where some pairs are found and the next one would take more checks than this, a
-/// shift closer to it is cheaper.
+/// If some pairs have converged and the next one would take more checks than this, a
+/// closer shift is cheaper.
 const MORE_CHECKS: f64 = 3.0;
 
-/// A direction shorter than this part of what it was has no digit left: all
-/// that the start can reach is found.
+/// A direction reduced by orthogonalisation below this part of its length is rounding: the
+/// Krylov space of the start is exhausted.
 const EXHAUSTED: f64 = 1e-13;
 
 /// An eigenvector of unit mass.
@@ -34,18 +33,17 @@ pub struct Lanczos<'a> {
     pub shift: f64,
     /// Solves (K - sigma M) x = b in place.
     pub solve: &'a mut dyn FnMut(&mut [f64]),
-    /// Eigenvectors that are not to be found again.
+    /// Eigenvectors found before, to be excluded.
     pub known: &'a [Mode],
-    /// Of an eigenvector, relative to its eigenvalue; that of the eigenvalue is the
-    /// square of it.
+    /// Relative accuracy of an eigenvector; that of the eigenvalue is its square.
     pub accuracy: f64,
-    /// Directions between checks of what has converged.
+    /// Directions between convergence checks.
     pub check_every: usize,
-    /// When it ends with nothing found.
+    /// Time limit, beyond which nothing is returned.
     pub time: &'a Limit,
 }
 
-/// In eight sums, so that none waits for the one before.
+/// With eight partial sums, which are independent of each other.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a, rest_a), (b, rest_b)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
     let mut sums = [0.0; 8];
@@ -64,8 +62,8 @@ fn subtract(a: &mut [f64], factor: f64, b: &[f64]) {
 
 impl Lanczos<'_> {
     /// The eigenvalues next above sigma, from the load `start`: `wanted` or
-    /// more of them, less if there are no more below `limit` or the run becomes
-    /// too long. Then also a value that the wanted ones do not exceed.
+    /// more of them, fewer if there are no more below `limit` or the run becomes
+    /// too long. Also a value that the wanted ones do not exceed.
     pub fn run(&mut self, start: Vec<f64>, wanted: usize, limit: f64) -> (Vec<Mode>, Option<f64>) {
         let mut next = start;
         (self.solve)(&mut next);
@@ -73,7 +71,7 @@ impl Lanczos<'_> {
         let mut basis: Vec<Vec<f64>> = Vec::new();
         let (mut diagonal, mut off): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
         let mut length = self.orthogonal(&mut next, &basis);
-        // How many pairs were found at the last check, and how far off the next one was.
+        // Number of converged pairs at the last check, and the error of the next one.
         let mut last_check = (0, f64::INFINITY);
         while basis.len() < most && length > 0.0 && !self.time.reached() {
             next.iter_mut().for_each(|x| *x /= length);
@@ -112,7 +110,7 @@ impl Lanczos<'_> {
                         eigenvalue: eigenvalue(k),
                         vector: self.combined(&basis, &vectors, k),
                     };
-                    // What is not positive is rounding.
+                    // Values that are not positive are due to rounding.
                     let positive = values.iter().take_while(|&&value| value > 0.0).count();
                     let found = (0..done.min(positive)).map(pair).collect();
                     let short = done < wanted && wanted <= positive;
@@ -125,8 +123,8 @@ impl Lanczos<'_> {
         (Vec::new(), None)
     }
 
-    /// Makes a vector orthogonal to the basis and to what is known, twice, as
-    /// once does not reach the last digits. Returns its length.
+    /// Orthogonalises a vector against the basis and the known modes, twice, since
+    /// once is not accurate to the last digits. Returns its length.
     fn orthogonal(&self, vector: &mut [f64], basis: &[Vec<f64>]) -> f64 {
         for _ in 0..2 {
             let loaded = self.masses.times(vector);
@@ -144,7 +142,7 @@ impl Lanczos<'_> {
         for (k, direction) in basis.iter().enumerate() {
             subtract(&mut sum, -coefficients[(k, column)], direction);
         }
-        // Not but for rounding.
+        // The length differs from one by rounding.
         let length = dot(&sum, &self.masses.times(&sum)).sqrt();
         sum.iter_mut().for_each(|x| *x /= length);
         sum

@@ -1,5 +1,5 @@
-//! Modes with the forces they let the segments carry, of which the derivatives of
-//! eigenvalues are made.
+//! Modes with the forces that they cause in the segments, for the derivatives of
+//! eigenvalues.
 
 use super::{Eigenpair, Wanted, masses, of_softened, quotient, softened};
 use crate::leaf::{DiscreteLeaf, Increment, State};
@@ -8,29 +8,29 @@ use crate::motion::Physics;
 use crate::rod::Section;
 use glam::DVec3;
 
-/// Accuracy of eigenvectors where the derivatives of eigenvalues are wanted.
+/// Accuracy of eigenvectors for the derivatives of eigenvalues.
 const DERIVED: f64 = 1e-9;
 
-/// So many times as much is softened what shows to first order what softening does.
+/// Ratio of the softenings from which the first-order effect of softening is computed.
 const SOFTER: f64 = 4.0;
 
-/// Cosine of the angle between shapes that are those of one mode.
+/// Cosine of the angle between two shapes above which they are the same mode.
 const ALIKE: f64 = 0.99;
 
-/// A mode with the spatial forces that it lets the segments carry.
+/// A mode with the spatial forces that it causes in the segments.
 #[derive(Clone, Debug)]
 pub struct LoadedMode {
     /// Lambda.
     pub eigenvalue: f64,
     /// Turns and shifts of all nodes, rod after rod, base to tip.
     pub shape: Vec<Increment>,
-    /// Of all segments, rod after rod.
+    /// Forces of all segments, rod by rod.
     pub forces: Vec<DVec3>,
 }
 
-/// As [`lowest`], with shapes and forces that are those of the leaf as stiff as it is:
-/// the derivatives of an eigenvalue, unlike itself, have an error of the first order of
-/// theirs. It is taken off by the modes of a leaf that is softened more.
+/// As [`lowest`], with the shapes and forces of the leaf without softening:
+/// derivatives of an eigenvalue, unlike the eigenvalue itself, depend on errors of these
+/// in first order. The effect of softening is removed by means of the modes of a softer leaf.
 pub fn loaded(
     leaf: &DiscreteLeaf,
     physics: &Physics,
@@ -68,13 +68,13 @@ pub fn loaded(
     };
     let mut modes = with_forces(&soft, pairs);
     for (mode, softer) in modes.iter_mut().zip(&softer) {
-        mode.stiffen(softer);
+        mode.remove_softening(softer);
     }
     Some(modes)
 }
 
 impl LoadedMode {
-    /// Both modes at once.
+    /// The sum of two modes.
     pub fn plus(&self, other: &LoadedMode) -> LoadedMode {
         let mut sum = self.clone();
         let both = sum.shape.iter_mut().flatten();
@@ -83,10 +83,9 @@ impl LoadedMode {
         sum
     }
 
-    /// Takes off what softening does to first order, by the same mode of a leaf that is
-    /// softened more. Where modes lie so close together that each is a mixture of
-    /// several, all remains.
-    fn stiffen(&mut self, softer: &LoadedMode) {
+    /// Removes the first-order effect of softening by means of the same mode of a softer
+    /// leaf. If modes are so close together that they mix, it is not removed.
+    fn remove_softening(&mut self, softer: &LoadedMode) {
         let dot = |a: &[Increment], b: &[Increment]| -> f64 {
             let both = a.iter().flatten().zip(b.iter().flatten());
             both.map(|(a, b)| a * b).sum()
@@ -106,8 +105,8 @@ impl LoadedMode {
     }
 }
 
-/// The eigenvalue by the shape and the forces of a mode, be they those of a leaf and
-/// a state nearby: an error of theirs enters in the second order only. In the
+/// The eigenvalue from the shape and the forces of a mode, possibly those of a neighbouring
+/// leaf and state: their errors have only a second-order effect. In the
 /// scenario's unit of time.
 pub fn eigenvalue(leaf: &DiscreteLeaf, physics: &Physics, state: &State, mode: &LoadedMode) -> f64 {
     let quotient = quotient::with_forces(leaf, state, &mode.shape, &mode.forces);

@@ -1,4 +1,4 @@
-//! The mass matrix: a tensor for the turn of every node, a mass for its shift.
+//! The mass matrix: for every node an inertia tensor and a mass.
 
 use crate::leaf::{DiscreteLeaf, Increment, SparsePattern, State, System, shift, turn};
 use crate::motion::Physics;
@@ -6,21 +6,21 @@ use glam::{DMat3, DVec3};
 
 /// Inertia of a node.
 struct Node {
-    /// Rod, number from 1.
-    place: (usize, usize),
+    /// Rod, and number of the node from 1.
+    index: (usize, usize),
     unknowns: [usize; 2],
     tensor: DMat3,
     mass: f64,
 }
 
-/// The mass matrix of a leaf, its unknowns numbered as by the pattern of its
-/// stiffness. A joint tip has the masses of all rods' ends.
+/// The mass matrix of a leaf, its unknowns numbered as in the pattern of its
+/// stiffness. A shared tip has the masses of all rods' ends.
 pub struct Masses {
     nodes: Vec<Node>,
 }
 
 impl Masses {
-    /// As they are in motion, the nodes turned as in `state`.
+    /// The masses of the moving leaf, its nodes rotated as in `state`.
     pub fn new(
         leaf: &DiscreteLeaf,
         physics: &Physics,
@@ -30,10 +30,10 @@ impl Masses {
         let node = |(j, i)| {
             let inertia = physics.inertia(leaf, j, i);
             let tensor = inertia.tensor(state.q[state.base(j) + i]);
-            // What does not move has no part in any motion.
+            // Fixed components have no mass.
             let [turns, shifts] = leaf.moves(i);
             Node {
-                place: (j, i),
+                index: (j, i),
                 unknowns: pattern.unknowns(j, i),
                 tensor: if turns { tensor } else { DMat3::ZERO },
                 mass: if shifts { inertia.mass } else { 0.0 },
@@ -60,7 +60,7 @@ impl Masses {
     /// Adds `factor` M to the matrix of a system.
     pub fn add(&self, system: &mut System, factor: f64) {
         for node in &self.nodes {
-            let ((j, i), none) = (node.place, (DVec3::ZERO, DVec3::ZERO));
+            let ((j, i), none) = (node.index, (DVec3::ZERO, DVec3::ZERO));
             system.add(j, i, (node.tensor * factor, node.mass * factor), none);
         }
     }

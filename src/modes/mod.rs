@@ -6,12 +6,12 @@
 //! A positive lambda is the square of a frequency, a negative one that of the
 //! rate at which the leaf leaves an unstable equilibrium.
 //!
-//! K - sigma M is factorised for a sigma below all eigenvalues, which the signs
-//! of its pivots prove, and the Lanczos method finds the eigenvalues next to
-//! sigma. How many there are below the last one found follows again from
-//! the signs of the pivots (Sylvester's law), of a second factorisation there: those
-//! that were missed, such as the second one of a double eigenvalue, are looked
-//! for besides the known ones until the numbers agree. A list that could not
+//! K - sigma M is factorised for a sigma below all eigenvalues, as the signs
+//! of its pivots prove, and the Lanczos method finds the eigenvalues nearest to
+//! sigma. Their number below the last one found follows from
+//! the signs of the pivots of a second factorisation there (Sylvester's law): missing ones,
+//! such as the second one of a double eigenvalue, are
+//! searched for until the numbers agree. A list whose completeness cannot
 //! be proved is not returned.
 
 mod lanczos;
@@ -28,32 +28,32 @@ use masses::Masses;
 use quotient::quotient;
 pub use quotient::rounding;
 
-/// Stiffness, in A/L^2, to which stiffer rods are softened in the matrix, as a
+/// Stiffness, in A/L^2, to which stiffer rods are softened in the matrix, since a
 /// larger one loses digits. The eigenvalues do not change to first order.
 const STIFFEST: f64 = 1e6;
 
-/// It is at least so many times the largest force carried.
+/// That stiffness is at least this multiple of the largest force carried.
 const STIFFER: f64 = 1e4;
 
-/// The first shift below zero that is tried for an unstable leaf, in
+/// The first negative shift tried for an unstable leaf, in
 /// A/(rho L^4), and the factor to the next.
 const FIRST_SHIFT: f64 = 1e-3;
 const NEXT_SHIFT: f64 = 8.0;
 
-/// Eigenvalues are counted below the last one less this part of the way to it
-/// from below all; the first of these that does not hit another one.
+/// Eigenvalues are counted below the last one minus this part of its distance from
+/// the lower shift; the first of these at which the matrix is not singular.
 const BELOW: [f64; 3] = [1e-7, 1e-6, 1e-5];
 
-/// Shifts closer to eigenvalues that are close together: by what part of the
-/// way from there back to the last shift, and the factor to the next try.
+/// Shifts closer to clustered eigenvalues: the distance from them as a part of that to
+/// the last shift, and its factor for the next attempt.
 const FIRST_PART: f64 = 2e-3;
 const NEXT_PART: f64 = 6.0;
 
-/// Searches that begin with modes near those that are sought.
+/// Number of searches that start with approximate modes.
 const FROM_NEAR: usize = 2;
 
-/// Searches before the list is given up, besides one for every mode wanted: of
-/// equal eigenvalues each finds one.
+/// Largest number of searches in excess of one for every mode wanted: each finds only one
+/// of equal eigenvalues.
 const SEARCHES: usize = 16;
 
 /// A mode and its eigenvalue.
@@ -65,17 +65,17 @@ pub struct Eigenpair {
     pub shape: Vec<Increment>,
 }
 
-/// What is asked of the modes of a leaf.
+/// Request for the modes of a leaf.
 #[derive(Clone, Copy)]
 pub struct Wanted<'a> {
-    /// How many of the lowest.
+    /// Number of the lowest modes.
     pub count: usize,
-    /// Of eigenvectors; the error of an eigenvalue is the square of it.
+    /// Accuracy of eigenvectors; the error of an eigenvalue is its square.
     pub accuracy: f64,
-    /// The modes of the same grid in a shape nearby, or of another grid
-    /// interpolated: the search begins with them.
+    /// Approximate modes, from the same grid in a shape nearby or interpolated from another grid:
+    /// the search begins with them.
     pub near: &'a [Eigenpair],
-    /// When it ends with nothing found.
+    /// Time limit, beyond which nothing is returned.
     pub time: &'a Limit,
 }
 
@@ -89,9 +89,9 @@ struct Vibration<'a> {
     near: Vec<Vec<f64>>,
 }
 
-/// The lowest eigenvalues, ascending, all if there are fewer than are wanted, with
-/// their modes, which are orthonormal with the masses. `None` if memory is short, the
-/// time is over, or the list cannot be proved to be complete.
+/// The lowest eigenvalues, ascending (all if there are fewer than wanted), with
+/// their modes, orthonormal in the mass product. `None` if memory is short, the
+/// time limit is exceeded, or the list cannot be proved to be complete.
 pub fn lowest(
     leaf: &DiscreteLeaf,
     physics: &Physics,
@@ -130,8 +130,8 @@ fn of_softened(
     Some(pairs)
 }
 
-/// The leaf with a matrix that keeps the digits of its soft modes; what is softened is
-/// so `times` as much.
+/// The leaf with a matrix that keeps the digits of its soft modes; the softening is multiplied
+/// by `times`.
 fn softened(leaf: &DiscreteLeaf, state: &State, times: f64) -> DiscreteLeaf {
     let mut soft = leaf.clone();
     let tension = state.n.iter().fold(0.0_f64, |m, n| m.max(n.length()));
@@ -151,7 +151,7 @@ impl Vibration<'_> {
         self.pattern.factorize(system, 0.0).ok()
     }
 
-    /// A shift below all eigenvalues, no farther than it must be.
+    /// A shift below all eigenvalues, as close to them as necessary.
     fn below_all(&self, system: &mut System) -> Option<(f64, SparseFactor<'_>)> {
         let mut shift = -self.leaf.neutral_shift();
         loop {
@@ -202,8 +202,8 @@ impl Vibration<'_> {
         None
     }
 
-    /// How many eigenvalues are missing, and below what value: just below the
-    /// `count`-th of those found, to which there may be more that are equal.
+    /// Number of missing eigenvalues, and the value below which they are: just below the
+    /// `count`-th of those found, which may have further equal ones.
     fn missing(
         &self,
         system: &mut System,
@@ -217,7 +217,7 @@ impl Vibration<'_> {
             let below = last - (part * (last - lowest)).max(4.0 * rounding);
             let there = self.factorize(system, below)?.negative();
             let here = found.iter().filter(|f| f.eigenvalue < below).count();
-            // Too many: one is equal to the limit but for rounding.
+            // Too many: one is equal to the limit up to rounding.
             if let Some(count) = there.checked_sub(here) {
                 return Some((count, below));
             }
@@ -225,8 +225,8 @@ impl Vibration<'_> {
         None
     }
 
-    /// A shift closer to the next eigenvalues, where many are close together:
-    /// somewhat below `bound`, but above no more than those found.
+    /// A shift closer to the next eigenvalues, if many are close together:
+    /// somewhat below `bound`, but above no eigenvalue that is not found yet.
     fn closer(
         &self,
         system: &mut System,
@@ -246,8 +246,8 @@ impl Vibration<'_> {
         Some(None)
     }
 
-    /// Adds to the eigenvalues found so many more of those next above the
-    /// shift, fewer if there are no more below a limit; see [`Lanczos::run`].
+    /// Adds so many of the eigenvalues next above the shift to those found,
+    /// fewer if there are no more below a limit; see [`Lanczos::run`].
     fn search(
         &self,
         (shift, factor): (f64, &mut SparseFactor),
@@ -275,7 +275,7 @@ impl Vibration<'_> {
         bound
     }
 
-    /// A load of all modes that are near those not found yet.
+    /// A load that excites all approximate modes not found yet.
     fn near_start(&self, found: usize) -> Vec<f64> {
         let mut load = vec![0.0; self.pattern.size()];
         for near in &self.near[found..] {
@@ -284,7 +284,7 @@ impl Vibration<'_> {
         self.masses.times(&load)
     }
 
-    /// A load without any symmetry, another one in every search.
+    /// A load without any symmetry, different in every search.
     fn start(&self, search: usize) -> Vec<f64> {
         // Multiples of the golden ratio spread evenly: no symmetry, no chance.
         let golden = |k: usize| (k as f64 * 0.618_033_988_749_895).fract() - 0.5;

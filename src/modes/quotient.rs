@@ -1,21 +1,21 @@
-//! The eigenvalue that belongs to a shape.
+//! Rayleigh quotients of shapes.
 
 use crate::leaf::{DiscreteLeaf, Increment, State, shift, turn};
 use crate::rod::{Section, Segment};
 use glam::DVec3;
 
-/// What rounding may do to a quotient of a mode of unit mass.
+/// Rounding error of the quotient of a mode of unit mass.
 pub fn rounding(leaf: &DiscreteLeaf) -> f64 {
     let sections = leaf.sections.iter();
     let stiffest = sections.fold(0.0_f64, |m, s| m.max(s.couple_stiffness.max_element()));
     4.0 * f64::EPSILON * stiffest * (leaf.segments() * leaf.segments()) as f64
 }
 
-/// Rayleigh's quotient of a shape of unit mass, in mixed form: with the forces
-/// that the shape lets the segments carry, taken as independent. An error of the
-/// shape or of these forces enters in the second order only, be it rounding or
-/// that of a stiffness by which the forces were condensed out; and no large
-/// stiffness stands in it.
+/// Rayleigh quotient of a shape of unit mass, in mixed form: with the forces
+/// that the shape causes in the segments as independent variables. Errors of the
+/// shape or of these forces, from rounding or from the stiffness with which the forces were
+/// condensed out, have only a second-order effect; and no large
+/// stiffness enters.
 pub fn quotient(leaf: &DiscreteLeaf, state: &State, shape: &[Increment]) -> f64 {
     let n = leaf.segments();
     let mut sum = 0.0;
@@ -35,7 +35,7 @@ pub fn quotient(leaf: &DiscreteLeaf, state: &State, shape: &[Increment]) -> f64 
     sum
 }
 
-/// The spatial forces that a shape lets the segments carry.
+/// The spatial forces that a shape causes in the segments.
 pub fn forces(leaf: &DiscreteLeaf, state: &State, shape: &[Increment]) -> Vec<DVec3> {
     let n = leaf.segments();
     let force = |(j, i): (usize, usize)| {
@@ -47,8 +47,8 @@ pub fn forces(leaf: &DiscreteLeaf, state: &State, shape: &[Increment]) -> Vec<DV
     leaf.each(0..n).map(force).collect()
 }
 
-/// The quotient of a shape with given forces, of both of which an error enters in the
-/// second order only, for a leaf and a state near those that they are of.
+/// The quotient of a shape with given forces, for a leaf and a state near those they belong to:
+/// errors of both have only a second-order effect.
 pub fn with_forces(
     leaf: &DiscreteLeaf,
     state: &State,
@@ -74,7 +74,7 @@ pub fn with_forces(
     sum
 }
 
-/// The second derivatives with the turns, at constant force.
+/// The contribution of second derivatives with respect to rotations, at constant force.
 fn turns(segment: &Segment, section: &Section, a: DVec3, b: DVec3) -> f64 {
     let bare = Section {
         condensing: DVec3::ZERO,
@@ -87,7 +87,7 @@ fn turns(segment: &Segment, section: &Section, a: DVec3, b: DVec3) -> f64 {
 /// The part of a segment with the increments `a` and `b` of its nodes.
 fn of_segment(mut segment: Segment, section: &Section, a: &Increment, b: &Increment) -> f64 {
     let (dx, a, b) = (shift(b) - shift(a), turn(a), turn(b));
-    // What the equilibrium itself leaves of it is no matter of the mode.
+    // The residual strain of the equilibrium is not part of the mode.
     segment.gap = DVec3::ZERO;
     let force = segment.force_increment(section, dx, a, b);
     let force = segment.frame.transpose() * force;

@@ -1,4 +1,4 @@
-//! The energy of a moving leaf, and whether it can be trusted.
+//! The energy of a moving leaf, and whether the motion is reliable.
 
 use super::method::{Energy, Snapshot, Stopped, Velocity};
 use super::physics::Physics;
@@ -6,15 +6,15 @@ use crate::leaf::{DiscreteLeaf, State};
 use crate::rod::RESOLVED_TURN;
 use glam::DVec3;
 
-/// Part of the energy that ever moved by which it may have grown without cause.
-/// Growth without bound passes any such limit soon.
+/// Largest energy that may appear without cause, as a part of the largest energy that moved.
+/// Unbounded growth soon exceeds any such limit.
 const LARGEST_IMBALANCE: f64 = 0.5;
 
-/// Energy, in units of A/L, that rounding may make.
+/// Energy, in units of A/L, that may be due to rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Energies at an instant, but what was dissipated and put in before. Leaves
-/// `leaf` with the loads and rest shape of that time.
+/// Energies at an instant, without what was dissipated and put in before. Sets the loads and
+/// the rest shape of `leaf` to those of that time.
 pub fn measure(
     leaf: &mut DiscreteLeaf,
     physics: &Physics,
@@ -40,7 +40,7 @@ pub fn measure(
         energy.coupling += stretch;
         energy.potential += potential - stretch;
         if i < n {
-            // By strains: the force may have a part of friction in it.
+            // From the strains: the force may include friction.
             let (section, force) = (leaf.section(j, i), state.n[j * n + i]);
             let segment = leaf.segment(state, j, i, force);
             let strain = segment.v(section) - section.rest_strain;
@@ -53,9 +53,9 @@ pub fn measure(
     energy
 }
 
-/// The energy that the loads, had they come all at once, would give a leaf at
-/// rest in a step of `h`: what comes faster than steps can follow is not known
-/// better than this.
+/// The energy that the loads, if they were applied at once, would give a leaf at
+/// rest in a step of `h`: for loads that change faster than steps resolve, the energy is not
+/// known more accurately than this.
 fn unresolved_energy(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) -> f64 {
     let loads = physics.loads(time);
     let n = leaf.segments();
@@ -72,7 +72,7 @@ fn unresolved_energy(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) 
     0.5 * h * h * energy
 }
 
-/// Whether a grid can resolve a segment bent by `turn`.
+/// Fails if the grid cannot resolve a segment bent by `turn`.
 pub fn resolved(leaf: &DiscreteLeaf, time: f64, turn: f64) -> Result<(), Stopped> {
     match turn > RESOLVED_TURN {
         true => Err(Stopped::Unresolved {
@@ -84,7 +84,7 @@ pub fn resolved(leaf: &DiscreteLeaf, time: f64, turn: f64) -> Result<(), Stopped
     }
 }
 
-/// What was taken out and put in.
+/// Energy dissipated and put in.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Exchange {
     pub dissipated: f64,
@@ -98,13 +98,13 @@ impl std::ops::AddAssign for Exchange {
     }
 }
 
-/// What was exchanged, and where it began.
+/// The energy exchanged, and the initial balance.
 #[derive(Clone, Debug, Default)]
 pub struct EnergyBalance {
     exchanged: Exchange,
     balance: f64,
     potential: f64,
-    /// The largest energy that ever moved.
+    /// The largest energy that moved so far.
     largest: f64,
 }
 
@@ -115,7 +115,7 @@ impl EnergyBalance {
         self.record(&start.energy);
     }
 
-    /// Energy that has moved: what is there or was taken out, or what loads gave.
+    /// Energy that has moved: present or dissipated, or put in by loads.
     fn record(&mut self, energy: &Energy) {
         let there = energy.kinetic + energy.elastic + energy.coupling + energy.dissipated;
         let given = (energy.potential - self.potential - energy.work).abs();
@@ -126,7 +126,7 @@ impl EnergyBalance {
         self.exchanged += exchange;
     }
 
-    /// The energy now, with what was exchanged so far and `since`.
+    /// The present energy, with what was exchanged so far and `since`.
     pub fn complete(&self, energy: Energy, since: Exchange) -> Energy {
         Energy {
             dissipated: self.exchanged.dissipated + since.dissipated,
@@ -135,8 +135,8 @@ impl EnergyBalance {
         }
     }
 
-    /// Whether the leaf, which was moved by steps of `h`, can be trusted to be
-    /// where it is; if not, `otherwise` may help besides a shorter step.
+    /// Checks that the motion of the leaf, in steps of `h`, is reliable; if it is not,
+    /// `otherwise` is advice besides a shorter step.
     pub fn judge(
         &mut self,
         leaf: &DiscreteLeaf,
@@ -147,7 +147,7 @@ impl EnergyBalance {
     ) -> Result<(), Stopped> {
         let time = now.time;
         self.record(&now.energy);
-        // Energy may be lost to the method's own damping, but not gained.
+        // The method's own damping may reduce energy, but nothing may increase it.
         let gain = now.energy.balance() - self.balance;
         let unresolved = unresolved_energy(leaf, physics, time, h);
         let imbalance = gain / (self.largest + unresolved + ROUNDING);
@@ -168,7 +168,6 @@ impl EnergyBalance {
         [dissipated, work, self.balance, self.potential, self.largest]
     }
 
-    /// Takes back what was saved.
     pub fn restore(&mut self, next: &mut impl FnMut() -> f64) {
         let [dissipated, work, balance, potential, largest] = [(); 5].map(|()| next());
         *self = EnergyBalance {

@@ -1,12 +1,12 @@
 //! The rate at which strains change, for internal friction.
 
-/// A step shorter than this part of the next determines the rate too poorly.
+/// A step shorter than this part of the next one makes the rate inaccurate.
 const SHORTEST_PART: f64 = 0.25;
 
-/// Weights of a value and the two before it in its rate of change now, the
-/// last step having been `last` long and the one before `before`: the backward
-/// difference of second order. Of first order where that step was too short
-/// or none (zero); none where there was no step at all.
+/// Weights of a value and the two before it for its present rate of change, the
+/// last step being `last` long and the one before `before`: the backward
+/// difference of second order; of first order if that step was too short
+/// or missing (zero); all zero if there was no step.
 pub fn rates(last: f64, before: f64) -> [f64; 3] {
     if last == 0.0 {
         return [0.0; 3];

@@ -1,4 +1,4 @@
-//! What every method of moving a leaf can do.
+//! The interface of all methods of time integration.
 
 use crate::leaf::State;
 use glam::DVec3;
@@ -12,31 +12,31 @@ pub struct Velocity {
     pub linear: DVec3,
 }
 
-/// Where the energy of a moving leaf is. Dimensionless: A/L.
+/// The energies of a moving leaf. Dimensionless: in A/L.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Energy {
-    /// Of motion.
+    /// Kinetic energy.
     pub kinetic: f64,
-    /// Of the strains.
+    /// Elastic energy of the strains.
     pub elastic: f64,
-    /// Of the coupling between rods.
+    /// Energy of the coupling between rods.
     pub coupling: f64,
-    /// Potential of the loads as they are now.
+    /// Potential of the loads at their present values.
     pub potential: f64,
-    /// Taken by damping since the beginning.
+    /// Energy dissipated by damping since the start.
     pub dissipated: f64,
-    /// Put in since the beginning by loads and rest shapes that change, and by
+    /// Work done since the start by varying loads and rest shapes, and by
     /// the moment on a tip, which has no potential.
     pub work: f64,
 }
 
 impl Energy {
-    /// What the motion cannot change: all energies less the work put in.
+    /// The conserved quantity: all energies minus the work.
     pub fn balance(&self) -> f64 {
         self.kinetic + self.elastic + self.coupling + self.potential + self.dissipated - self.work
     }
 
-    /// All of them changed alike.
+    /// Applies a function to all of them.
     pub(crate) fn map(self, change: impl Fn(f64) -> f64) -> Self {
         Energy {
             kinetic: change(self.kinetic),
@@ -62,20 +62,20 @@ pub struct Snapshot {
     pub energy: Energy,
 }
 
-/// Why a motion ended before its time. Times are dimensionless as a [`Method`]
-/// returns them, and in the scenario's unit as a simulation does.
+/// Why a motion ended early. Times are dimensionless as a [`Method`]
+/// returns them, and in the scenario's unit in a simulation.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Stopped {
-    /// Energy appeared from nowhere, or a value is not a number.
+    /// Energy appeared without cause, or a value is not a number.
     #[error(
         "diverged at t = {time:.6e}: energy grew from nowhere by {percent:.0} % of all that moved; use a shorter step, or {otherwise}"
     )]
     Diverged {
-        /// When.
+        /// Time.
         time: f64,
-        /// Energy gained, in percent of the largest that ever moved.
+        /// Energy gained, in percent of the largest energy that moved.
         percent: f64,
-        /// What else may help.
+        /// Further advice.
         otherwise: &'static str,
     },
     /// The grid is too coarse.
@@ -83,19 +83,19 @@ pub enum Stopped {
         "at t = {time:.6e} a segment is bent by {turn:.2} rad, more than it can resolve; use more segments than {segments}"
     )]
     Unresolved {
-        /// When.
+        /// Time.
         time: f64,
         /// Bending of the segment, radians.
         turn: f64,
-        /// Segments a rod.
+        /// Segments per rod.
         segments: usize,
     },
     /// No time step is short enough.
     #[error("at t = {time:.6e} no time step is short enough to go on; {advice}")]
     StepTooShort {
-        /// When.
+        /// Time.
         time: f64,
-        /// What may help.
+        /// Advice.
         advice: &'static str,
     },
 }
@@ -110,7 +110,7 @@ impl Stopped {
         }
     }
 
-    /// The same with its time in another unit: `unit` is that of the present one.
+    /// The same with its time in another unit, of which the present unit is `unit`.
     pub fn in_unit(mut self, unit: f64) -> Self {
         match &mut self {
             Stopped::Diverged { time, .. }
@@ -121,27 +121,27 @@ impl Stopped {
     }
 }
 
-/// A method that moves a leaf on in time. Dimensionless throughout.
+/// A method that integrates the motion of a leaf. Dimensionless throughout.
 pub trait Method {
-    /// The time now.
+    /// Present time.
     fn time(&self) -> f64;
 
-    /// Time steps made.
+    /// Number of time steps.
     fn steps(&self) -> usize;
 
-    /// Moves on to exactly `until`.
+    /// Advances to exactly `until`.
     ///
     /// # Errors
-    /// If the motion cannot be trusted any more.
+    /// If the motion is not reliable any more.
     fn advance(&mut self, until: f64) -> Result<(), Stopped>;
 
-    /// The leaf now, positions and velocities at the same instant.
+    /// The present state, with positions and velocities at the same instant.
     fn snapshot(&mut self) -> Snapshot;
 
-    /// All numbers the motion depends on from here, to go on bit for bit.
+    /// All numbers that determine the further motion, to continue it with identical bits.
     fn save(&self) -> Vec<f64>;
 
-    /// Goes back to the numbers that [`Method::save`] returned of the same leaf and
+    /// Restores the numbers that [`Method::save`] returned for the same leaf and
     /// method; false if they do not fit.
     fn restore(&mut self, numbers: &[f64]) -> bool;
 }

@@ -1,4 +1,4 @@
-//! From the leaf to the arrays of the explicit method, and back.
+//! Conversion of the leaf to the arrays of the explicit method, and back.
 
 use super::kernel::{
     Array, BLOCK, GROUP, Material, Motion, Node, Past, Positions, StepTotals, blocks,
@@ -9,7 +9,7 @@ use crate::leaf::{DiscreteLeaf, State};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
-/// One rod's arrays but its positions, which its neighbours read.
+/// One rod's arrays except its positions, which its neighbours read.
 #[derive(Clone, Debug)]
 pub struct Rod {
     pub motion: Motion,
@@ -38,13 +38,13 @@ pub fn positions(leaf: &DiscreteLeaf, state: &State, j: usize) -> Positions {
     Positions { x }
 }
 
-/// A rod at rest; what it has in common with the rod `beside` is shared.
+/// A rod at rest; blocks that it has in common with the rod `neighbour` are shared.
 pub fn rod(
     leaf: &DiscreteLeaf,
     physics: &Physics,
     state: &State,
     j: usize,
-    beside: Option<&Rod>,
+    neighbour: Option<&Rod>,
 ) -> Rod {
     let n = leaf.segments();
     let length = length(n);
@@ -57,20 +57,20 @@ pub fn rod(
     let mut last = DQuat::IDENTITY;
     for i in 0..=n {
         let q = state.q[state.base(j) + i];
-        // Signs of neighbouring quaternions are aligned once and stay so.
+        // Signs of neighbouring quaternions are aligned once, and remain so.
         let flipped = i > 0 && last.dot(q) < 0.0;
         last = if flipped { -q } else { q };
         for (array, value) in motion.q.iter_mut().zip(last.to_array()) {
             array[GROUP + i] = value;
         }
     }
-    let made_of: Vec<_> = (0..=n).map(|i| made_of(leaf, physics, j, i)).collect();
+    let data: Vec<_> = (0..=n).map(|i| node_data(leaf, physics, j, i)).collect();
     let remembered = if physics.retardation > 0.0 { length } else { 0 };
     let past = || [arrays::<3>(remembered), arrays::<3>(remembered)];
     let (one, two) = (past(), past());
     let mut rod = Rod {
         motion,
-        material: blocks(&made_of, beside.map(|rod| &*rod.material)),
+        material: blocks(&data, neighbour.map(|rod| &*rod.material)),
         past: Past { one, two },
         totals: StepTotals::default(),
     };
@@ -78,8 +78,8 @@ pub fn rod(
     rod
 }
 
-/// What node `i` of rod `j` is made of, and the segment behind it.
-pub fn made_of(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> Node {
+/// Properties of node `i` of rod `j`, and of the segment after it.
+pub fn node_data(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> Node {
     let n = leaf.segments();
     let joined = leaf.tips_move_together();
     let mut node = Node {
@@ -101,7 +101,7 @@ pub fn made_of(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> No
     }
     if i < n {
         let section = leaf.section(j, i);
-        // A factor that changes in time is multiplied there.
+        // A time-dependent factor is applied in each step.
         let rest = physics.constant_rest.unwrap_or(1.0);
         node.rest_length = section.rest_strain.x * section.ds;
         for c in 0..3 {
@@ -114,20 +114,20 @@ pub fn made_of(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> No
 }
 
 impl Rod {
-    /// The block of a node, and its place there, by its index in the arrays.
+    /// The block of a node, and its index there, by its index in the arrays.
     pub fn block(&self, at: usize) -> (&Material, usize) {
         let i = at - GROUP;
         (&self.material[i / BLOCK], i % BLOCK)
     }
 
-    /// Length of rod that loads on a node come from.
+    /// Length of rod whose loads act on a node.
     pub fn weight(&self, at: usize) -> f64 {
         let (material, i) = self.block(at);
         material.weight[i]
     }
 
-    /// Gives the places behind the last node, up to its group's end and the next, its
-    /// rotation: segments read there, without stiffness, are straight.
+    /// Sets the entries after the last node, up to the end of its group and of the next, to its
+    /// rotation: the segments read there, which have no stiffness, are then straight.
     pub fn pad(&mut self, segments: usize) {
         let last = GROUP + segments;
         for q in &mut self.motion.q {
@@ -136,7 +136,7 @@ impl Rod {
         }
     }
 
-    /// The arrays on which the motion depends, but positions.
+    /// The arrays that determine the motion, without positions.
     pub fn moving_arrays(&self) -> impl Iterator<Item = &Array> {
         let Motion { q, v, p, .. } = &self.motion;
         let past = self.past.one.iter().chain(&self.past.two).flatten();
@@ -157,7 +157,7 @@ impl Rod {
     }
 
     pub fn rotation(&self, at: usize) -> DQuat {
-        // They are brought back to unit length now and then only.
+        // They are normalised at intervals only.
         DQuat::from_array([0, 1, 2, 3].map(|c| self.motion.q[c][at])).normalize()
     }
 

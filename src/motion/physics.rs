@@ -1,4 +1,4 @@
-//! What a leaf needs to move: masses, damping, and loads that change in time.
+//! What a leaf needs to move: masses, damping, and time-dependent loads.
 //! Dimensionless: time in units of sqrt(rho L^4/A).
 
 use crate::leaf::{DiscreteLeaf, Leaf, Loads, Scale};
@@ -6,15 +6,14 @@ use crate::rotation::outer;
 use crate::scenario::Dynamics;
 use glam::{DMat3, DQuat, DVec3};
 
-/// Inertia of a node: the mass and the moments of inertia of the half-segments
-/// beside it.
+/// Inertia of a node: the mass and the moments of inertia of the adjacent half-segments.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inertia {
     /// Mass.
     pub mass: f64,
     /// Moment of inertia about d2 and d3.
     pub transverse: f64,
-    /// By what part of this that about d1 is larger.
+    /// Relative excess of that about d1.
     pub excess: f64,
 }
 
@@ -24,7 +23,7 @@ impl Inertia {
         self.transverse * (1.0 + self.excess)
     }
 
-    /// Tensor of inertia of the node turned by `rotation`, along the lab axes.
+    /// Inertia tensor of the node rotated by `rotation`, along the lab axes.
     pub fn tensor(&self, rotation: DQuat) -> DMat3 {
         let d1 = rotation * DVec3::X;
         let excess = self.excess * self.transverse;
@@ -37,28 +36,28 @@ impl Inertia {
 pub struct Physics {
     dynamics: Dynamics,
     scale: Scale,
-    /// Unit of time in the scenario's.
+    /// Unit of time, in that of the scenario.
     pub time: f64,
-    /// Unit of mass per length in the scenario's: the mean density.
+    /// Unit of mass per length, in that of the scenario: the mean density.
     density: f64,
     /// External damping: every velocity decays at this rate.
     pub damping: f64,
     /// Internal damping: retardation time.
     pub retardation: f64,
-    /// The loads, if they do not change.
+    /// The loads, if they are constant.
     constant_loads: Option<Loads>,
-    /// The factor of the rest curvatures, if it does not change.
+    /// The factor of the rest curvatures, if it is constant.
     pub constant_rest: Option<f64>,
 }
 
 impl Physics {
-    /// As a leaf's scenario has them.
+    /// Those of a leaf's scenario.
     pub fn new(leaf: &Leaf) -> Self {
         Physics::of(leaf, leaf.scenario().dynamics.clone())
     }
 
-    /// As they are where a scenario says nothing of motion, under its loads at
-    /// rest: the damped motion by which a leaf comes to rest.
+    /// The defaults for scenarios without dynamics, under the loads at
+    /// rest: the damped motion of a relaxation.
     pub fn at_rest(leaf: &Leaf) -> Self {
         let s = leaf.scenario();
         let dynamics = Dynamics::default_for(&s.rods);
@@ -105,7 +104,7 @@ impl Physics {
         }
     }
 
-    /// Duration of the motion and interval of its output.
+    /// Duration of the motion and output interval.
     pub fn duration(&self) -> (f64, f64) {
         let (duration, interval) = (self.dynamics.duration, self.dynamics.output_interval);
         (duration / self.time, interval / self.time)
@@ -131,17 +130,17 @@ impl Physics {
         self.constant_rest.unwrap_or_else(changing)
     }
 
-    /// Whether loads change in time.
+    /// Whether loads vary in time.
     pub fn loads_change(&self) -> bool {
         self.constant_loads.is_none()
     }
 
-    /// Whether rest curvatures change in time.
+    /// Whether rest curvatures vary in time.
     pub fn rest_changes(&self) -> bool {
         self.constant_rest.is_none()
     }
 
-    /// Whether rest curvatures are ever other than the leaf's own.
+    /// Whether rest curvatures ever differ from the leaf's own.
     pub fn rest_differs(&self) -> bool {
         self.constant_rest != Some(1.0)
     }

@@ -1,22 +1,21 @@
 //! The longest stable time step of the explicit method.
 //!
 //! A leapfrog step h is stable while h omega < 2 for every frequency omega of
-//! the leaf. Its squared frequencies are at most the largest that any one
-//! segment would have with its share of the masses at its ends, plus what
-//! coupling adds (T. J. R. Hughes, The Finite Element Method, 1987, section
-//! 9.2). Any shares will do; here they are in proportion to what each segment
-//! holds the node with, so that a short or stiff segment has most of a mass
+//! the leaf. Its squared frequencies are at most the largest of any single
+//! segment with its share of the masses at its ends, plus the contribution of
+//! coupling (T. J. R. Hughes, The Finite Element Method, 1987, section
+//! 9.2). The shares are arbitrary; here they are in proportion to the stiffness with which
+//! each segment holds the node, so that a short or stiff segment has most of a mass
 //! that it alone moves fast. With the rate of internal friction from three
-//! strains (see
-//! [`super::friction::rates`]) a mode with the part K of its squared frequency
-//! from strains and C from coupling goes like
+//! strains (see [`super::friction::rates`]) a mode with the part K of its squared frequency
+//! from strains and C from coupling satisfies
 //!
 //! ```text
 //! z^3 + (a + 3 b/2 - 2) z^2 + (1 - 2 b) z + b/2 = 0,   a = h^2 (K + C),   b = eta h K
 //! ```
 //!
-//! whose roots are inside the unit circle while a + 4 b < 4; external damping
-//! leaves that as it is.
+//! with roots inside the unit circle while a + 4 b < 4; external damping
+//! does not change that.
 
 use super::physics::Physics;
 use crate::leaf::{DiscreteLeaf, State};
@@ -34,7 +33,7 @@ pub struct StableStep {
 }
 
 impl StableStep {
-    /// Of a leaf with these positions and rotations.
+    /// For a leaf with these positions and rotations.
     pub fn of(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> Self {
         let (strains, mut limit) = fastest_segment(leaf, physics, state);
         let coupling = coupling(leaf, physics);
@@ -52,18 +51,18 @@ impl StableStep {
     }
 }
 
-/// Stiffness of a segment: between the shift of its left end, that of its
-/// right, and the turns of both.
+/// Stiffness of a segment, between the displacements of its left and its right end, and
+/// the rotations of both.
 type Stiffness = [[DMat3; 4]; 4];
 
-/// How hard a node is held: as it moves along its directors, and as it turns
+/// Stiffness with which a node is held: for displacements along its directors, and for rotations
 /// about them.
 type Hold = [DVec3; 2];
 
-/// The least part of its largest component that a hold has in any direction.
+/// Least stiffness of a hold in any direction, as a part of its largest component.
 const LEAST_HOLD: f64 = 0.01;
 
-/// Largest squared frequency of any segment alone, and of what motion.
+/// Largest squared frequency of any single segment, and the motion it belongs to.
 fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f64, &'static str) {
     let (rods, n) = (leaf.rods(), leaf.segments());
     let joined = leaf.leaf.joined() && rods > 1;
@@ -78,7 +77,7 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
             }
         }
     }
-    // All rods hold a joint tip, along directors of their own: as one number.
+    // All rods hold a shared tip, along their own directors: as a scalar.
     let tips = (0..rods).map(|j| held[state.base(j) + n][0].max_element());
     let tip: f64 = tips.sum();
     let tip_mass = (0..rods).map(|j| physics.inertia(leaf, j, n).mass);
@@ -86,7 +85,7 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> (f6
     let (mut largest, mut fastest) = (0.0, None);
     for (j, i) in leaf.each(0..n) {
         let stiffness = stiffness(leaf, state, j, i);
-        // One over the root of the masses of an end, along the lab axes.
+        // Inverse square root of the masses of an end, along the lab axes.
         let root = |end: usize| {
             if i + end == 0 && physics.clamped() {
                 return [DMat3::ZERO; 2];
@@ -139,7 +138,7 @@ fn stiffness(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> Stiffnes
     ]
 }
 
-/// How hard a segment holds the node of rotation `q` at its left or right end.
+/// Stiffness with which a segment holds the node of rotation `q` at its left or right end.
 fn hold(stiffness: &Stiffness, end: usize, q: DQuat) -> Hold {
     let frame = DMat3::from_quat(q);
     [end, 2 + end].map(|c| {
@@ -149,7 +148,7 @@ fn hold(stiffness: &Stiffness, end: usize, q: DQuat) -> Hold {
     })
 }
 
-/// What a motion of a segment, shifts of its ends and turns, is mostly.
+/// The dominant kind of a motion of a segment, given by displacements and rotations of its ends.
 fn name(
     leaf: &DiscreteLeaf,
     state: &State,
@@ -173,8 +172,8 @@ fn name(
     most.map_or("", |(_, name)| name)
 }
 
-/// What coupling adds to the squared frequency, at most: of all pairs of
-/// nodes that are tied together, the largest sum of what ties each, over its
+/// Upper bound on the contribution of coupling to the squared frequency: of all pairs of
+/// coupled nodes, the largest sum of the stiffness that couples each, over its
 /// mass. (The same bound for the Laplacian of a graph: W. N. Anderson and
 /// T. D. Morley, Linear and Multilinear Algebra 18, 1985.)
 fn coupling(leaf: &DiscreteLeaf, physics: &Physics) -> f64 {

@@ -1,12 +1,12 @@
-//! What cannot be simulated.
+//! Requests that cannot be simulated.
 
 use crate::relax;
 
-/// Longest time that a simulation may be expected to take, in seconds.
+/// Longest expected duration of a simulation that is accepted, in seconds.
 pub const MOST_SECONDS: f64 = 3.0 * DAY;
 const DAY: f64 = 86_400.0;
 
-/// What cannot be simulated. Times are in the scenario's unit.
+/// Why a request cannot be simulated. Times are in the scenario's unit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Refused {
     /// The explicit method has no stable time step.
@@ -27,7 +27,7 @@ pub enum Refused {
     /// The time step is not positive.
     #[error("step = {found}: must be greater than 0")]
     NotPositive {
-        /// The step asked for.
+        /// The requested step.
         found: f64,
     },
     /// The time step is too long for the explicit method.
@@ -36,7 +36,7 @@ pub enum Refused {
          use a shorter step, or the semi-implicit method, or leave the step out"
     )]
     Unstable {
-        /// The step asked for.
+        /// The requested step.
         found: f64,
         /// The longest stable one.
         stable: f64,
@@ -54,18 +54,18 @@ pub enum Refused {
         step: f64,
         /// Steps to the end.
         steps: f64,
-        /// About how long they take.
+        /// Estimated duration.
         seconds: f64,
     },
-    /// The grid or the tolerance is impossible.
+    /// The grid or the tolerance is invalid.
     #[error(transparent)]
     Request(#[from] relax::RelaxError),
-    /// The leaf is to start at rest and does not come to rest.
+    /// The leaf should start at rest, and its relaxation fails.
     #[error(
         "dynamics.start = \"at-rest\": the leaf does not come to rest under its loads at time 0 ({outcome}): use start = \"released\""
     )]
     NoRest {
-        /// How its relaxation ended.
+        /// The outcome of its relaxation.
         outcome: &'static str,
     },
 }

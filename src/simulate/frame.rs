@@ -5,7 +5,7 @@ use crate::motion::{Energy, Physics, Snapshot, Velocity};
 use crate::shape::weights;
 use glam::{DQuat, DVec3};
 
-/// Nodes that a cubic goes through.
+/// Number of nodes for cubic interpolation.
 const CUBIC: usize = 4;
 
 /// A leaf at an instant, in the units of its scenario. Nodes are numbered rod
@@ -14,7 +14,7 @@ const CUBIC: usize = 4;
 pub struct Frame {
     /// Time.
     pub time: f64,
-    /// Time steps made until then.
+    /// Number of time steps so far.
     pub steps: usize,
     /// Number of rods.
     pub rods: usize,
@@ -46,7 +46,7 @@ impl Frame {
         }
     }
 
-    /// The same with nodes at the fractions `to` of the length, by cubics through
+    /// The same with nodes at the fractions `to` of the length, by cubic interpolation between
     /// those at the fractions `from`.
     pub fn at(&self, from: &[f64], to: &[f64]) -> Frame {
         let weights: Vec<_> = to.iter().map(|&at| weights(from, at, CUBIC)).collect();
@@ -60,7 +60,7 @@ impl Frame {
             for (first, weights) in &weights {
                 let near = || (base + first..).zip(weights.iter().copied());
                 let sum = |of: &dyn Fn(usize) -> DVec3| near().map(|(i, w)| w * of(i)).sum();
-                // A rotation's two quaternions must not be mixed up.
+                // Quaternions of equal rotations may differ in sign: align them.
                 let side = self.rotations[base + first];
                 let rotation = near().fold(DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), |sum, (i, w)| {
                     let q = self.rotations[i];
@@ -83,7 +83,7 @@ impl Frame {
         &self.positions[rod * nodes..(rod + 1) * nodes]
     }
 
-    /// The joint tip alone, or one tip per rod.
+    /// The shared tip alone, or one tip per rod.
     pub fn tips(&self, joined: bool) -> Vec<DVec3> {
         let ends = self.positions.chunks(self.positions.len() / self.rods);
         let tips = ends.map(|rod| rod[rod.len() - 1]);

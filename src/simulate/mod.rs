@@ -1,4 +1,4 @@
-//! A leaf followed in time: start, method, and the outputs on the way.
+//! A leaf followed in time: start, method, and outputs.
 //!
 //! ```
 //! use leafdyn::scenario::Scenario;
@@ -38,20 +38,20 @@ use crate::motion::{Explicit, Method, Physics, Rigid, SemiImplicit, StableStep, 
 use crate::relax::{self, LARGEST_TOLERANCE, RelaxError, SMALLEST_TOLERANCE, start};
 use crate::scenario::{Scenario, Start};
 
-/// Default of segments a rod, if its rest shape does not need more.
+/// Default number of segments per rod, unless its rest shape needs more.
 const SEGMENTS: usize = 16;
 
-/// Seconds that one step of one segment takes.
+/// Seconds per step and segment.
 const EXPLICIT_SECONDS: f64 = 2e-8;
 const SEMI_IMPLICIT_SECONDS: f64 = 2e-6;
 
-/// Which method moves the leaf.
+/// The method of time integration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scheme {
-    /// [`Explicit`]: short steps, each very cheap. Not for rigid rods.
+    /// [`Explicit`]: short, very cheap steps. Not for rigid rods.
     Explicit,
-    /// [`SemiImplicit`]: steps as long as the accuracy allows, any stiffness.
+    /// [`SemiImplicit`]: steps as long as accuracy allows, for any stiffness.
     SemiImplicit,
 }
 
@@ -65,23 +65,23 @@ impl Scheme {
     }
 }
 
-/// What is asked of a simulation.
+/// Options of a simulation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// The method; `None`: explicit, unless a rod is rigid.
     pub scheme: Option<Scheme>,
-    /// Segments a rod; `None`: 16, or as many as the rest shape needs.
+    /// Segments per rod; `None`: 16, or as many as the rest shape needs.
     pub segments: Option<usize>,
-    /// The longest time step, in the scenario's unit of time. `None`: of the
-    /// explicit method, nine tenths of the stable one; of the semi-implicit
-    /// one, so that the error of a step stays below the scenario's tolerance.
+    /// The longest time step, in the scenario's unit of time. `None`: for the
+    /// explicit method, nine tenths of the stable one; for the semi-implicit
+    /// one, such that the error of a step stays below the scenario's tolerance.
     pub step: Option<f64>,
-    /// Replaces the scenario's tolerance: of the semi-implicit method, the
+    /// Replaces the scenario's tolerance: for the semi-implicit method, the
     /// local error of a step relative to the longest rod.
     pub tolerance: Option<f64>,
 }
 
-/// A leaf that is followed in time.
+/// The simulation of a leaf in time.
 pub struct Simulation {
     leaf: Leaf,
     grid: Grid,
@@ -119,7 +119,7 @@ impl Simulation {
             Start::Released if leaf.held.is_none() => {
                 start(&DiscreteLeaf::new(&leaf, grid.clone()))
             }
-            // Tips that are held are led to their holders, the leaf at rest.
+            // Held tips are moved to their positions by the relaxation.
             Start::Released | Start::AtRest => at_rest(&leaf, &physics, &grid, tolerance)?,
         };
         let discrete = DiscreteLeaf::new(&leaf, grid.clone());
@@ -154,8 +154,8 @@ impl Simulation {
             stable,
             step,
             method,
-            // A duration that is a whole number of intervals but for rounding
-            // has no short one at its end.
+            // A duration that is a multiple of the interval up to rounding
+            // has no short interval at its end.
             outputs: (duration / interval * (1.0 - 1e-12)).ceil().max(1.0) as usize,
             made: 0,
             moving: Duration::ZERO,
@@ -173,8 +173,8 @@ impl Simulation {
         }
     }
 
-    /// Steps from here to the end, and about how many seconds they take on one core
-    /// of a machine of 2020; `None` where the error of the steps decides.
+    /// Steps from here to the end, and the approximate number of seconds they take on one core
+    /// of a machine of 2020; `None` if the error determines the steps.
     pub fn expected(&self) -> Option<(f64, f64)> {
         let (duration, _) = self.physics.duration();
         let steps = ((duration * self.physics.time - self.time()) / self.step?).max(0.0);
@@ -186,12 +186,12 @@ impl Simulation {
         Some((steps, steps * nodes as f64 * each))
     }
 
-    /// The leaf that moves.
+    /// The moving leaf.
     pub fn leaf(&self) -> &Leaf {
         &self.leaf
     }
 
-    /// Which method moves the leaf.
+    /// The method of time integration.
     pub fn scheme(&self) -> Scheme {
         self.scheme
     }
@@ -206,8 +206,8 @@ impl Simulation {
         self.grid.sigma()
     }
 
-    /// The longest time step, in the scenario's unit; `None` where the error
-    /// of the steps decides.
+    /// The longest time step, in the scenario's unit; `None` if the error
+    /// determines the steps.
     pub fn longest_step(&self) -> Option<f64> {
         self.step
     }
@@ -218,23 +218,23 @@ impl Simulation {
         self.stable
     }
 
-    /// The local error a step of the semi-implicit method may have, relative
+    /// The permitted local error of a step of the semi-implicit method, relative
     /// to the longest rod.
     pub fn tolerance(&self) -> f64 {
         self.tolerance
     }
 
-    /// The time on the clock that the motion has taken since this was made.
+    /// Wall-clock time of the motion since this was created.
     pub fn wall_time(&self) -> Duration {
         self.moving
     }
 
-    /// Time steps made.
+    /// Number of time steps.
     pub fn steps(&self) -> usize {
         self.method.steps()
     }
 
-    /// Frames to come after the first, and how many there have been.
+    /// Number of frames still to come, and of frames so far, without the first.
     pub fn frames(&self) -> (usize, usize) {
         (self.outputs, self.made)
     }
@@ -255,11 +255,11 @@ impl Simulation {
         Frame::new(&self.leaf, &self.physics, &snapshot, self.method.steps())
     }
 
-    /// Moves on to the time of the next output.
+    /// Advances to the time of the next output.
     ///
     /// # Errors
-    /// If the motion cannot be trusted any more; [`Simulation::frame`] then
-    /// shows it as it is.
+    /// If the motion is not reliable any more; [`Simulation::frame`] then
+    /// returns its present state.
     pub fn next_frame(&mut self) -> Result<Frame, Stopped> {
         let clock = Instant::now();
         let frame = self.advance();
@@ -279,15 +279,15 @@ impl Simulation {
         Ok(self.frame())
     }
 
-    /// All numbers on which the motion depends from here, to go on bit for bit
-    /// with a simulation of the same leaf and options.
+    /// All numbers that determine the further motion, to continue it with identical bits
+    /// in a simulation of the same leaf with the same options.
     pub fn save(&self) -> Vec<f64> {
         let mut numbers = vec![self.made as f64];
         numbers.extend(self.method.save());
         numbers
     }
 
-    /// Goes back to where [`Simulation::save`] was called; false if the
+    /// Restores the state at a call of [`Simulation::save`]; false if the
     /// numbers do not fit, or one of them is not finite.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let Some((&made, numbers)) = numbers.split_first() else {
@@ -332,7 +332,7 @@ fn explicit(
     }
 }
 
-/// The equilibrium under the loads and with the rest shape of time 0.
+/// The equilibrium under the loads and with the rest shape at time 0.
 fn at_rest(leaf: &Leaf, physics: &Physics, grid: &Grid, tolerance: f64) -> Result<State, Refused> {
     let scenario = at_beginning(leaf.scenario());
     let options = relax::Options {
@@ -352,7 +352,7 @@ fn at_rest(leaf: &Leaf, physics: &Physics, grid: &Grid, tolerance: f64) -> Resul
     Ok(State::new(grid.segments(), x.collect(), q.collect()))
 }
 
-/// The scenario with the loads and the rest shape of time 0.
+/// The scenario with the loads and the rest shape at time 0.
 fn at_beginning(scenario: &Scenario) -> Scenario {
     let mut scenario = scenario.clone();
     let dynamics = &scenario.dynamics;

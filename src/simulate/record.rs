@@ -1,4 +1,4 @@
-//! What is known of a simulation that has ended.
+//! The record of a simulation that has ended.
 
 use super::{Frame, Scheme, Simulation, Stopped};
 use crate::motion::{Energy, StableStep};
@@ -7,22 +7,22 @@ use crate::shape::serialize_tips;
 use glam::DVec3;
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
-/// What is kept of every output, in the units of the scenario.
+/// Data recorded at every output, in the units of the scenario.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
     /// Time.
     pub time: f64,
-    /// Time steps made until then.
+    /// Number of time steps so far.
     pub steps: usize,
     /// Energies.
     pub energy: Energy,
-    /// The joint tip, or the mean of free ones.
+    /// The shared tip, or the mean of free ones.
     pub tip: DVec3,
 }
 
 impl Moment {
-    /// What is kept of a frame. Negative zeros become zeros, as in the files,
-    /// so that a moment read back is the same.
+    /// The data of a frame. Negative zeros become zeros, as in the files,
+    /// so that data read back are the same.
     pub fn of(frame: &Frame, joined: bool) -> Self {
         let tips = frame.tips(joined);
         Moment {
@@ -37,13 +37,13 @@ impl Moment {
 /// The shape of a leaf at an instant, for pictures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Still {
-    /// Which of the moments it is.
+    /// Index of its moment.
     pub moment: usize,
     /// Positions of the nodes of every rod, base to tip.
     pub curves: Vec<Vec<DVec3>>,
 }
 
-/// A simulation that has ended: how, and what was seen of it. In the units of
+/// A simulation that has ended: its outcome and its outputs. In the units of
 /// the scenario. As JSON it is the `summary.json` of a simulation.
 #[derive(Clone, Debug, Serialize)]
 pub struct Record {
@@ -52,12 +52,12 @@ pub struct Record {
     /// The method.
     #[serde(rename = "method")]
     pub scheme: Scheme,
-    /// Why it ended before its time, if it did.
+    /// Why it ended early, if it did.
     #[serde(flatten, serialize_with = "serialize_outcome")]
     pub stopped: Option<Stopped>,
     /// Number of rods.
     pub rods: usize,
-    /// Whether their tips are one.
+    /// Whether the tips share one point.
     #[serde(skip)]
     pub joined: bool,
     /// The longest rod.
@@ -65,22 +65,22 @@ pub struct Record {
     pub length: f64,
     /// Segments a rod.
     pub segments: usize,
-    /// Local error that a step of the semi-implicit method was allowed.
+    /// Permitted local error of a step of the semi-implicit method.
     pub tolerance: f64,
-    /// How long the leaf was to be followed.
+    /// The requested duration.
     pub duration: f64,
     /// The time of the last output.
     pub time: f64,
-    /// The longest time step, if it was not the error that decided.
+    /// The longest time step, unless the error determined it.
     pub time_step: Option<f64>,
     /// The longest stable time step of the explicit method.
     pub stable_step: Option<StableStep>,
-    /// Time steps made.
+    /// Number of time steps.
     pub steps: usize,
     /// All outputs; the first at time 0.
     #[serde(flatten, serialize_with = "serialize_moments")]
     pub moments: Vec<Moment>,
-    /// The joint tip at the last output, or the tips of all rods.
+    /// The shared tip at the last output, or the tips of all rods.
     #[serde(flatten, serialize_with = "serialize_tips")]
     pub tips: Vec<DVec3>,
     /// Fractions of the length at which these shapes have nodes.
@@ -89,15 +89,15 @@ pub struct Record {
     /// Shapes at some of the outputs, the last among them.
     #[serde(skip)]
     pub stills: Vec<Still>,
-    /// Shapes at many outputs, for films, if they are wanted.
+    /// Shapes at many outputs, for films, if requested.
     #[serde(skip)]
     pub film: Vec<Still>,
-    /// Time on the clock for the motion alone.
+    /// Wall-clock time of the motion alone.
     pub wall_seconds: f64,
 }
 
 impl Record {
-    /// The record of a simulation so far, whose outputs were these.
+    /// The record of a simulation with these outputs so far.
     pub fn new(
         simulation: &Simulation,
         stopped: Option<Stopped>,
@@ -133,7 +133,7 @@ impl Record {
         }
     }
 
-    /// How it ended, in one word: `completed`, or [`Stopped::word`].
+    /// The outcome in one word: `completed`, or [`Stopped::word`].
     pub fn outcome(&self) -> &'static str {
         outcome(&self.stopped)
     }
@@ -156,8 +156,8 @@ fn serialize_outcome<S: Serializer>(
     keys.end()
 }
 
-/// How many there are, all energies at the last, and what no motion can change at
-/// the first and at the last.
+/// Their number, all energies at the last one, and the conserved quantity at the first and the
+/// last.
 fn serialize_moments<S: Serializer>(moments: &[Moment], serializer: S) -> Result<S::Ok, S::Error> {
     #[derive(Serialize)]
     struct Energies {

@@ -1,24 +1,24 @@
-//! Which outputs to show in a few pictures.
+//! Selection of outputs for a few pictures.
 
 use super::Moment;
 
-/// A tip that moves by less than this part of the longest rod hardly moves.
+/// A tip that moves by less than this part of the longest rod counts as hardly moving.
 const HARDLY: f64 = 1e-3;
 
-/// Moments among which those shown are chosen.
+/// Number of moments from which those shown are selected.
 const CANDIDATES: usize = 400;
 
-/// The numbers of `count` moments that show a motion, or of all if there are
-/// no more: the first, the last, and others at which the tip is far from where the
-/// one before shows it, the turning points of a swing. If the tip hardly
-/// moves (`length`: the longest rod), equal times are between them.
+/// The indices of `count` moments that show a motion, or of all if there are
+/// no more: the first, the last, and others with the tip far from that of
+/// the previous one, such as the turning points of a swing. If the tip hardly
+/// moves (`length`: the longest rod), they are at equal intervals of time.
 pub fn stills(moments: &[Moment], count: usize, length: f64) -> Vec<usize> {
     if moments.len() <= count {
         return (0..moments.len()).collect();
     }
     let pairs = moments.windows(2);
-    let way: f64 = pairs.map(|pair| pair[0].tip.distance(pair[1].tip)).sum();
-    if way.is_finite() && way > HARDLY * length {
+    let distance: f64 = pairs.map(|pair| pair[0].tip.distance(pair[1].tip)).sum();
+    if distance.is_finite() && distance > HARDLY * length {
         return far_apart(moments, count);
     }
     let times: Vec<f64> = moments.iter().map(|moment| moment.time).collect();
@@ -27,7 +27,7 @@ pub fn stills(moments: &[Moment], count: usize, length: f64) -> Vec<usize> {
     let mut chosen: Vec<usize> = (0..count).map(|k| nearest(&times, wanted(k))).collect();
     chosen[0] = 0;
     chosen[count - 1] = moments.len() - 1;
-    // Each only once: a jump from one output to the next spans several ways.
+    // Without duplicates: a jump between outputs may span several intervals.
     for k in 1..count {
         chosen[k] = chosen[k].max(chosen[k - 1] + 1);
     }
@@ -37,9 +37,9 @@ pub fn stills(moments: &[Moment], count: usize, length: f64) -> Vec<usize> {
     chosen
 }
 
-/// The first, the last, and others between, so that the roots of the distances from
-/// each tip to the next have the largest sum: turning points, and on the way from one
-/// to the next equal distances, as the root is concave. By dynamic programming.
+/// The first, the last, and others between, such that the sum of the square roots of the
+/// distances between successive tips is largest: turning points, and equal distances between
+/// them, as the root is concave. By dynamic programming.
 fn far_apart(moments: &[Moment], count: usize) -> Vec<usize> {
     let last = moments.len() - 1;
     let most = CANDIDATES.max(count);
@@ -52,7 +52,7 @@ fn far_apart(moments: &[Moment], count: usize) -> Vec<usize> {
         let [from, to] = [i, j].map(|k| moments[candidates[k]].tip);
         from.distance(to).sqrt()
     };
-    // The best sum with k more chosen after the first, the last of them j, and whence.
+    // The best sum with k more chosen after the first, the last of them j, and its predecessor.
     let mut best = vec![f64::NEG_INFINITY; n];
     best[0] = 0.0;
     let mut whence = vec![vec![0; n]; count];
@@ -77,7 +77,7 @@ fn far_apart(moments: &[Moment], count: usize) -> Vec<usize> {
     chosen.into_iter().map(|k| candidates[k]).collect()
 }
 
-/// Of rising numbers, the index of the one nearest to `wanted`.
+/// The index of the number nearest to `wanted` in an ascending list.
 fn nearest(numbers: &[f64], wanted: f64) -> usize {
     let after = numbers.partition_point(|&number| number < wanted);
     match after {
@@ -88,12 +88,12 @@ fn nearest(numbers: &[f64], wanted: f64) -> usize {
     }
 }
 
-/// Shapes of a film, and nodes of all of them, at most.
+/// Largest number of shapes of a film, and of nodes of all of them.
 const FILM: usize = 401;
 const FILM_NODES: usize = 4_000_000;
 
-/// Which of so many outputs, each of so many nodes, a film shows: evenly many, the last
-/// among them.
+/// Which of so many outputs, each with so many nodes, a film shows: at equal intervals, including
+/// the last.
 pub fn film(outputs: usize, nodes: usize) -> Vec<usize> {
     let most = FILM.min(FILM_NODES / nodes.max(1)).max(2);
     let stride = outputs.saturating_sub(1).div_ceil(most - 1).max(1);
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn a_swing_is_shown_at_its_turning_points() {
-        // Turns every 5 outputs, slower and slower.
+        // Turns every 5 outputs, and decays.
         let swing = |t: f64| (0.1 * std::f64::consts::TAU * t).cos() * (-t / 40.0).exp();
         let chosen = stills(&moments(1001, swing), 8, 1.0);
         assert_eq!((chosen[0], chosen[7]), (0, 1000));

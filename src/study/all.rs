@@ -11,19 +11,19 @@ use crate::relax::{Equilibrium, Options, RelaxError, SemiImplicit, Shape, relax,
 use crate::scenario::Scenario;
 use crate::shape::serialize_tips;
 
-/// Starts that are relaxed at once, between two looks at what is new.
+/// Starts relaxed in parallel, before the next check for new equilibria.
 const BATCH: usize = 16;
 
-/// The search ends when so many starts in a row have found nothing new, or all
-/// have been made.
+/// The search ends after so many starts in a row without a new equilibrium, or after
+/// all starts.
 pub const IN_VAIN: usize = 32;
 const MOST: usize = 160;
 
-/// Equilibria nearer to each other than this part of the longest rod, or than
-/// their error estimates, are one.
+/// Equilibria closer to each other than this part of the longest rod, or than
+/// their error estimates, are the same.
 const SAME: f64 = 1e-3;
 
-/// Energies that differ by less than this part are the same.
+/// Energies that differ by less than this, relatively, are the same.
 const SAME_ENERGY: f64 = 1e-6;
 
 /// The equilibria of a leaf that many starts have found. As JSON it is
@@ -32,31 +32,31 @@ const SAME_ENERGY: f64 = 1e-6;
 pub struct All {
     /// Name of the scenario.
     pub scenario: String,
-    /// Starts that were made.
+    /// Number of starts.
     pub starts: usize,
     /// Those that did not come to rest within the tolerance.
     pub failed: usize,
     /// The equilibria, lowest energy first.
     #[serde(rename = "equilibria")]
     pub found: Vec<Found>,
-    /// That a stable one has less energy than the one in which a relaxation ends.
+    /// A remark if a stable one has less energy than the one in which a relaxation ends.
     pub remark: Option<String>,
-    /// Time of all, in seconds.
+    /// Total time, in seconds.
     pub wall_seconds: f64,
 }
 
-/// One of them.
+/// One of the equilibria.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// The equilibrium.
     pub equilibrium: Equilibrium,
     /// Starts that ended in it.
     pub starts: usize,
-    /// Whether the undisturbed start, that of a relaxation, is one of them.
+    /// Whether one of them is the unperturbed start, that of a relaxation.
     pub plain: bool,
 }
 
-/// Of the equilibrium: what tells it from others, and its shape.
+/// Of the equilibrium only what identifies it, and its shape.
 impl Serialize for Found {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
@@ -88,10 +88,10 @@ impl Serialize for Found {
     }
 }
 
-/// Lets the leaf come to rest from its plain start, from many disturbed ones,
-/// and to the equilibrium, stable or not, that Newton's method finds. Which
-/// equilibria there are no number of starts can prove. When `limit` is reached, what
-/// has been found until then is all.
+/// Relaxes the leaf from its unperturbed start, from many perturbed ones,
+/// and to the equilibrium, stable or not, that Newton's method finds. No number of
+/// starts can prove that there are no other equilibria. If `limit` is reached, the result is
+/// what has been found until then.
 ///
 /// # Errors
 /// Requests that cannot be met.
@@ -183,14 +183,14 @@ impl All {
 }
 
 impl All {
-    /// Which stable equilibrium has less energy than the one of the undisturbed start.
+    /// The stable equilibrium with less energy than that of the unperturbed start, if any.
     fn lower(&self) -> Option<String> {
         let plain = self.found.iter().position(|found| found.plain)?;
         let stable = |found: &Found| found.equilibrium.stable() == Some(true);
         let lowest = self.found.iter().position(stable)?;
         let [least, energy] = [lowest, plain].map(|k| self.found[k].equilibrium.energy);
         let (least, energy) = (least?, energy?);
-        // Mirror images are alike but for rounding.
+        // Mirror images differ by rounding only.
         let less = energy - least;
         (less > SAME_ENERGY * energy.abs()).then(|| {
             format!(
@@ -206,7 +206,7 @@ impl All {
 fn same(a: &Equilibrium, b: &Equilibrium) -> bool {
     let errors = [a, b].map(|leaf| leaf.accuracy.error_estimate.unwrap_or(0.0));
     let within = (SAME * a.shape.longest()).max(2.0 * (errors[0] + errors[1]));
-    // Their grids may differ: compared at the stations that both have.
+    // Their grids may differ: compared at common stations.
     let both = common(&a.shape.stations, &b.shape.stations);
     a.shape.rods.iter().zip(&b.shape.rods).all(|(a, b)| {
         both.iter()

@@ -1,4 +1,4 @@
-//! Two roads to the same equilibrium, compared.
+//! Two independent methods for the same equilibrium, compared.
 
 mod shot;
 
@@ -6,7 +6,7 @@ pub use shot::Shot;
 
 use serde::Serialize;
 
-use super::judge::{fine_grid, index_at, same_places, timed, with_those_of};
+use super::judge::{fine_grid, index_at, nearest_indices, timed, with_nodes_of};
 use super::words::words;
 use crate::bvp::{self, Solution, Start};
 use crate::limit::Limit;
@@ -16,11 +16,11 @@ use crate::shape::Difference;
 use shot::relaxation;
 
 /// Rotations may differ by this many times the tolerance (in radians) before
-/// the shapes are called different: they are less accurate than the positions
-/// the tolerance is for, but a vein twisted otherwise is another equilibrium.
+/// the shapes count as different: they are less accurate than the positions, to which
+/// the tolerance applies, but a vein with another twist is another equilibrium.
 const ROTATION_PART: f64 = 100.0;
 
-/// What is asked of a check.
+/// Options of a check.
 #[derive(Clone, Debug, Default)]
 pub struct CheckOptions {
     /// Replaces the scenario's tolerance.
@@ -30,11 +30,11 @@ pub struct CheckOptions {
     /// Intervals of the shooting; `None`: as many as the growth of
     /// perturbations needs.
     pub intervals: Option<usize>,
-    /// When to give up: the leaf is then not at rest, or there is no second solution.
+    /// Time limit: beyond it the leaf is not at rest, or there is no second solution.
     pub limit: Limit,
 }
 
-/// What a check says.
+/// Verdict of a check.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "verdict", content = "reason", rename_all = "kebab-case")]
 pub enum Verdict {
@@ -42,11 +42,11 @@ pub enum Verdict {
     Agree,
     /// They do not.
     Differ,
-    /// There are not two solutions to compare: why.
+    /// There are not two solutions to compare, with the reason.
     NotCompared(String),
 }
 
-/// The quantities that are compared.
+/// The quantities compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Positions of the centerlines.
@@ -69,7 +69,7 @@ words! {
 }
 
 impl Quantity {
-    /// Its part of a difference.
+    /// Its component of a difference.
     pub fn of(self, difference: &Difference) -> f64 {
         match self {
             Quantity::Position => difference.position,
@@ -80,7 +80,7 @@ impl Quantity {
     }
 }
 
-/// Where two shapes differ most.
+/// The place of the largest difference of two shapes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     /// The rod, counted from 0.
@@ -89,7 +89,7 @@ pub struct Place {
     pub sigma: f64,
 }
 
-/// Both roads, and how far apart they end: `check.json`.
+/// Both methods, and the distance of their results: `check.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Check {
     /// Name of the scenario.
@@ -99,12 +99,11 @@ pub struct Check {
     pub verdict: Verdict,
     /// Number of veins.
     pub rods: usize,
-    /// Wanted accuracy, relative to the longest rod.
+    /// Required accuracy, relative to the longest rod.
     pub tolerance: f64,
-    /// Largest differences of all.
+    /// Largest differences anywhere.
     pub difference: Option<Difference>,
-    /// Whether the positions differ by no more than both error estimates
-    /// together allow.
+    /// Whether the positions differ by no more than the sum of both error estimates.
     pub within_estimates: Option<bool>,
     /// The relaxed leaf.
     #[serde(rename = "relaxation", serialize_with = "relaxation")]
@@ -114,13 +113,13 @@ pub struct Check {
     pub shot: Option<Shot>,
     /// Stations of the relaxed leaf: fractions of the length.
     pub stations: Vec<f64>,
-    /// Largest differences of all veins at each of them; none without a solution.
+    /// Largest differences over all veins at each of them; empty without a solution.
     #[serde(rename = "differences")]
     pub along: Vec<Difference>,
 }
 
 impl Check {
-    /// Of a relaxed leaf and what the shooting found from there.
+    /// From a relaxed leaf and the shooting solution started from it.
     pub(crate) fn new(relaxed: Equilibrium, shot: Option<Shot>) -> Self {
         let mut check = Check {
             scenario: relaxed.scenario.clone(),
@@ -183,10 +182,10 @@ impl Check {
         self.shot.as_ref()?.found.as_ref().ok()
     }
 
-    /// Where a quantity differs most.
+    /// The place at which a quantity differs most.
     pub fn farthest(&self, quantity: Quantity) -> Option<Place> {
         let solution = self.solution()?;
-        let places = same_places(&self.stations, &solution.stations);
+        let indices = nearest_indices(&self.stations, &solution.stations);
         let rods = self
             .relaxed
             .shape
@@ -195,9 +194,9 @@ impl Check {
             .zip(&solution.rods)
             .enumerate();
         let found = rods.flat_map(|(rod, (a, b))| {
-            let nodes = a.nodes.iter().zip(&places).zip(&self.stations);
-            nodes.map(move |((a, &place), &sigma)| {
-                let difference = quantity.of(&Difference::of(a, &b.nodes[place]));
+            let nodes = a.nodes.iter().zip(&indices).zip(&self.stations);
+            nodes.map(move |((a, &index), &sigma)| {
+                let difference = quantity.of(&Difference::of(a, &b.nodes[index]));
                 (difference, Place { rod, sigma })
             })
         });
@@ -205,13 +204,13 @@ impl Check {
         found.reduce(farther).map(|(_, place)| place)
     }
 
-    /// Distance of positions up to which the shapes are called the same, in
+    /// Distance of positions up to which the shapes count as the same, in
     /// units of length.
     pub fn allowed(&self) -> f64 {
         self.tolerance * self.relaxed.shape.longest()
     }
 
-    /// Angle between directors up to which the shapes are called the same.
+    /// Angle between directors up to which the shapes count as the same.
     pub fn allowed_rotation(&self) -> f64 {
         ROTATION_PART * self.tolerance
     }
@@ -239,14 +238,14 @@ pub fn check(
     };
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
     relax::check_tolerance(tolerance)?;
-    // Forces are compared, too.
+    // Forces are compared as well.
     let (relaxed, _) = relax::relax_on_grids(scenario, &asked, tolerance, progress)?;
     let lost = matches!(relaxed.outcome, Outcome::NotAtRest | Outcome::Diverged);
     let shot = (!lost).then(|| shoot(scenario, &relaxed, options, progress));
     Ok(Check::new(relaxed, shot))
 }
 
-/// Solves the boundary-value problem from a relaxed leaf, as accurately.
+/// Solves the boundary-value problem from a relaxed leaf, to the same accuracy.
 fn shoot(
     scenario: &Scenario,
     relaxed: &Equilibrium,
@@ -259,7 +258,7 @@ fn shoot(
         rods: &relaxed.shape.rods,
     };
     let precision = bvp::Precision::Error(relaxed.accuracy.tolerance);
-    let stations = with_those_of(grid.sigma(), &relaxed.shape.stations);
+    let stations = with_nodes_of(grid.sigma(), &relaxed.shape.stations);
     let options = bvp::Options {
         intervals: asked.intervals,
         limit: asked.limit.clone(),
@@ -286,16 +285,16 @@ fn shoot(
 }
 
 /// Largest differences over all rods at each station of the relaxed leaf, which
-/// are among those of the solution: paired by place, as panels between knots
-/// may be cut otherwise on another grid of as many segments.
+/// are among those of the solution: matched by station, since another grid with as many
+/// segments may divide the panels between knots differently.
 fn differences(relaxed: &Equilibrium, solution: &Solution) -> Vec<Difference> {
     let leaf = &relaxed.shape;
     let rods = || leaf.rods.iter().zip(&solution.rods);
-    let places = same_places(&leaf.stations, &solution.stations);
-    (places.into_iter().enumerate())
-        .map(|(i, place)| {
+    let indices = nearest_indices(&leaf.stations, &solution.stations);
+    (indices.into_iter().enumerate())
+        .map(|(i, index)| {
             rods()
-                .map(|(a, b)| Difference::of(&a.nodes[i], &b.nodes[place]))
+                .map(|(a, b)| Difference::of(&a.nodes[i], &b.nodes[index]))
                 .fold(Difference::default(), Difference::max)
         })
         .collect()

@@ -1,8 +1,8 @@
-//! The judge of all that compares methods: what a method answers, within a
-//! deadline if there is one, how far apart two answers are, and whether they
+//! Common basis of all comparisons of methods: the answer of a method, within a
+//! time limit if there is one, the distance of two answers, and whether they
 //! confirm each other.
 //!
-//! What is right is decided by two methods that share nothing: the relaxed leaf,
+//! The reference is determined by two independent methods: the relaxed leaf,
 //! and the solution of the boundary-value problem that starts from it.
 
 use std::time::Instant;
@@ -18,29 +18,27 @@ use crate::undulation::Undulation;
 /// Stations closer than this are the same.
 const SAME_STATION: f64 = 1e-9;
 
-/// Segments of a grid on which negative eigenvalues are counted, at least.
+/// Least number of segments of a grid on which negative eigenvalues are counted.
 pub const SEGMENTS: usize = 32;
 
-/// Two leaves this far apart, in lengths, are not two grids' versions of one.
-pub const SAME_PLACE: f64 = 0.05;
+/// Leaves farther apart than this, in lengths, are not the same leaf on two grids.
+pub const SAME_LEAF: f64 = 0.05;
 
-/// What a method answers, in the units of the scenario.
+/// The answer of a method, in the units of the scenario.
 #[derive(Clone, Debug)]
 pub struct Answer {
     /// How the run ended.
     pub outcome: Outcome,
-    /// Why it did not succeed, or what else the method says of it.
+    /// Why it did not succeed, or another remark of the method.
     pub remark: Option<String>,
     /// Fractions of the length at which the shape is known, ascending.
     pub stations: Vec<f64>,
     /// The shape there, one per rod.
     pub rods: Vec<RodShape>,
-    /// Energy.
     pub energy: f64,
     /// Number of negative eigenvalues.
     pub index: Option<usize>,
-    /// Bound on the error of the positions, in units of length, by the method
-    /// itself.
+    /// The method's own bound on the error of the positions, in units of length.
     pub error_estimate: Option<f64>,
     /// Waves and twist of the veins.
     pub undulation: Undulation,
@@ -68,13 +66,13 @@ impl Answer {
     /// Relaxes a leaf.
     ///
     /// # Errors
-    /// If that cannot be asked of the method.
+    /// Requests that the method does not support.
     pub fn relaxed(scenario: &Scenario, options: &Options) -> Result<Self, RelaxError> {
         relax::relax(scenario, options, &mut |_| {}).map(Answer::from)
     }
 
-    /// What a solution of the boundary-value problem says if this `accuracy`,
-    /// relative to the longest rod, was asked for. Eigenvalues are not counted.
+    /// The answer given by a solution of the boundary-value problem with this `accuracy`,
+    /// relative to the longest rod. Eigenvalues are not counted.
     pub fn of_solution(scenario: &Scenario, solution: Solution, accuracy: f64) -> Self {
         let error = solution.error.position;
         Answer {
@@ -98,12 +96,12 @@ impl Answer {
         }
     }
 
-    /// Whether the leaf is at rest, stable or not, accurate or not.
+    /// Whether the leaf is at rest, whatever its stability and accuracy.
     pub fn at_rest(&self) -> bool {
         self.outcome.is_success() || self.outcome == Outcome::ToleranceNotReached
     }
 
-    /// It as the start of a boundary-value problem.
+    /// The answer as the start of a boundary-value problem.
     pub fn as_start(&self) -> Start<'_> {
         Start::Leaf {
             stations: &self.stations,
@@ -112,8 +110,8 @@ impl Answer {
     }
 
     /// Largest distance from another answer at the stations common to both;
-    /// nothing is interpolated. `None` if there are none but the base, which is
-    /// clamped. What is not a number is infinitely far.
+    /// nothing is interpolated. `None` if the only common station is the clamped
+    /// base. NaN counts as infinite.
     pub fn distance(&self, other: &Answer) -> Option<f64> {
         let common = common(&self.stations, &other.stations);
         if common.iter().all(|&(i, _)| self.stations[i] == 0.0) {
@@ -127,19 +125,18 @@ impl Answer {
         Some(largest.position)
     }
 
-    /// Whether two answers this far apart differ by no more than their error
-    /// estimates together allow.
+    /// Whether this distance is no more than the sum of both error estimates.
     pub fn confirms(&self, other: &Answer, distance: f64) -> bool {
         distance <= self.error() + other.error()
     }
 
-    /// The bound on its error; infinite if it has none.
+    /// The bound on its error; infinite if there is none.
     pub fn error(&self) -> f64 {
         self.error_estimate.unwrap_or(f64::INFINITY)
     }
 }
 
-/// Does something, and tells also the seconds it took.
+/// Returns the result of `run` and the seconds it took.
 pub fn timed<T>(run: impl FnOnce() -> T) -> (T, f64) {
     let clock = Instant::now();
     let found = run();
@@ -156,8 +153,8 @@ pub fn fine_grid(scenario: &Scenario, segments: usize) -> Grid {
     grid
 }
 
-/// Negative eigenvalues of the equilibrium near a shape that is known at the
-/// nodes of `grid` and perhaps at other stations.
+/// Number of negative eigenvalues of the equilibrium near a shape given at the
+/// nodes of `grid` and possibly at other stations.
 pub fn index_at(
     scenario: &Scenario,
     grid: Grid,
@@ -175,10 +172,9 @@ pub fn index_at(
     index_near(scenario, grid, &rods)
 }
 
-/// Bound on the error of a leaf on one grid, in units of length: from the
-/// distance to the leaf on a grid twice as fine, which is three quarters of it
-/// where the grids are fine enough for their series. `None` if one of both is
-/// not at rest within the tolerance.
+/// Error estimate of a leaf on one grid, in units of length: from the
+/// distance to the leaf on a grid twice as fine, which is three quarters of the error
+/// in the asymptotic range. `None` if one of them is not at rest within the tolerance.
 pub fn grid_error(
     scenario: &Scenario,
     segments: usize,
@@ -197,10 +193,10 @@ pub fn grid_error(
         leaf.outcome.is_success().then_some(leaf)
     };
     let apart = on(segments)?.distance(&on(2 * segments)?)?;
-    Some((SAFETY * apart).min(SAME_PLACE * longest(&scenario.rods)))
+    Some((SAFETY * apart).min(SAME_LEAF * longest(&scenario.rods)))
 }
 
-/// Places in two ascending lists of the stations that are in both.
+/// Index pairs of the stations that are in both ascending lists.
 pub fn common(a: &[f64], b: &[f64]) -> Vec<(usize, usize)> {
     let (mut i, mut j) = (0, 0);
     let mut common = Vec::new();
@@ -217,21 +213,21 @@ pub fn common(a: &[f64], b: &[f64]) -> Vec<(usize, usize)> {
     common
 }
 
-/// For every one of some stations the place of the nearest in an ascending list.
-pub fn same_places(stations: &[f64], list: &[f64]) -> Vec<usize> {
+/// For each station the index of the nearest one in an ascending list.
+pub fn nearest_indices(stations: &[f64], list: &[f64]) -> Vec<usize> {
     let nearest = |&station: &f64| {
-        let behind = list.partition_point(|&other| other < station);
-        let before = behind.saturating_sub(1);
-        match list.get(behind) {
-            Some(other) if other - station < station - list[before] || behind == 0 => behind,
+        let after = list.partition_point(|&other| other < station);
+        let before = after.saturating_sub(1);
+        match list.get(after) {
+            Some(other) if other - station < station - list[before] || after == 0 => after,
             _ => before,
         }
     };
     stations.iter().map(nearest).collect()
 }
 
-/// The nodes of a grid, and those of `others` that are not among them.
-pub fn with_those_of(grid: &[f64], others: &[f64]) -> Vec<f64> {
+/// The nodes of a grid and those of `others` that are not among them.
+pub fn with_nodes_of(grid: &[f64], others: &[f64]) -> Vec<f64> {
     let shared: Vec<usize> = common(others, grid).into_iter().map(|(i, _)| i).collect();
     let own = (0..others.len()).filter(|i| shared.binary_search(i).is_err());
     let mut all: Vec<f64> = grid.iter().copied().chain(own.map(|i| others[i])).collect();
@@ -239,7 +235,7 @@ pub fn with_those_of(grid: &[f64], others: &[f64]) -> Vec<f64> {
     all
 }
 
-/// All stations in one ascending list.
+/// All stations in one ascending list without duplicates.
 pub fn union(mut stations: Vec<f64>) -> Vec<f64> {
     stations.sort_by(f64::total_cmp);
     stations.dedup_by(|b, a| *b - *a <= SAME_STATION);
@@ -302,8 +298,8 @@ mod tests {
         assert_eq!(stations, [0.0, 0.3, 0.5, 1.0]);
         assert_eq!(common(&stations, &[0.0, 0.5, 0.7]), [(0, 0), (2, 1)]);
         let others = [0.0, 0.2, 0.5 + 1e-16, 1.0];
-        let all = with_those_of(&stations, &others);
+        let all = with_nodes_of(&stations, &others);
         assert_eq!(all, [0.0, 0.2, 0.3, 0.5, 1.0]);
-        assert_eq!(same_places(&others, &all), [0, 1, 3, 4]);
+        assert_eq!(nearest_indices(&others, &all), [0, 1, 3, 4]);
     }
 }

@@ -1,4 +1,4 @@
-//! What is built on the solvers.
+//! Studies built on the solvers.
 
 mod all;
 mod boundary;

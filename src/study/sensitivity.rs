@@ -1,4 +1,4 @@
-//! A leaf at rest, and how it changes with numbers of its scenario.
+//! A leaf at rest, and its derivatives with respect to numbers of its scenario.
 
 use super::{Base, Keys, VaryError};
 use crate::relax::{
@@ -10,10 +10,10 @@ use crate::scenario::Scenario;
 /// Why there are no derivatives.
 #[derive(Debug, thiserror::Error)]
 pub enum SensitivityError {
-    /// By numbers that cannot be.
+    /// Numbers that cannot vary.
     #[error(transparent)]
     Vary(#[from] VaryError),
-    /// A relaxation that cannot be.
+    /// A relaxation that cannot be run.
     #[error(transparent)]
     Relax(#[from] RelaxError),
     /// Shooting has no grids on which equations are linearised.
@@ -21,9 +21,9 @@ pub enum SensitivityError {
     Method,
 }
 
-/// Brings the leaf of `base` to rest and finds how its tip, its energy and its lowest
-/// eigenvalue change with these numbers of its scenario, as
-/// [`Equilibrium::sensitivities`]; of a leaf that is not at rest there are none.
+/// Relaxes the leaf of `base` and computes the derivatives of its tip, its energy and its lowest
+/// eigenvalue with respect to these numbers of its scenario, as
+/// [`Equilibrium::sensitivities`]; none if the leaf is not at rest.
 ///
 /// # Errors
 /// Requests that cannot be met.

@@ -1,11 +1,11 @@
 //! Numbers of a scenario that vary: `KEY=FROM..TO[:COUNT][log]`.
 //!
 //! A key is any number of the scenario by its path as in `--set`, one entry of
-//! a list by an index that counts from 0 (`load.gravity[2]`), all numbers of a key
-//! multiplied (`scale:stiffness.bending_2`), or a setting of a method
+//! a list by an index that counts from 0 (`load.gravity[2]`), a common factor of all numbers
+//! of a key (`scale:stiffness.bending_2`), or a setting of a method
 //! (`method.step`). Several keys joined by `+` take the same value. The
-//! values go into a scenario as those of `--set` do, so that every limit of the
-//! format holds for them ([`Base::at`]); its text is read once only.
+//! values are substituted as by `--set`, so that every limit of the
+//! format applies to them ([`Base::at`]); the text is parsed only once.
 //!
 //! ```
 //! use leafdyn::study::{Base, Vary};
@@ -34,17 +34,17 @@ use std::str::FromStr;
 
 use crate::scenario::{Form, Key, Part, Scenario, ScenarioError, Value};
 
-/// Values where no count is given.
+/// Default number of values.
 const COUNT: usize = 11;
 
-/// Most values along one axis.
+/// Largest number of values along one axis.
 const MOST: usize = 10_000;
 
-/// The largest size of a value, and the smallest that is not zero: what is between
-/// two of them, their product and their quotient are numbers.
+/// Largest and smallest magnitude of a non-zero value: differences, products and quotients
+/// of two of them neither overflow nor underflow.
 const SIZES: RangeInclusive<f64> = 1e-100..=1e100;
 
-/// Decimal digits that values between the ends keep: 0.001, not
+/// Decimal digits to which intermediate values are rounded: 0.001, not
 /// 0.0010000000000000002.
 const DIGITS: usize = 12;
 
@@ -53,7 +53,7 @@ const DIGITS: usize = 12;
 pub enum Knob {
     /// `method.step`: the time step of explicit motion, in the scenario's unit.
     Step,
-    /// `method.segments`: one fixed grid of so many segments a rod.
+    /// `method.segments`: one fixed grid of so many segments per rod.
     Segments,
 }
 
@@ -73,7 +73,7 @@ impl Knob {
     }
 }
 
-/// The settings of methods; `None`: as the method chooses.
+/// The settings of methods; `None`: the default of the method.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Knobs {
     /// `method.step`.
@@ -96,17 +96,17 @@ impl Knobs {
     }
 }
 
-/// One number that can be set.
+/// A number that can be set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
-    /// Of the scenario.
+    /// A number of the scenario.
     Entry(Part),
-    /// Of a method.
+    /// A setting of a method.
     Knob(Knob),
 }
 
 impl Target {
-    /// The key of the scenario, if it is of that.
+    /// The key of the scenario, unless it is a setting of a method.
     pub(crate) fn key(self) -> Option<Key> {
         match self {
             Target::Entry(part) => Some(part.key),
@@ -135,7 +135,7 @@ impl Target {
         }
     }
 
-    /// What that text means; none of a number too large to be a whole one.
+    /// The value that this text denotes; none if a whole number would be too large.
     fn value(self, value: f64) -> Option<Value> {
         match self.is_whole() {
             true => {
@@ -179,12 +179,12 @@ impl fmt::Display for Target {
 pub struct Keys(Vec<Target>);
 
 impl Keys {
-    /// Each of them; at least one.
+    /// All of them; at least one.
     pub fn targets(&self) -> &[Target] {
         &self.0
     }
 
-    /// What the number is measured by where it is zero, in a scenario's units.
+    /// The reference magnitude of the number if it is zero, in a scenario's units.
     pub(crate) fn unit(&self, scenario: &Scenario) -> f64 {
         let unit = |target: &Target| match target {
             Target::Entry(part) if part.scale => 1.0,
@@ -194,7 +194,7 @@ impl Keys {
         self.0.iter().map(unit).fold(0.0, f64::max)
     }
 
-    /// Whether all are greater than zero, or not below it.
+    /// Whether all must be positive, or non-negative.
     pub(crate) fn is_positive(&self) -> bool {
         self.0.iter().all(|target| match target {
             Target::Entry(part) => part.scale || part.key.is_positive(),
@@ -202,26 +202,26 @@ impl Keys {
         })
     }
 
-    /// Whether some number is among both.
+    /// Whether they have a number in common.
     pub(crate) fn overlaps(&self, other: &Keys) -> bool {
         self.0
             .iter()
             .any(|one| other.0.iter().any(|two| one.overlaps(*two)))
     }
 
-    /// Whether a scenario is linear in the number. One that is several keys may be a
-    /// product of itself, as that of coupling and lengths.
+    /// Whether a scenario is linear in the number. Several keys may enter as a
+    /// product, as coupling and lengths do.
     pub(crate) fn is_linear(&self) -> bool {
         let mut keys = self.0.iter().filter_map(|target| target.key());
         self.0.len() == 1 && keys.all(Key::is_linear)
     }
 
-    /// Whether only whole numbers make sense.
+    /// Whether only whole numbers are allowed.
     pub fn is_whole(&self) -> bool {
         self.0.iter().any(|target| target.is_whole())
     }
 
-    /// Whether it is, alone or among others, this setting of a method.
+    /// Whether it contains this setting of a method.
     pub fn sets(&self, knob: Knob) -> bool {
         self.0.contains(&Target::Knob(knob))
     }
@@ -257,9 +257,9 @@ impl fmt::Display for Keys {
 pub struct Vary {
     /// The keys.
     pub keys: Keys,
-    /// The values, from FROM to TO; at least one, none twice.
+    /// The values, from FROM to TO; at least one, without duplicates.
     pub values: Vec<f64>,
-    /// Whether quotients of neighbours are equal, and not differences.
+    /// Whether they are spaced logarithmically.
     pub log: bool,
 }
 
@@ -314,7 +314,7 @@ impl FromStr for Vary {
     }
 }
 
-/// The `i`-th of `last` + 1 values; the ends as they are.
+/// The `i`-th of `last` + 1 values; the ends exactly.
 fn between(from: f64, to: f64, i: usize, last: usize, log: bool) -> f64 {
     if i == 0 || i == last {
         return if i == 0 { from } else { to };
@@ -328,19 +328,19 @@ fn between(from: f64, to: f64, i: usize, last: usize, log: bool) -> f64 {
     rounded.parse().unwrap_or(value)
 }
 
-/// Why numbers cannot vary as asked.
+/// Why numbers cannot vary as requested.
 #[derive(Debug, thiserror::Error)]
 pub enum VaryError {
-    /// Not of the form.
+    /// A syntax error.
     #[error("{0}; write KEY=FROM..TO[:COUNT][log], as in stiffness.bending_2=1..1e-5:12log")]
     Form(String),
     /// A key that cannot vary.
     #[error("{0}")]
     Key(String),
-    /// The setting of a method cannot be this.
+    /// An inadmissible value for the setting of a method.
     #[error("{0}")]
     Knob(String),
-    /// The scenario with these values is refused.
+    /// The scenario with these values is invalid.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
 }

@@ -1,16 +1,16 @@
-//! Words for what is one of a few: a method, an outcome.
+//! Words for the variants of an enum, such as a method or an outcome.
 
-/// A word that is none of those allowed.
+/// A word that is not among those allowed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{found}: must be one of {}", allowed.join(", "))]
 pub struct UnknownWord {
     /// The word.
     pub found: String,
-    /// The words there are.
+    /// The allowed words.
     pub allowed: Vec<&'static str>,
 }
 
-/// Gives enums their words: `ALL` and `word()`, from which all else follows.
+/// Defines `ALL` and `word()` for an enum, on which everything else is based.
 macro_rules! words {
     ($($type:ident { $($variant:ident = $word:literal),* $(,)? })*) => {$(
         impl $type {
@@ -29,7 +29,7 @@ macro_rules! words {
     )*};
 }
 
-/// Lets types with `ALL` and `word()` be written and read by their words.
+/// Implements writing and parsing by word for types with `ALL` and `word()`.
 macro_rules! read_and_write {
     ($type:ty) => {
         impl std::fmt::Display for $type {
@@ -42,7 +42,7 @@ macro_rules! read_and_write {
             type Err = $crate::study::words::UnknownWord;
 
             fn from_str(text: &str) -> Result<Self, Self::Err> {
-                // Methods are known by words of earlier releases too.
+                // The words of earlier releases are accepted for methods.
                 let word = $crate::relax::Method::named(text).map_or(text, |it| it.word());
                 let found = Self::ALL.into_iter().find(|it| it.word() == word);
                 found.ok_or_else(|| $crate::study::words::UnknownWord {

@@ -1,39 +1,38 @@
-//! Leaves on either side of a boundary.
+//! Leaves on either side of a stability boundary.
 
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use super::grids::{every_second, state_on_coarser};
 use super::plane::Plane;
-use super::search::Lost;
-use super::sheet::{Direction, Sheet, Spot};
+use super::search::NotFound;
+use super::sheet::{Direction, Manifold, Solution};
 use super::table::Verified;
 use crate::branch::critical::Kind;
 use crate::leaf::{Grid, Leaf, State};
 use crate::limit::Limit;
 use crate::relax::fall::settle_from;
 
-/// How far from the boundary they are sought, in turn: in lengths on the sheet, or parts of
-/// the ranges.
+/// Distances from the boundary at which they are sought, in this order: arclengths on the
+/// solution manifold, or fractions of the ranges.
 const AWAY: [f64; 5] = [0.1, 0.05, 0.02, 0.01, 0.005];
 
-/// The finest grid that pictures need, in segments.
+/// The finest grid used for pictures, in segments.
 const FINEST: usize = 64;
 
-/// A leaf beside a boundary.
-pub struct Beside {
-    pub spot: Spot,
-    /// Its Morse index.
+/// A leaf next to a boundary.
+pub struct Neighbour {
+    pub solution: Solution,
     pub index: usize,
-    /// Where it began to fall, if it is what the leaf of the other, stable side comes to rest
-    /// as: at the equilibrium beyond a branch point, or at the fold.
+    /// If it is where the leaf of the other, stable side comes to rest beyond the boundary, the
+    /// initial state of that fall: the unstable equilibrium at a branch point, or the fold.
     pub fallen_from: Option<State>,
 }
 
-/// The leaves on both sides of a point of a boundary that goes `along` this way in the plane:
-/// equilibria on the sheet, that with the smaller index first. If this is stable the other is
-/// what it comes to rest as beyond. None if one of them is not found.
-pub fn beside(plane: Plane, point: &Verified, along: [f64; 2]) -> Option<[Beside; 2]> {
+/// The leaves on both sides of a point of a boundary with this tangent `along` it in the
+/// parameter plane: equilibria, the one of smaller index first. If that is stable, the other is
+/// where it comes to rest beyond the boundary. None if one of them is not found.
+pub fn beside(plane: Plane, point: &Verified, along: [f64; 2]) -> Option<[Neighbour; 2]> {
     let (grid, point) = &for_pictures(plane, point);
     let [a, b] = point.indices;
     let (fewer, more) = (a.min(b), a.max(b));
@@ -43,17 +42,17 @@ pub fn beside(plane: Plane, point: &Verified, along: [f64; 2]) -> Option<[Beside
     let low = AWAY.iter().find_map(|away| at(-away, fewer..=fewer))?;
     let high = match (fewer, point.kind) {
         (0, Kind::Branching) => {
-            // Another boundary may be close behind this one: across as few as can be.
+            // Another boundary may be close: take the equilibrium of least index.
             let found = AWAY.iter().filter_map(|away| at(*away, more..=usize::MAX));
-            at_rest(plane, grid, found.min_by_key(|found| found.index)?.spot)?
+            at_rest(plane, grid, found.min_by_key(|found| found.index)?.solution)?
         }
-        (0, Kind::Fold) => at_rest(plane, grid, beyond(point, &low.spot, along)?)?,
+        (0, Kind::Fold) => at_rest(plane, grid, beyond(point, &low.solution, along)?)?,
         _ => AWAY.iter().find_map(|away| at(*away, more..=more))?,
     };
     Some([low, high])
 }
 
-/// The point on a grid that is as coarse as pictures allow.
+/// The point on the coarsest grid that pictures allow.
 fn for_pictures(plane: Plane, point: &Verified) -> (Grid, Verified) {
     let mut grid = Grid::through(&point.stations, plane.family.first().kinks());
     let mut point = point.clone();
@@ -66,71 +65,71 @@ fn for_pictures(plane: Plane, point: &Verified) -> (Grid, Verified) {
     (grid, point)
 }
 
-/// The equilibrium so far from a point across the boundary, if it has one of these indices.
+/// The equilibrium at a distance across the boundary, if its index is one of these.
 fn on_sheet(
     plane: Plane,
     grid: &Grid,
     point: &Verified,
     along: [f64; 2],
     (away, indices): (f64, &RangeInclusive<usize>),
-) -> Option<Beside> {
-    let found = || -> Result<Beside, Lost> {
-        let mut sheet = Sheet::new(plane, grid.clone())?;
+) -> Option<Neighbour> {
+    let found = || -> Result<Neighbour, NotFound> {
+        let mut manifold = Manifold::new(plane, grid.clone())?;
         let along = Direction {
-            place: along,
-            ..sheet.number(0)
+            params: along,
+            ..manifold.unit_parameter(0)
         };
-        let start = Spot {
+        let start = Solution {
             state: point.state.clone(),
-            place: point.place,
+            params: point.params,
         };
-        let start = sheet.beside(&start, &point.across, away)?;
-        let rates = sheet.rates(&start)?;
-        let sample = sheet.settle(&start, [&along, &point.across], &[], &rates)?;
-        Ok(Beside {
-            spot: sample.spot,
+        let start = manifold.beside(&start, &point.across, away)?;
+        let rates = manifold.rates(&start)?;
+        let sample = manifold.correct(&start, [&along, &point.across], &[], &rates)?;
+        Ok(Neighbour {
+            solution: sample.solution,
             index: sample.solved.negative,
             fallen_from: None,
         })
     };
     let found = found().ok()?;
-    (indices.contains(&found.index) && inside(found.spot.place)).then_some(found)
+    (indices.contains(&found.index) && inside(found.solution.params)).then_some(found)
 }
 
-/// A fold's leaf where there is none near: on the other side of the boundary than the stable
-/// one.
-fn beyond(point: &Verified, stable: &Spot, along: [f64; 2]) -> Option<Spot> {
+/// Initial state beyond a fold, where no equilibrium is near: the leaf at the fold, with
+/// parameters on the side of the boundary opposite to the stable one.
+fn beyond(point: &Verified, stable: &Solution, along: [f64; 2]) -> Option<Solution> {
     let normal = [-along[1], along[0]];
     let off: f64 = (0..2)
-        .map(|i| (stable.place[i] - point.place[i]) * normal[i])
+        .map(|i| (stable.params[i] - point.params[i]) * normal[i])
         .sum();
     let length = along[0].hypot(along[1]).copysign(-off);
     let mut away = AWAY.iter().map(|away| away / length);
-    let place = away.find_map(|away| {
-        let place = [0, 1].map(|i| point.place[i] + away * normal[i]);
-        inside(place).then_some(place)
+    let params = away.find_map(|away| {
+        let params = [0, 1].map(|i| point.params[i] + away * normal[i]);
+        inside(params).then_some(params)
     })?;
-    Some(Spot {
+    Some(Solution {
         state: point.state.clone(),
-        place,
+        params,
     })
 }
 
-/// Where a leaf comes to rest.
-fn at_rest(plane: Plane, grid: &Grid, from: Spot) -> Option<Beside> {
-    let scenario = Arc::new(plane.scenario(from.place).ok()?);
+/// The equilibrium to which a leaf relaxes.
+fn at_rest(plane: Plane, grid: &Grid, from: Solution) -> Option<Neighbour> {
+    let scenario = Arc::new(plane.scenario(from.params).ok()?);
     let leaf = Leaf::in_units(scenario, plane.family.scale());
     let state = settle_from(&leaf, grid, from.state.clone(), &Limit::default())?;
-    Some(Beside {
-        spot: Spot {
+    Some(Neighbour {
+        solution: Solution {
             state,
-            place: from.place,
+            params: from.params,
         },
         index: 0,
         fallen_from: Some(from.state),
     })
 }
 
-fn inside(place: [f64; 2]) -> bool {
-    place.iter().all(|part| (0.0..=1.0).contains(part))
+fn inside(params: [f64; 2]) -> bool {
+    params.iter().all(|part| (0.0..=1.0).contains(part))
 }

@@ -1,7 +1,7 @@
-//! Equilibria at places of a plane, each reached from another one beside it.
+//! Equilibria at points of the parameter plane, each continued from a neighbouring one.
 
 use super::plane::Plane;
-use super::sheet::Spot;
+use super::sheet::Solution;
 use crate::branch::Point;
 use crate::branch::critical::Critical;
 use crate::branch::equations::{Equations, Stuck};
@@ -12,47 +12,46 @@ use crate::branch::walk::{End, Walk, walk};
 use crate::leaf::Grid;
 use crate::scenario::Scenario;
 
-/// The longest step, as a part of the way, and most points on it.
+/// The longest step, as a part of the path, and the largest number of points on it.
 const LONGEST: f64 = 1.0;
 const MOST: usize = 100;
 
-/// The finest grid to go on, in segments.
+/// The finest grid for repeating a path, in segments.
 const FINEST: usize = 1024;
 
-/// The grid from which on an index is counted once more.
+/// Segments of the coarsest grid for counting an index again.
 const RECOUNTED: usize = 256;
 
-/// Grids of a critical point at least.
+/// Least number of grids for a critical point.
 const CRITICAL_GRIDS: usize = 4;
 
-/// An equilibrium at a place of the plane.
+/// An equilibrium at a point of the parameter plane.
 #[derive(Clone, Debug)]
 pub struct AtRest {
-    /// Where it is, on a grid.
-    pub spot: Spot,
+    /// State and parameters on a grid, and that grid.
+    pub solution: Solution,
     pub grid: Grid,
-    /// Morse index, by finer grids.
+    /// Morse index, confirmed on finer grids.
     pub index: usize,
 }
 
-/// What was found on the straight way from an equilibrium to another place.
+/// What was found on the straight path from an equilibrium to another point of the plane.
 #[derive(Default)]
-pub struct Way {
-    /// The grid on which it was gone, if it could be begun.
+pub struct Path {
+    /// The grid on which it was followed, if that could be begun.
     pub grid: Option<Grid>,
     /// Tips of all rods along it, in the family's units.
     pub tips: Vec<Vec<[f64; 3]>>,
-    /// Where the index changes on that grid; the parameter goes from 0 to 1 along it.
+    /// Its critical points on that grid; the parameter goes from 0 to 1 along the path.
     pub critical: Vec<Critical>,
-    /// Whether the branch turns back before its end.
+    /// Whether the branch turns back before the end of the path.
     turned: bool,
-    /// The equilibrium there; none where the branch turns back before, or is lost.
+    /// The equilibrium at the end; none if the branch turns back before, or is lost.
     pub end: Option<AtRest>,
-    /// Matrices factorised on the way.
     pub factorizations: usize,
 }
 
-/// The straight way between two places of a plane.
+/// The scenarios on the straight path between two points of the plane.
 type Between<'p> = dyn Fn(f64) -> Result<Scenario, String> + Sync + 'p;
 
 fn between<'p>(plane: &'p Plane, [from, to]: [[f64; 2]; 2]) -> Box<Between<'p>> {
@@ -65,25 +64,25 @@ fn between<'p>(plane: &'p Plane, [from, to]: [[f64; 2]; 2]) -> Box<Between<'p>> 
     })
 }
 
-/// Follows the branch through an equilibrium along the straight way to another place, by
-/// arclength, as long as it does not turn back; what is there counts if three finer grids
-/// in a row have it with the same index. Where they have none, or that is not the index on
-/// the grid of the way, this is too coarse, and the way is gone once more on a finer one.
-pub fn go(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Way {
-    let make = between(plane, [from.spot.place, to]);
-    let family = plane.family.along(&*make);
-    let mut way = Way::default();
-    let Ok(family) = family else { return way };
+/// Follows the branch through an equilibrium along the straight path to another point of the
+/// plane, by arclength, unless it turns back. The equilibrium at the end is accepted if three
+/// finer grids in a row have it with the same index. If they do not, or this is not the index
+/// on the grid of the path, that grid is too coarse, and a finer one is tried.
+pub fn follow_path(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Path {
+    let make = between(plane, [from.solution.params, to]);
+    let family = plane.family.along_path(&*make);
+    let mut path = Path::default();
+    let Ok(family) = family else { return path };
     let equations = Equations::new(&family, from.grid.clone());
     let first = equations.map_err(Stuck::from).and_then(|mut equations| {
-        let (first, _) = equations.correct(&from.spot.state, 0.0, None)?;
+        let (first, _) = equations.correct(&from.solution.state, 0.0, None)?;
         Ok((equations, first))
     });
     let Ok((mut equations, mut first)) = first else {
-        return way;
+        return path;
     };
     loop {
-        let last = follow(&mut equations, &first, &mut way);
+        let last = follow(&mut equations, &first, &mut path);
         let index = last
             .as_ref()
             .and_then(|it| index_at(&mut equations, it).ok());
@@ -91,38 +90,38 @@ pub fn go(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Way {
         if let (Some(last), Some(index)) = (last, index)
             && (index == last.index || !finer)
         {
-            way.end = Some(AtRest {
-                spot: Spot {
+            path.end = Some(AtRest {
+                solution: Solution {
                     state: last.state,
-                    place: to,
+                    params: to,
                 },
                 grid: equations.grid().clone(),
                 index,
             });
-            return way;
+            return path;
         }
         match on_finer(&mut equations, &first) {
-            Ok(on_finer) if finer && !way.turned => (equations, first) = on_finer,
-            _ => return way,
+            Ok(on_finer) if finer && !path.turned => (equations, first) = on_finer,
+            _ => return path,
         }
     }
 }
 
-/// The index of an equilibrium counted once more, on fine grids alone; none if they do not have
+/// The index of an equilibrium counted again, on fine grids alone; none if they do not have
 /// it, or do not agree.
 pub fn recount(plane: &Plane, at: &AtRest) -> Option<usize> {
-    let make = between(plane, [at.spot.place; 2]);
-    let family = plane.family.along(&*make).ok()?;
+    let make = between(plane, [at.solution.params; 2]);
+    let family = plane.family.along_path(&*make).ok()?;
     let mut equations = Equations::new(&family, at.grid.clone()).ok()?;
-    let (mut point, _) = equations.correct(&at.spot.state, 0.0, None).ok()?;
+    let (mut point, _) = equations.correct(&at.solution.state, 0.0, None).ok()?;
     while point.state.segments() < RECOUNTED {
         (equations, point) = on_finer(&mut equations, &point).ok()?;
     }
     index_at(&mut equations, &point).ok()
 }
 
-/// The point at the end of the way on this grid, if the branch comes there.
-fn follow(equations: &mut Equations, first: &Point, way: &mut Way) -> Option<Point> {
+/// The point at the end of the path on this grid, if the branch reaches it.
+fn follow(equations: &mut Equations, first: &Point, path: &mut Path) -> Option<Point> {
     let mut first = first.clone();
     first.tangent = first.tangent.towards(true);
     let turned = |points: &[Point]| points[points.len() - 1].tangent.fraction < 0.0;
@@ -132,11 +131,11 @@ fn follow(equations: &mut Equations, first: &Point, way: &mut Way) -> Option<Poi
     };
     let before = equations.factorizations;
     let branch = walk(equations, first, &how, &mut |_, _| {});
-    way.factorizations += equations.factorizations - before;
-    way.grid = Some(equations.grid().clone());
-    way.tips = branch.points.iter().map(tips).collect();
-    way.critical = branch.critical.into_iter().map(|(_, it)| it).collect();
-    way.turned = matches!(branch.end, Some(End::Enough | End::Returned));
+    path.factorizations += equations.factorizations - before;
+    path.grid = Some(equations.grid().clone());
+    path.tips = branch.points.iter().map(tips).collect();
+    path.critical = branch.critical.into_iter().map(|(_, it)| it).collect();
+    path.turned = matches!(branch.end, Some(End::Enough | End::Returned));
     match branch.end {
         Some(End::Reached) if branch.missed.is_empty() => branch.points.last().cloned(),
         _ => None,
@@ -148,8 +147,8 @@ fn tips(point: &Point) -> Vec<[f64; 3]> {
     (0..state.rods()).map(|j| state.tip(j).to_array()).collect()
 }
 
-/// A critical point on the way from a place to another without the error of its grid.
-pub fn refine_on(
+/// A critical point on the path between two points of the plane, extrapolated over grids.
+pub fn refine_on_path(
     plane: &Plane,
     ends: [[f64; 2]; 2],
     grid: &Grid,
@@ -157,6 +156,6 @@ pub fn refine_on(
     accuracy: f64,
 ) -> Result<Refined, Doubt> {
     let make = between(plane, ends);
-    let family = plane.family.along(&*make)?;
+    let family = plane.family.along_path(&*make)?;
     refine_critical(&family, grid, critical, accuracy, CRITICAL_GRIDS)
 }

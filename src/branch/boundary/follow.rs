@@ -1,41 +1,40 @@
-//! Following a boundary through the plane of two numbers, both ways.
+//! Following a boundary through the plane of two parameters, in both directions.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use super::halt::Halt;
-use super::place::{Place, Seed};
+use super::place::{Seed, SingularPoint};
 use super::plane::Plane;
-use super::search::Lost;
-use super::sheet::Sheet;
+use super::search::NotFound;
+use super::sheet::Manifold;
 use super::table::Verified;
-use super::walk::{Stride, Walk};
+use super::walk::{Walk, WalkOptions};
 use crate::branch::critical::Kind;
 use crate::leaf::Grid;
 
-/// A boundary on both sides of where it began.
+/// A boundary, on both sides of its starting point.
 #[derive(Clone, Debug)]
 pub struct Boundary {
-    /// What becomes of the branch along the first number, and in how many directions.
+    /// The kind of its critical points along the first parameter, and how many modes are neutral.
     pub kind: Kind,
     pub neutral: usize,
-    /// Its points, verified.
     pub points: Vec<Verified>,
-    /// How it ended, at its first point and at its last.
+    /// How it ended at its first point and at its last.
     pub ends: [Halt; 2],
-    /// Matrices factorised for it, but for those of softened leaves.
+    /// Matrices factorised for it, without those of softened leaves.
     pub factorizations: usize,
 }
 
-/// Told of each point: how many there are, and where.
+/// Called for each point with the number of points so far and its parameters.
 type Progress<'p> = dyn FnMut(usize, [f64; 2]) + Send + 'p;
 
-/// Follows the boundary on which a critical point of a branch lies both ways, side by side.
+/// Follows the boundary through a critical point of a branch in both directions, in parallel.
 pub fn follow(
     plane: Plane,
     grid: &Grid,
     seed: &Seed,
-    how: &Stride,
+    how: &WalkOptions,
     progress: &mut Progress,
 ) -> Boundary {
     let mut boundary = Boundary {
@@ -45,10 +44,10 @@ pub fn follow(
         ends: [Halt::Stuck; 2],
         factorizations: 0,
     };
-    let begun = Sheet::new(plane, grid.clone()).map_err(Lost::from);
-    let begun = begun.and_then(|mut sheet| {
-        let begun = Place::begin(&mut sheet, seed);
-        boundary.factorizations += sheet.equations.factorizations;
+    let begun = Manifold::new(plane, grid.clone()).map_err(NotFound::from);
+    let begun = begun.and_then(|mut manifold| {
+        let begun = SingularPoint::begin(&mut manifold, seed);
+        boundary.factorizations += manifold.equations.factorizations;
         begun
     });
     let first = match begun {
@@ -58,34 +57,34 @@ pub fn follow(
             return boundary;
         }
     };
-    let (closed, told) = (AtomicBool::new(false), Mutex::new(([0; 2], progress)));
-    let walk = |side: usize, way: Place| {
-        let mut walk = Walk::new(plane, how, way, seed.given());
-        let mut tell = |points: usize, place| {
-            let mut told = told.lock().unwrap_or_else(PoisonError::into_inner);
-            told.0[side] = points;
-            let points = told.0.iter().sum();
-            told.1(points, place);
+    let (closed, reported) = (AtomicBool::new(false), Mutex::new(([0; 2], progress)));
+    let walk = |side: usize, first: SingularPoint| {
+        let mut walk = Walk::new(plane, how, first, seed.given());
+        let mut report = |points: usize, params| {
+            let mut reported = reported.lock().unwrap_or_else(PoisonError::into_inner);
+            reported.0[side] = points;
+            let points = reported.0.iter().sum();
+            reported.1(points, params);
         };
-        // Where one way leads back to the start, the other one need not be gone.
-        let needless = || side == 0 && closed.load(Ordering::Relaxed);
-        let end = walk.run(grid.clone(), &needless, &mut tell);
+        // If one direction leads back to the start, the other is not needed.
+        let cancelled = || side == 0 && closed.load(Ordering::Relaxed);
+        let end = walk.run(grid.clone(), &cancelled, &mut report);
         closed.fetch_or(side == 1 && end == Halt::Closed, Ordering::Relaxed);
         (walk, end)
     };
-    let ((ahead, end), (behind, beginning)) =
+    let ((forward, end), (backward, beginning)) =
         rayon::join(|| walk(1, first.clone()), || walk(0, first.turned()));
-    boundary.factorizations += ahead.factorizations;
+    boundary.factorizations += forward.factorizations;
     boundary.ends = [beginning, end];
-    boundary.points = ahead.in_order();
+    boundary.points = forward.in_order();
     if end == Halt::Closed {
         boundary.ends[0] = end;
         return boundary;
     }
-    boundary.factorizations += behind.factorizations;
-    // The first point is that of the other way.
+    boundary.factorizations += backward.factorizations;
+    // Both directions begin with the same point.
     let skip = usize::from(!boundary.points.is_empty());
-    let before = behind.in_order().into_iter().skip(skip).rev();
+    let before = backward.in_order().into_iter().skip(skip).rev();
     boundary.points.splice(..0, before);
     boundary
 }

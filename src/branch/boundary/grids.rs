@@ -1,9 +1,9 @@
-//! Points of a boundary taken to finer grids and to coarser ones.
+//! Transfer of boundary points to finer and coarser grids.
 
-use super::place::Place;
+use super::place::SingularPoint;
 use super::plane::Plane;
-use super::search::Lost;
-use super::sheet::{Direction, Sheet, Spot};
+use super::search::NotFound;
+use super::sheet::{Direction, Manifold, Solution};
 use crate::branch::field::prolong as prolong_field;
 use crate::leaf::{Field, Grid, State};
 use crate::relax::prolong::prolong;
@@ -11,52 +11,59 @@ use crate::relax::prolong::prolong;
 /// Segments of the coarsest.
 const COARSEST: usize = 8;
 
-/// A point of the same kind on the grid with all segments halved: where it would be, with
-/// its directions.
-pub fn on_finer<'a>(sheet: &mut Sheet<'a>, place: &Place) -> Result<(Sheet<'a>, Place), Lost> {
-    let state = prolong(sheet.leaf(place.spot.place)?, &place.spot.state);
-    let finer = sheet.refined()?;
+/// Initial guess for a boundary point on the grid with all segments halved, with its
+/// directions.
+pub fn on_finer<'a>(
+    manifold: &mut Manifold<'a>,
+    point: &SingularPoint,
+) -> Result<(Manifold<'a>, SingularPoint), NotFound> {
+    let state = prolong(manifold.leaf(point.solution.params)?, &point.solution.state);
+    let finer = manifold.refined()?;
     let direction = |it: &Direction| {
         finer.normalised(Direction {
             increments: prolong_field(&it.increments),
-            place: it.place,
+            params: it.params,
         })
     };
-    let place = Place {
-        spot: Spot {
+    let point = SingularPoint {
+        solution: Solution {
             state,
-            ..place.spot
+            ..point.solution
         },
-        held: place.held.iter().map(prolong_field).collect(),
-        tangent: direction(&place.tangent),
-        normal: direction(&place.normal),
-        ..place.clone()
+        soft: point.soft.iter().map(prolong_field).collect(),
+        tangent: direction(&point.tangent),
+        normal: direction(&point.normal),
+        ..point.clone()
     };
-    Ok((finer, place))
+    Ok((finer, point))
 }
 
-/// The point on the grid with every second node: where it would be.
-pub fn on_coarser(plane: Plane, grid: &Grid, place: &Place) -> Option<(Grid, Place)> {
-    let (coarse, state) = state_on_coarser(plane, grid, &place.spot.state)?;
+/// Initial guess for the point on the grid with every second node.
+pub fn on_coarser(
+    plane: Plane,
+    grid: &Grid,
+    point: &SingularPoint,
+) -> Option<(Grid, SingularPoint)> {
+    let (coarse, state) = state_on_coarser(plane, grid, &point.solution.state)?;
     let direction = |it: &Direction| Direction {
         increments: every_second(&it.increments),
-        place: it.place,
+        params: it.params,
     };
-    let place = Place {
-        spot: Spot {
+    let point = SingularPoint {
+        solution: Solution {
             state,
-            ..place.spot
+            ..point.solution
         },
-        held: place.held.iter().map(every_second).collect(),
-        tangent: direction(&place.tangent),
-        normal: direction(&place.normal),
-        ..place.clone()
+        soft: point.soft.iter().map(every_second).collect(),
+        tangent: direction(&point.tangent),
+        normal: direction(&point.normal),
+        ..point.clone()
     };
-    Some((coarse, place))
+    Some((coarse, point))
 }
 
-/// A state on the grid with every second node; none if this would be too coarse, or not the
-/// one of which `grid` is the next finer.
+/// A state on the grid with every second node; none if that would be too coarse, or if `grid` is
+/// not its refinement.
 pub fn state_on_coarser(plane: Plane, grid: &Grid, state: &State) -> Option<(Grid, State)> {
     let stations: Vec<f64> = grid.sigma().iter().copied().step_by(2).collect();
     let coarse = Grid::through(&stations, plane.family.first().kinks());

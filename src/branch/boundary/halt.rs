@@ -1,10 +1,10 @@
 //! How a boundary ended.
 
-use super::search::Lost;
+use super::search::NotFound;
 use crate::branch::equations::Stuck;
 use crate::branch::refined::Doubt;
 
-/// That is, on one of its sides.
+/// The end on one of its sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Halt {
     /// At an end of one of the ranges.
@@ -15,32 +15,32 @@ pub enum Halt {
     Met,
     /// After as many points as were allowed.
     MostPoints,
-    /// The second number breaks the symmetry by which branches cross.
+    /// The second parameter breaks the symmetry to which the branch point is due.
     Unfolded,
-    /// Modes that become neutral together do so no longer.
-    Parted,
-    /// No leaf is there.
+    /// Modes that became neutral together no longer do.
+    Separated,
+    /// No leaf exists there.
     OutOfRange,
-    /// No step however short could be made.
+    /// The step could not be made however short.
     Stuck,
-    /// What comes next could not be verified.
+    /// The next point could not be verified.
     Unverified(Doubt),
 }
 
 impl Halt {
-    /// Whether the boundary is known as far as was asked.
+    /// Whether the boundary is known as far as requested.
     pub fn complete(self) -> bool {
         matches!(self, Halt::Reached | Halt::Closed | Halt::Met)
     }
 }
 
-impl From<Lost> for Halt {
-    fn from(lost: Lost) -> Self {
+impl From<NotFound> for Halt {
+    fn from(lost: NotFound) -> Self {
         match lost {
-            Lost::Parted => Halt::Parted,
-            Lost::Unfolded => Halt::Unfolded,
-            Lost::Stuck(Stuck::OutOfRange(_)) => Halt::OutOfRange,
-            Lost::Stuck(_) => Halt::Stuck,
+            NotFound::Separated => Halt::Separated,
+            NotFound::Unfolded => Halt::Unfolded,
+            NotFound::Stuck(Stuck::OutOfRange(_)) => Halt::OutOfRange,
+            NotFound::Stuck(_) => Halt::Stuck,
         }
     }
 }

@@ -1,102 +1,103 @@
-//! A point of a boundary: an equilibrium on the sheet at which the matrix is singular.
+//! A point of a boundary: an equilibrium at which the matrix is singular.
 
 use nalgebra::DMatrix;
 
-use super::search::{self, Eigen, Found, Lost, Search};
-use super::sheet::{Direction, Sample, Sheet, Spot};
+use super::search::{self, Eigen, Found, NotFound, Search};
+use super::sheet::{Direction, Manifold, Sample, Solution};
 use crate::branch::critical::{Critical, Kind};
 use crate::branch::deflation::STIFF;
 use crate::branch::equations::Stuck;
 use crate::branch::field::{add, combined, dot, plus, times};
 use crate::leaf::Field;
 
-/// The distance over which the change of a singular value is differenced.
+/// Step of the central differences for the derivative of an eigenvalue.
 const DIFFERENCE: f64 = 3e-4;
 
-/// Below this part of what a mode could feel of a number, it feels nothing but rounding.
-const DRIVEN: f64 = 1e-5;
+/// A parameter's work on a mode, relative to the largest possible, below which it is rounding.
+const FORCED: f64 = 1e-5;
 
-/// Eigenvalues that differ by more than this, relative to their change with a step of
-/// length one, do not vanish together.
+/// Eigenvalues that differ by more than this, relative to their derivative with respect to
+/// arclength, do not vanish together.
 const TOGETHER: f64 = 1e-5;
 
-/// An eigenvalue that is smaller than this is that of a neutral mode.
+/// Eigenvalues below this belong to neutral modes.
 const NEUTRAL: f64 = 1e-7;
 
 /// A point of a boundary on one grid.
 #[derive(Clone, Debug)]
-pub struct Place {
-    /// Where it is.
-    pub spot: Spot,
-    /// What becomes neutral there, and whether the branch along the first number turns.
+pub struct SingularPoint {
+    pub solution: Solution,
+    /// The kind of critical point, along the first parameter.
     pub kind: Kind,
     /// How many modes become neutral together.
     pub neutral: usize,
     /// The modes of the border: first the neutral ones.
-    pub held: Vec<Field>,
-    /// The way along the boundary and the way across it on the sheet: this goes to where
-    /// there are more negative eigenvalues.
+    pub soft: Vec<Field>,
+    /// Directions along the boundary and across it on the solution manifold; the latter points
+    /// to where there are more negative eigenvalues.
     pub tangent: Direction,
     pub normal: Direction,
-    /// Change of the eigenvalue of H along the latter.
+    /// Derivative of the eigenvalue of H along the latter.
     pub slope: f64,
-    /// Morse index across the boundary, and before it.
+    /// Morse index beyond the boundary, on the side of the normal.
     pub index: usize,
-    /// Eigenvalues of H but for those that are zero.
+    /// The other eigenvalues of H.
     pub others: Vec<f64>,
-    /// Along a fold: the change of the numbers with the way along the boundary, which
-    /// changes its sign at a cusp.
+    /// At a fold: the derivative of the parameters with respect to arclength along the boundary,
+    /// as the component along `heading`; it changes sign at a cusp.
     pub speed: f64,
-    /// The direction in the plane of the numbers in which a fold goes.
+    /// The direction of the curve of folds in the parameter plane.
     pub heading: [f64; 2],
 }
 
-/// A critical point of a branch through the plane.
+/// A critical point of a branch in the parameter plane.
 #[derive(Clone, Copy)]
 pub struct Seed<'c> {
     pub critical: &'c Critical,
-    /// Both numbers, as fractions of their ranges,
-    pub place: [f64; 2],
-    /// and their change with the parameter of the branch.
-    pub way: [f64; 2],
+    /// Both parameters, as fractions of their ranges,
+    pub params: [f64; 2],
+    /// and their derivatives with respect to the parameter of the branch.
+    pub direction: [f64; 2],
 }
 
 impl Seed<'_> {
-    /// The number that does not change along the branch, if there is one.
+    /// The parameter that is constant along the branch, if there is one.
     pub fn given(&self) -> Option<usize> {
-        [1, 0].into_iter().find(|&which| self.way[which] == 0.0)
+        [1, 0]
+            .into_iter()
+            .find(|&which| self.direction[which] == 0.0)
     }
 }
 
-impl Place {
-    /// Where a boundary begins: it lies across the branch.
-    pub fn begin(sheet: &mut Sheet, seed: &Seed) -> Result<Place, Lost> {
+impl SingularPoint {
+    /// The first point of a boundary, the normal of which is along the branch.
+    pub fn begin(manifold: &mut Manifold, seed: &Seed) -> Result<SingularPoint, NotFound> {
         let Seed {
             critical,
-            place,
-            way,
+            params,
+            direction,
         } = seed;
-        let modes = critical.modes.iter().chain(&critical.held);
-        let held = independent(sheet, modes, critical.held.len());
-        let spot = Spot {
+        let modes = critical.modes.iter().chain(&critical.soft);
+        let soft = independent(manifold, modes, critical.soft.len());
+        let solution = Solution {
             state: critical.state.clone(),
-            place: *place,
+            params: *params,
         };
         let across = Direction {
             increments: critical.tangent.increments.clone(),
-            place: way.map(|part| part * critical.tangent.fraction),
+            params: direction.map(|part| part * critical.tangent.fraction),
         };
-        let slope = critical.slope / sheet.along(&across, &across).sqrt();
-        let across = sheet.normalised(across);
-        let along = sheet.normalised(Direction {
-            place: [-way[1], way[0]],
-            ..sheet.number(1)
+        let slope = critical.slope / manifold.inner(&across, &across).sqrt();
+        let across = manifold.normalised(across);
+        let along = manifold.normalised(Direction {
+            params: [-direction[1], direction[0]],
+            ..manifold.unit_parameter(1)
         });
-        let like = Place {
-            spot,
+        let like = SingularPoint {
+            solution,
             kind: critical.kind,
             neutral: critical.modes.len(),
-            held,
+            soft,
             tangent: along.clone(),
             normal: across.clone(),
             slope,
@@ -106,102 +107,114 @@ impl Place {
             heading: [0.0; 2],
         };
         let found = Search {
-            spot: &like.spot,
+            solution: &like.solution,
             across: &across,
             slope,
             along: &along,
-            held: &like.held,
+            soft: &like.soft,
             neutral: like.neutral,
             accuracy: 1e-11,
             furthest: 0.1,
         };
-        let found = found.run(sheet)?;
-        like.at(sheet, found)
+        let found = found.secant(manifold)?;
+        like.completed(manifold, found)
     }
 
-    /// The point that was found from this one, with the directions of this one.
-    pub fn moved(&self, sheet: &Sheet, found: Found) -> Place {
+    /// The boundary point that was found from this one, with the directions of this one.
+    pub fn moved(&self, manifold: &Manifold, found: Found) -> SingularPoint {
         let Found { sample, eigen, .. } = found;
-        Place {
-            held: held(sheet, &sample, &eigen),
+        SingularPoint {
+            soft: soft(manifold, &sample, &eigen),
             index: index(&sample, &eigen),
             others: eigen.others,
-            spot: sample.spot,
+            solution: sample.solution,
             ..self.clone()
         }
     }
 
-    /// The same with its own directions: the way along the boundary as here.
-    pub fn at(&self, sheet: &mut Sheet, found: Found) -> Result<Place, Lost> {
-        let border = self.held.iter().map(|mode| sheet.equations.momentum(mode));
+    /// The same with its own directions; the tangent is oriented as here.
+    pub fn completed(
+        &self,
+        manifold: &mut Manifold,
+        found: Found,
+    ) -> Result<SingularPoint, NotFound> {
+        let border = self
+            .soft
+            .iter()
+            .map(|mode| manifold.equations.momentum(mode));
         let border: Vec<Field> = border.collect();
-        let sample = sheet.look(found.sample.spot, &border)?;
+        let sample = manifold.sample_at_rest(found.sample.solution, &border)?;
         let eigen = search::eigen(&sample, self.neutral);
-        let basis = self.basis(sheet, &sample, &eigen)?;
-        let held = held(sheet, &sample, &eigen);
-        let change = self.change(sheet, &sample, &basis, &held)?;
+        let basis = self.basis(manifold, &sample, &eigen)?;
+        let soft = soft(manifold, &sample, &eigen);
+        let change = self.change(manifold, &sample, &basis, &soft)?;
         let slope = change[0].hypot(change[1]);
         if !(slope.is_finite() && slope > NEUTRAL) {
-            return Err(Lost::Stuck(Stuck::NotConverged));
+            return Err(NotFound::Stuck(Stuck::NotConverged));
         }
         if eigen.spread > TOGETHER * slope {
-            return Err(Lost::Parted);
+            return Err(NotFound::Separated);
         }
         let [a, b] = change.map(|part| part / slope);
         let normal = Direction::mixed([a, b], &basis);
         let mut tangent = Direction::mixed([-b, a], &basis);
-        if sheet.along(&tangent, &self.tangent) < 0.0 {
+        if manifold.inner(&tangent, &self.tangent) < 0.0 {
             tangent = tangent.reversed();
         }
-        let drive = self.drive(&sample, &eigen, slope);
-        if self.kind == Kind::Branching && drive.felt > DRIVEN {
-            return Err(Lost::Unfolded);
+        let forcing = self.forcing(&sample, &eigen, slope);
+        if self.kind == Kind::Branching && forcing.largest > FORCED {
+            return Err(NotFound::Unfolded);
         }
-        // A fold moves in the direction in which the mode feels nothing.
-        let mut heading = drive.free;
+        // A fold moves in the direction in which the parameters do no work on the mode.
+        let mut heading = forcing.free;
         if heading[0] * self.heading[0] + heading[1] * self.heading[1] < 0.0 {
             heading = heading.map(|part| -part);
         }
-        Ok(Place {
+        Ok(SingularPoint {
             kind: self.kind,
             neutral: self.neutral,
-            held,
-            speed: heading[0] * tangent.place[0] + heading[1] * tangent.place[1],
+            soft,
+            speed: heading[0] * tangent.params[0] + heading[1] * tangent.params[1],
             heading,
             tangent,
             normal,
             slope,
             index: index(&sample, &eigen),
             others: eigen.others,
-            spot: sample.spot,
+            solution: sample.solution,
         })
     }
 
-    /// The change of the eigenvalue along both directions on the sheet: with K X + B H = 0
-    /// and B^T X = 1 that of H is -X^T dK X. How far off the sheet a straight way leads does
-    /// not count in central differences, but for stiff segments, which feel it.
+    /// Derivatives of the eigenvalue in both directions on the manifold: with K X + B H = 0
+    /// and B^T X = 1 that of H is -X^T dK X. The second-order distance of a straight line from
+    /// the manifold cancels in central differences, except for stiff segments, which are corrected.
     fn change(
         &self,
-        sheet: &mut Sheet,
+        manifold: &mut Manifold,
         sample: &Sample,
         basis: &[Direction; 2],
-        held: &[Field],
-    ) -> Result<[f64; 2], Lost> {
-        let modes = &held[..self.neutral.min(held.len())];
-        let border: Vec<Field> = held.iter().map(|it| sheet.equations.momentum(it)).collect();
-        let stiff = sheet.leaf(sample.spot.place)?.stiffest() * STIFF <= 1.0;
+        soft: &[Field],
+    ) -> Result<[f64; 2], NotFound> {
+        let modes = &soft[..self.neutral.min(soft.len())];
+        let border: Vec<Field> = soft
+            .iter()
+            .map(|it| manifold.equations.momentum(it))
+            .collect();
+        let stiff = manifold.leaf(sample.solution.params)?.stiffest() * STIFF <= 1.0;
         let mut change = [0.0; 2];
         for (change, direction) in change.iter_mut().zip(basis) {
             let mut at = |step: f64| {
-                let mut spot = sheet.beside(&sample.spot, direction, step)?;
+                let mut solution = manifold.beside(&sample.solution, direction, step)?;
                 if stiff {
                     let normals = [&basis[0], &basis[1]];
-                    spot = sheet.settle(&spot, normals, &border, &sample.rates)?.spot;
+                    solution = manifold
+                        .correct(&solution, normals, &border, &sample.rates)?
+                        .solution;
                 }
-                Ok::<_, Stuck>((step, sheet.curvature(spot, modes)?))
+                Ok::<_, Stuck>((step, manifold.curvature(solution, modes)?))
             };
             let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| match at(step) {
-                // At an end of a range there may be nothing beyond.
+                // At an end of a range there may be no leaf beyond.
                 Err(Stuck::OutOfRange(_)) => at(0.0),
                 found => found,
             });
@@ -211,15 +224,20 @@ impl Place {
         Ok(change)
     }
 
-    /// Two directions of length one, normal to each other, that span the sheet.
-    fn basis(&self, sheet: &Sheet, sample: &Sample, eigen: &Eigen) -> Result<[Direction; 2], Lost> {
+    /// Two orthonormal directions that span the tangent plane of the solution manifold.
+    fn basis(
+        &self,
+        manifold: &Manifold,
+        sample: &Sample,
+        eigen: &Eigen,
+    ) -> Result<[Direction; 2], NotFound> {
         let solved = &sample.solved;
         let p = solved.modes.len();
         let others = eigen.others.iter().zip(&eigen.vectors[self.neutral..]);
         let left = others.filter(|(value, _)| value.abs() < NEUTRAL);
         let mut frozen: Vec<&Vec<f64>> = left.map(|(_, vector)| vector).collect();
         if self.kind == Kind::Branching {
-            // Along a neutral mode another branch may leave: the sheet is this one's.
+            // Another branch may leave along a neutral mode: exclude that from the tangent plane.
             frozen.extend(&eigen.vectors[..self.neutral]);
         }
         let rows = (p + frozen.len()).max(p + 2);
@@ -250,26 +268,26 @@ impl Place {
             }
             Direction {
                 increments,
-                place: [part(p), part(p + 1)],
+                params: [part(p), part(p + 1)],
             }
         };
-        let first = sheet.normalised(direction(order[0]));
+        let first = manifold.normalised(direction(order[0]));
         let second = direction(order[1]);
-        let part = sheet.along(&first, &second);
+        let part = manifold.inner(&first, &second);
         let second = Direction {
             increments: plus(&second.increments, -part, &first.increments),
-            place: [0, 1].map(|i| second.place[i] - part * first.place[i]),
+            params: [0, 1].map(|i| second.params[i] - part * first.params[i]),
         };
-        Ok([first, sheet.normalised(second)])
+        Ok([first, manifold.normalised(second)])
     }
 
-    fn drive(&self, sample: &Sample, eigen: &Eigen, slope: f64) -> Drive {
+    fn forcing(&self, sample: &Sample, eigen: &Eigen, slope: f64) -> Forcing {
         let (solved, rates) = (&sample.solved, &sample.rates);
-        let mut felt = 0.0_f64;
+        let mut largest = 0.0_f64;
         let mut free = [0.0; 2];
         for vector in &eigen.vectors[..self.neutral] {
             let mode = combined(vector, &solved.modes);
-            let drive = [0, 1].map(|i| {
+            let forcing = [0, 1].map(|i| {
                 let multipliers = &solved.rates[i].multipliers;
                 vector
                     .iter()
@@ -279,27 +297,27 @@ impl Place {
             });
             for i in 0..2 {
                 let most = (dot(&rates[i], &rates[i]) * dot(&mode, &mode)).sqrt();
-                felt = felt.max(drive[i].abs() / most.max(slope));
+                largest = largest.max(forcing[i].abs() / most.max(slope));
             }
-            let size = drive[0].hypot(drive[1]);
-            free = [-drive[1] / size, drive[0] / size];
+            let size = forcing[0].hypot(forcing[1]);
+            free = [-forcing[1] / size, forcing[0] / size];
         }
-        Drive { felt, free }
+        Forcing { largest, free }
     }
 
-    /// The direction on the sheet, across the boundary, in which one of the numbers
-    /// stays, and the change of the eigenvalue along it.
-    pub fn across_at(&self, sheet: &Sheet, which: usize) -> (Direction, f64) {
-        let parts = [self.tangent.place[which], -self.normal.place[which]];
+    /// The direction on the manifold, across the boundary, in which one of the parameters
+    /// is constant, and the derivative of the eigenvalue along it.
+    pub fn across_at(&self, manifold: &Manifold, which: usize) -> (Direction, f64) {
+        let parts = [self.tangent.params[which], -self.normal.params[which]];
         let both = [self.normal.clone(), self.tangent.clone()];
-        let across = sheet.normalised(Direction::mixed(parts, &both));
-        let slope = self.slope * sheet.along(&across, &self.normal);
+        let across = manifold.normalised(Direction::mixed(parts, &both));
+        let slope = self.slope * manifold.inner(&across, &self.normal);
         (across, slope)
     }
 
-    /// Going along the boundary the other way.
-    pub fn turned(&self) -> Place {
-        Place {
+    /// The same point with the opposite orientation along the boundary.
+    pub fn turned(&self) -> SingularPoint {
+        SingularPoint {
             tangent: self.tangent.reversed(),
             speed: -self.speed,
             ..self.clone()
@@ -307,36 +325,36 @@ impl Place {
     }
 }
 
-/// The modes for the next border: those of the eigenvectors of H.
-fn held(sheet: &Sheet, sample: &Sample, eigen: &Eigen) -> Vec<Field> {
+/// The modes for the next border: from the eigenvectors of H.
+fn soft(manifold: &Manifold, sample: &Sample, eigen: &Eigen) -> Vec<Field> {
     let modes = eigen.vectors.iter();
     let modes: Vec<Field> = modes.map(|it| combined(it, &sample.solved.modes)).collect();
-    independent(sheet, modes.iter(), modes.len())
+    independent(manifold, modes.iter(), modes.len())
 }
 
-/// Morse index across the boundary: by the inertia of the bordered matrix, which is that of
-/// the matrix alone and of H together. Neutral modes do not count, but for the boundary's.
+/// Morse index beyond the boundary: from the inertia of the bordered matrix, which is that of
+/// the matrix and that of H together. Only the boundary's own neutral modes count as negative.
 fn index(sample: &Sample, eigen: &Eigen) -> usize {
     let held_negative = eigen.others.iter().filter(|&&h| h < NEUTRAL).count();
     sample.solved.negative.saturating_sub(held_negative)
 }
 
-/// What the neutral modes feel of the numbers.
-struct Drive {
-    /// The largest part of what they could feel.
-    felt: f64,
-    /// The direction in the plane of the numbers in which they feel nothing.
+/// Work of the parameters' force rates on the neutral modes.
+struct Forcing {
+    /// The largest, relative to the largest possible.
+    largest: f64,
+    /// The direction in the parameter plane in which it vanishes.
     free: [f64; 2],
 }
 
-/// As many of these modes as are wanted, of mass one and normal to each other over the
-/// masses; those that depend on the ones before are left out.
+/// At most `count` of these modes, orthonormal in the mass product; linearly dependent ones
+/// are left out.
 fn independent<'m>(
-    sheet: &Sheet,
+    manifold: &Manifold,
     modes: impl Iterator<Item = &'m Field>,
     count: usize,
 ) -> Vec<Field> {
-    let equations = &sheet.equations;
+    let equations = &manifold.equations;
     let mut kept: Vec<Field> = Vec::new();
     for mode in modes {
         let size = equations.product(mode, mode).sqrt();

@@ -1,35 +1,35 @@
-//! Leaves that differ in two numbers.
+//! Leaves that differ in two parameters.
 
 use std::sync::Arc;
 
 use crate::branch::family::{Family, OutOfRange};
-use crate::branch::recent::Recent;
+use crate::branch::lru_cache::LruCache;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::scenario::Scenario;
 
-/// Fractions of a range within this are the same.
+/// Fractions within this of an end are at the end.
 const EXACT: f64 = 1e-12;
 
-/// Leaves that differ in two numbers: a family along the first for every value of the
+/// Leaves that differ in two parameters: a family along the first for every value of the
 /// second.
 #[derive(Clone, Copy)]
 pub struct Plane<'a> {
-    /// Along the first number, at some value of the second: range and units.
+    /// Along the first parameter, at some value of the second: range and units.
     pub family: &'a Family<'a>,
     /// The scenario at values of both.
     pub make: &'a (dyn Fn([f64; 2]) -> Result<Scenario, String> + Sync),
-    /// The second number at the ends of its range.
+    /// Values of the second parameter at the ends of its range.
     pub range: [f64; 2],
-    /// Whether equal steps of its fraction are equal quotients of its value.
+    /// Whether fractions are those of the logarithm of the value.
     pub log: bool,
 }
 
 impl Plane<'_> {
-    /// Both numbers at fractions of their ranges.
-    pub fn values(&self, place: [f64; 2]) -> [f64; 2] {
+    /// Values of both parameters at fractions of their ranges.
+    pub fn values(&self, params: [f64; 2]) -> [f64; 2] {
         let [from, to] = self.range;
-        // At an end rounding must not lead beyond: there may be nothing.
-        let [first, second] = place.map(|part| match part {
+        // At an end, rounding must not lead beyond: there may be no leaf.
+        let [first, second] = params.map(|part| match part {
             part if part.abs() < EXACT => 0.0,
             part if (part - 1.0).abs() < EXACT => 1.0,
             part => part,
@@ -43,7 +43,7 @@ impl Plane<'_> {
         [self.family.value(first), second]
     }
 
-    /// The fraction of the second number's range at which it has a value.
+    /// The fraction of the second parameter's range at a value of it.
     pub fn fraction(&self, value: f64) -> f64 {
         let [from, to] = self.range;
         match self.log {
@@ -53,28 +53,28 @@ impl Plane<'_> {
     }
 
     /// The scenario at fractions of both ranges.
-    pub fn scenario(&self, place: [f64; 2]) -> Result<Scenario, OutOfRange> {
-        (self.make)(self.values(place)).map_err(OutOfRange)
+    pub fn scenario(&self, params: [f64; 2]) -> Result<Scenario, OutOfRange> {
+        (self.make)(self.values(params)).map_err(OutOfRange)
     }
 }
 
-/// The last few leaves of a plane on a grid, as in [`crate::branch::family::Leaves`].
+/// Cache of the last leaves of a plane on a grid, as in [`crate::branch::family::Leaves`].
 #[derive(Default)]
-pub struct Kept(Recent<[f64; 2], DiscreteLeaf, KEPT>);
+pub struct LeafCache(LruCache<[f64; 2], DiscreteLeaf, CACHED>);
 
-/// Of differences over both numbers, and one more.
-const KEPT: usize = 6;
+/// Number of cached leaves: those of differences over both parameters, and one more.
+const CACHED: usize = 6;
 
-impl Kept {
+impl LeafCache {
     pub fn at(
         &mut self,
         plane: &Plane,
         family: &Family,
         grid: &Grid,
-        place: [f64; 2],
+        params: [f64; 2],
     ) -> Result<&DiscreteLeaf, OutOfRange> {
-        self.0.at(place, || {
-            let scenario = Arc::new(plane.scenario(place)?);
+        self.0.at(params, || {
+            let scenario = Arc::new(plane.scenario(params)?);
             Ok(family.discretised(&Leaf::in_units(scenario, family.scale()), grid))
         })
     }

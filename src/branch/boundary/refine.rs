@@ -1,55 +1,55 @@
-//! Points of a boundary on finer and finer grids: extrapolated, and thereby verified.
+//! Points of a boundary on finer and finer grids: extrapolated and thereby verified.
 
 use super::grids::{on_coarser, on_finer};
-use super::place::Place;
+use super::place::SingularPoint;
 use super::plane::Plane;
-use super::search::{Found, Lost, Search};
-use super::sheet::{Direction, Sheet, Spot};
+use super::search::{Found, NotFound, Search};
+use super::sheet::{Direction, Manifold, Solution};
 use super::special::{Special, locate_near};
-use super::table::{Numbers, Table, Verified};
+use super::table::{Parameters, Table, Verified};
 use crate::branch::critical::Kind;
-use crate::branch::refine_critical::{BY_PARABOLA, FINER, NEARLY_RIGID, SOFTENINGS, UNSOFTENING};
+use crate::branch::refine_critical::{CUBIC, FINER, NEARLY_RIGID, PARABOLA, SOFTENINGS};
 use crate::branch::refined::Doubt;
 use crate::leaf::Grid;
 use crate::newton::Contraction;
 use crate::relax::level::Level;
 use crate::relax::predict::{predict, weights};
 
-/// Grids of a point at least and at most, those of a nearly rigid leaf, and segments of
-/// the finest.
+/// Least and largest number of grids of a point, that of a nearly rigid leaf, and segments of
+/// the finest grid.
 const FEWEST: usize = 3;
 const GRIDS: usize = 6;
 const RIGID: usize = 4;
 const FINEST: usize = 4096;
 
-/// From grid to grid a point moves by less and less, if by more than this (lengths).
+/// Displacements from grid to grid must decrease, unless below this (lengths).
 const STILL: f64 = 1e-4;
 
-/// Largest error of the tips (lengths) of a point that is known by its numbers.
+/// Largest error of the tips (lengths) of a point whose parameters are known.
 const NEUTRAL_TIPS: f64 = 1e-3;
 
-/// Newton's method leaves at most this part of the error that is allowed, on a grid.
+/// Largest iteration error of Newton's method on a grid, as a part of the error allowed.
 const LEFT: f64 = 1e-3;
 
-/// Numbers within this part of their ranges are exact.
+/// Parameters with errors below this part of their ranges are exact.
 const EXACT: f64 = 1e-12;
 
-/// Compliance by which matrices of nearly rigid leaves are softened first, and the part of
-/// what this leaves that a smaller one must leave at most.
+/// First compliance by which matrices of nearly rigid leaves are softened, and the largest ratio
+/// of the errors of successive, smaller ones.
 const FIRST_SOFTENING: f64 = 1e-3;
 const LESS: f64 = 0.5;
 
-/// Accuracy of a point on its grid, as a part of the ranges, and how far it may lie from
-/// where it is on the grid before.
+/// Accuracy of a point on its grid, as a part of the ranges, and the largest distance from the
+/// initial guess of the previous grid.
 const ACCURACY: f64 = 1e-13;
 const NEAR: f64 = 0.5;
 
-/// The line across the boundary leaves it at an angle of at least this (its sine), and one
-/// of the numbers changes along the boundary by at least this part of the other.
+/// Least angle (its sine) between the boundary and the line on which its point is sought, and the
+/// least derivative of one parameter along the boundary relative to the other.
 const SINE: f64 = 0.3;
 const PART: f64 = 0.1;
 
-/// How accurate points are to be: their tips, and both numbers as parts of their ranges.
+/// Required accuracy of points: of their tips, and of both parameters as parts of their ranges.
 #[derive(Clone, Copy, Debug)]
 pub struct Accuracy {
     pub tips: f64,
@@ -60,30 +60,30 @@ pub struct Accuracy {
 #[derive(Clone, Debug)]
 pub struct Step {
     /// Where it is on a grid.
-    pub place: Place,
-    /// What it is besides.
+    pub point: SingularPoint,
+    /// Whether it is a special point.
     pub special: Option<Special>,
-    /// The number that is given: at the end of a range.
+    /// The parameter that is fixed: at an end of its range.
     pub given: Option<usize>,
 }
 
-/// A point on as many grids as it takes; on all of them it must be the same. Of a nearly
-/// rigid leaf, of which fine grids know the matrix worse, beginning with coarser ones if
-/// that can be.
+/// Verifies a point on as many grids as necessary; they must agree on index and
+/// branch. For a nearly rigid leaf, whose matrix loses more digits on finer grids, starting from
+/// coarser ones if possible.
 pub fn refine(
     plane: Plane,
     grid: &Grid,
     step: &Step,
     accuracy: Accuracy,
 ) -> Result<Verified, Doubt> {
-    let rigid = Sheet::new(plane, grid.clone())?
-        .leaf(step.place.spot.place)?
+    let rigid = Manifold::new(plane, grid.clone())?
+        .leaf(step.point.solution.params)?
         .stiffest();
     if rigid * NEARLY_RIGID < 1.0
-        && let Some((grid, place)) = on_coarser(plane, grid, &step.place)
+        && let Some((grid, point)) = on_coarser(plane, grid, &step.point)
     {
         let step = Step {
-            place,
+            point,
             ..step.clone()
         };
         if let Ok(verified) = refine(plane, &grid, &step, accuracy) {
@@ -93,79 +93,79 @@ pub fn refine(
     refine_from(plane, grid, step, accuracy)
 }
 
-/// The same from this grid on.
+/// The same, starting from this grid.
 fn refine_from(
     plane: Plane,
     grid: &Grid,
     step: &Step,
     accuracy: Accuracy,
 ) -> Result<Verified, Doubt> {
-    let mut sheet = Sheet::new(plane, grid.clone())?;
-    let mut near = step.place.clone();
-    let given = step.given.or_else(|| given_at(&sheet, &near));
+    let mut manifold = Manifold::new(plane, grid.clone())?;
+    let mut near = step.point.clone();
+    let given = step.given.or_else(|| given_at(&manifold, &near));
     let given = given.filter(|_| step.special.is_none());
-    let mut table = Table::new(given.map(|which| (which, near.spot.place[which])));
+    let mut table = Table::new(given.map(|which| (which, near.solution.params[which])));
     let (mut moved, mut factorizations) = (f64::INFINITY, 0);
     let mut contraction = Contraction::default();
-    let (mut levels, mut places) = (Vec::<Level>::new(), Vec::new());
+    let (mut levels, mut params) = (Vec::<Level>::new(), Vec::new());
     let enough = accuracy.numbers.max(EXACT);
     let mut softening = None;
     for level in 0..GRIDS {
         if level > 0 {
-            (sheet, near) = on_finer(&mut sheet, &near)?;
+            (manifold, near) = on_finer(&mut manifold, &near)?;
         }
-        let mut start = near.spot.clone();
+        let mut start = near.solution.clone();
         let believed = table.tips.best().map_or(0, |best| best.columns + 1);
-        predict_spot(&levels, &places, believed, &mut start);
-        let rigid = sheet.leaf(near.spot.place)?.stiffest() * NEARLY_RIGID < 1.0;
-        let (place, along) = match (step.special, rigid) {
+        predict_spot(&levels, &params, believed, &mut start);
+        let rigid = manifold.leaf(near.solution.params)?.stiffest() * NEARLY_RIGID < 1.0;
+        let (point, along) = match (step.special, rigid) {
             (None, false) => {
                 let left = LEFT * enough;
                 let from = (&near, &start);
-                let found = from_near(&mut sheet, from, given, left, &mut contraction)?;
-                table.left = table.left.max(found.1);
+                let found = newton_or_secant(&mut manifold, from, given, left, &mut contraction)?;
+                table.iteration_error = table.iteration_error.max(found.1);
                 (found.0, None)
             }
-            _ => again(&mut sheet, &near, step.special, given)?,
+            _ => relocated(&mut manifold, &near, step.special, given)?,
         };
-        factorizations += sheet.equations.factorizations;
-        let shift = near.spot.state.shift_to(&place.spot.state);
+        factorizations += manifold.equations.factorizations;
+        let shift = near.solution.state.shift_to(&point.solution.state);
         if shift > moved.max(STILL) {
             return Err(Doubt::OtherBranch);
         }
-        if place.index != step.place.index {
+        if point.index != step.point.index {
             return Err(Doubt::OtherIndex);
         }
         if level > 0 {
             moved = shift;
         }
-        near = place;
+        near = point;
         levels.push(Level {
-            leaf: sheet.leaf(near.spot.place)?.clone(),
-            state: near.spot.state.clone(),
+            leaf: manifold.leaf(near.solution.params)?.clone(),
+            state: near.solution.state.clone(),
         });
-        places.push(near.spot.place);
+        params.push(near.solution.params);
         let sought = (step.special, given);
         let numbers = match (rigid, softening) {
-            (false, _) => Numbers::of(near.spot.place),
-            (true, Some(known)) => unsoftened(&mut sheet, &near, sought, known)?,
-            (true, None) => least_softened(&mut sheet, &near, sought, (&table, along))?,
+            (false, _) => Parameters::of(near.solution.params),
+            (true, Some(known)) => unsoftened(&mut manifold, &near, sought, known)?,
+            (true, None) => least_softened(&mut manifold, &near, sought, (&table, along))?,
         };
         softening = rigid.then_some(numbers.softening);
-        table.push(&mut sheet, (&near, along), &numbers)?;
+        table.push(&mut manifold, (&near, along), &numbers)?;
         if level + 1 < FEWEST {
             continue;
         }
         let exact = table.is_exact(enough);
-        let last =
-            level + 1 == if rigid { RIGID } else { GRIDS } || 2 * sheet.grid().segments() > FINEST;
+        let last = level + 1 == if rigid { RIGID } else { GRIDS }
+            || 2 * manifold.grid().segments() > FINEST;
         let tips = if last { NEUTRAL_TIPS } else { accuracy.tips };
         let tips = table.tips.best().is_some_and(|best| best.error <= tips);
         let numbers = table.errors().iter().all(|error| *error <= accuracy.tips);
         if tips && (exact || last && numbers) {
             return Ok(Verified {
                 factorizations,
-                ..table.verified(&sheet, &near, step.special)
+                ..table.verified(&manifold, &near, step.special)
             });
         }
         if last {
@@ -175,84 +175,87 @@ fn refine_from(
     Err(Doubt::Inaccurate)
 }
 
-/// The number that may be given while a point is sought across the boundary, if there is
+/// The parameter that can be fixed while a point is sought across the boundary, if there is
 /// one: the second, unless the boundary goes along the first alone.
-fn given_at(sheet: &Sheet, place: &Place) -> Option<usize> {
-    let [first, second] = place.tangent.place.map(f64::abs);
+fn given_at(manifold: &Manifold, point: &SingularPoint) -> Option<usize> {
+    let [first, second] = point.tangent.params.map(f64::abs);
     let sine = |which: usize| {
-        let (across, _) = place.across_at(sheet, which);
-        sheet.along(&across, &place.normal).abs()
+        let (across, _) = point.across_at(manifold, which);
+        manifold.inner(&across, &point.normal).abs()
     };
     let order = if second >= PART * first {
         [1, 0]
     } else {
         [0, 1]
     };
-    let changes = place.tangent.place.map(|part| part.abs() > PART * SINE);
+    let changes = point.tangent.params.map(|part| part.abs() > PART * SINE);
     order.into_iter().find(|&k| changes[k] && sine(k) > SINE)
 }
 
-/// The point on this grid, to rounding; of a crossing also the change of the other
-/// eigenvalue along the boundary, which is all that tells where on it the crossing is. (At a
-/// cusp the numbers do not change along it.)
-fn again(
-    sheet: &mut Sheet,
-    near: &Place,
+/// The point on this grid, to rounding; for a crossing also the derivative of the other
+/// eigenvalue along the boundary, which alone determines the position of the crossing on it.
+/// (At a cusp the parameters are stationary along it.)
+fn relocated(
+    manifold: &mut Manifold,
+    near: &SingularPoint,
     special: Option<Special>,
     given: Option<usize>,
-) -> Result<(Place, Option<f64>), Lost> {
+) -> Result<(SingularPoint, Option<f64>), NotFound> {
     if let Some(special) = special {
-        let (place, slope) = locate_near(sheet, near, special)?;
-        return Ok((place, (special == Special::Crossing).then_some(slope)));
+        let (point, slope) = locate_near(manifold, near, special)?;
+        return Ok((point, (special == Special::Crossing).then_some(slope)));
     }
-    let found = sought(sheet, near, given).run(sheet)?;
-    Ok((near.moved(sheet, found), None))
+    let found = sought(manifold, near, given).secant(manifold)?;
+    Ok((near.moved(manifold, found), None))
 }
 
-/// The spot on the next grid by those on coarser ones, if there are two at least: of as
-/// many as are believed to be of one series.
-fn predict_spot(levels: &[Level], places: &[[f64; 2]], believed: usize, spot: &mut Spot) {
+/// Predicts the point on the next grid from those on at least two coarser ones: the last ones,
+/// as many as are taken to follow one error series.
+fn predict_spot(levels: &[Level], params: &[[f64; 2]], believed: usize, solution: &mut Solution) {
     if levels.len() < 2 {
         return;
     }
     let skipped = levels.len() - believed.clamp(2, levels.len());
-    let (levels, places) = (&levels[skipped..], &places[skipped..]);
-    predict(&levels.iter().collect::<Vec<_>>(), &mut spot.state);
+    let (levels, params) = (&levels[skipped..], &params[skipped..]);
+    predict(&levels.iter().collect::<Vec<_>>(), &mut solution.state);
     let segments: Vec<usize> = levels.iter().map(|it| it.leaf.segments()).collect();
-    let weights = weights(&segments, spot.state.segments());
-    spot.place = [0, 1].map(|i| (places.iter().zip(&weights).map(|(at, part)| part * at[i])).sum());
+    let weights = weights(&segments, solution.state.segments());
+    solution.params =
+        [0, 1].map(|i| (params.iter().zip(&weights).map(|(at, part)| part * at[i])).sum());
 }
 
-/// The point on this grid from where it is predicted, if it can be found from there, and
-/// what is left of its error on this grid.
-fn from_near(
-    sheet: &mut Sheet,
-    (near, start): (&Place, &Spot),
+/// The point on this grid by Newton's method from its prediction, or by the secant method if
+/// that fails; and the estimated iteration error.
+fn newton_or_secant(
+    manifold: &mut Manifold,
+    (near, start): (&SingularPoint, &Solution),
     given: Option<usize>,
     accuracy: f64,
     contraction: &mut Contraction,
-) -> Result<(Place, f64), Lost> {
-    let mut owned = sought(sheet, near, given);
-    let own = std::mem::replace(&mut owned.near.spot, start.clone());
+) -> Result<(SingularPoint, f64), NotFound> {
+    let mut search = sought(manifold, near, given);
+    let own = std::mem::replace(&mut search.near.solution, start.clone());
     let frozen = near.kind == Kind::Branching;
-    let found = owned.search(accuracy).near(sheet, frozen, contraction);
+    let found = search
+        .search(accuracy)
+        .newton(manifold, frozen, contraction);
     let (found, left) = found.or_else(|_| {
-        owned.near.spot = own;
-        owned.run(sheet).map(|found| (found, 0.0))
+        search.near.solution = own;
+        search.secant(manifold).map(|found| (found, 0.0))
     })?;
-    Ok((near.moved(sheet, found), left))
+    Ok((near.moved(manifold, found), left))
 }
 
-/// How the point is sought, from where it is on the grid before.
-fn sought(sheet: &Sheet, near: &Place, given: Option<usize>) -> Owned {
+/// The search for the point, starting from that on the previous grid.
+fn sought(manifold: &Manifold, near: &SingularPoint, given: Option<usize>) -> PointSearch {
     let (across, slope, along) = match given {
         Some(which) => {
-            let (across, slope) = near.across_at(sheet, which);
-            (across, slope, sheet.number(which))
+            let (across, slope) = near.across_at(manifold, which);
+            (across, slope, manifold.unit_parameter(which))
         }
         None => (near.normal.clone(), near.slope, near.tangent.clone()),
     };
-    Owned {
+    PointSearch {
         near: near.clone(),
         across,
         slope,
@@ -261,25 +264,25 @@ fn sought(sheet: &Sheet, near: &Place, given: Option<usize>) -> Owned {
 }
 
 /// A search that owns its directions.
-struct Owned {
-    near: Place,
+struct PointSearch {
+    near: SingularPoint,
     across: Direction,
     slope: f64,
     along: Direction,
 }
 
-impl Owned {
-    fn run(&self, sheet: &mut Sheet) -> Result<Found, Lost> {
-        self.search(ACCURACY).run(sheet)
+impl PointSearch {
+    fn secant(&self, manifold: &mut Manifold) -> Result<Found, NotFound> {
+        self.search(ACCURACY).secant(manifold)
     }
 
     fn search(&self, accuracy: f64) -> Search<'_> {
         Search {
-            spot: &self.near.spot,
+            solution: &self.near.solution,
             across: &self.across,
             slope: self.slope,
             along: &self.along,
-            held: &self.near.held,
+            soft: &self.near.soft,
             neutral: self.near.neutral,
             accuracy,
             furthest: NEAR,
@@ -287,68 +290,74 @@ impl Owned {
     }
 }
 
-/// The numbers at a point of a nearly rigid leaf on a first grid, by matrices softened less
-/// and less until rounding leaves more than that, here or on a grid that is finer.
+/// The parameters at a point of a nearly rigid leaf on its first grid: the softening is reduced
+/// until rounding errors, here or on the finest grid, exceed those of extrapolation.
 fn least_softened(
-    sheet: &mut Sheet,
-    near: &Place,
+    manifold: &mut Manifold,
+    near: &SingularPoint,
     sought: (Option<Special>, Option<usize>),
     (table, along): (&Table, Option<f64>),
-) -> Result<Numbers, Lost> {
+) -> Result<Parameters, NotFound> {
     let largest = |[a, b]: [f64; 2]| a.max(b);
-    let mut numbers = unsoftened(sheet, near, sought, FIRST_SOFTENING)?;
-    let finest = FINER * sheet.grid().segments() as f64;
+    let mut numbers = unsoftened(manifold, near, sought, FIRST_SOFTENING)?;
+    let finest = FINER * manifold.grid().segments() as f64;
     for softening in SOFTENINGS {
-        let rounding = table.rounding(sheet, (near, along), softening, finest)?;
-        let left = largest(numbers.left);
+        let rounding = table.rounding(manifold, (near, along), softening, finest)?;
+        let left = largest(numbers.errors);
         if largest(rounding) > left {
             break;
         }
-        match unsoftened(sheet, near, sought, softening) {
-            Ok(better) if largest(better.left) < LESS * left => numbers = better,
+        match unsoftened(manifold, near, sought, softening) {
+            Ok(better) if largest(better.errors) < LESS * left => numbers = better,
             _ => break,
         }
     }
     Ok(numbers)
 }
 
-/// The numbers at a point of a nearly rigid leaf: by matrices softened by one to four times
-/// as much, extrapolated to none.
+/// The parameters at a point of a nearly rigid leaf: from matrices softened by one to four times
+/// as much, extrapolated to zero.
 fn unsoftened(
-    sheet: &mut Sheet,
-    near: &Place,
+    manifold: &mut Manifold,
+    near: &SingularPoint,
     (special, given): (Option<Special>, Option<usize>),
     softening: f64,
-) -> Result<Numbers, Lost> {
-    let grid = sheet.grid().clone();
-    let mut places = [[0.0; 2]; 4];
-    let mut owned = sought(sheet, near, given);
-    for (k, place) in places.iter_mut().enumerate().rev() {
-        let mut soft = Sheet::new(sheet.plane, grid.clone())?;
+) -> Result<Parameters, NotFound> {
+    let grid = manifold.grid().clone();
+    let mut values_by_softening = [[0.0; 2]; 4];
+    let mut search = sought(manifold, near, given);
+    for (k, params) in values_by_softening.iter_mut().enumerate().rev() {
+        let mut soft = Manifold::new(manifold.plane, grid.clone())?;
         soft.soften(softening * (k + 1) as f64);
-        owned.near.spot = match special {
-            Some(special) => locate_near(&mut soft, &owned.near, special)?.0.spot,
-            None => owned.run(&mut soft)?.spot().clone(),
+        search.near.solution = match special {
+            Some(special) => locate_near(&mut soft, &search.near, special)?.0.solution,
+            None => search.secant(&mut soft)?.solution().clone(),
         };
-        *place = owned.near.spot.place;
+        *params = search.near.solution.params;
     }
     let by = |weights: [f64; 4]| {
-        let sum = |i: usize| weights.iter().zip(&places).map(|(w, at)| w * at[i]).sum();
+        let sum = |i: usize| {
+            weights
+                .iter()
+                .zip(&values_by_softening)
+                .map(|(w, at)| w * at[i])
+                .sum()
+        };
         [0, 1].map(sum)
     };
-    let (values, parabola): ([f64; 2], [f64; 2]) = (by(UNSOFTENING), by(BY_PARABOLA));
-    Ok(Numbers {
+    let (values, parabola): ([f64; 2], [f64; 2]) = (by(CUBIC), by(PARABOLA));
+    Ok(Parameters {
         values,
         softening,
-        left: [0, 1].map(|i| (values[i] - parabola[i]).abs()),
+        errors: [0, 1].map(|i| (values[i] - parabola[i]).abs()),
     })
 }
 
-impl From<Lost> for Doubt {
-    fn from(lost: Lost) -> Self {
+impl From<NotFound> for Doubt {
+    fn from(lost: NotFound) -> Self {
         match lost {
-            Lost::Stuck(stuck) => stuck.into(),
-            Lost::Parted | Lost::Unfolded => Doubt::OtherBranch,
+            NotFound::Stuck(stuck) => stuck.into(),
+            NotFound::Separated | NotFound::Unfolded => Doubt::OtherBranch,
         }
     }
 }

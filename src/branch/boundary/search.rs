@@ -1,86 +1,84 @@
 //! The search for a point of a boundary: the zero of an eigenvalue across it.
 
-use super::sheet::{Direction, Sample, Sheet, Spot};
+use super::sheet::{Direction, Manifold, Sample, Solution};
 use crate::branch::equations::{ITERATIONS, LARGEST, Stuck};
 use crate::branch::field::{add, combined, dot, is_finite, largest, times};
 use crate::leaf::Field;
 use crate::newton::{Contraction, converged};
 
-/// Evaluations in the search for a zero.
+/// Largest number of evaluations in the search for a zero.
 const EVALUATIONS: usize = 30;
 
-/// A slope from points nearer than this is rounding.
+/// Differences over less than this do not give a reliable slope.
 const LOCAL: f64 = 1e-6;
 
-/// Newton's method for state and boundary together knows the change of the eigenvalue to
-/// this part; increments below the other that do not shrink are rounding.
+/// Relative accuracy of the derivative of the eigenvalue in the combined Newton method; and the
+/// size below which increments that do not shrink are due to rounding.
 const SLOPES: f64 = 1e-3;
 const ROUNDED: f64 = 1e-9;
 
-/// What one evaluation says of the modes that become neutral.
+/// Eigenvalues of H at one evaluation.
 pub struct Eigen {
-    /// The mean of their eigenvalues, and how far these are apart.
+    /// The mean of those that become neutral, and the largest difference between them.
     pub value: f64,
     pub spread: f64,
-    /// Eigenvectors of H: first theirs, then the others with their eigenvalues.
+    /// Eigenvectors of H: first theirs, then the others; and the eigenvalues of the others.
     pub vectors: Vec<Vec<f64>>,
     pub others: Vec<f64>,
 }
 
-/// Why no point of a boundary is there.
+/// Why no point of a boundary is found.
 #[derive(Clone, Debug)]
-pub enum Lost {
-    /// No solution was found.
+pub enum NotFound {
     Stuck(Stuck),
     /// The modes do not become neutral together.
-    Parted,
-    /// The mode feels the number, so that branches do not cross.
+    Separated,
+    /// The parameter does work on the mode, so that there is no branch point.
     Unfolded,
 }
 
-impl<E: Into<Stuck>> From<E> for Lost {
+impl<E: Into<Stuck>> From<E> for NotFound {
     fn from(stuck: E) -> Self {
-        Lost::Stuck(stuck.into())
+        NotFound::Stuck(stuck.into())
     }
 }
 
-/// How a point of a boundary is sought from a spot.
+/// A search for a point of a boundary.
 pub struct Search<'s> {
     /// From here,
-    pub spot: &'s Spot,
-    /// this way, along which the eigenvalue changes so much,
+    pub solution: &'s Solution,
+    /// in this direction, along which the eigenvalue has this derivative,
     pub across: &'s Direction,
     pub slope: f64,
     /// in the plane normal to this,
     pub along: &'s Direction,
-    /// with these modes in the border, of which so many, the first, become neutral,
-    pub held: &'s [Field],
+    /// with these modes in the border, the first `neutral` of which become neutral,
+    pub soft: &'s [Field],
     pub neutral: usize,
-    /// to this accuracy, and not further.
+    /// to this accuracy, and not further than this.
     pub accuracy: f64,
     pub furthest: f64,
 }
 
-/// A point without directions.
+/// A boundary point without its directions.
 pub struct Found {
     pub sample: Sample,
     pub eigen: Eigen,
-    /// How far from the start of the search.
+    /// Distance from the start of the search.
     pub distance: f64,
 }
 
 impl Found {
-    /// Where it is.
-    pub fn spot(&self) -> &Spot {
-        &self.sample.spot
+    pub fn solution(&self) -> &Solution {
+        &self.sample.solution
     }
 }
 
-/// The eigenvalues of H, of which so many modes of the border, its first, become neutral.
+/// The eigenvalues of H; the first `neutral` modes of the border become neutral.
 pub fn eigen(sample: &Sample, neutral: usize) -> Eigen {
     let all = sample.solved.h.clone().symmetric_eigen();
     let count = all.eigenvalues.len();
-    // The neutral modes are the first of the border.
+    // The neutral modes come first in the border.
     let weight = |k: usize| -> f64 {
         let own = (0..neutral).map(|i| all.eigenvectors[(i, k)].powi(2));
         own.sum()
@@ -102,25 +100,25 @@ pub fn eigen(sample: &Sample, neutral: usize) -> Eigen {
 
 impl Search<'_> {
     /// The same point by Newton's method for the state and the zero of the eigenvalue
-    /// together, from near it, and what it leaves. Where branches cross, the modes are
-    /// `frozen`: the sheet is that of a symmetric branch, whose forces do not excite them.
-    /// Of one that crosses askew this does not find the point: with the matrix singular,
-    /// nothing tells how much of the mode it has.
-    pub fn near(
+    /// together, from a good initial guess; also returns the estimated iteration error. At branch
+    /// points the modes are `frozen`: the manifold is that of a symmetric branch, whose forces do
+    /// not excite them. For an asymmetric branch this does not find the point: with a singular
+    /// matrix, the amplitude of the mode is undetermined.
+    pub fn newton(
         &self,
-        sheet: &mut Sheet,
+        manifold: &mut Manifold,
         frozen: bool,
         contraction: &mut Contraction,
-    ) -> Result<(Found, f64), Lost> {
-        let border: Vec<Field> = (self.held.iter())
-            .map(|mode| sheet.equations.momentum(mode))
+    ) -> Result<(Found, f64), NotFound> {
+        let border: Vec<Field> = (self.soft.iter())
+            .map(|mode| manifold.equations.momentum(mode))
             .collect();
-        let along = sheet.equations.momentum(&self.along.increments);
-        let mut spot = sheet.with_forces(self.spot)?;
+        let along = manifold.equations.momentum(&self.along.increments);
+        let mut solution = manifold.with_segment_forces(self.solution)?;
         let mut previous = f64::INFINITY;
         for _ in 0..ITERATIONS {
-            let rates = sheet.rates(&spot)?;
-            let (mut sample, noise) = sheet.sample(spot, &border, rates, false)?;
+            let rates = manifold.rates(&solution)?;
+            let (mut sample, noise) = manifold.sample(solution, &border, rates, false)?;
             let eigen = eigen(&sample, self.neutral);
             let forces = &sample.solved.forces.multipliers;
             let excited = |mode: &Vec<f64>| {
@@ -130,10 +128,10 @@ impl Search<'_> {
             if frozen && eigen.vectors[..self.neutral].iter().any(excited) {
                 break;
             }
-            let (slope, numbers) = self.change(sheet, &sample, &eigen, &border, frozen)?;
+            let (slope, numbers) = self.change(manifold, &sample, &eigen, &border, frozen)?;
             let value = eigen.value / self.slope;
             let functions = [
-                (&along, self.along.place.as_slice(), 0.0),
+                (&along, self.along.params.as_slice(), 0.0),
                 (&slope, numbers.as_slice(), value),
             ];
             let (increments, changes) = sample.solved.step(&functions, noise)?;
@@ -143,17 +141,18 @@ impl Search<'_> {
             if !is_finite(&increments) || !size.is_finite() || size > LARGEST {
                 break;
             }
-            let place = [0, 1].map(|i| sample.spot.place[i] + changes[i]);
-            let state = sheet.advanced(&sample.spot.state, place, &increments, 1.0)?;
-            spot = Spot { state, place };
+            let params = [0, 1].map(|i| sample.solution.params[i] + changes[i]);
+            let state = manifold.advanced(&sample.solution.state, params, &increments, 1.0)?;
+            solution = Solution { state, params };
             contraction.learn(size, previous);
             let first = contraction.after_first(size, 0.0);
             let accuracy = (self.accuracy, ROUNDED);
-            // Where slopes are known worse, increments shrink no faster than these are known.
+            // With less accurate derivatives, increments cannot shrink faster than these are known.
             let slopes = SLOPES.max(size / previous);
             if let Some(left) = converged(size, previous, [slopes; 2], accuracy, first) {
-                let distance = sheet.along(&sheet.way(self.spot, &spot), self.across);
-                sample.spot = spot;
+                let distance =
+                    manifold.inner(&manifold.difference(self.solution, &solution), self.across);
+                sample.solution = solution;
                 let found = Found {
                     sample,
                     eigen,
@@ -163,18 +162,18 @@ impl Search<'_> {
             }
             previous = size;
         }
-        Err(Lost::Stuck(Stuck::NotConverged))
+        Err(NotFound::Stuck(Stuck::NotConverged))
     }
 
-    /// The change of the eigenvalue with increments and numbers, in units of that across.
+    /// Derivatives of the eigenvalue with respect to increments and parameters, over its slope.
     fn change(
         &self,
-        sheet: &mut Sheet,
+        manifold: &mut Manifold,
         sample: &Sample,
         eigen: &Eigen,
         border: &[Field],
         frozen: bool,
-    ) -> Result<(Field, [f64; 2]), Lost> {
+    ) -> Result<(Field, [f64; 2]), NotFound> {
         let own = &eigen.vectors[..self.neutral];
         let modes = own.iter().map(|it| combined(it, &sample.solved.modes));
         let modes: Vec<Field> = modes.collect();
@@ -182,7 +181,7 @@ impl Search<'_> {
         let mut all = times(&modes[0], 0.0);
         let mut numbers = [0.0; 2];
         for mode in &modes {
-            let (change, rates) = sheet.curvature_change(&sample.spot, mode)?;
+            let (change, rates) = manifold.curvature_change(&sample.solution, mode)?;
             add(&mut all, part, &change);
             for (number, rate) in numbers.iter_mut().zip(rates) {
                 *number += part * rate;
@@ -197,16 +196,16 @@ impl Search<'_> {
         Ok((all, numbers))
     }
 
-    /// The zero of the eigenvalue by the secant method.
-    pub fn run(&self, sheet: &mut Sheet) -> Result<Found, Lost> {
-        let border: Vec<Field> = (self.held.iter())
-            .map(|mode| sheet.equations.momentum(mode))
+    /// The zero of the eigenvalue by a secant method.
+    pub fn secant(&self, manifold: &mut Manifold) -> Result<Found, NotFound> {
+        let border: Vec<Field> = (self.soft.iter())
+            .map(|mode| manifold.equations.momentum(mode))
             .collect();
-        let rates = sheet.rates(self.spot)?;
-        // From the last spot, which the next is near.
-        let mut at = |from: &Spot, step: f64, distance: f64| -> Result<Found, Lost> {
-            let spot = sheet.moved(from, self.across, step)?;
-            let sample = sheet.settle(&spot, [self.along, self.across], &border, &rates)?;
+        let rates = manifold.rates(self.solution)?;
+        // From the previous solution, to which the next is close.
+        let mut at = |from: &Solution, step: f64, distance: f64| -> Result<Found, NotFound> {
+            let solution = manifold.moved(from, self.across, step)?;
+            let sample = manifold.correct(&solution, [self.along, self.across], &border, &rates)?;
             let eigen = eigen(&sample, self.neutral);
             Ok(Found {
                 sample,
@@ -215,20 +214,20 @@ impl Search<'_> {
             })
         };
         let (mut distance, mut slope) = (0.0, self.slope);
-        let mut best = at(self.spot, 0.0, distance)?;
-        let (mut value, mut last) = (best.eigen.value, best.spot().clone());
+        let mut best = at(self.solution, 0.0, distance)?;
+        let (mut value, mut last) = (best.eigen.value, best.solution().clone());
         let mut worse = 0;
         for _ in 0..EVALUATIONS {
             let step = -value / slope;
             if !step.is_finite() || (distance + step).abs() > self.furthest {
-                return Err(Lost::Stuck(Stuck::NotConverged));
+                return Err(NotFound::Stuck(Stuck::NotConverged));
             }
             if step.abs() < self.accuracy {
                 return Ok(best);
             }
             let next = at(&last, step, distance + step)?;
             let after = next.eigen.value;
-            last.clone_from(next.spot());
+            last.clone_from(next.solution());
             if step.abs() > LOCAL {
                 slope = (after - value) / step;
             }
@@ -241,6 +240,6 @@ impl Search<'_> {
                 return Ok(best);
             }
         }
-        Err(Lost::Stuck(Stuck::NotConverged))
+        Err(NotFound::Stuck(Stuck::NotConverged))
     }
 }

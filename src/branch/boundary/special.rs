@@ -1,46 +1,46 @@
-//! Points of a boundary that are more than that: cusps, and crossings with another one.
+//! Special points of a boundary: cusps, and crossings with another boundary.
 
-use super::place::Place;
-use super::search::{Lost, Search};
-use super::sheet::Sheet;
+use super::place::SingularPoint;
+use super::search::{NotFound, Search};
+use super::sheet::Manifold;
 use crate::branch::critical::Kind;
 use crate::branch::equations::Stuck;
 
-/// Evaluations in the search along the boundary.
+/// Largest number of evaluations in the search along the boundary.
 const EVALUATIONS: usize = 25;
 
-/// Accuracy along the boundary: at a cusp the numbers are known to its square; at a
-/// crossing it is that of the numbers.
+/// Accuracy along the boundary: at a cusp the parameters are accurate to its square; at a
+/// crossing it is that of the parameters.
 const ACCURACY: f64 = 1e-11;
 
-/// The least change that tells a slope from rounding.
+/// Differences over less than this do not give a reliable slope.
 const LOCAL: f64 = 1e-7;
 
-/// How far the point may lie from where it is expected, along the boundary.
+/// Largest distance of the point from its initial guess, along the boundary.
 const REACH: f64 = 0.3;
 
-/// Accuracy of points on the way to it.
+/// Accuracy of the boundary points during the search.
 const EXACT: f64 = 1e-13;
 
-/// Accuracy of points that are given a number.
+/// Accuracy of points at a given parameter.
 const GIVEN: f64 = 1e-12;
 
-/// What a point of a boundary is besides.
+/// Kind of a special point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Special {
     /// A curve of folds turns back: two folds meet and vanish.
     Cusp,
-    /// Another mode becomes neutral, too: two boundaries cross or touch.
+    /// Another mode also becomes neutral: two boundaries cross or touch.
     Crossing,
 }
 
 impl Special {
-    /// What is zero there, at a point of the boundary.
-    fn value(self, place: &Place) -> f64 {
+    /// The function that vanishes there, at a point of the boundary.
+    fn value(self, point: &SingularPoint) -> f64 {
         match self {
-            Special::Cusp => place.speed,
+            Special::Cusp => point.speed,
             Special::Crossing => {
-                let others = place.others.iter().copied();
+                let others = point.others.iter().copied();
                 let nearest = others.min_by(|a, b| a.abs().total_cmp(&b.abs()));
                 nearest.unwrap_or(f64::INFINITY)
             }
@@ -48,74 +48,74 @@ impl Special {
     }
 }
 
-/// The point of the boundary in the plane across its tangent that is so far along it.
-pub fn onto(
-    sheet: &mut Sheet,
-    now: &Place,
+/// The point of the boundary in the plane normal to its tangent at a distance `step` along it.
+pub fn at_distance(
+    manifold: &mut Manifold,
+    now: &SingularPoint,
     step: f64,
     accuracy: f64,
     furthest: f64,
-) -> Result<(Place, f64), Lost> {
-    let spot = sheet.moved(&now.spot, &now.tangent, step)?;
+) -> Result<(SingularPoint, f64), NotFound> {
+    let solution = manifold.moved(&now.solution, &now.tangent, step)?;
     let search = Search {
-        spot: &spot,
+        solution: &solution,
         across: &now.normal,
         slope: now.slope,
         along: &now.tangent,
-        held: &now.held,
+        soft: &now.soft,
         neutral: now.neutral,
         accuracy,
         furthest,
     };
-    let found = search.run(sheet)?;
+    let found = search.secant(manifold)?;
     let off = found.distance.abs();
-    Ok((now.at(sheet, found)?, off))
+    Ok((now.completed(manifold, found)?, off))
 }
 
-/// The special point between two of a boundary, the second so far along the tangent of
+/// The special point between two points of a boundary, the second `step` along the tangent of
 /// the first.
 fn locate(
-    sheet: &mut Sheet,
-    [now, next]: [&Place; 2],
+    manifold: &mut Manifold,
+    [now, next]: [&SingularPoint; 2],
     step: f64,
     special: Special,
-) -> Result<Place, Lost> {
-    let values = [now, next].map(|place| special.value(place));
+) -> Result<SingularPoint, NotFound> {
+    let values = [now, next].map(|point| special.value(point));
     let slope = (values[1] - values[0]) / step;
-    Ok(zero(sheet, now, special, slope, [-0.1 * step, 1.1 * step])?.0)
+    Ok(zero(manifold, now, special, slope, [-0.1 * step, 1.1 * step])?.0)
 }
 
-/// The special point near one that is nearly it, and the change of what is zero there with
-/// the way along the boundary.
+/// The special point near an approximation to it, and the derivative of the vanishing function
+/// along the boundary.
 pub fn locate_near(
-    sheet: &mut Sheet,
-    near: &Place,
+    manifold: &mut Manifold,
+    near: &SingularPoint,
     special: Special,
-) -> Result<(Place, f64), Lost> {
-    let first = onto(sheet, near, 0.0, EXACT, REACH)?.0;
+) -> Result<(SingularPoint, f64), NotFound> {
+    let first = at_distance(manifold, near, 0.0, EXACT, REACH)?.0;
     let away = 1e-2;
-    let second = onto(sheet, &first, away, EXACT, REACH)?.0;
+    let second = at_distance(manifold, &first, away, EXACT, REACH)?.0;
     let slope = (special.value(&second) - special.value(&first)) / away;
-    zero(sheet, &first, special, slope, [-REACH, REACH])
+    zero(manifold, &first, special, slope, [-REACH, REACH])
 }
 
-/// The zero by the secant method, from a point of the boundary.
+/// The zero by a secant method, from a point of the boundary.
 fn zero(
-    sheet: &mut Sheet,
-    now: &Place,
+    manifold: &mut Manifold,
+    now: &SingularPoint,
     special: Special,
     mut slope: f64,
     [least, most]: [f64; 2],
-) -> Result<(Place, f64), Lost> {
+) -> Result<(SingularPoint, f64), NotFound> {
     let mut best = now.clone();
     let (mut at, mut value) = (0.0, special.value(now));
     let mut worse = 0;
     for _ in 0..EVALUATIONS {
         let step = -value / slope;
         if !step.is_finite() || !(least..=most).contains(&(at + step)) {
-            return Err(Lost::Stuck(Stuck::NotConverged));
+            return Err(NotFound::Stuck(Stuck::NotConverged));
         }
-        let (next, _) = onto(sheet, now, at + step, EXACT, REACH)?;
+        let (next, _) = at_distance(manifold, now, at + step, EXACT, REACH)?;
         let after = special.value(&next);
         if step.abs() > LOCAL {
             slope = (after - value) / step;
@@ -129,52 +129,52 @@ fn zero(
             return Ok((best, slope));
         }
     }
-    Err(Lost::Stuck(Stuck::NotConverged))
+    Err(NotFound::Stuck(Stuck::NotConverged))
 }
 
-/// The point of the boundary at a value of one of the numbers, about so far along the
+/// The point of the boundary at a value of one of the parameters, predicted `step` along the
 /// tangent.
-pub fn land(
-    sheet: &mut Sheet,
-    now: &Place,
+pub fn at_value(
+    manifold: &mut Manifold,
+    now: &SingularPoint,
     step: f64,
     which: usize,
     value: f64,
-) -> Result<Place, Lost> {
-    let mut spot = sheet.moved(&now.spot, &now.tangent, step)?;
-    spot.place[which] = value;
-    let (across, slope) = now.across_at(sheet, which);
-    let along = sheet.number(which);
+) -> Result<SingularPoint, NotFound> {
+    let mut solution = manifold.moved(&now.solution, &now.tangent, step)?;
+    solution.params[which] = value;
+    let (across, slope) = now.across_at(manifold, which);
+    let along = manifold.unit_parameter(which);
     let search = Search {
-        spot: &spot,
+        solution: &solution,
         across: &across,
         slope,
         along: &along,
-        held: &now.held,
+        soft: &now.soft,
         neutral: now.neutral,
         accuracy: GIVEN,
         furthest: 0.5,
     };
-    let found = search.run(sheet)?;
-    let mut place = now.at(sheet, found)?;
-    place.spot.place[which] = value;
-    Ok(place)
+    let found = search.secant(manifold)?;
+    let mut point = now.completed(manifold, found)?;
+    point.solution.params[which] = value;
+    Ok(point)
 }
 
-/// Special points between two of a boundary, the second so far along the tangent of the
-/// first; more than one are not told apart.
+/// Special points between two points of a boundary, the second `step` along the tangent of the
+/// first; fails if there is more than one.
 pub fn special_between(
-    sheet: &mut Sheet,
-    [now, next]: [&Place; 2],
+    manifold: &mut Manifold,
+    [now, next]: [&SingularPoint; 2],
     step: f64,
-) -> Result<Option<(Special, Place)>, Lost> {
+) -> Result<Option<(Special, SingularPoint)>, NotFound> {
     let cusp = now.kind == Kind::Fold && now.speed * next.speed < 0.0;
     let special = match (cusp, now.index.abs_diff(next.index)) {
         (false, 0) => return Ok(None),
         (true, 0) => Special::Cusp,
         (false, 1) => Special::Crossing,
-        _ => return Err(Lost::Stuck(Stuck::NotConverged)),
+        _ => return Err(NotFound::Stuck(Stuck::NotConverged)),
     };
-    let place = locate(sheet, [now, next], step, special)?;
-    Ok(Some((special, place)))
+    let point = locate(manifold, [now, next], step, special)?;
+    Ok(Some((special, point)))
 }

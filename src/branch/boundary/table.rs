@@ -1,84 +1,82 @@
-//! What grids finer and finer say of a point of a boundary, extrapolated.
+//! A point of a boundary, extrapolated over finer and finer grids.
 
-use super::place::Place;
-use super::search::Lost;
-use super::sheet::{Direction, Sheet};
+use super::place::SingularPoint;
+use super::search::NotFound;
+use super::sheet::{Direction, Manifold};
 use super::special::Special;
 use crate::branch::critical::Kind;
 use crate::leaf::State;
 use crate::relax::richardson::Richardson;
 
-/// What extrapolation to no softening makes of rounding: the root of the sum of the squares
-/// of its weights.
+/// Amplification of rounding errors by extrapolation to zero softening: the root of the sum of
+/// the squares of its weights.
 const AMPLIFIED: f64 = 8.3;
 
-/// Extrapolation makes of what Newton's method leaves on a grid at most so much.
+/// Largest amplification of iteration errors by extrapolation.
 const KEPT: f64 = 2.0;
 
-/// A point of a boundary without the error of its grid.
+/// A point of a boundary extrapolated to zero segment length.
 #[derive(Clone, Debug)]
 pub struct Verified {
-    /// Both numbers, as fractions of their ranges, and bounds on their errors.
-    pub place: [f64; 2],
+    /// Both parameters, as fractions of their ranges, and bounds on their errors.
+    pub params: [f64; 2],
     pub errors: [f64; 2],
     /// Tips of all rods, in the family's units, and a bound on their error.
     pub tips: Vec<[f64; 3]>,
     pub error: f64,
     /// The state on the finest grid.
     pub state: State,
-    /// The way across the boundary on the sheet, to where there are more negative eigenvalues.
+    /// The direction across the boundary on the manifold, to where more eigenvalues are negative.
     pub across: Direction,
-    /// Fractions of the length of its nodes.
+    /// The nodes as fractions of the length.
     pub stations: Vec<f64>,
-    /// What it is.
     pub kind: Kind,
     pub special: Option<Special>,
-    /// Morse indices where the first number is smaller and where it is larger; of a fold,
-    /// of both branches that meet there.
+    /// Morse indices where the first parameter is smaller and where it is larger; at a fold,
+    /// of the two branches that meet there.
     pub indices: [usize; 2],
-    /// Matrices factorised for it, but for those of softened leaves.
+    /// Matrices factorised for it, without those of softened leaves.
     pub factorizations: usize,
 }
 
-/// Both numbers at a point on a grid.
+/// Both parameters at a point on a grid.
 #[derive(Default)]
-pub struct Numbers {
+pub struct Parameters {
     pub values: [f64; 2],
-    /// Compliance by which the matrix was softened, in units of L^2/A, and what that may have
-    /// left in the numbers.
+    /// Compliance by which the matrix was softened, in units of L^2/A, and the error of the
+    /// extrapolation to zero.
     pub softening: f64,
-    pub left: [f64; 2],
+    pub errors: [f64; 2],
 }
 
-impl Numbers {
+impl Parameters {
     /// Without softening.
     pub fn of(values: [f64; 2]) -> Self {
-        Numbers {
+        Parameters {
             values,
-            ..Numbers::default()
+            ..Parameters::default()
         }
     }
 }
 
-/// What is extrapolated.
+/// The values to be extrapolated.
 #[derive(Default)]
 pub struct Table {
     pub tips: Richardson,
     numbers: [Richardson; 2],
-    /// The number that is the same on every grid, if there is one.
+    /// The parameter that is fixed on all grids, if there is one, and its value.
     given: Option<(usize, f64)>,
-    /// What rounding of the matrix may have done to the numbers on a grid, and how many
-    /// times as much to those of no softening.
+    /// Errors of the parameters due to rounding of the matrix on a grid, and their amplification
+    /// by extrapolation to zero softening.
     rounded: [f64; 2],
     amplified: f64,
-    /// What softening may have left in the numbers on a grid.
+    /// Errors of the parameters due to softening.
     softened: [f64; 2],
-    /// What Newton's method may have left on a grid.
-    pub left: f64,
+    /// Largest iteration error of Newton's method.
+    pub iteration_error: f64,
 }
 
 impl Table {
-    /// With nothing in it yet.
     pub fn new(given: Option<(usize, f64)>) -> Self {
         Table {
             given,
@@ -87,46 +85,46 @@ impl Table {
         }
     }
 
-    /// What rounding of a matrix with so much softening, on so many segments, may do to the
-    /// numbers at a point; `along` is the change of what is zero there along the boundary.
+    /// Errors of the parameters due to rounding of a matrix with so much softening, on so many
+    /// segments; `along` is the derivative of the vanishing function along the boundary.
     pub fn rounding(
         &self,
-        sheet: &mut Sheet,
-        (place, along): (&Place, Option<f64>),
+        manifold: &mut Manifold,
+        (point, along): (&SingularPoint, Option<f64>),
         softening: f64,
         segments: f64,
-    ) -> Result<[f64; 2], Lost> {
+    ) -> Result<[f64; 2], NotFound> {
         let (across, slope) = match self.given {
-            Some((which, _)) => place.across_at(sheet, which),
-            None => (place.normal.clone(), place.slope),
+            Some((which, _)) => point.across_at(manifold, which),
+            None => (point.normal.clone(), point.slope),
         };
-        let leaf = sheet.leaf(place.spot.place)?;
+        let leaf = manifold.leaf(point.solution.params)?;
         let limit = 1.0 / softening;
         let condensing = leaf.sections.iter().map(|it| it.condensing.max_element());
         let stiffest = condensing.fold(0.0_f64, |most, it| most.max(it.min(limit)));
         let rounding = f64::EPSILON * stiffest * segments * segments;
         Ok([0, 1].map(|i| {
-            let own = (rounding / slope * across.place[i]).abs();
-            let along = along.map_or(0.0, |slope| rounding / slope * place.tangent.place[i]);
+            let own = (rounding / slope * across.params[i]).abs();
+            let along = along.map_or(0.0, |slope| rounding / slope * point.tangent.params[i]);
             own + along.abs()
         }))
     }
 
     pub fn push(
         &mut self,
-        sheet: &mut Sheet,
-        (place, along): (&Place, Option<f64>),
-        numbers: &Numbers,
-    ) -> Result<(), Lost> {
-        let state = &place.spot.state;
+        manifold: &mut Manifold,
+        (point, along): (&SingularPoint, Option<f64>),
+        numbers: &Parameters,
+    ) -> Result<(), NotFound> {
+        let state = &point.solution.state;
         let segments = state.segments() as f64;
-        let rounding = self.rounding(sheet, (place, along), numbers.softening, segments)?;
+        let rounding = self.rounding(manifold, (point, along), numbers.softening, segments)?;
         if numbers.softening > 0.0 {
             self.amplified = AMPLIFIED;
         }
         for i in 0..2 {
             self.rounded[i] = self.rounded[i].max(rounding[i]);
-            self.softened[i] = self.softened[i].max(numbers.left[i]);
+            self.softened[i] = self.softened[i].max(numbers.errors[i]);
         }
         let tips = (0..state.rods()).flat_map(|j| state.tip(j).to_array());
         self.tips.push(state.segments(), tips.collect());
@@ -148,7 +146,7 @@ impl Table {
         })
     }
 
-    /// Whether both numbers are known as well, or to rounding.
+    /// Whether the errors of both parameters are below this, or below rounding.
     pub fn is_exact(&self, enough: f64) -> bool {
         let errors = self.errors().into_iter().zip(self.rounded);
         errors
@@ -156,7 +154,12 @@ impl Table {
             .all(|(error, rounded)| error <= enough.max(rounded))
     }
 
-    pub fn verified(&self, sheet: &Sheet, place: &Place, special: Option<Special>) -> Verified {
+    pub fn verified(
+        &self,
+        manifold: &Manifold,
+        point: &SingularPoint,
+        special: Option<Special>,
+    ) -> Verified {
         let columns = |table: &Richardson| table.best().map_or(0, |best| best.columns);
         let tips = self.tips.column(columns(&self.tips));
         let errors = self.errors();
@@ -165,32 +168,32 @@ impl Table {
             _ => self.numbers[i].column(columns(&self.numbers[i]))[0],
         };
         let free = |i: usize| self.given.is_none_or(|(which, _)| which != i);
-        let (beyond, below) = (place.index, place.index.saturating_sub(place.neutral));
-        let forward = match place.kind {
+        let (beyond, below) = (point.index, point.index.saturating_sub(point.neutral));
+        let forward = match point.kind {
             Kind::Branching => {
-                let (across, slope) = place.across_at(sheet, 1);
-                slope * across.place[0] > 0.0
+                let (across, slope) = point.across_at(manifold, 1);
+                slope * across.params[0] > 0.0
             }
             Kind::Fold => true,
         };
         Verified {
-            place: [number(0), number(1)],
+            params: [number(0), number(1)],
             errors: [0, 1].map(|i| match free(i) {
                 true => {
                     let rounded = self.amplified * self.rounded[i];
-                    errors[i] + self.softened[i] + rounded + KEPT * self.left
+                    errors[i] + self.softened[i] + rounded + KEPT * self.iteration_error
                 }
                 false => 0.0,
             }),
             tips: tips.chunks(3).map(|tip| [tip[0], tip[1], tip[2]]).collect(),
-            // No tip is better than the precision of its numbers.
+            // No tip is more accurate than machine precision.
             error: (self.tips.best()).map_or(f64::INFINITY, |best| {
-                best.error + KEPT * self.left + f64::EPSILON
+                best.error + KEPT * self.iteration_error + f64::EPSILON
             }),
-            state: place.spot.state.clone(),
-            across: place.normal.clone(),
-            stations: sheet.grid().sigma().to_vec(),
-            kind: place.kind,
+            state: point.solution.state.clone(),
+            across: point.normal.clone(),
+            stations: manifold.grid().sigma().to_vec(),
+            kind: point.kind,
             special,
             indices: match forward {
                 true => [below, beyond],

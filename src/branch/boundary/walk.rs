@@ -1,87 +1,90 @@
-//! Following a boundary one way, step by step.
+//! Following a boundary in one direction, step by step.
 
 use rayon::prelude::*;
 
 use super::grids::on_finer;
 use super::halt::Halt;
-use super::place::Place;
+use super::place::SingularPoint;
 use super::plane::Plane;
 use super::refine::{Accuracy, Step, refine};
-use super::search::Lost;
-use super::sheet::Sheet;
-use super::special::{land, onto, special_between};
+use super::search::NotFound;
+use super::sheet::Manifold;
+use super::special::{at_distance, at_value, special_between};
 use super::table::Verified;
 use crate::branch::equations::Stuck;
 use crate::branch::refined::Doubt;
 use crate::leaf::Grid;
 
-/// First step as a part of the longest, and the shortest.
+/// First step and shortest step, as parts of the longest.
 const FIRST: f64 = 0.25;
 const SHORTEST: f64 = 1e-4;
 
-/// Growth of the step where the boundary turns little.
+/// Growth factor of the step, where the cosine of the boundary's turn exceeds the other.
 const GROWTH: f64 = 1.5;
 const STRAIGHT: f64 = 0.97;
 
-/// A boundary, or the sheet across it, that turns by more than this (cosine) in a step is
-/// not trusted to be the same.
+/// A step in which the boundary, or the normal to it, turns by more than this (cosine) is
+/// rejected.
 const BENT: f64 = 0.85;
 
-/// A point may lie off the prediction by this part of the step.
+/// Largest distance of a point from its prediction, as a part of the step.
 const DRIFT: f64 = 0.3;
 
-/// Accuracy of points on the way, and of those that are given a number.
+/// Accuracy of ordinary points, and of those at a given parameter.
 const ACCURACY: f64 = 1e-8;
 const EXACT: f64 = 1e-12;
 
-/// Points that are made before they are verified, side by side.
+/// Points computed ahead while earlier ones are verified in parallel.
 const AHEAD: usize = 8;
 
 /// The finest grid to follow a boundary on, in segments.
 const FINEST: usize = 256;
 
-/// The start of the boundary again: numbers and shapes are the same within these.
+/// Tolerances (parameter, shape) within which the boundary is closed.
 const SAME: [f64; 2] = [1e-6, 1e-4];
 
-/// How to follow a boundary.
+/// How to follow a boundary: step control and accuracy.
 #[derive(Clone, Copy, Debug)]
-pub struct Stride {
-    /// The longest step; each number's range is one, and so is a turn of all nodes by ten
-    /// radians or a shift by one length.
+pub struct WalkOptions {
+    /// The longest step; the range of each parameter has length one, and so has a turn of all
+    /// nodes by ten radians or a shift by one length.
     pub longest: f64,
-    /// Most points.
     pub most: usize,
-    /// Wanted accuracy.
     pub accuracy: Accuracy,
 }
 
-/// A boundary followed one way.
+/// A boundary followed in one direction.
 pub struct Walk<'a, 'h> {
     plane: Plane<'a>,
-    how: &'h Stride,
-    /// The second number where it began.
+    how: &'h WalkOptions,
+    /// The second parameter at the starting point.
     second: f64,
-    first: Place,
+    first: SingularPoint,
     /// Length of the next step.
     step: f64,
     steps: Vec<Step>,
     verified: Vec<Verified>,
     end: Option<Halt>,
-    /// Matrices factorised on grids that were left, and to verify points.
+    /// Matrices factorised on earlier grids, and to verify points.
     pub factorizations: usize,
 }
 
 impl<'a, 'h> Walk<'a, 'h> {
-    /// From its first point, at which one of the numbers may be given.
-    pub fn new(plane: Plane<'a>, how: &'h Stride, first: Place, given: Option<usize>) -> Self {
+    /// From its first point, at which one of the parameters may be given.
+    pub fn new(
+        plane: Plane<'a>,
+        how: &'h WalkOptions,
+        first: SingularPoint,
+        given: Option<usize>,
+    ) -> Self {
         Walk {
             plane,
             how,
-            second: first.spot.place[1],
+            second: first.solution.params[1],
             first: first.clone(),
             step: FIRST * how.longest,
             steps: vec![Step {
-                place: first,
+                point: first,
                 special: None,
                 given,
             }],
@@ -91,24 +94,24 @@ impl<'a, 'h> Walk<'a, 'h> {
         }
     }
 
-    /// Goes on to its end; every point is verified, on finer grids where it must.
+    /// Follows it to its end; every point is verified, on finer grids where necessary.
     pub fn run(
         &mut self,
         grid: Grid,
-        needless: &dyn Fn() -> bool,
+        cancelled: &dyn Fn() -> bool,
         progress: &mut dyn FnMut(usize, [f64; 2]),
     ) -> Halt {
-        let mut sheet = match Sheet::new(self.plane, grid) {
-            Ok(sheet) => sheet,
+        let mut manifold = match Manifold::new(self.plane, grid) {
+            Ok(manifold) => manifold,
             Err(_) => return Halt::OutOfRange,
         };
         let mut counted = 0;
         loop {
-            if needless() {
+            if cancelled() {
                 return Halt::Closed;
             }
-            // The next points are made while those before are verified, side by side.
-            let (plane, accuracy, grid) = (self.plane, self.how.accuracy, sheet.grid().clone());
+            // The next points are computed while the previous ones are verified, in parallel.
+            let (plane, accuracy, grid) = (self.plane, self.how.accuracy, manifold.grid().clone());
             let new = self.steps[self.verified.len()..].to_vec();
             let mut found = Vec::new();
             rayon::in_place_scope(|scope| {
@@ -116,30 +119,30 @@ impl<'a, 'h> Walk<'a, 'h> {
                     let each = new.par_iter();
                     found = each.map(|it| refine(plane, &grid, it, accuracy)).collect();
                 });
-                self.go_on(&mut sheet, AHEAD, progress);
+                self.extend(&mut manifold, AHEAD, progress);
             });
-            self.factorizations += sheet.equations.factorizations - counted;
-            counted = sheet.equations.factorizations;
+            self.factorizations += manifold.equations.factorizations - counted;
+            counted = manifold.equations.factorizations;
             let all = new.len() + self.verified.len() == self.steps.len();
             let end = match (self.accept(found), self.end) {
                 (None, Some(end)) if all => match end {
-                    Halt::Stuck | Halt::Unfolded | Halt::Parted => end,
+                    Halt::Stuck | Halt::Unfolded | Halt::Separated => end,
                     _ => return end,
                 },
                 (None, _) => continue,
                 (Some(doubt), _) => Halt::Unverified(doubt),
             };
-            // Perhaps a finer grid knows better.
-            if !self.refine(&mut sheet) {
+            // A finer grid may resolve it.
+            if !self.refine(&mut manifold) {
                 return end;
             }
             counted = 0;
         }
     }
 
-    /// Its points, verified. Grids move them at a given value of one number or of the other:
-    /// where that changes a point may come to lie before the one before it, and is left out,
-    /// unless it is the last or a special one.
+    /// Its verified points, in order. Extrapolation moves points at a fixed value of one parameter
+    /// or of the other: where that changes, a point may come to lie before its predecessor, and is
+    /// left out, unless it is the last or a special one.
     pub fn in_order(self) -> Vec<Verified> {
         let mut kept: Vec<(Step, Verified)> = Vec::new();
         let last = self.verified.len().saturating_sub(1);
@@ -149,13 +152,14 @@ impl<'a, 'h> Walk<'a, 'h> {
                 while kept.len() > 1
                     && let Some((before, found)) = kept.last()
                     && before.special.is_none()
-                    && goes_back([before, &step], [found, &point])
+                    && order_reversed([before, &step], [found, &point])
                 {
                     kept.pop();
                 }
             }
-            let back =
-                |(before, found): &(Step, Verified)| goes_back([before, &step], [found, &point]);
+            let back = |(before, found): &(Step, Verified)| {
+                order_reversed([before, &step], [found, &point])
+            };
             if needed || !kept.last().is_some_and(back) {
                 kept.push((step, point));
             }
@@ -163,10 +167,10 @@ impl<'a, 'h> Walk<'a, 'h> {
         kept.into_iter().map(|(_, point)| point).collect()
     }
 
-    /// Makes so many further points, unless it comes to an end.
-    fn go_on(
+    /// Computes so many further points, unless the boundary ends.
+    fn extend(
         &mut self,
-        sheet: &mut Sheet,
+        manifold: &mut Manifold,
         points: usize,
         progress: &mut dyn FnMut(usize, [f64; 2]),
     ) {
@@ -176,13 +180,13 @@ impl<'a, 'h> Walk<'a, 'h> {
                 self.end = Some(Halt::MostPoints);
                 break;
             }
-            self.try_step(sheet);
+            self.try_step(manifold);
             let last = &self.steps[self.steps.len() - 1];
-            progress(self.steps.len(), last.place.spot.place);
+            progress(self.steps.len(), last.point.solution.params);
         }
     }
 
-    /// Keeps what was verified; forgets what cannot be, and what was made after that.
+    /// Keeps verified points; at the first failure discards that point and all later ones.
     fn accept(&mut self, found: Vec<Result<Verified, Doubt>>) -> Option<Doubt> {
         for point in found {
             match point {
@@ -200,41 +204,41 @@ impl<'a, 'h> Walk<'a, 'h> {
         None
     }
 
-    /// Takes the last point to the grid with all segments halved; false where that is too
+    /// Transfers the last point to the grid with all segments halved; false if that is too
     /// fine, or has no such point.
-    fn refine(&mut self, sheet: &mut Sheet<'a>) -> bool {
-        if 2 * sheet.grid().segments() > FINEST {
+    fn refine(&mut self, manifold: &mut Manifold<'a>) -> bool {
+        if 2 * manifold.grid().segments() > FINEST {
             return false;
         }
-        let mut on_finer = |place: &Place, given| {
-            let (mut finer, near) = on_finer(sheet, place).ok()?;
-            let place = match given {
-                Some(which) => land(&mut finer, &near, 0.0, which, near.spot.place[which]),
-                None => onto(&mut finer, &near, 0.0, ACCURACY, 1.0).map(|(place, _)| place),
+        let mut on_finer = |point: &SingularPoint, given| {
+            let (mut finer, near) = on_finer(manifold, point).ok()?;
+            let point = match given {
+                Some(which) => at_value(&mut finer, &near, 0.0, which, near.solution.params[which]),
+                None => at_distance(&mut finer, &near, 0.0, ACCURACY, 1.0).map(|(point, _)| point),
             };
-            Some((finer, place.ok()?))
+            Some((finer, point.ok()?))
         };
         let Some(last) = self.steps.last_mut() else {
             return false;
         };
-        let (Some((_, first)), Some((finer, place))) = (
+        let (Some((_, first)), Some((finer, point))) = (
             on_finer(&self.first, Some(1)),
-            on_finer(&last.place, last.given),
+            on_finer(&last.point, last.given),
         ) else {
             return false;
         };
-        (self.first, last.place) = (first, place);
+        (self.first, last.point) = (first, point);
         self.step *= 0.5;
         self.end = None;
-        *sheet = finer;
+        *manifold = finer;
         true
     }
 
-    /// Makes a step from the last point, or shortens the next try; ends where that is too
-    /// short.
-    fn try_step(&mut self, sheet: &mut Sheet) {
-        let now = self.steps[self.steps.len() - 1].place.clone();
-        match self.advance(sheet, &now) {
+    /// Makes a step from the last point, or shortens the next attempt; ends the boundary if that
+    /// is too short.
+    fn try_step(&mut self, manifold: &mut Manifold) {
+        let now = self.steps[self.steps.len() - 1].point.clone();
+        match self.advance(manifold, &now) {
             Ok((next, end)) => {
                 self.steps.extend(next);
                 self.end = end;
@@ -244,31 +248,31 @@ impl<'a, 'h> Walk<'a, 'h> {
         }
     }
 
-    /// The next points: special ones between, and that of the step itself.
+    /// The next points: special ones in between, and that of the step itself.
     fn advance(
         &mut self,
-        sheet: &mut Sheet,
-        now: &Place,
-    ) -> Result<(Vec<Step>, Option<Halt>), Lost> {
-        let not_converged = || Lost::Stuck(Stuck::NotConverged);
-        if leaves(now) {
+        manifold: &mut Manifold,
+        now: &SingularPoint,
+    ) -> Result<(Vec<Step>, Option<Halt>), NotFound> {
+        let not_converged = || NotFound::Stuck(Stuck::NotConverged);
+        if leaves_range(now) {
             return Ok((Vec::new(), Some(Halt::Reached)));
         }
         let mut step = self.step;
-        let mut given = self.edge(now, step, |which| {
-            now.spot.place[which] + step * now.tangent.place[which]
+        let mut given = self.first_mark(now, step, |which| {
+            now.solution.params[which] + step * now.tangent.params[which]
         });
         if given.is_none() {
-            let (next, off) = onto(sheet, now, step, ACCURACY, DRIFT * step)?;
-            given = self.edge(now, step, |which| next.spot.place[which]);
+            let (next, off) = at_distance(manifold, now, step, ACCURACY, DRIFT * step)?;
+            given = self.first_mark(now, step, |which| next.solution.params[which]);
             if given.is_none() {
-                let turn = self.accepts(sheet, [now, &next], off, step)?;
+                let turn = self.accepts(manifold, [now, &next], off, step)?;
                 if turn > STRAIGHT {
                     self.step = (GROWTH * step).min(self.how.longest);
                 }
-                let mut steps = self.between(sheet, [now, &next], step)?;
+                let mut steps = self.between(manifold, [now, &next], step)?;
                 steps.push(Step {
-                    place: next,
+                    point: next,
                     special: None,
                     given: None,
                 });
@@ -279,37 +283,37 @@ impl<'a, 'h> Walk<'a, 'h> {
             return Err(not_converged());
         };
         step = part;
-        let next = land(sheet, now, step, which, value)?;
-        let off = sheet.way(&now.spot, &next.spot);
-        let along = sheet.along(&off, &now.tangent);
-        let off = (sheet.along(&off, &off) - along * along).max(0.0).sqrt();
-        self.accepts(sheet, [now, &next], off, step)?;
+        let next = at_value(manifold, now, step, which, value)?;
+        let off = manifold.difference(&now.solution, &next.solution);
+        let along = manifold.inner(&off, &now.tangent);
+        let off = (manifold.inner(&off, &off) - along * along).max(0.0).sqrt();
+        self.accepts(manifold, [now, &next], off, step)?;
         let edge = value == 0.0 || value == 1.0;
-        let mut steps = self.between(sheet, [now, &next], step)?;
+        let mut steps = self.between(manifold, [now, &next], step)?;
         let end = match () {
             () if edge => Some(Halt::Reached),
-            () if self.is_first(sheet, &next) => Some(Halt::Closed),
+            () if self.is_first(manifold, &next) => Some(Halt::Closed),
             () => None,
         };
         steps.push(Step {
-            place: next,
+            point: next,
             special: None,
             given: Some(which),
         });
         Ok((steps, end))
     }
 
-    /// The number, its value and the part of the step where this first leaves a range, or
-    /// passes the second number's value at the start.
-    fn edge(
+    /// Where the step first leaves a range, or passes the initial value of the second parameter:
+    /// which parameter, its value, and the length of the step to it.
+    fn first_mark(
         &self,
-        now: &Place,
+        now: &SingularPoint,
         step: f64,
         next: impl Fn(usize) -> f64,
     ) -> Option<(usize, f64, f64)> {
         let marks = [(0, 0.0), (0, 1.0), (1, 0.0), (1, 1.0), (1, self.second)];
         let passed = marks.into_iter().filter_map(|(which, value)| {
-            let (before, after) = (now.spot.place[which], next(which));
+            let (before, after) = (now.solution.params[which], next(which));
             let part = (value - before) / (after - before);
             let inside = value == self.second && which == 1;
             let passed = match inside {
@@ -321,56 +325,60 @@ impl<'a, 'h> Walk<'a, 'h> {
         passed.min_by(|a, b| a.2.total_cmp(&b.2))
     }
 
-    /// Whether a step may be believed to have stayed on the boundary; by how much this
-    /// turned.
+    /// Checks that a step has stayed on the boundary; returns the cosine of its turn.
     fn accepts(
         &self,
-        sheet: &Sheet,
-        [now, next]: [&Place; 2],
+        manifold: &Manifold,
+        [now, next]: [&SingularPoint; 2],
         off: f64,
         step: f64,
-    ) -> Result<f64, Lost> {
-        let turn = sheet.along(&now.tangent, &next.tangent);
-        let tilt = sheet.along(&now.normal, &next.normal);
+    ) -> Result<f64, NotFound> {
+        let turn = manifold.inner(&now.tangent, &next.tangent);
+        let tilt = manifold.inner(&now.normal, &next.normal);
         match off <= DRIFT * step && turn > BENT && tilt > BENT {
             true => Ok(turn),
-            false => Err(Lost::Stuck(Stuck::NotConverged)),
+            false => Err(NotFound::Stuck(Stuck::NotConverged)),
         }
     }
 
-    /// Special points between two of a boundary.
-    fn between(&self, sheet: &mut Sheet, pair: [&Place; 2], step: f64) -> Result<Vec<Step>, Lost> {
-        let special = special_between(sheet, pair, step)?;
-        let step = |(special, place)| Step {
-            place,
+    /// Special points between two points of a boundary.
+    fn between(
+        &self,
+        manifold: &mut Manifold,
+        pair: [&SingularPoint; 2],
+        step: f64,
+    ) -> Result<Vec<Step>, NotFound> {
+        let special = special_between(manifold, pair, step)?;
+        let step = |(special, point)| Step {
+            point,
             special: Some(special),
             given: None,
         };
         Ok(special.into_iter().map(step).collect())
     }
 
-    fn is_first(&self, sheet: &Sheet, place: &Place) -> bool {
+    fn is_first(&self, manifold: &Manifold, point: &SingularPoint) -> bool {
         let first = &self.first;
-        (first.spot.place[0] - place.spot.place[0]).abs() < SAME[0]
-            && first.spot.state.shift_to(&place.spot.state) < SAME[1]
-            && sheet.along(&first.tangent, &place.tangent) > BENT
+        (first.solution.params[0] - point.solution.params[0]).abs() < SAME[0]
+            && first.solution.state.shift_to(&point.solution.state) < SAME[1]
+            && manifold.inner(&first.tangent, &point.tangent) > BENT
     }
 }
 
-/// Whether the verified points of two steps follow each other the other way.
-fn goes_back(steps: [&Step; 2], found: [&Verified; 2]) -> bool {
+/// Whether extrapolation has reversed the order of the points of two steps.
+fn order_reversed(steps: [&Step; 2], found: [&Verified; 2]) -> bool {
     let way = |[a, b]: [[f64; 2]; 2]| [0, 1].map(|i| b[i] - a[i]);
     let [a, b] = [
-        way(steps.map(|step| step.place.spot.place)),
-        way(found.map(|point| point.place)),
+        way(steps.map(|step| step.point.solution.params)),
+        way(found.map(|point| point.params)),
     ];
     a[0] * b[0] + a[1] * b[1] < 0.0
 }
 
-/// Whether a point is at an end of a range, and the boundary goes on beyond.
-fn leaves(now: &Place) -> bool {
+/// Whether a point is at an end of a range and the boundary leaves it.
+fn leaves_range(now: &SingularPoint) -> bool {
     (0..2).any(|k| {
-        let (at, way) = (now.spot.place[k], now.tangent.place[k]);
+        let (at, way) = (now.solution.params[k], now.tangent.params[k]);
         at <= EXACT && way < 0.0 || at >= 1.0 - EXACT && way > 0.0
     })
 }

@@ -1,4 +1,4 @@
-//! The equations against those of the paper, differentiated automatically.
+//! The equations compared with those of the paper, differentiated automatically.
 
 use super::*;
 use nalgebra::{SMatrix, SVector};
@@ -24,8 +24,8 @@ fn turned<D: DualNum<Primitive = f64> + Copy>(frame: &[[D; 3]; 3], a: [D; 3]) ->
     [0, 1, 2].map(|i| frame[i][0] * a[0] + frame[i][1] * a[1] + frame[i][2] * a[2])
 }
 
-/// r', spatial rate of rotation, n', m' of the paper's equations (1) to (6), the state
-/// being moved on by (dr, t, dn, dm).
+/// r', spatial rate of rotation, n', m' of the paper's equations (1) to (6), in the state
+/// perturbed by (dr, t, dn, dm).
 fn paper<D: DualNum<Primitive = f64> + Copy>(
     z: SVector<D, 12>,
     rod: &RodState,

@@ -1,4 +1,4 @@
-//! Motion to a given time, snapshots, and numbers to go on from.
+//! Motion to a given time, snapshots, and saved states.
 
 use super::Explicit;
 use crate::leaf::State;
@@ -8,19 +8,19 @@ use crate::motion::method::{Method, Snapshot, Stopped, Velocity};
 use crate::motion::nodes::vector;
 use glam::DVec3;
 
-/// Part of a step that is rounding.
+/// Part of a step below which differences of time are rounding.
 const NO_TIME: f64 = 1e-9;
 
-/// What may help if energy grows, besides a shorter step.
+/// Advice if energy grows, besides a shorter step.
 const OTHERWISE: &str = "the semi-implicit method";
 
-/// Steps between checks of the bending, which cost nothing, and of the energy.
+/// Steps between checks of the bending, which are free, and of the energy.
 const BENDING_CHECKED: usize = 200;
 const ENERGY_CHECKED: usize = 1000;
 
 impl Explicit {
     /// Forces of all segments at the present positions, rod by rod. Strains
-    /// become the last step's if they are to be remembered.
+    /// are stored as those of the last step if `remember`.
     pub(super) fn forces(&mut self, remember: bool) -> Vec<DVec3> {
         let (law, segments) = (self.law(remember), self.leaf.segments());
         let mut forces = Vec::with_capacity(self.rods.len() * segments);
@@ -45,7 +45,6 @@ impl Explicit {
         state
     }
 
-    /// Positions and rotations.
     pub(super) fn state(&self) -> State {
         let n = self.leaf.segments();
         let nodes = || self.leaf.each(GROUP..=GROUP + n);
@@ -58,7 +57,7 @@ impl Explicit {
         let now = self.snapshot();
         (self.balance).judge(&self.leaf, &self.physics, &now, self.step, OTHERWISE)?;
         self.last_snapshot = Some(now);
-        // In the balance rotations are at most pi, as they are in space.
+        // In the balance rotations are at most pi, as in space.
         resolved(&self.leaf, self.time, self.largest_turn())
     }
 }
@@ -75,7 +74,7 @@ impl Method for Explicit {
     fn advance(&mut self, until: f64) -> Result<(), Stopped> {
         let h = self.step;
         loop {
-            // Times are not summed up, and neither is rounding.
+            // Times are multiples of the step, so that rounding does not accumulate.
             let next = self.begin.0 + h * (self.steps + 1 - self.begin.1) as f64;
             if next > until + NO_TIME * h {
                 break;

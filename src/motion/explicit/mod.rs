@@ -1,20 +1,20 @@
 //! The explicit method: leapfrog for positions and angular momenta.
 //!
-//! Forces at the nodes' positions kick velocities from half a step before to
-//! half a step after; with these, positions and rotations drift freely for
-//! one step. A node of a round section is a body with one axis of symmetry,
+//! Forces at the nodes' positions advance velocities from half a step before to
+//! half a step after (kick); with these, positions and rotations advance without forces for
+//! one step (drift). A node of a round section is a body with one axis of symmetry,
 //! whose free rotation is known in closed form. The method is of second order
-//! and symplectic, and keeps momentum and angular momentum to rounding, since
-//! the forces of a segment, which follow from an energy that no rigid motion
-//! changes, do. External damping enters by its mean over the kick.
+//! and symplectic, and conserves momentum and angular momentum to rounding, since
+//! the forces of a segment derive from an energy that is invariant under rigid
+//! motions. External damping enters by its mean over the kick.
 //!
 //! It is stable up to a time step of 2/omega for the highest frequency omega,
 //! which is at most that of a single segment ([`Explicit::stable_step`]), as
-//! long as the step stays the same: steps that alternate between one length
-//! and half of it are unstable from less than 0.9 of that bound on. So all
-//! steps are of one length, and what is asked for at a time between two of
-//! them is reached by a shorter step from the one before, off the path, to
-//! which the motion returns. It does not depend on the times asked for.
+//! long as the step is constant: steps that alternate between one length
+//! and half of it are unstable from less than 0.9 of that bound on. Therefore all
+//! steps have the same length, and a time between two of
+//! them is reached by a shorter step from the earlier one, off the path, to
+//! which the motion returns. The path does not depend on the times asked for.
 
 mod advance;
 #[cfg(test)]
@@ -34,55 +34,55 @@ use glam::DVec3;
 use pulp::Arch;
 use rayon::prelude::*;
 
-/// Part of the stable time step that is used.
+/// Part of the stable time step used.
 const SAFETY: f64 = 0.9;
 
-/// Every so many steps quaternions are brought back to unit length.
+/// Steps between normalisations of the quaternions.
 const NORMALISED: usize = 8;
 
-/// From this many segments on, rods are shared out among threads. Measured: below
-/// it waking the threads costs more than they bring.
+/// Number of segments from which rods are distributed to threads. Measured: below
+/// it waking the threads costs more than it saves.
 const PARALLEL_SEGMENTS: usize = 1000;
 
-/// Rods that are not divided any further: some two shares for every thread.
+/// Number of rods that are not divided further: about two portions for every thread.
 fn share(rods: usize) -> usize {
     (rods / (2 * rayon::current_num_threads())).max(1)
 }
 
-/// A leaf on the move.
+/// A leaf in explicit motion.
 pub struct Explicit {
     leaf: DiscreteLeaf,
     physics: Physics,
     arch: Arch,
     positions: Vec<Positions>,
-    /// Where the next step puts them.
+    /// Their positions after the next step.
     next: Vec<Positions>,
     rods: Vec<Rod>,
     block: Block,
-    /// Mass of the joint tip, if there is one.
+    /// Mass of the shared tip, if there is one.
     tip_mass: Option<f64>,
     step: f64,
-    /// Time of the last step, and that asked for, less than a step later.
+    /// Time of the last step, and the time asked for, less than a step later.
     stepped: f64,
     time: f64,
     steps: usize,
-    /// Time and steps when the first of the present length began.
+    /// Time and number of steps at the beginning of steps of the present length.
     begin: (f64, usize),
     /// Widths of the last step and of the one before; zero if there was none.
     widths: [f64; 2],
     balance: EnergyBalance,
-    /// The last snapshot, until the leaf moves or is changed: where a motion
-    /// was judged it is often wanted, too.
+    /// The last snapshot, until the leaf moves or is changed: after a check
+    /// it is often needed.
     last_snapshot: Option<Snapshot>,
     parallel: bool,
 }
 
-/// A stiffness the method cannot handle: that of a rigid rod.
+/// A rigid rod, whose stiffness the method cannot handle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rigid;
 
 impl Explicit {
-    /// A leaf at rest in `state`. Time steps are nine tenths of what is stable,
+    /// A leaf at rest in `state`. Time steps are nine tenths of the stable one,
     /// or `step` if that is given, stable or not.
     ///
     /// # Errors
@@ -129,7 +129,7 @@ impl Explicit {
         explicit.step = step.unwrap_or_else(|| SAFETY * explicit.stable_step().step);
         explicit.forces(true);
         for rod in &mut explicit.rods {
-            // At rest the past was like the present.
+            // At rest earlier strains equal the present ones.
             rod.past.two = rod.past.one.clone();
         }
         let start = explicit.snapshot();
@@ -137,7 +137,7 @@ impl Explicit {
         Ok(explicit)
     }
 
-    /// The longest stable time step of the leaf as it stands.
+    /// The longest stable time step of the leaf in its present state.
     pub fn stable_step(&self) -> StableStep {
         let mut leaf = self.leaf.clone();
         if self.physics.rest_differs() {
@@ -151,16 +151,16 @@ impl Explicit {
         self.step
     }
 
-    /// Gives the nodes masses that serve to come to rest, not to move: the
-    /// fastest motions of all segments become alike. Time steps may be as long
-    /// as one then, and the leaf is stopped.
+    /// Replaces the masses of the nodes by fictitious ones, for relaxation only: the
+    /// fastest motions of all segments have equal frequencies. Time steps may then be as long
+    /// as one, and the leaf is stopped.
     pub fn use_fictitious_masses(&mut self) {
         let tip = fictitious::masses(&self.leaf, &self.physics, &mut self.rods);
         self.tip_mass = self.tip_mass.map(|_| tip);
         self.stop();
     }
 
-    /// Takes all velocities away.
+    /// Sets all velocities to zero.
     pub fn stop(&mut self) {
         self.last_snapshot = None;
         for rod in &mut self.rods {
@@ -171,7 +171,7 @@ impl Explicit {
         self.widths = [0.0; 2];
     }
 
-    /// Sets the rate at which every velocity decays from now on.
+    /// Sets the decay rate of all velocities from now on.
     pub fn set_damping(&mut self, rate: f64) {
         self.last_snapshot = None;
         self.physics.damping = rate;
@@ -195,7 +195,7 @@ impl Explicit {
         4.0 * (0.5 * deltas.fold(0.0, f64::max).sqrt()).min(1.0).asin()
     }
 
-    /// Whether numbers were finite and bending resolved before the last step.
+    /// Whether numbers were finite and bending was resolved before the last step.
     fn trusted(&self) -> bool {
         let finite = |rod: &Rod| rod.totals.twice_kinetic.is_finite();
         self.largest_turn() <= RESOLVED_TURN && self.rods.iter().all(finite)
@@ -209,18 +209,18 @@ impl Explicit {
         exchange
     }
 
-    /// How long velocities lag behind positions: half a step, but not at the start.
-    fn behind(&self) -> f64 {
+    /// Time by which velocities lag behind positions: half a step, but zero at the start.
+    fn lag(&self) -> f64 {
         0.5 * self.widths[0]
     }
 
-    /// Kicks velocities, by the forces at the present positions, to where they
-    /// are `ahead` of these, and lets positions drift for the time `drift`.
-    /// Strains become the last step's if they are to be remembered. Returns
-    /// twice the kinetic energy in the middle of the kick, too.
+    /// Advances velocities, by the forces at the present positions, to the time
+    /// `ahead` of these, and positions by the time `drift`.
+    /// Strains are stored as those of the last step if `remember`. Also returns
+    /// twice the kinetic energy in the middle of the kick.
     fn kick(&mut self, ahead: f64, drift: f64, remember: bool) -> (Exchange, f64) {
-        let length = self.behind() + ahead;
-        let [from, to] = [self.stepped - self.behind(), self.stepped + ahead];
+        let length = self.lag() + ahead;
+        let [from, to] = [self.stepped - self.lag(), self.stepped + ahead];
         let loads = self.physics.loads(self.stepped);
         let mut work = 0.0;
         if self.physics.loads_change() {
@@ -268,7 +268,7 @@ impl Explicit {
         (exchange, energy)
     }
 
-    /// By how much the potential falls with other loads, the leaf standing still.
+    /// Decrease of the potential with other loads at fixed positions.
     fn potential_of(&self, before: &Loads, after: &Loads) -> f64 {
         let last = GROUP + self.leaf.segments();
         let gravity = after.gravity - before.gravity;
@@ -301,18 +301,18 @@ impl Explicit {
         }
     }
 
-    /// Moves all nodes but a joint tip; the positions before are left in `next`.
+    /// Moves all nodes except a shared tip; the previous positions are left in `next`.
     fn step_rods(&mut self, loads: &Loads, kick: (f64, f64), drift: f64, remember: bool) {
         let (arch, law, segments) = (self.arch, self.law(remember), self.leaf.segments());
         let mut loads = *loads;
         if self.tip_mass.is_some() {
-            // The force on a free tip acts in its own rod, on a joint one elsewhere.
+            // The force on a free tip acts in its own rod, that on a shared one elsewhere.
             loads.tip_force = DVec3::ZERO;
         }
         let normalise = self.steps.is_multiple_of(NORMALISED);
         let (all, leaf) = (&self.positions, &self.leaf);
         let one = |block: &mut Block, j: usize, rod: &mut Rod, next: &mut Positions| {
-            let beside = |other: usize, gap: usize| {
+            let neighbour = |other: usize, gap: usize| {
                 (other < all.len()).then(|| Neighbour {
                     positions: &all[other],
                     stiffness: leaf.coupling(gap).to_array(),
@@ -323,8 +323,8 @@ impl Explicit {
                 positions: &all[j],
                 next,
                 neighbours: [
-                    beside(j.wrapping_sub(1), j.wrapping_sub(1)),
-                    beside(j + 1, j),
+                    neighbour(j.wrapping_sub(1), j.wrapping_sub(1)),
+                    neighbour(j + 1, j),
                 ],
                 motion: &mut rod.motion,
                 material: &rod.material,

@@ -43,7 +43,7 @@ fn bent(leaf: &DiscreteLeaf) -> State {
     state
 }
 
-/// Force and moment on every node by the gradient of the element's energy.
+/// Force and moment on every node from the gradient of the element's energy.
 fn by_element(leaf: &DiscreteLeaf, state: &State) -> Vec<(DVec3, DVec3)> {
     let mut all = vec![(DVec3::ZERO, DVec3::ZERO); state.x.len()];
     for (j, i) in leaf.each(0..=leaf.segments()) {
@@ -62,8 +62,8 @@ fn by_element(leaf: &DiscreteLeaf, state: &State) -> Vec<(DVec3, DVec3)> {
     all
 }
 
-/// The loops' forces are the gradient of the energy that the relaxation
-/// minimises, whatever instructions the processor has.
+/// The forces of the loops are the gradient of the energy that the relaxation
+/// minimises, with all instruction sets of the processor.
 #[test]
 fn forces_are_those_of_the_element() {
     for n in SEGMENTS {
@@ -101,12 +101,12 @@ fn forces_are_those(leaf: &DiscreteLeaf) {
         let v = explicit.rods[2].moving(GROUP + n).0;
         let error = (v * (explicit.tip_mass.unwrap() / (0.5 * h)) - tip).length();
         assert!(error < allowed, "tip: {error}");
-        // The clamped ends stay where they are.
+        // Clamped ends do not move.
         assert_eq!(explicit.state().x[0], DVec3::ZERO);
     }
 }
 
-/// What rods and blocks have in common is there once.
+/// Blocks common to rods are stored once.
 #[test]
 fn like_blocks_are_shared() {
     let distinct = |rods: &str, segments: usize| {
@@ -128,7 +128,7 @@ fn like_blocks_are_shared() {
     assert_eq!(distinct("rods = 3, length = [1.0, 1.0, 1.1]", 50), (2, 3));
 }
 
-/// A constant factor of the rest curvature is as good as other curvatures.
+/// A constant factor of the rest curvature is equivalent to other curvatures.
 #[test]
 fn a_constant_factor_of_the_rest_curvature_counts() {
     let after = |toml: &str| {

@@ -1,11 +1,11 @@
-//! Arrays that begin where a line of the processor's memory does.
+//! Arrays aligned to cache lines.
 
 use std::ops::{Deref, DerefMut, Range};
 
-/// Numbers in a line.
+/// Numbers in a cache line.
 const LINE: usize = 8;
 
-/// An array of fixed length whose first number is the first of a line, so that
+/// An array of fixed length aligned to a cache line, so that
 /// no group of nodes lies in two. Measured: otherwise steps of long rods take 1.1
 /// times as long.
 #[derive(Debug)]
@@ -15,7 +15,6 @@ pub struct Array {
 }
 
 impl Array {
-    /// So many zeros.
     pub fn zeros(length: usize) -> Self {
         let room = vec![0.0; length + LINE];
         let first = room.as_ptr().align_offset(LINE * size_of::<f64>());

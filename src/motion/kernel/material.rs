@@ -1,4 +1,4 @@
-//! What a rod is made of, for the loops over its nodes.
+//! Material data of a rod, for the loops over its nodes.
 
 use super::BLOCK;
 use std::sync::Arc;
@@ -12,24 +12,24 @@ pub struct Node {
     pub rest_length: f64,
     /// A/ds.
     pub bend: [f64; 3],
-    /// ds u0, and its factor if that is constant.
+    /// ds u0, times its factor if that is constant.
     pub rest_turn: [f64; 3],
-    /// Mass; that of a held node and of a joint tip is not in here.
+    /// Mass; zero for a held node and for a shared tip.
     pub mass: f64,
-    /// 1/mass; zero for a node that is held, and for a joint tip.
+    /// 1/mass; zero for a held node, and for a shared tip.
     pub per_mass: f64,
-    /// 1/J of a node about d2 and d3; zero for a node that is held.
+    /// 1/J of a node about d2 and d3; zero for a held node.
     pub per_inertia: f64,
     /// 1/J1 - 1/J.
     pub per_spin: f64,
-    /// Length of rod that loads on the node come from.
+    /// Length of rod whose loads act on the node.
     pub weight: f64,
-    /// Fraction of the length that coupling on the node comes from.
+    /// Fraction of the length whose coupling acts on the node.
     pub coupled: f64,
 }
 
-/// The nodes of a block, one array for each number of a [`Node`], and what
-/// follows from these.
+/// The nodes of a block, one array for each number of a [`Node`], and derived
+/// quantities.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(align(64))]
 pub struct Material {
@@ -37,7 +37,7 @@ pub struct Material {
     pub rest_length: [f64; BLOCK],
     pub bend: [[f64; BLOCK]; 3],
     pub rest_turn: [[f64; BLOCK]; 3],
-    /// A u0: what the moment lacks where the segment is straight.
+    /// A u0: minus the moment where the segment is straight.
     pub rest_moment: [[f64; BLOCK]; 3],
     pub mass: [f64; BLOCK],
     pub per_mass: [f64; BLOCK],
@@ -72,14 +72,14 @@ impl Material {
     }
 }
 
-/// A rod's nodes in blocks. Blocks that are like the one before, or like the one
-/// at their place in the rod `beside`, are shared: they stay in the processor's
-/// nearest memory, and most leaves have few that differ.
-pub fn blocks(nodes: &[Node], beside: Option<&[Arc<Material>]>) -> Vec<Arc<Material>> {
+/// A rod's nodes in blocks. Blocks that equal the previous one, or the one
+/// at the same position in the rod `neighbour`, are shared: they stay in the innermost
+/// cache, and most leaves have few that differ.
+pub fn blocks(nodes: &[Node], neighbour: Option<&[Arc<Material>]>) -> Vec<Arc<Material>> {
     let mut blocks: Vec<Arc<Material>> = Vec::with_capacity(nodes.len().div_ceil(BLOCK));
     for nodes in nodes.chunks(BLOCK) {
         let material = Material::new(nodes);
-        let above = beside.and_then(|rod| rod.get(blocks.len()));
+        let above = neighbour.and_then(|rod| rod.get(blocks.len()));
         let near = [blocks.last(), above].into_iter().flatten();
         let same = { near }.find(|other| ***other == material).cloned();
         blocks.push(same.unwrap_or_else(|| Arc::new(material)));

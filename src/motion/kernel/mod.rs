@@ -1,11 +1,11 @@
 //! The explicit method's loop over a rod: a whole time step, from the forces of
 //! its segments to the new positions of its nodes.
 //!
-//! It goes along the rod in blocks. The forces of a block's segments
-//! ([`segments`]) stay in the processor's nearest memories until its nodes have
-//! moved ([`nodes`]). Nodes that have moved are not read again: the next block's
-//! first node gets what the segment before it does from the block before, and
-//! the new positions are written to other arrays, as neighbouring rods are coupled
+//! It processes the rod in blocks. The forces of a block's segments
+//! ([`segments`]) stay in the innermost caches until its nodes have
+//! moved ([`nodes`]). Nodes that have moved are not read again: the force of the segment before
+//! the next block's first node is carried over from the previous block, and
+//! the new positions are written to other arrays, since neighbouring rods are coupled
 //! to the old ones.
 
 mod array;
@@ -23,21 +23,20 @@ use pulp::{Arch, Simd};
 use std::sync::Arc;
 
 /// Nodes of a block. Measured: with half as many, steps take 1.06 times as long,
-/// for the beginnings and ends of the loops; twice as many gain nothing.
+/// due to the beginnings and ends of the loops; twice as many gain nothing.
 pub const BLOCK: usize = 32 * GROUP;
 
-/// Positions of a rod's nodes, one array per component. Nodes come in groups, and
-/// arrays are a group longer at both ends: node i stands at GROUP + i; what is before and after is never used, only read.
+/// Positions of a rod's nodes, one array per component. Nodes come in groups, and arrays are
+/// a group longer at both ends: node i is at GROUP + i; the padding is read, but not used.
 #[derive(Clone, Debug)]
 pub struct Positions {
     pub x: [Array; 3],
 }
 
-/// What else moves.
+/// Other variables of the motion.
 #[derive(Clone, Debug)]
 pub struct Motion {
-    /// Rotations as quaternions, but for rounding and for what [`nodes`] cuts off
-    /// of unit length.
+    /// Rotations as quaternions, normalised up to rounding and the truncation error of [`nodes`].
     pub q: [Array; 4],
     /// Velocities, half a step behind or ahead.
     pub v: [Array; 3],
@@ -53,23 +52,23 @@ pub struct Past {
     pub two: [[Array; 3]; 2],
 }
 
-/// How strains make forces at an instant.
+/// Constitutive law at an instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Law {
     /// Whether there is internal friction.
     pub damped: bool,
-    /// Whether the rest curvature changes, and its work is summed up.
+    /// Whether the rest curvature varies, and its work is summed up.
     pub changes: bool,
-    /// Factor of the rest curvature if that changes, or one.
+    /// Factor of the rest curvature if that varies, or one.
     pub rest: f64,
     pub retardation: f64,
-    /// Weights of the present and the past strains in their rate.
+    /// Weights of the present and the previous strains in their rate.
     pub rates: [f64; 3],
-    /// Whether the present becomes the past.
+    /// Whether the present strains are stored.
     pub remember: bool,
 }
 
-/// What the segments of a block do to their ends.
+/// Forces of the segments of a block on their ends.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub struct Block {
@@ -94,7 +93,7 @@ impl Block {
         }
     }
 
-    /// Goes on to the next block after one of `nodes` nodes.
+    /// Proceeds to the next block after one of `nodes` nodes.
     fn advance(&mut self, nodes: usize) {
         for array in self.n.iter_mut().chain(&mut self.right) {
             array[GROUP - 1] = array[GROUP + nodes - 1];
@@ -111,11 +110,11 @@ pub struct Neighbour<'a> {
 }
 
 /// A time step of a rod: a kick by all forces, of length `kick`, velocities
-/// before it times `keep`, and motion free of forces for the time `drift`.
+/// before it being multiplied by `keep`, and a drift without forces for the time `drift`.
 pub struct Step<'a> {
     pub segments: usize,
     pub positions: &'a Positions,
-    /// Where they will be, but for a joint tip, which is set outside.
+    /// Their positions after the step, except a shared tip, which is set elsewhere.
     pub next: &'a mut Positions,
     pub neighbours: [Option<Neighbour<'a>>; 2],
     pub motion: &'a mut Motion,
@@ -123,30 +122,29 @@ pub struct Step<'a> {
     pub material: &'a [Arc<Material>],
     pub past: &'a mut Past,
     pub law: Law,
-    /// Without the force on a joint tip.
+    /// Without the force on a shared tip.
     pub loads: Loads,
     pub keep: f64,
     pub kick: f64,
     pub drift: f64,
-    /// Whether quaternions are brought back to unit length, from which rounding
-    /// and truncated series slowly take them.
+    /// Whether quaternions are normalised; rounding and truncated series slowly change their
+    /// length.
     pub normalise: bool,
-    /// Room to work in.
     pub block: &'a mut Block,
 }
 
-/// What a step sums up over a rod.
+/// Sums over a rod in a step.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StepTotals {
     /// Twice the kinetic energy in the middle of the kick.
     pub twice_kinetic: f64,
-    /// Power of internal friction, over the retardation time.
+    /// Power of internal friction, divided by the retardation time.
     pub friction: f64,
-    /// Elastic energy taken by a rise of the factor of the rest curvature, over that.
+    /// Derivative of the elastic energy with respect to the factor of the rest curvature.
     pub rest: f64,
     /// Largest (2 sin(psi/4))^2 of a segment bent by psi, before the step.
     pub largest_delta: f64,
-    /// Of the last segment.
+    /// Force of the last segment.
     pub last_force: [f64; 3],
 }
 
@@ -183,9 +181,9 @@ impl<const DAMPED: bool, const CHANGES: bool> pulp::WithSimd for Dispatched<'_, 
         let mut start = 0;
         while start <= segments {
             let nodes = length(segments, start);
-            let place = (GROUP + start, nodes);
+            let range = (GROUP + start, nodes);
             let part = Nodes {
-                place,
+                range,
                 x: &step.positions.x,
                 q: &step.motion.q,
                 material: &step.material[start / BLOCK],
@@ -202,7 +200,7 @@ impl<const DAMPED: bool, const CHANGES: bool> pulp::WithSimd for Dispatched<'_, 
                     block.left[c][tip] = 2.0 * step.loads.tip_moment[c];
                 }
             }
-            energy = energy + step.kick_and_drift(simd, place);
+            energy = energy + step.kick_and_drift(simd, range);
             step.block.advance(nodes);
             start += nodes;
         }
@@ -215,7 +213,7 @@ impl<const DAMPED: bool, const CHANGES: bool> pulp::WithSimd for Dispatched<'_, 
     }
 }
 
-/// The forces of a rod's segments alone, put into `forces`.
+/// Only the forces of a rod's segments, written to `forces`.
 pub struct Forces<'a> {
     pub segments: usize,
     pub positions: &'a Positions,
@@ -237,7 +235,7 @@ impl pulp::WithSimd for Forces<'_> {
         while start < self.segments {
             let nodes = length(self.segments, start);
             let part = Nodes {
-                place: (GROUP + start, nodes),
+                range: (GROUP + start, nodes),
                 x: &self.positions.x,
                 q: &self.motion.q,
                 material: &self.material[start / BLOCK],

@@ -6,30 +6,30 @@ use super::segments::quaternion;
 use super::{BLOCK, GROUP, Motion, Neighbour, Step};
 use crate::lanes::{Lanes, Vectors, cut, cut_mut, slice, slice_mut};
 
-/// cos and sin(a)/a as series in a^2, for angles of a step (halved). Truncated,
-/// they turn a node by a little too much: by 2e-10 of the angle at a = 0.1,
-/// growing with a^6, which leaves the order of the method. As the angle still
+/// cos and sin(a)/a as series in a^2, for angles of a step (halved). Due to truncation
+/// a node turns by slightly too much: by 2e-10 of the angle at a = 0.1,
+/// increasing with a^6, which does not affect the order of the method. As the angle still
 /// depends on the angular momentum alone, the method stays symplectic. cos^2 +
 /// sin^2 exceeds 1 by at most 4e-4 a^8.
 const COS: [f64; 4] = [1.0, -1.0 / 2.0, 1.0 / 24.0, -1.0 / 720.0];
 const SINC: [f64; 3] = [1.0, -1.0 / 6.0, 1.0 / 120.0];
 
 impl Step<'_> {
-    /// Moves the nodes of `place` (index of the first, count) with the forces in
+    /// Moves the nodes of `range` (index of the first, count) with the forces in
     /// the block; returns eight times their kinetic energy in the middle of the
-    /// kick. Every node turns as a body free of moments with one axis of symmetry
-    /// does: about its angular momentum, and about its own axis.
+    /// kick. Every node rotates as a torque-free body with one axis of symmetry:
+    /// about its angular momentum, and about its own axis.
     #[inline(always)]
-    pub fn kick_and_drift<S: Simd>(&mut self, simd: S, place: (usize, usize)) -> Lanes<S> {
-        // In two loops, as of forces.
+    pub fn kick_and_drift<S: Simd>(&mut self, simd: S, range: (usize, usize)) -> Lanes<S> {
+        // In two loops, as for the forces.
         let moving = match self.neighbours {
-            [None, None] => self.translate(simd, place, []),
-            [Some(one), None] | [None, Some(one)] => self.translate(simd, place, [one]),
-            [Some(one), Some(two)] => self.translate(simd, place, [one, two]),
+            [None, None] => self.translate(simd, range, []),
+            [Some(one), None] | [None, Some(one)] => self.translate(simd, range, [one]),
+            [Some(one), Some(two)] => self.translate(simd, range, [one, two]),
         };
         let turning = match self.normalise {
-            true => self.rotate::<S, true>(simd, place),
-            false => self.rotate::<S, false>(simd, place),
+            true => self.rotate::<S, true>(simd, range),
+            false => self.rotate::<S, false>(simd, range),
         };
         moving + turning
     }
@@ -39,23 +39,23 @@ impl Step<'_> {
     fn translate<S: Simd, const K: usize>(
         &mut self,
         simd: S,
-        place: (usize, usize),
+        range: (usize, usize),
         neighbours: [Neighbour; K],
     ) -> Lanes<S> {
-        let nodes = place.1;
+        let nodes = range.1;
         let own = |array| slice(array, (0, nodes));
         let blocks = self.material;
-        let material = &blocks[(place.0 - GROUP) / BLOCK];
+        let material = &blocks[(range.0 - GROUP) / BLOCK];
         let (weight, coupled) = (own(&material.weight), own(&material.coupled));
         let (mass, per_mass) = (own(&material.mass), own(&material.per_mass));
         let n_right = cut(&self.block.n, (GROUP, nodes));
         let n_left = cut(&self.block.n, (GROUP - 1, nodes));
-        let x = cut(&self.positions.x, place);
-        let mut next = cut_mut(&mut self.next.x, place);
-        let mut v = cut_mut(&mut self.motion.v, place);
-        let (mut beside, mut ties) = ([x; K], [Vectors::splat(simd, [0.0; 3]); K]);
+        let x = cut(&self.positions.x, range);
+        let mut next = cut_mut(&mut self.next.x, range);
+        let mut v = cut_mut(&mut self.motion.v, range);
+        let (mut neighbour, mut ties) = ([x; K], [Vectors::splat(simd, [0.0; 3]); K]);
         for k in 0..K {
-            beside[k] = cut(&neighbours[k].positions.x, place);
+            neighbour[k] = cut(&neighbours[k].positions.x, range);
             ties[k] = Vectors::splat(simd, neighbours[k].stiffness);
         }
         let gravity = Vectors::splat(simd, self.loads.gravity.to_array());
@@ -70,7 +70,7 @@ impl Step<'_> {
             let x = Vectors::load(simd, &x, at);
             let share = Lanes::load(simd, coupled, at);
             for k in 0..K {
-                let gap = Vectors::load(simd, &beside[k], at) - x;
+                let gap = Vectors::load(simd, &neighbour[k], at) - x;
                 force = (gap * ties[k]).times(share, force);
             }
             let per_mass = Lanes::load(simd, per_mass, at);
@@ -90,24 +90,24 @@ impl Step<'_> {
     fn rotate<S: Simd, const NORMALISE: bool>(
         &mut self,
         simd: S,
-        place: (usize, usize),
+        range: (usize, usize),
     ) -> Lanes<S> {
-        let nodes = place.1;
+        let nodes = range.1;
         let own = |array| slice(array, (0, nodes));
         let blocks = self.material;
-        let material = &blocks[(place.0 - GROUP) / BLOCK];
+        let material = &blocks[(range.0 - GROUP) / BLOCK];
         let (per_inertia, per_spin) = (own(&material.per_inertia), own(&material.per_spin));
         let left = cut(&self.block.left, (GROUP, nodes));
         let right = cut(&self.block.right, (GROUP - 1, nodes));
         let Motion { q, p, .. } = &mut *self.motion;
         let [i, j, k, l] = q;
         let q = [
-            slice_mut(i, place),
-            slice_mut(j, place),
-            slice_mut(k, place),
-            slice_mut(l, place),
+            slice_mut(i, range),
+            slice_mut(j, range),
+            slice_mut(k, range),
+            slice_mut(l, range),
         ];
-        let mut p = cut_mut(p, place);
+        let mut p = cut_mut(p, range);
         let keep = Lanes::splat(simd, self.keep);
         let half_kick = Lanes::splat(simd, 0.5 * self.kick);
         let half_step = Lanes::splat(simd, 0.5 * self.drift);
@@ -139,7 +139,7 @@ impl Step<'_> {
             let squared = b * b;
             let (mut c, mut s) = (squared.polynomial(&COS), b * squared.polynomial(&SINC));
             if NORMALISE {
-                // From very near to unit length.
+                // Newton's iteration for the length, which is nearly one.
                 let scale = half.times_from(r.dot(r) + w * w, three_halves);
                 (c, s) = (c * scale, s * scale);
             }

@@ -1,7 +1,7 @@
 //! Internal forces of the midpoint element.
 //!
-//! The element is that of [`crate::rod`] with the force not carried as an
-//! unknown but following from the strains, n = H (v - v0), which has the same
+//! The element is that of [`crate::rod`], with the force not as an independent
+//! unknown but given by the strains, n = H (v - v0), which has the same
 //! equilibria. With the unit quaternions q0, q1 at its ends, s = q0 + q1,
 //! delta = |q1 - q0|^2 = (2 sin(psi/4))^2 = 4 - |s|^2, and w the vector part of
 //! q0^* q1, of length sin(psi/2):
@@ -13,11 +13,11 @@
 //! G = dx x N,   T = R M - (R tau) x G
 //! ```
 //!
-//! R w is the vector part of q1 q0^*: that of q0^* q1 is its even part less its
+//! R w is the vector part of q1 q0^*: that of q0^* q1 is its even part minus its
 //! odd part, and this their sum.
 //!
-//! S = sigma + c w w^T is the derivative of the rotation vector. As it leaves
-//! what lies along w as it is, c = (1 - sigma)/|w|^2 = -4 B/|s|^2 if sigma is
+//! S = sigma + c w w^T is the derivative of the rotation vector. As it maps
+//! vectors along w to themselves, c = (1 - sigma)/|w|^2 = -4 B/|s|^2 if sigma is
 //! written as 1 + B delta. B is a polynomial in delta ([`B`]): a segment costs one
 //! division and no root.
 
@@ -27,7 +27,7 @@ use crate::rotation::{B, directors};
 use pulp::Simd;
 use std::ops::Deref;
 
-/// The rate of a strain, from the last two.
+/// The rate of a strain, from it and the last two.
 #[inline(always)]
 fn rate<S: Simd>(
     (one, two): (&mut [&mut [f64]; 3], &mut [&mut [f64]; 3]),
@@ -45,18 +45,17 @@ fn rate<S: Simd>(
     before.times(rates[2], last.times(rates[1], now.scale(rates[0])))
 }
 
-/// Nodes of a rod.
 #[derive(Clone, Copy)]
 pub struct Nodes<'a> {
     /// Index of the first, count.
-    pub place: (usize, usize),
+    pub range: (usize, usize),
     pub x: &'a [Array; 3],
     pub q: &'a [Array; 4],
     pub material: &'a Material,
     pub law: &'a Law,
 }
 
-/// What the loops over segments sum up over a rod: see [`super::StepTotals`].
+/// Sums of the loops over segments: see [`super::StepTotals`].
 #[derive(Clone, Copy)]
 pub struct SegmentSums<S: Simd> {
     /// If `DAMPED`.
@@ -78,7 +77,7 @@ impl<S: Simd> SegmentSums<S> {
     }
 }
 
-/// Forces and moments of the segments behind `nodes`, put into `block`.
+/// Forces and moments of the segments after `nodes`, written to `block`.
 #[inline(always)]
 pub fn forces<S: Simd, const DAMPED: bool, const CHANGES: bool>(
     simd: S,
@@ -88,12 +87,12 @@ pub fn forces<S: Simd, const DAMPED: bool, const CHANGES: bool>(
     sums: &mut SegmentSums<S>,
 ) {
     let ([one_v, one_psi], [two_v, two_psi]) = (&mut past.one, &mut past.two);
-    // In two loops: of short ones the processor works on several rounds at once.
+    // In two loops: the processor overlaps iterations of short ones.
     bend::<S, DAMPED, CHANGES>(simd, nodes, (one_psi, two_psi), block, sums);
     stretch::<S, DAMPED>(simd, nodes, (one_v, two_v), block, sums);
 }
 
-/// Bending: M, R tau and 2/|s|^2, for [`stretch`] to go on with.
+/// Bending: M, R tau and 2/|s|^2, for [`stretch`].
 #[inline(always)]
 fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
     simd: S,
@@ -103,22 +102,22 @@ fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
     sums: &mut SegmentSums<S>,
 ) {
     let Nodes {
-        place: (start, count),
+        range: (start, count),
         q,
         material,
         law,
         ..
     } = nodes;
-    // Of one length all: what is inside one is inside the others.
-    let (place, own) = ((start, count), (GROUP, count));
-    let (q0, q1) = (cut(q, place), cut(q, (start + 1, count)));
+    // All arrays have one length: an index valid for one is valid for the others.
+    let (range, own) = ((start, count), (GROUP, count));
+    let (q0, q1) = (cut(q, range), cut(q, (start + 1, count)));
     let stiffness = cut(&material.bend, (0, count));
     let rest_turn = cut(&material.rest_turn, (0, count));
     let rest_moment = cut(&material.rest_moment, (0, count));
     let mut moment = cut_mut(&mut block.left, own);
     let mut tangent = cut_mut(&mut block.right, own);
     let twice_inverse = &mut block.twice_inverse[..count];
-    let mut past = DAMPED.then(|| (cut_mut(past_one, place), cut_mut(past_two, place)));
+    let mut past = DAMPED.then(|| (cut_mut(past_one, range), cut_mut(past_two, range)));
     let rates = law.rates.map(|rate| Lanes::splat(simd, rate));
     let retardation = Lanes::splat(simd, law.retardation);
     let rest = Lanes::splat(simd, law.rest);
@@ -141,8 +140,8 @@ fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
         let w = even - odd;
         (even + odd).scale(twice).store(&mut tangent, at);
         let stiffness = Vectors::load(simd, &stiffness, at);
-        // The moment A (2 sigma w - u0) and its part along w, as far as possible
-        // before sigma is known: the series takes long.
+        // The moment A (2 sigma w - u0) and its component along w, as far as possible
+        // before sigma is known: the series has a long latency.
         let slope = w * stiffness;
         let mut at_rest = Vectors::load(simd, &rest_moment, at);
         if CHANGES {
@@ -176,7 +175,7 @@ fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
     };
 }
 
-/// Stretch and shear, and all that acts on the ends.
+/// Stretch and shear, and the forces and moments on the ends.
 #[inline(always)]
 fn stretch<S: Simd, const DAMPED: bool>(
     simd: S,
@@ -186,22 +185,22 @@ fn stretch<S: Simd, const DAMPED: bool>(
     sums: &mut SegmentSums<S>,
 ) {
     let Nodes {
-        place: (start, count),
+        range: (start, count),
         x,
         q,
         material,
         law,
     } = nodes;
-    let (place, after, own) = ((start, count), (start + 1, count), (GROUP, count));
-    let (x0, x1) = (cut(x, place), cut(x, after));
-    let (q0, q1) = (cut(q, place), cut(q, after));
+    let (range, after, own) = ((start, count), (start + 1, count), (GROUP, count));
+    let (x0, x1) = (cut(x, range), cut(x, after));
+    let (q0, q1) = (cut(q, range), cut(q, after));
     let stiffness = cut(&material.stretch, (0, count));
     let rest_length = slice(&material.rest_length, (0, count));
     let mut force = cut_mut(&mut block.n, own);
     let mut left = cut_mut(&mut block.left, own);
     let mut right = cut_mut(&mut block.right, own);
     let twice_inverse = &block.twice_inverse[..count];
-    let mut past = DAMPED.then(|| (cut_mut(past_one, place), cut_mut(past_two, place)));
+    let mut past = DAMPED.then(|| (cut_mut(past_one, range), cut_mut(past_two, range)));
     let rates = law.rates.map(|rate| Lanes::splat(simd, rate));
     let retardation = Lanes::splat(simd, law.retardation);
     let mut power = sums.friction;
@@ -209,7 +208,7 @@ fn stretch<S: Simd, const DAMPED: bool>(
     while at + S::F64_LANES <= count {
         let (a, aw) = quaternion(simd, &q0, at);
         let (b, bw) = quaternion(simd, &q1, at);
-        // Midpoint frame: the rotation matrix of s without its length.
+        // Midpoint frame: the rotation matrix of s, not normalised.
         let (s, sw) = (a + b, aw + bw);
         let directors = directors((s, sw), Lanes::load(simd, twice_inverse, at));
         let dx = Vectors::load(simd, &x1, at) - Vectors::load(simd, &x0, at);

@@ -1,16 +1,16 @@
-//! A start whose rigid segments are strained, as arcs of different chords are.
+//! Closing of an initial state with strained rigid segments, as of arcs of different chords.
 
 use super::SemiImplicit;
 use super::curves::meeting;
 use crate::leaf::{DiscreteLeaf, State};
 use crate::newton::{Definite, Equations, Newton, Work};
 
-/// Squared frequencies of the springs that hold the nodes where they are: stiff
-/// ones first; a straight vein that must give way may need softer ones.
+/// Squared frequencies of the springs that hold the nodes in place: stiff
+/// ones first; a straight vein that must buckle may need softer ones.
 const HOLDS: [f64; 3] = [1e3, 30.0, 1.0];
 
-/// Compliances (L^2/A) by which the leaf is made rigid: the first, the ratio of
-/// the next, and the last.
+/// Compliances (L^2/A) through which the leaf is made rigid: the first, the ratio of
+/// successive ones, and the last.
 const FIRST: f64 = 0.1;
 const NEXT: f64 = 0.3;
 const LAST: f64 = 1e-9;
@@ -21,11 +21,11 @@ const NEARLY: f64 = 1e-4;
 const CLOSED: f64 = 1e-13;
 
 impl SemiImplicit {
-    /// Moves the nodes to where rigid segments are not strained, by little: the
-    /// leaf is made rigid by steps, without loads, while springs in proportion to
-    /// the masses hold its nodes. Where that fails, as straight rods do not know to
-    /// which side to give way, the rods become curves that meet. Leaves the nodes
-    /// where they are if there are none.
+    /// Moves the nodes slightly to a state with unstrained rigid segments: the
+    /// leaf is made rigid in steps, without loads, while springs in proportion to
+    /// the masses hold its nodes. If that fails, since the side to which straight rods buckle is
+    /// undetermined, the rods become curves with a common tip. If there are none, the nodes are
+    /// not moved.
     pub(super) fn close(&mut self) {
         let mut leaf = self.leaf.clone();
         leaf.sections.clone_from(&self.sections);
@@ -38,7 +38,7 @@ impl SemiImplicit {
         }
     }
 
-    /// The state that springs of this `rate` leave, if there is one.
+    /// The equilibrium with springs of this `rate`, if there is one.
     fn closed(&mut self, leaf: &DiscreteLeaf, rate: f64) -> Option<State> {
         let mut state = self.state.clone();
         let mut floor = FIRST;
@@ -51,7 +51,7 @@ impl SemiImplicit {
         Some(state)
     }
 
-    /// To the equilibrium of `leaf` whose nodes are held where they are now.
+    /// Solves for the equilibrium of `leaf` with springs at the present positions of its nodes.
     fn hold(
         &mut self,
         leaf: &DiscreteLeaf,

@@ -1,22 +1,22 @@
-//! Rigid rods that meet: curves of two parameters in the plane of the fan, neither
-//! stretched nor sheared, from the base to a common tip.
+//! Rigid rods with a common tip: curves of two parameters in the plane of the fan, neither
+//! stretched nor sheared, from the base to the tip.
 
 use crate::leaf::{DiscreteLeaf, State};
 use crate::rotation;
 use glam::{DMat2, DQuat, DVec2, DVec3};
 
-/// The tip lies at the mean of what the arcs reach, but within these parts of the
-/// length of the shortest rod; nearer by this factor, as often as it takes, where
-/// a rod does not get there.
+/// The tip is at the mean of the ends of the arcs, but within these parts of the
+/// length of the shortest rod; nearer by this factor, repeatedly, if
+/// a rod does not reach it.
 const REACH: [f64; 2] = [0.2, 0.97];
 const NEARER: f64 = 0.96;
 
-/// Where the searches for a curve begin: the second parameter. The first is that of
-/// the arc, less a third of this, which keeps the direction of the chord. A straight
-/// rod that must give way has no side, and gets one.
+/// Initial values of the second parameter in the search for a curve. The first is that of
+/// the arc minus a third of this, which keeps the direction of the chord. The side to which a
+/// straight rod buckles is arbitrary; these values choose one.
 const BENDS: [f64; 9] = [0.0, 2.0, -2.0, 4.0, -4.0, 7.0, -7.0, 10.0, -10.0];
 
-/// Iterations of a search, their longest step, and the gap that is none.
+/// Iterations of a search, their longest step, and the gap that counts as closed.
 const ITERATIONS: usize = 30;
 const LONGEST: f64 = 0.7;
 const CLOSED: f64 = 1e-14;
@@ -52,13 +52,13 @@ pub(super) fn meeting(leaf: &DiscreteLeaf) -> Option<State> {
         })?;
     let (mut x, mut q) = (Vec::new(), Vec::new());
     for (rod, parameters) in rods.iter().zip(found) {
-        rod.place(parameters, &mut x, &mut q);
+        rod.append_nodes(parameters, &mut x, &mut q);
         *x.last_mut()? = tip.extend(0.0);
     }
     Some(State::new(leaf.segments(), x, q))
 }
 
-/// A rod whose direction turns by a p + b p (1 - p) up to the part p of its length.
+/// A rod whose direction has turned by a p + b p (1 - p) at the part p of its length.
 struct Rod {
     angle: f64,
     length: f64,
@@ -95,7 +95,7 @@ impl Rod {
         towards.angle_to(DVec2::from_angle(self.angle))
     }
 
-    /// What a node at `part` turns by, for a unit of each parameter.
+    /// Derivatives of a node's turn at `part` with respect to both parameters.
     fn turns(part: f64) -> [f64; 2] {
         [part, part * (1.0 - part)]
     }
@@ -105,7 +105,7 @@ impl Rod {
         self.angle + a * of_a + b * of_b
     }
 
-    /// Where the rod ends, and the derivatives of that.
+    /// The end of the rod, and its derivatives.
     fn end(&self, parameters: [f64; 2]) -> [DVec2; 3] {
         let mut sums = [DVec2::ZERO; 3];
         for (ends, segment) in self.parts.windows(2).zip(&self.segments) {
@@ -120,8 +120,8 @@ impl Rod {
         sums
     }
 
-    /// The parameters with which the rod ends at `tip`, bent as little as the searches
-    /// find, by Newton's method.
+    /// The parameters with which the rod ends at `tip`, with the least bending among those found,
+    /// by Newton's method.
     fn reaching(&self, tip: DVec2, arc: f64) -> Option<[f64; 2]> {
         let searches = BENDS.iter().filter_map(|&bend| {
             let mut at = DVec2::new(arc - bend / 3.0, bend);
@@ -155,7 +155,7 @@ impl Rod {
         })
     }
 
-    /// Square of the curvature over the length.
+    /// Square of the curvature integrated over the length.
     fn bending(&self, parameters: [f64; 2]) -> f64 {
         let turns = self.segment_turns(parameters);
         turns.map(|(turn, part)| turn * turn / part).sum()
@@ -166,8 +166,7 @@ impl Rod {
         turns.fold(0.0, |largest, (turn, _)| largest.max(turn.abs()))
     }
 
-    /// Appends the nodes.
-    fn place(&self, parameters: [f64; 2], x: &mut Vec<DVec3>, q: &mut Vec<DQuat>) {
+    fn append_nodes(&self, parameters: [f64; 2], x: &mut Vec<DVec3>, q: &mut Vec<DQuat>) {
         let frame = |part| rotation::exp(self.direction(parameters, part) * DVec3::Z);
         let mut node = DVec3::ZERO;
         x.push(node);

@@ -19,7 +19,7 @@ impl SemiImplicit {
         leaf.each(0..n).map(strains).collect()
     }
 
-    /// Makes the attempted step of `h`, and accounts for it.
+    /// Accepts the attempted step of `h` and updates the energy balance.
     pub(super) fn accept(&mut self, h: f64) {
         std::mem::swap(&mut self.state, &mut self.trial);
         std::mem::swap(&mut self.moving, &mut self.next_moving);
@@ -40,8 +40,8 @@ impl SemiImplicit {
         self.count += 1;
     }
 
-    /// Work of what changed in the accepted step of `h`: as much as it would
-    /// be on the mean of the states before (the trial) and after.
+    /// Work of changing loads and rest shapes in the accepted step of `h`: that on the mean of
+    /// the states before (the trial) and after.
     fn work_of_changes(&mut self, h: f64) -> f64 {
         let (from, to) = (self.time, self.time + h);
         let mut work = 0.0;
@@ -98,9 +98,9 @@ impl SemiImplicit {
         self.physics.retardation * power
     }
 
-    /// The mean momentum of the accepted step times its displacement: work of
-    /// external damping, over its rate. Of what the step does not resolve,
-    /// which alternates, nothing is left in it.
+    /// The mean momentum of the accepted step times its displacement: the work of
+    /// external damping over its rate. It contains nothing of the unresolved motion,
+    /// which alternates.
     fn momentum_times_displacement(&self) -> f64 {
         let mut sum = 0.0;
         for (k, inertia) in self.inertia.iter().enumerate() {

@@ -1,26 +1,26 @@
-//! The start: forces and accelerations of a leaf at rest.
+//! Initial forces and accelerations of a leaf at rest.
 
 use super::step::add_inertia;
 use super::{Inertia, Moving, SemiImplicit};
 use glam::{DMat3, DVec3};
 
-/// A first step from rest, of implicit Euler, so short that the leaf hardly
-/// moves: one over the square of its length. It gives the forces in rigid
-/// segments, which no strain determines.
+/// Inverse square of the length of a first step from rest, of implicit Euler, so short that the
+/// leaf hardly moves. It determines the forces in rigid
+/// segments, which do not follow from strains.
 const INVERSE_STEP_SQUARED: f64 = 1e6;
 
 /// Its iterations, and the size of the last.
 const ITERATIONS: usize = 30;
 const LAST: f64 = 1e-15;
 
-/// A length by which rounding may strain a rigid segment.
+/// Strain of a rigid segment, as a length, that may be due to rounding.
 const VIOLATION: f64 = 1e-12;
 
-/// One that is not closed.
+/// The same, above which the state must be closed.
 const STRAINED: f64 = 1e-8;
 
 impl SemiImplicit {
-    /// Gives the segments their forces and the nodes their accelerations.
+    /// Initialises the forces of the segments and the accelerations of the nodes.
     pub(super) fn initialise(&mut self) {
         self.apply_loads_and_damping(0.0, 0.0, INVERSE_STEP_SQUARED);
         let violation = self.set_segment_forces();
@@ -28,7 +28,7 @@ impl SemiImplicit {
             return self.set_accelerations();
         }
         if violation > VIOLATION {
-            // To where rigid segments are not strained.
+            // Close the state: no rigid segment may be strained.
             let strained = self.state.clone();
             if self.first_step() {
                 std::mem::swap(&mut self.state, &mut self.trial);
@@ -55,7 +55,7 @@ impl SemiImplicit {
     }
 
     /// Sets the force of every segment to that of its strain, and of a rigid one to
-    /// zero. Returns the largest strain of these, as a length.
+    /// zero. Returns the largest strain of rigid ones, as a length.
     fn set_segment_forces(&mut self) -> f64 {
         let (n, mut violation) = (self.leaf.segments(), 0.0_f64);
         for (j, i) in self.leaf.each(0..n) {

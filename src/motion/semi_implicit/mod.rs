@@ -5,8 +5,8 @@
 //! It is of second order, stable at any time step for any stiffness, and damps
 //! only what the step does not resolve. Every step solves the balance of
 //! momentum at its end by Newton's method, with the matrices and the mixed
-//! form of the relaxation: rigid rods are allowed. Spatial increments turn
-//! the nodes, as everywhere.
+//! form of the relaxation, which allows rigid rods. Rotations are updated by spatial
+//! increments, as everywhere.
 //!
 //! With d the increment over a step h, v the velocity, a an auxiliary
 //! acceleration and w the true one,
@@ -30,8 +30,8 @@ use crate::newton::Definite;
 use crate::rod::Section;
 use glam::{DQuat, DVec3};
 
-/// Spectral radius rho_inf at infinite frequency: what remains in a step of what
-/// it cannot resolve. Smaller values damp more of what it can.
+/// Spectral radius rho_inf at infinite frequency: the part of unresolved motion that
+/// remains after a step. Smaller values also damp more of what is resolved.
 const RHO_INF: f64 = 0.8;
 
 /// Weights of the method.
@@ -58,29 +58,29 @@ impl Weights {
     }
 }
 
-/// Shortest step, and the part of a step that is rounding.
+/// Shortest step, and the part of a step below which differences of time are rounding.
 const SHORTEST_STEP: f64 = 1e-10;
 const NO_TIME: f64 = 1e-9;
 
-/// Bounds of the change of the step.
+/// Bounds on the ratio of successive steps.
 const GROWTH: (f64, f64) = (0.2, 2.0);
 
-/// What may help if energy grows, besides a shorter step, and if steps are too short.
+/// Advice if energy grows, besides a shorter step, and if steps are too short.
 const OTHERWISE: &str = "dynamics.start = \"at-rest\"";
 const TOO_SHORT: &str = "use more segments a rod, or slower changes of the loads";
 const TOO_SHORT_AT_THE_START: &str = "the arcs it is released from strain rods that are rigid: \
     use dynamics.start = \"at-rest\", or a stiffness less than inf";
 
-/// How long time steps are.
+/// Control of the time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Steps {
-    /// All of this length, but those that hit the times asked for.
+    /// All of this length, except those that end at the times asked for.
     Fixed(f64),
-    /// So that the local error of positions (lengths) and rotations (radians)
+    /// Such that the local error of positions (lengths) and rotations (radians)
     /// stays below this.
     Error(f64),
-    /// The same where only the end of a motion matters: its equations are solved no
-    /// better than that, and of what a step does not resolve a part `rho_inf` remains.
+    /// The same if only the end of a motion matters: equations are solved with
+    /// lower accuracy, and the part `rho_inf` of unresolved motion remains after a step.
     ToRest {
         /// The local error.
         error: f64,
@@ -90,7 +90,7 @@ pub enum Steps {
 }
 
 impl Steps {
-    /// The local error allowed, if it decides.
+    /// The permitted local error, if it determines the step.
     fn error(self) -> Option<f64> {
         match self {
             Steps::Fixed(_) => None,
@@ -119,19 +119,19 @@ struct Moving {
 }
 
 impl Moving {
-    /// With an acceleration, but no velocity.
+    /// An acceleration without velocity.
     fn at_rest(w: [DVec3; 2]) -> Self {
         let v = [DVec3::ZERO; 2];
         Moving { v, a: w, w }
     }
 }
 
-/// A leaf on the move.
+/// A leaf in semi-implicit motion.
 pub struct SemiImplicit {
     leaf: DiscreteLeaf,
     physics: Physics,
     inertia: Vec<Inertia>,
-    /// The rods' own sections, where internal damping changes them.
+    /// The rods' own sections, if internal damping changes them.
     sections: Vec<Section>,
     /// Strains (v, u) of all segments at the last step and the one before, and
     /// the width of the step between.
@@ -147,13 +147,13 @@ pub struct SemiImplicit {
     moving: Vec<Moving>,
     next_moving: Vec<Moving>,
     weights: Weights,
-    /// Size of an iteration over the square of the one before, as last seen.
+    /// Last ratio of the size of an iteration to the square of the previous one.
     contraction: f64,
     steps: Steps,
     step: f64,
     time: f64,
     count: usize,
-    /// Factorisations so far.
+    /// Number of factorisations.
     pub factorizations: usize,
     balance: EnergyBalance,
 }
@@ -207,7 +207,7 @@ impl SemiImplicit {
             return Ok(());
         }
         let count = (left / self.step * (1.0 - 1e-12)).ceil().max(1.0);
-        // The last two steps share what is left.
+        // The last two steps divide the remaining time equally.
         let last = count == 1.0;
         let h = match self.steps {
             Steps::Fixed(_) => left / count,
@@ -222,7 +222,7 @@ impl SemiImplicit {
                 self.step = next;
                 return Ok(());
             }
-            // The error of a step cut short by `until` does not limit the next.
+            // A step cut short by `until` does not limit the next.
             self.step = if last { next.max(self.step) } else { next };
         }
         match error {
@@ -326,7 +326,7 @@ impl Method for SemiImplicit {
         for v in self.state.n.iter_mut().chain(moving.chain(past).flatten()) {
             *v = vector(&mut next);
         }
-        // The solver in use decides the last digits, too.
+        // Results depend on the present solver in the last digits.
         self.leaf.assemble(&self.state, &mut self.system);
         let pattern = direct.then(|| SparsePattern::new(&self.system).ok());
         self.solver.direct = pattern.flatten();

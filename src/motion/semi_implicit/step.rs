@@ -9,29 +9,29 @@ use crate::rotation;
 use glam::{DMat3, DVec3};
 
 /// Newton iterations in a step, and the size of the last (radians, lengths),
-/// as a part of the error allowed and at most; of steps of given length.
+/// as a part of the permitted error and as an upper limit; for steps of given length.
 const ITERATIONS: usize = 12;
 const LAST_ITERATION: f64 = 1e-3;
 const LARGEST_LAST: f64 = 1e-9;
 const FIXED_LAST: f64 = 1e-12;
 
-/// What may be left of the iterations where only the end of the motion matters, as a
-/// part of the error allowed.
+/// Iteration error if only the end of the motion matters, as a
+/// part of the permitted error.
 const LAST_TO_REST: f64 = 1e-2;
 
-/// Relative accuracy of the conjugate gradients, and the same where only the end matters.
+/// Relative accuracy of the conjugate gradients, and the same if only the end matters.
 const CG_TOLERANCE: f64 = 1e-10;
 const CG_TO_REST: f64 = 1e-3;
 
-/// Least part of the last contraction that is taken for the next.
+/// Least estimate of the next contraction as a part of the last one.
 const FORGETTING: f64 = 0.5;
 
 /// Largest rotation of a node in a step, radians.
 const LARGEST_TURN: f64 = 0.5;
 
 /// The stiffness with which the forces of rigid segments are condensed out is
-/// so many times what inertia puts against it, at least: iterations gain as
-/// much, however short the step.
+/// at least this multiple of the resistance of inertia: iterations then converge
+/// equally fast for all steps.
 const STIFFER: f64 = 1e3;
 
 impl SemiImplicit {
@@ -47,15 +47,15 @@ impl SemiImplicit {
             .solve(&mut self.system, 0.0, None, accuracy, &mut uncounted)
     }
 
-    /// Moves the trial by the increments that were solved for.
+    /// Adds the solved increments to the trial.
     pub(super) fn advance_trial(&mut self) {
         let (leaf, next) = (&self.leaf, &mut self.next);
         leaf.advance(&self.trial, &self.system, 1.0, next);
         std::mem::swap(&mut self.trial, next);
     }
 
-    /// Turn and shift of a node from the state to the trial; none of a base or a tip
-    /// that is held, which not even rounding may move.
+    /// Rotation and displacement of a node from the state to the trial; exactly zero for a held
+    /// base or tip.
     pub(super) fn increment(&self, k: usize) -> [DVec3; 2] {
         let [turns, shifts] = match k % (self.leaf.segments() + 1) {
             0 => [false; 2],
@@ -91,7 +91,7 @@ impl SemiImplicit {
         }
     }
 
-    /// One step of h; returns its local error, or `None` if it was too long.
+    /// Attempts a step of h; returns its local error, or `None` if it was too long.
     pub(super) fn attempt(&mut self, h: f64) -> Option<f64> {
         let damping = self.physics.damping;
         let Weights {
@@ -143,7 +143,7 @@ impl SemiImplicit {
         None
     }
 
-    /// What an iteration of this size leaves to the next: iterations are quadratic.
+    /// Estimated size of the next iteration: convergence is quadratic.
     fn after_iteration(&mut self, size: f64, before: f64) -> f64 {
         if !before.is_finite() {
             return self.contraction * size * size;
@@ -164,12 +164,12 @@ impl SemiImplicit {
         error * (self.weights.beta - 1.0 / 6.0).abs() * h * h
     }
 
-    /// The trial if accelerations did not change in the step.
+    /// Predicts the trial with constant accelerations.
     fn predict(&mut self, h: f64) {
         self.trial.clone_from(&self.state);
         for (k, m) in self.moving.iter().enumerate() {
             let d = |c: usize| h * m.v[c] + 0.5 * h * h * m.a[c];
-            // Far from the present the present is the better guess.
+            // If the prediction is far away, the present state is better.
             let turn = d(0);
             if turn.length() < LARGEST_TURN {
                 self.trial.q[k] = (rotation::exp(turn) * self.trial.q[k]).normalize();
@@ -181,7 +181,7 @@ impl SemiImplicit {
     /// Sets the leaf's loads and rest shapes at a time, and in its sections the
     /// internal friction of a step of `h` that ends then: with the strain
     /// rate c0 v + c1 v1 + c2 v2 from this and the last two strains, a rod is
-    /// stiffer by 1 + eta c0 and rests elsewhere. Inertia enters the matrix by
+    /// stiffer by 1 + eta c0 and has another rest shape. Inertia enters the matrix as
     /// `per_mass` times the masses.
     pub(super) fn apply_loads_and_damping(&mut self, time: f64, h: f64, per_mass: f64) {
         self.leaf.loads = self.physics.loads(time);
@@ -210,7 +210,7 @@ impl SemiImplicit {
 }
 
 /// Adds mass times `per_mass` to the matrix, and a moment and a force to the
-/// right-hand side, at all nodes but the bases.
+/// right-hand side, at all nodes except the bases.
 pub(super) fn add_inertia(
     system: &mut System,
     state: &State,

@@ -3,14 +3,14 @@
 use glam::DVec3;
 
 use super::result::{Boundary, LeafBeside};
-use crate::branch::boundary::{self as curves, Beside, Plane, Verified, beside};
+use crate::branch::boundary::{self as curves, Neighbour, Plane, Verified, beside};
 use crate::leaf::State;
 
-/// Curves that have leaves beside them.
+/// Largest number of curves with leaves on either side.
 const MOST: usize = 4;
 
 /// Finds leaves on either side of a few curves: of those that bound stable leaves or, if there
-/// are none, of those with the smallest index beside them.
+/// are none, of those with the smallest index next to them.
 pub fn add_leaves(plane: Plane, known: &[curves::Boundary], boundary: &mut Boundary) {
     let index = |point: &Verified| point.indices[0].min(point.indices[1]);
     let mut order: Vec<(usize, usize)> = Vec::new();
@@ -23,7 +23,7 @@ pub fn add_leaves(plane: Plane, known: &[curves::Boundary], boundary: &mut Bound
     order.retain(|curve| Some(curve.0) == smallest);
     let found = order.into_iter().filter_map(|(least, number)| {
         let points = &known[number].points;
-        // In the middle between ends and special points.
+        // Midway between ends and special points.
         let special = |&k: &usize| points[k].special.is_some();
         let special: Vec<usize> = (0..points.len()).filter(special).collect();
         let off = |&k: &usize| {
@@ -33,8 +33,8 @@ pub fn add_leaves(plane: Plane, known: &[curves::Boundary], boundary: &mut Bound
         let same = (0..points.len()).filter(|&k| index(&points[k]) == least);
         let at = same.max_by_key(off)?;
         let before = &points[at.saturating_sub(1)];
-        let behind = points.get(at + 1).unwrap_or(&points[at]);
-        let along = [0, 1].map(|i| behind.place[i] - before.place[i]);
+        let after = points.get(at + 1).unwrap_or(&points[at]);
+        let along = [0, 1].map(|i| after.params[i] - before.params[i]);
         Some((number, beside(plane, &points[at], along)?))
     });
     let joined = boundary.joined;
@@ -44,17 +44,17 @@ pub fn add_leaves(plane: Plane, known: &[curves::Boundary], boundary: &mut Bound
     }
 }
 
-fn in_units(plane: &Plane, joined: bool, leaf: Beside) -> LeafBeside {
+fn in_units(plane: &Plane, joined: bool, leaf: Neighbour) -> LeafBeside {
     let length = plane.family.scale().length;
     let curves = |state: &State| -> Vec<Vec<DVec3>> {
         let rods = state.x.chunks(state.segments() + 1);
         rods.map(|rod| rod.iter().map(|x| *x * length).collect())
             .collect()
     };
-    let state = &leaf.spot.state;
+    let state = &leaf.solution.state;
     let tips = (0..state.rods()).map(|j| state.tip(j) * length);
     LeafBeside {
-        values: plane.values(leaf.spot.place),
+        values: plane.values(leaf.solution.params),
         index: leaf.index,
         tips: tips.take(if joined { 1 } else { usize::MAX }).collect(),
         curves: curves(state),

@@ -1,60 +1,60 @@
-//! What curves say of the index on a straight way through the plane.
+//! The index along a straight path through the plane, as implied by the curves.
 
 use super::known::IMAGES;
 use crate::branch::Kind;
 use crate::branch::boundary::{Boundary, Special, Verified};
 
-/// Points closer than this part of both ranges are one: polynomials through both would
-/// make slopes of their errors.
+/// Points closer than this part of both ranges are merged: their errors would dominate the
+/// slopes of interpolating polynomials.
 const APART: f64 = 1e-4;
 
-/// Crossings closer than this may be in the other order.
+/// Crossings closer than this may be in either order.
 const SAME: f64 = 1e-3;
 
-/// Tips of a curve farther than this from those of a branch (lengths) are of another one.
+/// A curve and a branch with tips farther apart than this (lengths) belong to different leaves.
 const NEAR: f64 = 0.02;
 
-/// Curves between larger indices are not followed for a map: what is beyond is judged by the
-/// singular matrices on the way itself.
+/// Curves between larger indices are not followed for a map: beyond this, singular
+/// matrices on the path itself are used.
 pub const MOST_INDEX: usize = 8;
 
-/// A straight way along one of the numbers, on which a branch was followed.
+/// A straight path along one of the parameters, on which a branch was followed.
 pub struct Edge {
-    /// Both numbers at its ends, as fractions of their ranges.
+    /// Both parameters at its ends, as fractions of their ranges.
     pub ends: [[f64; 2]; 2],
-    /// The index where it begins.
+    /// The index at its start.
     pub index: usize,
-    /// Tips along it, in the units of the curves: one if they are joined.
+    /// Tips along it, in the units of the curves: only one if they are joined.
     pub tips: Vec<Vec<[f64; 3]>>,
-    /// Where else matrices are singular on it, beyond the largest index of curves.
+    /// Critical points on it with indices too large for the curves.
     pub beyond: Vec<Crossing>,
-    /// The index where it ends; none if the branch does not come there.
+    /// The index at its end; none if the branch does not reach it.
     pub found: Option<usize>,
 }
 
-/// Where a curve is crossed.
+/// Crossing of a path and a curve.
 #[derive(Clone)]
 pub struct Crossing {
-    /// The number that changes.
+    /// The parameter that varies.
     pub at: f64,
     /// Whether the branch ends there.
     pub fold: bool,
     pub indices: [usize; 2],
 }
 
-/// Whether a change of the index is one that is followed for a map.
+/// Whether a change of the index is followed for a map.
 pub fn is_followed(indices: [usize; 2]) -> bool {
     indices.iter().all(|index| *index <= MOST_INDEX)
 }
 
 impl Edge {
-    /// The number that changes along it.
+    /// The parameter that varies along it.
     fn along(&self) -> usize {
         usize::from(self.ends[0][0] == self.ends[1][0])
     }
 
-    /// Whether what was found is what the curves say: at each of them that has the present
-    /// index on one side it becomes that on the other; at a fold the branch ends.
+    /// Whether the result agrees with the curves: at each curve that has the present index on one
+    /// side the index becomes that on the other; at a fold the branch ends.
     pub fn is_explained(&self, curves: &[Boundary]) -> bool {
         let along = self.along();
         let [from, to] = self.ends.map(|end| end[along]);
@@ -77,43 +77,43 @@ impl Edge {
                 return self.found.is_none();
             }
             reached = distance(&crossing);
-            let [before, behind] = crossing.indices;
-            now = before + behind - now;
+            let [before, after] = crossing.indices;
+            now = before + after - now;
         }
         self.found == Some(now)
     }
 
-    /// Where a curve of this branch crosses the line of this way.
+    /// Crossings of a curve of this branch with the line of this path.
     fn crossings(&self, curve: &Boundary) -> Vec<Crossing> {
         let along = self.along();
         let value = self.ends[0][1 - along];
         let mut points: Vec<&Verified> = Vec::new();
         for point in &curve.points {
             let far =
-                |last: &&Verified| (0..2).any(|i| (point.place[i] - last.place[i]).abs() > APART);
+                |last: &&Verified| (0..2).any(|i| (point.params[i] - last.params[i]).abs() > APART);
             if points.last().is_none_or(far) {
                 points.push(point);
             }
         }
-        let places = points
+        let coordinates = points
             .iter()
-            .map(|it| [it.place[along], it.place[1 - along]]);
-        let places: Vec<[f64; 2]> = places.collect();
+            .map(|it| [it.params[along], it.params[1 - along]]);
+        let coordinates: Vec<[f64; 2]> = coordinates.collect();
         let mut crossings = Vec::new();
-        for k in 1..places.len() {
-            let [low, high] = [places[k - 1][1], places[k][1]];
+        for k in 1..coordinates.len() {
+            let [low, high] = [coordinates[k - 1][1], coordinates[k][1]];
             let part = (value - low) / (high - low);
             if (low < value) == (high < value) || !self.is_near([points[k - 1], points[k]], part) {
                 continue;
             }
-            // Through four points where the number goes one way along them, or two.
-            let few = k.saturating_sub(2)..(k + 2).min(places.len());
+            // Through four points if the parameter is monotonic along them, else through two.
+            let few = k.saturating_sub(2)..(k + 2).min(coordinates.len());
             let rises = |pair: &[[f64; 2]]| (pair[1][1] > pair[0][1]) == (high > low);
-            let near = match places[few.clone()].windows(2).all(rises) {
-                true => &places[few],
-                false => &places[k - 1..=k],
+            let near = match coordinates[few.clone()].windows(2).all(rises) {
+                true => &coordinates[few],
+                false => &coordinates[k - 1..=k],
             };
-            // Where curves cross, other modes count as well.
+            // Where curves cross, further modes contribute.
             let point = match points[k].special {
                 Some(Special::Crossing) => points[k - 1],
                 _ => points[k],
@@ -127,14 +127,14 @@ impl Edge {
         crossings
     }
 
-    /// Whether the tips between two points of a curve are somewhere those of the branch,
-    /// which is known at its points only.
+    /// Whether the tips between two points of a curve agree with those of the branch, which are
+    /// known at its points only, anywhere along it.
     fn is_near(&self, [a, b]: [&Verified; 2], part: f64) -> bool {
         let tips = a.tips.iter().zip(&b.tips);
         let between =
             |(a, b): (&[f64; 3], &[f64; 3])| [0, 1, 2].map(|c| a[c] + part * (b[c] - a[c]));
         let tips: Vec<[f64; 3]> = tips.map(between).collect();
-        // Its image in a plane of the axes has the same index.
+        // The mirror image in a plane of the axes has the same index.
         let images = IMAGES.map(|signs| image(&tips, signs));
         let own = self.tips.iter();
         let off = own.flat_map(|own| images.iter().map(|tips| distance(own, tips)));
@@ -147,13 +147,13 @@ impl Edge {
     }
 }
 
-/// The image of tips, by the signs of y and z.
+/// The mirror image of tips, by the signs of y and z.
 fn image(tips: &[[f64; 3]], [y, z]: [f64; 2]) -> Vec<[f64; 3]> {
     let tips = tips.iter();
     tips.map(|tip| [tip[0], y * tip[1], z * tip[2]]).collect()
 }
 
-/// The largest distance of tips.
+/// The largest distance between corresponding tips.
 fn distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     let squares = a.iter().zip(b).map(|(a, b)| {
         let parts = a.iter().zip(b).map(|(x, y)| (x - y) * (x - y));
@@ -162,7 +162,7 @@ fn distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     squares.fold(0.0, f64::max).sqrt()
 }
 
-/// The polynomial through points, at a value of their second coordinate.
+/// Interpolates points by a polynomial in their second coordinate.
 fn through(points: &[[f64; 2]], at: f64) -> f64 {
     let mut sum = 0.0;
     for (i, [value, own]) in points.iter().enumerate() {

@@ -1,26 +1,24 @@
-//! Critical points of branches through the plane, and whether they lie on a curve that is
-//! known.
+//! Critical points of branches in the plane, and whether they lie on a known curve.
 
 use crate::branch::boundary::{Boundary, Halt, Seed, Verified};
 use crate::branch::{Critical, Kind, Point, Refined};
 use crate::leaf::Grid;
-use crate::study::trace::{Trace, TraceError, TraceRequest, trace_seen};
+use crate::study::trace::{Trace, TraceError, TraceRequest, trace_observed};
 
-/// A trace along the first number, where it begins, and what it met.
+/// A trace along the first parameter, with its first point and its critical points.
 pub struct Traced {
     pub trace: Trace,
-    /// The first point, and a grid of which its own is a coarser one; none where there is none.
+    /// The first point, and a grid that refines its own; none if there is no first point.
     pub first: Option<(Point, Grid)>,
     pub critical: Vec<(Critical, Refined)>,
 }
 
-/// Makes it.
 pub fn traced(
     request: &TraceRequest,
     progress: &mut dyn FnMut(usize, f64),
 ) -> Result<Traced, TraceError> {
     let (mut first, mut critical) = (None, Vec::new());
-    let trace = trace_seen(
+    let trace = trace_observed(
         request,
         &mut |_, points, value| progress(points, value),
         &mut |followed| {
@@ -39,46 +37,46 @@ pub fn traced(
     })
 }
 
-/// A critical point of a branch, without the error of its grid.
+/// A critical point of a branch, extrapolated over grids.
 pub struct Start<'a> {
     pub critical: &'a Critical,
     pub refined: &'a Refined,
-    /// Both numbers where the branch begins, as fractions, and their change with its
-    /// parameter.
+    /// Both parameters at the start of the branch, as fractions, and their derivatives with respect
+    /// to its parameter.
     pub from: [f64; 2],
-    pub way: [f64; 2],
+    pub direction: [f64; 2],
 }
 
-/// Both numbers, as fractions, and the tips are the same within this, besides the errors that
-/// both have.
+/// Parameters (as fractions) and tips that agree within this plus both error bounds are
+/// the same.
 const SAME: f64 = 1e-6;
 
-/// Improvements of the nearest point.
+/// Iterations for the nearest point.
 const ITERATIONS: usize = 20;
 
-/// Points of a curve closer than this are one for the polynomials: their errors over
-/// their distance would be slopes.
+/// Points of a curve closer than this are merged for interpolation: their errors would dominate
+/// the slopes.
 const APART: f64 = 1e-3;
 
-/// A point may lie before an interval of a curve or behind it, by this part of it.
+/// A point may lie outside an interval of a curve by this part of it.
 const BEYOND: f64 = 0.05;
 
 impl Start<'_> {
-    /// Both numbers at a value of the branch's parameter.
+    /// Both parameters at a value of the branch's parameter.
     fn numbers(&self, parameter: f64) -> [f64; 2] {
-        [0, 1].map(|i| self.from[i] + parameter * self.way[i])
+        [0, 1].map(|i| self.from[i] + parameter * self.direction[i])
     }
 
-    /// As the beginning of a curve.
+    /// The start of a curve.
     pub fn seed(&self) -> Seed<'_> {
         Seed {
             critical: self.critical,
-            place: self.numbers(self.critical.fraction),
-            way: self.way,
+            params: self.numbers(self.critical.fraction),
+            direction: self.direction,
         }
     }
 
-    /// The grid of it, of leaves with these kinks.
+    /// Its grid, for leaves with these kinks.
     pub fn grid(&self, kinks: &[f64]) -> Grid {
         coarsened(&self.refined.grid, self.critical.state.segments(), kinks)
     }
@@ -87,9 +85,9 @@ impl Start<'_> {
     pub fn is_on(&self, curve: &Boundary) -> bool {
         let tips = self.refined.tips.iter().flatten();
         let numbers = self.numbers(self.refined.fraction);
-        let length = self.way[0].hypot(self.way[1]);
+        let length = self.direction[0].hypot(self.direction[1]);
         let singular = Singular {
-            place: numbers.into_iter().chain(tips.copied()).collect(),
+            coordinates: numbers.into_iter().chain(tips.copied()).collect(),
             error: self.refined.fraction_error * length + self.refined.error,
             kind: self.critical.kind,
             modes: self.critical.modes.len(),
@@ -99,11 +97,11 @@ impl Start<'_> {
     }
 }
 
-/// Leaves out of a curve what repeats others at its ends; nothing may be left.
-pub fn leave_out_known(curve: &mut Boundary, known: &[Boundary]) {
+/// Removes from the ends of a curve what repeats known ones; nothing may remain.
+pub fn remove_known(curve: &mut Boundary, known: &[Boundary]) {
     let is_known = |point: &Verified| {
         let singular = Singular {
-            place: place(point),
+            coordinates: coordinates(point),
             error: error(point),
             kind: point.kind,
             modes: curve.neutral,
@@ -116,7 +114,7 @@ pub fn leave_out_known(curve: &mut Boundary, known: &[Boundary]) {
         curve.points.clear();
         return;
     }
-    // One that is known may be where curves cross; the last of several is where they meet.
+    // A known point may be a crossing of curves; the last known one of several is where they meet.
     let first = repeated.iter().take_while(|known| **known).count();
     let last = repeated.iter().rev().take_while(|known| **known).count();
     if last > 1 {
@@ -129,68 +127,68 @@ pub fn leave_out_known(curve: &mut Boundary, known: &[Boundary]) {
     }
 }
 
-/// A place of the plane and of the tips where a matrix is singular.
+/// A singular point, by its parameters and tips.
 struct Singular {
-    place: Vec<f64>,
+    coordinates: Vec<f64>,
     error: f64,
     kind: Kind,
     modes: usize,
-    /// The smaller index beside it and the larger one.
+    /// The smaller and the larger index next to it.
     sides: [usize; 2],
 }
 
-/// A leaf and its images in the planes of its axes along its length lose their stability
+/// A leaf and its mirror images in the planes of its longitudinal axes lose stability
 /// together: signs of y and z.
 pub const IMAGES: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
 
 impl Singular {
-    /// Whether it lies on a curve or on one of its images: beside a polynomial through points
-    /// of it by no more than this is off one of lower degree, where it separates the same
-    /// indices. Where more modes become neutral than those of the curve, others cross it.
+    /// Whether it lies on a curve or on one of its mirror images: no farther from a polynomial
+    /// through its points than that is from one of lower degree, with the same indices on both
+    /// sides. If more modes become neutral than those of the curve, others cross it there.
     fn is_on(&self, curve: &Boundary) -> bool {
         let crossed = self.modes > curve.neutral;
         if self.modes < curve.neutral || !crossed && curve.kind != self.kind {
             return false;
         }
-        let (mut points, mut places) = (Vec::new(), Vec::<Vec<f64>>::new());
+        let (mut points, mut points_of_curve) = (Vec::new(), Vec::<Vec<f64>>::new());
         for point in &curve.points {
-            let place = place(point);
-            if (places.last()).is_none_or(|last| distance(last, &place) > APART) {
+            let coordinates = coordinates(point);
+            if (points_of_curve.last()).is_none_or(|last| distance(last, &coordinates) > APART) {
                 points.push(point);
-                places.push(place);
+                points_of_curve.push(coordinates);
             }
         }
         IMAGES.iter().any(|signs| {
-            let target = image(&self.place, *signs);
+            let target = image(&self.coordinates, *signs);
             if let [only] = &points[..] {
-                return distance(&places[0], &target) < SAME + self.error + error(only);
+                return distance(&points_of_curve[0], &target) < SAME + self.error + error(only);
             }
             (1..points.len()).any(|k| {
                 let pair = &points[k - 1..=k];
                 let within = pair.iter().map(|it| error(it)).fold(0.0, f64::max);
                 let mut sides = pair.iter().map(|it| sorted(it.indices));
                 let same_sides = crossed || sides.any(|sides| sides == self.sides);
-                same_sides && is_between(&places, k, &target, SAME + self.error + within)
+                same_sides && is_between(&points_of_curve, k, &target, SAME + self.error + within)
             })
         })
     }
 }
 
-/// The image of a place, by the signs of y and z of its tips.
-fn image(place: &[f64], [y, z]: [f64; 2]) -> Vec<f64> {
-    let (numbers, tips) = place.split_at(2);
+/// The mirror image of a point, by the signs of y and z of its tips.
+fn image(coordinates: &[f64], [y, z]: [f64; 2]) -> Vec<f64> {
+    let (numbers, tips) = coordinates.split_at(2);
     let tips = tips
         .chunks(3)
         .flat_map(|tip| [tip[0], y * tip[1], z * tip[2]]);
     numbers.iter().copied().chain(tips).collect()
 }
 
-/// Bounds on the errors of a point, added.
+/// Sum of the error bounds of a point.
 fn error(point: &Verified) -> f64 {
     point.errors[0] + point.errors[1] + point.error
 }
 
-/// The grid of so many segments of which this is a finer one.
+/// The grid of so many segments that this one refines.
 pub fn coarsened(grid: &Grid, segments: usize, kinks: &[f64]) -> Grid {
     let stations = grid.sigma().iter().copied();
     let stations: Vec<f64> = stations.step_by(grid.segments() / segments).collect();
@@ -201,10 +199,10 @@ fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// A point of a curve as one of a space: both numbers, and the tips.
-fn place(point: &Verified) -> Vec<f64> {
+/// A point of a curve as a vector: both parameters, then the tips.
+fn coordinates(point: &Verified) -> Vec<f64> {
     let tips = point.tips.iter().flatten();
-    point.place.into_iter().chain(tips.copied()).collect()
+    point.params.into_iter().chain(tips.copied()).collect()
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
@@ -212,9 +210,9 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     squares.sum::<f64>().sqrt()
 }
 
-/// Whether a point lies on the curve through places, between one of them and that before.
-fn is_between(places: &[Vec<f64>], k: usize, target: &[f64], error: f64) -> bool {
-    let few = &places[k.saturating_sub(2)..(k + 2).min(places.len())];
+/// Whether a point lies on the interpolated curve, between one of its points and the previous.
+fn is_between(points_of_curve: &[Vec<f64>], k: usize, target: &[f64], error: f64) -> bool {
+    let few = &points_of_curve[k.saturating_sub(2)..(k + 2).min(points_of_curve.len())];
     let chords = few.windows(2).map(|pair| distance(&pair[0], &pair[1]));
     let mut at = vec![0.0];
     at.extend(chords.scan(0.0, |sum, chord| {
@@ -237,7 +235,7 @@ fn is_between(places: &[Vec<f64>], k: usize, target: &[f64], error: f64) -> bool
         }
         t = (t + along / square).clamp(low - beyond, high + beyond);
     }
-    // Without the point that is farther away, or on a straight line.
+    // Lower degree: without the outermost point, or a straight line.
     let (from, to) = match few.len() {
         2 => (0, 2),
         len if first == 0 => (0, len - 1),
@@ -251,15 +249,15 @@ fn is_between(places: &[Vec<f64>], k: usize, target: &[f64], error: f64) -> bool
     distance(&found, target) < error + distance(&found, &lower)
 }
 
-/// The polynomial through places at such distances along a curve.
-fn through(places: &[Vec<f64>], at: &[f64], t: f64) -> Vec<f64> {
-    let mut sum = vec![0.0; places[0].len()];
-    for (i, place) in places.iter().enumerate() {
+/// The polynomial through points at these arclengths.
+fn through(points_of_curve: &[Vec<f64>], at: &[f64], t: f64) -> Vec<f64> {
+    let mut sum = vec![0.0; points_of_curve[0].len()];
+    for (i, coordinates) in points_of_curve.iter().enumerate() {
         let others = at.iter().enumerate().filter(|(j, _)| *j != i);
         let weight: f64 = others
             .map(|(_, other)| (t - other) / (at[i] - other))
             .product();
-        for (sum, x) in sum.iter_mut().zip(place) {
+        for (sum, x) in sum.iter_mut().zip(coordinates) {
             *sum += weight * x;
         }
     }
@@ -273,19 +271,19 @@ mod tests {
     use crate::leaf::State;
     use glam::{DQuat, DVec3};
 
-    /// A parabola over the second number, between two values of it, with tips that move.
+    /// A parabola over the second parameter, between two of its values, with tips that move.
     fn curve(from: f64, to: f64, y: f64) -> Boundary {
         let point = |k: usize| {
             let at = from + (to - from) * k as f64 / 20.0;
             Verified {
-                place: [0.3 + 0.2 * at * at, at],
+                params: [0.3 + 0.2 * at * at, at],
                 errors: [1e-9, 0.0],
                 tips: vec![[1.0 - 0.3 * at, y * at, 0.0]],
                 error: 1e-9,
                 state: State::new(1, vec![DVec3::ZERO; 2], vec![DQuat::IDENTITY; 2]),
                 across: Direction {
                     increments: Vec::new(),
-                    place: [1.0, 0.0],
+                    params: [1.0, 0.0],
                 },
                 stations: vec![0.0, 1.0],
                 kind: Kind::Branching,
@@ -307,10 +305,10 @@ mod tests {
     fn a_curve_ends_where_it_meets_another() {
         let known = [curve(0.0, 0.61, 0.5)];
         let mut second = curve(0.2, 1.0, 0.5);
-        leave_out_known(&mut second, &known);
+        remove_known(&mut second, &known);
         assert_eq!(second.ends, [Halt::Met, Halt::Reached]);
         let first = &second.points[0];
-        assert!((first.place[1] - 0.6).abs() < 1e-12, "{:?}", first.place);
+        assert!((first.params[1] - 0.6).abs() < 1e-12, "{:?}", first.params);
         assert_eq!(second.points.len(), 11);
     }
 
@@ -318,7 +316,7 @@ mod tests {
     fn a_curve_that_repeats_another_or_its_image_is_left_out() {
         for y in [0.5, -0.5] {
             let mut second = curve(0.1, 0.9, y);
-            leave_out_known(&mut second, &[curve(0.0, 1.0, 0.5)]);
+            remove_known(&mut second, &[curve(0.0, 1.0, 0.5)]);
             assert!(second.points.is_empty());
         }
     }
@@ -327,8 +325,9 @@ mod tests {
     fn other_curves_stay_as_they_are() {
         let mut second = curve(0.0, 1.0, 0.5);
         let mut other = curve(0.0, 1.0, 0.5);
-        (other.points.iter_mut()).for_each(|point| point.place[0] += 1e-3 * (point.place[1] - 0.5));
-        leave_out_known(&mut second, &[other]);
+        (other.points.iter_mut())
+            .for_each(|point| point.params[0] += 1e-3 * (point.params[1] - 0.5));
+        remove_known(&mut second, &[other]);
         assert_eq!(second.points.len(), 21);
         assert_eq!(second.ends, [Halt::Reached; 2]);
     }

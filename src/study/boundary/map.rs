@@ -1,43 +1,42 @@
-//! The coarse map under the curves of a boundary: the index of equilibria in the middles of
-//! cells, each reached from one beside it. They know nothing of the curves.
+//! The coarse map under the curves of a boundary: the index of equilibria at the centres of
+//! cells, each continued from a neighbouring cell, independently of the curves.
 
 use rayon::prelude::*;
 
 use super::compare::{Crossing, Edge, is_followed};
 use super::result::BoundaryMap;
-use crate::branch::boundary::{AtRest, Boundary, Plane, Way, go, recount};
+use crate::branch::boundary::{AtRest, Boundary, Path, Plane, follow_path, recount};
 use crate::branch::{Critical, Kind};
 use crate::leaf::Grid;
 
-/// Most cells along a side.
+/// Largest number of cells along a side.
 pub const MOST_CELLS: usize = 256;
 
-/// The cells of a map, as far as they are known.
+/// The cells of a map, as far as they have been computed.
 pub struct Cells<'p> {
     plane: Plane<'p>,
     /// Columns and rows.
     size: [usize; 2],
     joined: bool,
-    /// Equilibria that were found last, from which others may be reached.
+    /// The equilibria found in the last sweep, from which others may be reached.
     front: Vec<Option<AtRest>>,
-    /// Ways that were gone, by the cell to which they lead; the last one found it, if any.
+    /// Paths that were followed, by the cell at their end; only the last one may have reached it.
     edges: Vec<Vec<Edge>>,
     pub factorizations: usize,
 }
 
-/// A way that is not as the curves say, with the critical points that were met on it.
+/// A path that contradicts the curves, with the critical points on it.
 pub struct Unexplained {
     pub ends: [[f64; 2]; 2],
     pub grid: Grid,
     pub critical: Vec<Critical>,
 }
 
-/// Where the cells beside one are: before it along the first number, behind it, and the same
-/// along the second.
-const BESIDE: [[isize; 2]; 4] = [[-1, 0], [1, 0], [0, -1], [0, 1]];
+/// Offsets of neighbouring cells along the first and the second parameter.
+const NEIGHBOURS: [[isize; 2]; 4] = [[-1, 0], [1, 0], [0, -1], [0, 1]];
 
 impl<'p> Cells<'p> {
-    /// A map of so many cells, of which none is known.
+    /// A map of so many cells, all unknown.
     pub fn new(plane: Plane<'p>, size: [usize; 2], joined: bool) -> Self {
         let count = size[0] * size[1];
         Cells {
@@ -50,17 +49,17 @@ impl<'p> Cells<'p> {
         }
     }
 
-    /// The middle of a cell.
+    /// The centre of a cell.
     fn middle(&self, cell: usize) -> [f64; 2] {
         let at = [cell % self.size[0], cell / self.size[0]];
         [0, 1].map(|i| (at[i] as f64 + 0.5) / self.size[i] as f64)
     }
 
-    /// The cells beside one.
-    fn beside(&self, cell: usize) -> impl Iterator<Item = usize> + use<> {
+    /// The neighbours of a cell.
+    fn neighbours(&self, cell: usize) -> impl Iterator<Item = usize> + use<> {
         let [columns, rows] = self.size;
         let (column, row) = (cell % columns, cell / columns);
-        BESIDE.into_iter().filter_map(move |[right, up]| {
+        NEIGHBOURS.into_iter().filter_map(move |[right, up]| {
             let column = column.checked_add_signed(right).filter(|it| *it < columns);
             let row = row.checked_add_signed(up).filter(|it| *it < rows);
             Some(row? * columns + column?)
@@ -72,29 +71,28 @@ impl<'p> Cells<'p> {
         self.edges[cell].last()?.found
     }
 
-    /// Goes from an equilibrium to the cell of the first column that is nearest to it, along
-    /// the first number and then along the second; returns the ways that are not as the
-    /// curves say.
+    /// Continues an equilibrium to the nearest cell of the first column, along the first parameter
+    /// and then along the second; returns the paths that contradict the curves.
     pub fn begin(&mut self, first: AtRest, curves: &[Boundary]) -> Vec<Unexplained> {
-        let second = first.spot.place[1];
+        let second = first.solution.params[1];
         let row = ((second * self.size[1] as f64) as usize).min(self.size[1] - 1);
         let cell = row * self.size[0];
         let middle = self.middle(cell);
         let mut unexplained = Vec::new();
         let mut now = Some(first);
         for to in [[middle[0], second], middle] {
-            if let Some(from) = now.take_if(|from| from.spot.place != to) {
-                let mut way = go(&self.plane, &from, to);
-                now = way.end.take();
-                unexplained.extend(self.keep((&from, to, now.as_ref()), cell, way, curves));
+            if let Some(from) = now.take_if(|from| from.solution.params != to) {
+                let mut path = follow_path(&self.plane, &from, to);
+                now = path.end.take();
+                unexplained.extend(self.record((&from, to, now.as_ref()), cell, path, curves));
             }
         }
         self.front[cell] = now;
         unexplained
     }
 
-    /// Counts the index once more, on finer grids, in those of the cells found last where it
-    /// is not what the curves say: close beside a curve, grids of a way may be too coarse.
+    /// Recounts the index on finer grids in those cells of the last sweep where it contradicts
+    /// the curves: close to a curve, the grid of a path may be too coarse.
     fn recount(&mut self, curves: &[Boundary]) {
         let counted: Vec<(usize, usize)> = (self.front.par_iter().enumerate())
             .filter_map(|(cell, at)| {
@@ -113,30 +111,30 @@ impl<'p> Cells<'p> {
         }
     }
 
-    /// Goes to all cells beside those that were found last, side by side; returns the ways
-    /// that are not as the curves say, or nothing if there are no such cells.
-    pub fn go_on(&mut self, curves: &[Boundary]) -> Option<Vec<Unexplained>> {
+    /// Continues to all neighbours of the cells found last, in parallel; returns the paths that
+    /// contradict the curves, or `None` if there are no such neighbours.
+    pub fn advance(&mut self, curves: &[Boundary]) -> Option<Vec<Unexplained>> {
         self.recount(curves);
         let next: Vec<(usize, Vec<usize>)> = (0..self.front.len())
             .filter(|&cell| self.index(cell).is_none())
             .map(|cell| {
-                let from = self.beside(cell).filter(|&it| self.front[it].is_some());
+                let from = self.neighbours(cell).filter(|&it| self.front[it].is_some());
                 (cell, from.collect())
             })
             .filter(|(_, from): &(usize, Vec<usize>)| !from.is_empty())
             .collect();
-        let gone: Vec<Vec<(usize, Way)>> = (next.par_iter())
+        let followed: Vec<Vec<(usize, Path)>> = (next.par_iter())
             .map(|(cell, from)| self.reach(*cell, from))
             .collect();
         let none = vec![None; self.front.len()];
         let before = std::mem::replace(&mut self.front, none);
         let mut unexplained = Vec::new();
-        for ((cell, _), ways) in next.iter().zip(gone) {
-            for (from, mut way) in ways {
-                let (to, end) = (self.middle(*cell), way.end.take());
+        for ((cell, _), paths) in next.iter().zip(followed) {
+            for (from, mut path) in paths {
+                let (to, end) = (self.middle(*cell), path.end.take());
                 if let Some(from) = &before[from] {
                     let ends = (from, to, end.as_ref());
-                    unexplained.extend(self.keep(ends, *cell, way, curves));
+                    unexplained.extend(self.record(ends, *cell, path, curves));
                 }
                 self.front[*cell] = end;
             }
@@ -144,38 +142,38 @@ impl<'p> Cells<'p> {
         (!next.is_empty()).then_some(unexplained)
     }
 
-    /// Goes to a cell from those beside it in turn, until one way leads there.
-    fn reach(&self, cell: usize, from: &[usize]) -> Vec<(usize, Way)> {
-        let mut ways = Vec::new();
+    /// Continues to a cell from its neighbours in turn, until one path reaches it.
+    fn reach(&self, cell: usize, from: &[usize]) -> Vec<(usize, Path)> {
+        let mut paths = Vec::new();
         for &other in from {
             let Some(begun) = &self.front[other] else {
                 continue;
             };
-            let way = go(&self.plane, begun, self.middle(cell));
-            let found = way.end.is_some();
-            ways.push((other, way));
+            let path = follow_path(&self.plane, begun, self.middle(cell));
+            let found = path.end.is_some();
+            paths.push((other, path));
             if found {
                 break;
             }
         }
-        ways
+        paths
     }
 
-    /// Keeps what is to be known of a way to a cell: from where, to where, and what is there.
-    fn keep(
+    /// Records a path to a cell; returns it if it contradicts the curves.
+    fn record(
         &mut self,
         (from, to, end): (&AtRest, [f64; 2], Option<&AtRest>),
         cell: usize,
-        mut way: Way,
+        mut path: Path,
         curves: &[Boundary],
     ) -> Option<Unexplained> {
-        self.factorizations += way.factorizations;
+        self.factorizations += path.factorizations;
         if self.joined {
-            way.tips.iter_mut().for_each(|tips| tips.truncate(1));
+            path.tips.iter_mut().for_each(|tips| tips.truncate(1));
         }
-        let ends = [from.spot.place, to];
+        let ends = [from.solution.params, to];
         let along = usize::from(ends[0][0] == ends[1][0]);
-        let beyond = way.critical.extract_if(.., |it| !is_followed(it.indices));
+        let beyond = path.critical.extract_if(.., |it| !is_followed(it.indices));
         let beyond = beyond.map(|critical| Crossing {
             at: ends[0][along] + critical.fraction * (to[along] - ends[0][along]),
             fold: critical.kind == Kind::Fold,
@@ -185,21 +183,21 @@ impl<'p> Cells<'p> {
             ends,
             beyond: beyond.collect(),
             index: from.index,
-            tips: way.tips,
+            tips: path.tips,
             found: end.map(|end| end.index),
         };
         let unexplained = (!edge.is_explained(curves)).then(|| Unexplained {
             ends: edge.ends,
-            grid: way.grid.unwrap_or_else(|| from.grid.clone()),
-            critical: way.critical,
+            grid: path.grid.unwrap_or_else(|| from.grid.clone()),
+            critical: path.critical,
         });
         self.edges[cell].push(edge);
         unexplained
     }
 
-    /// The map, compared with the curves. A cell is not as they say if its index is not what
-    /// they make of that of the cell from which it was reached, or if no way leads there
-    /// though they have nothing against one.
+    /// The map, compared with the curves. A cell disagrees if its index is not the one that they
+    /// imply from the cell at the start of its path, or if no path reaches it though they do not
+    /// prevent it.
     pub fn compared(&self, curves: &[Boundary]) -> BoundaryMap {
         let [columns, rows] = self.size;
         let value = |i: usize, cell: usize| self.plane.values(self.middle(cell))[i];

@@ -1,4 +1,4 @@
-//! `trace` over two numbers: the boundary of stability as curves in their plane.
+//! `trace` over two parameters: the boundary of stability as curves in their plane.
 
 mod beside;
 mod compare;
@@ -13,25 +13,24 @@ pub use run::boundary;
 use super::trace::{TraceError, TraceRequest};
 use super::vary::Vary;
 
-/// Most curves of a boundary.
+/// Largest number of curves of a boundary.
 pub const MOST_CURVES: usize = 24;
 
-/// What is asked of a boundary.
+/// A request for a boundary.
 #[derive(Clone, Debug)]
 pub struct BoundaryRequest {
-    /// The trace along the first number whose critical points are followed; it is made
-    /// at the scenario's value of the second number or, where that has none within the
-    /// range, at its start.
+    /// The trace along the first parameter whose critical points are followed; it is made
+    /// at the scenario's value of the second parameter or, if that is not within the range, at
+    /// its start.
     pub trace: TraceRequest,
-    /// The second number, and over which range; no step is longer than the distance of its
-    /// values.
+    /// The second parameter and its range; no step is longer than the distance of its values.
     pub across: Vary,
-    /// Cells of a coarse map under the curves, along both numbers, if there is to be one.
+    /// Cells of a coarse map under the curves, along both parameters, if requested.
     pub map: Option<[usize; 2]>,
 }
 
 impl BoundaryRequest {
-    /// Whether it can be met, as far as can be told before.
+    /// Validates the request before it is run.
     fn check(&self) -> Result<(), TraceError> {
         self.trace.check()?;
         let second = TraceRequest {

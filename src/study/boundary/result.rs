@@ -1,4 +1,4 @@
-//! What a boundary is, as found.
+//! The result of a boundary.
 
 use glam::DVec3;
 use serde::ser::{Serialize, Serializer};
@@ -9,21 +9,21 @@ use crate::scenario::Units;
 use crate::shape::serialize_tips;
 use crate::study::Keys;
 
-/// The boundary of stability in the plane of two numbers of a scenario: the curves on
+/// The boundary of stability in the plane of two parameters of a scenario: the curves on
 /// which the Morse index of a leaf changes. As JSON it is `boundary.json`.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Boundary {
     /// Name of the scenario.
     pub scenario: String,
-    /// The numbers.
+    /// The parameters.
     #[serde(rename = "vary", serialize_with = "serialize_keys")]
     pub keys: [Keys; 2],
     /// Their values at the ends of their ranges.
     pub ranges: [[f64; 2]; 2],
-    /// Whether their logarithms vary evenly.
+    /// Whether their logarithms are spaced evenly.
     #[serde(skip)]
     pub log: [bool; 2],
-    /// The second number at the first trace, at whose critical points curves begin; others
+    /// The second parameter at the first trace, at whose critical points curves begin; others
     /// begin at those of the map's rows.
     pub start: f64,
     /// Names of the units, if the scenario gives any.
@@ -34,57 +34,57 @@ pub struct Boundary {
     /// Whether the tips share one point.
     #[serde(skip)]
     pub joined: bool,
-    /// Wanted accuracy of the tips, relative to the longest rod.
+    /// Required accuracy of the tips, relative to the longest rod.
     pub tolerance: f64,
-    /// Whether there are curves, and all are known as far as was asked.
+    /// Whether there are curves, and all are known as far as requested.
     pub complete: bool,
     /// Why there is no curve, or fewer than there may be.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,
     /// The curves.
     pub curves: Vec<BoundaryCurve>,
-    /// The map under them, if it was asked for.
+    /// The map under them, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub map: Option<BoundaryMap>,
-    /// Matrices factorised to follow and verify the curves, but for those of softened leaves,
-    /// and to follow the first trace and the ways between the cells of the map.
+    /// Matrices factorised to follow and verify the curves, without those of softened leaves,
+    /// and to follow the first trace and the paths between the cells of the map.
     pub factorizations: usize,
-    /// Time of all, in seconds.
+    /// Total time, in seconds.
     pub wall_seconds: f64,
 }
 
 /// One curve.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct BoundaryCurve {
-    /// What becomes of a branch along the first number: a fold, or a crossing.
+    /// What happens to a branch along the first parameter: a fold, or a crossing.
     #[serde(serialize_with = "serialize_kind")]
     pub kind: Kind,
     /// How many modes become neutral.
     pub multiplicity: usize,
-    /// How it ended: before its first point, and behind its last.
+    /// How it ended: before its first point, and after its last.
     pub ends: [CurveEnd; 2],
-    /// Its points in order: the second number grows from the first point or, where that
-    /// is also the last, has grown.
+    /// Its points, ordered so that the second parameter increases from the first point or, where
+    /// that is also the last, has increased.
     pub points: Vec<BoundaryPoint>,
-    /// Leaves on either side of it, for pictures: of a few curves, those that bound stable
-    /// leaves if there are any.
+    /// Leaves on either side, for pictures: of a few curves, those that bound stable leaves if
+    /// there are any.
     #[serde(skip)]
     pub beside: Vec<LeafBeside>,
 }
 
-/// A leaf beside a curve, in the scenario's units, without the error of its grid told.
+/// A leaf next to a curve, in the scenario's units, without an error estimate.
 #[derive(Clone, Debug)]
 pub struct LeafBeside {
-    /// Both numbers.
+    /// Both parameters.
     pub values: [f64; 2],
     /// Morse index.
     pub index: usize,
-    /// The joint tip alone, or every tip.
+    /// The shared tip alone, or every tip.
     pub tips: Vec<DVec3>,
     /// Centerlines, one per rod.
     pub curves: Vec<Vec<DVec3>>,
-    /// If it is what the stable leaf of the other side comes to rest as, the centerlines from
-    /// where it fell: of the equilibrium at the same numbers or, of a fold, at the curve.
+    /// If the stable leaf of the other side relaxes to it, the initial centerlines of that fall: of
+    /// the equilibrium at the same parameters or, at a fold, on the curve.
     pub fallen_from: Option<Vec<Vec<DVec3>>>,
 }
 
@@ -95,17 +95,17 @@ pub struct BoundaryPoint {
     pub point: usize,
     /// `fold`, `branch-point`, `cusp` or `crossing`.
     pub kind: &'static str,
-    /// Both numbers.
+    /// Both parameters.
     pub values: [f64; 2],
-    /// Bounds on their errors; zero of one that was given.
+    /// Bounds on their errors; zero for a given one.
     pub errors: [f64; 2],
-    /// The joint tip alone, or every tip.
+    /// The shared tip alone, or every tip.
     #[serde(flatten, serialize_with = "serialize_tips")]
     pub tips: Vec<DVec3>,
     /// Bound on the error of the tips.
     pub error: f64,
-    /// Morse index before the point and behind it, along the first number; of a fold,
-    /// the lower one and the higher one of the two branches that meet there.
+    /// Morse index before the point and after it, along the first parameter; at a fold,
+    /// the lower and the higher one of the two branches that meet there.
     pub index_before: usize,
     /// See above.
     pub index_behind: usize,
@@ -117,28 +117,28 @@ pub struct BoundaryPoint {
     pub curves: Vec<Vec<DVec3>>,
 }
 
-/// Cells of the plane of two numbers, of equal size where the axes are even.
+/// Cells of the plane of two parameters, of equal size on the scales of the axes.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct BoundaryMap {
-    /// Values of the first number in the middle of the cells.
+    /// Values of the first parameter at the centres of the cells.
     pub first: Vec<f64>,
     /// Those of the second.
     pub second: Vec<f64>,
-    /// Morse index of equilibria that were reached from cell to cell, beginning with that at
-    /// the start of the first number's range; row by row of the second; none where branches
+    /// Morse index of equilibria continued from cell to cell, beginning with that at
+    /// the start of the first parameter's range; row by row of the second; none where branches
     /// turn back before, or could not be followed.
     pub index: Vec<Vec<Option<usize>>>,
-    /// Cells that the curves have another index for: numbers of both values, from 1.
+    /// Cells for which the curves imply another index: column and row, from 1.
     pub disagreeing: Vec<[usize; 2]>,
 }
 
 impl BoundaryMap {
-    /// How many cells have an index.
+    /// Number of cells with an index.
     pub fn known(&self) -> usize {
         self.index.iter().flatten().flatten().count()
     }
 
-    /// How many cells there are.
+    /// Number of cells.
     pub fn cells(&self) -> usize {
         self.first.len() * self.second.len()
     }
@@ -149,7 +149,7 @@ impl BoundaryMap {
 pub struct CurveEnd(pub(super) Halt);
 
 impl CurveEnd {
-    /// The word in files.
+    /// The word used in files.
     pub fn word(self) -> &'static str {
         match self.0 {
             Halt::Reached => "reached",
@@ -157,19 +157,19 @@ impl CurveEnd {
             Halt::Met => "met",
             Halt::MostPoints => "most-points",
             Halt::Unfolded => "unfolds",
-            Halt::Parted => "parts",
+            Halt::Separated => "parts",
             Halt::OutOfRange => "out-of-range",
             Halt::Stuck => "stuck",
             Halt::Unverified(_) => "unverified",
         }
     }
 
-    /// Whether the curve is known as far as was asked.
+    /// Whether the curve is known as far as requested.
     pub fn complete(self) -> bool {
         self.0.complete()
     }
 
-    /// The same in a phrase, for people.
+    /// The same as a phrase for people.
     pub fn phrase(self) -> &'static str {
         match self.0 {
             Halt::Reached => "the end of a range",
@@ -177,7 +177,7 @@ impl CurveEnd {
             Halt::Met => "on a curve above",
             Halt::MostPoints => "goes on: allow more points",
             Halt::Unfolded => "the second number breaks the symmetry by which branches cross",
-            Halt::Parted => "modes that become neutral together part",
+            Halt::Separated => "modes that become neutral together part",
             Halt::OutOfRange => "no leaf is there",
             Halt::Stuck => "lost",
             Halt::Unverified(Doubt::Unsolved) => "not verified: finer grids have none",
@@ -194,7 +194,7 @@ impl Serialize for CurveEnd {
     }
 }
 
-/// The word for what a point is.
+/// The word for the kind of a point.
 pub(super) fn word(kind: Kind, special: Option<Special>) -> &'static str {
     match (special, kind) {
         (Some(Special::Cusp), _) => "cusp",

@@ -1,35 +1,37 @@
-//! Making a boundary.
+//! Computation of a boundary.
 
 use std::time::Instant;
 
 use glam::DVec3;
 
 use super::beside::add_leaves;
-use super::known::{Start, coarsened, leave_out_known, traced};
+use super::known::{Start, coarsened, remove_known, traced};
 use super::map::{Cells, Unexplained};
 use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, CurveEnd, word};
 use super::{BoundaryRequest, MOST_CURVES};
 use crate::branch::Family;
-use crate::branch::boundary::{self as curves, Accuracy, AtRest, Plane, Spot, Stride, Verified};
+use crate::branch::boundary::{
+    self as curves, Accuracy, AtRest, Plane, Solution, Verified, WalkOptions,
+};
 use crate::scenario::Scenario;
 use crate::study::trace::{TraceError, TraceRequest};
 
-/// Longest step along a curve where few values are asked for.
+/// Longest step along a curve if few values are asked for.
 const LONGEST: f64 = 0.1;
 
-/// That of curves that are followed for a map.
+/// Longest step along curves that are followed for a map.
 const OF_MAP: f64 = 0.04;
 
-/// Numbers are to be so many times as exact as tips: of the part of their ranges. Not those of
+/// Accuracy of parameters, as parts of their ranges, relative to that of tips; not for
 /// curves that are followed for a map only.
 const EXACTER: f64 = 1e-2;
 
-/// The curves on which the index of a leaf changes in the plane of two numbers, through
-/// the critical points of a trace along the first. `progress` is told of each point: the
-/// curve (none of the trace itself), how many points there are, and the values.
+/// The curves on which the index of a leaf changes in the plane of two parameters, through
+/// the critical points of a trace along the first. `progress` is called for each point: with
+/// the curve (none for the trace itself), the number of points, and the values.
 ///
 /// # Errors
-/// Requests that cannot be met; all that happens on the way is in the result.
+/// Requests that cannot be met; failures during the run are part of the result.
 pub fn boundary(
     request: &BoundaryRequest,
     progress: &mut (dyn FnMut(Option<usize>, usize, [f64; 2]) + Send),
@@ -85,7 +87,7 @@ pub fn boundary(
     };
     let mut run = Run {
         plane,
-        how: Stride {
+        how: WalkOptions {
             longest: (1.0 / (across.values.len() - 1) as f64).min(LONGEST),
             most: request.trace.most_points,
             accuracy: Accuracy {
@@ -102,7 +104,7 @@ pub fn boundary(
             critical,
             refined,
             from: [0.0, plane.fraction(start)],
-            way: [1.0, 0.0],
+            direction: [1.0, 0.0],
         };
         run.follow_new(&start, &mut boundary);
     }
@@ -111,9 +113,9 @@ pub fn boundary(
         let first = AtRest {
             grid: coarsened(&grid, point.state.segments(), kinks),
             index: point.index,
-            spot: Spot {
+            solution: Solution {
                 state: point.state,
-                place: [0.0, plane.fraction(start)],
+                params: [0.0, plane.fraction(start)],
             },
         };
         boundary.map = Some(run.map(size, first, &mut boundary));
@@ -139,18 +141,18 @@ pub fn boundary(
     Ok(boundary)
 }
 
-/// Following curves.
+/// The run that follows the curves.
 struct Run<'r, 'p> {
     plane: Plane<'r>,
-    how: Stride,
+    how: WalkOptions,
     known: Vec<curves::Boundary>,
-    /// Critical points from which curves were followed.
+    /// Number of critical points from which curves were started.
     tried: usize,
     progress: &'p mut (dyn FnMut(Option<usize>, usize, [f64; 2]) + Send),
 }
 
 impl Run<'_, '_> {
-    /// Follows the curve through a critical point, if it lies on none that is known.
+    /// Follows the curve through a critical point, unless it lies on a known one.
     fn follow_new(&mut self, start: &Start, boundary: &mut Boundary) {
         if self.known.iter().any(|known| start.is_on(known)) {
             return;
@@ -162,12 +164,12 @@ impl Run<'_, '_> {
         self.tried += 1;
         let (plane, progress) = (self.plane, &mut *self.progress);
         let number = boundary.curves.len();
-        let mut tell = |points, place| progress(Some(number), points, plane.values(place));
+        let mut report = |points, params| progress(Some(number), points, plane.values(params));
         let grid = start.grid(plane.family.first().kinks());
-        let mut curve = curves::follow(plane, &grid, &start.seed(), &self.how, &mut tell);
+        let mut curve = curves::follow(plane, &grid, &start.seed(), &self.how, &mut report);
         boundary.factorizations += curve.factorizations;
         if !curve.points.is_empty() {
-            leave_out_known(&mut curve, &self.known);
+            remove_known(&mut curve, &self.known);
             if curve.points.is_empty() {
                 return;
             }
@@ -176,9 +178,9 @@ impl Run<'_, '_> {
         self.known.push(curve);
     }
 
-    /// The map of so many cells, reached from an equilibrium. Critical points on the way that
-    /// lie on no known curve begin new ones; one after the other, so that they are the same on
-    /// any number of threads, and in longer steps than those of the trace, for the map alone.
+    /// The map of so many cells, continued from an equilibrium. Critical points on the paths that
+    /// lie on no known curve start new ones; sequentially, so that the result does not depend on
+    /// the number of threads, and with longer steps than those of the trace, for the map alone.
     fn map(&mut self, size: [usize; 2], first: AtRest, boundary: &mut Boundary) -> BoundaryMap {
         let accuracy = self.how.accuracy.tips;
         self.how.longest = self.how.longest.max(OF_MAP);
@@ -194,20 +196,21 @@ impl Run<'_, '_> {
             {
                 let [from, to] = *ends;
                 for critical in critical {
-                    let refined = curves::refine_on(&self.plane, *ends, grid, critical, accuracy);
+                    let refined =
+                        curves::refine_on_path(&self.plane, *ends, grid, critical, accuracy);
                     if let Ok(refined) = &refined {
-                        let way = [0, 1].map(|i| to[i] - from[i]);
+                        let direction = [0, 1].map(|i| to[i] - from[i]);
                         let start = Start {
                             critical,
                             refined,
                             from,
-                            way,
+                            direction,
                         };
                         self.follow_new(&start, boundary);
                     }
                 }
             }
-            next = cells.go_on(&self.known);
+            next = cells.advance(&self.known);
         }
         boundary.factorizations += cells.factorizations;
         cells.compared(&self.known)
@@ -230,8 +233,8 @@ fn in_units(plane: &Plane, joined: bool, curve: &curves::Boundary) -> BoundaryCu
 /// A point in the scenario's units.
 fn point_in_units(plane: &Plane, joined: bool, number: usize, point: &Verified) -> BoundaryPoint {
     let length = plane.family.scale().length;
-    let values = plane.values(point.place);
-    let beyond = plane.values([0, 1].map(|i| point.place[i] + point.errors[i]));
+    let values = plane.values(point.params);
+    let beyond = plane.values([0, 1].map(|i| point.params[i] + point.errors[i]));
     let tips = (point.tips.iter()).map(|tip| DVec3::from_array(*tip) * length);
     let nodes = point.state.segments() + 1;
     BoundaryPoint {

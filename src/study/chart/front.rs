@@ -1,7 +1,7 @@
-//! What is fast and accurate at once.
+//! The Pareto front of speed and accuracy.
 
 /// Which points (seconds, error) are on the Pareto front: no other is at least
-/// as fast and as accurate. Errors below `floor` are equal; of equal points the
+/// as fast and as accurate. Errors below `floor` count as equal; of equal points the
 /// first is on the front.
 pub fn front(points: &[(f64, f64)], floor: f64) -> Vec<bool> {
     let error = |i: usize| points[i].1.max(floor);

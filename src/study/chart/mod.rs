@@ -1,5 +1,5 @@
-//! Speed against accuracy: every way to bring a leaf to rest, over its own knob,
-//! measured side by side against one reference.
+//! Speed against accuracy: all methods for an equilibrium, over their own accuracy settings,
+//! measured together against one reference.
 
 mod front;
 mod peers;
@@ -23,13 +23,13 @@ pub use timing::{Spread, Turn};
 use crate::relax::RelaxError;
 use crate::scenario::{Scenario, longest};
 
-/// What is asked of a chart.
+/// Options of a chart.
 #[derive(Clone, Debug)]
 pub struct ChartOptions {
-    /// About how long to measure, in seconds; slow runs are made once whatever
-    /// they take.
+    /// Approximate total time of the measurement, in seconds; slow runs are made once, however
+    /// long they take.
     pub seconds: f64,
-    /// Who takes part.
+    /// The methods measured.
     pub contenders: Vec<Contender>,
     /// Measurements of other programs.
     pub peers: Vec<PeerRow>,
@@ -45,19 +45,19 @@ impl Default for ChartOptions {
     }
 }
 
-/// Longest time that can be asked for: a day.
+/// Longest time that can be requested: a day.
 const MOST_SECONDS: f64 = 86_400.0;
 
-/// A chart that cannot be made.
+/// Why a chart cannot be made.
 #[derive(Debug, Error)]
 pub enum ChartError {
     /// The leaf cannot be relaxed.
     #[error(transparent)]
     Relax(#[from] RelaxError),
-    /// The time allowed is out of range.
+    /// The time requested is out of range.
     #[error("seconds {0}: must be greater than 0 and at most {MOST_SECONDS}")]
     Seconds(f64),
-    /// The one thread that all runs have cannot be started.
+    /// The single thread for all runs cannot be started.
     #[error("cannot start a thread: {0}")]
     Thread(#[from] rayon::ThreadPoolBuildError),
 }
@@ -72,7 +72,7 @@ pub fn chart(
     progress: &mut (dyn FnMut(&Turn) + Send),
 ) -> Result<Chart, ChartError> {
     let cells = plan::cells(scenario, &options.contenders);
-    let (reference, rows, rounds) = alone(options.seconds, || {
+    let (reference, rows, rounds) = on_one_thread(options.seconds, || {
         let (measured, rounds) = timing::measure(&cells, options.seconds, progress);
         let found = reference::find(scenario, rows::stations(&measured))?;
         let (reference, answer) = found.unzip();
@@ -104,8 +104,8 @@ pub fn chart(
     Ok(chart.compared())
 }
 
-/// Does something on one thread, if it may take so many `seconds`.
-fn alone<R: Send>(
+/// Calls a function on one thread, if it may take so many `seconds`.
+fn on_one_thread<R: Send>(
     seconds: f64,
     work: impl FnOnce() -> Result<R, RelaxError> + Send,
 ) -> Result<R, ChartError> {

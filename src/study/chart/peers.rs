@@ -1,13 +1,13 @@
-//! Measurements of other programs, beside ours.
+//! Measurements of other programs, next to ours.
 
 use serde::Serialize;
 
 use super::timing::Spread;
 
-/// First words of outcomes that are solutions.
+/// First words of outcomes that are equilibria.
 const AT_REST: [&str; 2] = ["converged", "at-rest"];
 
-/// First word of a measurement that was not meant to come to rest.
+/// First word of the outcome of a measurement that is not a search for an equilibrium.
 const COMPLETED: &str = "completed";
 
 /// One measurement of another program.
@@ -19,7 +19,7 @@ pub struct PeerRow {
     pub scenario: String,
     /// Veins of the leaf.
     pub rods: usize,
-    /// What was set to make it more accurate, and other settings after a blank.
+    /// The setting for its accuracy; other settings follow after a blank.
     pub knob: String,
     /// The time it took.
     pub seconds: f64,
@@ -32,12 +32,12 @@ pub struct PeerRow {
 /// A peer's measurements at one setting.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Peer {
-    /// The program, with its settings other than the knob.
+    /// The program, with its other settings.
     #[serde(rename = "program")]
     pub name: String,
-    /// Where its knob stands.
+    /// The value of its accuracy setting.
     pub knob: String,
-    /// Times of all rows alike.
+    /// Times of all rows with these settings.
     #[serde(flatten)]
     pub seconds: Spread,
     /// The largest error of these rows, relative to the longest rod; `None`
@@ -58,8 +58,8 @@ impl Peer {
     }
 }
 
-/// The rows about a leaf, with equal rows taken together, and what is to be
-/// said of the others. Errors become relative to the longest rod.
+/// The rows for a leaf, rows with equal settings combined, and remarks on
+/// the others. Errors become relative to the longest rod.
 pub fn about(
     rows: &[PeerRow],
     scenario: &str,

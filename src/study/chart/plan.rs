@@ -1,4 +1,4 @@
-//! What is charted: contenders, their knobs, and the cells of the chart.
+//! The contents of a chart: contenders, their accuracy settings, and the cells.
 
 use std::fmt;
 
@@ -8,22 +8,22 @@ use crate::relax::Method;
 use crate::scenario::Scenario;
 use crate::study::words::read_and_write;
 
-/// A way to bring a leaf to rest, with one knob for its accuracy.
+/// A method for an equilibrium, with one setting for its accuracy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Contender {
-    /// The method; whether it has one grid says the knob.
+    /// The method; the setting depends on whether it is used on one grid.
     pub method: Method,
-    /// Whether it is on one grid, whose segments are then its knob, and not on
+    /// Whether it is used on one grid, with the number of segments as its setting, and not on
     /// nested grids with extrapolation.
     pub one_grid: bool,
 }
 
-/// What is set to make a contender more accurate.
+/// The setting of a contender's accuracy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Setting {
-    /// Wanted accuracy, relative to the longest rod.
+    /// Required accuracy, relative to the longest rod.
     Tolerance(f64),
-    /// Segments a rod.
+    /// Segments per rod.
     Segments(usize),
 }
 
@@ -62,12 +62,12 @@ impl Contender {
         }
     }
 
-    /// Whether it is what [`crate::relax::relax`] does unless told otherwise.
+    /// Whether it is the default of [`crate::relax::relax`].
     pub fn is_default(self) -> bool {
         self == Contender::ALL[0]
     }
 
-    /// The settings of its knob that are charted, from coarse to fine.
+    /// The settings that are charted, from coarse to fine.
     pub fn knobs(self) -> Vec<Setting> {
         match self.one_grid {
             true => SEGMENTS.map(Setting::Segments).to_vec(),
@@ -94,7 +94,7 @@ impl fmt::Display for Setting {
     }
 }
 
-/// One point of a chart: a leaf, a contender, and where its knob stands.
+/// One point of a chart: a leaf, a contender, and its setting.
 #[derive(Clone, Copy, Debug)]
 pub struct Cell<'s> {
     pub scenario: &'s Scenario,

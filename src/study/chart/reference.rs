@@ -1,4 +1,4 @@
-//! The solution that all others are measured against.
+//! The solution against which all others are measured.
 
 use serde::Serialize;
 
@@ -8,21 +8,20 @@ use crate::scenario::{Scenario, longest};
 use crate::study::judge::{Answer, union};
 
 /// Tolerances of the relaxation: first one that most leaves reach, then the
-/// best, or else one that asks for fewer grids to come to rest on.
+/// best one, or else one that requires fewer grids.
 const FIRST: f64 = 1e-10;
 const LARGER: f64 = 1e-4;
 
-/// The reference, and how far it can be trusted. Lengths are relative to the
-/// longest rod.
+/// The reference and its reliability. Lengths are relative to the longest rod.
 #[derive(Clone, Debug, Serialize)]
 pub struct Reference {
     /// Whether relaxation and shooting agree within their error estimates.
     pub confirmed: bool,
-    /// Which solution it is, and why it is not confirmed: a sentence.
+    /// A sentence: which solution it is, and why it is not confirmed.
     pub told: String,
-    /// How well the reference is known: the better of both error estimates, or
-    /// the difference of both if that is larger and they agree. Smaller errors
-    /// cannot be told from none.
+    /// Accuracy of the reference: the smaller of both error estimates, or the difference
+    /// of both solutions if that is larger and they agree. Smaller errors cannot be
+    /// distinguished from zero.
     pub known_within: f64,
     /// Error estimate of the relaxation, if the leaf came to rest.
     pub relaxation_estimate: Option<f64>,
@@ -30,13 +29,13 @@ pub struct Reference {
     pub shooting_estimate: Option<f64>,
     /// Largest distance between both.
     pub difference: Option<f64>,
-    /// How the leaf could move without resistance, if it could: errors then say
-    /// where along that way a run came to rest.
+    /// How the leaf can move without resistance, if it can: errors then include the
+    /// position at which a run came to rest along that neutral direction.
     pub neutral: Option<String>,
 }
 
-/// Finds the reference of a scenario, at `wanted` stations if shooting can
-/// tell them. `None` if neither way finds an equilibrium.
+/// Finds the reference of a scenario, at the `wanted` stations if shooting
+/// succeeds. `None` if neither method finds an equilibrium.
 ///
 /// # Errors
 /// If the leaf cannot be relaxed at all.
@@ -120,7 +119,7 @@ fn best_relaxed(scenario: &Scenario) -> Result<Option<Answer>, RelaxError> {
 }
 
 /// The boundary-value solution, which is known at all stations, if both agree;
-/// otherwise the one that claims to be better.
+/// otherwise the one with the smaller error estimate.
 fn choose(leaf: Answer, shot: Answer, confirmed: bool) -> (String, Answer) {
     let (told, answer) = match (confirmed, leaf.error() < shot.error()) {
         (true, _) => (
@@ -161,8 +160,7 @@ mod tests {
             let (_, taken) = choose(relaxed.clone(), elsewhere.clone(), false);
             assert_eq!(taken.rods == elsewhere.rods, is_taken);
         }
-        // An estimate that is as large as the difference confirms little, but
-        // truly.
+        // An estimate as large as the difference confirms little, but validly.
         elsewhere.error_estimate = Some(3e-6);
         assert!(relaxed.confirms(&elsewhere, 1e-6));
     }

@@ -1,4 +1,4 @@
-//! What a chart says: `chart.json`.
+//! The result of a chart: `chart.json`.
 
 use serde::{Serialize, Serializer};
 
@@ -10,16 +10,16 @@ use super::scaling::Scaling;
 use super::timing::{Spread, serialize_spread};
 use crate::relax::Outcome;
 
-/// How a run ended, for a chart.
+/// Outcome of a run in a chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// As the run itself says.
+    /// The outcome of the run itself.
     Ended(Outcome),
     /// At rest, but not in the reference's equilibrium.
     OtherEquilibrium,
-    /// The contender cannot be asked this.
+    /// The contender does not support the request.
     Refused,
-    /// Not run, as a coarser run of the contender took too long.
+    /// Not run, since a coarser run of the contender took too long.
     NotRun,
 }
 
@@ -34,8 +34,8 @@ impl Ending {
         }
     }
 
-    /// Whether the leaf is at rest where it should be, as accurately as asked
-    /// for, and stable as far as known.
+    /// Whether the leaf is at rest in the reference equilibrium, with the requested accuracy,
+    /// and not known to be unstable.
     pub fn is_success(self) -> bool {
         let Ending::Ended(outcome) = self else {
             return false;
@@ -53,10 +53,10 @@ impl Serialize for Ending {
 /// One setting of one contender. Errors are relative to the longest rod.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// Who.
+    /// The contender.
     #[serde(rename = "method")]
     pub contender: Contender,
-    /// Where its knob stands.
+    /// Its setting.
     pub knob: Setting,
     /// Times from the checked scenario to the result; `None` if it did not run.
     #[serde(flatten, serialize_with = "serialize_spread")]
@@ -70,7 +70,7 @@ pub struct Row {
     /// Largest distance from the reference; `None` if the leaf is not at rest,
     /// or there is no reference.
     pub true_error: Option<f64>,
-    /// What the run itself says of its error.
+    /// The run's own error estimate.
     pub error_estimate: Option<f64>,
     /// How it ended.
     #[serde(rename = "outcome")]
@@ -84,7 +84,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// Of a contender that did not get anywhere.
+    /// A row of a contender without a result.
     pub fn without_result(contender: Contender, knob: Setting, ending: Ending) -> Self {
         Row {
             contender,
@@ -120,24 +120,24 @@ pub struct Chart {
     pub joined: bool,
     /// Threads that every run had.
     pub threads: usize,
-    /// Rounds in which all contenders took turns.
+    /// Number of rounds in which all contenders took turns.
     pub rounds: usize,
-    /// What errors are measured against; `None` if no equilibrium was found.
+    /// The reference for errors; `None` if no equilibrium was found.
     pub reference: Option<Reference>,
-    /// What is to be said of the measurement: one sentence each.
+    /// Remarks on the measurement: one sentence each.
     pub remarks: Vec<String>,
     /// All settings of all contenders.
     #[serde(rename = "runs")]
     pub rows: Vec<Row>,
     /// Measurements of other programs.
     pub peers: Vec<Peer>,
-    /// The fastest ways to every power of ten.
+    /// The fastest contender for every power of ten.
     pub decades: Vec<Decade>,
-    /// Cost against the number of veins, if asked for.
+    /// Cost against the number of veins, if requested.
     pub scaling: Option<Scaling>,
 }
 
-/// The fastest way to an accuracy, and how much slower the default one is.
+/// The fastest contender for an accuracy, and how much slower the default one is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Decade {
     /// The accuracy.
@@ -145,19 +145,19 @@ pub struct Decade {
     /// The fastest contender that is as accurate.
     #[serde(rename = "method")]
     pub contender: Option<Contender>,
-    /// Where its knob stands.
+    /// Its setting.
     pub knob: Option<Setting>,
     /// Its time.
     pub seconds: Option<f64>,
-    /// Where the default contender's knob stands when it is as accurate.
+    /// The setting at which the default contender is as accurate.
     pub default_knob: Option<Setting>,
     /// Its time.
     pub default_seconds: Option<f64>,
-    /// How many times longer the default contender takes.
+    /// Ratio of the default contender's time to the fastest.
     pub factor: Option<f64>,
 }
 
-/// Accuracies for which the fastest way is told: powers of ten.
+/// Accuracies for which the fastest contender is given: powers of ten.
 const DECADES: [i32; 9] = [-2, -3, -4, -5, -6, -7, -8, -9, -10];
 
 impl Chart {
@@ -166,21 +166,20 @@ impl Chart {
         self.reference.as_ref().is_some_and(|found| found.confirmed)
     }
 
-    /// Errors that cannot be told from none.
+    /// Errors below this cannot be distinguished from zero.
     fn floor(&self) -> f64 {
         self.reference
             .as_ref()
             .map_or(0.0, |found| found.known_within)
     }
 
-    /// The chart with its Pareto front, the ratios of its peers, and the fastest
-    /// ways.
+    /// The chart with its Pareto front, the ratios of its peers, and the fastest contenders.
     pub(crate) fn compared(mut self) -> Self {
         self.mark_front();
         let floor = self.floor();
         let ratio = |peer: &Peer| {
             let (seconds, error) = peer.point()?;
-            // Errors that cannot be told from none are equal.
+            // Errors indistinguishable from zero count as equal.
             let ours = self.fastest(error.max(floor), |row| row.contender.is_default())?;
             Some(seconds / ours.seconds?.median)
         };

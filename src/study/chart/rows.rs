@@ -1,5 +1,5 @@
-//! From what runs found to the rows of a chart: true errors, and runs that
-//! ended elsewhere.
+//! Rows of a chart from the results of runs: true errors, and runs that ended in another
+//! equilibrium.
 
 use super::plan::{Cell, Contender};
 use super::reference::Reference;
@@ -9,14 +9,14 @@ use crate::relax::{Method, Outcome};
 use crate::scenario::{Scenario, longest};
 use crate::study::judge::{Answer, common};
 
-/// Errors above this are not of discretisation if the run's own estimate is
+/// Errors above this are not due to discretisation if the run's own estimate is
 /// less than half as large: it is another equilibrium.
 const ELSEWHERE: f64 = 1e-2;
 const MUCH_LESS: f64 = 0.5;
 
-/// Stations at which the reference is wanted: those of all runs, so that
-/// nothing has to be interpolated. Runs on one grid have those of the others
-/// among their own, if they are fine enough; only those that have not add theirs.
+/// Stations required of the reference: those of all runs, so that
+/// nothing has to be interpolated. The stations of runs on one grid are usually among those of
+/// the others; only those that are not are added.
 pub fn stations(measured: &[Measured]) -> Vec<f64> {
     let runs = || measured.iter().filter_map(Measured::answer);
     let Some(fewest) = runs().min_by_key(|run| run.stations.len()) else {
@@ -31,7 +31,7 @@ pub fn stations(measured: &[Measured]) -> Vec<f64> {
     wanted
 }
 
-/// A cell, what was measured in it, and how far that is from the reference,
+/// A cell, the measurement in it, and its distance from the reference,
 /// relative to the longest rod.
 struct Judged<'a> {
     cell: &'a Cell<'a>,
@@ -40,7 +40,7 @@ struct Judged<'a> {
 }
 
 impl<'a> Judged<'a> {
-    /// Where the run knows the leaf to be at rest.
+    /// The answer, if the leaf is at rest.
     fn at_rest(&self) -> Option<&'a Answer> {
         self.measured.answer().filter(|run| run.at_rest())
     }
@@ -70,7 +70,7 @@ pub fn rows(
         .collect()
 }
 
-/// Whether a run owes its error to being in another equilibrium.
+/// Whether the error of a run is due to another equilibrium.
 fn is_elsewhere(i: usize, judged: &[Judged], unit: f64) -> bool {
     let this = &judged[i];
     let (Some(answer), Some(error)) = (this.at_rest(), this.error) else {
@@ -83,8 +83,8 @@ fn is_elsewhere(i: usize, judged: &[Judged], unit: f64) -> bool {
         let estimate = answer.error_estimate.map(|estimate| estimate / unit);
         return estimate.is_some_and(|estimate| estimate < MUCH_LESS * error);
     }
-    // On one grid, which has no estimate of its error, it is if a coarser grid
-    // does much better, or the next grid finds nearly the same shape.
+    // On one grid, without an error estimate: if a coarser grid is much more accurate,
+    // or the next grid has nearly the same shape.
     let alike = |other: &&Judged| other.cell.contender == this.cell.contender;
     let mut coarser = judged[..i].iter().filter(alike);
     if coarser.any(|it| {
@@ -134,13 +134,13 @@ fn row(judged: &Judged, elsewhere: bool) -> Row {
         true_error: *error,
         error_estimate: run.error_estimate.map(|estimate| estimate / unit),
         ending,
-        // That the count of eigenvalues is not known is no failure.
+        // An unknown number of negative eigenvalues is not a failure.
         remark: run.remark.clone().filter(|_| !ending.is_success()),
         ..blank
     }
 }
 
-/// What is to be said of these rows and their reference.
+/// Remarks on these rows and their reference.
 pub fn remarks(
     rows: &[Row],
     contenders: &[Contender],
@@ -169,7 +169,6 @@ pub fn remarks(
     remarks
 }
 
-/// What is to be said of one contender.
 fn remarks_on(contender: Contender, rows: &[Row], floor: f64, neutral: bool) -> Vec<String> {
     let mut remarks = Vec::new();
     let of_it = || rows.iter().filter(|row| row.contender == contender);
@@ -185,7 +184,7 @@ fn remarks_on(contender: Contender, rows: &[Row], floor: f64, neutral: bool) -> 
             first.knob
         ));
     }
-    // The chart is the place where an estimate is found out.
+    // Estimates that are smaller than the true error are reported here.
     let too_small = |row: &&Row| {
         let estimate = row.error_estimate.unwrap_or(f64::INFINITY).max(floor);
         row.ending.is_success() && row.true_error.is_some_and(|error| error > estimate)
@@ -256,7 +255,7 @@ mod tests {
         }
     }
 
-    /// The rows of a contender that found this at its first settings, and nothing
+    /// The rows of a contender with these results at its first settings, and none
     /// at the others.
     fn judged(contender: &str, mut measured: Vec<Measured>) -> Vec<Row> {
         let scenario = scenario();
@@ -296,8 +295,8 @@ mod tests {
         assert_eq!(rows[3].remark.as_deref(), Some("why"));
     }
 
-    /// A coarse grid is far off because it is coarse, unless the next grid is
-    /// as far off in the same place.
+    /// A coarse grid may have a large error because it is coarse, unless the next grid has
+    /// the same one.
     #[test]
     fn a_coarse_grid_is_not_called_another_equilibrium() {
         let elsewhere = |shifts: &[f64]| -> Vec<bool> {

@@ -6,11 +6,11 @@ use crate::relax::{Method, Options, Outcome, RelaxError, SHOOTING_START};
 use crate::scenario::Scenario;
 use crate::study::judge::{Answer, timed};
 
-/// Runs a cell; returns also the time from the checked scenario to the result,
+/// Runs a cell; also returns the time from the checked scenario to the result,
 /// in seconds.
 ///
 /// # Errors
-/// If the contender cannot be asked this.
+/// If the contender does not support the request.
 pub fn run(cell: &Cell) -> Result<(Answer, f64), RelaxError> {
     let (tolerance, segments) = match cell.knob {
         Setting::Tolerance(tolerance) => (Some(tolerance), None),
@@ -29,8 +29,8 @@ pub fn run(cell: &Cell) -> Result<(Answer, f64), RelaxError> {
     Ok((answer?, seconds))
 }
 
-/// Shooting from a coarsely relaxed leaf. What both do is added up, and nothing
-/// else takes time: eigenvalues are not counted.
+/// Shooting from a coarsely relaxed leaf. The work of both is added, and no time is
+/// spent on counting eigenvalues.
 fn shoot_from_rest(scenario: &Scenario, accuracy: f64) -> Result<(Answer, f64), RelaxError> {
     let options = Options {
         tolerance: Some(SHOOTING_START),
@@ -52,7 +52,7 @@ fn shoot_from_rest(scenario: &Scenario, accuracy: f64) -> Result<(Answer, f64), 
             let shot = Answer::of_solution(scenario, solution, accuracy);
             Answer {
                 outcome: match (shot.outcome, rest.outcome) {
-                    // A coarse relaxation is to start from, no more.
+                    // The coarse relaxation only provides the start.
                     (Outcome::Converged, Outcome::ToleranceNotReached) => Outcome::Converged,
                     (Outcome::Converged, outcome) => outcome,
                     (outcome, _) => outcome,

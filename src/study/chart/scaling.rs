@@ -3,7 +3,7 @@
 use super::plan::{Cell, Contender, SEGMENTS, Setting};
 use super::reference;
 use super::run::run;
-use super::{ChartError, ChartOptions, Ending, Row, Turn, alone, rows, timing};
+use super::{ChartError, ChartOptions, Ending, Row, Turn, on_one_thread, rows, timing};
 use crate::relax::{MAX_NODES, Method, Outcome, RelaxError, check_tolerance};
 use crate::scenario::{Scenario, longest};
 use crate::study::judge::Answer;
@@ -15,7 +15,7 @@ pub struct Scaling {
     /// Name of the scenario.
     #[serde(skip)]
     pub scenario: String,
-    /// Wanted accuracy, relative to the longest rod.
+    /// Required accuracy, relative to the longest rod.
     pub tolerance: f64,
     /// Numbers of veins whose reference is not confirmed.
     pub unconfirmed: Vec<usize>,
@@ -29,13 +29,13 @@ pub struct Scaling {
 pub struct ScalingRow {
     /// Number of veins.
     pub rods: usize,
-    /// What was measured.
+    /// The measurement.
     #[serde(flatten)]
     pub row: Row,
 }
 
 /// Measures all contenders on these leaves, from few veins to many, at one
-/// tolerance. On one grid, a contender gets the coarsest that is accurate
+/// tolerance. A contender on one grid gets the coarsest that is accurate
 /// enough.
 ///
 /// # Errors
@@ -50,7 +50,7 @@ pub fn scaling(
     let mut leaves: Vec<&Scenario> = leaves.iter().collect();
     leaves.sort_by_key(|leaf| leaf.rods.len());
     leaves.dedup_by_key(|leaf| leaf.rods.len());
-    let (rows, unconfirmed) = alone(options.seconds, || {
+    let (rows, unconfirmed) = on_one_thread(options.seconds, || {
         measure(&leaves, tolerance, options, progress)
     })?;
     Ok(Scaling {
@@ -97,8 +97,8 @@ fn measure(
         })
     });
     let leaves: Vec<Leaf> = leaves.collect::<Result<_, RelaxError>>()?;
-    // A contender goes from few veins to many: if one leaf takes it too long,
-    // larger ones are not tried.
+    // From few veins to many: if a contender takes too long for one leaf,
+    // it is not tried on larger ones.
     let (mut cells, mut of_leaf, mut rows) = (Vec::new(), Vec::new(), Vec::new());
     for &contender in &options.contenders {
         for leaf in &leaves {

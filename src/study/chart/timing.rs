@@ -1,5 +1,5 @@
-//! Time measured fairly: all cells take turns, so that a busy machine treats
-//! them alike.
+//! Fair timing: all cells take turns, so that a varying load of the machine affects
+//! them equally.
 
 use serde::{Serialize, Serializer};
 
@@ -11,36 +11,36 @@ use crate::study::judge::Answer;
 /// Runs that take longer, in seconds, are slow: they are not repeated.
 const SLOW: f64 = 1.0;
 
-/// Runs of the others, at least and at most.
+/// Least and largest number of runs of the others.
 const FEWEST: usize = 3;
 const MOST: usize = 101;
 
-/// How far the measurement has come.
+/// Progress of the measurement.
 #[derive(Clone, Copy, Debug)]
 pub struct Turn {
     /// Veins of the leaf that is run next.
     pub rods: usize,
-    /// How it is run.
+    /// The contender.
     pub contender: Contender,
-    /// Where its knob stands.
+    /// Its setting.
     pub knob: super::Setting,
     /// Present round.
     pub round: usize,
-    /// Rounds in all, as far as known.
+    /// Number of rounds, as far as known.
     pub rounds: usize,
 }
 
 /// A cell after all rounds.
 pub struct Measured {
-    /// What the first run found. `None`: it was not run, as a coarser one of
-    /// its contender took too long already.
+    /// The result of the first run. `None`: it was not run, since a coarser one of
+    /// its contender took too long.
     pub found: Option<Result<Answer, RelaxError>>,
     /// Seconds of each run, ascending.
     pub seconds: Vec<f64>,
 }
 
 impl Measured {
-    /// What was found, unless the run was refused or not made.
+    /// The answer, unless the run was refused or not made.
     pub fn answer(&self) -> Option<&Answer> {
         self.found.as_ref()?.as_ref().ok()
     }
@@ -70,10 +70,10 @@ impl Spread {
     pub fn of(sorted: &[f64]) -> Option<Self> {
         let last = sorted.len().checked_sub(1)?;
         let at = |part: f64| {
-            let place = part * last as f64;
-            let below = place.floor() as usize;
+            let position = part * last as f64;
+            let below = position.floor() as usize;
             let above = (below + 1).min(last);
-            let rest = place - below as f64;
+            let rest = position - below as f64;
             (1.0 - rest) * sorted[below] + rest * sorted[above]
         };
         Some(Spread {
@@ -106,9 +106,9 @@ pub fn serialize_spread<S: Serializer>(
 }
 
 /// Runs all cells once, in order, and those that are not slow [`FEWEST`] times;
-/// then again and again for about `budget` seconds in all, each about equally
-/// long. Cells of one contender go from cheap to dear: if one takes longer than
-/// the budget (or [`SLOW`]), those after it are not run. Returns also the number
+/// then repeatedly for about `budget` seconds in all, each for about the same time.
+/// Cells of one contender are ordered by cost: if one takes longer than
+/// the budget (or [`SLOW`]), those after it are not run. Also returns the number
 /// of rounds.
 pub fn measure(
     cells: &[Cell],
@@ -140,8 +140,8 @@ pub fn measure(
         });
         measured.push(Measured { found, seconds });
     }
-    let mut again = |measured: &mut Measured, cell: &Cell, round: usize, rounds: usize| {
-        // What ran once runs again.
+    let mut run_again = |measured: &mut Measured, cell: &Cell, round: usize, rounds: usize| {
+        // It succeeded before, and does so again.
         if let Ok((_, time)) = run(cell, round, rounds) {
             measured.seconds.push(time);
         }
@@ -150,7 +150,7 @@ pub fn measure(
     for round in 1..FEWEST {
         for (cell, measured) in cells.iter().zip(&mut measured) {
             if is_fast(measured) {
-                again(measured, cell, round + 1, FEWEST);
+                run_again(measured, cell, round + 1, FEWEST);
             }
         }
     }
@@ -161,8 +161,8 @@ pub fn measure(
     let rest = repeats.iter().copied().max().unwrap_or(0);
     for round in 0..rest {
         for ((cell, measured), repeats) in cells.iter().zip(&mut measured).zip(&repeats) {
-            if takes_part(round, *repeats, rest) {
-                again(measured, cell, FEWEST + round + 1, FEWEST + rest);
+            if runs_in(round, *repeats, rest) {
+                run_again(measured, cell, FEWEST + round + 1, FEWEST + rest);
             }
         }
     }
@@ -172,8 +172,8 @@ pub fn measure(
     (measured, FEWEST + rest)
 }
 
-/// Runs after the first few, for a `share` of the time: none of a slow cell. A
-/// first run may be disturbed, the shortest is not.
+/// Number of further runs after the first few, within a `share` of the time: none for a slow
+/// cell. The first run may be disturbed; the fastest one is used.
 fn repeats(seconds: &[f64], share: f64) -> usize {
     let shortest = seconds.iter().copied().reduce(f64::min);
     match shortest {
@@ -184,9 +184,9 @@ fn repeats(seconds: &[f64], share: f64) -> usize {
     }
 }
 
-/// Whether a cell with so many `repeats` runs in this of all `rounds`: they are
-/// spread evenly.
-fn takes_part(round: usize, repeats: usize, rounds: usize) -> bool {
+/// Whether a cell with so many `repeats` runs in this round: they are spread evenly over all
+/// `rounds`.
+fn runs_in(round: usize, repeats: usize, rounds: usize) -> bool {
     (round + 1) * repeats / rounds > round * repeats / rounds
 }
 
@@ -197,7 +197,7 @@ mod tests {
     #[test]
     fn repeats_are_as_many_as_wanted_and_spread() {
         for repeats in [0, 1, 2, 7, 100] {
-            let rounds: Vec<usize> = (0..100).filter(|&r| takes_part(r, repeats, 100)).collect();
+            let rounds: Vec<usize> = (0..100).filter(|&r| runs_in(r, repeats, 100)).collect();
             assert_eq!(rounds.len(), repeats);
             let gaps = rounds.windows(2).map(|pair| pair[1] - pair[0]);
             assert!(gaps.max().unwrap_or(0) <= 100_usize.div_ceil(repeats.max(1)));

@@ -1,4 +1,4 @@
-//! Both solutions as `check.json` has them.
+//! Serialisation of both solutions for `check.json`.
 
 use glam::DVec3;
 use serde::{Serialize, Serializer};
@@ -7,12 +7,12 @@ use crate::bvp::{self, Failure, Reason, Solution};
 use crate::relax::{Equilibrium, serialize_index};
 use crate::shape::{Difference, serialize_tips};
 
-/// The boundary-value solution, judged, or why there is none.
+/// The boundary-value solution with its verdict, or why there is none.
 #[derive(Clone, Debug)]
 pub struct Shot {
     /// What the shooting found.
     pub found: Result<Solution, Failure>,
-    /// The joint tip alone, or one tip per rod; empty without a solution.
+    /// The shared tip alone, or one tip per rod; empty without a solution.
     pub tips: Vec<DVec3>,
     /// Its Morse index, counted on the energy's Hessian at this shape.
     pub negative_eigenvalues: Option<usize>,
@@ -20,7 +20,7 @@ pub struct Shot {
     pub wall_seconds: f64,
 }
 
-/// What `check.json` says of the relaxed leaf.
+/// The part of `check.json` on the relaxed leaf.
 pub fn relaxation<S: Serializer>(leaf: &Equilibrium, serializer: S) -> Result<S::Ok, S::Error> {
     #[derive(Serialize)]
     struct Keys<'a> {

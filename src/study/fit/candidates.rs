@@ -1,22 +1,25 @@
-//! Which experiment would say most.
+//! Which candidate experiment would be most informative.
 
 use nalgebra::DMatrix;
 
 use super::FitError;
-use super::case::{Component, What};
+use super::case::{Compared, Component};
 use super::data::{Data, Experiment};
-use super::judge::Judge;
 use super::model::Model;
 use super::result::FitCandidate;
+use super::statistics::Statistics;
 
-/// What is known of a coordinate beforehand: a factor of ten each way, as 95 %.
+/// Prior of a coordinate: 95 % within a factor of ten up and down.
 const BEFORE: f64 = std::f64::consts::LN_10 / super::directions::NORMAL;
 
-/// What each of these experiments would add to what the fit knows, the one that adds
-/// most first. Its data are as accurate as said, or as those of the fit.
-pub(super) fn judge(judge: &Judge, wanted: &[Experiment]) -> Result<Vec<FitCandidate>, FitError> {
-    let count = judge.values.len();
-    let known = judge.jacobian.transpose() * &judge.jacobian / judge.spread.powi(2);
+/// The information each of these experiments would add to the fit, the most informative
+/// first. Its data are as accurate as given, or as those of the fit.
+pub(super) fn rank(
+    stats: &Statistics,
+    wanted: &[Experiment],
+) -> Result<Vec<FitCandidate>, FitError> {
+    let count = stats.values.len();
+    let known = stats.jacobian.transpose() * &stats.jacobian / stats.spread.powi(2);
     let known = known + DMatrix::identity(count, count) / BEFORE.powi(2);
     let mut found = Vec::new();
     for experiment in wanted {
@@ -24,7 +27,7 @@ pub(super) fn judge(judge: &Judge, wanted: &[Experiment]) -> Result<Vec<FitCandi
             experiments: vec![experiment.clone()],
             traced: Vec::new(),
         };
-        let of = judge.model;
+        let of = stats.model;
         let model = Model::new(of.base, of.coordinates, &of.options, data)?;
         let mut candidate = FitCandidate {
             experiment: experiment.name.clone(),
@@ -32,7 +35,7 @@ pub(super) fn judge(judge: &Judge, wanted: &[Experiment]) -> Result<Vec<FitCandi
             shrinks: 1.0,
             remark: None,
         };
-        match added(judge, &model) {
+        match added(stats, &model) {
             Err(refused) => candidate.remark = Some(refused),
             Ok(added) => {
                 let with = &known + &added;
@@ -52,17 +55,17 @@ pub(super) fn judge(judge: &Judge, wanted: &[Experiment]) -> Result<Vec<FitCandi
     Ok(found)
 }
 
-fn added(judge: &Judge, model: &Model) -> Result<DMatrix<f64>, String> {
-    let found = model.find(&judge.point.theta);
+fn added(stats: &Statistics, model: &Model) -> Result<DMatrix<f64>, String> {
+    let found = model.find(&stats.point.theta);
     let (mut point, _) = found.map_err(|refused| refused.to_string())?;
     (model.differentiate(&mut point)).map_err(|_| "its equilibrium is singular".to_string())?;
     let sd = |component: &Component| match component.what {
-        What::Result(quantity) => component.sd.or(judge.assumed(quantity.kind())),
-        What::Vein { .. } => component.sd,
+        Compared::Result(quantity) => component.sd.or(stats.assumed(quantity.kind())),
+        Compared::Vein { .. } => component.sd,
     };
     let sd: Option<Vec<f64>> = point.components().map(sd).collect();
     let sd = sd.ok_or("its standard deviation must be given (sd_frequency_1, sd_tip_x, ...)")?;
     let rows: Vec<&Vec<f64>> = point.gradients().collect();
-    let jacobian = DMatrix::from_fn(rows.len(), judge.values.len(), |i, k| rows[i][k] / sd[i]);
+    let jacobian = DMatrix::from_fn(rows.len(), stats.values.len(), |i, k| rows[i][k] / sd[i]);
     Ok(jacobian.transpose() * jacobian)
 }

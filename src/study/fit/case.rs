@@ -1,14 +1,14 @@
-//! A leaf at rest under the conditions of one experiment, what it predicts for the
-//! data, and how that changes.
+//! A leaf at rest under the conditions of one experiment, its predictions for the data, and
+//! their derivatives.
 
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
-use super::answers::Answers;
 use super::change::Change;
 use super::data::{Experiment, Measured, Origin, Traced};
 use super::quantity::{Kind, Quantity};
+use super::responses::Responses;
 use super::vein::Vein;
 use crate::leaf::{LeafRate, Response, shift};
 use crate::limit::Limit;
@@ -18,47 +18,45 @@ use crate::relax::{AtRest, Level, Lost, Nearby, Number, extrapolation, unit_forc
 use crate::scenario::Scenario;
 use crate::study::Keys;
 
-/// Unknowns of the finest grid on which modes are looked for, but for the first.
+/// Largest number of unknowns of a grid on which modes are computed, except the first.
 const FEW_UNKNOWNS: usize = 4_000;
 
-/// A leaf under the conditions of one experiment, and what was seen of it.
+/// A leaf under the conditions of one experiment, with its measurements.
 pub(super) struct Case {
     pub name: String,
     pub settings: Vec<(Keys, f64)>,
     pub measured: Vec<Measured>,
     pub traced: Vec<Traced>,
     pub origin: Option<Origin>,
-    /// How its scenario changes with each free number, where that is the same
-    /// wherever these are.
+    /// Derivatives of its scenario with respect to each free number, if they are constant.
     pub changes: OnceLock<Option<Vec<Change>>>,
-    /// Its scenario with the numbers that the fit starts with.
+    /// Its scenario with the initial values of the free numbers.
     pub start: OnceLock<Arc<Scenario>>,
-    /// Whether only loads set it apart from the others: it then changes with the free
-    /// numbers as they do.
+    /// Whether it differs from the other experiments by loads only: it then has the same
+    /// derivatives with respect to the free numbers.
     pub loaded_only: bool,
 }
 
-/// One number that is compared.
+/// One scalar datum.
 #[derive(Clone, Debug)]
 pub(super) struct Component {
-    /// The experiment.
     pub case: usize,
-    pub what: What,
+    pub what: Compared,
     pub observed: f64,
     pub model: f64,
-    /// Its standard deviation, if it is known.
+    /// Its standard deviation, if known.
     pub sd: Option<f64>,
-    /// Whether another of the same point takes its place in the count: a point beside
-    /// a curve says nothing about the place along it.
+    /// Whether it does not count as a datum: the distance of a point from a curve contains no
+    /// information on the position along it.
     pub free: bool,
     pub origin: Option<Origin>,
 }
 
-/// What is compared.
+/// The quantity compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum What {
+pub(super) enum Compared {
     Result(Quantity),
-    /// A coordinate of a point of a rod, at this fraction of its length.
+    /// A coordinate of a point on a rod, at this fraction of its length.
     Vein {
         rod: usize,
         axis: usize,
@@ -66,30 +64,29 @@ pub(super) enum What {
     },
 }
 
-impl What {
-    /// What kind of number it is.
+impl Compared {
     pub fn kind(self) -> Kind {
         match self {
-            What::Result(quantity) => quantity.kind(),
-            What::Vein { .. } => Kind::Length,
+            Compared::Result(quantity) => quantity.kind(),
+            Compared::Vein { .. } => Kind::Length,
         }
     }
 }
 
-/// A leaf at rest for some values of the free numbers.
+/// A leaf at rest at some values of the free numbers.
 pub(super) struct CaseAt {
     pub at: AtRest,
     /// Modes on the first grids.
     pub modes: Vec<Vec<modes::LoadedMode>>,
     pub components: Vec<Component>,
-    /// How it answers the numbers; none until asked for.
-    pub answers: Option<Answers>,
-    /// The gradients of the components; empty until asked for.
+    /// Its response to the numbers, once computed.
+    pub responses: Option<Responses>,
+    /// The gradients of the components; empty until computed.
     pub gradients: Vec<Vec<f64>>,
 }
 
 impl Case {
-    /// One of which no points were traced.
+    /// An experiment without traced points.
     pub fn new(experiment: Experiment) -> Case {
         let mut targets = experiment.settings.iter().flat_map(|it| it.0.targets());
         let loaded_only = targets.all(|target| {
@@ -110,7 +107,7 @@ impl Case {
 }
 
 impl CaseAt {
-    /// Predictions of a leaf at rest, beside the data of this experiment.
+    /// Predictions of a leaf at rest for the data of this experiment.
     pub fn new(of: &Case, case: usize, at: AtRest) -> Result<CaseAt, Lost> {
         let frequencies = of
             .measured
@@ -143,13 +140,13 @@ impl CaseAt {
             at,
             modes,
             components: Vec::new(),
-            answers: None,
+            responses: None,
             gradients: Vec::new(),
         };
         for measured in &of.measured {
             found.components.push(Component {
                 case,
-                what: What::Result(measured.quantity),
+                what: Compared::Result(measured.quantity),
                 observed: measured.value.unwrap_or(f64::NAN),
                 model: found.result(measured.quantity),
                 sd: measured.sd,
@@ -171,7 +168,7 @@ impl CaseAt {
             for (number, (axis, observed)) in seen.enumerate() {
                 found.components.push(Component {
                     case,
-                    what: What::Vein {
+                    what: Compared::Vein {
                         rod: traced.rod,
                         axis,
                         sigma,
@@ -187,27 +184,27 @@ impl CaseAt {
         Ok(found)
     }
 
-    /// The axes along which its tip was measured, if that is all that was, and on a leaf
-    /// whose equations are symmetric: their solution for each axis then tells the change
-    /// with any number. `None` where so many numbers are no more work.
+    /// The axes along which its tip was measured, if there are no other data, and the equations of
+    /// the leaf are symmetric: adjoint solutions for each axis then give the derivatives with
+    /// respect to all numbers. `None` if solving for each number takes no more work.
     pub fn tip_axes(&self, numbers: usize) -> Option<Vec<usize>> {
         let leaf = &self.at.levels[0].leaf;
         let symmetric = leaf.leaf.held.is_none() && leaf.tip_moment() == DVec3::ZERO;
         let tip = |component: &Component| match component.what {
-            What::Result(Quantity::Tip(axis)) => Some(axis),
+            Compared::Result(Quantity::Tip(axis)) => Some(axis),
             _ => None,
         };
         let mut axes: Vec<usize> = self.components.iter().map(tip).collect::<Option<_>>()?;
         axes.sort_unstable();
         axes.dedup();
-        // One more is for the step that follows.
+        // One more is for the next step.
         (symmetric && axes.len() + 1 < numbers).then_some(axes)
     }
 
-    /// The gradients of the components by these solutions.
+    /// The gradients of the components from these solutions.
     pub fn tip_rates(
         &self,
-        answers: &Answers,
+        responses: &Responses,
         axes: &[usize],
         slopes: &[f64],
     ) -> Result<Vec<Vec<f64>>, Lost> {
@@ -219,25 +216,25 @@ impl CaseAt {
             }
             let all = unit_forces(&level.leaf, 1);
             let units: Vec<_> = axes.iter().map(|&axis| all[axis].clone()).collect();
-            let rates = answers.by_results((k, level), &units)?;
+            let rates = responses.by_results((k, level), &units)?;
             for (axis, rates) in axes.iter().zip(rates) {
                 let sums = sums[*axis].iter_mut().zip(rates).zip(slopes);
                 sums.for_each(|((sum, rate), slope)| *sum += weight * rate * slope);
             }
         }
         let row = |component: &Component| match component.what {
-            What::Result(Quantity::Tip(axis)) => sums[axis].clone(),
+            Compared::Result(Quantity::Tip(axis)) => sums[axis].clone(),
             _ => Vec::new(),
         };
         Ok(self.components.iter().map(row).collect())
     }
 
-    /// How it answers steps of the numbers on these grids, of which each is one of its
-    /// own: not at all where there are none.
+    /// Its response to steps of the numbers on these grids, each of which must be one of its
+    /// own; empty if there are no steps.
     pub fn answer(&self, levels: &[Level], steps: &[f64]) -> Result<Vec<Response>, Lost> {
         let none = |level: &Level| Response::none(level.leaf.rods(), level.leaf.segments());
-        match &self.answers {
-            Some(answers) if steps.iter().any(|step| *step != 0.0) => answers.to(levels, steps),
+        match &self.responses {
+            Some(responses) if steps.iter().any(|step| *step != 0.0) => responses.to(levels, steps),
             _ => Ok(levels.iter().map(none).collect()),
         }
     }
@@ -267,7 +264,7 @@ impl CaseAt {
         }
     }
 
-    /// An eigenvalue, extrapolated over the grids on which modes are known.
+    /// An eigenvalue, extrapolated over the grids with modes.
     fn eigenvalue(&self, mode: usize) -> f64 {
         self.over_modes(|level| self.modes[level][mode - 1].eigenvalue)
     }
@@ -283,27 +280,27 @@ impl CaseAt {
             .sum()
     }
 
-    /// The change of a result with a number of the scenario.
+    /// The derivative of a result with respect to a number of the scenario.
     pub fn result_rate(
         &self,
         quantity: Quantity,
-        (number, rate, answers): (&Number, &LeafRate, &[Response]),
+        (number, rate, responses): (&Number, &LeafRate, &[Response]),
     ) -> f64 {
         match quantity {
             Quantity::Tip(axis) => {
                 let tip = |k: usize, level: &Level| {
-                    shift(&answers[k].nodes[0][level.leaf.segments() - 1])
+                    shift(&responses[k].nodes[0][level.leaf.segments() - 1])
                 };
                 self.at.best(tip)[axis] * self.length()
             }
             Quantity::Reaction(axis) => {
-                let force = |k: usize, level: &Level| level.leaf.reaction_rate(rate, &answers[k]);
+                let force = |k: usize, level: &Level| level.leaf.reaction_rate(rate, &responses[k]);
                 self.at.best(force)[axis] * self.force()
             }
             Quantity::Frequency(mode) => {
                 let scenarios = number.nearby().unwrap_or_default();
                 let of = |k: usize| {
-                    let near = Nearby::new(&self.at.levels[k], &scenarios, (rate, &answers[k]));
+                    let near = Nearby::new(&self.at.levels[k], &scenarios, (rate, &responses[k]));
                     near.eigenvalue_rate(&self.modes[k][mode - 1])
                 };
                 // omega^2 = (2 pi f)^2.
@@ -313,11 +310,11 @@ impl CaseAt {
         }
     }
 
-    /// The changes of the coordinates of a point on a vein; of the nearest one to a
-    /// point that was not marked only those across the vein.
+    /// The derivatives of the coordinates of a point on a vein; for the nearest point to an
+    /// unmarked one, only the components normal to the vein.
     pub fn vein_rates(
         &self,
-        answers: &Answers,
+        responses: &Responses,
         (rod, sigma): (usize, f64),
         point: &[&Component],
         slopes: &[f64],
@@ -325,8 +322,8 @@ impl CaseAt {
         let stencils = self.at.stencils(sigma);
         let axes: Vec<usize> = (point.iter())
             .map(|component| match component.what {
-                What::Vein { axis, .. } => axis,
-                What::Result(_) => 0,
+                Compared::Vein { axis, .. } => axis,
+                Compared::Result(_) => 0,
             })
             .collect();
         let mut along = DVec3::ZERO;
@@ -338,18 +335,18 @@ impl CaseAt {
             axes.iter().for_each(|&axis| along[axis] = slope[axis]);
             along = along.normalize_or_zero();
         }
-        let change = |answers: &Vec<Response>| {
+        let change = |responses: &Vec<Response>| {
             let change = self.at.best(|k, _| {
                 stencils[k].value(|i| match i {
                     0 => DVec3::ZERO,
-                    _ => shift(&answers[k].nodes[rod][i - 1]),
+                    _ => shift(&responses[k].nodes[rod][i - 1]),
                 })
             }) * self.length();
             let mut seen = DVec3::ZERO;
             axes.iter().for_each(|&axis| seen[axis] = change[axis]);
             seen - seen.dot(along) * along
         };
-        let changes: Vec<DVec3> = answers.each.iter().map(change).collect();
+        let changes: Vec<DVec3> = responses.each.iter().map(change).collect();
         let row = |&axis: &usize| {
             let all = changes.iter().zip(slopes);
             all.map(|(change, slope)| change[axis] * slope).collect()

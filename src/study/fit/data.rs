@@ -6,7 +6,7 @@ use super::FitError;
 use super::quantity::Quantity;
 use crate::study::Keys;
 
-/// Where a number was read: a file and a line of it.
+/// Origin of a number: a file and a line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Origin {
     /// Name of the file.
@@ -21,44 +21,44 @@ impl std::fmt::Display for Origin {
     }
 }
 
-/// A number that was measured.
+/// A measured number.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// Of what.
+    /// The quantity.
     pub quantity: Quantity,
-    /// Its value; of a candidate there is none.
+    /// Its value; none for a candidate.
     pub value: Option<f64>,
-    /// Its standard deviation, if it is known.
+    /// Its standard deviation, if known.
     pub sd: Option<f64>,
 }
 
 /// One experiment.
 #[derive(Clone, Debug)]
 pub struct Experiment {
-    /// Its name, or its number among all.
+    /// Its name, or its number.
     pub name: String,
-    /// Numbers of the scenario while it was made.
+    /// Numbers of the scenario during the experiment.
     pub settings: Vec<(Keys, f64)>,
     /// What was measured.
     pub measured: Vec<Measured>,
-    /// Where it stands.
+    /// Its position in the data.
     pub origin: Option<Origin>,
 }
 
 /// A point on a vein.
 #[derive(Clone, Debug)]
 pub struct Traced {
-    /// The name of its experiment; none: the scenario as it is.
+    /// The name of its experiment; none: the scenario without changes.
     pub experiment: Option<String>,
     /// Rod, counted from 0.
     pub rod: usize,
-    /// Fraction of the length, of a point that was marked.
+    /// Fraction of the length, for a marked point.
     pub sigma: Option<f64>,
-    /// Coordinates that were seen.
+    /// The coordinates measured.
     pub at: [Option<f64>; 3],
-    /// Standard deviation of each, if it is known.
+    /// Standard deviation of each, if known.
     pub sd: Option<f64>,
-    /// Where it stands.
+    /// Its position in the data.
     pub origin: Origin,
 }
 
@@ -71,8 +71,8 @@ pub struct Data {
     pub traced: Vec<Traced>,
 }
 
-/// A table as written.
-struct Sheet<'t> {
+/// A parsed table.
+struct Table<'t> {
     file: &'t str,
     header: Vec<&'t str>,
     /// Lines, counted from 1, and their cells.
@@ -89,7 +89,7 @@ fn unquoted(cell: &str) -> &str {
     inner.unwrap_or(cell).trim()
 }
 
-impl<'t> Sheet<'t> {
+impl<'t> Table<'t> {
     fn of(text: &'t str, file: &'t str) -> Result<Self, FitError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line));
@@ -130,7 +130,7 @@ impl<'t> Sheet<'t> {
         if rows.is_empty() {
             return Err(refuse(file, first, "has no row below the header"));
         }
-        Ok(Sheet { file, header, rows })
+        Ok(Table { file, header, rows })
     }
 
     /// The number in a cell; `None` if it is empty.
@@ -167,65 +167,65 @@ impl Data {
     /// Adds a file of measured data; `veins` is the number of rods.
     ///
     /// # Errors
-    /// If it is not of the form.
+    /// If the format is wrong.
     pub fn read(&mut self, text: &str, file: &str, veins: usize) -> Result<(), FitError> {
-        let sheet = Sheet::of(text, file)?;
-        match sheet.header.contains(&"rod") {
-            true => self.read_traced(&sheet, veins),
+        let table = Table::of(text, file)?;
+        match table.header.contains(&"rod") {
+            true => self.read_traced(&table, veins),
             false => {
-                let experiments = experiments(&sheet, false, self.experiments.len())?;
+                let experiments = experiments(&table, false, self.experiments.len())?;
                 self.experiments.extend(experiments);
                 Ok(())
             }
         }
     }
 
-    fn read_traced(&mut self, sheet: &Sheet, veins: usize) -> Result<(), FitError> {
+    fn read_traced(&mut self, table: &Table, veins: usize) -> Result<(), FitError> {
         let known = ["rod", "x", "y", "z", "sigma", "sd", "experiment"];
-        let strange = sheet.header.iter().find(|name| !known.contains(name));
+        let strange = table.header.iter().find(|name| !known.contains(name));
         if let Some(name) = strange {
             let why = format!(
                 "unknown column {name}: points on veins have {}",
                 known.join(", ")
             );
-            return Err(refuse(sheet.file, 1, why));
+            return Err(refuse(table.file, 1, why));
         }
-        let column = |name: &str| sheet.header.iter().position(|known| *known == name);
-        for row in 0..sheet.rows.len() {
-            let line = sheet.rows[row].0;
+        let column = |name: &str| table.header.iter().position(|known| *known == name);
+        for row in 0..table.rows.len() {
+            let line = table.rows[row].0;
             let number = |name: &str| match column(name) {
-                Some(column) => sheet.number(row, column),
+                Some(column) => table.number(row, column),
                 None => Ok(None),
             };
             let rod = number("rod")?.filter(|rod| rod.fract() == 0.0);
             let Some(rod) = rod.filter(|rod| (1.0..=veins as f64).contains(rod)) else {
                 let why = format!("rod: must be a whole number from 1 to {veins} (leaf.rods)");
-                return Err(refuse(sheet.file, line, why));
+                return Err(refuse(table.file, line, why));
             };
             let sigma = number("sigma")?;
             if let Some(sigma) = sigma.filter(|sigma| !(0.0..=1.0).contains(sigma)) {
                 let why =
                     format!("sigma = {sigma}: is a fraction of the vein's length, from 0 to 1");
-                return Err(refuse(sheet.file, line, why));
+                return Err(refuse(table.file, line, why));
             }
             let at = [number("x")?, number("y")?, number("z")?];
             let seen = at.iter().flatten().count();
             if seen < 2 && sigma.is_none() || seen == 0 {
                 let why = "at least two of x, y, z are needed, or one and sigma";
-                return Err(refuse(sheet.file, line, why));
+                return Err(refuse(table.file, line, why));
             }
-            let experiment = column("experiment").map(|column| sheet.rows[row].1[column]);
+            let experiment = column("experiment").map(|column| table.rows[row].1[column]);
             self.traced.push(Traced {
                 experiment: experiment.filter(|name| !name.is_empty()).map(String::from),
                 rod: rod as usize - 1,
                 sigma,
                 at,
                 sd: match column("sd") {
-                    Some(column) => sheet.positive(row, column)?,
+                    Some(column) => table.positive(row, column)?,
                     None => None,
                 },
                 origin: Origin {
-                    file: sheet.file.into(),
+                    file: table.file.into(),
                     line,
                 },
             });
@@ -234,15 +234,15 @@ impl Data {
     }
 }
 
-/// Experiments that could be made: as those that were, but nothing is measured yet.
+/// Candidate experiments: like those made, but without measured values.
 ///
 /// # Errors
-/// If the table is not of the form.
+/// If the format of the table is wrong.
 pub fn candidates(text: &str, file: &str) -> Result<Vec<Experiment>, FitError> {
-    experiments(&Sheet::of(text, file)?, true, 0)
+    experiments(&Table::of(text, file)?, true, 0)
 }
 
-/// What a column of experiments is.
+/// The meaning of a column of experiments.
 enum Column {
     Name,
     Setting(Keys),
@@ -250,7 +250,7 @@ enum Column {
     Deviation(Quantity),
 }
 
-fn column(sheet: &Sheet, name: &str) -> Result<Column, FitError> {
+fn column(table: &Table, name: &str) -> Result<Column, FitError> {
     let quantity = |text: &str| text.parse::<Quantity>().ok();
     if name == "experiment" {
         return Ok(Column::Name);
@@ -271,16 +271,16 @@ fn column(sheet: &Sheet, name: &str) -> Result<Column, FitError> {
                 Quantity::ALL
             ),
         };
-        refuse(sheet.file, 1, why)
+        refuse(table.file, 1, why)
     })
 }
 
 fn experiments(
-    sheet: &Sheet,
+    table: &Table,
     candidates: bool,
     before: usize,
 ) -> Result<Vec<Experiment>, FitError> {
-    let columns = sheet.header.iter().map(|name| column(sheet, name));
+    let columns = table.header.iter().map(|name| column(table, name));
     let columns = columns.collect::<Result<Vec<_>, _>>()?;
     let results: Vec<Quantity> = (columns.iter())
         .filter_map(|column| match column {
@@ -293,21 +293,21 @@ fn experiments(
             && !results.contains(quantity)
         {
             let why = format!("sd_{quantity} without {quantity}: add that column");
-            return Err(refuse(sheet.file, 1, why));
+            return Err(refuse(table.file, 1, why));
         }
     }
     if results.is_empty() && candidates {
         let why = format!("no column is a result ({})", Quantity::ALL);
-        return Err(refuse(sheet.file, 1, why));
+        return Err(refuse(table.file, 1, why));
     }
     let mut found = Vec::new();
-    for (row, (line, cells)) in sheet.rows.iter().enumerate() {
+    for (row, (line, cells)) in table.rows.iter().enumerate() {
         let mut experiment = Experiment {
             name: (before + row + 1).to_string(),
             settings: Vec::new(),
             measured: Vec::new(),
             origin: Some(Origin {
-                file: sheet.file.into(),
+                file: table.file.into(),
                 line: *line,
             }),
         };
@@ -317,14 +317,14 @@ fn experiments(
                 Column::Name if !cells[k].is_empty() => experiment.name = cells[k].into(),
                 Column::Name => {}
                 Column::Setting(keys) => {
-                    let Some(value) = sheet.number(row, k)? else {
+                    let Some(value) = table.number(row, k)? else {
                         let why = format!("{keys} is empty: every experiment needs its value");
-                        return Err(refuse(sheet.file, *line, why));
+                        return Err(refuse(table.file, *line, why));
                     };
                     experiment.settings.push((keys.clone(), value));
                 }
                 Column::Result(quantity) => {
-                    let value = sheet.number(row, k)?;
+                    let value = table.number(row, k)?;
                     if value.is_some() || candidates {
                         experiment.measured.push(Measured {
                             quantity: *quantity,
@@ -334,7 +334,7 @@ fn experiments(
                     }
                 }
                 Column::Deviation(quantity) => {
-                    deviations.insert(quantity.to_string(), sheet.positive(row, k)?);
+                    deviations.insert(quantity.to_string(), table.positive(row, k)?);
                 }
             }
         }

@@ -1,22 +1,22 @@
-//! How the components of a point change with the free numbers.
+//! Derivatives of the components of a point with respect to the free numbers.
 
 use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
-use super::answers::Answers;
-use super::case::{CaseAt, Component, What};
+use super::case::{CaseAt, Compared, Component};
 use super::change::Change;
 use super::model::{Model, Point};
+use super::responses::Responses;
 use crate::leaf::{Leaf, LeafRate};
 use crate::relax::{Grids, Lost, Number};
 use crate::scenario::Scenario;
 
-/// Derivatives of a search are as accurate as of a leaf with this tolerance.
+/// Derivatives in a search have the accuracy of those of a leaf with this tolerance.
 const OF_SEARCH: f64 = 1e-5;
 
 impl Model<'_> {
-    /// Finds how the components of a point change with the coordinates.
+    /// Computes the derivatives of a point's components with respect to the coordinates.
     pub fn differentiate(&self, point: &mut Point) -> Result<(), Lost> {
         let theta = point.theta.clone();
         let shared = OnceLock::new();
@@ -26,20 +26,20 @@ impl Model<'_> {
         cases.map(each).collect()
     }
 
-    /// The same of one leaf. Those that only loads set apart share how they change.
+    /// The same for one leaf. Leaves that differ by loads only share their derivatives.
     fn differentiate_case<'s>(
         &'s self,
         (case, found): (usize, &mut CaseAt),
         theta: &[f64],
         shared: &OnceLock<Vec<LeafRate<'s>>>,
     ) -> Result<(), Lost> {
-        if found.answers.is_some() {
+        if found.responses.is_some() {
             return Ok(());
         }
         let of = &self.cases[case];
         let fixed = self.values(of, theta);
         let first = fixed.len() - theta.len();
-        // Where all numbers are as they are, all scenarios are the same.
+        // With unchanged numbers all cases have the same scenario.
         let here: OnceLock<Option<Arc<Scenario>>> = OnceLock::new();
         let made: Vec<_> = (0..theta.len())
             .map(|k| {
@@ -88,17 +88,17 @@ impl Model<'_> {
             Grids::AsNeeded => self.base.scenario().tolerance.min(self.tolerance()),
             Grids::These => OF_SEARCH,
         };
-        let mut answers = Answers::new(&found.at, rates, tolerance);
+        let mut responses = Responses::new(&found.at, rates, tolerance);
         let slopes = self.coordinates.iter().zip(theta);
         let slopes: Vec<f64> = slopes.map(|(free, theta)| free.slope(*theta)).collect();
         if let Some(axes) = found.tip_axes(numbers.len()) {
-            found.gradients = found.tip_rates(&answers, &axes, &slopes)?;
-            found.answers = Some(answers);
+            found.gradients = found.tip_rates(&responses, &axes, &slopes)?;
+            found.responses = Some(responses);
             return Ok(());
         }
-        answers.solve_each(&found.at.levels)?;
-        found.gradients = found.rates(&answers, (&numbers, rates), &slopes);
-        found.answers = Some(answers);
+        responses.solve_each(&found.at.levels)?;
+        found.gradients = found.rates(&responses, (&numbers, rates), &slopes);
+        found.responses = Some(responses);
         Ok(())
     }
 }
@@ -109,10 +109,10 @@ fn rates<'c>(leaf: &Leaf, changes: &'c [Change]) -> Vec<LeafRate<'c>> {
 }
 
 impl CaseAt {
-    /// How its components change with the coordinates, each a number of `slopes` as steep.
+    /// Derivatives of its components with respect to the coordinates, whose `slopes` are given.
     fn rates(
         &self,
-        answers: &Answers,
+        responses: &Responses,
         (numbers, rates): (&[Number], &[LeafRate]),
         slopes: &[f64],
     ) -> Vec<Vec<f64>> {
@@ -121,23 +121,23 @@ impl CaseAt {
         while index < self.components.len() {
             let component = &self.components[index];
             match component.what {
-                What::Result(quantity) => {
+                Compared::Result(quantity) => {
                     let by = |k: usize| {
-                        let of = (&numbers[k], &rates[k], answers.each[k].as_slice());
+                        let of = (&numbers[k], &rates[k], responses.each[k].as_slice());
                         slopes[k] * self.result_rate(quantity, of)
                     };
                     gradients.push((0..numbers.len()).map(by).collect());
                     index += 1;
                 }
-                What::Vein { rod, sigma, .. } => {
+                Compared::Vein { rod, sigma, .. } => {
                     // All coordinates of the point.
                     let same = |other: &&Component| match other.what {
-                        What::Vein { .. } => other.origin == component.origin,
-                        What::Result(_) => false,
+                        Compared::Vein { .. } => other.origin == component.origin,
+                        Compared::Result(_) => false,
                     };
                     let point: Vec<&Component> =
                         self.components[index..].iter().take_while(same).collect();
-                    let rows = self.vein_rates(answers, (rod, sigma), &point, slopes);
+                    let rows = self.vein_rates(responses, (rod, sigma), &point, slopes);
                     index += point.len();
                     gradients.extend(rows);
                 }

@@ -2,24 +2,24 @@
 
 use nalgebra::DMatrix;
 
-/// Singular values below this part of the largest are those of combinations that the
-/// data do not feel at all; derivatives are known better than that.
+/// Singular values below this part of the largest belong to combinations to which the data are
+/// insensitive; derivatives are more accurate than that.
 pub(super) const NULL: f64 = 1e-7;
 
-/// Components of a combination smaller than this part of its largest are left out.
+/// Components of a combination smaller than this part of its largest are set to zero.
 const NEGLIGIBLE: f64 = 1e-3;
 
-/// Half of a 95 % interval, in standard deviations of a normal number.
+/// Half width of a 95 % interval of a normal variable, in standard deviations.
 pub(super) const NORMAL: f64 = 1.959_963_984_540_054;
 
 /// Singular values, ascending, and their right singular vectors as columns.
 pub(super) fn singular(jacobian: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
     let count = jacobian.ncols();
     if jacobian.nrows() > 2 * count {
-        // Of many rows the triangle has the same.
+        // For many rows: those of the triangular factor, which are the same.
         return singular(&jacobian.clone().qr().r());
     }
-    // With rows of zeros there are as many values as columns.
+    // Padded with zero rows, there are as many values as columns.
     let rows = jacobian.nrows().max(count);
     let square = jacobian.clone().resize_vertically(rows, 0.0);
     let svd = square.svd(false, true);
@@ -31,8 +31,8 @@ pub(super) fn singular(jacobian: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
     (values, directions)
 }
 
-/// A basis of a space of directions in which as many components as possible are
-/// zero: its reduced echelon form.
+/// A basis of a space of directions with as many zero components as possible:
+/// its reduced row echelon form.
 pub(super) fn sparse(space: &DMatrix<f64>) -> Vec<Vec<(usize, f64)>> {
     let mut rows = space.transpose();
     let (count, width) = rows.shape();
@@ -64,9 +64,9 @@ pub(super) fn sparse(space: &DMatrix<f64>) -> Vec<Vec<(usize, f64)>> {
     all
 }
 
-/// Half of a 95 % interval in standard deviations, if these are estimated from so many
-/// degrees of freedom (Student's distribution; Abramowitz and Stegun, Handbook of Mathematical Functions,
-/// 26.7.5).
+/// Half width of a 95 % interval in standard deviations that are estimated with this number of
+/// degrees of freedom (Student's distribution; Abramowitz and Stegun, Handbook of Mathematical
+/// Functions, 26.7.5).
 pub(super) fn student(freedom: usize) -> f64 {
     const FEW: [f64; 4] = [12.706_2, 4.302_7, 3.182_4, 2.776_4];
     if let Some(quantile) = FEW.get(freedom.wrapping_sub(1)) {
@@ -117,7 +117,7 @@ mod tests {
     fn rows_fewer_than_columns_leave_directions_unfelt() {
         let (values, directions) = singular(&DMatrix::from_row_slice(1, 2, &[3.0, 4.0]));
         assert!(values[0] < 1e-12 && (values[1] - 5.0).abs() < 1e-12);
-        let unfelt = directions.column(0);
-        assert!((3.0 * unfelt[0] + 4.0 * unfelt[1]).abs() < 1e-12);
+        let insensitive = directions.column(0);
+        assert!((3.0 * insensitive[0] + 4.0 * insensitive[1]).abs() < 1e-12);
     }
 }

@@ -1,94 +1,94 @@
-//! Ends of intervals of numbers of which the sum of squares does not follow its curvature:
-//! by a few points around the minimum, and derivatives at few of them.
+//! Ends of the intervals of numbers for which the sum of squares is not quadratic: from
+//! a few points around the minimum, with derivatives at few of them.
 
 use nalgebra::DVector;
 
-use super::around::{Around, Least, Slopes};
-use super::judge::OPEN;
 use super::model::Point;
+use super::neighbourhood::{Least, Neighbourhood, Slopes};
+use super::statistics::OPEN;
 
-/// The sum of squares at the ends of an interval may be off by this part before the
-/// interval is taken from the profile of the sum.
-pub(super) const STRAIGHT: f64 = 0.15;
+/// Largest relative deviation of the sum of squares from a quadratic at the ends of an interval;
+/// beyond it the interval is taken from the profile of the sum.
+pub(super) const QUADRATIC: f64 = 0.15;
 
-/// Points by which an end is looked for before the whole profile is, what part of the sum
-/// a correction may still take off there, and how exactly it is found.
+/// Largest number of points in the search for an end before the full profile is computed, the
+/// relative reduction still possible by a correction there, and the accuracy of the end.
 const FEW: usize = 14;
 const SETTLED: f64 = 0.1;
 const NEAR_ENOUGH: f64 = 0.03;
 
-/// A correction that leaves more than this part of what it was to gain did not help, and
-/// what part of it is then taken where it went too far.
-const STAGNATES: f64 = 0.5;
+/// A correction that leaves more than this part of the expected reduction has failed, and
+/// the part of it that is taken next if it went too far.
+const STAGNATION: f64 = 0.5;
 const SHORTER: f64 = 0.5;
 
-/// How often leaves may be lost on the way to them.
+/// Largest number of lost leaves in the search.
 const FEW_LOST: usize = 3;
 
-/// A sum that is off by no more than this part of what may be needs no other look.
+/// A sum with a smaller relative error than this needs no further evaluation.
 const CLEARLY: f64 = 0.5;
 
-/// A sum of squares so far below the minimum, in variances, belongs to a better one.
+/// Excess below the minimum, in variances, that indicates a better minimum.
 pub(super) const BETTER: f64 = 0.1;
 
-/// Where a profile ends.
+/// The end of a profile on one side.
 pub(super) enum Side {
-    /// So far from the minimum.
+    /// At this distance from the minimum.
     At(f64),
     /// Not within a factor of ten, nor before a bound.
     Open,
-    /// Leaves cannot be followed there.
+    /// Leaves cannot be followed to it.
     Lost,
 }
 
-/// What a few points around a minimum tell of the ends of an interval.
+/// The ends of an interval as determined by a few points around a minimum.
 pub(super) enum Ends {
-    /// They are where the curvature has them,
-    Straight,
-    /// or elsewhere, below and above; or about so far where the points do not tell.
-    Apart([Result<Side, f64>; 2]),
+    /// They are those of the quadratic approximation,
+    Quadratic,
+    /// or not, below and above; as errors, approximate distances that are not confirmed.
+    Searched([Result<Side, f64>; 2]),
 }
 
 /// Residuals at a point near a minimum.
 type Known = (DVector<f64>, Point);
 
-/// The ends of an interval by a few points around the minimum; `None` where there are none.
-pub(super) fn ends(around: &Around, k: usize, first: f64, half: f64) -> Option<Ends> {
-    let judge = around.judge;
-    let slopes = around.slopes();
-    let along = judge.conditional(k, OPEN);
+/// The ends of an interval from a few points around the minimum; `None` if there are none.
+pub(super) fn ends(near: &Neighbourhood, k: usize, first: f64, half: f64) -> Option<Ends> {
+    let stats = near.stats;
+    let slopes = near.slopes();
+    let along = stats.conditional(k, OPEN);
     let mut known: Option<Known> = None;
     if half <= OPEN {
-        let expected = judge.quantile.powi(2);
+        let expected = stats.quantile.powi(2);
         let off = |above: f64| (above / expected - 1.0).abs();
         let change = &along * first;
-        let up = around.residuals(judge.point, &around.moved(&change)).ok()?;
-        // To second order the other side is its mirror image.
-        let linear = &judge.jacobian * change;
+        let up = near.residuals(stats.point, &near.moved(&change)).ok()?;
+        // By reflection, to second order.
+        let linear = &stats.jacobian * change;
         let down = &up.0 - &linear - &linear;
         let sides =
-            [&up.0, &down].map(|residuals| around.least(&slopes, k, residuals, f64::INFINITY));
+            [&up.0, &down].map(|residuals| near.least(&slopes, k, residuals, f64::INFINITY));
         let clear = |least: &Option<Least>| {
-            (least.as_ref()).is_some_and(|least| off(least.above) < CLEARLY * STRAIGHT)
+            (least.as_ref()).is_some_and(|least| off(least.above) < CLEARLY * QUADRATIC)
         };
         if sides.iter().all(clear) {
-            return Some(Ends::Straight);
+            return Some(Ends::Quadratic);
         }
         known = Some(up);
     }
-    let [low, high] = judge.model.coordinates[k].bounds;
-    let theta = judge.point.theta[k];
-    let reach = |sign: f64, room: f64, known: Option<Known>| {
+    let [low, high] = stats.model.coordinates[k].bounds;
+    let theta = stats.point.theta[k];
+    let distance = |sign: f64, room: f64, known: Option<Known>| {
         let most = (OPEN + 0.1).min(room);
         let search = Search {
-            around,
+            near,
             k,
             at_minimum: &slopes,
             along: &along,
             sign,
             most,
-            reach: first.min(most),
-            bend: DVector::zeros(along.len()),
+            distance: first.min(most),
+            curvature: DVector::zeros(along.len()),
             before: (0.0, 0.0),
             there: None,
             longest: f64::INFINITY,
@@ -100,30 +100,31 @@ pub(super) fn ends(around: &Around, k: usize, first: f64, half: f64) -> Option<E
         };
         search.run(known.filter(|_| first <= most))
     };
-    let down = reach(-1.0, theta - low, None);
-    let up = reach(1.0, high - theta, known);
-    let same = |side: &Result<Side, f64>| matches!(side, Ok(Side::At(reach)) if *reach == first);
+    let down = distance(-1.0, theta - low, None);
+    let up = distance(1.0, high - theta, known);
+    let same =
+        |side: &Result<Side, f64>| matches!(side, Ok(Side::At(distance)) if *distance == first);
     Some(match same(&down) && same(&up) && half <= OPEN {
-        true => Ends::Straight,
-        false => Ends::Apart([down, up]),
+        true => Ends::Quadratic,
+        false => Ends::Searched([down, up]),
     })
 }
 
-/// A search for the end of a profile on one side: along a parabola from the minimum, which
-/// is bent to where the sum is least. Derivatives are those of the minimum until an end
-/// is near, and then of where they were last found to mislead.
+/// Search for the end of a profile on one side: along a parabola from the minimum, which
+/// is corrected towards the least sum. Derivatives are those of the minimum until an end
+/// is near, and then those where they last proved inaccurate.
 struct Search<'s, 'j, 'm, 'a> {
-    around: &'s Around<'j, 'm, 'a>,
+    near: &'s Neighbourhood<'j, 'm, 'a>,
     k: usize,
     at_minimum: &'s Slopes,
     along: &'s DVector<f64>,
     sign: f64,
-    /// Not beyond this.
+    /// Upper limit of the distance.
     most: f64,
-    /// How far the end is supposed to be.
-    reach: f64,
-    bend: DVector<f64>,
-    /// Reach and root of the sum of the point before.
+    /// Present estimate of the distance of the end.
+    distance: f64,
+    curvature: DVector<f64>,
+    /// Distance and root of the sum at the previous point.
     before: (f64, f64),
     /// Where derivatives are known, if not only at the minimum.
     there: Option<(Point, Slopes)>,
@@ -132,29 +133,29 @@ struct Search<'s, 'j, 'm, 'a> {
     last: Correction,
 }
 
-/// How the others were moved to where the sum is least.
+/// A correction of the other numbers towards the least sum.
 struct Correction {
     length: f64,
-    /// From which sum, and what it was to gain.
+    /// The sum before it, and its expected reduction.
     from: f64,
     gain: f64,
 }
 
-/// What follows a point.
+/// Continuation of the search after a point.
 enum Next {
-    /// Another one.
+    /// Another point.
     Point,
-    /// It is the end.
+    /// This is the end.
     End(Side),
-    /// The search leads nowhere.
-    Nothing,
+    /// The search fails.
+    Failed,
 }
 
 impl Search<'_, '_, '_, '_> {
-    /// The end; `known` is what is found at the first guess.
+    /// Finds the end; `known` is the point at the first guess.
     ///
     /// # Errors
-    /// With how far the end may be, where that does not settle.
+    /// The approximate distance of the end, if the search does not converge.
     fn run(mut self, mut known: Option<Known>) -> Result<Side, f64> {
         if self.most <= 0.0 {
             return Ok(Side::Open);
@@ -166,26 +167,27 @@ impl Search<'_, '_, '_, '_> {
                 if lost > FEW_LOST {
                     break;
                 }
-                self.reach = 0.5 * (self.before.0 + self.reach);
+                self.distance = 0.5 * (self.before.0 + self.distance);
                 continue;
             };
-            match self.judged(step == 0, found) {
+            match self.evaluate(step == 0, found) {
                 Next::Point => {}
                 Next::End(side) => return Ok(side),
-                Next::Nothing => break,
+                Next::Failed => break,
             }
         }
-        Err(self.reach)
+        Err(self.distance)
     }
 
-    /// The leaves where the end is supposed to be.
+    /// The leaves at the present estimate of the end.
     fn point(&self) -> Option<Known> {
-        let change = self.along * (self.sign * self.reach) + &self.bend * self.reach.powi(2);
+        let change =
+            self.along * (self.sign * self.distance) + &self.curvature * self.distance.powi(2);
         let from = match &self.there {
             Some((point, _)) => point,
-            None => self.around.judge.point,
+            None => self.near.stats.point,
         };
-        let found = self.around.residuals(from, &self.around.moved(&change));
+        let found = self.near.residuals(from, &self.near.moved(&change));
         found.ok()
     }
 
@@ -194,46 +196,46 @@ impl Search<'_, '_, '_, '_> {
             Some((_, slopes)) => slopes,
             None => self.at_minimum,
         };
-        self.around.least(slopes, self.k, residuals, self.longest)
+        self.near.least(slopes, self.k, residuals, self.longest)
     }
 
-    /// Whether the sum is least there, and that of an end.
+    /// Whether the sum is the least one, and that of an end.
     fn settled(&self, least: &Least) -> bool {
         let corrected = least.straight - least.above < SETTLED * least.above;
         corrected && (self.root(least) - 1.0).abs() < NEAR_ENOUGH
     }
 
-    /// The root of the sum, one at an end.
+    /// The root of the sum, normalised to one at an end.
     fn root(&self, least: &Least) -> f64 {
-        least.above.max(0.0).sqrt() / self.around.judge.quantile
+        least.above.max(0.0).sqrt() / self.near.stats.quantile
     }
 
-    fn judged(&mut self, first: bool, (residuals, point): Known) -> Next {
-        let wanted = self.around.judge.quantile.powi(2);
+    fn evaluate(&mut self, first: bool, (residuals, point): Known) -> Next {
+        let wanted = self.near.stats.quantile.powi(2);
         let Some(mut least) = self.least(&residuals) else {
-            return Next::Nothing;
+            return Next::Failed;
         };
         if least.straight < -BETTER {
-            return Next::Nothing;
+            return Next::Failed;
         }
-        if self.reach >= self.most && least.straight < wanted {
+        if self.distance >= self.most && least.straight < wanted {
             return Next::End(Side::Open);
         }
-        if first && (least.above / wanted - 1.0).abs() < STRAIGHT {
-            return Next::End(Side::At(self.reach));
+        if first && (least.above / wanted - 1.0).abs() < QUADRATIC {
+            return Next::End(Side::At(self.distance));
         }
         let gain = least.straight - least.above;
-        let stagnates = self.there.is_some() && gain > STAGNATES * self.last.gain;
+        let stagnates = self.there.is_some() && gain > STAGNATION * self.last.gain;
         if stagnates || self.settled(&least) {
-            // By the derivatives there it may be lower still.
-            self.there = self.around.slopes_at(point).ok();
-            let anew = self.there.as_ref().and_then(|_| self.least(&residuals));
-            let Some(anew) = anew else {
-                return Next::Nothing;
+            // With the derivatives there it may be reduced further.
+            self.there = self.near.slopes_at(point).ok();
+            let updated = self.there.as_ref().and_then(|_| self.least(&residuals));
+            let Some(updated) = updated else {
+                return Next::Failed;
             };
-            least = anew;
+            least = updated;
             if self.settled(&least) {
-                return Next::End(Side::At(self.reach));
+                return Next::End(Side::At(self.distance));
             }
         }
         if stagnates {
@@ -243,34 +245,34 @@ impl Search<'_, '_, '_, '_> {
                 false => 2.0 * self.longest,
             };
             let Some(other) = self.least(&residuals) else {
-                return Next::Nothing;
+                return Next::Failed;
             };
             least = other;
         }
-        self.go_on(&least)
+        self.advance(&least)
     }
 
-    fn go_on(&mut self, least: &Least) -> Next {
+    fn advance(&mut self, least: &Least) -> Next {
         self.last = Correction {
             length: least.correction.norm(),
             from: least.straight,
             gain: least.straight - least.above,
         };
-        self.bend += &least.correction / self.reach.powi(2);
+        self.curvature += &least.correction / self.distance.powi(2);
         // The root of the sum is nearly linear.
         let root = self.root(least);
-        let secant = (root - self.before.1) / (self.reach - self.before.0);
-        let wanted = self.around.judge.quantile.powi(2);
+        let secant = (root - self.before.1) / (self.distance - self.before.0);
+        let wanted = self.near.stats.quantile.powi(2);
         let next = match &self.there {
-            None if secant > 0.0 => self.reach + (1.0 - root) / secant,
-            _ => self.reach + self.sign * least.step(wanted, self.sign),
+            None if secant > 0.0 => self.distance + (1.0 - root) / secant,
+            _ => self.distance + self.sign * least.step(wanted, self.sign),
         };
         if !next.is_finite() {
-            return Next::Nothing;
+            return Next::Failed;
         }
-        self.before = (self.reach, root);
-        self.reach = next
-            .clamp(0.5 * self.reach, 2.0 * self.reach)
+        self.before = (self.distance, root);
+        self.distance = next
+            .clamp(0.5 * self.distance, 2.0 * self.distance)
             .min(self.most);
         Next::Point
     }

@@ -1,35 +1,34 @@
-//! The result of a fit: from the minimum and what surrounds it.
+//! The result of a fit: the minimum and its neighbourhood.
 
 use super::candidates;
-use super::case::What;
+use super::case::Compared;
 use super::data::Experiment;
 use super::directions::sparse;
 use super::free::Coordinate;
-use super::judge::{Judge, OPEN};
 use super::least_squares::End;
 use super::model::Model;
 use super::result::{Fit, FitLeaf, FitOutcome, FitParameter, FitResidual, FitWork};
-use super::words::{self, Open};
+use super::statistics::{OPEN, Statistics};
+use super::words::{self, Undetermined};
 use crate::relax::Lost;
 use crate::study::Keys;
 
-/// Components of a combination that is hardly felt smaller than this part of its
+/// Components of a weakly determined combination smaller than this part of its
 /// largest are left out.
 const NEGLIGIBLE: f64 = 0.1;
 
-/// The result.
 pub(super) fn fit(
-    judge: &Judge,
+    stats: &Statistics,
     end: &End,
     parameters: Vec<FitParameter>,
     wanted: &[Experiment],
 ) -> Fit {
-    let base = judge.model.base;
-    let coordinates = judge.model.coordinates;
-    let mut remarks = remarks(judge, end);
+    let base = stats.model.base;
+    let coordinates = stats.model.coordinates;
+    let mut remarks = remarks(stats, end);
     let open = match end {
-        End::Converged => open(judge, &parameters),
-        // Elsewhere the data may feel other combinations.
+        End::Converged => open(stats, &parameters),
+        // Away from a minimum, the data may be insensitive to other combinations.
         _ => Vec::new(),
     };
     let keys: Vec<String> = coordinates
@@ -45,48 +44,48 @@ pub(super) fn fit(
         End::Converged => FitOutcome::Undetermined,
         _ => FitOutcome::NotConverged,
     };
-    let candidates = match candidates::judge(judge, wanted) {
+    let candidates = match candidates::rank(stats, wanted) {
         Ok(candidates) => candidates,
         Err(refused) => {
             remarks.push(format!("candidates: {refused}"));
             Vec::new()
         }
     };
-    let values: Vec<(&Keys, f64)> = (coordinates.iter().zip(&judge.point.theta))
+    let values: Vec<(&Keys, f64)> = (coordinates.iter().zip(&stats.point.theta))
         .map(|(free, theta)| (&free.keys, free.value(*theta)))
         .collect();
     Fit {
         scenario: base.scenario().name.clone(),
         outcome,
         remarks,
-        correlations: judge.correlations(),
+        correlations: stats.correlations(),
         undetermined: open
             .iter()
             .map(|open| words::map(open, &keys, &units))
             .collect(),
-        says: words::says(&parameters, &open, &logs),
+        says: words::sentences(&parameters, &open, &logs),
         parameters,
-        chi_squared: match judge.known {
-            true => judge.residuals.norm_squared(),
-            // In units of the deviation that they tell themselves.
-            false => judge.residuals.norm_squared() / judge.spread.powi(2).max(f64::MIN_POSITIVE),
+        chi_squared: match stats.known {
+            true => stats.residuals.norm_squared(),
+            // In units of the deviation estimated from the residuals.
+            false => stats.residuals.norm_squared() / stats.spread.powi(2).max(f64::MIN_POSITIVE),
         },
-        degrees_of_freedom: judge.freedom,
-        standard_deviation: (!judge.known).then_some(judge.spread * judge.weighing.assumed),
-        residuals: compared(judge),
+        degrees_of_freedom: stats.freedom,
+        standard_deviation: (!stats.known).then_some(stats.spread * stats.weighting.assumed),
+        residuals: compared(stats),
         candidates,
         work: FitWork {
-            evaluations: judge.evaluations.rough + judge.evaluations.accurate,
-            accurate: judge.evaluations.accurate,
-            last: Model::work(judge.point),
+            evaluations: stats.evaluations.coarse + stats.evaluations.accurate,
+            accurate: stats.evaluations.accurate,
+            last: Model::work(stats.point),
         },
         wall_seconds: 0.0,
         fitted: base.toml(&values).unwrap_or_default(),
-        leaves: leaves(judge),
+        leaves: leaves(stats),
     }
 }
 
-fn remarks(judge: &Judge, end: &End) -> Vec<String> {
+fn remarks(stats: &Statistics, end: &End) -> Vec<String> {
     let mut remarks = Vec::new();
     match end {
         End::Converged => {}
@@ -103,7 +102,7 @@ fn remarks(judge: &Judge, end: &End) -> Vec<String> {
         }
         End::Stuck(None) => remarks.push("no step makes the residuals smaller".into()),
     }
-    for (free, theta) in judge.model.coordinates.iter().zip(&judge.point.theta) {
+    for (free, theta) in stats.model.coordinates.iter().zip(&stats.point.theta) {
         let bound = free.bounds.iter().find(|bound| *bound == theta);
         if let Some(bound) = bound {
             let (keys, bound) = (&free.keys, free.value(*bound));
@@ -113,34 +112,35 @@ fn remarks(judge: &Judge, end: &End) -> Vec<String> {
             });
         }
     }
-    if judge.freedom == 0 {
+    if stats.freedom == 0 {
         remarks
             .push("there are as many numbers as data: nothing is left to judge the fit by".into());
     }
-    if judge.known && judge.suspicious() {
+    if stats.known && stats.suspicious() {
         remarks.push(format!(
             "chi squared is {:.3e} for {} degrees of freedom: the standard deviations are not \
              those of these data, or the model is not that of this leaf; intervals are then too narrow",
-            judge.residuals.norm_squared(),
-            judge.freedom
+            stats.residuals.norm_squared(),
+            stats.freedom
         ));
     }
     remarks
 }
 
-/// Combinations that stay open: those that are not felt, in their sparsest form, and
-/// those that may be off by more than a factor of ten.
-fn open(judge: &Judge, parameters: &[FitParameter]) -> Vec<Open> {
-    let mut open: Vec<Open> = sparse(&judge.directions.columns(0, judge.unfelt).into_owned())
-        .into_iter()
-        .map(|parts| Open {
-            parts,
-            exactly: true,
-        })
-        .collect();
-    for direction in judge.unfelt..judge.values.len() {
-        if judge.quantile * judge.spread / judge.values[direction] > OPEN {
-            let v = judge.directions.column(direction);
+/// Undetermined combinations: those to which the data are insensitive, in their sparsest form,
+/// and those with an uncertainty of more than a factor of ten.
+fn open(stats: &Statistics, parameters: &[FitParameter]) -> Vec<Undetermined> {
+    let mut open: Vec<Undetermined> =
+        sparse(&stats.directions.columns(0, stats.insensitive).into_owned())
+            .into_iter()
+            .map(|parts| Undetermined {
+                parts,
+                exactly: true,
+            })
+            .collect();
+    for direction in stats.insensitive..stats.values.len() {
+        if stats.quantile * stats.spread / stats.values[direction] > OPEN {
+            let v = stats.directions.column(direction);
             let largest = v.amax();
             let sign = v
                 .iter()
@@ -148,17 +148,17 @@ fn open(judge: &Judge, parameters: &[FitParameter]) -> Vec<Open> {
                 .map_or(1.0, |p| p.signum());
             let parts = v.iter().map(|part| sign * part / largest).enumerate();
             let parts = parts.filter(|(_, part)| part.abs() > NEGLIGIBLE);
-            open.push(Open {
+            open.push(Undetermined {
                 parts: parts.collect(),
                 exactly: false,
             });
         }
     }
-    // A number of which only the profile has no end.
+    // A number whose profile alone has no end.
     for (k, parameter) in parameters.iter().enumerate() {
-        let named = |open: &Open| open.parts.iter().any(|(part, _)| *part == k);
+        let named = |open: &Undetermined| open.parts.iter().any(|(part, _)| *part == k);
         if !parameter.determined && !open.iter().any(named) {
-            open.push(Open {
+            open.push(Undetermined {
                 parts: vec![(k, 1.0)],
                 exactly: false,
             });
@@ -167,19 +167,19 @@ fn open(judge: &Judge, parameters: &[FitParameter]) -> Vec<Open> {
     open
 }
 
-fn compared(judge: &Judge) -> Vec<FitResidual> {
-    let bands = judge.bands();
-    (judge.point.components().zip(bands))
+fn compared(stats: &Statistics) -> Vec<FitResidual> {
+    let bands = stats.bands();
+    (stats.point.components().zip(bands))
         .map(|(component, band)| {
-            let sd = judge.sd(component);
+            let sd = stats.sd(component);
             let (what, rod, sigma) = match component.what {
-                What::Result(quantity) => (quantity.to_string(), None, None),
-                What::Vein { rod, axis, sigma } => {
+                Compared::Result(quantity) => (quantity.to_string(), None, None),
+                Compared::Vein { rod, axis, sigma } => {
                     (["x", "y", "z"][axis].into(), Some(rod + 1), Some(sigma))
                 }
             };
             FitResidual {
-                experiment: judge.model.cases[component.case].name.clone(),
+                experiment: stats.model.cases[component.case].name.clone(),
                 what,
                 rod,
                 sigma,
@@ -193,8 +193,8 @@ fn compared(judge: &Judge) -> Vec<FitResidual> {
         .collect()
 }
 
-fn leaves(judge: &Judge) -> Vec<(String, FitLeaf)> {
-    let cases = judge.model.cases.iter().zip(&judge.point.cases);
+fn leaves(stats: &Statistics) -> Vec<(String, FitLeaf)> {
+    let cases = stats.model.cases.iter().zip(&stats.point.cases);
     cases
         .filter_map(|(case, at)| {
             let finest = at.at.levels.last()?;
@@ -215,7 +215,7 @@ fn leaves(judge: &Judge) -> Vec<(String, FitLeaf)> {
         .collect()
 }
 
-/// By what a coefficient of a coordinate's combination is one of its number.
+/// Ratio of a coefficient of a coordinate to that of its number.
 fn unit(free: &Coordinate) -> f64 {
     1.0 / free.unit
 }

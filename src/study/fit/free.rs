@@ -1,4 +1,4 @@
-//! The numbers that are free in a fit.
+//! The free numbers of a fit.
 
 use std::fmt;
 use std::str::FromStr;
@@ -9,17 +9,17 @@ use crate::study::{Base, Keys};
 /// Longest step of a logarithm, or of another number in its unit.
 pub(super) const LONGEST_STEP: f64 = 1.5;
 
-/// How far a number without bounds may move from where it starts, in logarithms (a
-/// factor of a thousand) or units: what the data would have larger still, or smaller,
-/// they do not determine.
+/// Largest distance of a number without bounds from its initial value, in logarithms (a
+/// factor of a thousand) or units: numbers that the data drive beyond this
+/// are not determined by them.
 const FARTHEST: f64 = 6.907_755_278_982_137;
 
-/// Numbers that a fit may change together: `KEY`, or `KEY=LOW..HIGH`.
+/// Numbers that a fit varies together: `KEY`, or `KEY=LOW..HIGH`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Free {
     /// The key, as in `--vary`.
     pub keys: Keys,
-    /// Bounds, if they are given.
+    /// Bounds, if given.
     pub bounds: Option<[f64; 2]>,
 }
 
@@ -64,8 +64,8 @@ impl fmt::Display for Free {
     }
 }
 
-/// A free number as the least squares see it: a coordinate that is a logarithm, or
-/// the number in a unit of its own.
+/// A free number as a coordinate of the least squares: its logarithm, or the number in a
+/// suitable unit.
 #[derive(Clone, Debug)]
 pub(super) struct Coordinate {
     pub keys: Keys,

@@ -1,9 +1,9 @@
-//! Least squares: Gauss's and Newton's method within a region of trust and within
-//! bounds, along equilibria that are followed and never jumped between.
+//! Least squares: Gauss-Newton with a trust region and
+//! bounds, along equilibria that are followed continuously, without jumps.
 //!
-//! Whether a point is a minimum is asked of the longest step that is ever taken, not of
-//! the one within the present region: that may be short for another direction's sake,
-//! and then gains little from a point that is none along what the data feel weakly.
+//! Convergence is tested with the longest admissible step, not with the one within the present
+//! trust region: that may be small because of another direction, and then gains little even if
+//! the point is not a minimum in a weakly determined direction.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -12,53 +12,53 @@ use super::free::LONGEST_STEP;
 use super::model::{Model, Point};
 use crate::relax::{Grids, Lost};
 
-/// Steps tried before a minimum is given up.
+/// Largest number of steps of an iteration.
 const MOST_STEPS: usize = 100;
 
-/// The longest step at first, in logarithms or units, and the least that is tried.
+/// The initial radius of the trust region, in logarithms or units, and the least one.
 const FIRST_STEP: f64 = 0.7;
 const LEAST_STEP: f64 = 1e-12;
 
-/// A step this small ends the iteration; and a point from which the longest step is
+/// A smaller step ends the iteration; and a point from which the longest step is
 /// expected to gain no more than this part of one datum's variance.
 const STEP: f64 = 1e-9;
 const GAIN: f64 = 1e-7;
 
-/// Gains below this part of it may be the finite accuracy of the equilibria: two in
+/// Gains below this part of the variance may be errors of the equilibria: two in
 /// succession end the iteration, and so does a loss.
 const ACCURACY: f64 = 1e-2;
 
-/// A minimum is none where the longest step was expected to gain more than this part.
+/// A minimum is rejected if the longest step was expected to gain more than this part.
 const WORTHWHILE: f64 = 0.1;
 
-/// Bisections to the damping that shortens a step.
+/// Bisections for the damping that shortens a step.
 const BISECTIONS: usize = 40;
 
-/// The least variance that is reckoned with, of residuals in units of the assumed
-/// deviation: equilibria are not known better.
+/// Least variance of residuals in units of the assumed deviation: equilibria are not more
+/// accurate.
 const LEAST_VARIANCE: f64 = 1e-6;
 
-/// Tukey's constant of Huber's weights: 95 % efficient for normal errors.
+/// Tuning constant of Huber's weights: 95 % efficient for normal errors.
 const HUBER: f64 = 1.345;
 
-/// The standard deviation that is assumed where none is known, in lengths of the
-/// leaf, until the residuals tell it.
+/// The standard deviation assumed if none is known, in lengths of the
+/// leaf, until it is estimated from the residuals.
 pub(super) const ASSUMED: f64 = 1e-3;
 
-/// As [`NULL`] while the search goes on with less accurate derivatives.
+/// As [`NULL`], for the less accurate derivatives of the search.
 const NULL_OF_SEARCH: f64 = 3e-7;
 
-/// How residuals are weighed.
+/// Weights of residuals.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Weighing {
-    /// In place of standard deviations that are not known.
+pub(super) struct Weighting {
+    /// Replaces unknown standard deviations.
     pub assumed: f64,
-    /// Whether large residuals count less.
+    /// Whether large residuals have smaller weights.
     pub robust: bool,
 }
 
-impl Weighing {
-    /// Residuals over their standard deviations.
+impl Weighting {
+    /// Residuals divided by their standard deviations.
     pub fn residuals(&self, point: &Point) -> DVector<f64> {
         let components = point.components();
         let residual = components.map(|c| (c.model - c.observed) / c.sd.unwrap_or(self.assumed));
@@ -75,7 +75,7 @@ impl Weighing {
         DMatrix::from_fn(rows.len(), point.theta.len(), |i, k| rows[i][k] / sd[i])
     }
 
-    /// Roots of the weights of residuals: less than one for those beyond Huber's
+    /// Square roots of the weights of residuals: less than one beyond Huber's
     /// bound, in units of the spread of all.
     pub fn roots(&self, residuals: &DVector<f64>) -> DVector<f64> {
         if !self.robust {
@@ -88,7 +88,7 @@ impl Weighing {
         })
     }
 
-    /// Their sum: of squares, beyond Huber's bound linear.
+    /// The sum of their squares, linear beyond Huber's bound.
     pub fn sum(&self, residuals: &DVector<f64>, bound: f64) -> f64 {
         let term = |r: &f64| match self.robust && r.abs() > bound {
             true => bound * (2.0 * r.abs() - bound),
@@ -102,7 +102,7 @@ impl Weighing {
     }
 }
 
-/// The standard deviation of normal numbers, by the median of their sizes.
+/// The standard deviation of normal variables, from the median of their magnitudes.
 fn spread(residuals: &DVector<f64>) -> f64 {
     let mut sizes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
     sizes.sort_by(f64::total_cmp);
@@ -115,37 +115,36 @@ fn spread(residuals: &DVector<f64>) -> f64 {
 pub(super) enum End {
     Converged,
     MostSteps,
-    /// No step leads on; why the last did not.
+    /// No further step succeeds; with the reason of the last failure.
     Stuck(Option<Lost>),
 }
 
-/// An iteration to the least sum of squares.
 pub(super) struct Iteration<'m, 'a> {
     pub model: &'m Model<'a>,
-    pub weighing: Weighing,
-    /// Coordinates that are held.
+    pub weighting: Weighting,
+    /// Coordinates that are held fixed.
     pub held: Vec<bool>,
     pub most_steps: usize,
-    /// What the longest step may be expected to gain at the end, of a datum's variance.
+    /// Gain that the longest step may still promise at the end, as a part of a datum's variance.
     pub enough: f64,
-    /// Whether the derivatives of the last point but one will do for the last, if that is a
+    /// Whether the derivatives of the previous point may be used for the last one, if that is a
     /// minimum by them.
     pub lean: bool,
-    /// Where a leaf would have had to jump, as near as that was tried.
+    /// The nearest values tried at which a leaf would have had to jump.
     pub jump: Option<Vec<f64>>,
-    /// Told the number of the step and the sum.
+    /// Called with the number of the step and the sum.
     pub progress: &'m mut dyn FnMut(usize, f64),
 }
 
 impl<'m, 'a> Iteration<'m, 'a> {
     pub fn new(
         model: &'m Model<'a>,
-        weighing: Weighing,
+        weighting: Weighting,
         progress: &'m mut dyn FnMut(usize, f64),
     ) -> Self {
         Iteration {
             model,
-            weighing,
+            weighting,
             held: vec![false; model.coordinates.len()],
             most_steps: MOST_STEPS,
             enough: GAIN,
@@ -155,7 +154,7 @@ impl<'m, 'a> Iteration<'m, 'a> {
         }
     }
 
-    /// From a point to the minimum near it, which is differentiated.
+    /// From a point to a minimum near it, with derivatives.
     pub fn run(&mut self, mut point: Point) -> (Point, End, usize) {
         if let Err(lost) = self.model.differentiate(&mut point) {
             return (point, End::Stuck(Some(lost)), 0);
@@ -164,9 +163,9 @@ impl<'m, 'a> Iteration<'m, 'a> {
         let mut evaluations = 0;
         let mut small = 0;
         for step in 0..self.most_steps {
-            let residuals = self.weighing.residuals(&point);
-            let bound = self.weighing.bound(&residuals);
-            let sum = self.weighing.sum(&residuals, bound);
+            let residuals = self.weighting.residuals(&point);
+            let bound = self.weighting.bound(&residuals);
+            let sum = self.weighting.sum(&residuals, bound);
             (self.progress)(step, sum);
             let linear = self.linear(&point, &residuals);
             let variance = linear.variance(&point, sum);
@@ -191,9 +190,9 @@ impl<'m, 'a> Iteration<'m, 'a> {
                 evaluations += 1;
                 match self.model.follow(&point, &theta) {
                     Ok(mut trial) => {
-                        let found = self.weighing.residuals(&trial);
-                        let gained = sum - self.weighing.sum(&found, bound);
-                        if self.lean && gained > 0.0 && self.rests(&point, &theta, &found) {
+                        let found = self.weighting.residuals(&trial);
+                        let gained = sum - self.weighting.sum(&found, bound);
+                        if self.lean && gained > 0.0 && self.is_minimum(&point, &theta, &found) {
                             trial.take_gradients(&mut point);
                             return (trial, End::Converged, evaluations);
                         }
@@ -229,10 +228,10 @@ impl<'m, 'a> Iteration<'m, 'a> {
         (point, End::MostSteps, evaluations)
     }
 
-    /// The residuals as they change with the coordinates that may move.
+    /// The linearised residuals in the coordinates that may move.
     fn linear(&self, point: &Point, residuals: &DVector<f64>) -> Linear {
-        let roots = self.weighing.roots(residuals);
-        let mut jacobian = self.weighing.jacobian(point);
+        let roots = self.weighting.roots(residuals);
+        let mut jacobian = self.weighting.jacobian(point);
         for (mut row, root) in jacobian.row_iter_mut().zip(roots.iter()) {
             row *= *root;
         }
@@ -249,25 +248,24 @@ impl<'m, 'a> Iteration<'m, 'a> {
         };
         let least = null * values.last().copied().unwrap_or(0.0);
         Linear {
-            unfelt: values.iter().filter(|value| **value <= least).count(),
+            insensitive: values.iter().filter(|value| **value <= least).count(),
             slopes,
             values,
             directions,
         }
     }
 
-    /// Whether residuals at `theta` are at their least by the derivatives at a point, as
-    /// far as these matter.
-    fn rests(&self, point: &Point, theta: &[f64], residuals: &DVector<f64>) -> bool {
-        let bound = self.weighing.bound(residuals);
+    /// Whether residuals at `theta` are minimal by the derivatives at a point, up to what is
+    /// significant.
+    fn is_minimum(&self, point: &Point, theta: &[f64], residuals: &DVector<f64>) -> bool {
+        let bound = self.weighting.bound(residuals);
         let linear = self.linear(point, residuals);
-        let variance = linear.variance(point, self.weighing.sum(residuals, bound));
+        let variance = linear.variance(point, self.weighting.sum(residuals, bound));
         let longest = self.clamped(theta, &linear.step(LONGEST_STEP));
         linear.gain(&change(theta, &longest)) < self.enough * variance
     }
 
-    /// Coordinates that may move: not held, nor at a bound that the gradient drives
-    /// them against.
+    /// Coordinates that may move: neither held, nor pushed against a bound by the gradient.
     fn active(&self, point: &Point, gradient: &DVector<f64>) -> Vec<bool> {
         let coordinates = self.model.coordinates.iter().enumerate();
         coordinates
@@ -295,21 +293,21 @@ fn change(from: &[f64], to: &[f64]) -> DVector<f64> {
     DVector::from_iterator(to.len(), to.iter().zip(from).map(|(to, from)| to - from))
 }
 
-/// Weighed residuals, linear in the coordinates, along their singular directions.
+/// Weighted residuals, linearised, along their singular directions.
 struct Linear {
     /// Singular values, ascending, and their directions as columns.
     values: Vec<f64>,
     directions: DMatrix<f64>,
     /// Derivatives of half the sum of squares along these.
     slopes: DVector<f64>,
-    /// Directions that no datum feels: the first so many. Nothing moves along them.
-    unfelt: usize,
+    /// Number of directions, the first ones, to which the data are insensitive; they stay fixed.
+    insensitive: usize,
 }
 
 impl Linear {
     /// The variance of a datum, in units of its assumed one.
     fn variance(&self, point: &Point, sum: f64) -> f64 {
-        let felt = self.values.len() - self.unfelt;
+        let sensitive = self.values.len() - self.insensitive;
         let mut count = 0_usize;
         let mut known = true;
         for component in point.components() {
@@ -318,14 +316,14 @@ impl Linear {
         }
         match known {
             true => 1.0,
-            false => (sum / count.saturating_sub(felt).max(1) as f64).max(LEAST_VARIANCE),
+            false => (sum / count.saturating_sub(sensitive).max(1) as f64).max(LEAST_VARIANCE),
         }
     }
 
-    /// The step within a radius to where the sum of squares is least.
+    /// The step within a radius that minimises the sum of squares.
     fn step(&self, radius: f64) -> DVector<f64> {
         let along = |damping: f64| {
-            let part = |k: usize, slope: f64| match k < self.unfelt {
+            let part = |k: usize, slope: f64| match k < self.insensitive {
                 true => 0.0,
                 false => -slope / (self.values[k].powi(2) + damping),
             };
@@ -334,7 +332,7 @@ impl Linear {
         };
         let mut parts = along(0.0);
         if parts.norm() > radius {
-            // The length falls with the damping.
+            // The length decreases with the damping.
             let (mut low, mut high) = (0.0, self.slopes.norm() / radius);
             for _ in 0..BISECTIONS {
                 let middle = match low > 0.0 {
@@ -351,7 +349,7 @@ impl Linear {
         &self.directions * parts
     }
 
-    /// What a step is expected to take off the sum of squares.
+    /// The expected reduction of the sum of squares by a step.
     fn gain(&self, step: &DVector<f64>) -> f64 {
         let parts = self.directions.tr_mul(step);
         let terms = parts.iter().enumerate();

@@ -1,15 +1,14 @@
 //! From measurements to the numbers of a scenario: least squares over experiments and
-//! traced veins, and what the data say about each number and what they do not.
+//! traced veins, and what the data determine about each number and what they do not.
 //!
 //! The leaves of all experiments are followed from equilibrium to equilibrium, with
-//! derivatives from their linearised equations, so that a fit does not hop between
+//! derivatives from their linearised equations, so that a fit does not jump between
 //! branches. Positive numbers are fitted by their logarithms.
 
-mod answers;
-mod around;
 mod candidates;
 mod case;
 mod change;
+mod coarse;
 mod data;
 mod derivatives;
 mod directions;
@@ -17,12 +16,13 @@ mod end;
 mod found;
 mod free;
 mod interval;
-mod judge;
 mod least_squares;
 mod model;
+mod neighbourhood;
 mod quantity;
+mod responses;
 mod result;
-mod rough;
+mod statistics;
 mod vein;
 mod words;
 
@@ -39,18 +39,18 @@ use super::{Base, VaryError};
 use crate::limit::Limit;
 use crate::relax::{Lost, Options, RelaxError, check_tolerance};
 use free::Coordinate;
-use judge::{Evaluations, Judge};
-use least_squares::{ASSUMED, End, Iteration, Weighing};
+use least_squares::{ASSUMED, End, Iteration, Weighting};
 use model::Model;
+use statistics::{Evaluations, Statistics};
 
-/// Minima that are left for better ones.
+/// Largest number of minima abandoned for better ones.
 const MOST_MINIMA: usize = 4;
 
-/// Jumps of leaves to other equilibria, where a fit cannot go on without.
+/// Largest number of jumps of leaves to other equilibria, if a fit cannot continue without.
 const MOST_JUMPS: usize = 3;
 
-/// Where the standard deviation of the data comes from the residuals, that of the
-/// search may be larger by this factor: else coarse grids are seen in it.
+/// If the standard deviation of the data is estimated from the residuals, the largest ratio of
+/// that of the search to it: a larger one is due to coarse grids.
 const SAME_SPREAD: f64 = 1.05;
 
 /// Why nothing can be fitted.
@@ -65,51 +65,51 @@ pub enum FitError {
     /// An experiment whose leaf does not come to rest.
     #[error("{0}")]
     NoEquilibrium(String),
-    /// A scenario that is refused.
+    /// A scenario that is invalid.
     #[error(transparent)]
     Vary(#[from] VaryError),
-    /// A relaxation that cannot be.
+    /// A relaxation that cannot be run.
     #[error(transparent)]
     Relax(#[from] RelaxError),
 }
 
-/// What is to be fitted to what.
+/// A request for a fit.
 #[derive(Clone, Debug)]
 pub struct FitRequest {
-    /// The scenario: its numbers are where the fit starts.
+    /// The scenario, with the initial values of its numbers.
     pub base: Base,
     /// The data.
     pub data: Data,
-    /// The numbers that are free.
+    /// The free numbers.
     pub free: Vec<Free>,
-    /// Whether data far off the others count less (Huber's weights).
+    /// Whether outliers have smaller weights (Huber's weights).
     pub robust: bool,
-    /// Experiments that could be made: which of them would say most?
+    /// Candidate experiments, to be ordered by information.
     pub candidates: Vec<Experiment>,
     /// Replaces the scenario's tolerance.
     pub tolerance: Option<f64>,
-    /// When to give up.
+    /// Time limit.
     pub limit: Limit,
 }
 
 impl FitRequest {
-    /// Experiments that could be made, from a table like that of experiments.
+    /// Reads candidate experiments from a table like that of experiments.
     ///
     /// # Errors
-    /// If it is not of the form.
+    /// If the format is wrong.
     pub fn read_candidates(text: &str, file: &str) -> Result<Vec<Experiment>, FitError> {
         data::candidates(text, file)
     }
 }
 
-/// What is said where a leaf did not stay on its branch.
+/// Remark if a leaf did not stay on its branch.
 const JUMPED: &str = "on the way a leaf jumped to another equilibrium, that to which it \
     relaxes from the start: compare with a fit that starts from the values found";
 
-/// Fits the free numbers to the data. `progress` is told of each step.
+/// Fits the free numbers to the data. `progress` is called at each step.
 ///
 /// # Errors
-/// Requests that cannot be met; how the fit itself ended is its outcome.
+/// Requests that cannot be met; failures of the fit itself are part of its outcome.
 pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<Fit, FitError> {
     let clock = Instant::now();
     let base = &request.base;
@@ -125,33 +125,33 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
     let model = Model::new(base, &coordinates, &options, request.data.clone())?;
     let start: Vec<f64> = coordinates.iter().map(|free| free.start).collect();
     let assumed = ASSUMED * model.unit();
-    let (first, _) = model.loose(assumed).find(&start)?;
+    let (first, _) = model.with_loose_tolerance(assumed).find(&start)?;
     let known = model.check_deviations(&first)?;
     let measured = first.components().filter(|component| !component.free);
     check_count(coordinates.len(), measured.count(), known)?;
-    let weighing = Weighing {
+    let weighting = Weighting {
         assumed,
         robust: request.robust,
     };
-    let (mut rough, mut point) = model.rough(&first, weighing)?;
+    let (mut coarse, mut point) = model.coarse(&first, weighting)?;
     let mut evaluations = Evaluations::default();
     let mut attempts = 0;
     let mut jumps = 0;
     let mut found = loop {
-        // The search on coarse grids, and the last steps on all.
+        // The search on coarse grids; the last steps use all.
         let mut searching = |step, sum| {
             let known = None;
             progress(&FitStep { step, sum, known });
         };
-        let mut search = Iteration::new(&rough, weighing, &mut searching);
+        let mut search = Iteration::new(&coarse, weighting, &mut searching);
         let (near, searched, more) = search.run(point);
-        evaluations.rough += more;
+        evaluations.coarse += more;
         attempts += 1;
         let there = model.refined(&near).or_else(|_| {
             let found = model.find(&near.theta);
             found.map(|(there, _)| there)
         })?;
-        let mut last = Iteration::new(&model, weighing, &mut searching);
+        let mut last = Iteration::new(&model, weighting, &mut searching);
         last.lean = true;
         let (mut least, end, more) = last.run(there);
         evaluations.accurate += 1 + more;
@@ -159,33 +159,33 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
             .jump
             .filter(|_| end == End::Stuck(Some(Lost::Elsewhere)));
         if let Some(theta) = beyond.filter(|_| jumps < MOST_JUMPS)
-            && let Some(there) = model.beyond(&theta, &least, weighing)
+            && let Some(there) = model.beyond(&theta, &least, weighting)
         {
             jumps += 1;
             attempts -= 1;
-            (rough, point) = model.rough(&there, weighing)?;
+            (coarse, point) = model.coarse(&there, weighting)?;
             continue;
         }
-        let of_search = Judge::new(&rough, weighing, known, &near, evaluations);
-        let spread = Judge::new(&model, weighing, known, &least, evaluations).spread;
+        let of_search = Statistics::new(&coarse, weighting, known, &near, evaluations);
+        let spread = Statistics::new(&model, weighting, known, &least, evaluations).spread;
         let same = searched == End::Converged && of_search.spread < SAME_SPREAD * spread;
         if !same && end == End::Converged {
-            // What is around it is asked of its own leaves.
+            // Its neighbourhood is computed with its own leaves.
             let differentiated = model.differentiate(&mut least);
             differentiated.map_err(|lost| model.no_equilibrium(0, &lost))?;
         }
-        let judge = Judge::new(&model, weighing, known, &least, evaluations);
-        let shape = if same { &of_search } else { &judge };
+        let stats = Statistics::new(&model, weighting, known, &least, evaluations);
+        let shape = if same { &of_search } else { &stats };
         let parameters = match end {
-            End::Converged => interval::intervals(&judge, shape, progress),
-            _ => Ok(interval::without_intervals(&judge)),
+            End::Converged => interval::intervals(&stats, shape, progress),
+            _ => Ok(interval::without_intervals(&stats)),
         };
         match parameters {
-            Ok(parameters) => break found::fit(&judge, &end, parameters, &request.candidates),
+            Ok(parameters) => break found::fit(&stats, &end, parameters, &request.candidates),
             Err(better) if attempts < MOST_MINIMA => point = better,
             Err(_) => {
-                let parameters = interval::without_intervals(&judge);
-                break found::fit(&judge, &End::MostSteps, parameters, &request.candidates);
+                let parameters = interval::without_intervals(&stats);
+                break found::fit(&stats, &End::MostSteps, parameters, &request.candidates);
             }
         }
     };
@@ -196,7 +196,7 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
     Ok(found)
 }
 
-/// The coordinates of the free numbers, none of which is another's.
+/// The coordinates of the free numbers, checked to be distinct.
 fn coordinates(request: &FitRequest) -> Result<Vec<Coordinate>, FitError> {
     let base = &request.base;
     let free = expanded(request)?;
@@ -216,7 +216,7 @@ fn coordinates(request: &FitRequest) -> Result<Vec<Coordinate>, FitError> {
     Ok(coordinates)
 }
 
-/// Whether there are data enough.
+/// Checks that there are enough data.
 fn check_count(free: usize, count: usize, known: bool) -> Result<(), FitError> {
     if free == 0 || free > count {
         return Err(FitError::Free(match free {
@@ -235,7 +235,7 @@ fn check_count(free: usize, count: usize, known: bool) -> Result<(), FitError> {
     Ok(())
 }
 
-/// The free numbers, with every entry of a list or a profile in its place.
+/// The free numbers, lists and profiles replaced by their entries.
 fn expanded(request: &FitRequest) -> Result<Vec<Free>, FitError> {
     let mut all = Vec::new();
     for free in &request.free {

@@ -1,5 +1,5 @@
-//! What the leaf of a scenario predicts for the data, and how that changes with the
-//! free numbers.
+//! Predictions of a scenario's leaf for the data, and their derivatives with respect to the free
+//! numbers.
 
 use std::sync::{Arc, OnceLock};
 
@@ -16,26 +16,25 @@ use crate::relax::{AtRest, Equilibrium, Grids, Lost, Options};
 use crate::scenario::Scenario;
 use crate::study::{Base, Keys};
 
-/// How far a prediction of a search may be from the accurate one, in standard deviations
-/// of its datum.
-pub(super) const UNNOTICED: f64 = 0.05;
+/// Largest error of a prediction during a search, in standard deviations of its datum.
+pub(super) const INSIGNIFICANT: f64 = 0.05;
 
 /// The largest tolerance of leaves from which a search starts.
 const LOOSEST: f64 = 1e-4;
 
-/// What all points of a fit have in common.
+/// Data common to all points of a fit.
 pub(super) struct Model<'a> {
     pub base: &'a Base,
     pub coordinates: &'a [Coordinate],
     pub options: Options,
     pub cases: Arc<Vec<Case>>,
-    /// On which grids leaves are followed.
+    /// The grids on which leaves are followed.
     pub grids: Grids,
-    /// Whether scenarios change with the free numbers in proportion, wherever these are.
+    /// Whether scenarios are linear in the free numbers.
     pub linear: bool,
-    /// How scenarios change with the free numbers, where that is the same for all.
+    /// The derivatives of scenarios with respect to the free numbers, if common to all.
     pub changes: Arc<OnceLock<Option<Vec<Change>>>>,
-    /// What to add to them.
+    /// The same as increments.
     pub additions: Arc<OnceLock<Option<Vec<Addition>>>>,
 }
 
@@ -62,11 +61,11 @@ impl Point {
     }
 }
 
-/// Tables of a scenario whose numbers change it in proportion, whatever the others are:
+/// Tables of a scenario in whose numbers it is linear, independently of the others:
 /// a length changes the coupling of its gap, and a section its stiffnesses.
 const APART: [&str; 4] = ["stiffness.", "coupling.", "load.", "rest."];
 
-/// Whether the changes of a scenario with these are the same wherever they are.
+/// Whether the derivatives of a scenario with respect to these are constant.
 fn is_linear(coordinates: &[Coordinate]) -> bool {
     coordinates.iter().all(|free| {
         let mut keys = free.keys.targets().iter().filter_map(|target| target.key());
@@ -181,12 +180,12 @@ impl<'a> Model<'a> {
         Ok(made)
     }
 
-    /// Whether the numbers are those that the fit starts with.
+    /// Whether the numbers are the initial ones.
     fn starts(&self, theta: &[f64]) -> bool {
         (self.coordinates.iter().zip(theta)).all(|(free, theta)| free.start == *theta)
     }
 
-    /// The same where the free numbers change all scenarios in proportion, and alike.
+    /// The same if all scenarios are linear in the free numbers, with the same derivatives.
     fn by_additions(&self, case: &Case, theta: &[f64]) -> Option<Scenario> {
         let start = case.start.get()?;
         let changes = self.changes.get()?.as_ref()?;
@@ -205,7 +204,7 @@ impl<'a> Model<'a> {
         Some(scenario)
     }
 
-    /// The leaves at rest from where relaxations start.
+    /// The leaves at rest, relaxed from their usual starts.
     pub fn find(&self, theta: &[f64]) -> Result<(Point, Vec<Equilibrium>), FitError> {
         let find = |case: usize| -> Result<(CaseAt, Equilibrium), FitError> {
             let scenario = self.scenario(&self.cases[case], theta)?;
@@ -239,8 +238,7 @@ impl<'a> Model<'a> {
         ))
     }
 
-    /// The leaves for other values, followed from those of a point that is
-    /// differentiated.
+    /// The leaves at other values, followed from those of a point with derivatives.
     pub fn follow(&self, from: &Point, theta: &[f64]) -> Result<Point, Lost> {
         self.follow_on(from, theta, self.grids)
     }
@@ -264,7 +262,7 @@ impl<'a> Model<'a> {
         })
     }
 
-    /// What the data are measured by: the length of the leaf, or the largest of them.
+    /// Unit of the data: the length of the leaf, or the largest of them.
     pub fn unit(&self) -> f64 {
         let mut measured = self.cases.iter().flat_map(|case| &case.measured);
         let mut traced = self.cases.iter().flat_map(|case| &case.traced);
@@ -279,28 +277,31 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// By how much the numbers change.
+    /// The changes of the numbers.
     pub fn steps(&self, from: &[f64], to: &[f64]) -> Vec<f64> {
         let each = self.coordinates.iter().zip(to).zip(from);
         each.map(|((free, to), from)| free.value(*to) - free.value(*from))
             .collect()
     }
 
-    /// The same model with leaves no more accurate than its data notice, of which all are
+    /// The same model with leaves only as accurate as the resolution of its data, all of which are
     /// lengths.
-    pub fn loose(&self, assumed: f64) -> Model<'a> {
+    pub fn with_loose_tolerance(&self, assumed: f64) -> Model<'a> {
         let length = self.base.scenario().scale().length;
         let sd = |sd: Option<f64>| sd.unwrap_or(assumed) / length;
         let mut tolerance = f64::INFINITY;
         for case in self.cases.iter() {
             for measured in &case.measured {
                 let known = match measured.quantity.kind() {
-                    Kind::Length => UNNOTICED * sd(measured.sd),
+                    Kind::Length => INSIGNIFICANT * sd(measured.sd),
                     _ => 0.0,
                 };
                 tolerance = known.min(tolerance);
             }
-            let traced = case.traced.iter().map(|traced| UNNOTICED * sd(traced.sd));
+            let traced = case
+                .traced
+                .iter()
+                .map(|traced| INSIGNIFICANT * sd(traced.sd));
             tolerance = traced.fold(tolerance, f64::min);
         }
         Model {
@@ -320,7 +321,7 @@ impl<'a> Model<'a> {
         self.options.tolerance.unwrap_or(scenario.tolerance)
     }
 
-    /// Standard deviations are known of all data, or of none, which are then of one kind.
+    /// Checks that the standard deviations are known for all data, or for none, then of one kind.
     pub fn check_deviations(&self, point: &Point) -> Result<bool, FitError> {
         let known = |component: &&Component| component.sd.is_some();
         let count = point.components().filter(known).count();

@@ -1,24 +1,24 @@
-//! What can be measured on a leaf.
+//! Quantities that can be measured on a leaf.
 
 use std::str::FromStr;
 
-/// What can be measured on a leaf.
+/// A quantity that can be measured on a leaf.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// A coordinate of the joint tip, or of the only rod's: 0, 1, 2.
+    /// A coordinate of the shared tip, or of the only rod's: 0, 1, 2.
     Tip(usize),
-    /// A component of the force that the holder of a held tip feels: 0, 1, 2.
+    /// A component of the reaction at a held tip: 0, 1, 2.
     Reaction(usize),
     /// The frequency of a mode in cycles per time; modes are numbered from 1.
     Frequency(usize),
 }
 
 impl Quantity {
-    /// What is measured, in words that allow for their plural.
+    /// The quantities as words that can be followed by a plural.
     pub(super) const ALL: &str =
         "tip_x, tip_y, tip_z, reaction_x, reaction_y, reaction_z, frequency_1, frequency_2, ...";
 
-    /// What kind of number it is.
+    /// Its kind.
     pub(super) fn kind(self) -> Kind {
         match self {
             Quantity::Tip(_) => Kind::Length,
@@ -28,7 +28,7 @@ impl Quantity {
     }
 }
 
-/// Kinds of data, which can only be weighed against each other by their deviations.
+/// Kinds of data, which can only be weighted relative to each other by their deviations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Length,
@@ -36,7 +36,6 @@ pub(super) enum Kind {
     Frequency,
 }
 
-/// Names of the axes.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 impl FromStr for Quantity {

@@ -1,4 +1,4 @@
-//! What a fit found.
+//! The result of a fit.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ pub enum FitOutcome {
     Converged,
     /// Not at a minimum.
     NotConverged,
-    /// At a minimum, but some number or combination of them could be another.
+    /// At a minimum, but some number or combination of numbers is not determined.
     Undetermined,
 }
 
@@ -34,20 +34,20 @@ impl FitOutcome {
 pub struct FitParameter {
     /// Its key.
     pub key: String,
-    /// Its value at the minimum: of one that is not determined, one of many.
+    /// Its value at the minimum: if it is not determined, one of many.
     pub value: f64,
     /// Lower end of the 95 % interval; `None` if there is none.
     pub low: Option<f64>,
     /// Upper end.
     pub high: Option<f64>,
-    /// Whether the data determine it: within a factor of ten.
+    /// Whether the data determine it within a factor of ten.
     pub determined: bool,
-    /// Whether the interval is that of the profile likelihood: where the curvature at
-    /// the minimum is not to be trusted.
+    /// Whether the interval is that of the profile likelihood, since the quadratic approximation at
+    /// the minimum is inaccurate.
     pub profiled: bool,
 }
 
-/// One number that was compared.
+/// One scalar datum.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FitResidual {
     /// The experiment.
@@ -60,54 +60,52 @@ pub struct FitResidual {
     pub sigma: Option<f64>,
     /// The datum.
     pub data: f64,
-    /// The model's.
+    /// The prediction of the model.
     pub model: f64,
-    /// Half the width of the model's 95 % band: what the determined combinations
-    /// leave open.
+    /// Half the width of the model's 95 % band, due to the uncertainty of the determined
+    /// combinations.
     pub band: f64,
-    /// Standard deviation of the datum: as given, or as all residuals tell it.
+    /// Standard deviation of the datum: as given, or as estimated from all residuals.
     pub sd: f64,
     /// (data - model)/sd.
     pub residual: f64,
 }
 
-/// An experiment that could be made.
+/// A candidate experiment.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FitCandidate {
     /// Its name.
     pub experiment: String,
-    /// What it would say about the free numbers, in bits: by how many halvings it
-    /// shrinks what is open between them, a factor of ten each way being all.
+    /// The information it would add on the free numbers, in bits: the number of halvings of
+    /// their uncertainty, limited to a factor of ten up and down.
     pub bits: f64,
-    /// The least determined combination with it, as a factor of its uncertainty
-    /// without it.
+    /// The uncertainty of the least determined combination with it, relative to that without it.
     pub shrinks: f64,
     /// Why it cannot be judged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,
 }
 
-/// How far a fit has come.
+/// Progress of a fit.
 #[derive(Clone, Copy, Debug)]
 pub struct FitStep {
-    /// Steps made towards the present minimum.
+    /// Number of steps towards the present minimum.
     pub step: usize,
     /// The sum of squares there.
     pub sum: f64,
-    /// Once the minimum is found: of how many numbers the interval is known, and of how
-    /// many there are.
+    /// Once the minimum is found: the number of known intervals, and that of all numbers.
     pub known: Option<(usize, usize)>,
 }
 
 /// Work of a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct FitWork {
-    /// Times the leaves of all experiments were brought to rest.
+    /// Number of times the leaves of all experiments were relaxed.
     pub evaluations: usize,
-    /// How many of these were as accurate as is wanted; the others were those of the
-    /// search, on the coarsest grids of which the data notice nothing.
+    /// How many of these had the required accuracy; the others were those of the
+    /// search, on the coarsest grids that do not affect the fit.
     pub accurate: usize,
-    /// Of the leaves at the minimum.
+    /// Work for the leaves at the minimum.
     #[serde(flatten)]
     pub last: Work,
 }
@@ -119,35 +117,35 @@ pub struct Fit {
     pub scenario: String,
     /// How it ended.
     pub outcome: FitOutcome,
-    /// Why, if it did not converge; what else is to be known.
+    /// Why it did not converge; other remarks.
     pub remarks: Vec<String>,
     /// The free numbers.
     pub parameters: Vec<FitParameter>,
-    /// Correlations of their coordinates (logarithms of positive numbers); null where
+    /// Correlations of their coordinates (logarithms of positive numbers); null if
     /// one is not determined.
     pub correlations: Vec<Vec<Option<f64>>>,
-    /// Combinations about which the data say nothing: along each, exponents of
+    /// Combinations to which the data are insensitive: for each, exponents of
     /// positive numbers and coefficients of others.
     pub undetermined: Vec<BTreeMap<String, f64>>,
-    /// What the data say, in words.
+    /// The results in words.
     pub says: Vec<String>,
     /// Sum of the squares of residuals over their standard deviations.
     pub chi_squared: f64,
-    /// Data less determined combinations.
+    /// Degrees of freedom: data minus determined combinations.
     pub degrees_of_freedom: usize,
-    /// Standard deviation of all data, where none was given.
+    /// Standard deviation of all data, if none was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_deviation: Option<f64>,
     /// Data, model and residuals.
     pub residuals: Vec<FitResidual>,
-    /// Experiments that could be made, the one that says most first.
+    /// Candidate experiments, the most informative first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub candidates: Vec<FitCandidate>,
     /// Work.
     pub work: FitWork,
-    /// Time of all, in seconds.
+    /// Total time, in seconds.
     pub wall_seconds: f64,
-    /// The scenario with the values in place, as TOML.
+    /// The scenario with the fitted values, as TOML.
     #[serde(skip)]
     pub fitted: String,
     /// The leaf of every experiment at the minimum, with its name.
@@ -165,7 +163,7 @@ pub struct FitLeaf {
 }
 
 impl Fit {
-    /// Whether the numbers that were asked for are known (exit status 0).
+    /// Whether the requested numbers are determined (exit status 0).
     pub fn is_success(&self) -> bool {
         self.outcome == FitOutcome::Converged
     }

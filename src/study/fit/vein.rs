@@ -1,10 +1,10 @@
-//! A vein as a curve on which the nearest point to a traced one is looked for.
+//! A vein as a curve, for the nearest point to a traced one.
 
 use glam::DVec3;
 
 use crate::relax::{AtRest, Stencil};
 
-/// Iterations to the nearest point between two nodes, and how exactly it is found.
+/// Iterations for the nearest point between two nodes, and its accuracy.
 const ITERATIONS: usize = 60;
 const EXACT: f64 = 1e-10;
 
@@ -12,7 +12,7 @@ const EXACT: f64 = 1e-10;
 pub(super) struct Vein<'a> {
     at: &'a AtRest,
     rod: usize,
-    /// Fractions of the length, and places in the scenario's units.
+    /// Fractions of the length, and positions in the scenario's units.
     nodes: Vec<(f64, DVec3)>,
 }
 
@@ -29,7 +29,7 @@ impl<'a> Vein<'a> {
     }
 
     /// The point at a fraction of the length, in the scenario's units, and its derivative
-    /// with the fraction. Beyond its ends the vein goes on straight.
+    /// with respect to the fraction. The vein is extended straight beyond its ends.
     pub fn point(&self, sigma: f64) -> (DVec3, DVec3) {
         let length = self.at.levels[0].leaf.leaf.scale.length;
         let (mut x, mut slope) = (DVec3::ZERO, DVec3::ZERO);
@@ -45,10 +45,10 @@ impl<'a> Vein<'a> {
         (x * length, slope * length)
     }
 
-    /// The fraction of the length nearest to a point of which these coordinates were
-    /// seen, and the point there. The vein goes on straight beyond its ends: a traced
-    /// point beside them is compared across the vein like all others, so that noise along
-    /// it, of which half is beyond the end, does not lengthen the vein.
+    /// The fraction of the length nearest to a point with these measured coordinates,
+    /// and the point there. The vein is extended straight beyond its ends: a traced
+    /// point near an end is compared across the vein like all others, so that noise along
+    /// it, half of which is beyond the end, does not lengthen the vein.
     pub fn nearest(&self, seen: [Option<f64>; 3]) -> (f64, DVec3) {
         let mask = DVec3::from_array(seen.map(|value| f64::from(u8::from(value.is_some()))));
         let seen = DVec3::from_array(seen.map(|value| value.unwrap_or(0.0)));
@@ -65,7 +65,7 @@ impl<'a> Vein<'a> {
             let slope = mask * slope;
             (slope.dot(x - seen), slope.length_squared(), x)
         };
-        // Newton's method, but for the curvature; then by secants.
+        // Newton's method without the curvature; then the secant method.
         let mut sigma = self.nodes[best].0;
         let mut before: Option<(f64, f64)> = None;
         for _ in 0..ITERATIONS {
@@ -77,7 +77,7 @@ impl<'a> Vein<'a> {
                 _ if squared > 0.0 => -value / squared,
                 _ => 0.0,
             };
-            // Where it goes on straight, the first step is exact.
+            // On a straight extension, the first step is exact.
             let inside = (low..=high).contains(&(sigma + step));
             let [base, tip] = [
                 low == 0.0 && sigma + step < low,
@@ -102,15 +102,15 @@ impl<'a> Vein<'a> {
             before = Some((sigma, value));
             sigma += step;
         }
-        let found = self.enclosed(self.nodes[best].0, (low, high), &|sigma| {
+        let found = self.bracketed(self.nodes[best].0, (low, high), &|sigma| {
             let (value, squared, _) = rate(sigma);
             (value, squared)
         });
         (found, self.point(found).0)
     }
 
-    /// The same between two nodes beside the best, where the derivative changes its sign.
-    fn enclosed(
+    /// The same between two nodes next to the best, where the derivative changes its sign.
+    fn bracketed(
         &self,
         best: f64,
         (mut low, mut high): (f64, f64),
@@ -128,7 +128,7 @@ impl<'a> Vein<'a> {
         if at_low > 0.0 || at_high < 0.0 {
             return sigma;
         }
-        // The rule of false position; the end that stays counts half (Illinois).
+        // Regula falsi; the value at the retained end is halved (Illinois).
         for _ in 0..ITERATIONS {
             let middle = low + (high - low) * at_low / (at_low - at_high);
             if (middle - sigma).abs() < EXACT || !middle.is_finite() {

@@ -1,24 +1,24 @@
-//! What the data say, in words.
+//! The results in words.
 
 use std::collections::BTreeMap;
 
 use super::result::FitParameter;
 
-/// A combination along which the numbers could be others: coordinates and their parts.
-pub(super) struct Open {
-    /// Index of the free number, and its part; the largest is one.
+/// An undetermined combination: coordinates and their coefficients.
+pub(super) struct Undetermined {
+    /// Index of the free number, and its coefficient; the largest is one.
     pub parts: Vec<(usize, f64)>,
-    /// Whether the data say nothing at all about it, or only little.
+    /// Whether the data are completely insensitive to it, or only weakly sensitive.
     pub exactly: bool,
 }
 
-/// The combination as the result has it.
-pub(super) fn map(open: &Open, keys: &[String], units: &[f64]) -> BTreeMap<String, f64> {
+/// The combination in the form of the result.
+pub(super) fn map(open: &Undetermined, keys: &[String], units: &[f64]) -> BTreeMap<String, f64> {
     let part = |(k, part): &(usize, f64)| (keys[*k].clone(), rounded(part * units[*k]));
     open.parts.iter().map(part).collect()
 }
 
-/// Without what rounding makes of a simple number.
+/// Removes rounding errors from a simple number.
 fn rounded(value: f64) -> f64 {
     let digits = (value * 1e4).round() / 1e4;
     if (digits - value).abs() < 1e-4 * value.abs().max(1e-3) {
@@ -28,9 +28,13 @@ fn rounded(value: f64) -> f64 {
     }
 }
 
-/// A sentence about each number and each open combination. `logs` says of which
-/// numbers the coordinate is a logarithm.
-pub(super) fn says(parameters: &[FitParameter], open: &[Open], logs: &[bool]) -> Vec<String> {
+/// A sentence for each number and each undetermined combination. `logs` are the numbers
+/// whose coordinate is a logarithm.
+pub(super) fn sentences(
+    parameters: &[FitParameter],
+    open: &[Undetermined],
+    logs: &[bool],
+) -> Vec<String> {
     let mut said = Vec::new();
     for (k, parameter) in parameters.iter().enumerate() {
         let (low, high) = match (parameter.low, parameter.high) {
@@ -58,7 +62,7 @@ fn percent(part: f64) -> String {
     }
 }
 
-fn sentence(open: &Open, parameters: &[FitParameter], logs: &[bool]) -> String {
+fn sentence(open: &Undetermined, parameters: &[FitParameter], logs: &[bool]) -> String {
     let key = |k: usize| parameters[k].key.as_str();
     let all_logs = open.parts.iter().all(|(k, _)| logs[*k]);
     match open.parts.as_slice() {
@@ -74,7 +78,7 @@ fn sentence(open: &Open, parameters: &[FitParameter], logs: &[bool]) -> String {
                 "{} and {}: {}only as their {only}",
                 key(*a),
                 key(*b),
-                hardly(open)
+                how_weakly(open)
             )
         }
         parts => {
@@ -93,7 +97,7 @@ fn sentence(open: &Open, parameters: &[FitParameter], logs: &[bool]) -> String {
     }
 }
 
-fn hardly(open: &Open) -> &'static str {
+fn how_weakly(open: &Undetermined) -> &'static str {
     if open.exactly { "" } else { "nearly " }
 }
 

@@ -1,4 +1,4 @@
-//! One cell: the reference, each method's answer, and what it is worth.
+//! One cell: the reference, and each method's answer with its verdict.
 
 use std::time::{Duration, Instant};
 
@@ -7,31 +7,31 @@ use crate::limit::Limit;
 use crate::relax::{self, Method, Options, Outcome};
 use crate::scenario::{Scenario, longest};
 use crate::study::judge::{
-    Answer, SAME_PLACE, SEGMENTS, fine_grid, grid_error, index_at, timed, union,
+    Answer, SAME_LEAF, SEGMENTS, fine_grid, grid_error, index_at, timed, union,
 };
 use crate::study::vary::{Knobs, Varied};
 
 use super::motion;
 use super::row::{Confidence, Found, MapMethod, MapOutcome, MapRow};
 
-/// The reference is sharper than what it judges by this factor, as far as
-/// double precision allows.
+/// The tolerance of the reference is smaller than that of the answers by this factor, as far
+/// as double precision allows.
 const SHARPER: f64 = 1e-2;
 const SHARPEST: f64 = 1e-12;
 
-/// Seconds that a node takes on any machine, at the very least: a grid is made and
-/// started on before anybody looks at the clock.
+/// Lower bound on the seconds per node on any machine: a grid is built and its solution
+/// started before the time limit is first checked.
 const LEAST_SECONDS: f64 = 1e-6;
 
-/// What a cell's leaf is solved with.
+/// What is needed to solve a cell's leaf.
 pub struct Cell<'a> {
     scenario: &'a Scenario,
     knobs: Knobs,
     tolerance: f64,
     limit: Duration,
-    /// When all cells give up.
+    /// Time limit for all cells.
     all: &'a Limit,
-    /// The default's answer and its seconds: the start of shooting from rest.
+    /// The default method's answer and its seconds: the start of shooting from rest.
     relaxed: (Found, f64),
     reference: Option<Answer>,
     confidence: Confidence,
@@ -70,7 +70,7 @@ impl<'a> Cell<'a> {
         cell
     }
 
-    /// Solves by a method and judges.
+    /// Solves by a method and judges the answer.
     pub fn row(&self, cell: usize, method: MapMethod) -> MapRow {
         let (found, seconds) = self.answer(method);
         let blank = MapRow {
@@ -146,7 +146,6 @@ impl<'a> Cell<'a> {
         })
     }
 
-    /// Solves the boundary-value problem.
     fn shoot(&self, start: Start, accuracy: f64, intervals: Option<usize>, limit: &Limit) -> Found {
         let segments = match &self.relaxed.0 {
             Ok(relaxed) => relaxed.stations.len() - 1,
@@ -205,7 +204,7 @@ impl<'a> Cell<'a> {
         }
     }
 
-    /// What an answer is worth at this distance from the reference.
+    /// The verdict on an answer at this distance from the reference.
     fn judge(&self, answer: &Answer, distance: Option<f64>) -> (MapOutcome, String) {
         let note = answer.remark.as_deref().unwrap_or_default();
         if let Some(index @ 1..) = answer.index {
@@ -234,7 +233,7 @@ impl<'a> Cell<'a> {
         }
     }
 
-    /// Whether the equilibrium near an answer is not the reference.
+    /// Whether the equilibrium near an answer is another than the reference.
     fn is_elsewhere(&self, answer: &Answer, reference: &Answer, distance: f64) -> bool {
         let (near, _) = within(self.limit, self.all, |limit| {
             self.shoot(answer.as_start(), self.tolerance, None, limit)
@@ -243,13 +242,13 @@ impl<'a> Cell<'a> {
             Ok(near) if near.distance(answer) < Some(distance) => {
                 near.distance(reference) > Some(0.5 * distance)
             }
-            _ => distance > SAME_PLACE * longest(&self.scenario.rods),
+            _ => distance > SAME_LEAF * longest(&self.scenario.rods),
         }
     }
 }
 
-/// Lets a method run, told when to give up; returns also the seconds it took.
-/// What takes longer than it may is out of time, whatever it found.
+/// Runs a method with a time limit; also returns the seconds it took.
+/// A run that exceeds the limit counts as out of time, whatever its result.
 fn within(limit: Duration, all: &Limit, run: impl FnOnce(&Limit) -> Found) -> (Found, f64) {
     let until = Limit {
         deadline: Some(Instant::now() + limit),
@@ -266,7 +265,7 @@ fn within(limit: Duration, all: &Limit, run: impl FnOnce(&Limit) -> Found) -> (F
     }
 }
 
-/// Relaxes, perhaps on one grid. That tells no error: a finer grid does.
+/// Relaxes, perhaps on one grid. That has no error estimate of its own: a finer grid gives one.
 pub fn relaxed(scenario: &Scenario, method: Method, tolerance: f64, limit: &Limit) -> Found {
     let options = Options {
         method,
@@ -303,9 +302,9 @@ pub fn relaxed(scenario: &Scenario, method: Method, tolerance: f64, limit: &Limi
     Ok(answer)
 }
 
-/// The reference, of a relaxed leaf and the solution that shooting found from
-/// there, if it did. Where they agree, in their numbers of negative eigenvalues
-/// too, it is the solution; where not, only if that is stable.
+/// The reference, from a relaxed leaf and, if found, the shooting solution started from it.
+/// If they agree, also in their numbers of negative eigenvalues, it is the shooting solution;
+/// if not, only if that is stable.
 fn confirm(relaxed: &Answer, shot: Option<Answer>) -> (Confidence, Answer) {
     let Some(shot) = shot else {
         return (Confidence::Unconfirmed, relaxed.clone());
@@ -319,7 +318,7 @@ fn confirm(relaxed: &Answer, shot: Option<Answer>) -> (Confidence, Answer) {
     }
 }
 
-/// Tables have one line a row.
+/// Puts a text on one line, as tables require.
 pub fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -1,9 +1,8 @@
-//! Where the leaf of a cell is at rest in another equilibrium than that of the next: its
-//! place jumps between them.
+//! Jumps: neighbouring cells in which the leaf rests in different equilibria.
 //!
-//! Pairs of cells whose answers are farther apart than those beside them are looked at
-//! again: the leaf is brought to rest half way, then half way of the half in which it
-//! moves more. What is continuous moves less and less; what jumps goes on jumping.
+//! Pairs of cells whose answers are farther apart than those of the neighbouring pairs are
+//! bisected: the leaf is relaxed at the midpoint, then at that of the half in which it moves
+//! more. The displacement of a continuous branch decreases with bisection; a jump does not.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -20,46 +19,46 @@ use crate::relax::Method;
 use crate::scenario::longest;
 use crate::study::judge::Answer;
 
-/// Leaves closer than this, in lengths, are not told from each other.
+/// Leaves closer than this, in lengths, count as the same.
 const SAME: f64 = 0.01;
 
-/// A pair is looked at if its tips, or its twists, are so many times as far apart as those of
-/// a pair beside it.
+/// A pair is examined if its tips, or its twists, are farther apart than those of
+/// a neighbouring pair by this factor.
 const FARTHER: f64 = 1.5;
 
-/// Half way a leaf that moves continuously is nearer to the middle than this part of the
-/// way.
+/// At the midpoint, a leaf on a continuous branch is nearer to the mean of both ends than this
+/// part of their distance.
 const NEAR_MIDDLE: f64 = 0.1;
 
-/// Halves: where a branch ends in a fold, or leaves another one, a leaf moves as the root
-/// of the distance from there, a sixty-fourth.
+/// Number of bisections: near a fold or a branch point a leaf moves as the square root of the
+/// distance from it, here a sixty-fourth.
 const HALVES: usize = 12;
 
 /// Two neighbouring cells between which the leaf jumps to another equilibrium.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MapJump {
-    /// What varies from the one to the other.
+    /// The key that varies between them.
     pub key: String,
     /// The varied values of one cell.
     pub from: Vec<String>,
     /// Those of the other.
     pub to: Vec<String>,
-    /// It jumps between these two values of the key.
+    /// The two values of the key between which it jumps.
     pub between: [f64; 2],
-    /// How far, in units of length.
+    /// Size of the jump, in units of length.
     pub distance: f64,
 }
 
-/// Two cells next to each other along an axis.
+/// Two neighbouring cells along an axis.
 struct Pair {
     axis: usize,
     cells: [usize; 2],
 }
 
 impl Map {
-    /// Looks where the leaf jumps to another equilibrium from a cell to the next, by the
-    /// default method: `jumps` has these then.
-    /// `progress` is told how many pairs of cells are looked at, and of how many.
+    /// Searches for jumps of the leaf to another equilibrium between neighbouring cells, by the
+    /// default method, and stores them in `jumps`.
+    /// `progress` is called with the number of pairs examined and their total number.
     pub fn find_jumps(&mut self, progress: &(dyn Fn(usize, usize) + Sync)) {
         self.jumps = Some(jumps(&self.request, &self.rows, progress));
     }
@@ -77,7 +76,7 @@ fn jumps(
         known[row.cell] = Some(row);
     }
     let pairs: Vec<Pair> = pairs(request)
-        .filter(|pair| stands_out(request, &known, pair))
+        .filter(|pair| may_jump(request, &known, pair))
         .collect();
     let done = AtomicUsize::new(0);
     let found = pairs.par_iter().map(|pair| {
@@ -91,53 +90,53 @@ fn jumps(
 fn pairs(request: &MapRequest) -> impl Iterator<Item = Pair> {
     (0..request.cells()).flat_map(move |cell| {
         (0..request.axes.len()).filter_map(move |axis| {
-            let next = beside(request, cell, axis, 1)?;
+            let next = neighbour(request, cell, axis, 1)?;
             let cells = [cell, next];
             Some(Pair { axis, cells })
         })
     })
 }
 
-/// The cell so many places away along an axis.
-fn beside(request: &MapRequest, cell: usize, axis: usize, places: isize) -> Option<usize> {
-    let behind = request.axes.iter().skip(axis + 1);
-    let stride: usize = behind.map(|axis| axis.values.len()).product();
-    let at = request.place(cell)[axis].checked_add_signed(places)?;
+/// The cell at a signed offset along an axis.
+fn neighbour(request: &MapRequest, cell: usize, axis: usize, offset: isize) -> Option<usize> {
+    let later = request.axes.iter().skip(axis + 1);
+    let stride: usize = later.map(|axis| axis.values.len()).product();
+    let at = request.place(cell)[axis].checked_add_signed(offset)?;
     let there = at < request.axes[axis].values.len();
-    there.then(|| cell.wrapping_add_signed(places * stride as isize))
+    there.then(|| cell.wrapping_add_signed(offset * stride as isize))
 }
 
-/// Whether the leaf may jump between two cells, by their rows and those beside them. Where
-/// its tip is held, only the leaf itself tells.
-fn stands_out(request: &MapRequest, known: &[Option<&MapRow>], pair: &Pair) -> bool {
+/// Whether the leaf may jump between two cells, by comparison with neighbouring rows. If
+/// its tip is held, only its shape can show it.
+fn may_jump(request: &MapRequest, known: &[Option<&MapRow>], pair: &Pair) -> bool {
     let [a, b] = pair.cells;
-    let apart = |a: usize, b: usize| Some(apart(known[a]?, known[b]?));
-    let Some(own) = apart(a, b) else {
+    let distances = |a: usize, b: usize| Some(distances(known[a]?, known[b]?));
+    let Some(own) = distances(a, b) else {
         return false;
     };
     let scenario = request.base.scenario();
     if scenario.held_tip.is_some() {
         return true;
     }
-    let before = beside(request, a, pair.axis, -1).and_then(|before| apart(before, a));
-    let behind = beside(request, b, pair.axis, 1).and_then(|behind| apart(b, behind));
+    let before = neighbour(request, a, pair.axis, -1).and_then(|before| distances(before, a));
+    let after = neighbour(request, b, pair.axis, 1).and_then(|after| distances(b, after));
     let units = [longest(&scenario.rods), 1.0];
     (0..2).any(|k| {
-        let beside = [before, behind].into_iter().flatten().map(|it| it[k]);
-        let least = beside.fold(f64::INFINITY, f64::min);
+        let others = [before, after].into_iter().flatten().map(|it| it[k]);
+        let least = others.fold(f64::INFINITY, f64::min);
         own[k] > SAME * units[k] && (!least.is_finite() || own[k] > FARTHER * least)
     })
 }
 
-/// How far tips are apart, and twists.
-fn apart(a: &MapRow, b: &MapRow) -> [f64; 2] {
+/// Distances of the tips and of the twists.
+fn distances(a: &MapRow, b: &MapRow) -> [f64; 2] {
     let difference = |of: fn(&MapRow) -> Option<f64>| of(a).zip(of(b)).map_or(0.0, |(a, b)| a - b);
     let tip = [difference(|row| row.tip_x), difference(|row| row.tip_y)];
     let tip = tip[0].hypot(tip[1]).hypot(difference(|row| row.tip_z));
     [tip, difference(|row| row.twist).abs()]
 }
 
-/// The jump between two cells, if there is one for certain.
+/// The jump between two cells, if there certainly is one.
 fn jump(request: &MapRequest, pair: &Pair) -> Option<MapJump> {
     let axis = &request.axes[pair.axis];
     let ends = pair.cells.map(|cell| request.values(cell)[pair.axis].1);
@@ -155,7 +154,7 @@ fn jump(request: &MapRequest, pair: &Pair) -> Option<MapJump> {
         }
         let part = 0.5 * (low.0 + high.0);
         let middle = at(part)?;
-        if half == 0 && off_middle(&low.1, &middle, &high.1)? < NEAR_MIDDLE * distance {
+        if half == 0 && distance_from_middle(&low.1, &middle, &high.1)? < NEAR_MIDDLE * distance {
             return None;
         }
         let [below, above] = [low.1.distance(&middle)?, middle.distance(&high.1)?];
@@ -173,7 +172,7 @@ fn jump(request: &MapRequest, pair: &Pair) -> Option<MapJump> {
     })
 }
 
-/// The leaf at rest with another value on the axis of a pair.
+/// The relaxed leaf at another value along the axis of a pair.
 fn answer(request: &MapRequest, pair: &Pair, value: f64) -> Option<Answer> {
     let mut values = request.values(pair.cells[0]);
     values[pair.axis].1 = value;
@@ -187,8 +186,8 @@ fn answer(request: &MapRequest, pair: &Pair, value: f64) -> Option<Answer> {
     relaxed(&varied.scenario, method, tolerance, &limit).ok()
 }
 
-/// How far a leaf is from the middle between two others, at most.
-fn off_middle(low: &Answer, middle: &Answer, high: &Answer) -> Option<f64> {
+/// Largest distance of a leaf from the mean of two others.
+fn distance_from_middle(low: &Answer, middle: &Answer, high: &Answer) -> Option<f64> {
     let common = |sigma: f64, of: &Answer| of.stations.iter().position(|it| *it == sigma);
     let mut most: f64 = 0.0;
     for (i, &sigma) in middle.stations.iter().enumerate() {

@@ -1,10 +1,10 @@
-//! Where each method fails: a leaf solved in every cell of a grid of
-//! parameters by every method, each answer judged.
+//! Where each method fails: a leaf solved by every method in every cell of a grid of
+//! parameters, with a verdict on each answer.
 //!
-//! What is right is decided by two methods that share nothing: the relaxed
+//! The reference is determined by two independent methods: the relaxed
 //! leaf, and the solution of the boundary-value problem that starts from it,
-//! a hundred times sharper. Where they agree within their estimates the
-//! reference is confirmed. Everything else is measured against it.
+//! both at a hundredth of the tolerance. If they agree within their estimates the
+//! reference is confirmed. All answers are measured against it.
 
 mod cell;
 mod jumps;
@@ -22,21 +22,21 @@ use std::thread;
 
 use serde::{Serialize, Serializer};
 
-/// A finished map, or as much of one as there is.
+/// A map, complete or partial.
 #[derive(Clone, Debug)]
 pub struct Map {
-    /// What was asked.
+    /// The request.
     pub request: MapRequest,
-    /// What is known, sorted by cell and method, none twice.
+    /// The rows so far, sorted by cell and method, without duplicates.
     pub rows: Vec<MapRow>,
     /// What the figure shows.
     pub show: MapShow,
-    /// Between which cells the leaf jumps to another equilibrium, once that was looked for.
+    /// The jumps of the leaf to another equilibrium between cells, if they were searched for.
     pub jumps: Option<Vec<MapJump>>,
 }
 
 impl Map {
-    /// Sorts the rows; of two about the same the first stays.
+    /// Sorts the rows; of duplicates the first is kept.
     pub fn new(request: MapRequest, mut rows: Vec<MapRow>) -> Self {
         rows.sort_by_key(|row| (row.cell, row.method));
         rows.dedup_by_key(|row| (row.cell, row.method));
@@ -48,7 +48,7 @@ impl Map {
         }
     }
 
-    /// How often a method had an outcome.
+    /// Number of a method's answers with an outcome.
     pub fn count(&self, method: MapMethod, outcome: MapOutcome) -> usize {
         let counted = |row: &&MapRow| row.method == method && row.outcome == outcome;
         self.rows.iter().filter(counted).count()
@@ -65,8 +65,8 @@ impl Map {
     }
 }
 
-/// `map.json`: which map the rows beside it are of, and how often each method had
-/// each outcome; those it never had are left out.
+/// `map.json`: the request, which identifies the map of the rows in the table, and how often each
+/// method had each outcome; zero counts are left out.
 impl Serialize for Map {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
@@ -103,16 +103,15 @@ impl Serialize for Map {
     }
 }
 
-/// Solves cells, each by its methods, and hands over the rows of each as it
-/// is finished; `false` from there ends the run. As many cells at a time as
-/// rayon has threads, each on one thread of its own, so that no cell's time is
-/// spent on another's work.
+/// Solves cells, each by its methods, and passes the rows of each to a callback as it
+/// is finished; if that returns `false` the run ends. As many cells at a time as
+/// rayon has threads, each on a single thread, so that no cell's time includes another's work.
 pub fn map(
     request: &MapRequest,
     cells: &[(usize, Vec<MapMethod>)],
     done: &mut (dyn FnMut(Vec<MapRow>) -> bool + Send),
 ) {
-    // A thread that panics ends the run anyway.
+    // A panic in a thread ends the run anyway.
     let left = Mutex::new(cells.iter());
     let next = || left.lock().unwrap_or_else(PoisonError::into_inner).next();
     let done = Mutex::new(done);
@@ -132,7 +131,7 @@ pub fn map(
                 let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build();
                 match alone {
                     Ok(pool) => pool.install(work),
-                    // Slower, but as right.
+                    // Slower, with the same result.
                     Err(_) => work(),
                 }
             });

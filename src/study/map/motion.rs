@@ -1,5 +1,5 @@
-//! Explicit motion with one time step, whether that is stable or not: what a
-//! plain simulation of the damped leaf would answer.
+//! Explicit motion with one time step, stable or not: the answer of a plain simulation
+//! of the damped leaf.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
 use crate::limit::Limit;
@@ -7,22 +7,22 @@ use crate::motion::{Explicit, Method, Physics, Stopped};
 use crate::relax::{self, Outcome, Work, index_near, node_state, start};
 use crate::scenario::Scenario;
 use crate::shape::RodShape;
-use crate::study::judge::{Answer, SAME_PLACE, fine_grid, grid_error};
+use crate::study::judge::{Answer, SAME_LEAF, fine_grid, grid_error};
 use crate::undulation::Undulation;
 
 use super::row::{Found, MapOutcome};
 use crate::study::vary::{Knobs, Varied};
 
-/// Segments a rod where none are asked for: as in a simulation.
+/// Default number of segments per rod: as in a simulation.
 const SEGMENTS: usize = 16;
 
-/// Stations of a grid at which answers are compared.
+/// Largest number of stations at which answers are compared.
 const MOST_STATIONS: usize = 4096;
 
-/// Steps between looks at the clock.
+/// Steps between checks of the time limit.
 const LOOK: f64 = 1000.0;
 
-/// Released from where a relaxation starts, the leaf moves for the scenario's
+/// Moves the leaf, released from the initial state of a relaxation, for the scenario's
 /// duration under the loads of its dynamics, in steps of `method.step`.
 pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) -> Found {
     let refused = |why: String| Err((MapOutcome::Refused, why));
@@ -72,7 +72,7 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
             };
         }
         if limit.reached() {
-            // What is late is out of time, whatever is said here.
+            // Past the limit it counts as out of time, whatever is returned here.
             return failed(MapOutcome::OutOfTime, "still moving".into());
         }
     }
@@ -90,7 +90,7 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
     }
     let length = leaf.scale.length;
     let error = grid_error(scenario, segments, tolerance, limit);
-    let estimate = error.unwrap_or(SAME_PLACE * length) + tolerance * length;
+    let estimate = error.unwrap_or(SAME_LEAF * length) + tolerance * length;
     Ok(Answer {
         outcome: Outcome::Converged,
         remark: Some(note),
@@ -105,7 +105,7 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
     })
 }
 
-/// The longest step that is known to be stable.
+/// The longest step known to be stable.
 pub fn stable_step(varied: &Varied) -> Option<f64> {
     let leaf = Leaf::new(&varied.scenario);
     let segments = relax::check_segments(&leaf, varied.knobs.segments, SEGMENTS).ok()?;
@@ -117,7 +117,7 @@ pub fn stable_step(varied: &Varied) -> Option<f64> {
     Some(motion.stable_step().step * time)
 }
 
-/// The state in the scenario's units.
+/// The shape in the scenario's units.
 fn shape(leaf: &DiscreteLeaf, state: &State) -> Vec<RodShape> {
     let scale = leaf.leaf.scale;
     (0..leaf.rods())
@@ -137,7 +137,7 @@ fn shape(leaf: &DiscreteLeaf, state: &State) -> Vec<RodShape> {
         .collect()
 }
 
-/// Stations that a reference should have beside its own.
+/// Additional stations that a reference should have.
 pub fn stations(scenario: &Scenario, knobs: Knobs) -> Vec<f64> {
     let leaf = Leaf::new(scenario);
     match relax::check_segments(&leaf, knobs.segments, SEGMENTS) {

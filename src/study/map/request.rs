@@ -1,4 +1,4 @@
-//! What is asked of a map, and what cannot be asked.
+//! Requests for maps, and their validation.
 
 use std::time::Duration;
 
@@ -12,13 +12,13 @@ use crate::memory::Request;
 use crate::relax::check_tolerance;
 use crate::study::vary::{Base, Keys, Knob, Vary, VaryError};
 
-/// Most cells of a map.
+/// Largest number of cells of a map.
 const MOST_CELLS: usize = 1_000_000;
 
-/// Seconds allowed for each method in each cell, if nothing else is said.
+/// Default seconds allowed for each method in each cell.
 pub const CELL_SECONDS: f64 = 20.0;
 
-/// What is asked of a map.
+/// A request for a map.
 #[derive(Clone, Debug)]
 pub struct MapRequest {
     /// The scenario.
@@ -31,17 +31,17 @@ pub struct MapRequest {
     pub tolerance: Option<f64>,
     /// Seconds allowed for each method in each cell.
     pub cell_seconds: f64,
-    /// When a cell that is not finished gives up, if somebody says so.
+    /// Time limit for unfinished cells, if set.
     pub limit: Limit,
 }
 
-/// A map that cannot be made: why, in a sentence.
+/// Why a map cannot be made, as a sentence.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub struct MapRefused(String);
 
 impl MapRequest {
-    /// Checks what is asked. Without `methods`: all, explicit motion only if
+    /// Validates the request. Default `methods`: all, explicit motion only if
     /// its time step is set or varies.
     ///
     /// # Errors
@@ -110,7 +110,7 @@ impl MapRequest {
         Ok(request)
     }
 
-    /// A number that no cell could vary is a slip, not a failure of methods.
+    /// A value that no cell accepts is a mistake in the request, not a failure of methods.
     fn check_entries(&self) -> Result<(), MapRefused> {
         let first = self.base.at(&self.values(0));
         let last = self.base.at(&self.values(self.cells() - 1));
@@ -125,7 +125,7 @@ impl MapRequest {
         self.axes.iter().map(|axis| axis.values.len()).product()
     }
 
-    /// Place of a cell along each axis.
+    /// Index of a cell along each axis.
     pub fn place(&self, cell: usize) -> Vec<usize> {
         let mut rest = cell;
         let mut place: Vec<usize> = (self.axes.iter().rev())
@@ -139,21 +139,21 @@ impl MapRequest {
         place
     }
 
-    /// The varied numbers of a cell.
+    /// The varied values of a cell.
     pub fn values(&self, cell: usize) -> Vec<(&Keys, f64)> {
         let axes = self.axes.iter().zip(self.place(cell));
         axes.map(|(axis, at)| (&axis.keys, axis.values[at]))
             .collect()
     }
 
-    /// The same as they are written into tables.
+    /// The same as texts, as in tables.
     pub fn texts(&self, cell: usize) -> Vec<String> {
         let values = self.values(cell).into_iter();
         values.map(|(keys, value)| keys.text(value)).collect()
     }
 
-    /// The longest time step of explicit motion in a cell that is known to be
-    /// stable, in the scenario's unit of time.
+    /// The longest time step of explicit motion known to be stable in a cell, in the scenario's
+    /// unit of time.
     pub fn stable_step(&self, cell: usize) -> Option<f64> {
         motion::stable_step(&self.base.at(&self.values(cell)).ok()?)
     }
@@ -179,8 +179,8 @@ impl MapRequest {
     }
 }
 
-/// What tells one map from another. Values are texts, as in the table: they must
-/// be the same to the last digit.
+/// What identifies a map. Values are texts, as in the table: they must
+/// agree to the last digit.
 impl Serialize for MapRequest {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
@@ -219,7 +219,7 @@ impl Serialize for MapRequest {
     }
 }
 
-/// FNV-1a: tells whether a text has changed, from release to release the same.
+/// FNV-1a, a hash that is stable across releases, to detect changes of a text.
 fn digest(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)

@@ -1,4 +1,4 @@
-//! What is said of one method in one cell: a closed set of words, and numbers.
+//! The result of one method in one cell: a closed set of words, and numbers.
 
 use std::cmp::Ordering;
 
@@ -11,8 +11,8 @@ use crate::study::words::{read_and_write, words};
 /// The methods that are compared, in the order of the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum MapMethod {
-    /// A method that brings the leaf to rest. Shooting from rest starts from what
-    /// the default finds at the same tolerance.
+    /// A method of relaxation or shooting. Shooting from rest starts from the result of
+    /// the default method at the same tolerance.
     ToRest(Method),
     /// Explicit motion with one time step for the scenario's duration.
     ExplicitMotion,
@@ -37,7 +37,7 @@ impl MapMethod {
         }
     }
 
-    fn place(self) -> Option<usize> {
+    fn rank(self) -> Option<usize> {
         MapMethod::ALL.iter().position(|method| *method == self)
     }
 }
@@ -50,7 +50,7 @@ impl Default for MapMethod {
 
 impl Ord for MapMethod {
     fn cmp(&self, other: &Self) -> Ordering {
-        self.place().cmp(&other.place())
+        self.rank().cmp(&other.rank())
     }
 }
 
@@ -60,10 +60,10 @@ impl PartialOrd for MapMethod {
     }
 }
 
-/// How a method fared.
+/// Outcome of a method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum MapOutcome {
-    /// At rest where the reference is, as closely as both say they know.
+    /// At rest in the reference equilibrium, within both error estimates.
     Right,
     /// At rest in another equilibrium, not known to be unstable.
     OtherEquilibrium,
@@ -72,29 +72,29 @@ pub enum MapOutcome {
     /// In the same equilibrium, but further from the reference than both
     /// error estimates allow.
     Inaccurate,
-    /// Not at rest, or not to the tolerance.
+    /// Not at rest, or not within the tolerance.
     NotConverged,
-    /// Values grew out of all bounds, or no step lowered the energy.
+    /// Values grew without bound, or no step lowered the energy.
     Diverged,
     /// The method or the format refuses such a leaf.
     #[default]
     Refused,
-    /// The time allowed was over.
+    /// The time limit was exceeded.
     OutOfTime,
 }
 
-/// An answer at rest within the tolerance, or why there is none: an outcome and
-/// a sentence.
+/// An answer at rest within the tolerance, or an outcome and a sentence that say why there
+/// is none.
 pub type Found = Result<Answer, (MapOutcome, String)>;
 
-/// What there is to compare with.
+/// Reliability of the reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Confidence {
     /// Relaxation and shooting from there agree within both error estimates,
     /// and so do their numbers of negative eigenvalues.
     Confirmed,
-    /// They do not: the shooting is the reference if it found a stable
-    /// equilibrium, otherwise the relaxation.
+    /// They do not: the reference is the shooting solution if that is a stable
+    /// equilibrium, otherwise the relaxed leaf.
     Unconfirmed,
     /// The relaxation did not come to rest.
     #[default]
@@ -104,10 +104,10 @@ pub enum Confidence {
 /// What the figure of a map shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MapShow {
-    /// How each method fared.
+    /// The outcome of each method.
     #[default]
     Outcomes,
-    /// How many waves the margins of stable answers make.
+    /// The number of waves along the margins of stable answers.
     Waves,
 }
 
@@ -136,21 +136,21 @@ words! {
 }
 
 /// One method in one cell: a row of `map.csv`, in the order of its columns.
-/// Lengths are relative to the longest rod but for the tip.
+/// Lengths except the tip's coordinates are relative to the longest rod.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MapRow {
-    /// The cell, counted along the last axis first; in the table its values tell.
+    /// The number of the cell, the last axis varying fastest; the table gives its values instead.
     #[serde(skip)]
     pub cell: usize,
     /// The method.
     pub method: MapMethod,
-    /// How it fared.
+    /// The outcome.
     pub outcome: MapOutcome,
-    /// What else there is to say, on one line.
+    /// Further information, on one line.
     pub detail: String,
     /// Negative eigenvalues of the equilibrium found.
     pub index: Option<usize>,
-    /// The joint tip, or the first rod's.
+    /// The shared tip, or the first rod's.
     #[serde(serialize_with = "number")]
     pub tip_x: Option<f64>,
     /// Its y.
@@ -165,7 +165,7 @@ pub struct MapRow {
     /// Largest distance from the reference.
     #[serde(serialize_with = "number")]
     pub error: Option<f64>,
-    /// What the method says of its error.
+    /// The method's own error estimate.
     #[serde(serialize_with = "number")]
     pub error_estimate: Option<f64>,
     /// Waves along the margins of the equilibrium found: a multiple of 1/2.
@@ -180,11 +180,11 @@ pub struct MapRow {
     /// Time taken, by one thread.
     #[serde(serialize_with = "microseconds")]
     pub seconds: f64,
-    /// What it was compared with.
+    /// The reliability of the reference.
     pub reference: Confidence,
 }
 
-/// As in Rust's own notation, which reads back to the last bit.
+/// As in Rust's notation, which is read back exactly.
 fn number<S: Serializer>(value: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
     match value {
         // Adding zero turns -0 into 0.

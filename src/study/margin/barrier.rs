@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{Entrance, Stable};
+use super::{Stable, StartPoint};
 use crate::branch::{Equations, Family, Point, between, on_finer, prolong_field};
 use crate::leaf::{Field, Grid, State};
 use crate::relax::fall::settle_from;
@@ -10,87 +10,79 @@ use crate::relax::prolong::prolong;
 use crate::relax::richardson::Richardson;
 use crate::relax::{Barrier, Neighbour, Saddle};
 
-/// Modes of the leaf along which saddles are looked for, to both sides.
+/// Number of modes along which saddles are sought, in both directions.
 const MODES: usize = 3;
 pub(super) const MODE_CLIMBS: usize = 2 * MODES;
 
-/// Grids over which the energy of a pass is extrapolated at most, nodes of the finest,
-/// and the relative error at which it is known well enough.
+/// Largest number of grids for the extrapolated energy of a pass, nodes of the finest,
+/// and the relative error at which it is accurate enough.
 const GRIDS: usize = 7;
 const MOST_NODES: usize = 20_000;
 const ENOUGH: f64 = 1e-7;
 
-/// The leaf comes back to where it was within this distance, in lengths and as a part of
-/// the way to the pass.
+/// The leaf has returned to its equilibrium within this distance, in lengths and as a part of
+/// the distance to the pass.
 const SAME: f64 = 1e-3;
 const SAME_PART: f64 = 0.1;
 
-/// Near a fold a coarse grid may have no pass, or another one: so often it is looked for on
-/// a grid with all segments halved, of so many nodes at most.
+/// Near a fold a coarse grid may have no pass, or another one: so often the grid is refined
+/// for the search, up to so many nodes.
 const HALVINGS: usize = 3;
 const FEW_NODES: usize = 800;
 
-/// Passes whose heights differ by less than this part are tried once.
+/// Passes whose heights differ by less than this, relatively, are examined once.
 const SAME_HEIGHT: f64 = 1e-6;
 
-/// Rounding of the difference of two energies, relative to these: of a column 0.5 % beyond
+/// Rounding error of the difference of two energies, relative to these: for a column 0.5 % beyond
 /// its Euler load it was 3.1e-13.
 const ROUNDING: f64 = 5e-13;
 
-/// A saddle on the grid on which it was found, with the leaf there.
+/// A saddle on the grid on which it was found, with the stable leaf there.
 struct Pass {
     grid: Grid,
     saddle: Point,
     leaf: Point,
-    /// Energy of the saddle above the leaf's, without units.
+    /// Energy of the saddle above the leaf's, dimensionless.
     height: f64,
 }
 
-/// The lowest pass that is found from these entrances and along the softest modes; also
-/// from how many places it was looked for.
+/// The lowest pass found from these start points and along the softest modes; also
+/// the number of start points.
 pub(super) fn barrier(
     stable: &Stable,
-    mut entrances: Vec<Entrance>,
+    mut starts: Vec<StartPoint>,
     weight: f64,
 ) -> (Option<Barrier>, usize) {
     let make = |_: f64| Ok(stable.scenario.clone());
     let Ok(family) = Family::new(&make, (0.0, 1.0), false) else {
         return (None, 0);
     };
-    entrances.extend(along_modes(stable, &family).unwrap_or_default());
+    starts.extend(along_modes(stable, &family).unwrap_or_default());
     let all = &stable.searches.all;
     let counted = all.load(std::sync::atomic::Ordering::Relaxed);
     let pushes = counted.saturating_sub(MODE_CLIMBS);
-    all.store(
-        pushes + entrances.len(),
-        std::sync::atomic::Ordering::Relaxed,
-    );
-    let looked = entrances.len();
+    all.store(pushes + starts.len(), std::sync::atomic::Ordering::Relaxed);
+    let count = starts.len();
     for _ in 0..HALVINGS {
-        let found = lowest(stable, &family, &entrances, weight);
+        let found = lowest(stable, &family, &starts, weight);
         if found.is_some() || stable.limit.reached() {
-            return (found, looked);
+            return (found, count);
         }
-        let finer: Option<_> = entrances.iter().map(|it| on_halved(&family, it)).collect();
+        let finer: Option<_> = starts.iter().map(|it| on_refined(&family, it)).collect();
         match finer {
-            Some(finer) => entrances = finer,
-            None => return (None, looked),
+            Some(finer) => starts = finer,
+            None => return (None, count),
         }
-        all.fetch_add(looked, std::sync::atomic::Ordering::Relaxed);
+        all.fetch_add(count, std::sync::atomic::Ordering::Relaxed);
     }
-    (lowest(stable, &family, &entrances, weight), looked)
+    (lowest(stable, &family, &starts, weight), count)
 }
 
-/// The lowest pass that is found from these entrances on their grids.
-fn lowest(
-    stable: &Stable,
-    family: &Family,
-    entrances: &[Entrance],
-    weight: f64,
-) -> Option<Barrier> {
-    let mut passes: Vec<Pass> = (entrances.par_iter())
-        .filter_map(|entrance| {
-            let pass = climb(stable, family, entrance);
+/// The lowest pass found from these start points on their grids.
+fn lowest(stable: &Stable, family: &Family, starts: &[StartPoint], weight: f64) -> Option<Barrier> {
+    let mut passes: Vec<Pass> = (starts.par_iter())
+        .filter_map(|start| {
+            let pass = climb(stable, family, start);
             stable.searches.finish_one();
             pass
         })
@@ -98,32 +90,32 @@ fn lowest(
     passes.sort_by(|a, b| a.height.total_cmp(&b.height));
     passes.dedup_by(|a, b| (a.height - b.height).abs() < SAME_HEIGHT * b.height);
     let (pass, neighbour) = passes.iter().find_map(|pass| {
-        let neighbour = behind(stable, family, pass)?;
+        let neighbour = beyond(stable, family, pass)?;
         Some((pass, neighbour))
     })?;
     in_units(stable, family, pass, &neighbour, weight)
 }
 
-/// The same entrance on the grid with all segments halved; none if that has too many nodes.
-fn on_halved(family: &Family, entrance: &Entrance) -> Option<Entrance> {
-    let mut equations = Equations::new(family, entrance.grid.clone()).ok()?;
+/// The same start point on the grid with all segments halved; none if it has too many nodes.
+fn on_refined(family: &Family, start: &StartPoint) -> Option<StartPoint> {
+    let mut equations = Equations::new(family, start.grid.clone()).ok()?;
     let leaf = equations.leaves.at(0.0).ok()?;
-    (2 * leaf.rods() * leaf.segments() <= FEW_NODES).then(|| Entrance {
-        grid: entrance.grid.refined(),
-        state: prolong(leaf, &entrance.state),
-        way: prolong_field(&entrance.way),
+    (2 * leaf.rods() * leaf.segments() <= FEW_NODES).then(|| StartPoint {
+        grid: start.grid.refined(),
+        state: prolong(leaf, &start.state),
+        direction: prolong_field(&start.direction),
     })
 }
 
-/// Both ways along the softest modes of the leaf.
-fn along_modes(stable: &Stable, family: &Family) -> Option<Vec<Entrance>> {
+/// Both directions along the softest modes of the leaf.
+fn along_modes(stable: &Stable, family: &Family) -> Option<Vec<StartPoint>> {
     let mut equations = Equations::new(family, stable.grid.clone()).ok()?;
     let (point, _) = equations.correct(&stable.state, 0.0, None).ok()?;
     let modes = equations.soft_modes(&point, MODES).ok()?;
-    let entrance = |mode: &Field, sign: f64| Entrance {
+    let start = |mode: &Field, sign: f64| StartPoint {
         grid: stable.grid.clone(),
         state: point.state.clone(),
-        way: (mode.iter())
+        direction: (mode.iter())
             .map(|rod| {
                 rod.iter()
                     .map(|node| node.map(|part| sign * part))
@@ -131,41 +123,41 @@ fn along_modes(stable: &Stable, family: &Family) -> Option<Vec<Entrance>> {
             })
             .collect(),
     };
-    let both = |mode: &Field| [1.0, -1.0].map(|sign| entrance(mode, sign));
+    let both = |mode: &Field| [1.0, -1.0].map(|sign| start(mode, sign));
     Some(modes.iter().flat_map(both).collect())
 }
 
-/// Climbs to a saddle, and finds the leaf on the same grid.
-fn climb(stable: &Stable, family: &Family, entrance: &Entrance) -> Option<Pass> {
-    let mut equations = Equations::new(family, entrance.grid.clone()).ok()?;
+/// Climbs to a saddle, and finds the stable leaf on the same grid.
+fn climb(stable: &Stable, family: &Family, start: &StartPoint) -> Option<Pass> {
+    let mut equations = Equations::new(family, start.grid.clone()).ok()?;
     let stop = || stable.limit.reached();
-    let saddle = equations.climb(&entrance.state, 0.0, &entrance.way, &stop)?;
+    let saddle = equations.climb(&start.state, 0.0, &start.direction, &stop)?;
     let mut own = Equations::new(family, stable.grid.clone()).ok()?;
     let (mut leaf, _) = own.correct(&stable.state, 0.0, None).ok()?;
-    while own.grid().segments() < entrance.grid.segments() {
+    while own.grid().segments() < start.grid.segments() {
         (own, leaf) = on_finer(&mut own, &leaf).ok()?;
     }
     let discrete = equations.leaves.at(0.0).ok()?;
     let height = discrete.energy(&saddle.state) - discrete.energy(&leaf.state);
     (height > 0.0).then(|| Pass {
-        grid: entrance.grid.clone(),
+        grid: start.grid.clone(),
         saddle,
         leaf,
         height,
     })
 }
 
-/// The equilibrium behind a pass, if the leaf is the one before it.
-fn behind(stable: &Stable, family: &Family, pass: &Pass) -> Option<State> {
-    let way = pass.saddle.state.shift_to(&pass.leaf.state);
-    let same = |state: &State| state.shift_to(&pass.leaf.state) < SAME.min(SAME_PART * way);
+/// The equilibrium beyond a pass, if the one on this side is the leaf.
+fn beyond(stable: &Stable, family: &Family, pass: &Pass) -> Option<State> {
+    let distance = pass.saddle.state.shift_to(&pass.leaf.state);
+    let same = |state: &State| state.shift_to(&pass.leaf.state) < SAME.min(SAME_PART * distance);
     let mut equations = Equations::new(family, pass.grid.clone()).ok()?;
     let towards = between(&pass.saddle.state, &pass.leaf.state);
     let stop = || stable.limit.reached();
     let both = equations.fall(&pass.saddle, &towards, &stop).ok()?;
     let rest = |fallen: Result<Point, State>| match fallen {
         Ok(point) => Some(point.state),
-        // It may have to turn out of the way.
+        // Not reached by the descent: relax from its last state.
         Err(state) => settle_from(family.first(), &pass.grid, state, stable.limit),
     };
     let both = both.map(rest);
@@ -176,7 +168,7 @@ fn behind(stable: &Stable, family: &Family, pass: &Pass) -> Option<State> {
     }
 }
 
-/// A pass in the scenario's units, its energy without the error of its grid.
+/// A pass in the scenario's units, its energy extrapolated over grids.
 fn in_units(
     stable: &Stable,
     family: &Family,
@@ -204,7 +196,7 @@ fn in_units(
             .collect();
         let [(finer, saddle), (_, neighbour), (_, leaf)] = <[_; 3]>::try_from(finer.ok()?).ok()?;
         (equations, three) = (finer, [saddle, neighbour, leaf]);
-        // Or a finer grid has no such pass.
+        // Otherwise a finer grid has no such pass.
         if three.each_ref().map(|point| point.index) != [1, 0, 0] {
             return None;
         }
@@ -233,8 +225,8 @@ fn in_units(
     })
 }
 
-/// Energies of a saddle and of the equilibrium behind it above that of the leaf, by this
-/// `unit`, so that what is judged is relative; each as a point on a line.
+/// Energies of a saddle and of the equilibrium beyond it above that of the leaf, divided by
+/// `unit`, so that tolerances are relative.
 fn heights(equations: &mut Equations, three: &[Point; 3], unit: f64) -> Option<Vec<f64>> {
     let leaf = equations.leaves.at(0.0).ok()?;
     let [saddle, neighbour, own] = [0, 1, 2].map(|k| leaf.energy(&three[k].state));

@@ -20,21 +20,21 @@ use crate::relax::{
 };
 use crate::scenario::Scenario;
 
-/// The largest push: the loads under which the veins buckle as columns that are pinned at
-/// both ends (Euler), so many A/L^2, and so many weights; but no more than this part of
+/// The largest push: this many A/L^2, the load under which the veins buckle as columns pinned at
+/// both ends (Euler), and so many weights; but no more than this part of
 /// their axial stiffness.
 const STIFF: f64 = PI * PI;
 const WEIGHTS: f64 = 10.0;
 const AXIAL: f64 = 0.2;
 
-/// Points on the way need no more accuracy (of the tips, relative to the leaf): a
+/// Accuracy of points on the branch (of the tips, relative to the leaf); a
 /// critical one has its own error.
 const ACCURACY: f64 = 1e-4;
 
-/// A margin that cannot be found.
+/// Why a margin cannot be found.
 #[derive(Debug, thiserror::Error)]
 pub enum MarginError {
-    /// A relaxation that cannot be.
+    /// A relaxation that cannot be run.
     #[error(transparent)]
     Relax(#[from] RelaxError),
     /// Shooting has no grids on which branches are followed.
@@ -45,33 +45,32 @@ pub enum MarginError {
     Moment,
 }
 
-/// How far a margin has come.
+/// Progress of the computation of a margin.
 #[derive(Clone, Copy, Debug)]
 pub enum MarginProgress {
     /// The leaf comes to rest.
     Relaxing(Progress),
-    /// So many searches of so many are done; one of them pushes in a direction with
-    /// a force.
+    /// Number of searches done and in all; and the direction and force of one that is running.
     Searching {
         /// Searches done.
         done: usize,
-        /// All of them.
+        /// Number of all searches.
         all: usize,
-        /// What one of them is at.
+        /// Direction and force of a running one.
         push: Option<(Direction, f64)>,
     },
 }
 
-/// Largest difference of the softest eigenvalue on two grids in a row, as a part of it.
+/// Largest relative difference of the softest eigenvalue between two successive grids.
 const ALIKE: f64 = 0.25;
 
-/// Nodes of the finest grid on which that is sought.
+/// Nodes of the finest grid in that search.
 const MOST_NODES: usize = 5_000;
 
-/// Why there is no margin of a leaf without such a grid.
+/// Why there is no margin if no grid satisfies it.
 const UNDECIDED: &str = "its softest eigenvalue cannot be told from zero on any grid tried";
 
-/// Brings a leaf to rest and finds how far it is from losing its stability, as
+/// Relaxes a leaf and finds how far it is from losing its stability, as
 /// [`Equilibrium::margin`].
 ///
 /// # Errors
@@ -100,20 +99,19 @@ pub fn relax_with_margin(
     Ok(leaf)
 }
 
-/// A stable leaf on the grid on which it is pushed, and how.
+/// A stable leaf on the grid on which it is pushed, with the options.
 struct Stable<'a> {
     scenario: &'a Scenario,
     rest: &'a Equilibrium,
     grid: Grid,
     state: State,
     accuracy: f64,
-    /// The largest push.
     largest: f64,
     limit: &'a Limit,
     searches: Searches<'a>,
 }
 
-/// Counts searches, and tells of them.
+/// Counts searches and reports their progress.
 struct Searches<'a> {
     done: AtomicUsize,
     all: AtomicUsize,
@@ -121,8 +119,8 @@ struct Searches<'a> {
 }
 
 impl Searches<'_> {
-    fn tell(&self, push: Option<(Direction, f64)>) {
-        // Whoever finds another one telling has nothing to say.
+    fn report(&self, push: Option<(Direction, f64)>) {
+        // If another thread is reporting, this report is skipped.
         if let Ok(mut progress) = self.progress.try_lock() {
             progress(&MarginProgress::Searching {
                 done: self.done.load(Ordering::Relaxed),
@@ -134,15 +132,15 @@ impl Searches<'_> {
 
     fn finish_one(&self) {
         self.done.fetch_add(1, Ordering::Relaxed);
-        self.tell(None);
+        self.report(None);
     }
 }
 
-/// A place from which a saddle is looked for: on its grid, in this direction.
-struct Entrance {
+/// A start point for a saddle search, on its grid, with a direction.
+struct StartPoint {
     grid: Grid,
     state: State,
-    way: Field,
+    direction: Field,
 }
 
 fn margin(
@@ -153,7 +151,7 @@ fn margin(
     progress: &mut (dyn FnMut(&MarginProgress) + Send),
 ) -> Result<Margin, MarginError> {
     let clock = Instant::now();
-    let (grid, state) = match walking_grid(scenario, levels) {
+    let (grid, state) = match continuation_grid(scenario, levels) {
         Ok(found) => found,
         Err(why) => return Ok(Margin::none(why)),
     };
@@ -184,9 +182,9 @@ fn margin(
             pushed
         })
         .collect();
-    let (mut pushes, mut entrances) = (Vec::new(), Vec::new());
+    let (mut pushes, mut starts) = (Vec::new(), Vec::new());
     for (push, found) in pushed {
-        entrances.extend(found);
+        starts.extend(found);
         pushes.push(push);
     }
     add_mirrored(&mut pushes, rods);
@@ -194,7 +192,7 @@ fn margin(
         let [a, b] = [a, b].map(|push| push.force.unwrap_or(f64::INFINITY));
         a.total_cmp(&b)
     });
-    let (barrier, climbs) = barrier::barrier(&stable, entrances, weight);
+    let (barrier, climbs) = barrier::barrier(&stable, starts, weight);
     let held = scenario.held_tip.is_some();
     let remark = match options.limit.reached() {
         true => Some("the time allowed was over before all was tried".into()),
@@ -213,9 +211,9 @@ fn margin(
     })
 }
 
-/// The leaf on the coarsest grid that has its softest eigenvalue as the next finer one has:
-/// next to a bifurcation a coarse grid has another one. Or why there is none.
-fn walking_grid(scenario: &Scenario, levels: &[Level]) -> Result<(Grid, State), &'static str> {
+/// The leaf on the coarsest grid on which its softest eigenvalue agrees with the next finer one:
+/// near a bifurcation that of a coarse grid differs. Or why there is none.
+fn continuation_grid(scenario: &Scenario, levels: &[Level]) -> Result<(Grid, State), &'static str> {
     let make = |_: f64| Ok(scenario.clone());
     let family = Family::new(&make, (0.0, 1.0), false).map_err(|_| UNDECIDED)?;
     let first = levels[0].leaf.segments();
@@ -251,7 +249,6 @@ fn walking_grid(scenario: &Scenario, levels: &[Level]) -> Result<(Grid, State), 
     }
 }
 
-/// Weight of a leaf.
 fn weight(scenario: &Scenario) -> f64 {
     let lengths: f64 = scenario.rods.iter().map(|rod| rod.length).sum();
     let [x, y, z] = scenario.gravity;
@@ -270,8 +267,8 @@ fn largest_push(scenario: &Scenario, weight: f64) -> f64 {
     (stiff + WEIGHTS * weight).min(AXIAL * axial * together / scenario.rods.len() as f64)
 }
 
-/// The directions to push in: none if the tip is held; of two that are mirror images, of
-/// a leaf that is one, the first.
+/// The directions of the pushes: none if the tip is held; for a mirror-symmetric leaf only the
+/// first of two that are mirror images.
 fn directions(scenario: &Scenario, rest: &Equilibrium) -> Vec<Direction> {
     if scenario.held_tip.is_some() {
         return Vec::new();
@@ -285,7 +282,7 @@ fn directions(scenario: &Scenario, rest: &Equilibrium) -> Vec<Direction> {
     Direction::all().filter(own).collect()
 }
 
-/// Adds the mirror images of pushes that were not tried the other way.
+/// Adds the mirror images of pushes whose mirror image was not computed.
 fn add_mirrored(pushes: &mut Vec<Push>, rods: usize) {
     let has = |other: Direction| pushes.iter().any(|push| push.direction == other);
     let alone = pushes.iter().filter(|push| !has(push.direction.opposite()));

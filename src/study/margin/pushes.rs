@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Entrance, Stable};
+use super::{Stable, StartPoint};
 use crate::branch::{
     Critical, End, Family, Followed, Grids, Kind, NEARLY_RIGID, Point, Refined, Stuck, Walk,
     refine_at, switch,
@@ -11,25 +11,25 @@ use crate::relax::fall::settle_from;
 use crate::relax::{Direction, Fate, Loss, Neighbour, Push};
 use crate::scenario::Scenario;
 
-/// Longest step along the branch, and most points.
+/// Longest step along the branch, and largest number of points.
 const LONGEST: f64 = 0.1;
 const MOST_POINTS: usize = 400;
 
-/// Points behind the place where stability is lost by which it is known.
-const BEHIND: usize = 2;
+/// Points after the loss of stability that are needed to confirm it.
+const CONFIRMING: usize = 2;
 
-/// Grids of a critical point: of a leaf of few nodes, and of another.
+/// Grids of a critical point: for a leaf of few nodes, and for others.
 const CRITICAL_GRIDS: [usize; 2] = [4, 3];
 const FEW_NODES: usize = 500;
 
-/// Rounding of a force, relative to itself, and of a nearly rigid leaf to all that its tip
-/// bears: in eight runs of a buckled column it was 9e-10 at most.
+/// Rounding error of a force, relative to itself, and for a nearly rigid leaf relative to the
+/// total force on its tip: in eight runs of a buckled column it was at most 9e-10.
 const ROUNDING: f64 = 1e-14;
 const OF_RIGID: f64 = 3e-9;
 
 /// Pushes a leaf in one direction until it loses its stability, or to the largest push;
-/// also from where, and in which direction, saddles may be found then.
-pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push, Vec<Entrance>) {
+/// also returns start points for saddle searches there.
+pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push, Vec<StartPoint>) {
     let make = |force: f64| -> Result<Scenario, String> {
         let mut scenario = stable.scenario.clone();
         scenario.tip_force[direction.axis] += direction.sign() * force;
@@ -73,7 +73,7 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
     };
     let force = refined.fraction * stable.largest;
     let then = fate(stable, &mut grids, critical);
-    let entrances = entrances(&mut grids, critical);
+    let starts = starts(&mut grids, critical);
     let push = Push {
         direction,
         kind: match critical.kind {
@@ -85,15 +85,15 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
         per_weight: (weight > 0.0).then(|| force / weight),
         more_than: None,
         then: Some(then),
-        neighbour: landing(stable, &mut grids, (critical, refined), &entrances),
+        neighbour: rest_after_fold(stable, &mut grids, (critical, refined), &starts),
         tips: tips(stable, refined),
         mirrored: false,
         remark: None,
     };
-    (push, entrances)
+    (push, starts)
 }
 
-/// Rounding of a critical force.
+/// Rounding error of a critical force.
 fn rounding(stable: &Stable, force: f64, weight: f64) -> f64 {
     let rods = stable.scenario.rods.iter();
     let stiffness = rods.flat_map(|rod| &rod.force_stiffness);
@@ -103,12 +103,12 @@ fn rounding(stable: &Stable, force: f64, weight: f64) -> f64 {
     ROUNDING * force + if rigid { OF_RIGID * borne } else { 0.0 }
 }
 
-/// The branch of a push, to where it is known to have lost its stability.
+/// The branch of a push, until it is known to have lost its stability.
 fn follow(stable: &Stable, direction: Direction, grids: &mut Grids) -> Result<Followed, Stuck> {
     let (mut first, _) = (grids.of(&stable.state)).correct(&stable.state, 0.0, None)?;
     first.tangent = first.tangent.towards(true);
     let enough = |points: &[Point]| {
-        let behind = points.len().checked_sub(BEHIND);
+        let behind = points.len().checked_sub(CONFIRMING);
         behind.is_some_and(|behind| points[behind].index > 0) || stable.limit.reached()
     };
     let nodes = stable.state.rods() * stable.grid.segments();
@@ -118,14 +118,14 @@ fn follow(stable: &Stable, direction: Direction, grids: &mut Grids) -> Result<Fo
         critical_grids: CRITICAL_GRIDS[usize::from(nodes > FEW_NODES)],
         enough: Some(&enough),
     };
-    let mut tell = |_, fraction: f64| {
+    let mut report = |_, fraction: f64| {
         let push = (direction, fraction * stable.largest);
-        stable.searches.tell(Some(push));
+        stable.searches.report(Some(push));
     };
-    Ok(grids.follow(first, &walk, stable.accuracy, &mut tell))
+    Ok(grids.follow(first, &walk, stable.accuracy, &mut report))
 }
 
-/// What is known of a push under which stability was not lost as far as it is known.
+/// The result of a push under which the leaf was stable as far as it was followed.
 fn not_lost(stable: &Stable, followed: &Followed, unknown: &Push) -> Push {
     let points = followed.branch.points.iter().zip(&followed.points);
     let stably = points.take_while(|(point, _)| point.index == 0);
@@ -150,7 +150,7 @@ fn not_lost(stable: &Stable, followed: &Followed, unknown: &Push) -> Push {
     }
 }
 
-/// What the leaf does at a critical point: where a stable branch crosses, it goes on
+/// What the leaf does at a critical point: if a stable branch crosses, it continues
 /// along that.
 fn fate(stable: &Stable, grids: &mut Grids, critical: &Critical) -> Fate {
     if critical.kind == Kind::Fold {
@@ -163,29 +163,29 @@ fn fate(stable: &Stable, grids: &mut Grids, critical: &Critical) -> Fate {
     }
 }
 
-/// Where the leaf comes to rest that leaves a fold onwards, under the force there.
-fn landing(
+/// The equilibrium to which the leaf falls from a fold, under the force there.
+fn rest_after_fold(
     stable: &Stable,
     grids: &mut Grids,
     (critical, fold): (&Critical, &Refined),
-    entrances: &[Entrance],
+    starts: &[StartPoint],
 ) -> Option<Neighbour> {
-    let entrance = entrances.first().filter(|_| critical.kind == Kind::Fold)?;
+    let start = starts.first().filter(|_| critical.kind == Kind::Fold)?;
     let equations = grids.of(&critical.state);
     let stop = || stable.limit.reached();
-    let fallen = equations.descend(&critical.state, critical.fraction, &entrance.way, &stop);
+    let fallen = equations.descend(&critical.state, critical.fraction, &start.direction, &stop);
     let family = equations.leaves.family;
     let state = match fallen {
         Ok(point) => point.state,
-        // It may have to turn out of the way.
+        // Not reached by the descent: relax from its last state.
         Err(state) => {
             let leaf = family.leaf(fold.fraction).ok()?;
-            settle_from(&leaf, &entrance.grid, state, stable.limit)?
+            settle_from(&leaf, &start.grid, state, stable.limit)?
         }
     };
     let point = equations.correct(&state, fold.fraction, None);
     let (point, _) = point.ok().filter(|(point, _)| point.index == 0)?;
-    let rest = refine_at(family, &entrance.grid, &point, stable.accuracy).ok()?;
+    let rest = refine_at(family, &start.grid, &point, stable.accuracy).ok()?;
     let scale = family.scale();
     Some(Neighbour {
         energy: rest.energy * scale.moment(),
@@ -193,29 +193,29 @@ fn landing(
     })
 }
 
-/// Saddles may be found from a critical point along its neutral modes: at a fold
-/// onwards, at a branch point to both sides.
-fn entrances(grids: &mut Grids, critical: &Critical) -> Vec<Entrance> {
+/// Start points for saddles at a critical point, along its neutral modes: at a fold
+/// onwards, at a branch point on both sides.
+fn starts(grids: &mut Grids, critical: &Critical) -> Vec<StartPoint> {
     let equations = grids.of(&critical.state);
     let along = |mode| equations.product(mode, &critical.tangent.increments);
     let mut signs = vec![1.0, -1.0];
     if critical.kind == Kind::Fold {
         signs = vec![along(&critical.modes[0]).signum()];
     }
-    let way = |sign: f64| {
+    let direction = |sign: f64| {
         let of = |node: &[f64; 6]| node.map(|part| sign * part);
         let rods = critical.modes[0].iter();
         rods.map(|rod| rod.iter().map(of).collect()).collect()
     };
-    let entrance = |sign| Entrance {
+    let start = |sign| StartPoint {
         grid: equations.grid().clone(),
         state: critical.state.clone(),
-        way: way(sign),
+        direction: direction(sign),
     };
-    signs.into_iter().map(entrance).collect()
+    signs.into_iter().map(start).collect()
 }
 
-/// Tips in the scenario's units: the joint one alone, or each.
+/// Tips in the scenario's units: the shared one alone, or each.
 fn tips(stable: &Stable, refined: &Refined) -> Vec<DVec3> {
     let length = stable.scenario.scale().length;
     let count = if stable.scenario.joined {

@@ -3,31 +3,31 @@
 use glam::DVec3;
 use serde::{Serialize, Serializer};
 
-/// Smaller displacements are rounding, in lengths.
+/// Smaller displacements, in lengths, are due to rounding.
 const ROUNDING: f64 = 1e-11;
 
-/// The straight line through the forces on a tip against its displacements
+/// The straight line fitted to the forces on a tip as a function of its displacements
 /// along them: Hooke's law, and how well it holds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Law {
     /// Axis of the force: 0, 1, 2 for x, y, z.
     #[serde(serialize_with = "serialize_axis")]
     pub axis: usize,
-    /// Stiffness: slope of the line of least squares, force per length.
+    /// Stiffness: slope of the least-squares line, force per length.
     pub slope: f64,
-    /// Coefficient of determination of that line: 1 for a straight one.
+    /// Coefficient of determination of that line: 1 for an exact one.
     pub r_squared: f64,
     /// The largest deviation from the line, as a part of the range of the forces.
     pub deviation: f64,
-    /// Distance of base and tip where the range begins.
+    /// Distance of base and tip at the start of the range.
     pub length: f64,
     /// slope * length / cross-section, if one is given.
     pub young: Option<f64>,
 }
 
 impl Law {
-    /// Of forces along an axis and the tips under them; `None` with fewer than
-    /// three, or if the tip does not move by more than rounding.
+    /// From forces along an axis and the tips under them; `None` with fewer than
+    /// three, or if the tip moves by no more than rounding.
     pub(super) fn of(
         axis: usize,
         points: &[(f64, DVec3)],

@@ -1,4 +1,4 @@
-//! `trace`: an equilibrium followed through one number of its scenario.
+//! `trace`: an equilibrium followed through a parameter of its scenario.
 
 mod law;
 mod result;
@@ -7,45 +7,44 @@ mod run;
 pub use law::Law;
 pub use result::{PointKind, Trace, TraceBranch, TracePoint, TraceShow};
 pub use run::trace;
-pub(super) use run::trace_seen;
+pub(super) use run::trace_observed;
 
 use super::vary::{Base, Vary};
 use crate::relax::RelaxError;
 use crate::scenario::Key;
 use crate::study::{Target, VaryError};
 
-/// Most branches of a trace.
+/// Largest number of branches of a trace.
 pub const MOST_BRANCHES: usize = 24;
 
-/// Most points of a branch unless told otherwise.
+/// Default for the largest number of points of a branch.
 pub const MOST_POINTS: usize = 2000;
 
-/// What is asked of a trace.
+/// A request for a trace.
 #[derive(Clone, Debug)]
 pub struct TraceRequest {
     /// The scenario.
     pub base: Base,
-    /// The number that varies, and over which range; as many steps as it has
-    /// values would follow a leaf that does not change.
+    /// The number that varies, with its range; a leaf that does not change would be followed
+    /// in as many steps as it has values.
     pub vary: Vary,
-    /// Follow the branches that cross, too.
+    /// Whether to follow crossing branches as well.
     pub switch: bool,
-    /// Go by Newton's method to the first equilibrium, stable or not.
+    /// Whether to take the first equilibrium from Newton's method, stable or not.
     pub keep_unstable: bool,
-    /// The grid on which the branch is followed; left out: twice as fine as the
+    /// The grid on which the branch is followed; default: twice as fine as the
     /// coarsest on which the first equilibrium was found.
     pub segments: Option<usize>,
-    /// Wanted accuracy of the tips, relative to the longest rod; left out: the
-    /// scenario's.
+    /// Required accuracy of the tips, relative to the longest rod; default: the scenario's.
     pub tolerance: Option<f64>,
-    /// Most points of a branch.
+    /// Largest number of points of a branch.
     pub most_points: usize,
     /// Area of the leaf's cross-section, in the scenario's units, for an
     /// effective Young's modulus.
     pub cross_section: Option<f64>,
 }
 
-/// A trace that cannot be made.
+/// Why a trace cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
     /// The number cannot be followed.
@@ -54,16 +53,16 @@ pub enum TraceError {
     /// An option has a value it cannot have.
     #[error("{0}")]
     Option(String),
-    /// The scenario at the start of the range is refused.
+    /// The scenario at the start of the range is invalid.
     #[error(transparent)]
     Scenario(#[from] VaryError),
-    /// The first equilibrium is asked for in a way that cannot be met.
+    /// The request for the first equilibrium cannot be met.
     #[error(transparent)]
     Relax(#[from] RelaxError),
 }
 
 impl TraceRequest {
-    /// Whether it can be met, as far as can be told before.
+    /// Validates the request before it is run.
     pub(super) fn check(&self) -> Result<(), TraceError> {
         let keys = &self.vary.keys;
         let refuse = |why: &str| TraceError::Vary(format!("{keys}: {why}"));

@@ -1,4 +1,4 @@
-//! What a trace found.
+//! The result of a trace.
 
 use glam::DVec3;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
@@ -11,8 +11,7 @@ use crate::study::Keys;
 use crate::study::words::words;
 use crate::undulation::Undulation;
 
-/// An equilibrium followed through a number of its scenario. As JSON it is
-/// `trace.json`.
+/// An equilibrium followed through a number of its scenario. As JSON it is `trace.json`.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Trace {
     /// Name of the scenario.
@@ -22,10 +21,10 @@ pub struct Trace {
     pub keys: Keys,
     /// Its values at the ends of the range.
     pub range: [f64; 2],
-    /// Whether its logarithm varies evenly.
+    /// Whether its logarithm is spaced evenly.
     #[serde(skip)]
     pub log: bool,
-    /// What the figure shows, a panel each; none: the coordinate of the tip that varies most.
+    /// What the figure shows, one panel each; if empty, the coordinate of the tip that varies most.
     #[serde(skip)]
     pub show: Vec<TraceShow>,
     /// Names of the units, if the scenario gives any.
@@ -39,37 +38,36 @@ pub struct Trace {
     /// Whether the tips are held.
     #[serde(skip)]
     pub held: bool,
-    /// Segments a rod of the finest grid on which branches were followed.
+    /// Segments per rod of the finest grid on which branches were followed.
     pub segments: usize,
-    /// Wanted accuracy of the tips, relative to the longest rod.
+    /// Required accuracy of the tips, relative to the longest rod.
     pub tolerance: f64,
-    /// Whether there are branches, and all are known as far as was asked.
+    /// Whether there are branches, and all are known as far as requested.
     pub complete: bool,
     /// Why there is no branch, or fewer than there are.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,
     /// The branches: first that of the first equilibrium.
     pub branches: Vec<TraceBranch>,
-    /// Force against displacement, if it is a tip force that varied, or the place where
-    /// tips are held.
+    /// Force against displacement, if what varied is a tip force or the position of held tips.
     pub law: Option<Law>,
-    /// Matrices factorised while following.
+    /// Number of matrices factorised by the continuation.
     pub factorizations: usize,
-    /// Time of all, in seconds.
+    /// Total time, in seconds.
     pub wall_seconds: f64,
 }
 
 /// One branch.
 #[derive(Clone, Debug)]
 pub struct TraceBranch {
-    /// Indices of the branch and of its point from which it was entered; none of
+    /// Indices of the branch and of its point at which this one was entered; none for
     /// the first.
     pub from: Option<[usize; 2]>,
     /// Its points in order, critical ones among them.
     pub points: Vec<TracePoint>,
     /// How it ended.
     pub end: End,
-    /// Why, in a sentence, if that is not plain.
+    /// A sentence with the reason, if necessary.
     pub remark: Option<String>,
 }
 
@@ -78,24 +76,24 @@ pub struct TraceBranch {
 pub struct TracePoint {
     /// Its number on the branch, from 1.
     pub point: usize,
-    /// What it is.
+    /// Its kind.
     pub kind: PointKind,
     /// The number that varies.
     pub value: f64,
-    /// Bound on its error, where it is found and not chosen.
+    /// Bound on its error, if it is computed and not prescribed.
     pub value_error: Option<f64>,
-    /// The joint tip alone, or every tip.
+    /// The shared tip alone, or every tip.
     #[serde(flatten, serialize_with = "serialize_tips")]
     pub tips: Vec<DVec3>,
-    /// The force that the holder of held tips feels.
+    /// The reaction at held tips.
     #[serde(rename = "tip_reaction", skip_serializing_if = "Option::is_none")]
     pub reaction: Option<DVec3>,
-    /// Bound on the error of the tips, of held ones on that of the middles of the rods:
+    /// Bound on the error of the tips, or, if they are held, of the midpoints of the rods:
     /// within the tolerance.
     pub error: Option<f64>,
     /// Potential energy.
     pub energy: f64,
-    /// Morse index; at a critical point that behind it.
+    /// Morse index; at a critical point the one after it.
     #[serde(flatten, serialize_with = "serialize_index")]
     pub index: usize,
     /// Waves and twist of the veins.
@@ -110,8 +108,7 @@ pub struct TracePoint {
 }
 
 impl TracePoint {
-    /// The force on the tip along an axis where it is that which varies, or where the tip
-    /// is held.
+    /// The force on the tip along an axis, if that varies or the tip is held.
     pub fn force_on_tip(&self, axis: usize) -> f64 {
         self.reaction.map_or(self.value, |reaction| -reaction[axis])
     }
@@ -120,13 +117,13 @@ impl TracePoint {
 /// What the figure of a trace shows against the number that varies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TraceShow {
-    /// A coordinate of the tip; of free ones that of the first.
+    /// A coordinate of the tip; of the first one if they are free.
     TipX,
     /// Its y.
     TipY,
     /// Its z.
     TipZ,
-    /// A component of the force that the holder of the tips feels.
+    /// A component of the reaction at held tips.
     ReactionX,
     /// Its y.
     ReactionY,
@@ -152,13 +149,13 @@ words! {
 }
 
 impl TraceShow {
-    /// Whether only tips that are held have it.
+    /// Whether it exists for held tips only.
     pub fn is_reaction(self) -> bool {
         use TraceShow::{ReactionX, ReactionY, ReactionZ};
         matches!(self, ReactionX | ReactionY | ReactionZ)
     }
 
-    /// Of a point.
+    /// Its value at a point.
     pub fn of(self, point: &TracePoint) -> f64 {
         let tip = |axis: usize| point.tips.first().map_or(f64::NAN, |tip| tip[axis]);
         let reaction = |axis: usize| point.reaction.map_or(f64::NAN, |force| force[axis]);
@@ -175,14 +172,14 @@ impl TraceShow {
     }
 }
 
-/// What a point is.
+/// Kind of a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PointKind {
-    /// One of many.
+    /// A regular point.
     Regular,
-    /// The branch turns round here.
+    /// The branch turns back here.
     Fold,
-    /// Other branches cross here; in so many independent directions.
+    /// Other branches cross here, in so many independent directions.
     Branching(usize),
 }
 
@@ -218,12 +215,12 @@ impl End {
         }
     }
 
-    /// Whether the branch is known as far as was asked.
+    /// Whether the branch is known as far as requested.
     pub fn complete(&self) -> bool {
         matches!(self, End::Reached | End::Returned | End::Closed)
     }
 
-    /// What stopped a branch that is not, and what may help.
+    /// Why an incomplete branch stopped, and what may help.
     pub(super) fn remark(&self) -> Option<String> {
         match self {
             End::Reached | End::Returned | End::Closed => None,
@@ -245,7 +242,7 @@ impl TraceBranch {
     }
 }
 
-/// With its first, its last and its critical points for all of them.
+/// Also with the numbers of its first, last and critical points.
 impl Serialize for TraceBranch {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let critical: Vec<&TracePoint> = self.critical().map(|(_, point)| point).collect();

@@ -1,4 +1,4 @@
-//! Making a trace.
+//! Computation of a trace.
 
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -14,32 +14,32 @@ use crate::study::Target;
 use crate::undulation::Undulation;
 use glam::DVec3;
 
-/// Longest step along a branch where few values are asked for.
+/// Longest step along a branch if few values are asked for.
 const LONGEST: f64 = 0.1;
 
-/// Points in the same place: fractions of the range, and lengths.
+/// Points closer than this (fractions of the range, lengths) are the same.
 const SAME: f64 = 1e-5;
 
-/// Follows the equilibrium of a scenario through a number of it. `progress` is
-/// told of each point: the branch, how many points there are, and the value.
+/// Follows the equilibrium of a scenario through one of its numbers. `progress` is
+/// called for each point: with the branch, the number of points, and the value.
 ///
 /// # Errors
-/// Requests that cannot be met; all that happens on the way is in the result.
+/// Requests that cannot be met; failures during the run are part of the result.
 pub fn trace(
     request: &TraceRequest,
     progress: &mut dyn FnMut(usize, usize, f64),
 ) -> Result<Trace, TraceError> {
-    trace_seen(request, progress, &mut |_| {})
+    trace_observed(request, progress, &mut |_| {})
 }
 
-/// The same; `seen` is shown every branch as it was followed.
+/// The same; `observe` is called with each branch as it was followed.
 ///
 /// # Errors
 /// As above.
-pub fn trace_seen(
+pub fn trace_observed(
     request: &TraceRequest,
     progress: &mut dyn FnMut(usize, usize, f64),
-    seen: &mut dyn FnMut(&Followed),
+    observe: &mut dyn FnMut(&Followed),
 ) -> Result<Trace, TraceError> {
     request.check()?;
     let clock = Instant::now();
@@ -100,7 +100,7 @@ pub fn trace_seen(
                 tolerance,
                 crossings: Vec::new(),
                 progress,
-                seen,
+                observe,
             };
             run.follow_all(first, &mut trace);
         }
@@ -117,7 +117,7 @@ pub fn trace_seen(
     Ok(trace)
 }
 
-/// Segments of the grid that is wanted, as many as the leaf needs, if memory allows.
+/// Segments of the requested grid, or as many as the leaf needs, if memory allows.
 fn check_grid(family: &Family, wanted: Option<usize>, least: usize) -> Result<usize, RelaxError> {
     let segments = check_segments(family.first(), wanted, least)?;
     let rods = family.first().rods();
@@ -125,8 +125,8 @@ fn check_grid(family: &Family, wanted: Option<usize>, least: usize) -> Result<us
     Ok(segments)
 }
 
-/// Force against displacement, if it is one component of the force on the joint
-/// tip that varies, or of the place where it is held.
+/// Force against displacement, if what varies is one component of the force on the shared
+/// tip, or of the position at which it is held.
 fn law(request: &TraceRequest, branch: &TraceBranch) -> Option<Law> {
     let [
         Target::Entry(Part {
@@ -147,21 +147,21 @@ fn law(request: &TraceRequest, branch: &TraceBranch) -> Option<Law> {
     Law::of(*axis, &points?, request.cross_section)
 }
 
-/// What all branches have in common.
+/// Data common to all branches.
 struct Run<'r, 'p> {
     family: &'r Family<'r>,
     request: &'r TraceRequest,
-    /// On which branches are followed.
+    /// The grids on which branches are followed.
     grids: Grids<'r>,
     tolerance: f64,
-    /// Points where branches cross, found so far.
+    /// Branch points found so far.
     crossings: Vec<Refined>,
     progress: &'p mut dyn FnMut(usize, usize, f64),
-    seen: &'p mut dyn FnMut(&Followed),
+    observe: &'p mut dyn FnMut(&Followed),
 }
 
 impl Run<'_, '_> {
-    /// Follows the branch of the first point and, if that is asked for, those that
+    /// Follows the branch of the first point and, if requested, those that
     /// cross it, breadth first.
     fn follow_all(&mut self, mut first: Point, trace: &mut Trace) {
         trace.segments = first.state.segments();
@@ -177,13 +177,13 @@ impl Run<'_, '_> {
                 break;
             }
             let (family, progress) = (self.family, &mut *self.progress);
-            let mut tell = |points, at| progress(number, points, family.value(at));
-            let followed = (self.grids).follow(first, &how, self.tolerance, &mut tell);
+            let mut report = |points, at| progress(number, points, family.value(at));
+            let followed = (self.grids).follow(first, &how, self.tolerance, &mut report);
             let last = followed.branch.points.last();
             let segments = last.map_or(0, |point| point.state.segments());
             trace.segments = trace.segments.max(segments);
             trace.branches.push(self.in_units(&followed, from));
-            (self.seen)(&followed);
+            (self.observe)(&followed);
             if self.request.switch {
                 self.enter_crossing(&followed, number, &mut entrances);
             }
@@ -191,8 +191,8 @@ impl Run<'_, '_> {
         trace.factorizations = self.grids.factorizations();
     }
 
-    /// Adds first points of the branches that cross, each with the indices of the
-    /// branch and the point it was entered from, where that is new.
+    /// Adds the first points of crossing branches, each with the indices of the
+    /// branch and the point at which it was entered, if that is new.
     fn enter_crossing(
         &mut self,
         followed: &Followed,
@@ -206,8 +206,8 @@ impl Run<'_, '_> {
                 continue;
             }
             self.crossings.push(refined.clone());
-            // Where several modes become neutral at once for reasons of symmetry,
-            // branches of any mixture of them are the same, turned.
+            // If several modes become neutral at once due to symmetry, the branches
+            // of all their combinations are rotated copies of each other.
             let new = switch(self.grids.of(&critical.state), critical, 0, self.tolerance);
             let new = new.into_iter();
             let from = Some([number, after + 1 + which]);
@@ -241,7 +241,7 @@ impl Run<'_, '_> {
         }
     }
 
-    /// Waves and twist of a point's leaf, by its finest grid.
+    /// Waves and twist of the leaf at a point, on its finest grid.
     fn undulation(&self, refined: &Refined) -> Option<Undulation> {
         let scenario = self.family.scenario(refined.fraction).ok()?;
         let rods = refined.shapes(self.family).ok()?;

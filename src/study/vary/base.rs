@@ -1,11 +1,11 @@
-//! The scenario into which varying numbers are put.
+//! The scenario into which varying numbers are substituted.
 
 use std::path::Path;
 
 use super::{Keys, Knob, Knobs, Target, VaryError};
 use crate::scenario::{self, Entries, Form, Key, Part, Scenario, Value, resolve, with_overrides};
 
-/// A scenario as text, with some entries replaced: what numbers are put into.
+/// A scenario as text with some entries replaced, into which numbers are substituted.
 #[derive(Clone, Debug)]
 pub struct Base {
     text: String,
@@ -13,7 +13,7 @@ pub struct Base {
     overrides: Vec<String>,
     knobs: Knobs,
     scenario: Scenario,
-    /// What text and overrides say; none where numbers are larger than values can be.
+    /// The parsed text and overrides; none if numbers are larger than values can be.
     entries: Option<Entries>,
 }
 
@@ -31,7 +31,7 @@ impl Base {
     /// (`KEY=VALUE`, as in `--set`, or `method.segments=16`).
     ///
     /// # Errors
-    /// If it is refused as it is.
+    /// If the scenario is invalid.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, VaryError> {
         Base::of_text(scenario::text(path)?, path.display().to_string(), overrides)
     }
@@ -39,7 +39,7 @@ impl Base {
     /// The same from a text; messages call it `file`.
     ///
     /// # Errors
-    /// If it is refused as it is.
+    /// If the scenario is invalid.
     pub fn of_text(text: String, file: String, overrides: &[String]) -> Result<Self, VaryError> {
         let mut knobs = Knobs::default();
         let mut of_scenario = Vec::new();
@@ -63,12 +63,12 @@ impl Base {
         })
     }
 
-    /// The scenario with nothing varied.
+    /// The scenario without variation.
     pub fn scenario(&self) -> &Scenario {
         &self.scenario
     }
 
-    /// The settings of methods with nothing varied.
+    /// The settings of methods without variation.
     pub fn knobs(&self) -> Knobs {
         self.knobs
     }
@@ -83,8 +83,7 @@ impl Base {
         &self.overrides
     }
 
-    /// The number that the scenario has there, if it has one and the same for all of the
-    /// keys.
+    /// The number that the scenario has at these keys, if it is one and the same for all of them.
     pub fn number(&self, keys: &Keys) -> Option<f64> {
         let mut numbers = keys.targets().iter().map(|target| match target {
             Target::Entry(part) => self.entries.as_ref()?.number_at(*part),
@@ -94,10 +93,10 @@ impl Base {
         numbers.all(|other| other == Some(first)).then_some(first)
     }
 
-    /// The same with a value put in for good.
+    /// The base with a value substituted permanently.
     ///
     /// # Errors
-    /// If it is refused, or has no such entry.
+    /// If the scenario is then invalid, or has no such entry.
     pub fn with(&self, keys: &Keys, value: f64) -> Result<Base, VaryError> {
         let Varied { scenario, knobs } = self.at(&[(keys, value)])?;
         let entries = keys.targets().iter().filter_map(|target| match target {
@@ -118,7 +117,7 @@ impl Base {
     /// The scenario with these values.
     ///
     /// # Errors
-    /// If it is refused, or has no such entry.
+    /// If it is invalid, or has no such entry.
     pub fn at(&self, values: &[(&Keys, f64)]) -> Result<Varied, VaryError> {
         let mut knobs = self.knobs;
         for (keys, value) in values {
@@ -132,7 +131,7 @@ impl Base {
             return Ok(Varied { scenario, knobs });
         }
         let overrides = self.overriding(values);
-        // A part that is not there is not there at any value, unless rods are added.
+        // An entry that does not exist does so at no value, unless rods are added.
         let mut targets = values.iter().flat_map(|(keys, _)| keys.targets());
         let adds = |target: &Target| matches!(target, Target::Entry(part) if part.key == Key::Rods);
         if !targets.any(adds) {
@@ -144,8 +143,8 @@ impl Base {
         })
     }
 
-    /// The scenario with these values, made of the entries without reading the text again;
-    /// none where it is refused, which the text explains.
+    /// The scenario with these values, from the entries without parsing the text again;
+    /// none if it is invalid: parsing the text gives the reason.
     pub(super) fn changed(&self, values: &[(&Keys, f64)]) -> Option<Scenario> {
         let mut entries = self.entries.clone()?;
         for (keys, value) in values {
@@ -158,7 +157,7 @@ impl Base {
         entries.scenario()
     }
 
-    /// All overrides, those that make these values among them.
+    /// All overrides, including those that set these values.
     fn overriding(&self, values: &[(&Keys, f64)]) -> Vec<String> {
         let mut overrides = self.overrides.clone();
         for (keys, value) in values {
@@ -171,11 +170,11 @@ impl Base {
         overrides
     }
 
-    /// The number that these keys have: one of which derivatives can be taken, the
-    /// same for all of them; 1 where numbers are scaled.
+    /// The number at these keys: one with respect to which derivatives exist, the
+    /// same for all of them; 1 for a scale factor.
     ///
     /// # Errors
-    /// If it is whole, a setting of a method, no number by itself, or left out.
+    /// If it is a whole number, a setting of a method, not a single number, or left out.
     pub fn value(&self, keys: &Keys) -> Result<f64, VaryError> {
         let mut found = None;
         for &target in keys.targets() {
@@ -218,7 +217,7 @@ impl Base {
         self.entries.as_ref()?.value_at(part)
     }
 
-    /// The same keys, or one of each entry if they are a list or a profile.
+    /// The same keys, or one for each entry if they are a list or a profile.
     pub(crate) fn entries_of(&self, keys: &Keys) -> Vec<Keys> {
         let [Target::Entry(part)] = keys.targets() else {
             return vec![keys.clone()];
@@ -237,7 +236,7 @@ impl Base {
     }
 }
 
-/// The setting of a method by its path, and its value.
+/// Parses the setting of a method from its path and its value.
 fn setting(path: &str, value: &str) -> Result<(Knob, f64), VaryError> {
     let Some(knob) = Knob::from_path(path) else {
         let all = Knob::ALL.map(Knob::path).join(" and ");

@@ -213,7 +213,7 @@ fn refusals_name_key_and_reason() {
     }
 }
 
-/// What the format can say, in three scenarios: no two of these tables go together.
+/// All features of the format, in three scenarios: no two of these tables can be combined.
 const SECTION: &str = r#"
 name = "section"
 leaf = { rods = 1, length = 2, fan = [0.1], joined = true }
@@ -253,8 +253,8 @@ stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 
 dynamics = { density = 1, rotary_inertia = [0.01] }
 "#;
 
-/// A number put into the entries, and the same written into the text: equal scenarios,
-/// and refused or not alike, for every key.
+/// A number substituted into the entries is equivalent to one written into the text: equal
+/// scenarios, or both invalid, for every key.
 #[test]
 fn a_number_put_into_the_entries_is_that_of_the_text() {
     let parts = [
@@ -319,7 +319,7 @@ fn a_number_put_into_the_entries_is_that_of_the_text() {
     }
 }
 
-/// Several numbers one after the other, and a base that has some already.
+/// Several numbers substituted one after the other, also into a base that has some already.
 #[test]
 fn numbers_put_into_the_entries_add_up() {
     let base = base(&["load.gravity[0]=3", "stiffness.bending_2[1]=2.5"]).unwrap();

@@ -1,29 +1,28 @@
 //! The linear equations of multiple shooting, condensed to the tip.
 //!
-//! The base leaves 6 N perturbations free. They are marched through the
-//! intervals and, before they can all grow into the few directions that grow
-//! fastest, made orthonormal again (S. K. Godunov 1961; S. D. Conte, SIAM Rev. 8,
-//! 1966). The tip's 6 N conditions decide; the way back divides by the growth.
-//! A product of all sensitivities is never formed.
+//! The base leaves 6 N perturbations free. They are propagated through the
+//! intervals and re-orthonormalised before they all grow into the few directions of
+//! fastest growth (S. K. Godunov 1961; S. D. Conte, SIAM Rev. 8,
+//! 1966). The tip's 6 N conditions determine them; back substitution divides by the growth.
+//! The product of all sensitivities is never formed.
 
 use faer::{Col, ColRef, Mat};
 
 use super::equations::{Equations, TANGENT, Tip};
 use super::intervals::Units;
 
-/// Directions of the tip's conditions whose singular value is below this part
-/// of the largest are taken as undetermined.
+/// Directions of the tip's conditions with singular values below this part
+/// of the largest count as undetermined.
 pub const SINGULAR: f64 = 1e-10;
 
 /// The condensed equations, factorised.
-pub struct March {
-    /// Sensitivities of the intervals.
+pub struct Condensed {
     maps: Vec<Mat<f64>>,
-    /// Orthonormal bases of what the base leaves free, at the inner nodes.
+    /// Orthonormal bases of the free perturbations at the inner nodes.
     bases: Vec<Mat<f64>>,
     /// Their growth: upper triangular.
     growths: Vec<Mat<f64>>,
-    /// Singular value decomposition of the tip's conditions by the last basis.
+    /// Singular value decomposition of the tip's conditions in the last basis.
     left: Mat<f64>,
     singular_values: Vec<f64>,
     right: Mat<f64>,
@@ -31,8 +30,8 @@ pub struct March {
     units: Units,
 }
 
-impl March {
-    /// Marches the sensitivities to the tip. `None` if they are not finite.
+impl Condensed {
+    /// Propagates the sensitivities to the tip. `None` if they are not finite.
     pub fn new(equations: &Equations, units: &Units, maps: Vec<Mat<f64>>) -> Option<Self> {
         let (mut bases, mut growths) = (Vec::new(), Vec::new());
         let mut reached = maps[0].clone();
@@ -52,7 +51,7 @@ impl March {
             return None;
         }
         let svd = conditions.svd().ok()?;
-        Some(March {
+        Some(Condensed {
             maps,
             bases,
             growths,
@@ -85,8 +84,8 @@ impl March {
     }
 
     /// The increments at the beginnings of all intervals that close `defects`
-    /// (end of an interval minus beginning of the next, K - 1 of them) and make
-    /// the tip's `conditions` vanish. Undetermined directions are left alone.
+    /// (end of an interval minus beginning of the next, K - 1 of them) and satisfy
+    /// the tip's `conditions`. Undetermined directions are left unchanged.
     pub fn solve(&self, defects: &[Vec<f64>], conditions: &[f64]) -> Vec<Vec<f64>> {
         let (mut offsets, mut shifts) = (Vec::new(), Vec::new());
         let mut carried: Option<Col<f64>> = None;
@@ -119,7 +118,7 @@ impl March {
         self.back(&self.right * &amounts, &offsets, &shifts)
     }
 
-    /// The direction the tip's conditions determine least, at the beginnings
+    /// The direction least determined by the tip's conditions, at the beginnings
     /// of all intervals.
     pub fn null(&self) -> Vec<Vec<f64>> {
         let none = |matrix: &Mat<f64>| Col::zeros(matrix.nrows());
@@ -129,7 +128,7 @@ impl March {
         self.back(last, &offsets, &shifts)
     }
 
-    /// From what is free at the last node back to the base.
+    /// Back substitution from the free coefficients at the last node to the base.
     fn back(&self, last: Col<f64>, offsets: &[Col<f64>], shifts: &[Col<f64>]) -> Vec<Vec<f64>> {
         let mut increments = Vec::new();
         let mut free = last;
@@ -151,7 +150,7 @@ impl March {
     }
 }
 
-/// Linearised tip conditions of a perturbation there.
+/// Linearised tip conditions of a perturbation at the tip.
 fn at_tip(tip: Tip, units: &Units, perturbation: ColRef<f64>) -> Vec<f64> {
     let rods = perturbation.nrows() / TANGENT;
     let get = |j: usize, k: usize| perturbation[TANGENT * j + k];
@@ -199,14 +198,14 @@ mod tests {
         Scenario::from_toml(&text).unwrap()
     }
 
-    fn march(joined: bool, maps: Vec<Mat<f64>>) -> Option<March> {
+    fn condensed(joined: bool, maps: Vec<Mat<f64>>) -> Option<Condensed> {
         let scenario = scenario(joined);
         let equations = Equations::new(&scenario);
         let units = Units::new(&equations, &Trajectory::straight(&equations));
-        March::new(&equations, &units, maps)
+        Condensed::new(&equations, &units, maps)
     }
 
-    /// Numbers without any pattern in -1..1.
+    /// Pseudo-random numbers in -1..1.
     fn noise() -> impl FnMut() -> f64 {
         let mut state = 1_u64;
         move || {
@@ -230,7 +229,7 @@ mod tests {
             .collect()
     }
 
-    /// Rows of the tip's conditions, as the module says they are.
+    /// Rows of the tip's conditions, according to the documentation of the module.
     fn tip_rows(joined: bool, units: &Units) -> Mat<f64> {
         let mut rows = Mat::zeros(18, 36);
         for (j, k) in (0..3).flat_map(|j| (0..3).map(move |k| (j, k))) {
@@ -250,8 +249,8 @@ mod tests {
         rows
     }
 
-    /// The whole system at once: what each interval hands on is what the next
-    /// begins with, and the tip's conditions.
+    /// The whole system at once: continuity between intervals, and the tip's
+    /// conditions.
     fn dense(maps: &[Mat<f64>], tip: &Mat<f64>, misses: &[f64]) -> Col<f64> {
         let mut matrix = Mat::zeros(misses.len(), misses.len());
         for (k, map) in maps.iter().enumerate() {
@@ -278,9 +277,9 @@ mod tests {
             let misses: Vec<f64> = (0..36 * intervals - 18).map(|_| noise()).collect();
             let (defects, conditions) = misses.split_at(36 * (intervals - 1));
             let defects: Vec<Vec<f64>> = defects.chunks(36).map(<[f64]>::to_vec).collect();
-            let march = march(joined, maps.clone()).unwrap();
-            let found = march.solve(&defects, conditions);
-            let wanted = dense(&maps, &tip_rows(joined, &march.units), &misses);
+            let condensed = condensed(joined, maps.clone()).unwrap();
+            let found = condensed.solve(&defects, conditions);
+            let wanted = dense(&maps, &tip_rows(joined, &condensed.units), &misses);
             let mut wanted = wanted.iter().copied();
             let what = format!("joined {joined}, {intervals} intervals, {growth:e}");
             for (k, found) in found.iter().enumerate() {
@@ -308,15 +307,15 @@ mod tests {
         for joined in [true, false] {
             let scenario = scenario(joined);
             let equations = Equations::new(&scenario);
-            let march = march(joined, maps(1, 1.0)).unwrap();
+            let condensed = condensed(joined, maps(1, 1.0)).unwrap();
             let mut noise = noise();
             let step: Vec<f64> = (0..36).map(|_| 0.1 * noise()).collect();
             let mut y = equations.clamped();
-            march.units.advance(&mut y, &step, 1.0);
-            let found = march.scaled(&equations.tip_conditions(&y));
+            condensed.units.advance(&mut y, &step, 1.0);
+            let found = condensed.scaled(&equations.tip_conditions(&y));
             let step = Col::from_fn(36, |i| step[i]);
-            let wanted = tip_rows(joined, &march.units) * &step;
-            let linear = at_tip(equations.tip(), &march.units, step.as_ref());
+            let wanted = tip_rows(joined, &condensed.units) * &step;
+            let linear = at_tip(equations.tip(), &condensed.units, step.as_ref());
             for (i, found) in found.iter().enumerate() {
                 assert!((found - wanted[i]).abs() < 1e-14, "condition {i}");
                 assert!((linear[i] - wanted[i]).abs() < 1e-14);
@@ -324,8 +323,8 @@ mod tests {
         }
     }
 
-    /// A direction that the last interval does not hand on to the tip is neutral.
-    /// It is found, and left alone by the solution.
+    /// A direction that the last interval maps to zero at the tip is neutral.
+    /// It is found, and left unchanged by the solution.
     #[test]
     fn what_the_tip_does_not_feel_is_found_and_left_alone() {
         let mut maps = maps(3, 10.0);
@@ -334,10 +333,14 @@ mod tests {
         let last = &maps[1] * &middle;
         let lost = &maps[2] * &last;
         maps[2] -= (1.0 / last.squared_norm_l2()) * &lost * last.transpose();
-        let march = march(true, maps).unwrap();
-        assert!(march.condition() < 1e-13, "{:.1e}", march.condition());
+        let condensed = condensed(true, maps).unwrap();
+        assert!(
+            condensed.condition() < 1e-13,
+            "{:.1e}",
+            condensed.condition()
+        );
 
-        let null = march.null();
+        let null = condensed.null();
         let factor = null[0][6] / begin[0];
         for (i, value) in begin.iter().enumerate() {
             let found = null[0][12 * (i / 6) + 6 + i % 6];
@@ -350,7 +353,7 @@ mod tests {
         }
 
         let quiet = vec![vec![0.0; 36]; 2];
-        let step = march.solve(&quiet, &[1e-3; 18]);
+        let step = condensed.solve(&quiet, &[1e-3; 18]);
         assert!(step.iter().flatten().all(|v| v.abs() < 1.0));
         let along: f64 = step[2].iter().zip(last.iter()).map(|(a, b)| a * b).sum();
         assert!(along.abs() < 1e-12, "{along:.1e}");
@@ -360,6 +363,6 @@ mod tests {
     fn what_is_not_finite_is_refused() {
         let mut maps = maps(2, 1.0);
         maps[1][(0, 0)] = f64::NAN;
-        assert!(march(true, maps).is_none());
+        assert!(condensed(true, maps).is_none());
     }
 }

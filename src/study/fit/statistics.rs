@@ -1,66 +1,66 @@
-//! What the data determine around a minimum: deviations, correlations, bands.
+//! Statistics of a minimum: deviations, correlations, bands.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::case::Component;
 use super::directions::{NORMAL, NULL, singular, student};
-use super::least_squares::Weighing;
+use super::least_squares::Weighting;
 use super::model::{Model, Point};
 use super::quantity::Kind;
 
-/// A number that may be this far off, in logarithms or units, is not determined: a
+/// A number with an uncertainty of more than this, in logarithms or units, is not determined: a
 /// factor of ten.
 pub(super) const OPEN: f64 = std::f64::consts::LN_10;
 
-/// A number whose component in combinations that no datum feels is larger than this is
-/// not determined.
-const TAKES_PART: f64 = 1e-3;
+/// A number with a larger component than this in combinations to which the data are insensitive
+/// is not determined.
+const INSENSITIVE: f64 = 1e-3;
 
-/// How often the leaves of all experiments were brought to rest.
+/// Number of times the leaves of all experiments were relaxed.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Evaluations {
-    /// As accurately as a search needs.
-    pub rough: usize,
-    /// As accurately as is wanted.
+    /// With the accuracy of a search.
+    pub coarse: usize,
+    /// With the required accuracy.
     pub accurate: usize,
 }
 
-/// The minimum and what surrounds it.
-pub(super) struct Judge<'m, 'a> {
+/// The minimum and its statistics.
+pub(super) struct Statistics<'m, 'a> {
     pub model: &'m Model<'a>,
-    pub weighing: Weighing,
+    pub weighting: Weighting,
     /// Whether the standard deviations of the data are known.
     pub known: bool,
     pub point: &'m Point,
     pub evaluations: Evaluations,
     pub residuals: DVector<f64>,
     pub jacobian: DMatrix<f64>,
-    /// Directions of the coordinates, ascending in what the data say about them, and
-    /// the singular values.
+    /// Singular directions of the coordinates, in ascending order of the sensitivity of the data,
+    /// and the singular values.
     pub directions: DMatrix<f64>,
     pub values: Vec<f64>,
-    /// Directions that are not felt: the first so many.
-    pub unfelt: usize,
-    /// Data less determined combinations.
+    /// Number of directions, the first ones, to which the data are insensitive.
+    pub insensitive: usize,
+    /// Degrees of freedom: data minus determined combinations.
     pub freedom: usize,
     /// Standard deviation of residuals.
     pub spread: f64,
-    /// Half of a 95 % interval in standard deviations.
+    /// Half width of a 95 % interval in standard deviations.
     pub quantile: f64,
 }
 
-impl<'m, 'a> Judge<'m, 'a> {
+impl<'m, 'a> Statistics<'m, 'a> {
     pub fn new(
         model: &'m Model<'a>,
-        weighing: Weighing,
+        weighting: Weighting,
         known: bool,
         point: &'m Point,
         evaluations: Evaluations,
     ) -> Self {
-        let residuals = weighing.residuals(point);
-        let roots = weighing.roots(&residuals);
+        let residuals = weighting.residuals(point);
+        let roots = weighting.roots(&residuals);
         let mut jacobian = match point.gradients().next() {
-            Some(_) => weighing.jacobian(point),
+            Some(_) => weighting.jacobian(point),
             None => DMatrix::zeros(residuals.len(), point.theta.len()),
         };
         for (mut row, root) in jacobian.row_iter_mut().zip(roots.iter()) {
@@ -68,7 +68,7 @@ impl<'m, 'a> Judge<'m, 'a> {
         }
         let (values, directions) = singular(&jacobian);
         let largest = values.last().copied().unwrap_or(0.0);
-        let unfelt = values
+        let insensitive = values
             .iter()
             .filter(|value| **value <= NULL * largest)
             .count();
@@ -76,7 +76,7 @@ impl<'m, 'a> Judge<'m, 'a> {
             .components()
             .filter(|component| !component.free)
             .count();
-        let freedom = count.saturating_sub(values.len() - unfelt);
+        let freedom = count.saturating_sub(values.len() - insensitive);
         let weighed = residuals.component_mul(&roots);
         let (spread, quantile) = match known || freedom == 0 {
             true => (1.0, NORMAL),
@@ -85,9 +85,9 @@ impl<'m, 'a> Judge<'m, 'a> {
                 (mean.sqrt(), student(freedom))
             }
         };
-        Judge {
+        Statistics {
             model,
-            weighing,
+            weighting,
             known,
             point,
             evaluations,
@@ -95,18 +95,18 @@ impl<'m, 'a> Judge<'m, 'a> {
             jacobian,
             directions,
             values,
-            unfelt,
+            insensitive,
             freedom,
             spread,
             quantile,
         }
     }
 
-    /// Standard deviation of a coordinate, and what goes with its change in the others.
+    /// Standard deviation of a coordinate, and the correlated changes of the others.
     pub fn deviation(&self, k: usize) -> (f64, DVector<f64>) {
-        let felt = self.unfelt..self.values.len();
+        let sensitive = self.insensitive..self.values.len();
         let mut along = DVector::zeros(self.values.len());
-        for direction in felt {
+        for direction in sensitive {
             let v = self.directions.column(direction);
             along += v * (v[k] * (self.spread / self.values[direction]).powi(2));
         }
@@ -117,23 +117,24 @@ impl<'m, 'a> Judge<'m, 'a> {
         }
     }
 
-    /// What goes with a change of a coordinate in the others, if no more than this is
-    /// open of any of them: combinations that are hardly felt then stay where they are.
+    /// The changes of the others that are correlated with that of a coordinate, if none of them has
+    /// a larger uncertainty than `open`: weakly determined combinations then do not change.
     pub fn conditional(&self, k: usize, open: f64) -> DVector<f64> {
         let mut along = DVector::zeros(self.values.len());
         for (direction, value) in self.values.iter().enumerate() {
             let v = self.directions.column(direction);
-            let felt = (value / self.spread).powi(2);
-            along += v * (v[k] / (felt + (self.quantile / open).powi(2)));
+            let sensitive = (value / self.spread).powi(2);
+            along += v * (v[k] / (sensitive + (self.quantile / open).powi(2)));
         }
         let own = along[k];
         along / own
     }
 
-    /// The component of a coordinate in combinations that are not felt.
-    fn takes_part(&self, k: usize) -> f64 {
-        let unfelt = (0..self.unfelt).map(|direction| self.directions[(k, direction)].powi(2));
-        unfelt.sum::<f64>().sqrt()
+    /// The component of a coordinate in combinations to which the data are insensitive.
+    fn insensitive_part(&self, k: usize) -> f64 {
+        let insensitive =
+            (0..self.insensitive).map(|direction| self.directions[(k, direction)].powi(2));
+        insensitive.sum::<f64>().sqrt()
     }
 
     /// Whether the residuals are larger than their standard deviations allow: by five
@@ -141,15 +142,15 @@ impl<'m, 'a> Judge<'m, 'a> {
     pub fn suspicious(&self) -> bool {
         let freedom = self.freedom as f64;
         let expected = freedom + 5.0 * (2.0 * freedom).sqrt();
-        self.freedom > 0 && !self.weighing.robust && self.residuals.norm_squared() > expected
+        self.freedom > 0 && !self.weighting.robust && self.residuals.norm_squared() > expected
     }
 
-    /// Whether the data feel each change of a coordinate.
-    pub fn feels(&self, k: usize) -> bool {
-        self.takes_part(k) <= TAKES_PART
+    /// Whether the data are sensitive to every change of a coordinate.
+    pub fn is_sensitive_to(&self, k: usize) -> bool {
+        self.insensitive_part(k) <= INSENSITIVE
     }
 
-    /// The standard deviation of a candidate's datum: as those of the fit of its kind.
+    /// The standard deviation of a candidate's datum: that of the fit's data of its kind.
     pub fn assumed(&self, kind: Kind) -> Option<f64> {
         let alike = |component: &&Component| component.what.kind() == kind;
         let alike = self.point.components().filter(alike);
@@ -158,18 +159,19 @@ impl<'m, 'a> Judge<'m, 'a> {
         sds.get(sds.len() / 2).copied()
     }
 
-    /// The standard deviation of a datum: as given, or as all residuals tell it.
+    /// The standard deviation of a datum: as given, or as estimated from all residuals.
     pub fn sd(&self, component: &Component) -> f64 {
-        component.sd.unwrap_or(self.spread * self.weighing.assumed)
+        component.sd.unwrap_or(self.spread * self.weighting.assumed)
     }
 
-    /// Correlations of the coordinates that the data feel.
+    /// Correlations of the coordinates to which the data are sensitive.
     pub fn correlations(&self) -> Vec<Vec<Option<f64>>> {
         let count = self.values.len();
         let deviations: Vec<_> = (0..count).map(|k| self.deviation(k)).collect();
         let entry = |a: usize, b: usize| {
             let ((own, along), (other, _)) = (&deviations[a], &deviations[b]);
-            let known = self.feels(a) && self.feels(b) && *own > 0.0 && *other > 0.0;
+            let known =
+                self.is_sensitive_to(a) && self.is_sensitive_to(b) && *own > 0.0 && *other > 0.0;
             // along is the covariance with a over its variance.
             known.then(|| (along[b] * own / other).clamp(-1.0, 1.0))
         };
@@ -177,21 +179,21 @@ impl<'m, 'a> Judge<'m, 'a> {
         (0..count).map(row).collect()
     }
 
-    /// Half of the model's 95 % band at each datum.
+    /// Half width of the model's 95 % band at each datum.
     pub fn bands(&self) -> Vec<f64> {
-        let roots = self.weighing.roots(&self.residuals);
+        let roots = self.weighting.roots(&self.residuals);
         let components = self.point.components().enumerate();
         components
             .map(|(i, component)| {
                 let row = self.jacobian.row(i);
-                let felt = self.unfelt..self.values.len();
-                let variance: f64 = felt
+                let sensitive = self.insensitive..self.values.len();
+                let variance: f64 = sensitive
                     .map(|direction| {
                         let v = self.directions.column(direction);
                         ((row * v)[(0, 0)] / self.values[direction]).powi(2)
                     })
                     .sum();
-                let sd = component.sd.unwrap_or(self.weighing.assumed);
+                let sd = component.sd.unwrap_or(self.weighting.assumed);
                 self.quantile * self.spread * variance.sqrt() * sd / roots[i]
             })
             .collect()

@@ -1,21 +1,21 @@
-//! How a leaf at rest answers the free numbers.
+//! Response of a leaf at rest to changes of the free numbers.
 
 use std::sync::{Mutex, PoisonError};
 
 use crate::leaf::{Forces, LeafRate, Response};
 use crate::relax::{AtRest, Level, Linearized, Lost};
 
-/// Relative accuracy of where a leaf is expected, from which it is brought to rest.
+/// Relative accuracy of the predicted state from which a leaf is relaxed.
 const PREDICTED: f64 = 1e-3;
 
-/// The equations of a leaf at rest, linearised on every grid, and what the free numbers
-/// do to them.
-pub(super) struct Answers {
+/// The linearised equations of a leaf at rest on every grid, and the force rates of the free
+/// numbers.
+pub(super) struct Responses {
     linear: Mutex<Vec<Linearized>>,
-    /// On every grid, of each number.
+    /// Force rates of each number on every grid.
     forces: Vec<Vec<Forces>>,
-    /// Of each number, on every grid: none where equations are solved for the data, as
-    /// there are fewer of these.
+    /// Response to each number on every grid; empty if the adjoint equations are solved for the
+    /// data, since these are fewer.
     pub each: Vec<Vec<Response>>,
 }
 
@@ -23,15 +23,15 @@ fn singular() -> Lost {
     Lost::NotAtRest("the leaf is at a singular point".into())
 }
 
-impl Answers {
-    /// The equations about a leaf at rest.
-    pub fn new(at: &AtRest, rates: &[LeafRate], tolerance: f64) -> Answers {
+impl Responses {
+    /// The linearised equations at a leaf at rest.
+    pub fn new(at: &AtRest, rates: &[LeafRate], tolerance: f64) -> Responses {
         let linear = at.levels.iter();
         let linear: Vec<_> = linear
             .map(|level| Linearized::new(level, tolerance))
             .collect();
         let forces = linear.iter().zip(&at.levels);
-        Answers {
+        Responses {
             forces: forces
                 .map(|(linear, level)| linear.forces(level, rates))
                 .collect(),
@@ -49,8 +49,8 @@ impl Answers {
             .get_mut()
             .unwrap_or_else(PoisonError::into_inner);
         for ((level, linear), forces) in levels.iter().zip(linear).zip(&self.forces) {
-            let answers = linear.answers(level, forces).ok_or_else(singular)?;
-            for (all, answer) in all.iter_mut().zip(answers) {
+            let responses = linear.answers(level, forces).ok_or_else(singular)?;
+            for (all, answer) in all.iter_mut().zip(responses) {
                 all.push(answer);
             }
         }
@@ -58,8 +58,8 @@ impl Answers {
         Ok(())
     }
 
-    /// How results on one grid change with each number, if unit forces on the leaf
-    /// answer for these results: by one solution for each.
+    /// Derivatives of results on one grid with respect to each number, if the results are adjoint
+    /// to unit forces on the leaf: by one solution per result.
     pub fn by_results(
         &self,
         (k, level): (usize, &Level),
@@ -67,24 +67,24 @@ impl Answers {
     ) -> Result<Vec<Vec<f64>>, Lost> {
         let mut all = self.linear.lock().unwrap_or_else(PoisonError::into_inner);
         let linear = &mut all[k];
-        let answers = linear.answers(level, units).ok_or_else(singular)?;
+        let responses = linear.answers(level, units).ok_or_else(singular)?;
         let rates = |answer| {
             let forces = self.forces[k].iter();
             forces
                 .map(|force| linear.work(level, force, answer))
                 .collect()
         };
-        Ok(answers.iter().map(rates).collect())
+        Ok(responses.iter().map(rates).collect())
     }
 
-    /// The answer on each of these grids to steps of the numbers.
+    /// The response on each of these grids to steps of the numbers.
     pub fn to(&self, levels: &[Level], steps: &[f64]) -> Result<Vec<Response>, Lost> {
         let on = |(k, level): (usize, &Level)| {
             let (rods, segments) = (level.leaf.rods(), level.leaf.segments());
             if !self.each.is_empty() {
                 let mut sum = Response::none(rods, segments);
-                for (answers, step) in self.each.iter().zip(steps) {
-                    sum.add(*step, &answers[k]);
+                for (responses, step) in self.each.iter().zip(steps) {
+                    sum.add(*step, &responses[k]);
                 }
                 return Ok(sum);
             }

@@ -1,5 +1,5 @@
-//! A model that is as accurate as a search needs: on the coarsest grids on which the
-//! data would not notice the difference.
+//! A model with the accuracy of a search: on the coarsest grids whose error is insignificant
+//! relative to the data.
 
 use std::sync::Arc;
 
@@ -7,26 +7,26 @@ use rayon::prelude::*;
 
 use super::FitError;
 use super::case::{CaseAt, Component};
-use super::least_squares::Weighing;
-use super::model::{Model, Point, UNNOTICED};
+use super::least_squares::Weighting;
+use super::model::{INSIGNIFICANT, Model, Point};
 use crate::relax::{Grids, LARGEST_TOLERANCE, Lost, Options};
 
 /// Error of an iteration on them: of positions, in standard deviations.
-const ITERATED: f64 = 10.0 * UNNOTICED;
+const ITERATED: f64 = 10.0 * INSIGNIFICANT;
 
-/// Grids of a leaf at most.
+/// Largest number of grids of a leaf.
 const MOST_GRIDS: usize = 2;
 
 impl<'a> Model<'a> {
-    /// The same model on a few coarse grids, and its leaves there, from where this one
-    /// has found them.
-    pub fn rough(
+    /// The same model on a few coarse grids, and its leaves there, started from those of
+    /// this one.
+    pub fn coarse(
         &self,
         accurate: &Point,
-        weighing: Weighing,
+        weighting: Weighting,
     ) -> Result<(Model<'a>, Point), FitError> {
         let length = self.base.scenario().scale().length;
-        let sd = |component: &Component| component.sd.unwrap_or(weighing.assumed);
+        let sd = |component: &Component| component.sd.unwrap_or(weighting.assumed);
         let least = accurate.components().map(sd).fold(f64::INFINITY, f64::min);
         let tolerance = (ITERATED * least / length).min(LARGEST_TOLERANCE);
         let model = Model {
@@ -51,7 +51,7 @@ impl<'a> Model<'a> {
                 };
                 let found = CaseAt::new(&self.cases[case], case, at).map_err(lost)?;
                 let mut both = found.components.iter().zip(&known.components);
-                if both.all(|(a, b)| (a.model - b.model).abs() < UNNOTICED * sd(b)) {
+                if both.all(|(a, b)| (a.model - b.model).abs() < INSIGNIFICANT * sd(b)) {
                     return Ok(found);
                 }
             }
@@ -63,23 +63,23 @@ impl<'a> Model<'a> {
         Ok((model, Point { theta, cases }))
     }
 
-    /// The leaves at rest from where relaxations start, beyond the place where one of
-    /// `before` would have to jump; or there, if it can be in another equilibrium. `None`
-    /// where the data are no nearer.
-    pub fn beyond(&self, theta: &[f64], before: &Point, weighing: Weighing) -> Option<Point> {
-        let residuals = weighing.residuals(before);
-        let bound = weighing.bound(&residuals);
-        let sum = weighing.sum(&residuals, bound);
+    /// The leaves relaxed from their usual starts, beyond the values at which one of
+    /// `before` would have to jump; or there, if another equilibrium exists. `None`
+    /// if that does not reduce the residuals.
+    pub fn beyond(&self, theta: &[f64], before: &Point, weighting: Weighting) -> Option<Point> {
+        let residuals = weighting.residuals(before);
+        let bound = weighting.bound(&residuals);
+        let sum = weighting.sum(&residuals, bound);
         [theta, before.theta.as_slice()]
             .into_iter()
             .find_map(|theta| {
                 let (there, _) = self.find(theta).ok()?;
-                let nearer = weighing.sum(&weighing.residuals(&there), bound) < sum;
+                let nearer = weighting.sum(&weighting.residuals(&there), bound) < sum;
                 nearer.then_some(there)
             })
     }
 
-    /// The leaves of a point of another model, as accurate as this one wants them.
+    /// The leaves of a point of another model, with the accuracy of this one.
     pub fn refined(&self, point: &Point) -> Result<Point, Lost> {
         self.follow(point, &point.theta)
     }

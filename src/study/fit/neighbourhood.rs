@@ -1,75 +1,74 @@
-//! Residuals around a minimum, and the least sum of squares there for a number that is
-//! moved.
+//! Residuals near a minimum, and the least sum of squares for a given displacement of one
+//! number.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::case::CaseAt;
-use super::judge::{Judge, OPEN};
 use super::model::Point;
+use super::statistics::{OPEN, Statistics};
 use crate::relax::{Grids, Lost};
 
-/// The surroundings of a minimum.
-pub(super) struct Around<'j, 'm, 'a> {
-    pub judge: &'j Judge<'m, 'a>,
-    /// Numbers at a bound, which stay there.
+/// The neighbourhood of a minimum.
+pub(super) struct Neighbourhood<'j, 'm, 'a> {
+    pub stats: &'j Statistics<'m, 'a>,
+    /// Numbers at a bound, which stay fixed.
     fixed: Vec<bool>,
 }
 
-/// Derivatives of the residuals, and the curvature of the sum of squares by them, with a
-/// little more, so that combinations that are hardly felt stay where they are.
+/// Derivatives of the residuals, and the Gauss-Newton curvature of the sum of squares, slightly
+/// regularised, so that combinations to which the data are insensitive do not change.
 pub(super) struct Slopes {
     jacobian: DMatrix<f64>,
     curvature: DMatrix<f64>,
 }
 
-/// The least sum of squares where a number is held away from the minimum.
+/// The least sum of squares with one number fixed away from the minimum.
 pub(super) struct Least {
-    /// By how much it is above the minimum, in squared spreads.
+    /// Its excess over the minimum, in squared spreads.
     pub above: f64,
-    /// What that would be if the others stayed.
+    /// The same if the other numbers do not change.
     pub straight: f64,
-    /// How the others have to move.
+    /// The change of the other numbers.
     pub correction: DVector<f64>,
-    /// Half of the derivative of that sum, and of its second derivative.
+    /// Half of its first derivative, and half of its second derivative.
     slope: f64,
     bend: f64,
 }
 
-impl<'j, 'm, 'a> Around<'j, 'm, 'a> {
-    /// `None` where residuals are not weighed alike, or derivatives are not known.
-    pub fn new(judge: &'j Judge<'m, 'a>) -> Option<Self> {
-        let differentiated = |case: &CaseAt| case.answers.is_some();
-        if judge.weighing.robust || !judge.point.cases.iter().all(differentiated) {
+impl<'j, 'm, 'a> Neighbourhood<'j, 'm, 'a> {
+    /// `None` if residuals have different weights, or derivatives are not known.
+    pub fn new(stats: &'j Statistics<'m, 'a>) -> Option<Self> {
+        let differentiated = |case: &CaseAt| case.responses.is_some();
+        if stats.weighting.robust || !stats.point.cases.iter().all(differentiated) {
             return None;
         }
-        let coordinates = judge.model.coordinates.iter().zip(&judge.point.theta);
+        let coordinates = stats.model.coordinates.iter().zip(&stats.point.theta);
         let fixed = coordinates.map(|(free, theta)| free.bounds.contains(theta));
-        Some(Around {
-            judge,
+        Some(Neighbourhood {
+            stats,
             fixed: fixed.collect(),
         })
     }
 
-    /// Derivatives at the minimum.
     pub fn slopes(&self) -> Slopes {
-        self.slopes_of(self.judge.jacobian.clone())
+        self.slopes_of(self.stats.jacobian.clone())
     }
 
-    /// Derivatives at another point, which has them then.
+    /// Derivatives at another point, which stores them.
     pub fn slopes_at(&self, mut there: Point) -> Result<(Point, Slopes), Lost> {
-        self.judge.model.differentiate(&mut there)?;
-        let slopes = self.slopes_of(self.judge.weighing.jacobian(&there));
+        self.stats.model.differentiate(&mut there)?;
+        let slopes = self.slopes_of(self.stats.weighting.jacobian(&there));
         Ok((there, slopes))
     }
 
     fn slopes_of(&self, mut jacobian: DMatrix<f64>) -> Slopes {
-        let judge = self.judge;
+        let stats = self.stats;
         for k in (0..self.fixed.len()).filter(|&k| self.fixed[k]) {
             jacobian.column_mut(k).fill(0.0);
         }
-        let count = judge.values.len();
-        let least = (judge.quantile / OPEN).powi(2);
-        let curvature = jacobian.tr_mul(&jacobian) / judge.spread.powi(2)
+        let count = stats.values.len();
+        let least = (stats.quantile / OPEN).powi(2);
+        let curvature = jacobian.tr_mul(&jacobian) / stats.spread.powi(2)
             + DMatrix::identity(count, count) * least;
         Slopes {
             jacobian,
@@ -77,10 +76,10 @@ impl<'j, 'm, 'a> Around<'j, 'm, 'a> {
         }
     }
 
-    /// The values after a change from the minimum, within bounds.
+    /// The values after a change from the minimum, clamped to the bounds.
     pub fn moved(&self, change: &DVector<f64>) -> Vec<f64> {
-        let judge = self.judge;
-        let coordinates = judge.model.coordinates.iter().zip(&judge.point.theta);
+        let stats = self.stats;
+        let coordinates = stats.model.coordinates.iter().zip(&stats.point.theta);
         let moved = coordinates.zip(change.iter()).zip(&self.fixed);
         moved
             .map(|(((free, theta), change), fixed)| match fixed {
@@ -90,16 +89,16 @@ impl<'j, 'm, 'a> Around<'j, 'm, 'a> {
             .collect()
     }
 
-    /// The residuals for other values, and the point, followed from one that is
-    /// differentiated.
+    /// The residuals for other values, and their point, followed from a point with
+    /// derivatives.
     pub fn residuals(&self, from: &Point, theta: &[f64]) -> Result<(DVector<f64>, Point), Lost> {
-        let judge = self.judge;
-        let there = judge.model.follow_on(from, theta, Grids::These)?;
-        Ok((judge.weighing.residuals(&there), there))
+        let stats = self.stats;
+        let there = stats.model.follow_on(from, theta, Grids::These)?;
+        Ok((stats.weighting.residuals(&there), there))
     }
 
-    /// The least sum of squares over all numbers but the `k`th, to first order from where
-    /// the residuals are these, and no farther from there than `longest`.
+    /// The least sum of squares over all numbers but the `k`th, linearised where the residuals
+    /// are these, with a step no longer than `longest`.
     pub fn least(
         &self,
         slopes: &Slopes,
@@ -107,14 +106,14 @@ impl<'j, 'm, 'a> Around<'j, 'm, 'a> {
         residuals: &DVector<f64>,
         longest: f64,
     ) -> Option<Least> {
-        let judge = self.judge;
+        let stats = self.stats;
         let mut curvature = slopes.curvature.clone();
         let mut coupled = -curvature.column(k);
         coupled[k] = 1.0;
         curvature.row_mut(k).fill(0.0);
         curvature.column_mut(k).fill(0.0);
         curvature[(k, k)] = 1.0;
-        let variance = judge.spread.powi(2);
+        let variance = stats.spread.powi(2);
         let mut slope = slopes.jacobian.tr_mul(residuals) / variance;
         slope[k] = 0.0;
         let inverse = curvature.clone().cholesky()?;
@@ -122,14 +121,14 @@ impl<'j, 'm, 'a> Around<'j, 'm, 'a> {
         let mut correction = -inverse.solve(&slope);
         let corrected = residuals + &slopes.jacobian * &correction;
         let change = &slopes.jacobian * &along;
-        let mut damping = (judge.quantile / OPEN).powi(2);
+        let mut damping = (stats.quantile / OPEN).powi(2);
         while correction.norm() > longest {
             damping *= 2.0;
             let count = curvature.nrows();
             let damped = &curvature + DMatrix::identity(count, count) * damping;
             correction = -damped.cholesky()?.solve(&slope);
         }
-        let least = judge.residuals.norm_squared();
+        let least = stats.residuals.norm_squared();
         let above = |residuals: &DVector<f64>| (residuals.norm_squared() - least) / variance;
         Some(Least {
             above: above(&corrected),
@@ -142,9 +141,9 @@ impl<'j, 'm, 'a> Around<'j, 'm, 'a> {
 }
 
 impl Least {
-    /// By how much the number has to move so that the least sum is `above` the minimum, to
-    /// first order of the residuals: the farther of two such places, or where it is
-    /// least if there are none.
+    /// The change of the number at which the least sum exceeds the minimum by `above`, with
+    /// linearised residuals: the farther of two solutions, or the minimum of the excess if there
+    /// are none.
     pub fn step(&self, above: f64, sign: f64) -> f64 {
         let root = self.slope.powi(2) - self.bend * (self.above - above);
         (sign * root.max(0.0).sqrt() - self.slope) / self.bend

@@ -1,21 +1,21 @@
-//! The last few of what takes long to make.
+//! A small cache of values that are expensive to compute.
 
 use std::collections::VecDeque;
 
-/// Values by their keys, at most so many: those that were needed last.
-pub struct Recent<K, V, const MOST: usize>(VecDeque<(K, V)>);
+/// At most `MOST` values by key, the most recently used first.
+pub struct LruCache<K, V, const MOST: usize>(VecDeque<(K, V)>);
 
-impl<K, V, const MOST: usize> Default for Recent<K, V, MOST> {
+impl<K, V, const MOST: usize> Default for LruCache<K, V, MOST> {
     fn default() -> Self {
-        Recent(VecDeque::new())
+        LruCache(VecDeque::new())
     }
 }
 
-impl<K: Copy + PartialEq, V, const MOST: usize> Recent<K, V, MOST> {
-    /// The value of a key, made if it is not among them.
+impl<K: Copy + PartialEq, V, const MOST: usize> LruCache<K, V, MOST> {
+    /// The value of a key, computed by `make` if it is not cached.
     ///
     /// # Errors
-    /// Those of making it.
+    /// Those of `make`.
     pub fn at<E>(&mut self, key: K, make: impl FnOnce() -> Result<V, E>) -> Result<&V, E> {
         let known = self.0.iter().position(|(other, _)| *other == key);
         let found = match known.and_then(|index| self.0.remove(index)) {
@@ -27,10 +27,10 @@ impl<K: Copy + PartialEq, V, const MOST: usize> Recent<K, V, MOST> {
         Ok(&self.0[0].1)
     }
 
-    /// Others with the same keys.
+    /// Values derived from these, under the same keys.
     pub fn map(&self, other: impl Fn(&V) -> V) -> Self {
         let values = self.0.iter();
-        Recent(values.map(|(key, value)| (*key, other(value))).collect())
+        LruCache(values.map(|(key, value)| (*key, other(value))).collect())
     }
 }
 
@@ -40,16 +40,16 @@ mod tests {
 
     #[test]
     fn what_was_needed_last_is_not_made_again() {
-        let mut recent = Recent::<i32, i32, 2>::default();
+        let mut lru_cache = LruCache::<i32, i32, 2>::default();
         let mut made = Vec::new();
         for key in [1, 2, 1, 3, 1, 2] {
-            let value = recent.at(key, || {
+            let value = lru_cache.at(key, || {
                 made.push(key);
                 Ok::<_, ()>(10 * key)
             });
             assert_eq!(value, Ok(&(10 * key)));
         }
         assert_eq!(made, [1, 2, 3, 2]);
-        assert_eq!(recent.at(4, || Err("none")), Err("none"));
+        assert_eq!(lru_cache.at(4, || Err("none")), Err("none"));
     }
 }
