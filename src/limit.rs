@@ -1,21 +1,21 @@
-//! When a run gives up.
+//! Limits of the time of a run, and its cancellation.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// When a run gives up, at rest or not: at a time, or as soon as somebody says so.
-/// It is looked at in every step, so that a run may end a little later.
+/// When a run gives up, at rest or not: at a deadline, or when it is cancelled. It is
+/// checked in every step, so that a run may end slightly later.
 #[derive(Clone, Debug, Default)]
 pub struct Limit {
-    /// At this time.
+    /// The run ends at this time.
     pub deadline: Option<Instant>,
-    /// As soon as this is `true`.
+    /// The run ends as soon as this is `true`.
     pub cancel: Option<Arc<AtomicBool>>,
 }
 
 impl Limit {
-    /// At a time.
+    /// A limit at a time.
     pub fn at(deadline: Instant) -> Self {
         Limit {
             deadline: Some(deadline),
@@ -23,12 +23,12 @@ impl Limit {
         }
     }
 
-    /// Whether the run may go on for as long as it takes.
+    /// Whether the run is unlimited.
     pub(crate) fn is_none(&self) -> bool {
         self.deadline.is_none() && self.cancel.is_none()
     }
 
-    /// Whether it is time to give up.
+    /// Whether the run has to give up.
     pub(crate) fn reached(&self) -> bool {
         let cancelled = |cancel: &Arc<AtomicBool>| cancel.load(Ordering::Relaxed);
         self.deadline.is_some_and(|time| Instant::now() >= time)

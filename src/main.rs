@@ -1,5 +1,4 @@
-//! `leafdyn`: a scenario is read, becomes a leaf, comes to rest, and the
-//! result is judged and shown.
+//! The program `leafdyn`.
 
 use std::process::ExitCode;
 

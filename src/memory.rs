@@ -1,31 +1,34 @@
-//! How much memory a request would take, and how much it may.
+//! Estimates the memory that a request needs, and limits it.
 //!
-//! Requests are weighed before they start: what is refused in a sentence would
-//! otherwise end the process without one. The weights are what whole runs of the
-//! program were seen to take at most, files and figures included.
+//! Requests are checked before they start: one that is refused with a message would
+//! otherwise crash the process. The estimates are the largest amounts measured in whole
+//! runs of the program, files and figures included.
 
 use std::fmt;
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Bytes allowed; 0: not yet looked up.
+/// Allowed bytes; 0: not yet determined.
 static ALLOWED: AtomicU64 = AtomicU64::new(0);
 
-/// Allows the requests of this process so many bytes each, in place of half of
-/// what the machine has.
+/// Sets the bytes that each request of this process may take, in place of half of the
+/// memory of the machine.
 pub fn allow(bytes: u64) {
     ALLOWED.store(bytes.max(1), Ordering::Relaxed);
 }
 
-/// Bytes that one request may take: as many as [`allow`] said, or half of what the
-/// machine has, or the group of processes that this one belongs to. Where that is
-/// not known there is no limit.
+/// Bytes that one request may take: those set by [`allow`], or half of the memory of the
+/// machine, or of the control group of this process if that is less. If neither is known
+/// there is no limit.
 pub fn allowed() -> u64 {
     match ALLOWED.load(Ordering::Relaxed) {
         0 => {
             let group = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
-            let bytes = [of_machine(), of_group(Path::new("/sys/fs/cgroup"), &group)];
+            let bytes = [
+                machine_memory(),
+                group_limit(Path::new("/sys/fs/cgroup"), &group),
+            ];
             let bytes = bytes.into_iter().flatten().min();
             allow(bytes.map_or(u64::MAX, |bytes| bytes / 2));
             ALLOWED.load(Ordering::Relaxed)
@@ -34,8 +37,8 @@ pub fn allowed() -> u64 {
     }
 }
 
-/// Memory of the machine.
-fn of_machine() -> Option<u64> {
+/// The memory of the machine.
+fn machine_memory() -> Option<u64> {
     let text = fs::read_to_string("/proc/meminfo").ok()?;
     let line = text
         .lines()
@@ -44,11 +47,11 @@ fn of_machine() -> Option<u64> {
     kilobytes.checked_mul(1024)
 }
 
-/// The least limit of the group of processes `/proc/self/cgroup` names, and of
-/// those it is part of.
-fn of_group(root: &Path, named: &str) -> Option<u64> {
+/// The smallest memory limit of the control groups in `groups`, the content of
+/// `/proc/self/cgroup`, and of their parents.
+fn group_limit(root: &Path, groups: &str) -> Option<u64> {
     let bytes = |file: &Path| fs::read_to_string(file).ok()?.trim().parse::<u64>().ok();
-    let limits = named.lines().flat_map(|line| {
+    let limits = groups.lines().flat_map(|line| {
         let mut parts = line.splitn(3, ':').skip(1);
         let controllers = parts.next().unwrap_or_default();
         let path = parts.next().unwrap_or_default().trim_start_matches('/');
@@ -65,7 +68,7 @@ fn of_group(root: &Path, named: &str) -> Option<u64> {
     limits.filter_map(|file| bytes(&file)).min()
 }
 
-/// What takes memory.
+/// A request that needs memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
     /// A leaf on a grid.
@@ -82,7 +85,7 @@ pub enum Request {
         /// Segments a rod.
         segments: usize,
     },
-    /// The matrices of shooting.
+    /// The matrices of a shooting method.
     Shooting {
         /// Rods.
         rods: usize,
@@ -104,32 +107,32 @@ pub enum Request {
 }
 
 impl Request {
-    /// About as many bytes as it takes at most.
+    /// An estimate of the bytes it takes at most.
     pub fn bytes(self) -> u64 {
         let product = |factors: [usize; 3], each: u64| {
             let factors = factors.into_iter().map(|factor| factor as u64);
             factors.fold(each, u64::saturating_mul)
         };
         match self {
-            // 1750 seen for one rod of many segments, 2700 for many rods of few.
+            // 1750 measured for one rod of many segments, 2700 for many rods of few.
             Request::Grid { rods, segments } => {
                 product([rods, segments.saturating_add(1), 1], 2_700)
             }
             Request::Branches { rods, segments } => product([rods, segments, 1], 27_000),
-            // Five matrices of (12 N)^2 numbers an interval seen.
+            // Measured: five matrices of (12 N)^2 numbers per interval.
             Request::Shooting { rods, intervals } => {
                 product([rods, rods, intervals.saturating_add(1)], 5 * 144 * 8)
             }
             Request::Map { cells, methods } => product([cells, methods, 1], 1_000),
-            // 72 seen.
+            // 72 measured.
             Request::Scenario { bytes } => product([bytes, 1, 1], 75),
         }
     }
 
-    /// Refuses what would take more than is [`allowed`].
+    /// Checks that it takes no more than is [`allowed`].
     ///
     /// # Errors
-    /// If it would.
+    /// If it takes more.
     pub fn weigh(self) -> Result<(), TooMuch> {
         let (needed, allowed) = (self.bytes(), allowed());
         match needed > allowed {
@@ -149,7 +152,7 @@ impl Request {
     size(.request.bytes()), size(*.allowed), .request.instead()
 )]
 pub struct TooMuch {
-    /// What was asked.
+    /// The request.
     pub request: Request,
     /// Bytes it may take.
     pub allowed: u64,
@@ -186,7 +189,7 @@ impl fmt::Display for Request {
 
 const UNITS: [(&str, f64); 4] = [("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)];
 
-/// Bytes for people.
+/// Formats a number of bytes for people.
 fn size(bytes: u64) -> String {
     let bytes = bytes as f64;
     let unit = UNITS.into_iter().find(|(_, unit)| bytes >= *unit);
@@ -195,10 +198,10 @@ fn size(bytes: u64) -> String {
     })
 }
 
-/// Bytes as people write them: `2GB`, `500 MB`, `1e9`.
+/// Parses a size as people write it: `2GB`, `500 MB`, `1e9`.
 ///
 /// # Errors
-/// If it is no size, or none at all.
+/// If it is not a size of at least one byte.
 pub fn parse(text: &str) -> Result<u64, String> {
     let text = text.trim();
     let unit = UNITS.into_iter().find_map(|(name, unit)| {
@@ -245,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn the_least_limit_of_a_group_and_those_around_it_holds() {
+    fn the_smallest_limit_of_a_group_and_its_parents_holds() {
         let root = tempfile::tempdir().unwrap();
         let at = |path: &str, limit: &str| {
             let folder = root.path().join(path);
@@ -260,7 +263,7 @@ mod tests {
         at("a", "4000\n");
         at("a/b", "max\n");
         at("memory/c", "3000\n");
-        let limit = |named: &str| of_group(root.path(), named);
+        let limit = |groups: &str| group_limit(root.path(), groups);
         assert_eq!(limit("0::/a/b\n"), Some(4000));
         assert_eq!(limit("0::/\n"), None);
         assert_eq!(limit("5:cpu:/a\n4:memory:/c\n0::/a\n"), Some(3000));
@@ -269,7 +272,7 @@ mod tests {
 
     #[test]
     fn half_of_the_machine_is_allowed() {
-        if let Some(all) = of_machine() {
+        if let Some(all) = machine_memory() {
             assert!(all > 1 << 20 && allowed() <= all / 2);
         }
     }

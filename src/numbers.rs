@@ -1,7 +1,7 @@
-//! Numbers as people read them.
+//! Formats numbers for people.
 
-/// An upper bound for reading: two digits, rounded up so that it stays a
-/// bound, as in `3.1×10⁻⁹`.
+/// Formats an upper bound with two digits, rounded up so that it stays a bound, as in
+/// `3.1×10⁻⁹`.
 pub fn power_of_ten(bound: f64) -> String {
     if !bound.is_finite() {
         return "∞".into();
@@ -10,7 +10,7 @@ pub fn power_of_ten(bound: f64) -> String {
         return "0".into();
     }
     let mut exponent = bound.log10().floor() as i32;
-    // A hair less, so that 3.0 stored as 3.0000000000000004 is not 3.1.
+    // Tolerates rounding: 3.0000000000000004 must not yield 3.1.
     let mut tenths = (bound / 10f64.powi(exponent) * 10.0 * (1.0 - 1e-12)).ceil();
     if tenths >= 100.0 {
         tenths /= 10.0;
@@ -20,7 +20,7 @@ pub fn power_of_ten(bound: f64) -> String {
     format!("{mantissa:.1}×10{}", superscript(exponent))
 }
 
-/// A power, as in `⁻⁹`.
+/// An exponent as a superscript, as in `⁻⁹`.
 pub fn superscript(exponent: i32) -> String {
     let raised = |c: char| match c {
         '-' => '⁻',

@@ -1,4 +1,4 @@
-//! The state of rods at stations along them: what every method returns.
+//! The state of rods at stations along them, which every method returns.
 
 use glam::{DQuat, DVec3};
 use serde::{Serialize, Serializer};
@@ -45,7 +45,7 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// Between two shapes at the same stations.
+    /// The differences of two shapes at the same stations.
     pub fn between(a: &[RodShape], b: &[RodShape]) -> Self {
         let rods = a.iter().zip(b);
         rods.flat_map(|(a, b)| a.nodes.iter().zip(&b.nodes))
@@ -53,7 +53,7 @@ impl Difference {
             .fold(Difference::default(), Difference::max)
     }
 
-    /// Between two states.
+    /// The differences of two states.
     pub fn of(a: &NodeState, b: &NodeState) -> Self {
         let turn = a.rotation * b.rotation.conjugate();
         let half = DVec3::new(turn.x, turn.y, turn.z).length();
@@ -65,7 +65,7 @@ impl Difference {
         }
     }
 
-    /// The larger of each. What is not a number is infinite.
+    /// The larger of each component; NaN counts as infinite.
     pub fn max(self, other: Difference) -> Self {
         let larger = |a: f64, b: f64| match a.is_nan() || b.is_nan() {
             true => f64::INFINITY,
@@ -80,13 +80,13 @@ impl Difference {
     }
 }
 
-/// Stations that cut the length in so many equal parts.
+/// Stations that divide the length into `parts` equal parts.
 pub fn equally_spaced(parts: usize) -> Vec<f64> {
     (0..=parts).map(|i| i as f64 / parts as f64).collect()
 }
 
-/// Where the polynomial through `count` values at neighbouring `nodes` takes its
-/// values from for `at`: the first of them, and their weights.
+/// Interpolation at `at` by the polynomial through `count` neighbouring `nodes`: the index
+/// of the first of them, and their weights.
 pub fn weights(nodes: &[f64], at: f64, count: usize) -> (usize, Vec<f64>) {
     let count = count.min(nodes.len());
     let right = nodes.partition_point(|node| *node < at);
@@ -103,8 +103,8 @@ pub fn weights(nodes: &[f64], at: f64, count: usize) -> (usize, Vec<f64>) {
     (first, (0..count).map(weight).collect())
 }
 
-/// Serializes tips as the key `tip`, which is null if there are several, and
-/// then `tips`.
+/// Serializes tips as the key `tip`, which is null if there are several; these follow as
+/// the key `tips`.
 ///
 /// # Errors
 /// Those of the serializer.

@@ -1,21 +1,20 @@
-//! Undulation as numbers: the waves of each vein out of the leaf's surface,
-//! the twist of its section, and what linear theory says of both.
+//! Measures of undulation: the waves of each vein out of the leaf's surface, the twist of
+//! its section, and the waves predicted by linear theory.
 //!
-//! **Waves.** A vein waves where it bends out of the surface now to one side,
-//! now to the other. Its normal curvature is the part of its curvature along
-//! the normal of the leaf, which its tangent and the line from one margin to
-//! the other at equal fractions of the length span (a single vein's own
-//! director d2 takes the place of that line). The plane curve that has this curvature is cut at its inflections:
-//! what lies between two of them is a half-wave, and its height over their
-//! chord is its amplitude. So nothing has to be fitted, a vein that simply
-//! droops is one half-wave, however it droops, and the numbers depend neither
-//! on where the leaf lies nor on the order of its veins. Half-waves lower than
-//! [`LEAST_HEIGHT`] lengths, or than four error estimates, are no waves: they
-//! are joined with those beside them.
+//! **Waves.** A vein has waves where it bends out of the surface alternately to both
+//! sides. Its normal curvature is the component of its curvature along the normal of the
+//! leaf, which is perpendicular to its tangent and to the line between the margins at equal
+//! fractions of the length (for a single vein, to its own director d2 in place of that
+//! line). The plane curve with this curvature is cut at its inflections: a part between two
+//! of them is a half-wave, and its height above their chord is its amplitude. So nothing has
+//! to be fitted, a vein that only droops is one half-wave, and the numbers depend neither on
+//! the position of the leaf nor on the order of its veins. Half-waves lower than
+//! [`LEAST_HEIGHT`] lengths, or than four error estimates, do not count: they are joined
+//! with their neighbours.
 //!
-//! **Chirality.** The twist is the integral of u1 from base to tip, in radians,
-//! with that at rest. It is positive where d2 turns about d1 as a right-handed
-//! screw does when it is seen from the base.
+//! **Chirality.** The twist is the integral of u1 from base to tip, in radians, including
+//! the rest twist. It is positive where d2 turns about d1 like a right-handed screw seen
+//! from the base.
 //!
 //! **Linear theory** (section 5.1 of the paper). Under a mean axial force T the
 //! lateral displacement obeys, with eqs (12) and (13),
@@ -37,37 +36,36 @@ use crate::rotation;
 use crate::scenario::Scenario;
 use crate::shape::RodShape;
 
-/// Height of the lowest half-wave that counts, in lengths of the longest rod.
+/// Smallest height of a half-wave that counts, in lengths of the longest rod.
 pub const LEAST_HEIGHT: f64 = 1e-3;
 
-/// And in error estimates: a height is the difference of three positions.
+/// The same in error estimates: a height is a difference of three positions.
 const ERRORS: f64 = 4.0;
 
-/// Sine of the angle between a vein and the line between the margins below
-/// which these are one.
+/// Sine of the angle between a vein and the line between the margins below which the
+/// margins coincide.
 const SAME_PLACE: f64 = 1e-6;
 
-/// A turn at a node below this, in radians, is rounding: not even thousands of
-/// them make a half-wave that counts.
+/// Smaller turns at a node, in radians, are rounding: not even thousands of them make a
+/// half-wave that counts.
 const STRAIGHT: f64 = 1e-10;
 
-/// A mean twist below this, in radians, has no hand.
+/// Smaller mean twists, in radians, have no handedness.
 const LEAST_TWIST: f64 = 1e-3;
 
-/// Which way the sections turn from base to tip, on average; in lower case in
-/// `summary.json`.
+/// The handedness of the mean twist from base to tip; in lower case in `summary.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Hand {
-    /// As a right-handed screw: the mean twist is positive.
+    /// Right-handed: the mean twist is positive.
     Right,
-    /// As a left-handed one.
+    /// Left-handed: the mean twist is negative.
     Left,
-    /// Not at all, or as much to the right as to the left.
+    /// No twist, or as much right-handed as left-handed.
     None,
 }
 
-/// What one vein does.
+/// The undulation of one vein.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Vein {
     /// Half-waves along it: alternating extrema.
@@ -82,13 +80,13 @@ pub struct Vein {
     pub twist: f64,
     /// Mean axial force T; negative: compression.
     pub tension: f64,
-    /// |T| L^2/A2, free of units, with the mean A2; times the mean growth of
-    /// the rest length.
+    /// |T| L^2/A2, dimensionless, with the mean A2, times the mean growth of the rest
+    /// length.
     pub load_number: f64,
 }
 
 impl Vein {
-    /// Number of waves, a multiple of 1/2; a single bend is none.
+    /// Number of waves, a multiple of 1/2; a single half-wave does not count.
     pub fn waves(&self) -> f64 {
         match self.half_waves {
             0 | 1 => 0.0,
@@ -120,14 +118,14 @@ impl Serialize for Vein {
     }
 }
 
-/// What all veins do, from one edge of the leaf to the other.
+/// The undulation of all veins, from one edge of the leaf to the other.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Undulation {
     /// One entry per vein.
     pub veins: Vec<Vein>,
 }
 
-/// Of the margin that has more waves, or higher ones, in JSON.
+/// The margin with more waves, or higher ones, in JSON.
 struct Margin<'a>(&'a Vein);
 
 impl Serialize for Margin<'_> {
@@ -157,9 +155,9 @@ impl Serialize for Undulation {
 pub type Centerline = Vec<(DVec3, DQuat)>;
 
 impl Undulation {
-    /// Of a leaf at rest: waves and twist by its `lines`, one per rod and all
-    /// with nodes at the same fractions of the length; forces by its `rods` at
-    /// the `stations`. `error` bounds the error of positions, where known.
+    /// The undulation of a leaf at rest: waves and twist from its `lines`, one per rod with
+    /// nodes at the same fractions of the length; forces from its `rods` at the `stations`.
+    /// `error` bounds the error of positions, if known.
     pub fn of(
         scenario: &Scenario,
         lines: &[Centerline],
@@ -173,7 +171,7 @@ impl Undulation {
             .map(|j| {
                 let half_waves = half_waves(lines, j, least);
                 let material = &scenario.rods[j];
-                // Forces have the longer arms of a vein that has grown.
+                // Forces act on the longer arms of a vein that has grown.
                 let grown = material.rest_stretch.integral(1.0);
                 let tension = mean(stations, rods[j].nodes.iter().map(|node| node.n.x));
                 let bending = material.couple_stiffness[1].integral(1.0);
@@ -190,7 +188,7 @@ impl Undulation {
         Undulation { veins }
     }
 
-    /// The same, where the shape is known at no more than its stations.
+    /// The same if the shape is known only at the stations.
     pub fn at_stations(
         scenario: &Scenario,
         stations: &[f64],
@@ -205,7 +203,7 @@ impl Undulation {
         Undulation::of(scenario, &lines, stations, rods, error)
     }
 
-    /// The first and the last vein, which are one in a leaf of one.
+    /// The first and the last vein, which are the same in a leaf of one vein.
     pub fn margins(&self) -> Option<[&Vein; 2]> {
         Some([self.veins.first()?, self.veins.last()?])
     }
@@ -226,7 +224,7 @@ impl Undulation {
         sum / self.veins.len().max(1) as f64
     }
 
-    /// Which way that is.
+    /// Its handedness.
     pub fn hand(&self) -> Hand {
         match self.twist() {
             twist if twist > LEAST_TWIST => Hand::Right,
@@ -252,16 +250,16 @@ fn twist(line: &Centerline) -> f64 {
 /// A half-wave between two inflections.
 #[derive(Clone, Copy, Debug)]
 struct HalfWave {
-    /// Where it begins and ends: nodes and fractions of segments beyond them.
+    /// Its ends: indices of nodes plus fractions of the segments after them.
     ends: [f64; 2],
     /// Height of its extremum over the chord.
     height: f64,
-    /// How far along the vein that is.
+    /// Arc length up to the extremum.
     place: f64,
 }
 
-/// A vein developed into a plane by its normal curvature alone: what bends it
-/// within the surface is straightened out.
+/// A vein developed into a plane by its normal curvature alone: its bending within the
+/// surface is left out.
 struct Curve {
     /// Turn out of the surface at each inner node, in radians.
     turns: Vec<f64>,
@@ -271,7 +269,7 @@ struct Curve {
 }
 
 impl Curve {
-    /// Of vein `j`, which has three nodes at least.
+    /// The curve of vein `j`, which has at least three nodes.
     fn of(lines: &[Centerline], j: usize) -> Self {
         let line = &lines[j];
         let steps: Vec<DVec3> = line.windows(2).map(|w| w[1].0 - w[0].0).collect();
@@ -281,12 +279,12 @@ impl Curve {
             let tangent = (from + to).normalize_or_zero();
             let across = lines[lines.len() - 1][i + 1].0 - lines[0][i + 1].0;
             let mut normal = tangent.cross(across.normalize_or_zero());
-            // Where the margins meet there is no surface but the section's.
+            // Where the margins meet, the section defines the surface.
             if normal.length() < SAME_PLACE {
                 normal = tangent.cross(line[i + 1].1 * DVec3::Y);
             }
             normal = normal.normalize_or_zero();
-            // Margins that cross change places, but the surface goes on.
+            // Where the margins cross they change sides, but the normal must not.
             if last.is_some_and(|last: DVec3| last.dot(normal) < 0.0) {
                 normal = -normal;
             }
@@ -313,8 +311,8 @@ impl Curve {
         self.points[i].lerp(self.points[i + 1], at - i as f64)
     }
 
-    /// Where the normal curvature changes sign: between the last node on one
-    /// side and the first on the other.
+    /// Where the normal curvature changes sign: between the last node with one sign and
+    /// the first with the other.
     fn inflections(&self) -> Vec<f64> {
         let mut found = Vec::new();
         let mut last: Option<(usize, f64)> = None;
@@ -348,7 +346,7 @@ impl Curve {
     }
 }
 
-/// The half-waves of vein `j` that are at least so high.
+/// The half-waves of vein `j` with at least this height.
 fn half_waves(lines: &[Centerline], j: usize, least: f64) -> Vec<HalfWave> {
     if lines[j].len() < 4 {
         return Vec::new();
@@ -360,7 +358,7 @@ fn half_waves(lines: &[Centerline], j: usize, least: f64) -> Vec<HalfWave> {
     let mut waves: Vec<HalfWave> = (ends.windows(2))
         .map(|pair| curve.half_wave([pair[0], pair[1]]))
         .collect();
-    // The lowest goes first; what it parted bends to the same side and is one.
+    // The lowest is removed first; its neighbours bend to the same side and are joined.
     while let Some(low) = (0..waves.len())
         .filter(|&i| waves[i].height < least)
         .min_by(|&a, &b| waves[a].height.total_cmp(&waves[b].height))

@@ -1,4 +1,4 @@
-//! Numbers of results as arrays.
+//! Converts numbers of results to numpy arrays.
 
 use leafdyn::relax::{NodeState, RodShape};
 use pyo3::exceptions::PyKeyError;
@@ -6,12 +6,12 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyByteArray, PyTuple};
 
-/// An array of numpy, or why there is none.
+/// A numpy array, or the exception that prevented it.
 pub type Array<'py> = PyResult<Bound<'py, PyAny>>;
 
 static FROM_BUFFER: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
 
-/// An array of this shape of these numbers. It owns them, and may be written to.
+/// A writable array of this shape that owns these numbers.
 pub fn array<'py>(py: Python<'py>, numbers: Vec<f64>, shape: &[usize]) -> Array<'py> {
     const BYTES: usize = size_of::<f64>();
     let bytes = PyByteArray::new_with(py, BYTES * numbers.len(), |bytes| {
@@ -21,7 +21,7 @@ pub fn array<'py>(py: Python<'py>, numbers: Vec<f64>, shape: &[usize]) -> Array<
         Ok(())
     })?;
     let numbers = match numbers.is_empty() {
-        // There is nothing to read from.
+        // `frombuffer` refuses empty buffers.
         true => py.import("numpy")?.call_method1("empty", (0,))?,
         false => FROM_BUFFER
             .import(py, "numpy", "frombuffer")?
@@ -36,7 +36,8 @@ pub fn vectors<'py, V: Copy + Into<[f64; 3]>>(py: Python<'py>, vectors: &[V]) ->
     array(py, numbers, &[vectors.len(), 3])
 }
 
-/// Vectors one after the other. Adding zero turns -0 into 0, as in the files.
+/// The components of vectors, one after the other. Adding zero turns -0 into 0, as in the
+/// files.
 pub fn flat<V: Into<[f64; 3]>>(vectors: impl IntoIterator<Item = V>) -> Vec<f64> {
     let vectors = vectors.into_iter().flat_map(Into::into);
     vectors.map(|value| value + 0.0).collect()

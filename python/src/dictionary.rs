@@ -1,4 +1,4 @@
-//! Dictionaries as scenarios: their entries, and the text that these would be.
+//! Scenarios from dictionaries: their entries, and the same as TOML.
 
 use std::fmt::{self, Write};
 
@@ -8,12 +8,12 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple, PyType};
 
-use crate::errors::refuse_entry;
+use crate::errors::entry_error;
 
 static MAPPING: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 
-/// How deep lists and tables may stand in each other: none of a scenario stands deeper.
-const DEEPEST: usize = 8;
+/// Largest nesting depth of lists and tables; scenarios need less.
+const MAX_DEPTH: usize = 8;
 
 /// A key and its value.
 type Entry<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
@@ -21,14 +21,14 @@ type Entry<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
 /// Entries of a table, in the order of the dictionary.
 type Table = Vec<(String, Value)>;
 
-/// A dictionary: what stands outside of tables, and the tables.
+/// A dictionary: its entries outside of tables, and its tables.
 pub struct Document {
     top: Table,
     tables: Vec<(String, Table)>,
 }
 
 impl Document {
-    /// Reads it. What no scenario can hold is refused.
+    /// Converts a dictionary; refuses values that no scenario can have.
     pub fn read(scenario: &Bound<PyAny>) -> PyResult<Document> {
         let (mut top, mut tables) = (Table::new(), Vec::new());
         for (key, entry) in entries(scenario)? {
@@ -49,7 +49,7 @@ impl Document {
         Ok(Document { top, tables })
     }
 
-    /// Its entries; none if one has no key, which the text of it all explains.
+    /// Its entries; `None` if a key is unknown: parsing the text gives the reason.
     pub fn entries(&self) -> Option<Entries> {
         let mut entries = Entries::default();
         let top = self.top.iter().map(|entry| ("", entry));
@@ -67,12 +67,12 @@ impl Document {
             .then_some(entries)
     }
 
-    /// Its text: tables after what stands outside of them, an entry a line.
+    /// Its text: first the entries outside of tables, then the tables, one entry per line.
     pub fn text(&self) -> String {
         let mut text = String::new();
         let lines = |text: &mut String, table: &Table| {
             for (key, value) in table {
-                let _ = writeln!(text, "{} = {}", quoted_key(key), Written(value));
+                let _ = writeln!(text, "{} = {}", quoted_key(key), Toml(value));
             }
         };
         lines(&mut text, &self.top);
@@ -91,7 +91,7 @@ pub fn overrides(entries: &Bound<PyAny>) -> PyResult<Vec<String>> {
     for (key, new) in self::entries(entries)? {
         let key = name(&key, "")?;
         let new = value(&new, Path("", &key), 0)?;
-        texts.push(format!("{key}={}", Written(&new)));
+        texts.push(format!("{key}={}", Toml(&new)));
     }
     Ok(texts)
 }
@@ -107,8 +107,8 @@ fn entries<'py>(mapping: &Bound<'py, PyAny>) -> PyResult<Vec<Entry<'py>>> {
     }
 }
 
-/// Whether something is a mapping. An exception while it is asked, Ctrl-C above all, is not
-/// an answer, as it is where PyO3 asks.
+/// Whether an object is a mapping. Unlike PyO3's check, passes on an exception during the
+/// check, above all Ctrl-C.
 fn is_mapping(found: &Bound<PyAny>) -> PyResult<bool> {
     if found.is_instance_of::<PyDict>() {
         return Ok(true);
@@ -126,17 +126,17 @@ fn is_mapping(found: &Bound<PyAny>) -> PyResult<bool> {
 fn name(key: &Bound<PyAny>, table: &str) -> PyResult<String> {
     match key.cast::<PyString>() {
         Ok(key) => Ok(key.to_cow()?.into_owned()),
-        Err(_) => Err(refuse_entry(key, table, "keys are texts")),
+        Err(_) => Err(entry_error(key, table, "keys are texts")),
     }
 }
 
-/// Where an entry stands: its table, empty at the top, and its key.
+/// The path of an entry: its table, empty at the top, and its key.
 #[derive(Clone, Copy)]
 struct Path<'a>(&'a str, &'a str);
 
 impl Path<'_> {
     fn refuse(self, entry: &Bound<PyAny>, allowed: &str) -> PyErr {
-        refuse_entry(entry, &self.to_string(), allowed)
+        entry_error(entry, &self.to_string(), allowed)
     }
 
     fn is_stiffness(self) -> bool {
@@ -153,9 +153,10 @@ impl fmt::Display for Path<'_> {
     }
 }
 
-/// Numbers keep every digit. What has `tolist`, as arrays and numbers of numpy do, is that list.
+/// Converts a value. Numbers keep every digit. Objects with `tolist`, as numpy arrays and
+/// numbers have, are converted by it.
 fn value(entry: &Bound<PyAny>, path: Path, depth: usize) -> PyResult<Value> {
-    if depth > DEEPEST {
+    if depth > MAX_DEPTH {
         return Err(path.refuse(entry, "lists stand too deep in each other"));
     }
     if let Ok(number) = entry.cast::<PyFloat>() {
@@ -166,7 +167,7 @@ fn value(entry: &Bound<PyAny>, path: Path, depth: usize) -> PyResult<Value> {
         whole(entry, path)
     } else if let Ok(words) = entry.cast::<PyString>() {
         Ok(match &*words.to_cow()? {
-            // As results have it in JSON, which knows no infinity.
+            // As in the JSON of results, which has no infinity.
             "inf" if path.is_stiffness() => Value::Float(f64::INFINITY),
             words => Value::String(words.into()),
         })
@@ -189,7 +190,7 @@ fn value(entry: &Bound<PyAny>, path: Path, depth: usize) -> PyResult<Value> {
     }
 }
 
-/// A whole number, or one that is so large that only its first digits count.
+/// A whole number, or a float if it is too large for one.
 fn whole(entry: &Bound<PyAny>, path: Path) -> PyResult<Value> {
     if let Ok(number) = entry.extract::<i64>() {
         return Ok(Value::Integer(number));
@@ -204,10 +205,10 @@ fn whole(entry: &Bound<PyAny>, path: Path) -> PyResult<Value> {
     }
 }
 
-/// A value as TOML. Numbers keep every digit, and are as short as they can be.
-struct Written<'a>(&'a Value);
+/// A value as TOML. Numbers keep every digit in the shortest form.
+struct Toml<'a>(&'a Value);
 
-impl fmt::Display for Written<'_> {
+impl fmt::Display for Toml<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self.0 {
             Value::Float(number) if number.is_nan() => f.write_str("nan"),
@@ -217,7 +218,7 @@ impl fmt::Display for Written<'_> {
                 f.write_char('[')?;
                 for (at, item) in list.iter().enumerate() {
                     let comma = if at > 0 { ", " } else { "" };
-                    write!(f, "{comma}{}", Written(item))?;
+                    write!(f, "{comma}{}", Toml(item))?;
                 }
                 f.write_char(']')
             }
@@ -225,7 +226,7 @@ impl fmt::Display for Written<'_> {
                 f.write_char('{')?;
                 for (at, (key, item)) in table.iter().enumerate() {
                     let comma = if at > 0 { "," } else { "" };
-                    write!(f, "{comma} {} = {}", quoted_key(key), Written(item))?;
+                    write!(f, "{comma} {} = {}", quoted_key(key), Toml(item))?;
                 }
                 f.write_str(" }")
             }

@@ -1,4 +1,4 @@
-//! What is refused, as exceptions.
+//! Converts errors to exceptions.
 
 use std::error::Error;
 
@@ -9,13 +9,13 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
 
-/// What messages call a text that is not from a file.
+/// The name in messages of a text that is not from a file.
 pub const TEXT: &str = "scenario";
 
 static SCENARIO_ERROR: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 
-/// A refused scenario: `leafdyn.ScenarioError`.
-pub fn refused(py: Python, error: &ScenarioError) -> PyErr {
+/// `leafdyn.ScenarioError`, for a refused scenario.
+pub fn scenario_error(py: Python, error: &ScenarioError) -> PyErr {
     let (file, line) = match &error.place {
         Place::File { file, line } => (Some(file.as_str()), *line),
         Place::Set { .. } => (None, None),
@@ -32,7 +32,7 @@ pub fn refused(py: Python, error: &ScenarioError) -> PyErr {
     }
 }
 
-/// What a message says to change: its end.
+/// The end of a message, which says what to change.
 fn remedy(problem: &str) -> Option<&str> {
     let sentence = problem.lines().next()?;
     if sentence.starts_with("not valid TOML") {
@@ -44,8 +44,8 @@ fn remedy(problem: &str) -> Option<&str> {
     }
 }
 
-/// Refuses what no TOML can be made of.
-pub fn refuse_entry(found: &Bound<PyAny>, key: &str, allowed: &str) -> PyErr {
+/// The exception for an entry that cannot be converted to TOML.
+pub fn entry_error(found: &Bound<PyAny>, key: &str, allowed: &str) -> PyErr {
     let kind = found.get_type().name();
     let kind = kind.map_or("an object".into(), |name| name.to_string());
     let problem = format!("{key} = {kind}: {allowed}");
@@ -58,18 +58,18 @@ pub fn refuse_entry(found: &Bound<PyAny>, key: &str, allowed: &str) -> PyErr {
         key: Key::from_path(key),
         problem,
     };
-    refused(found.py(), &error)
+    scenario_error(found.py(), &error)
 }
 
-/// A request that cannot be met: a `ValueError`.
-pub fn cannot(error: impl Error) -> PyErr {
+/// A `ValueError`, for a request that cannot be met.
+pub fn value_error(error: impl Error) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// A number that cannot vary, or a scenario refused for it.
-pub fn cannot_vary(py: Python, error: VaryError) -> PyErr {
+/// The exception for a number that cannot vary, or for a scenario refused with it.
+pub fn vary_error(py: Python, error: VaryError) -> PyErr {
     match error {
-        VaryError::Scenario(error) => refused(py, &error),
-        error => cannot(error),
+        VaryError::Scenario(error) => scenario_error(py, &error),
+        error => value_error(error),
     }
 }

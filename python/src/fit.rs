@@ -1,4 +1,4 @@
-//! From measurements to the numbers of a scenario.
+//! Fits numbers of a scenario to measurements.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use leafdyn::scenario;
 use leafdyn::study::{self, Data, Experiment, FitError, FitRequest, FitStep, Free};
 use pyo3::prelude::*;
 
-use crate::errors::{cannot, cannot_vary};
+use crate::errors::{value_error, vary_error};
 use crate::result::Files;
 use crate::run::run;
 use crate::scenario::Scenario;
@@ -14,7 +14,7 @@ use crate::scenario::Scenario;
 /// A table of measurements.
 #[derive(FromPyObject)]
 pub enum Measurements {
-    /// Its text, after what messages call it.
+    /// Its name in messages, and its text.
     Text(String, String),
     /// A file.
     File(PathBuf),
@@ -26,18 +26,18 @@ impl Measurements {
         match self {
             Measurements::Text(name, text) => Ok((name, text)),
             Measurements::File(path) => {
-                let text = scenario::text(&path).map_err(cannot)?;
+                let text = scenario::text(&path).map_err(value_error)?;
                 Ok((path.display().to_string(), text))
             }
         }
     }
 }
 
-/// A fit that cannot be.
-fn refused(py: Python, error: FitError) -> PyErr {
+/// The exception for a fit that cannot be made.
+fn fit_error(py: Python, error: FitError) -> PyErr {
     match error {
-        FitError::Vary(error) => cannot_vary(py, error),
-        error => cannot(error),
+        FitError::Vary(error) => vary_error(py, error),
+        error => value_error(error),
     }
 }
 
@@ -60,7 +60,7 @@ pub fn fit(
         let (name, text) = table.read()?;
         measured
             .read(&text, &name, rods)
-            .map_err(|error| refused(py, error))?;
+            .map_err(|error| fit_error(py, error))?;
     }
     let free: Result<Vec<Free>, FitError> = free.iter().map(|number| number.parse()).collect();
     let candidates: Option<Vec<Experiment>> = match candidates {
@@ -68,13 +68,13 @@ pub fn fit(
         Some(table) => {
             let (name, text) = table.read()?;
             let candidates = FitRequest::read_candidates(&text, &name);
-            Some(candidates.map_err(|error| refused(py, error))?)
+            Some(candidates.map_err(|error| fit_error(py, error))?)
         }
     };
     let mut request = FitRequest {
         base: scenario.base(py)?,
         data: measured,
-        free: free.map_err(|error| refused(py, error))?,
+        free: free.map_err(|error| fit_error(py, error))?,
         robust,
         candidates: candidates.unwrap_or_default(),
         tolerance,
@@ -84,11 +84,11 @@ pub fn fit(
         request.limit = monitor.limit();
         study::fit(&request, &mut |now| {
             let FitStep { step, sum, .. } = *now;
-            monitor.say_or_end(step as f64, None, || {
+            monitor.report_or_end(step as f64, None, || {
                 format!("step {step}, sum of squares {sum:.6e}")
             });
         })
     })?;
-    let fit = found.map_err(|error| refused(py, error))?;
+    let fit = found.map_err(|error| fit_error(py, error))?;
     Ok(Files::of(fit, scenario.checked.clone()))
 }

@@ -1,5 +1,5 @@
-//! `leafdyn._leafdyn`: what the package `leafdyn` for Python is made of. Computations, arrays and
-//! the contents of files; how they are shown and documented is in the package.
+//! `leafdyn._leafdyn`: the native module of the Python package `leafdyn`. It has computations, arrays
+//! and the contents of files; their presentation and documentation are in the package.
 
 use pyo3::prelude::*;
 

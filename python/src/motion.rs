@@ -16,8 +16,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{Array, array, flat};
-use crate::errors::cannot;
-use crate::result::{Files, cannot_write, chosen};
+use crate::errors::value_error;
+use crate::result::{Files, chosen, write_error};
 use crate::run::{elapsed, on_pool, run};
 use crate::scenario::Scenario;
 
@@ -34,7 +34,7 @@ pub struct Motion {
 
 struct State {
     simulation: Simulation,
-    /// Those since the beginning, if they are kept.
+    /// The outputs since time 0, if they are kept.
     frames: Vec<Frame>,
     stopped: Option<Stopped>,
 }
@@ -106,7 +106,7 @@ impl Motion {
         let (leaf, asked) = (scenario.clone(), options.clone());
         let simulation = run(py, None, move |_| Simulation::new(&leaf, &asked))?;
         let state = State {
-            simulation: simulation.map_err(cannot)?,
+            simulation: simulation.map_err(value_error)?,
             frames: Vec::new(),
             stopped: None,
         };
@@ -139,7 +139,7 @@ impl Motion {
                     }
                 }
                 let time = simulation.time();
-                monitor.say(time, Some(duration), || {
+                monitor.report(time, Some(duration), || {
                     format!("t = {time:.4} of {duration}, {}", elapsed(clock))
                 });
             }
@@ -220,7 +220,7 @@ impl Motion {
             let record = recording.record(&state.simulation, state.stopped)?;
             Ok(recording.finish(&Document::new(&record, &self.scenario, None))?)
         })?;
-        written.map_err(|error: Box<dyn Error + Send + Sync>| cannot_write(error))
+        written.map_err(|error: Box<dyn Error + Send + Sync>| write_error(error))
     }
 }
 

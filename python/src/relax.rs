@@ -1,4 +1,4 @@
-//! Leaves that come to rest.
+//! Relaxation of leaves.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -13,15 +13,15 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use crate::errors::{cannot, cannot_vary};
+use crate::errors::{value_error, vary_error};
 use crate::result::Leaf;
 use crate::run::{Monitor, elapsed, run, run_here};
 use crate::scenario::Scenario;
 
-/// Most parts that stations can cut a vein into.
+/// Most parts into which stations can divide a vein.
 const MOST_STATIONS: usize = 1_000_000;
 
-/// What is asked of a relaxation besides its scenario.
+/// Options of a relaxation.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Asked {
@@ -34,18 +34,18 @@ pub struct Asked {
     modes: usize,
     mode_shapes: bool,
     stations: Option<usize>,
-    /// Numbers by which derivatives are found; only of one leaf.
+    /// Numbers with respect to which derivatives are computed; for one leaf only.
     sensitivity: Vec<String>,
-    /// Whether it is found how far it is from losing its stability; only of one leaf.
+    /// Whether the stability margin is computed; for one leaf only.
     margin: bool,
 }
 
-/// Refuses what cannot be asked.
+/// Refuses a request with a `ValueError`.
 pub fn refuse<T>(message: impl Into<String>) -> PyResult<T> {
     Err(PyValueError::new_err(message.into()))
 }
 
-/// Refuses a number of stations that is none, or too large to be meant.
+/// Refuses a number of stations that is zero or unreasonably large.
 pub fn check_stations(found: Option<usize>) -> PyResult<()> {
     match found {
         Some(found) if !(1..=MOST_STATIONS).contains(&found) => refuse(format!(
@@ -56,7 +56,7 @@ pub fn check_stations(found: Option<usize>) -> PyResult<()> {
 }
 
 impl Asked {
-    /// The method with its own options; refused where they do not fit each other.
+    /// The method with its options; refused if they do not fit the method.
     fn method(&self) -> PyResult<Method> {
         let method: Method = self
             .method
@@ -92,23 +92,23 @@ impl Asked {
     }
 }
 
-/// Says how far a relaxation has come, step by step.
-pub fn heard<'a>(monitor: &'a Monitor, name: &'a str) -> impl FnMut(&Progress) + 'a {
+/// Reports every step of a relaxation to a monitor.
+pub fn reporter<'a>(monitor: &'a Monitor, name: &'a str) -> impl FnMut(&Progress) + 'a {
     move |progress| {
         let (Progress::Relaxing { step, .. }
         | Progress::Shooting(Correction {
             iteration: step, ..
         })) = progress;
-        monitor.say(*step as f64, None, || format!("{name}: {progress}"));
+        monitor.report(*step as f64, None, || format!("{name}: {progress}"));
     }
 }
 
-/// Most rods of a leaf that may be solved by the thread that asks, and most nodes of its grid
-/// there: a step on it takes milliseconds.
+/// Most rods of a leaf that may be solved on the calling thread, and most nodes of its grid: a
+/// step then takes milliseconds.
 const FEW_RODS: usize = 8;
 const FEW_NODES: usize = 4096;
 
-/// Solves a leaf on this thread, if all of it is short steps.
+/// Solves a leaf on the calling thread if all steps are short; otherwise returns `None`.
 fn solve_here(
     py: Python,
     scenario: &scenario::Scenario,
@@ -118,20 +118,20 @@ fn solve_here(
 ) -> PyResult<Option<Result<Equilibrium, RelaxError>>> {
     let rods = scenario.rods.len();
     let few = |segments: usize| rods.saturating_mul(segments) <= FEW_NODES;
-    let steps = matches!(options.method, Method::SemiImplicit(_)) && options.modes == 0;
-    if !steps || rods > FEW_RODS || !few(asked.segments.unwrap_or(0)) {
+    let short_steps = matches!(options.method, Method::SemiImplicit(_)) && options.modes == 0;
+    if !short_steps || rods > FEW_RODS || !few(asked.segments.unwrap_or(0)) {
         return Ok(None);
     }
     let mut options = options.clone();
     let found = run_here(py, progress, |monitor, step| {
         options.limit = monitor.limit();
         let mut large = false;
-        let mut say = heard(monitor, &scenario.name);
+        let mut report = reporter(monitor, &scenario.name);
         let found = relax::relax(scenario, &options, &mut |progress| {
-            say(progress);
+            report(progress);
             step(monitor);
             if matches!(progress, Progress::Relaxing { grid, .. } if !few(*grid)) {
-                // It begins anew elsewhere, which costs little beside what is to come.
+                // It restarts on the pool, which costs little compared with the remaining steps.
                 large = true;
                 monitor.cancel();
             }
@@ -156,40 +156,44 @@ pub fn relax_one(
         let scenario = input.clone();
         let found = run(py, progress, move |monitor| {
             options.limit = monitor.limit();
-            let mut say = heard(monitor, &scenario.name);
-            let mut tell = |progress: &MarginProgress| match progress {
-                MarginProgress::Relaxing(progress) => say(progress),
+            let mut report = reporter(monitor, &scenario.name);
+            let mut report_margin = |progress: &MarginProgress| match progress {
+                MarginProgress::Relaxing(progress) => report(progress),
                 MarginProgress::Searching { done, all, .. } => {
-                    monitor.say(*done as f64, Some(*all as f64), || {
+                    monitor.report(*done as f64, Some(*all as f64), || {
                         format!("{}: {done} of {all} searches", scenario.name)
                     });
                 }
             };
-            study::relax_with_margin(&scenario, &options, &mut tell)
+            study::relax_with_margin(&scenario, &options, &mut report_margin)
         })?;
-        found.map_err(cannot)?
+        found.map_err(value_error)?
     } else if asked.sensitivity.is_empty() {
         if let Some(found) = solve_here(py, &input, &asked, &options, progress)? {
-            return Ok(Leaf::new(found.map_err(cannot)?, input, asked.stations));
+            return Ok(Leaf::new(
+                found.map_err(value_error)?,
+                input,
+                asked.stations,
+            ));
         }
         let scenario = input.clone();
         let found = run(py, progress, move |monitor| {
             options.limit = monitor.limit();
-            relax::relax(&scenario, &options, &mut heard(monitor, &scenario.name))
+            relax::relax(&scenario, &options, &mut reporter(monitor, &scenario.name))
         })?;
-        found.map_err(cannot)?
+        found.map_err(value_error)?
     } else {
         let keys: Result<Vec<Keys>, _> = asked.sensitivity.iter().map(|key| key.parse()).collect();
-        let keys = keys.map_err(|error| cannot_vary(py, error))?;
+        let keys = keys.map_err(|error| vary_error(py, error))?;
         let base = scenario.base(py)?;
         let found = run(py, progress, move |monitor| {
             options.limit = monitor.limit();
             let name = base.scenario().name.clone();
-            study::relax_with_sensitivities(&base, &keys, &options, &mut heard(monitor, &name))
+            study::relax_with_sensitivities(&base, &keys, &options, &mut reporter(monitor, &name))
         })?;
         found.map_err(|error| match error {
-            SensitivityError::Vary(error) => cannot_vary(py, error),
-            error => cannot(error),
+            SensitivityError::Vary(error) => vary_error(py, error),
+            error => value_error(error),
         })?
     };
     Ok(Leaf::new(found, input, asked.stations))
@@ -214,16 +218,16 @@ pub fn relax_many(
         let one = |scenario: &Arc<scenario::Scenario>| {
             let found = relax::relax(scenario, &options, &mut |_| {});
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            monitor.say(done as f64, Some(all as f64), || {
+            monitor.report(done as f64, Some(all as f64), || {
                 format!("{done} of {all} leaves, {}", elapsed(clock))
             });
             found
         };
-        // One by one: a leaf may take a thousand times as long as its neighbour.
+        // One by one: a leaf may take a thousand times as long as the next.
         let leaves = scenarios.par_iter().with_max_len(1).map(one);
         leaves.collect::<Result<Vec<Equilibrium>, RelaxError>>()
     })?;
-    let leaves = found.map_err(cannot)?.into_iter().zip(inputs);
+    let leaves = found.map_err(value_error)?.into_iter().zip(inputs);
     let leaf = |(found, input)| Leaf::new(found, input, asked.stations);
     Ok(leaves.map(leaf).collect())
 }

@@ -1,4 +1,4 @@
-//! Results: a leaf at rest, and what stands in the files of any result.
+//! Results: a leaf at rest, and the contents of the files of any result.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
@@ -14,7 +14,7 @@ use pyo3::types::{PyBytes, PyDict};
 use crate::arrays::{Array, array, curves, flat, nodes, vectors};
 use crate::run::on_pool;
 
-/// A result that files are written of, whatever it is.
+/// Any result that can be written to files.
 trait Contents: Send + Sync {
     fn names(&self) -> Vec<&'static str>;
     fn contents(&self, input: &Scenario, name: &str) -> Option<Vec<u8>>;
@@ -48,21 +48,22 @@ fn save(
 ) -> PyResult<Vec<PathBuf>> {
     let kinds = chosen(kinds);
     let saved = on_pool(py, || result.save(input, folder, &kinds))?;
-    saved.map_err(cannot_write)
+    saved.map_err(write_error)
 }
 
-/// A file that cannot be written. Options are the program's.
-pub fn cannot_write(error: impl ToString) -> PyErr {
+/// An `OSError`, for a file that cannot be written; its message mentions no options of the
+/// program.
+pub fn write_error(error: impl ToString) -> PyErr {
     PyOSError::new_err(error.to_string().replace(" with --out DIR", ""))
 }
 
-/// Kinds by their words.
+/// Kinds of files by their names.
 pub fn chosen(words: &[String]) -> Vec<Kind> {
     let wanted = |kind: &Kind| words.iter().any(|word| word == kind.word());
     Kind::ALL.into_iter().filter(wanted).collect()
 }
 
-/// What the interpreter need not wait for: a picture takes its time.
+/// The contents of a file, made without the interpreter's lock, as pictures take long.
 fn read<'py>(
     py: Python<'py>,
     result: &(impl Contents + ?Sized),
@@ -88,7 +89,7 @@ pub struct Files {
 }
 
 impl Files {
-    /// Of a result, made from a scenario.
+    /// The files of a result of the scenario `input`.
     pub fn of(result: impl Written + Send, input: Arc<Scenario>) -> Self {
         let result = Box::new(result);
         Files { result, input }
@@ -122,12 +123,13 @@ pub struct Leaf {
     found: Equilibrium,
     input: Arc<Scenario>,
     stations: Option<usize>,
-    /// The same at the stations that are shown, as soon as somebody looks at them.
+    /// The leaf at the shown stations, interpolated on demand.
     shown: OnceLock<Equilibrium>,
 }
 
 impl Leaf {
-    /// Shown at so many parts of equal length, or at the nodes of the finest grid.
+    /// A leaf shown at stations that divide veins into this number of equal parts, or at the
+    /// nodes of the finest grid.
     pub fn new(found: Equilibrium, input: Arc<Scenario>, stations: Option<usize>) -> Self {
         Leaf {
             found,
@@ -137,7 +139,7 @@ impl Leaf {
         }
     }
 
-    /// Shown at the stations where it was found.
+    /// A leaf shown at its own stations.
     pub fn as_found(found: Equilibrium, input: Arc<Scenario>) -> Self {
         Leaf {
             shown: found.clone().into(),
@@ -145,7 +147,7 @@ impl Leaf {
         }
     }
 
-    /// How it ended: at stations that were asked for the tolerance may not be kept.
+    /// The leaf with its final outcome: at requested stations the tolerance may be exceeded.
     fn ended(&self, py: Python) -> &Equilibrium {
         match self.stations {
             Some(_) => self.shown(py),

@@ -1,7 +1,7 @@
-//! Computations outside the interpreter: on a pool of threads of their own, while the thread that
-//! asked waits without the interpreter's lock and looks for Ctrl-C. To wake up another thread, and
-//! then this one again, takes as long as a part of a small leaf: what is made of short steps is
-//! done by the thread that asked, which looks for Ctrl-C between them.
+//! Computations outside the interpreter, on a separate pool of threads, while the calling thread
+//! waits without the interpreter's lock and checks for Ctrl-C. Switching to another thread and back
+//! takes a considerable part of the time of a small leaf, so computations in short steps run on the
+//! calling thread, which checks for Ctrl-C between them.
 
 use std::any::Any;
 use std::cell::OnceCell;
@@ -18,13 +18,13 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// Between two looks for signals and at how far a run has come.
-const LOOK: Duration = Duration::from_millis(10);
+/// Interval between checks for signals and progress.
+const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Most threads that can be asked for.
+/// Most threads that can be requested.
 const MOST_THREADS: usize = 1024;
 
-/// The threads that compute. A process that was forked has none of its parent's and makes new ones.
+/// The threads that compute. A forked process does not inherit them and makes new ones.
 struct Pool {
     process: u32,
     threads: Arc<ThreadPool>,
@@ -40,7 +40,7 @@ fn pool(wanted: Option<usize>) -> PyResult<Arc<ThreadPool>> {
     {
         return Ok(known.threads.clone());
     }
-    // Left out, the number is that of RAYON_NUM_THREADS, or of the processors.
+    // By default the number is RAYON_NUM_THREADS, or that of the processors.
     let threads = ThreadPoolBuilder::new()
         .num_threads(wanted.unwrap_or(0))
         .thread_name(|_| "leafdyn".into())
@@ -54,7 +54,7 @@ fn pool(wanted: Option<usize>) -> PyResult<Arc<ThreadPool>> {
     if let Some(old) = pool.replace(new)
         && old.process != process
     {
-        // Its threads are those of another process and cannot be told to end.
+        // Its threads belong to another process and cannot be stopped.
         mem::forget(old);
     }
     Ok(threads)
@@ -82,14 +82,14 @@ pub fn panic_on_purpose(py: Python) -> PyResult<()> {
     run(py, None, |_| panic!("on purpose"))
 }
 
-/// How far a run has come: how much is done, of how much if that is known, and in words.
-type Said = (f64, Option<f64>, String);
+/// The progress of a run: the completed amount, the total if known, and a message.
+type Report = (f64, Option<f64>, String);
 
-/// What a run and the thread that waits for it have in common.
+/// The state shared by a run and the thread that waits for it.
 #[derive(Default)]
 pub struct Monitor {
-    heard: bool,
-    said: Mutex<Option<Said>>,
+    has_listener: bool,
+    latest: Mutex<Option<Report>>,
     cancel: Arc<AtomicBool>,
 }
 
@@ -111,101 +111,104 @@ impl Monitor {
         self.cancel.load(Ordering::Relaxed)
     }
 
-    /// Says how far the run has come, if anybody hears it.
-    pub fn say(&self, done: f64, total: Option<f64>, words: impl FnOnce() -> String) {
-        if self.heard {
-            *self.said() = Some((done, total, words()));
+    /// Reports the progress of the run, if there is a listener.
+    pub fn report(&self, done: f64, total: Option<f64>, words: impl FnOnce() -> String) {
+        if self.has_listener {
+            *self.latest() = Some((done, total, words()));
         }
     }
 
-    /// As [`Monitor::say`], for what has no limit: ends the run here if it was cancelled.
-    pub fn say_or_end(&self, done: f64, total: Option<f64>, words: impl FnOnce() -> String) {
+    /// As [`Monitor::report`], for a computation without a limit: ends the run if it was
+    /// cancelled.
+    pub fn report_or_end(&self, done: f64, total: Option<f64>, words: impl FnOnce() -> String) {
         if self.cancelled() {
-            // Nobody waits for it. No message is printed of what is resumed.
+            // Nothing waits for the result, and resumed panics print no message.
             resume_unwind(Box::new("cancelled"));
         }
-        self.say(done, total, words);
+        self.report(done, total, words);
     }
 
-    fn said(&self) -> MutexGuard<'_, Option<Said>> {
-        self.said.lock().unwrap_or_else(PoisonError::into_inner)
+    fn latest(&self) -> MutexGuard<'_, Option<Report>> {
+        self.latest.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn tell(&self, progress: Option<&Bound<PyAny>>) -> PyResult<()> {
-        let said = self.said().take();
-        if let (Some(progress), Some(said)) = (progress, said) {
-            progress.call1(said)?;
+    /// Passes the latest report on to `progress`.
+    fn forward(&self, progress: Option<&Bound<PyAny>>) -> PyResult<()> {
+        let latest = self.latest().take();
+        if let (Some(progress), Some(report)) = (progress, latest) {
+            progress.call1(report)?;
         }
         Ok(())
     }
 }
 
+/// The thread that loaded the package.
 static FIRST: OnceLock<ThreadId> = OnceLock::new();
 
 thread_local! {
-    static ALONE: OnceCell<bool> = const { OnceCell::new() };
+    /// Whether this thread has a pool of its own.
+    static OWN_POOL: OnceCell<bool> = const { OnceCell::new() };
 }
 
-/// Remembers the thread that is here when the interpreter loads the package: that which hears
-/// Ctrl-C, as a rule.
+/// Remembers the thread that loads the package, which usually is the one that receives Ctrl-C.
 pub fn remember_first_thread() {
     let _ = FIRST.set(thread::current().id());
 }
 
-/// Whether this thread may compute: the first may. It is then a pool of its own, so that what is
-/// computed here wakes up no other threads, whose number others set and a fork has none of.
-fn computes_here() -> bool {
+/// Whether this thread may compute: only the first one may. It then is a pool of its own, so that
+/// computations here use no other threads, whose number others set and which a fork lacks.
+fn may_compute() -> bool {
     if FIRST.get() != Some(&thread::current().id()) {
         return false;
     }
     let build = || {
-        let alone = ThreadPoolBuilder::new().num_threads(1).use_current_thread();
+        let own = ThreadPoolBuilder::new().num_threads(1).use_current_thread();
         // It lasts as long as the thread.
-        alone.build().map(mem::forget).is_ok()
+        own.build().map(mem::forget).is_ok()
     };
-    ALONE.with(|alone| *alone.get_or_init(build))
+    OWN_POOL.with(|own| *own.get_or_init(build))
 }
 
-/// Does what is of the program alone, which counts threads: on the pool.
+/// Does `work` on the pool, whose number of threads the program takes into account.
 pub fn on_pool<T: Send>(py: Python, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     let pool = pool(None)?;
     Ok(py.detach(|| pool.install(work)))
 }
 
-/// What a run on this thread says at each of its steps.
+/// Called by a run on this thread after each of its steps.
 pub type Step<'a> = &'a mut dyn FnMut(&Monitor);
 
 /// Does `work` on this thread, if it may: work that calls its `Step` often, several times in
-/// [`LOOK`], and ends when its monitor is cancelled. Ctrl-C, and an exception of `progress`,
+/// [`POLL_INTERVAL`], and ends when its monitor is cancelled. Ctrl-C, and an exception of `progress`,
 /// cancel it.
 pub fn run_here<T: Send>(
     py: Python,
     progress: Option<&Bound<PyAny>>,
     work: impl FnOnce(&Monitor, Step) -> T + Send,
 ) -> PyResult<Option<T>> {
-    if !computes_here() {
+    if !may_compute() {
         return Ok(None);
     }
     let monitor = Monitor {
-        heard: progress.is_some(),
+        has_listener: progress.is_some(),
         ..Monitor::default()
     };
     let listener = progress.map(|progress| progress.clone().unbind());
     let (found, stop) = py.detach(|| {
-        let (mut looked, mut stop) = (Instant::now(), None);
+        let (mut polled, mut stop) = (Instant::now(), None);
         let mut step = |monitor: &Monitor| {
-            if looked.elapsed() < LOOK || stop.is_some() {
+            if polled.elapsed() < POLL_INTERVAL || stop.is_some() {
                 return;
             }
-            let look = Python::attach(|py| {
+            let poll = Python::attach(|py| {
                 py.check_signals()?;
-                monitor.tell(listener.as_ref().map(|it| it.bind(py)))
+                monitor.forward(listener.as_ref().map(|it| it.bind(py)))
             });
-            if let Err(why) = look {
+            if let Err(why) = poll {
                 stop = Some(why);
                 monitor.cancel();
             }
-            looked = Instant::now();
+            polled = Instant::now();
         };
         let found = catch_unwind(AssertUnwindSafe(|| work(&monitor, &mut step)));
         (found.map_err(|panic| panicked(&*panic)), stop)
@@ -213,7 +216,7 @@ pub fn run_here<T: Send>(
     match stop {
         Some(stop) => Err(stop),
         None => {
-            monitor.tell(progress)?;
+            monitor.forward(progress)?;
             found.map(Some)
         }
     }
@@ -226,37 +229,37 @@ pub fn run<T: Send + 'static>(
     work: impl FnOnce(&Monitor) -> T + Send + 'static,
 ) -> PyResult<T> {
     let monitor = Arc::new(Monitor {
-        heard: progress.is_some(),
+        has_listener: progress.is_some(),
         ..Monitor::default()
     });
     let (done, mut result) = sync_channel(1);
     let seen = monitor.clone();
     pool(None)?.spawn(move || {
         let found = catch_unwind(AssertUnwindSafe(|| work(&seen)));
-        // After Ctrl-C nobody may wait for it.
+        // After Ctrl-C nothing waits for it.
         let _ = done.send(found);
     });
     loop {
         let received;
-        (received, result) = py.detach(move || (result.recv_timeout(LOOK), result));
+        (received, result) = py.detach(move || (result.recv_timeout(POLL_INTERVAL), result));
         match received {
             Ok(Ok(found)) => {
-                monitor.tell(progress)?;
+                monitor.forward(progress)?;
                 return Ok(found);
             }
             Ok(Err(panic)) => return Err(panicked(&*panic)),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => return Err(panicked(&"a thread ended")),
         }
-        if let Err(stop) = py.check_signals().and_then(|()| monitor.tell(progress)) {
-            // It ends soon by itself, and may have much to free: nobody waits for that.
+        if let Err(stop) = py.check_signals().and_then(|()| monitor.forward(progress)) {
+            // It ends soon by itself. Freeing its memory may take long and is not waited for.
             monitor.cancel();
             return Err(stop);
         }
     }
 }
 
-/// A fault of this program as an exception.
+/// A `RuntimeError`, for a panic.
 fn panicked(panic: &(dyn Any + Send)) -> PyErr {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
@@ -266,7 +269,7 @@ fn panicked(panic: &(dyn Any + Send)) -> PyErr {
     ))
 }
 
-/// The time on the clock since something began, in words.
+/// Formats the time elapsed on a clock.
 pub fn elapsed(clock: Instant) -> String {
     format!("{:.0} s", clock.elapsed().as_secs_f64())
 }

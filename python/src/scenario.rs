@@ -1,4 +1,4 @@
-//! Scenarios: a text or a dictionary, what is replaced in it, and the checked leaf.
+//! Scenarios: a text or a dictionary, its overrides, and the checked result.
 
 use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
@@ -8,7 +8,7 @@ use leafdyn::study::Base;
 use pyo3::prelude::*;
 
 use crate::dictionary::Document;
-use crate::errors::{TEXT, cannot_vary, refused};
+use crate::errors::{TEXT, scenario_error, vary_error};
 
 /// A checked scenario, with what it is from.
 #[pyclass(frozen, module = "leafdyn._leafdyn")]
@@ -19,14 +19,14 @@ pub struct Scenario {
     pub checked: Arc<scenario::Scenario>,
 }
 
-/// What a scenario is from, before entries are replaced.
+/// The source of a scenario, before overrides.
 struct Source {
     /// The dictionary, if it is one.
     document: Option<Document>,
-    /// The text; of a dictionary as soon as somebody looks at it.
+    /// The text; that of a dictionary is made on demand.
     text: OnceLock<String>,
     file: String,
-    /// Its entries, as soon as some are replaced: none if they cannot be read.
+    /// Its entries, made when some are replaced; `None` if they cannot be parsed.
     entries: OnceLock<Option<Entries>>,
 }
 
@@ -55,15 +55,15 @@ impl Source {
         self.entries.get_or_init(read).as_ref()
     }
 
-    /// The leaf, without its text being read if that can be: where it is refused the text
-    /// says why. Every key of one that is `known` has been looked at.
+    /// The checked scenario, without parsing the text where possible; if it is refused the
+    /// text is parsed for the reason. If it is `known`, all its keys have been checked.
     fn checked(
         &self,
         py: Python,
         overrides: &[String],
         known: bool,
     ) -> PyResult<scenario::Scenario> {
-        let at_once = match (overrides, &self.document) {
+        let direct = match (overrides, &self.document) {
             ([], Some(document)) => document.entries().and_then(|all| all.scenario()),
             ([_, ..], document) if known || document.is_some() => {
                 let replaced = self.entries().and_then(|all| all.replaced(overrides));
@@ -71,18 +71,18 @@ impl Source {
             }
             _ => None,
         };
-        if let Some(found) = at_once {
+        if let Some(found) = direct {
             return Ok(found);
         }
-        // Settings of methods are no entries of the leaf, but are kept with it.
+        // Settings of methods are not entries of the scenario, but are kept with it.
         let of_method = |entry: &String| entry.trim_start().starts_with("method.");
         if overrides.iter().any(of_method) {
             let base = Base::of_text(self.text().into(), self.file.clone(), overrides);
-            let base = base.map_err(|error| cannot_vary(py, error))?;
+            let base = base.map_err(|error| vary_error(py, error))?;
             return Ok(base.scenario().clone());
         }
         let found = scenario::Scenario::from_toml_with(self.text(), &self.file, overrides);
-        found.map_err(|error| refused(py, &error))
+        found.map_err(|error| scenario_error(py, &error))
     }
 }
 
@@ -104,7 +104,7 @@ impl Scenario {
     /// A scenario from a file.
     #[staticmethod]
     fn read(py: Python, path: PathBuf, overrides: Vec<String>) -> PyResult<Self> {
-        let text = scenario::text(&path).map_err(|error| refused(py, &error))?;
+        let text = scenario::text(&path).map_err(|error| scenario_error(py, &error))?;
         Scenario::new(py, text, overrides, Some(path.display().to_string()))
     }
 
@@ -178,10 +178,10 @@ impl Scenario {
         })
     }
 
-    /// The same, for numbers that vary.
+    /// The scenario as a base for varied numbers.
     pub fn base(&self, py: Python) -> PyResult<Base> {
         let (text, file) = (self.source.text().to_string(), self.source.file.clone());
         let base = Base::of_text(text, file, &self.overrides);
-        base.map_err(|error| cannot_vary(py, error))
+        base.map_err(|error| vary_error(py, error))
     }
 }

@@ -1,4 +1,4 @@
-//! What is built on leaves at rest, and the program.
+//! Studies of leaves at rest, and the program itself.
 
 use std::ffi::OsString;
 use std::time::Instant;
@@ -12,14 +12,14 @@ use leafdyn::{cli, scenario};
 use pyo3::prelude::*;
 
 use crate::arrays::{array, curves, nodes};
-use crate::errors::{cannot, cannot_vary};
-use crate::relax::{check_stations, heard, refuse};
+use crate::errors::{value_error, vary_error};
+use crate::relax::{check_stations, refuse, reporter};
 use crate::result::{Files, Leaf};
 use crate::run::{elapsed, on_pool, run};
 use crate::scenario::Scenario;
 
-/// A check: its files, the relaxed leaf, and if there is one the boundary-value solution: its
-/// stations and positions.
+/// A check: its files, the relaxed leaf, and the stations and positions of the boundary-value
+/// solution, if there is one.
 type Checked<'py> = (Files, Leaf, Option<[Bound<'py, PyAny>; 2]>);
 
 /// Has a leaf confirmed by an independent method.
@@ -41,9 +41,9 @@ pub fn check<'py>(
             intervals,
             limit: monitor.limit(),
         };
-        study::check(&scenario, &options, &mut heard(monitor, &scenario.name))
+        study::check(&scenario, &options, &mut reporter(monitor, &scenario.name))
     })?;
-    let check = found.map_err(cannot)?;
+    let check = found.map_err(value_error)?;
     let solution = match check.solution() {
         None => None,
         Some(solution) => {
@@ -56,8 +56,8 @@ pub fn check<'py>(
     Ok((Files::of(check, input), leaf, solution))
 }
 
-/// Equilibria: the files of all, and each with the number of starts that ended there and whether
-/// the plain one is among them.
+/// All equilibria: their files, and each leaf with the number of starts that ended there and
+/// whether the plain one is among them.
 type All = (Files, Vec<(Leaf, usize, bool)>);
 
 /// Looks for all equilibria of a leaf.
@@ -78,14 +78,14 @@ pub fn all_shapes(
             full_model,
             ..SemiImplicit::default()
         };
-        let mut heard = |starts: usize, found: usize| {
-            monitor.say(starts as f64, None, || {
+        let mut report = |starts: usize, found: usize| {
+            monitor.report(starts as f64, None, || {
                 format!("{starts} starts, {found} equilibria")
             });
         };
-        study::all(&scenario, how, tolerance, &monitor.limit(), &mut heard)
+        study::all(&scenario, how, tolerance, &monitor.limit(), &mut report)
     })?;
-    let mut all = found.map_err(cannot)?;
+    let mut all = found.map_err(value_error)?;
     for one in &mut all.found {
         one.equilibrium = one.equilibrium.clone().at_stations(&input, stations);
     }
@@ -101,7 +101,7 @@ pub fn all_shapes(
 /// points of each branch, or curve.
 type Traced<'py> = (Files, bool, Option<String>, Vec<Vec<Bound<'py, PyAny>>>);
 
-/// What is asked of a trace besides its scenario and what varies.
+/// Options of a trace.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Asked {
@@ -115,7 +115,7 @@ pub struct Asked {
 
 impl Asked {
     fn request(&self, py: Python, scenario: &Scenario, vary: &str) -> PyResult<TraceRequest> {
-        let vary: Vary = vary.parse().map_err(|error| cannot_vary(py, error))?;
+        let vary: Vary = vary.parse().map_err(|error| vary_error(py, error))?;
         Ok(TraceRequest {
             base: scenario.base(py)?,
             vary,
@@ -129,10 +129,10 @@ impl Asked {
     }
 }
 
-fn cannot_trace(py: Python, error: TraceError) -> PyErr {
+fn trace_error(py: Python, error: TraceError) -> PyErr {
     match error {
-        TraceError::Scenario(error) => cannot_vary(py, error),
-        error => cannot(error),
+        TraceError::Scenario(error) => vary_error(py, error),
+        error => value_error(error),
     }
 }
 
@@ -147,14 +147,14 @@ pub fn trace<'py>(
 ) -> PyResult<Traced<'py>> {
     let request = asked.request(py, scenario, vary)?;
     let found = run(py, progress, move |monitor| {
-        let mut heard = |branch: usize, points: usize, value: f64| {
-            monitor.say_or_end(points as f64, None, || {
+        let mut report = |branch: usize, points: usize, value: f64| {
+            monitor.report_or_end(points as f64, None, || {
                 format!("branch {}, {points} points, at {value:.6}", branch + 1)
             });
         };
-        study::trace(&request, &mut heard)
+        study::trace(&request, &mut report)
     })?;
-    let trace = found.map_err(|error| cannot_trace(py, error))?;
+    let trace = found.map_err(|error| trace_error(py, error))?;
     let branches = trace.branches.iter();
     let lines: PyResult<Vec<Vec<_>>> = branches
         .map(|branch| {
@@ -180,18 +180,18 @@ pub fn boundary<'py>(
     let request = BoundaryRequest {
         map: None,
         trace: asked.request(py, scenario, along)?,
-        across: across.parse().map_err(|error| cannot_vary(py, error))?,
+        across: across.parse().map_err(|error| vary_error(py, error))?,
     };
     let found = run(py, progress, move |monitor| {
-        let mut heard = |curve: Option<usize>, points: usize, [first, second]: [f64; 2]| {
-            monitor.say_or_end(points as f64, None, || {
+        let mut report = |curve: Option<usize>, points: usize, [first, second]: [f64; 2]| {
+            monitor.report_or_end(points as f64, None, || {
                 let what = curve.map_or("trace".into(), |curve| format!("curve {}", curve + 1));
                 format!("{what}, {points} points, at {first:.6}, {second:.6}")
             });
         };
-        study::boundary(&request, &mut heard)
+        study::boundary(&request, &mut report)
     })?;
-    let boundary = found.map_err(|error| cannot_trace(py, error))?;
+    let boundary = found.map_err(|error| trace_error(py, error))?;
     let lines: PyResult<Vec<Vec<_>>> = (boundary.curves.iter())
         .map(|curve| {
             let points = curve.points.iter();
@@ -226,12 +226,12 @@ pub fn map(
         .or_else(|error| refuse(format!("show = {error}")))?;
     let request = MapRequest::new(
         scenario.base(py)?,
-        axes.map_err(|error| cannot_vary(py, error))?,
+        axes.map_err(|error| vary_error(py, error))?,
         methods.transpose()?,
         tolerance,
         cell_seconds.unwrap_or(CELL_SECONDS),
     );
-    let mut request = request.map_err(cannot)?;
+    let mut request = request.map_err(value_error)?;
     let mut map = run(py, progress, move |monitor| {
         request.limit = monitor.limit();
         let todo: Vec<_> = (0..request.cells())
@@ -242,7 +242,7 @@ pub fn map(
             rows.extend(new);
             done += 1;
             let cells = todo.len();
-            monitor.say(f64::from(done), Some(cells as f64), || {
+            monitor.report(f64::from(done), Some(cells as f64), || {
                 format!("{done} of {cells} cells, {}", elapsed(clock))
             });
             !monitor.cancelled()
@@ -250,7 +250,7 @@ pub fn map(
         let mut map = Map::new(request, rows);
         if !monitor.cancelled() {
             map.find_jumps(&|done, pairs| {
-                monitor.say(done as f64, Some(pairs as f64), || {
+                monitor.report(done as f64, Some(pairs as f64), || {
                     format!("{done} of {pairs} pairs of cells that stand apart")
                 });
             });
@@ -288,8 +288,8 @@ pub fn chart(
     let scenario = scenario.checked.clone();
     let input = scenario.clone();
     let found = run(py, progress, move |monitor| {
-        let mut heard = |turn: &Turn| {
-            monitor.say_or_end(turn.round as f64, Some(turn.rounds as f64), || {
+        let mut report = |turn: &Turn| {
+            monitor.report_or_end(turn.round as f64, Some(turn.rounds as f64), || {
                 let Turn {
                     rods,
                     round,
@@ -299,14 +299,14 @@ pub fn chart(
                 format!("{rods} veins, {}, round {round} of {rounds}", turn.knob)
             });
         };
-        let mut chart = study::chart(&scenario, &options, &mut heard)?;
+        let mut chart = study::chart(&scenario, &options, &mut report)?;
         if !leaves.is_empty() {
-            let scaling = study::scaling(&leaves, scenario.tolerance, &options, &mut heard)?;
+            let scaling = study::scaling(&leaves, scenario.tolerance, &options, &mut report)?;
             chart.scaling = Some(scaling);
         }
         Ok::<_, ChartError>(chart)
     })?;
-    let chart = found.map_err(cannot)?;
+    let chart = found.map_err(value_error)?;
     let (confirmed, remarks) = (chart.confirmed(), chart.remarks.clone());
     let scaling = chart.scaling.clone();
     let scaling = scaling.map(|scaling| Files::of(scaling, input.clone()));

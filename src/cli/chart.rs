@@ -1,20 +1,21 @@
-//! `leafdyn chart`: speed charted against accuracy.
+//! `leafdyn chart`: charts speed against accuracy.
 
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueHint};
 
 use crate::files;
-use crate::relax::{self, Method};
+use crate::relax;
 use crate::report::words::contender;
 use crate::scenario::Scenario;
 use crate::study::{self, Chart as Charted, ChartOptions, Contender, Turn};
 
 use crate::report;
 
-use super::progress::part_of;
-use super::request::{Done, How, Job, Request};
+use super::progress::fraction_of;
+use super::relax::possible_value;
+use super::request::{Delivered, Job, Request, VerbTraits};
 use super::{Refusal, Status};
 
 /// Measure every method over its own accuracy, and chart time against true error.
@@ -44,30 +45,19 @@ pub struct Chart {
     rods: Vec<usize>,
 }
 
-/// Contenders by their words; those of earlier releases are hidden.
+/// Parses the names of contenders; those of earlier releases are hidden aliases.
 fn contender_parser() -> impl TypedValueParser<Value = Contender> {
-    let words = Contender::ALL.map(|contender| {
-        let word = PossibleValue::new(contender.word());
-        match contender.method {
-            Method::Shooting { .. } => word.alias("multiple-shooting"),
-            Method::ShootingFromRest { .. } => word.alias("relaxed-shooting"),
-            _ => word,
-        }
-    });
+    let words = Contender::ALL.map(|it| possible_value(it.word(), it.method));
     PossibleValuesParser::new(words).try_map(|word| word.parse::<Contender>())
 }
 
 impl Chart {
     pub fn run(self) -> Result<Status, Refusal> {
-        let how = How {
-            varies: false,
-            stations: false,
-            side_by_side: false,
-        };
-        self.request.each::<Charted>(how, |job| self.one(job))
+        self.request
+            .each::<Charted>(VerbTraits::default(), |job| self.one(job))
     }
 
-    fn one(&self, job: &Job) -> Result<Done, Refusal> {
+    fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
         let scenario = &job.scenario;
         if self.request.tolerance.is_some() && self.rods.is_empty() {
             return Err(
@@ -89,13 +79,13 @@ impl Chart {
         let mut line = job.progress();
         let (mut rounds, mut first) = (0, 1);
         let mut progress = |turn: &Turn| {
-            // The rounds that all take part in come first, as long as they take.
+            // All contenders run in the first rounds; later the number of rounds changes.
             if turn.rounds != rounds {
                 (rounds, first) = (turn.rounds, turn.round);
-                line.next();
+                line.next_phase();
             }
-            let part = part_of(turn.round - first, rounds - first + 1);
-            line.tell(part, || {
+            let fraction = fraction_of(turn.round - first, rounds - first + 1);
+            line.update(fraction, || {
                 format!(
                     "{} veins, {}, {}, round {} of {}",
                     turn.rods,
@@ -106,7 +96,7 @@ impl Chart {
                 )
             });
         };
-        // What is asked of the second is looked at before the first is made.
+        // The options of the scaling are checked before the chart is made.
         let tolerance = self.request.tolerance.unwrap_or(scenario.tolerance);
         relax::check_tolerance(tolerance)?;
         let mut chart = study::chart(scenario, &options, &mut progress)?;
@@ -128,7 +118,7 @@ impl Chart {
             }
             Ok(None)
         });
-        job.done(&chart, success, written, |_| {
+        job.deliver_written(&chart, success, written, |_| {
             report::chart_report(&chart, files)
         })
     }

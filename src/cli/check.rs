@@ -1,4 +1,4 @@
-//! `leafdyn check`: two independent methods find the same shape, or not.
+//! `leafdyn check`: compares the shapes found by two independent methods.
 
 use clap::Args;
 
@@ -6,7 +6,7 @@ use crate::study::{self, Check as Checked, CheckOptions, Verdict};
 
 use crate::report;
 
-use super::request::{Done, How, Job, Request};
+use super::request::{Delivered, Job, Request, VerbTraits};
 use super::{Refusal, Status};
 
 /// Relax a leaf, solve its boundary-value problem by shooting from there, and compare.
@@ -29,15 +29,11 @@ pub struct Check {
 
 impl Check {
     pub fn run(self) -> Result<Status, Refusal> {
-        let how = How {
-            varies: false,
-            stations: false,
-            side_by_side: false,
-        };
-        self.request.each::<Checked>(how, |job| self.one(job))
+        self.request
+            .each::<Checked>(VerbTraits::default(), |job| self.one(job))
     }
 
-    fn one(&self, job: &Job) -> Result<Done, Refusal> {
+    fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
         let options = CheckOptions {
             tolerance: self.request.tolerance,
             keep_unstable: self.keep_unstable,
@@ -47,7 +43,7 @@ impl Check {
         let mut line = job.progress();
         let tolerance = self.request.tolerance.unwrap_or(job.scenario.tolerance);
         let check = study::check(&job.scenario, &options, &mut |progress| {
-            line.solving(progress, tolerance)
+            line.update_solver(progress, tolerance)
         })?;
         drop(line);
         if let Verdict::NotCompared(reason) = &check.verdict {

@@ -1,4 +1,4 @@
-//! `leafdyn fit`: from measurements to the numbers of a scenario.
+//! `leafdyn fit`: fits numbers of a scenario to measurements.
 
 use std::path::{Path, PathBuf};
 
@@ -8,8 +8,8 @@ use crate::limit::Limit;
 use crate::report;
 use crate::study::{self, Data, Fit as Fitted, FitRequest, FitStep, Free};
 
-use super::progress::part_of;
-use super::request::{Done, How, Job, Request};
+use super::progress::fraction_of;
+use super::request::{Delivered, Job, Request, VerbTraits};
 use super::{Refusal, Status};
 
 /// Fit numbers of the scenario to measurements, and say what these determine and what they do not.
@@ -45,15 +45,14 @@ pub struct Fit {
 
 impl Fit {
     pub fn run(self) -> Result<Status, Refusal> {
-        let how = How {
+        let traits = VerbTraits {
             varies: true,
-            stations: false,
-            side_by_side: false,
+            ..VerbTraits::default()
         };
-        self.request.each::<Fitted>(how, |job| self.one(job))
+        self.request.each::<Fitted>(traits, |job| self.one(job))
     }
 
-    fn one(&self, job: &Job) -> Result<Done, Refusal> {
+    fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
         let base = job.base()?;
         let mut data = Data::default();
         for file in &self.data {
@@ -85,13 +84,13 @@ impl Fit {
         let fit = study::fit(&request, &mut |now| {
             let FitStep { step, sum, known } = *now;
             if known.is_some() && !std::mem::replace(&mut profiling, true) {
-                line.next();
+                line.next_phase();
             }
-            let part = known.and_then(|(known, all)| part_of(known, all));
+            let fraction = known.and_then(|(known, all)| fraction_of(known, all));
             let intervals = known.map_or(String::new(), |(known, all)| {
                 format!("{known} of {all} intervals, ")
             });
-            line.tell(part, || {
+            line.update(fraction, || {
                 format!("{intervals}step {step}, sum of squares {sum:.6e}")
             });
         })?;
@@ -104,5 +103,5 @@ impl Fit {
 }
 
 fn read(file: &Path) -> Result<String, Refusal> {
-    crate::scenario::text(file).map_err(|refused| refused.into())
+    Ok(crate::scenario::text(file)?)
 }

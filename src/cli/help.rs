@@ -1,5 +1,5 @@
-//! `leafdyn schema`, `completions`, `man`: the program described for editors, shells
-//! and readers.
+//! `leafdyn schema`, `completions`, `man`: descriptions of the program for editors,
+//! shells and readers.
 
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;

@@ -1,10 +1,10 @@
-//! One scenario of a request: what is known of it, and how its result is delivered.
+//! One scenario of a request, and the delivery of its result.
 
 use std::fmt::Display;
 use std::path::PathBuf;
 
 use crate::files::{self, Document, Selection};
-use crate::report::table::named;
+use crate::report::table::list_files;
 use crate::report::{Refused, Written, json};
 use crate::scenario::Scenario;
 use crate::study::Base;
@@ -15,7 +15,7 @@ use super::{Refusal, Status, note};
 /// One scenario of a request, and where its files go.
 pub struct Job<'r> {
     pub(super) overrides: &'r [String],
-    /// Whether JSON is shown.
+    /// Whether the output is JSON.
     pub(super) json: bool,
     pub scenario: Scenario,
     pub(super) base: Option<Base>,
@@ -24,30 +24,31 @@ pub struct Job<'r> {
     pub(super) text: String,
     pub(super) file: String,
     pub(super) source: String,
-    /// Whether there are no others.
-    pub(super) alone: bool,
-    pub(super) side_by_side: bool,
+    /// Whether it is the only one.
+    pub(super) single: bool,
+    /// Whether several run in parallel.
+    pub(super) parallel: bool,
 }
 
-/// What was done about a scenario.
-pub struct Done {
+/// The delivered result of a scenario.
+pub struct Delivered {
     pub(super) status: Status,
-    /// For standard output.
+    /// The text for standard output.
     pub(super) report: String,
-    /// The result, where it is shown or put into a table.
+    /// The result as JSON, if it is printed or part of a table.
     pub(super) json: Vec<u8>,
     /// Why its files could not be written.
     pub(super) error: Option<String>,
 }
 
 impl Job<'_> {
-    /// The scenario into which varying numbers can be put.
+    /// The scenario as a base for varied numbers.
     pub fn base(&self) -> Result<Base, Refusal> {
         let base = self.base.clone();
         base.ok_or_else(|| "this verb does not vary its scenario".into())
     }
 
-    /// The scenario with one entry more overridden.
+    /// The scenario with one more entry overridden.
     pub fn with(&self, entry: &str) -> Result<Scenario, Refusal> {
         let overrides = [self.overrides, &[entry.into()]].concat();
         Ok(Scenario::from_toml_with(
@@ -55,63 +56,63 @@ impl Job<'_> {
         )?)
     }
 
-    /// A line that says how far it has come; of leaves side by side one for all does.
+    /// Its progress line; hidden if scenarios run in parallel, which share one.
     pub fn progress(&self) -> ProgressLine {
-        match self.side_by_side {
+        match self.parallel {
             true => ProgressLine::hidden(),
             false => ProgressLine::new(&self.scenario.name),
         }
     }
 
-    /// A remark on the result, beside the JSON that scripts read.
+    /// Prints a remark on the result to standard error if the output is JSON.
     pub fn remark(&self, remark: Option<impl Display>) {
         if let (true, Some(remark)) = (self.json, remark) {
             note(&format!("{}: {remark}", self.scenario.name));
         }
     }
 
-    /// A result with what it was made from.
+    /// A result with its input.
     pub fn document<'a, R>(&'a self, result: &'a R) -> Document<'a, R> {
         Document::new(result, &self.scenario, Some(&self.source))
     }
 
-    /// Writes the files of a result; the line that names them, if there are any.
+    /// Writes the files of a result; returns the line that lists them, if there are any.
     pub fn write<R: Written>(&self, result: &R) -> Result<Option<String>, Refusal> {
         let files = files::write_all(&self.folder, &self.document(result), &self.selection.kinds)?;
-        Ok(self.named(&files))
+        Ok(self.list_files(&files))
     }
 
-    /// The line that names files.
-    pub fn named(&self, files: &[PathBuf]) -> Option<String> {
-        (!files.is_empty()).then(|| named(&self.folder, files))
+    /// The line that lists files, if there are any.
+    pub fn list_files(&self, files: &[PathBuf]) -> Option<String> {
+        (!files.is_empty()).then(|| list_files(&self.folder, files))
     }
 
-    /// Writes the files of a result and says what is to be shown: JSON, or a report
-    /// that is told which files there are.
+    /// Writes the files of a result and returns its output: JSON, or the report, which is
+    /// given the list of the files.
     pub fn deliver<R: Written>(
         &self,
         result: &R,
         success: bool,
         report: impl FnOnce(Option<String>) -> String,
-    ) -> Result<Done, Refusal> {
-        self.done(result, success, self.write(result), report)
+    ) -> Result<Delivered, Refusal> {
+        self.deliver_written(result, success, self.write(result), report)
     }
 
-    /// The same of files that are written, or could not be: what was found is shown
-    /// all the same.
-    pub fn done<R: Written>(
+    /// The same for files that were written before, or could not be: the result is output
+    /// in either case.
+    pub fn deliver_written<R: Written>(
         &self,
         result: &R,
         success: bool,
         written: Result<Option<String>, Refusal>,
         report: impl FnOnce(Option<String>) -> String,
-    ) -> Result<Done, Refusal> {
+    ) -> Result<Delivered, Refusal> {
         let (files, error) = match written {
             Ok(files) => (files, None),
             Err(error) => (None, Some(error.to_string())),
         };
         let mut json = Vec::new();
-        if self.json || !self.alone {
+        if self.json || !self.single {
             let mut document = self.document(result);
             document.refused = error.as_deref().map(Refused::new);
             json::write(&document, &mut json)?;
@@ -120,9 +121,8 @@ impl Job<'_> {
             true => String::new(),
             false => report(files),
         };
-        let status = Status::of(success);
-        Ok(Done {
-            status,
+        Ok(Delivered {
+            status: Status::of(success),
             report,
             json,
             error,

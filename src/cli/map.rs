@@ -1,4 +1,4 @@
-//! `leafdyn map`: where each method fails.
+//! `leafdyn map`: maps where each method fails.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,8 +17,8 @@ use crate::study::{
 
 use crate::report;
 
-use super::progress::{part_of, time_left};
-use super::request::{Done, How, Job, Request};
+use super::progress::{fraction_of, time_left};
+use super::request::{Delivered, Job, Request, VerbTraits};
 use super::{Refusal, Status};
 
 /// Solve a leaf by several methods over one or two varying numbers, and map where each method fails.
@@ -58,7 +58,7 @@ pub struct Map {
 /// One of several parts of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Shard {
-    /// From 1.
+    /// Its number, from 1.
     part: usize,
     of: usize,
 }
@@ -68,7 +68,7 @@ impl Shard {
         format!("map-{}-of-{}.csv", self.part, self.of)
     }
 
-    fn has(self, cell: usize) -> bool {
+    fn contains(self, cell: usize) -> bool {
         cell % self.of == self.part - 1
     }
 }
@@ -89,15 +89,14 @@ const WHOLE: Shard = Shard { part: 1, of: 1 };
 
 impl Map {
     pub fn run(self) -> Result<Status, Refusal> {
-        let how = How {
+        let traits = VerbTraits {
             varies: true,
-            stations: false,
-            side_by_side: false,
+            ..VerbTraits::default()
         };
-        self.request.each::<Cells>(how, |job| self.one(job))
+        self.request.each::<Cells>(traits, |job| self.one(job))
     }
 
-    fn one(&self, job: &Job) -> Result<Done, Refusal> {
+    fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
         let folder = &job.folder;
         let request = MapRequest::new(
             job.base()?,
@@ -109,14 +108,14 @@ impl Map {
         files::belongs(folder, &request)?;
         let clock = Instant::now();
         let known = self.known(folder, &request)?;
-        // Rows are found again by the request beside them.
-        let kept = job.selection.kinds.contains(&Kind::Csv);
-        if kept {
+        // A later run identifies the rows by the request stored next to them.
+        let keeps_rows = job.selection.kinds.contains(&Kind::Csv);
+        if keeps_rows {
             let map = Cells::new(request.clone(), known.clone());
             files::claim(folder, &job.document(&map))?;
         }
         let computed = match self.draw.is_empty() {
-            true => self.solve(job, kept, &request, &known)?,
+            true => self.solve(job, keeps_rows, &request, &known)?,
             false => Vec::new(),
         };
         let counts = [known.len(), computed.len()];
@@ -126,32 +125,32 @@ impl Map {
             let line = Mutex::new(job.progress());
             map.find_jumps(&|done, pairs| {
                 if let Ok(mut line) = line.lock() {
-                    line.tell(part_of(done, pairs), || {
+                    line.update(fraction_of(done, pairs), || {
                         format!("{done} of {pairs} pairs of cells that stand apart")
                     });
                 }
             });
         }
-        let told = report::MapTold {
+        let work = report::MapWork {
             known: counts[0],
             computed: counts[1],
             seconds: clock.elapsed().as_secs_f64(),
         };
-        let report = |files| report::map_report(&map, told, files);
+        let report = |files| report::map_report(&map, work, files);
         let Some(shard) = self.shard else {
             return job.deliver(&map, true, report);
         };
         let mut written = None;
-        if kept {
+        if keeps_rows {
             let name = shard.file_name();
             files::write_rows(folder, &name, &map.request, &map.rows)?;
             written = Some(folder.join(name).display().to_string());
         }
-        job.done(&map, true, Ok(written), report)
+        job.deliver_written(&map, true, Ok(written), report)
     }
 
-    /// The rows that need not be computed: a shard's own, or of a whole map
-    /// all that are in the folder.
+    /// The rows that need not be computed: those of the shard or, for a whole map, all
+    /// in the folder.
     fn known(&self, folder: &Path, request: &MapRequest) -> Result<Vec<MapRow>, Refusal> {
         let mut files = match self.shard {
             Some(shard) => vec![folder.join(shard.file_name())],
@@ -171,26 +170,26 @@ impl Map {
         Ok(rows)
     }
 
-    /// Solves what is not known; rows are in the file as soon as they are found.
+    /// Computes the missing rows; each is written to the file as soon as it is known.
     fn solve(
         &self,
         job: &Job,
-        kept: bool,
+        keeps_rows: bool,
         request: &MapRequest,
         known: &[MapRow],
     ) -> Result<Vec<MapRow>, Refusal> {
         let shard = self.shard.unwrap_or(WHOLE);
-        let there = |cell: usize, method: MapMethod| {
+        let is_known = |cell: usize, method: MapMethod| {
             let found = known.binary_search_by_key(&(cell, method), |row| (row.cell, row.method));
             found.is_ok()
         };
         let todo: Vec<(usize, Vec<MapMethod>)> = (0..request.cells())
-            .filter(|&cell| shard.has(cell))
+            .filter(|&cell| shard.contains(cell))
             .map(|cell| {
                 let methods = request.methods.iter().copied();
                 (
                     cell,
-                    methods.filter(|&method| !there(cell, method)).collect(),
+                    methods.filter(|&method| !is_known(cell, method)).collect(),
                 )
             })
             .filter(|(_, methods): &(usize, Vec<_>)| !methods.is_empty())
@@ -199,7 +198,7 @@ impl Map {
             return Ok(Vec::new());
         }
         let name = self.shard.map_or("map.csv".into(), Shard::file_name);
-        let mut journal = match kept {
+        let mut journal = match keeps_rows {
             true => Some(Journal::open(&job.folder, &name, request, known)?),
             false => None,
         };
@@ -213,8 +212,8 @@ impl Map {
             rows.extend(new);
             finished += 1;
             let cells = todo.len();
-            line.say(|time| {
-                let time = time_left(time, part_of(finished, cells));
+            line.show(|time| {
+                let time = time_left(time, fraction_of(finished, cells));
                 format!("{finished} of {cells} cells, {time}")
             });
             failed.is_none()
@@ -251,7 +250,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_files_of_shards_are_taken_for_them() {
+    fn only_files_of_shards_are_recognized() {
         let folder = tempfile::tempdir().unwrap();
         for name in [
             "map-2-of-3.csv",

@@ -1,4 +1,4 @@
-//! The command line: one file per verb. What is computed is in the library.
+//! The command line, with one file per verb. All computations are in the library.
 
 mod chart;
 mod check;
@@ -52,7 +52,7 @@ enum Verb {
 }
 
 impl Cli {
-    /// Does what was asked for.
+    /// Runs the verb.
     fn run(self) -> Result<Status, Refusal> {
         let done = match self.verb {
             Verb::Relax(relax) => relax.run(),
@@ -67,13 +67,13 @@ impl Cli {
             Verb::Completions(completions) => completions.run(),
             Verb::Man(man) => man.run(),
         };
-        done.map_err(as_typed)
+        done.map_err(name_options)
     }
 }
 
-/// A message of the library about an option as it is typed: `segments = 2: ...` is
-/// about `--segments 2`.
-fn as_typed(refusal: Refusal) -> Refusal {
+/// Rewrites a message of the library about an option as the user types it:
+/// `segments = 2: ...` becomes `--segments 2: ...`.
+fn name_options(refusal: Refusal) -> Refusal {
     const OPTIONS: [&str; 7] = [
         "cell-seconds",
         "intervals",
@@ -95,36 +95,35 @@ fn as_typed(refusal: Refusal) -> Refusal {
     }
 }
 
-/// The program: does what the process was asked for, and returns its exit status.
+/// Runs the program with the arguments of the process, and returns its exit status.
 pub fn main() -> ExitCode {
     main_with(env::args_os().collect()).into()
 }
 
-/// The same with these arguments, the first of which is the program's name: returns the
-/// exit status.
+/// The same with these arguments, the first of which is the program's name.
 pub fn main_with(arguments: Vec<OsString>) -> u8 {
-    // Also of a request that cannot be understood.
+    // Found before parsing, which may fail.
     let json = arguments.iter().any(|argument| argument == "--json");
     JSON.store(json, Ordering::Relaxed);
     let command_line = match Cli::try_parse_from(arguments) {
         Ok(command_line) => command_line,
         Err(error) if error.use_stderr() => {
-            let message = error.render().to_string() + offer(&error);
+            let message = error.render().to_string() + suggestion(&error);
             let message = message.trim_start_matches("error: ").trim_end();
             return fail(message, Status::Refused, json) as u8;
         }
         // Help, or the version.
-        Err(told) => told.exit(),
+        Err(help) => help.exit(),
     };
     let interrupted = stop_at_once_on_interrupt();
     let status = interrupted.and_then(|()| command_line.run());
     status.unwrap_or_else(|refusal| fail(&refusal.to_string(), Status::Refused, json)) as u8
 }
 
-/// Whether standard output is for JSON.
+/// Whether standard output is JSON.
 static JSON: AtomicBool = AtomicBool::new(false);
 
-/// Says why something was not done: to people, and as JSON if that is still to come.
+/// Reports an error on standard error and, with `json`, as JSON on standard output.
 fn fail(error: &str, status: Status, json: bool) -> Status {
     note(&format!("error: {error}"));
     if json {
@@ -140,13 +139,13 @@ fn show_refused(error: &str, exit_status: i32) {
         ..Refused::new(error)
     };
     if json::write(&refused, &mut bytes).is_ok() {
-        // There is nobody left to tell.
+        // A failure to report the error cannot be reported.
         let _ = show(&bytes);
     }
 }
 
-/// Where a scenario can be had, if none is named.
-fn offer(error: &clap::Error) -> &'static str {
+/// How to get a scenario, if none is named.
+fn suggestion(error: &clap::Error) -> &'static str {
     let missing = error.kind() == clap::error::ErrorKind::MissingRequiredArgument;
     match missing && error.to_string().contains("<SCENARIO>") {
         false => "",
@@ -158,10 +157,10 @@ fn offer(error: &clap::Error) -> &'static str {
     }
 }
 
-/// Why something was not done: a message that says what to change.
+/// Why a request was refused or failed: a message that says what to change.
 type Refusal = Box<dyn Error + Send + Sync>;
 
-/// What the process tells its caller.
+/// Exit status of the process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Status {
     /// At rest within the tolerance; of a check: both methods agree; of a
@@ -169,8 +168,8 @@ enum Status {
     Success = 0,
     /// The run ended otherwise: not at rest within the tolerance; of a check:
     /// the methods differ or could not be compared; of a simulation: it ended
-    /// early; of a chart: its reference is not confirmed. What was found is
-    /// written all the same.
+    /// early; of a chart: its reference is not confirmed. The results are written
+    /// in any case.
     Failure = 1,
     /// The request was refused, or its result could not be written.
     Refused = 2,
@@ -188,11 +187,11 @@ impl Status {
 /// Status of a run ended by Ctrl-C: 128 and the number of the signal.
 const INTERRUPTED: i32 = 130;
 
-/// What writes a checkpoint of a simulation when the process is stopped, if there is one.
+/// Writes a checkpoint of the running simulation, if any, when the process is stopped.
 static CHECKPOINTER: Mutex<Option<Checkpointer>> = Mutex::new(None);
 
-/// Lets Ctrl-C end the process at once, with no file half written, and a
-/// simulation kept.
+/// Makes Ctrl-C end the process at once, without half-written files and with a
+/// checkpoint of a simulation.
 fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     ctrlc::set_handler(|| {
         let kept = checkpointer()
@@ -200,7 +199,7 @@ fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
             .and_then(Checkpointer::write_and_stop);
         files::abandon_unfinished();
         if io::stderr().is_terminal() {
-            // The progress line may be there.
+            // Clears the progress line.
             let _ = write!(io::stderr(), "\r\x1b[2K");
         }
         let status = match kept.map(|kept| show_checkpoint(&kept)) {
@@ -215,17 +214,17 @@ fn stop_at_once_on_interrupt() -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Lets Ctrl-C write a checkpoint, from now on.
+/// Makes Ctrl-C write a checkpoint from now on.
 fn checkpoint_on_interrupt(checkpointer: Checkpointer) {
     *self::checkpointer() = Some(checkpointer);
 }
 
 fn checkpointer() -> MutexGuard<'static, Option<Checkpointer>> {
-    // It is replaced as a whole: whatever its last user did, it is sound.
+    // It is only replaced as a whole, so it is valid even if the lock is poisoned.
     CHECKPOINTER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Says where a simulation that was kept can go on, or why it cannot.
+/// Reports the time of a checkpoint, or why it could not be written.
 fn show_checkpoint(kept: &Result<f64, FileError>) -> Status {
     match kept {
         Ok(time) => {
@@ -240,17 +239,17 @@ fn show_checkpoint(kept: &Result<f64, FileError>) -> Status {
     }
 }
 
-/// A line on standard error; if nobody can read it, nothing is lost.
+/// Prints a line to standard error; failures are ignored.
 fn note(line: &str) {
     let _ = writeln!(io::stderr(), "{}", printable(line));
 }
 
-/// A report on standard output.
+/// Prints a report to standard output.
 fn show_report(report: &str) -> Result<(), Refusal> {
     show(printable(report).as_bytes())
 }
 
-/// Writes to standard output. A reader that has seen enough (`| head`) is no error.
+/// Writes to standard output. A closed pipe (`| head`) is not an error.
 fn show(bytes: &[u8]) -> Result<(), Refusal> {
     let mut stdout = io::stdout().lock();
     match stdout.write_all(bytes).and_then(|()| stdout.flush()) {

@@ -1,4 +1,4 @@
-//! `leafdyn new`: a scenario to begin with.
+//! `leafdyn new`: writes an example scenario.
 
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
@@ -35,7 +35,7 @@ enum Example {
 }
 
 impl Example {
-    /// Its name, its text, and what to do with it.
+    /// Its name, its text, and the next command.
     fn contents(self) -> (&'static str, &'static str, &'static str) {
         match self {
             Example::Leaf => ("leaf", include_str!("examples/leaf.toml"), "relax FILE"),
@@ -59,9 +59,9 @@ impl New {
         let (name, text, next) = self.example.contents();
         let file = self.file.unwrap_or_else(|| format!("{name}.toml").into());
         let path = file.display();
-        // What somebody wrote is never replaced.
-        let begun = OpenOptions::new().write(true).create_new(true).open(&file);
-        let written = begun.and_then(|mut file| file.write_all(text.as_bytes()));
+        // An existing file is never overwritten.
+        let created = OpenOptions::new().write(true).create_new(true).open(&file);
+        let written = created.and_then(|mut file| file.write_all(text.as_bytes()));
         written.map_err(|reason| match reason.kind() {
             ErrorKind::AlreadyExists => format!("{path}: is there already: name another file"),
             _ => format!("{path}: cannot be written: {reason}"),

@@ -1,4 +1,4 @@
-//! One line on standard error that says how far a long run has come.
+//! A progress line on standard error for long runs.
 
 use std::io::{self, IsTerminal};
 use std::time::{Duration, Instant};
@@ -7,14 +7,14 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::relax::{Correction, Progress};
 
-/// Shorter runs show no line: it would only flicker.
+/// Shorter runs show no line, which would only flicker.
 const LONG_RUN: Duration = Duration::from_millis(500);
 
-/// Redraws of the line per second at most.
+/// Most redraws of the line per second.
 const REDRAWS_PER_SECOND: u8 = 10;
 
-/// Of less nothing can be said.
-const LEAST_PART: f64 = 1e-3;
+/// No estimate is made from a smaller fraction.
+const MIN_FRACTION: f64 = 1e-3;
 
 /// The progress line; it vanishes when dropped.
 pub struct ProgressLine {
@@ -24,72 +24,65 @@ pub struct ProgressLine {
     bar: Option<ProgressBar>,
     grids: Grids,
     shooting: Option<Corrections>,
-    /// Since when parts of the run are told: before that it did something else.
-    since: Duration,
+    /// When the current phase of the run began.
+    phase_start: Duration,
 }
 
 impl ProgressLine {
     pub fn new(scenario: &str) -> Self {
-        let terminal = io::stderr().is_terminal();
         ProgressLine {
             scenario: scenario.into(),
             start: Instant::now(),
-            terminal,
+            terminal: io::stderr().is_terminal(),
             bar: None,
             grids: Grids::default(),
             shooting: None,
-            since: Duration::ZERO,
+            phase_start: Duration::ZERO,
         }
     }
 
-    /// One that is never shown.
+    /// A line that is never shown.
     pub fn hidden() -> Self {
-        ProgressLine {
-            scenario: String::new(),
-            start: Instant::now(),
-            terminal: false,
-            bar: None,
-            grids: Grids::default(),
-            shooting: None,
-            since: Duration::ZERO,
-        }
+        let mut line = ProgressLine::new("");
+        line.terminal = false;
+        line
     }
 
-    /// How far a run to this tolerance has come.
-    pub fn solving(&mut self, progress: &Progress, tolerance: f64) {
-        let part = match progress {
+    /// Shows the progress of a solver that runs to this tolerance.
+    pub fn update_solver(&mut self, progress: &Progress, tolerance: f64) {
+        let fraction = match progress {
             &Progress::Relaxing {
                 grid,
                 step,
                 residual,
-            } => self.grids.part(grid, (step, residual), tolerance),
+            } => self.grids.fraction(grid, (step, residual), tolerance),
             Progress::Shooting(now) => {
                 if self.shooting.is_none() {
-                    self.next();
+                    self.next_phase();
                 }
-                self.shooting.get_or_insert_default().part(now)
+                self.shooting.get_or_insert_default().fraction(now)
             }
         };
-        self.tell(part, || progress.to_string());
+        self.update(fraction, || progress.to_string());
     }
 
-    /// Shows a message with the time taken and, where it is known which part of the
-    /// run is done, the time left.
-    pub fn tell(&mut self, part: Option<f64>, message: impl FnOnce() -> String) {
-        let since = self.since;
-        self.say(|elapsed| {
-            let left = left(elapsed.saturating_sub(since), part);
+    /// Shows a message with the elapsed time and, if the completed fraction of the phase is
+    /// known, the remaining time.
+    pub fn update(&mut self, fraction: Option<f64>, message: impl FnOnce() -> String) {
+        let phase_start = self.phase_start;
+        self.show(|elapsed| {
+            let left = remaining(elapsed.saturating_sub(phase_start), fraction);
             format!("{}, {:.0} s{left}", message(), elapsed.as_secs_f64())
         });
     }
 
-    /// From now on the part that is told is that of what comes next.
-    pub fn next(&mut self) {
-        self.since = self.start.elapsed();
+    /// Begins another phase: fractions refer to it from now on.
+    pub fn next_phase(&mut self) {
+        self.phase_start = self.start.elapsed();
     }
 
-    /// Shows a message, which is told how long the run has taken.
-    pub fn say(&mut self, message: impl FnOnce(Duration) -> String) {
+    /// Shows a message made from the elapsed time.
+    pub fn show(&mut self, message: impl FnOnce(Duration) -> String) {
         let elapsed = self.start.elapsed();
         if !self.terminal || elapsed < LONG_RUN {
             return;
@@ -105,87 +98,98 @@ impl ProgressLine {
     }
 }
 
-/// How long a run has taken, and about how long it will still take if this part of it,
-/// from 0 to 1, is done.
-pub fn time_left(elapsed: Duration, part: Option<f64>) -> String {
-    format!("{:.0} s{}", elapsed.as_secs_f64(), left(elapsed, part))
+/// The elapsed time of a run and an estimate of the remaining time, given the completed
+/// fraction.
+pub fn time_left(elapsed: Duration, fraction: Option<f64>) -> String {
+    format!(
+        "{:.0} s{}",
+        elapsed.as_secs_f64(),
+        remaining(elapsed, fraction)
+    )
 }
 
-/// What is to be added to the time taken: nothing where nothing is known.
-fn left(elapsed: Duration, part: Option<f64>) -> String {
-    let known = part.filter(|part| (LEAST_PART..=1.0).contains(part));
-    let left = |part: f64| duration(elapsed.as_secs_f64() * (1.0 / part - 1.0));
-    known.map_or(String::new(), |part| format!(", {} left", left(part)))
+/// An estimate of the remaining time, to follow the elapsed time; empty if unknown.
+fn remaining(elapsed: Duration, fraction: Option<f64>) -> String {
+    let known = fraction.filter(|fraction| (MIN_FRACTION..=1.0).contains(fraction));
+    let left = |fraction: f64| duration(elapsed.as_secs_f64() * (1.0 / fraction - 1.0));
+    known.map_or(String::new(), |fraction| {
+        format!(", {} left", left(fraction))
+    })
 }
 
-/// The part of so many equal ones that is done.
-pub fn part_of(done: usize, all: usize) -> Option<f64> {
+/// The completed fraction of `all` equal parts.
+pub fn fraction_of(done: usize, all: usize) -> Option<f64> {
     Some(done as f64 / all.max(1) as f64)
 }
 
-/// The part of the way from one number to another, or of that of their logarithms.
-pub fn part_of_way(from: f64, at: f64, to: f64, log: bool) -> Option<f64> {
+/// Where a number is between two others, from 0 to 1; linearly, or by logarithms.
+pub fn fraction_between(from: f64, at: f64, to: f64, log: bool) -> Option<f64> {
     let place = |value: f64| if log { value.abs().ln() } else { value };
-    let part = (place(at) - place(from)) / (place(to) - place(from));
-    part.is_finite().then_some(part)
+    let fraction = (place(at) - place(from)) / (place(to) - place(from));
+    fraction.is_finite().then_some(fraction)
 }
 
 /// The grids of a relaxation, each twice as fine as the one before.
 #[derive(Default)]
 struct Grids {
-    /// The first, and the present one.
+    /// The grids so far, the current one last.
     seen: Vec<usize>,
 }
 
 impl Grids {
-    /// About which part of the work is done: that of the first grid, on which the leaf
-    /// moves, as of six Newton steps there; of the others two each. Every grid removes
-    /// some three digits of the error.
-    fn part(&mut self, grid: usize, (step, residual): (usize, f64), tolerance: f64) -> Option<f64> {
+    /// Estimates the completed fraction of the work: the first grid, on which the leaf
+    /// moves, counts as six Newton steps there, every other grid as two. Every grid reduces
+    /// the error by about three digits.
+    fn fraction(
+        &mut self,
+        grid: usize,
+        (step, residual): (usize, f64),
+        tolerance: f64,
+    ) -> Option<f64> {
         const FIRST: f64 = 6.0;
         const LATER: f64 = 2.0;
         const DIGITS: f64 = 3.0;
-        /// Of the residual, on the way to rest.
+        /// Digits by which the residual falls until the leaf is at rest.
         const REST: f64 = 12.0;
         if self.seen.last() != Some(&grid) {
             self.seen.push(grid);
         }
-        let present = self.seen.len() - 1;
+        let current = self.seen.len() - 1;
         let wanted = (-tolerance.log10() / DIGITS).ceil().clamp(0.0, 16.0) as usize;
-        let last = present.max(wanted);
+        let last = current.max(wanted);
         let size = |grid: usize| (1_u64 << grid.min(32)) as f64;
         let work = |grid: usize| if grid == 0 { FIRST } else { LATER * size(grid) };
-        let here = match present {
+        let here = match current {
             0 => (-residual.log10() / REST).clamp(0.0, 1.0),
             _ => (step as f64 / LATER).min(1.0),
         };
-        let before: f64 = (0..present).map(work).sum();
+        let before: f64 = (0..current).map(work).sum();
         let all: f64 = (0..=last).map(work).sum();
-        Some((before + here * work(present)) / all)
+        Some((before + here * work(current)) / all)
     }
 }
 
-/// Part of the work left that a linearisation is.
+/// Fraction of the remaining work that a linearisation takes.
 const LINEARISATION: f64 = 0.9;
 
-/// The corrections of a shooting.
+/// The corrections of a shooting method.
 #[derive(Default)]
 struct Corrections {
-    /// The size of the first near the leaf.
+    /// Size of the first correction of the final problem.
     first: Option<f64>,
 }
 
 impl Corrections {
-    /// About which part of the work is done: of the way there, or of the digits wanted
-    /// and the linearisation for the next ones.
-    fn part(&mut self, now: &Correction) -> Option<f64> {
+    /// Estimates the completed fraction of the work: that of the continuation or, after it,
+    /// of the wanted digits and the linearisation for the next ones.
+    fn fraction(&mut self, now: &Correction) -> Option<f64> {
         if now.way < 1.0 {
             return Some(now.way);
         }
         let digits = match now.size.is_finite() {
             true => {
                 let first = *self.first.get_or_insert(now.size);
-                part_of_way(first, now.size, now.wanted, true)?.clamp(0.0, 1.0)
+                fraction_between(first, now.size, now.wanted, true)?.clamp(0.0, 1.0)
             }
             false => 0.0,
         };
@@ -193,7 +197,7 @@ impl Corrections {
     }
 }
 
-/// A time for people.
+/// Formats a duration for people.
 pub fn duration(seconds: f64) -> String {
     let seconds = seconds.ceil();
     match seconds as u64 {
@@ -216,32 +220,32 @@ impl Drop for ProgressLine {
 mod tests {
     use super::*;
 
-    fn told(part: Option<f64>) -> String {
-        time_left(Duration::from_secs(10), part)
+    fn after_10_s(fraction: Option<f64>) -> String {
+        time_left(Duration::from_secs(10), fraction)
     }
 
     #[test]
-    fn the_time_left_is_told_where_it_is_known() {
-        assert_eq!(told(Some(0.25)), "10 s, 30 s left");
-        assert_eq!(told(Some(1.0)), "10 s, 0 s left");
-        assert_eq!(told(Some(0.001)), "10 s, 3 h left");
+    fn the_remaining_time_is_shown_where_it_is_known() {
+        assert_eq!(after_10_s(Some(0.25)), "10 s, 30 s left");
+        assert_eq!(after_10_s(Some(1.0)), "10 s, 0 s left");
+        assert_eq!(after_10_s(Some(0.001)), "10 s, 3 h left");
         for unknown in [None, Some(0.0), Some(-0.1), Some(1.5), Some(f64::NAN)] {
-            assert_eq!(told(unknown), "10 s");
+            assert_eq!(after_10_s(unknown), "10 s");
         }
-        assert_eq!(told(part_of(3, 4)), "10 s, 4 s left");
-        assert_eq!(told(part_of(0, 0)), "10 s");
+        assert_eq!(after_10_s(fraction_of(3, 4)), "10 s, 4 s left");
+        assert_eq!(after_10_s(fraction_of(0, 0)), "10 s");
     }
 
     #[test]
-    fn ways_may_fall_and_be_logarithmic() {
+    fn ranges_may_decrease_and_be_logarithmic() {
         let close = |part: Option<f64>, wanted: f64| (part.unwrap() - wanted).abs() < 1e-12;
-        assert!(close(part_of_way(2.0, 1.0, -2.0, false), 0.25));
-        assert!(close(part_of_way(-0.1, -1.0, -100.0, true), 1.0 / 3.0));
-        assert_eq!(part_of_way(1.0, 1.0, 1.0, false), None);
+        assert!(close(fraction_between(2.0, 1.0, -2.0, false), 0.25));
+        assert!(close(fraction_between(-0.1, -1.0, -100.0, true), 1.0 / 3.0));
+        assert_eq!(fraction_between(1.0, 1.0, 1.0, false), None);
     }
 
     #[test]
-    fn a_shooting_goes_its_way_and_then_adds_digits() {
+    fn a_shooting_follows_its_continuation_and_then_adds_digits() {
         let mut corrections = Corrections::default();
         let mut part = |way: f64, linearized: f64, size: f64| {
             let now = Correction {
@@ -251,7 +255,7 @@ mod tests {
                 size,
                 wanted: 1e-10,
             };
-            corrections.part(&now).unwrap()
+            corrections.fraction(&now).unwrap()
         };
         assert_eq!(part(0.25, 0.5, 1e-3), 0.25);
         let parts = [
@@ -272,7 +276,7 @@ mod tests {
     fn a_relaxation_goes_on_from_grid_to_grid() {
         let mut grids = Grids::default();
         let mut part = |grid: usize, step: usize, residual: f64| {
-            grids.part(grid, (step, residual), 1e-6).unwrap()
+            grids.fraction(grid, (step, residual), 1e-6).unwrap()
         };
         let parts = [
             part(8, 1, 1.0),

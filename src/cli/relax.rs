@@ -1,4 +1,4 @@
-//! `leafdyn relax`: a leaf comes to rest.
+//! `leafdyn relax`: brings a leaf to rest.
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -7,12 +7,12 @@ use crate::relax::{self, Equilibrium, Method, Options, Settings};
 use crate::report::{self, numbers::brief};
 use crate::study::{self, All, Keys, MarginError, MarginProgress, SensitivityError};
 
-use super::progress::{ProgressLine, part_of};
-use super::request::{Done, How, Job, Request};
+use super::progress::{ProgressLine, fraction_of};
+use super::request::{Delivered, Job, Request, VerbTraits};
 use super::{Refusal, Status};
 
-/// Eigenvalues that are told unasked.
-const MODES: usize = 3;
+/// Eigenvalues that are reported by default.
+const DEFAULT_MODES: usize = 3;
 
 /// Find how a leaf comes to rest, how accurate that is and whether it is stable.
 ///
@@ -65,25 +65,28 @@ pub struct Relax {
     full_model: bool,
 }
 
-/// Methods by their words; those of earlier releases are hidden.
+/// Parses the names of methods; those of earlier releases are hidden aliases.
 fn method_parser() -> impl TypedValueParser<Value = Method> {
-    let words = Method::ALL.map(|method| {
-        let word = PossibleValue::new(method.word());
-        match method {
-            Method::Shooting { .. } => word.alias("multiple-shooting"),
-            Method::ShootingFromRest { .. } => word.alias("relaxed-shooting"),
-            _ => word,
-        }
-    });
+    let words = Method::ALL.map(|method| possible_value(method.word(), method));
     PossibleValuesParser::new(words).try_map(|word| word.parse::<Method>())
 }
 
-/// How far a margin has come.
-fn tell_margin(line: &mut ProgressLine, progress: &MarginProgress, tolerance: f64) {
+/// The name of a method, with its alias from earlier releases.
+pub fn possible_value(word: &'static str, method: Method) -> PossibleValue {
+    let value = PossibleValue::new(word);
+    match method {
+        Method::Shooting { .. } => value.alias("multiple-shooting"),
+        Method::ShootingFromRest { .. } => value.alias("relaxed-shooting"),
+        _ => value,
+    }
+}
+
+/// Shows the progress of a search for the margin.
+fn update_margin(line: &mut ProgressLine, progress: &MarginProgress, tolerance: f64) {
     match progress {
-        MarginProgress::Relaxing(progress) => line.solving(progress, tolerance),
+        MarginProgress::Relaxing(progress) => line.update_solver(progress, tolerance),
         MarginProgress::Searching { done, all, push } => {
-            line.tell(part_of(*done, *all), || {
+            line.update(fraction_of(*done, *all), || {
                 let push = push.map(|(direction, force)| {
                     format!(", pushed by {} along {direction}", brief(force))
                 });
@@ -95,18 +98,18 @@ fn tell_margin(line: &mut ProgressLine, progress: &MarginProgress, tolerance: f6
 
 impl Relax {
     pub fn run(self) -> Result<Status, Refusal> {
-        let how = How {
+        let traits = VerbTraits {
             varies: !self.sensitivity.is_empty(),
             stations: true,
-            side_by_side: true,
+            parallel: true,
         };
         match self.all {
-            true => self.request.each::<All>(how, |job| self.all(job)),
-            false => (self.request).each::<Equilibrium>(how, |job| self.one(job)),
+            true => self.request.each::<All>(traits, |job| self.all(job)),
+            false => (self.request).each::<Equilibrium>(traits, |job| self.one(job)),
         }
     }
 
-    fn one(&self, job: &Job) -> Result<Done, Refusal> {
+    fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
         let equilibrium = self.solve(job)?;
         let equilibrium = equilibrium.at_stations(&job.scenario, job.selection.stations);
         job.remark(equilibrium.remark.as_ref());
@@ -119,7 +122,7 @@ impl Relax {
         })
     }
 
-    /// The method with its own options; refused where they do not fit each other.
+    /// The method with its options; refused if they do not fit the method.
     fn method(&self) -> Result<Method, Refusal> {
         let settings = Settings {
             segments: self.segments,
@@ -138,7 +141,7 @@ impl Relax {
         let options = Options {
             method: self.method()?,
             tolerance: self.request.tolerance,
-            modes: self.modes.unwrap_or(MODES),
+            modes: self.modes.unwrap_or(DEFAULT_MODES),
             mode_shapes: self.modes.is_some_and(|count| count > 0),
             every_node: true,
             ..Options::default()
@@ -148,7 +151,7 @@ impl Relax {
         if !self.sensitivity.is_empty() {
             let (base, keys) = (job.base()?, &self.sensitivity);
             let found = study::relax_with_sensitivities(&base, keys, &options, &mut |progress| {
-                line.solving(progress, tolerance);
+                line.update_solver(progress, tolerance);
             });
             return found.map_err(|error| match error {
                 SensitivityError::Relax(error) => error.into(),
@@ -160,9 +163,9 @@ impl Relax {
             let found = study::relax_with_margin(&job.scenario, &options, &mut |progress| {
                 if let (false, MarginProgress::Searching { .. }) = (searching, progress) {
                     searching = true;
-                    line.next();
+                    line.next_phase();
                 }
-                tell_margin(&mut line, progress, tolerance);
+                update_margin(&mut line, progress, tolerance);
             });
             return found.map_err(|error| match error {
                 MarginError::Relax(error) => error.into(),
@@ -170,11 +173,11 @@ impl Relax {
             });
         }
         Ok(relax::relax(&job.scenario, &options, &mut |progress| {
-            line.solving(progress, tolerance)
+            line.update_solver(progress, tolerance)
         })?)
     }
 
-    fn all(&self, job: &Job) -> Result<Done, Refusal> {
+    fn all(&self, job: &Job) -> Result<Delivered, Refusal> {
         let Method::SemiImplicit(how) = self.method()? else {
             return Err("--all: only with the method semi-implicit".into());
         };
@@ -189,9 +192,9 @@ impl Relax {
                 if found > known {
                     (known, last_new) = (found, starts);
                 }
-                // Unless more is found.
-                let part = part_of(starts, last_new + study::IN_VAIN);
-                line.tell(part, || format!("{starts} starts, {found} equilibria"));
+                // Assuming that no more are found.
+                let fraction = fraction_of(starts, last_new + study::IN_VAIN);
+                line.update(fraction, || format!("{starts} starts, {found} equilibria"));
             },
         )?;
         drop(line);

@@ -1,5 +1,5 @@
-//! What every verb is asked and how it delivers: scenarios, folders, files and
-//! what is shown.
+//! The options common to all verbs, and how a verb runs over its scenarios: folders,
+//! files and output.
 
 use std::collections::HashMap;
 use std::io::{self, Read};
@@ -11,14 +11,14 @@ use rayon::prelude::*;
 
 use crate::files::{self, Kind, Selection};
 use crate::memory;
-use crate::report::table::{named, rows_of_json};
+use crate::report::table::{list_files, rows_of_json};
 use crate::report::{Refused, Written, json};
 use crate::scenario::Scenario;
 use crate::study::Base;
 
-pub use super::job::{Done, Job};
-use super::progress::{ProgressLine, part_of, time_left};
-use super::{Refusal, Status, as_typed, fail, note, show, show_report};
+pub use super::job::{Delivered, Job};
+use super::progress::{ProgressLine, fraction_of, time_left};
+use super::{Refusal, Status, fail, name_options, note, show, show_report};
 
 /// What every verb is asked.
 #[derive(Debug, Args)]
@@ -56,7 +56,7 @@ pub struct Request {
     pub json: bool,
 }
 
-/// Most stations that can be asked for.
+/// Most stations that can be requested.
 const MOST_STATIONS: i64 = 1_000_000;
 
 /// A list of kinds of files.
@@ -82,38 +82,38 @@ fn kinds(list: &str) -> Result<Kinds, String> {
         .map(Kinds)
 }
 
-/// What a verb does with scenarios.
-#[derive(Clone, Copy)]
-pub struct How {
-    /// Whether numbers are put into the scenario, and settings of methods.
+/// How a verb treats its scenarios.
+#[derive(Clone, Copy, Default)]
+pub struct VerbTraits {
+    /// Whether it varies numbers of the scenario and settings of methods.
     pub varies: bool,
-    /// Whether its files have stations that can be chosen.
+    /// Whether the stations in its files can be chosen.
     pub stations: bool,
-    /// Whether leaves are solved side by side; otherwise one after the other, each
-    /// on all cores.
-    pub side_by_side: bool,
+    /// Whether scenarios run in parallel; otherwise one after the other, each on all
+    /// cores.
+    pub parallel: bool,
 }
 
 impl Request {
-    /// Does what a verb does, whose results are `R`, for every scenario.
+    /// Runs a verb whose results are `R` for every scenario.
     pub fn each<R: Written>(
         &self,
-        how: How,
-        run: impl Fn(&Job) -> Result<Done, Refusal> + Sync,
+        traits: VerbTraits,
+        run: impl Fn(&Job) -> Result<Delivered, Refusal> + Sync,
     ) -> Result<Status, Refusal> {
         self.memory.into_iter().for_each(memory::allow);
-        let selection = self.selection::<R>(how)?;
-        let job = |file: &Path| self.open(file, how, &selection);
+        let selection = self.selection::<R>(traits)?;
+        let job = |file: &Path| self.open(file, traits, &selection);
         if let [file] = self.scenarios.as_slice() {
             let done = run(&job(file)?)?;
             self.show(&done)?;
             return match done.error {
-                // It is part of the JSON that was shown.
+                // The JSON output includes it.
                 Some(error) => Ok(fail(&error, Status::Refused, false)),
                 None => Ok(done.status),
             };
         }
-        // All are looked at before the first is solved.
+        // All are checked before the first is solved.
         let jobs: Vec<_> = self.scenarios.iter().map(|file| job(file)).collect();
         let mut folders = HashMap::new();
         for job in jobs.iter().flatten() {
@@ -128,28 +128,31 @@ impl Request {
         let finished = AtomicUsize::new(0);
         let solve = |job: Result<Job, Refusal>| {
             let done = job.and_then(|job| run(&job));
-            let done = done.map_err(|refusal| as_typed(refusal).to_string());
+            let done = done.map_err(|refusal| name_options(refusal).to_string());
             let count = 1 + finished.fetch_add(1, Ordering::Relaxed);
-            if let (true, Ok(mut line)) = (how.side_by_side, line.lock()) {
+            if let (true, Ok(mut line)) = (traits.parallel, line.lock()) {
                 let all = self.scenarios.len();
-                line.say(|time| {
-                    format!("{count} of {all}, {}", time_left(time, part_of(count, all)))
+                line.show(|time| {
+                    format!(
+                        "{count} of {all}, {}",
+                        time_left(time, fraction_of(count, all))
+                    )
                 });
             }
             done
         };
-        let done: Vec<_> = match how.side_by_side {
+        let done: Vec<_> = match traits.parallel {
             true => jobs.into_par_iter().map(solve).collect(),
             false => jobs.into_iter().map(solve).collect(),
         };
         self.finish::<R>(&selection, done)
     }
 
-    /// Shows what was done about several scenarios, and writes the table.
+    /// Outputs the results of several scenarios, and writes their table.
     fn finish<R: Written>(
         &self,
         selection: &Selection,
-        all: Vec<Result<Done, String>>,
+        all: Vec<Result<Delivered, String>>,
     ) -> Result<Status, Refusal> {
         let mut status = Status::Success;
         let (mut documents, mut errors) = (Vec::new(), Vec::new());
@@ -184,7 +187,7 @@ impl Request {
             let rows = rows_of_json(&documents)?;
             let file = files::write_table(&out, &name, &rows)?;
             if !self.json {
-                show_report(&format!("table      {}\n", named(&out, &[file])))?;
+                show_report(&format!("table      {}\n", list_files(&out, &[file])))?;
             }
         }
         if self.json {
@@ -197,13 +200,13 @@ impl Request {
         Ok(status)
     }
 
-    /// What is written; refused if the verb has none of it.
-    fn selection<R: Written>(&self, how: How) -> Result<Selection, Refusal> {
+    /// The files to write; refused if the verb has no such files.
+    fn selection<R: Written>(&self, traits: VerbTraits) -> Result<Selection, Refusal> {
         let has = R::kinds();
         let has =
             |kind: &Kind| has.contains(kind) || self.scenarios.len() > 1 && *kind == Kind::Csv;
         let stations = self.stations.map(|count| count as usize);
-        if let (Some(count), false) = (stations, how.stations) {
+        if let (Some(count), false) = (stations, traits.stations) {
             return Err(format!("--stations {count}: the files of this verb have none").into());
         }
         let kinds = match &self.write {
@@ -218,14 +221,19 @@ impl Request {
         Ok(Selection { kinds, stations })
     }
 
-    /// A scenario, and the folder for its files; refused before the run if
-    /// nothing could be written there.
-    fn open(&self, path: &Path, how: How, selection: &Selection) -> Result<Job<'_>, Refusal> {
+    /// Opens a scenario and chooses the folder for its files; refused before the run if
+    /// the folder is not writable.
+    fn open(
+        &self,
+        path: &Path,
+        traits: VerbTraits,
+        selection: &Selection,
+    ) -> Result<Job<'_>, Refusal> {
         let (file, text) = match path.to_str() {
             Some("-") => ("standard input".into(), standard_input()?),
             _ => (path.display().to_string(), crate::scenario::text(path)?),
         };
-        let base = match how.varies {
+        let base = match traits.varies {
             true => Some(Base::of_text(text.clone(), file.clone(), &self.overrides)?),
             false => None,
         };
@@ -233,9 +241,9 @@ impl Request {
             Some(base) => base.scenario().clone(),
             None => Scenario::from_toml_with(&text, &file, &self.overrides)?,
         };
-        let alone = self.scenarios.len() == 1;
+        let single = self.scenarios.len() == 1;
         let folder = match &self.out {
-            Some(out) if alone => out.clone(),
+            Some(out) if single => out.clone(),
             out => {
                 let out = out.as_deref().unwrap_or(Path::new("out"));
                 out.join(folder_name(&scenario.name))
@@ -247,7 +255,7 @@ impl Request {
         };
         if !selection.kinds.is_empty() {
             files::check_writable(&folder)?;
-            if self.out.is_none() || !alone {
+            if self.out.is_none() || !single {
                 files::check_owner(&folder, &source)?;
             }
         }
@@ -261,12 +269,12 @@ impl Request {
             text,
             file,
             source,
-            alone,
-            side_by_side: how.side_by_side && !alone,
+            single,
+            parallel: traits.parallel && !single,
         })
     }
 
-    fn show(&self, done: &Done) -> Result<(), Refusal> {
+    fn show(&self, done: &Delivered) -> Result<(), Refusal> {
         match self.json {
             true => show(&done.json),
             false => show_report(&done.report),
@@ -274,7 +282,7 @@ impl Request {
     }
 }
 
-/// A scenario on standard input.
+/// Reads a scenario from standard input.
 fn standard_input() -> Result<String, Refusal> {
     let mut bytes = Vec::new();
     io::stdin()
@@ -284,7 +292,7 @@ fn standard_input() -> Result<String, Refusal> {
     Ok(crate::scenario::utf8(bytes, "standard input")?)
 }
 
-/// The scenario's name as one folder below `out`, whatever is in it.
+/// The scenario's name as the name of a single folder, whatever characters it has.
 fn folder_name(name: &str) -> String {
     let plain = |c: char| {
         if c.is_alphanumeric() || "-_.+ ".contains(c) {

@@ -1,4 +1,4 @@
-//! `leafdyn simulate`: a leaf moves.
+//! `leafdyn simulate`: follows the motion of a leaf.
 
 use std::time::Instant;
 
@@ -9,12 +9,12 @@ use crate::files::Recording;
 use crate::report::{self, FileError, numbers::brief};
 use crate::simulate::{Options, Record, Scheme, Simulation, Stopped};
 
-use super::progress::{self, ProgressLine, part_of_way};
-use super::request::{Done, How, Job, Request};
+use super::progress::{self, ProgressLine, fraction_between};
+use super::request::{Delivered, Job, Request, VerbTraits};
 use super::{Refusal, Status, checkpoint_on_interrupt, note, show_checkpoint};
 
-/// Seconds from which on it is told before a simulation begins how long it takes.
-const WORTH_TELLING: f64 = 60.0;
+/// Longer simulations, in seconds, are announced with their expected duration.
+const ANNOUNCED: f64 = 60.0;
 
 /// Follow a leaf as it moves: its shape, velocities and energies in time.
 ///
@@ -43,7 +43,7 @@ pub struct Simulate {
     resume: bool,
 }
 
-/// The methods by their names.
+/// Parses the names of methods.
 fn method_parser() -> impl TypedValueParser<Value = Scheme> {
     let methods = [Scheme::Explicit, Scheme::SemiImplicit];
     let named = move |word: String| methods.into_iter().find(|method| method.name() == word);
@@ -53,15 +53,14 @@ fn method_parser() -> impl TypedValueParser<Value = Scheme> {
 
 impl Simulate {
     pub fn run(self) -> Result<Status, Refusal> {
-        let how = How {
-            varies: false,
+        let traits = VerbTraits {
             stations: true,
-            side_by_side: false,
+            ..VerbTraits::default()
         };
-        self.request.each::<Record>(how, |job| self.one(job))
+        self.request.each::<Record>(traits, |job| self.one(job))
     }
 
-    fn one(&self, job: &Job) -> Result<Done, Refusal> {
+    fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
         let options = Options {
             scheme: self.method,
             segments: self.segments,
@@ -75,7 +74,7 @@ impl Simulate {
             false => Recording::begin(folder, &mut simulation, selection)?,
         };
         if let Some((steps, seconds)) = simulation.expected()
-            && seconds > WORTH_TELLING
+            && seconds > ANNOUNCED
         {
             let (time, steps) = (progress::duration(seconds), brief(steps));
             note(&format!(
@@ -86,7 +85,7 @@ impl Simulate {
         checkpoint_on_interrupt(recording.checkpointer());
         let ended = self.follow(&mut simulation, &mut recording, job);
         if ended.is_err() {
-            keep(&recording);
+            write_checkpoint(&recording);
         }
         ended
     }
@@ -96,33 +95,33 @@ impl Simulate {
         simulation: &mut Simulation,
         recording: &mut Recording,
         job: &Job,
-    ) -> Result<Done, Refusal> {
+    ) -> Result<Delivered, Refusal> {
         let stopped = record(simulation, recording, job.progress())?;
         let record = recording.record(simulation, stopped)?;
         job.remark(stopped);
         let written = recording.finish(&job.document(&record));
         let written = match written {
-            Ok(files) => Ok(job.named(&files)),
+            Ok(files) => Ok(job.list_files(&files)),
             Err(error) => {
-                // What was found so far need not be lost with the files.
-                keep(recording);
+                // The motion so far need not be lost.
+                write_checkpoint(recording);
                 Err(error.into())
             }
         };
-        job.done(&record, stopped.is_none(), written, |files| {
+        job.deliver_written(&record, stopped.is_none(), written, |files| {
             report::simulate_report(&record, files)
         })
     }
 }
 
-/// Leaves a checkpoint, if that is possible.
-fn keep(recording: &Recording) {
+/// Writes a checkpoint, if possible, and reports it.
+fn write_checkpoint(recording: &Recording) {
     if let Some(kept) = recording.checkpointer().write() {
         show_checkpoint(&kept);
     }
 }
 
-/// Moves the leaf to the end, or as far as it goes, and records it.
+/// Runs the simulation to its end, or until it stops early, and records it.
 fn record(
     simulation: &mut Simulation,
     recording: &mut Recording,
@@ -136,8 +135,8 @@ fn record(
             Err(stopped) => return Ok(Some(stopped)),
         };
         recording.add(simulation, &frame)?;
-        let part = part_of_way(begin, frame.time, duration, false);
-        line.tell(part, || {
+        let fraction = fraction_between(begin, frame.time, duration, false);
+        line.update(fraction, || {
             let speed = (frame.time - begin) / clock.elapsed().as_secs_f64();
             let [time, duration, speed] = [frame.time, duration, speed].map(brief);
             format!("t = {time} of {duration}, {speed} a second")

@@ -1,4 +1,4 @@
-//! `leafdyn trace`: an equilibrium followed through a number of its scenario.
+//! `leafdyn trace`: follows an equilibrium through one or two numbers of its scenario.
 
 use clap::Args;
 
@@ -9,8 +9,8 @@ use crate::study::{
 
 use crate::report::{self, numbers::brief};
 
-use super::progress::part_of_way;
-use super::request::{Done, How, Job, Request};
+use super::progress::fraction_between;
+use super::request::{Delivered, Job, Request, VerbTraits};
 use super::{Refusal, Status};
 
 /// Follow an equilibrium through one number of the scenario: through folds, with the Morse index along the way. With a second number: follow the points at which that index changes through both, as curves.
@@ -58,21 +58,20 @@ pub struct Trace {
 
 impl Trace {
     pub fn run(self) -> Result<Status, Refusal> {
-        let how = How {
+        let traits = VerbTraits {
             varies: true,
-            stations: false,
-            side_by_side: false,
+            ..VerbTraits::default()
         };
         match self.vary.as_slice() {
             [_] if self.map.is_some() => {
                 Err("--map: a map is drawn over two numbers; give --vary twice".into())
             }
-            [along] => (self.request).each::<Traced>(how, |job| self.one(job, along)),
+            [along] => (self.request).each::<Traced>(traits, |job| self.one(job, along)),
             [_, _] if !self.show.is_empty() => {
                 Err("--show: a boundary is drawn over both numbers; give one --vary".into())
             }
             [along, across] => {
-                (self.request).each::<Boundary>(how, |job| self.boundary(job, along, across))
+                (self.request).each::<Boundary>(traits, |job| self.boundary(job, along, across))
             }
             more => Err(format!(
                 "--vary is given {} times: give one number to follow branches, two for a boundary",
@@ -82,7 +81,7 @@ impl Trace {
         }
     }
 
-    fn along(&self, job: &Job, vary: &Vary) -> Result<TraceRequest, Refusal> {
+    fn trace_request(&self, job: &Job, vary: &Vary) -> Result<TraceRequest, Refusal> {
         Ok(TraceRequest {
             base: job.base()?,
             vary: vary.clone(),
@@ -95,9 +94,9 @@ impl Trace {
         })
     }
 
-    fn boundary(&self, job: &Job, along: &Vary, across: &Vary) -> Result<Done, Refusal> {
+    fn boundary(&self, job: &Job, along: &Vary, across: &Vary) -> Result<Delivered, Refusal> {
         let request = BoundaryRequest {
-            trace: self.along(job, along)?,
+            trace: self.trace_request(job, along)?,
             across: across.clone(),
             map: self.map,
         };
@@ -105,20 +104,20 @@ impl Trace {
         let mut seen = (usize::MAX, [0.0; 2]);
         let boundary = study::boundary(&request, &mut |curve, points, [first, second]| {
             // A curve is followed to both ends of the second number's range.
-            let part = match curve {
-                None => part_of_way(ends(along)[0], first, ends(along)[1], along.log),
+            let fraction = match curve {
+                None => fraction_between(ends(along)[0], first, ends(along)[1], along.log),
                 Some(number) => {
                     if number != seen.0 {
                         seen = (number, [second; 2]);
-                        line.next();
+                        line.next_phase();
                     }
                     seen.1 = [seen.1[0].min(second), seen.1[1].max(second)];
                     let [from, to] = ends(across);
-                    let [low, high] = seen.1.map(|at| part_of_way(from, at, to, across.log));
+                    let [low, high] = seen.1.map(|at| fraction_between(from, at, to, across.log));
                     low.zip(high).map(|(low, high)| (high - low).abs())
                 }
             };
-            line.tell(part, || {
+            line.update(fraction, || {
                 let what = curve.map_or("trace".into(), |curve| format!("curve {}", curve + 1));
                 let [first, second] = [first, second].map(brief);
                 format!("{what}, {points} points, at {first}, {second}")
@@ -132,8 +131,8 @@ impl Trace {
         })
     }
 
-    fn one(&self, job: &Job, vary: &Vary) -> Result<Done, Refusal> {
-        let request = self.along(job, vary)?;
+    fn one(&self, job: &Job, vary: &Vary) -> Result<Delivered, Refusal> {
+        let request = self.trace_request(job, vary)?;
         let free = request.base.scenario().held_tip.is_none();
         if let Some(show) = self.show.iter().find(|show| free && show.is_reaction()) {
             return Err(
@@ -145,16 +144,16 @@ impl Trace {
         let mut trace = study::trace(&request, &mut |branch, points, value| {
             if branch != seen.0 {
                 seen = (branch, value);
-                line.next();
+                line.next_phase();
             }
-            // To the end it goes to; how many branches there will be, nobody knows.
+            // Relative to the end it moves to; the number of branches is not known.
             let [from, to] = ends(vary);
             let to = if (value - seen.1) * (to - from) < 0.0 {
                 from
             } else {
                 to
             };
-            line.tell(part_of_way(seen.1, value, to, vary.log), || {
+            line.update(fraction_between(seen.1, value, to, vary.log), || {
                 let at = brief(value);
                 format!("branch {}, {points} points, at {at}", branch + 1)
             });
@@ -169,7 +168,7 @@ impl Trace {
     }
 }
 
-/// Cells along both numbers, as 16x16.
+/// Parses the numbers of cells along both axes, as in 16x16.
 fn cells(given: &str) -> Result<[usize; 2], String> {
     let sides = given.split_once('x').map(|(columns, rows)| [columns, rows]);
     let sides = sides.map(|sides| sides.map(|side| side.trim().parse().ok()));
@@ -185,7 +184,7 @@ fn ends(vary: &Vary) -> [f64; 2] {
     ends.map(|end| end.copied().unwrap_or_default())
 }
 
-/// An error with the option that it is about.
+/// An error together with the option that caused it.
 fn name_option(error: TraceError) -> Refusal {
     match error {
         TraceError::Vary { .. } => format!("--vary {error}").into(),

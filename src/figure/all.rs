@@ -1,4 +1,4 @@
-//! All shapes of a leaf that were found, lowest energy first.
+//! All equilibria of a leaf that were found, lowest energy first.
 
 use super::drawing::{Drawing, NOTE};
 use super::page::new_page;
@@ -8,6 +8,7 @@ use super::veins::Veins;
 use crate::scenario::Scenario;
 use crate::study::All;
 
+/// Most equilibria drawn.
 const MOST: usize = 24;
 
 pub fn draw(all: &All, scenario: &Scenario) -> Drawing {

@@ -1,5 +1,5 @@
-//! Two axes around a panel: grid, frame, ticks and names; curves and markers
-//! in it. Every panel of numbers is one of these.
+//! Two axes around a panel: grid, frame, ticks and names, with curves and markers
+//! inside. Every panel of numbers is drawn with them.
 
 use glam::DVec2;
 
@@ -13,10 +13,11 @@ use super::page::{Cell, TEXT_SIZE, TICK_SIZE};
 
 const TICK: f64 = 4.0;
 const DIVISION: f64 = 2.0;
-/// From the frame to the base line of the name below.
+/// From the frame to the base line of the name of the horizontal axis.
 const NAME_BELOW: f64 = 34.0;
-/// And to that of the name beside: at least, after the labels, and at most.
-const NAME_BESIDE: f64 = 42.0;
+/// From the frame to that of the vertical axis: the least distance, the gap after the
+/// labels, and the largest distance.
+const NEAREST_NAME: f64 = 42.0;
 const AFTER_LABELS: f64 = 13.0;
 const FARTHEST_NAME: f64 = 53.0;
 
@@ -39,10 +40,10 @@ pub struct Axes {
 }
 
 impl Axes {
-    /// Where a point is on the page; `None` if it cannot be drawn.
+    /// The position of a point on the page; `None` if it cannot be drawn.
     pub fn at(&self, (x, y): (f64, f64)) -> Option<DVec2> {
-        let part = DVec2::new(self.across.part(x), 1.0 - self.up.part(y));
-        let at = self.cell.corner + self.cell.size * part;
+        let fraction = DVec2::new(self.across.fraction(x), 1.0 - self.up.fraction(y));
+        let at = self.cell.corner + self.cell.size * fraction;
         at.is_finite().then_some(at)
     }
 
@@ -50,16 +51,16 @@ impl Axes {
     pub fn draw(&self, page: &mut Drawing) {
         let Cell { corner, size } = self.cell;
         let end = self.cell.end();
-        let stroke = |axis: &Axis, tick: &Tick| match axis.stresses_zero && tick.value == 0.0 {
+        let stroke = |axis: &Axis, tick: &Tick| match axis.emphasizes_zero && tick.value == 0.0 {
             true => Stroke::new(FRAME, 0.8),
             false => Stroke::new(GRID, 0.7),
         };
         for tick in self.across.ticks(size.x, Direction::Across) {
-            let top = corner.with_x(corner.x + tick.part * size.x);
+            let top = corner.with_x(corner.x + tick.fraction * size.x);
             page.line(top, top.with_y(end.y), stroke(&self.across, &tick));
         }
         for tick in self.up.ticks(size.y, Direction::Up) {
-            let left = corner.with_y(end.y - tick.part * size.y);
+            let left = corner.with_y(end.y - tick.fraction * size.y);
             page.line(left, left.with_x(end.x), stroke(&self.up, &tick));
         }
         self.draw_frame(page);
@@ -77,15 +78,16 @@ impl Axes {
             (&self.across, Direction::Across, size.x, DVec2::Y),
             (&self.up, Direction::Up, size.y, DVec2::NEG_X),
         ] {
-            let foot = |part: f64| match direction {
-                Direction::Across => corner + size * DVec2::new(part, 1.0),
-                Direction::Up => corner + size * DVec2::new(0.0, 1.0 - part),
+            let foot = |fraction: f64| match direction {
+                Direction::Across => corner + size * DVec2::new(fraction, 1.0),
+                Direction::Up => corner + size * DVec2::new(0.0, 1.0 - fraction),
             };
-            for part in axis.divisions(length) {
-                page.line(foot(part), foot(part) + DIVISION * out, rim);
+            for fraction in axis.divisions(length) {
+                let foot = foot(fraction);
+                page.line(foot, foot + DIVISION * out, rim);
             }
-            for Tick { part, text, .. } in axis.ticks(length, direction) {
-                let foot = foot(part);
+            for Tick { fraction, text, .. } in axis.ticks(length, direction) {
+                let foot = foot(fraction);
                 page.line(foot, foot + TICK * out, rim);
                 match direction {
                     _ if !axis.labelled => (),
@@ -95,7 +97,7 @@ impl Axes {
                     }
                     Direction::Up => {
                         let end = foot - DVec2::new(TICK + 3.0, 0.0);
-                        page.beside(end, &text, TICK_SIZE, Anchor::End, NOTE);
+                        page.centered_label(end, &text, TICK_SIZE, Anchor::End, NOTE);
                         widest = widest.max(font.width(&text, TICK_SIZE));
                     }
                 }
@@ -106,14 +108,14 @@ impl Axes {
             page.label(base, &self.across.title(), TEXT_SIZE, Anchor::Middle, INK);
         }
         if self.up.labelled {
-            let away = (widest + AFTER_LABELS).clamp(NAME_BESIDE, FARTHEST_NAME);
-            let base = DVec2::new(corner.x - away, middle.y);
-            page.upright_label(base, &self.up.title(), TEXT_SIZE, INK);
+            let distance = (widest + AFTER_LABELS).clamp(NEAREST_NAME, FARTHEST_NAME);
+            let base = DVec2::new(corner.x - distance, middle.y);
+            page.rotated_label(base, &self.up.title(), TEXT_SIZE, INK);
         }
     }
 
-    /// Draws a curve through these points, as much of it as is inside the
-    /// frame; it is broken where a point cannot be drawn.
+    /// Draws the part of a curve through these points that is inside the frame, with
+    /// gaps where a point cannot be drawn.
     pub fn curve(&self, page: &mut Drawing, points: &[(f64, f64)], stroke: Stroke) {
         let columns = self.cell.size.x.ceil().max(1.0) as usize;
         let mut path: Path = Vec::new();
@@ -136,29 +138,29 @@ impl Axes {
 
     /// The part of a line that is inside the frame (Liang and Barsky).
     fn clipped(&self, from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
-        let way = to - from;
+        let step = to - from;
         let (low, high) = (self.cell.corner - from, self.cell.end() - from);
         let (mut first, mut last) = (0.0_f64, 1.0_f64);
-        for (way, low, high) in [(way.x, low.x, high.x), (way.y, low.y, high.y)] {
-            if way == 0.0 {
+        for (step, low, high) in [(step.x, low.x, high.x), (step.y, low.y, high.y)] {
+            if step == 0.0 {
                 if low > 0.0 || high < 0.0 {
                     return None;
                 }
                 continue;
             }
-            let (a, b) = (low / way, high / way);
+            let (a, b) = (low / step, high / step);
             first = first.max(a.min(b));
             last = last.min(a.max(b));
         }
         let point = |part: f64| match part {
             0.0 => from,
             1.0 => to,
-            part => from + part * way,
+            part => from + part * step,
         };
         (first <= last).then(|| (point(first), point(last)))
     }
 
-    /// Marks those of these points that are inside the frame.
+    /// Draws a marker at each of these points that is inside the frame.
     pub fn markers(
         &self,
         page: &mut Drawing,
@@ -175,8 +177,8 @@ impl Axes {
     }
 }
 
-/// Points that look the same when drawn over so many columns: of every
-/// column's, the first, the last, the lowest and the highest.
+/// Fewer points that look the same when drawn over `columns` columns: of each
+/// the first, the last, the lowest and the highest.
 fn thinned(points: &[(f64, f64)], columns: usize) -> Vec<(f64, f64)> {
     let each = points.len().div_ceil(columns);
     if each <= 4 {
@@ -201,7 +203,7 @@ mod tests {
     use crate::figure::svg::text;
 
     #[test]
-    fn curves_are_cut_at_the_frame_and_broken_at_holes() {
+    fn curves_are_clipped_at_the_frame_and_have_gaps_at_invalid_points() {
         let axes = Axes {
             cell: Cell {
                 corner: DVec2::new(10.0, 20.0),
@@ -220,11 +222,11 @@ mod tests {
         assert!(curve(&[(0.0, 0.0), (1.0, 1.0)]).contains(diagonal));
         assert!(!curve(&[(0.0, 1.5), (1.0, 1.2)]).contains("<path"));
         let line = [0.0, 0.2, 0.3, 0.4, 1.0];
-        let holed = line.map(|x| (x, if x == 0.3 { f64::NAN } else { x }));
-        assert_eq!(curve(&holed).matches('M').count(), 2);
+        let with_gap = line.map(|x| (x, if x == 0.3 { f64::NAN } else { x }));
+        assert_eq!(curve(&with_gap).matches('M').count(), 2);
         let heights = [0.5, f64::INFINITY, 1e300, -1e280];
-        let wild = [0, 1, 2, 3].map(|i| (0.1 * i as f64, heights[i]));
-        assert!(!curve(&wild).contains("<path"));
+        let extreme = [0, 1, 2, 3].map(|i| (0.1 * i as f64, heights[i]));
+        assert!(!curve(&extreme).contains("<path"));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! An axis: from values to parts of its length, and its round ticks.
+//! An axis: maps values to fractions of its length, and places round ticks.
 
 use super::font::Font;
 use super::page::TICK_SIZE;
@@ -6,20 +6,20 @@ use super::round::{multiples, round_step};
 use crate::report::numbers::{decade, digit_of_decade, fixed, superscript, time_of_decade};
 use std::ops::{Range, RangeInclusive};
 
-/// Air at both ends: as a part of a linear extent, and in decades.
-const AIR: f64 = 0.06;
-const DECADES_OF_AIR: f64 = 0.12;
-/// What is smaller is rounding of rounding.
+/// Padding at both ends: as a fraction of a linear extent, and in decades.
+const PADDING: f64 = 0.06;
+const PADDING_DECADES: f64 = 0.12;
+/// Most decades of an axis: smaller values are below rounding.
 const MOST_DECADES: f64 = 18.0;
-/// What is larger is a number gone wild.
+/// Larger values are diverged and not drawn.
 const LARGEST: f64 = 1e290;
-/// Powers of ten that are written out on a linear axis.
+/// Powers of ten for which a linear axis writes values without a factor.
 const PLAIN: Range<f64> = -2.0..4.0;
-/// Pixels between ticks at least, and between their labels.
+/// Least pixels between ticks, across and up, and between their labels.
 const LINEAR: [f64; 2] = [62.0, 25.0];
 const LOGARITHMIC: [f64; 2] = [38.0, 22.0];
 const BETWEEN_LABELS: f64 = 4.0;
-/// Pixels of a decade that is divided further.
+/// A decade wider than this many pixels is subdivided.
 const DIVIDED: f64 = 60.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,25 +42,25 @@ pub enum Ticks {
 #[derive(Clone, Debug)]
 pub struct Axis {
     pub name: String,
-    /// Of a logarithmic axis: the sign of all its values.
+    /// The sign of all values of a logarithmic axis; `None`: linear.
     pub sign: Option<f64>,
-    /// Values or, of a logarithmic axis, decades at both ends, which may fall.
+    /// Values at both ends or, on a logarithmic axis, decades; they may decrease.
     pub start: f64,
     pub end: f64,
     pub ticks: Ticks,
-    /// Pixels between ticks at least, if not as usual.
-    pub apart: Option<f64>,
-    /// Whether ticks and axis have their text.
+    /// Least pixels between ticks, in place of the default.
+    pub tick_spacing: Option<f64>,
+    /// Whether the ticks and the axis are labelled.
     pub labelled: bool,
-    /// Whether the grid line of zero, where most curves begin, is stressed.
-    pub stresses_zero: bool,
+    /// Whether the grid line of zero, where most curves begin, is emphasized.
+    pub emphasizes_zero: bool,
 }
 
 #[derive(Clone, Debug)]
 pub struct Tick {
     pub value: f64,
     /// From 0 at the start of the axis to 1 at its end.
-    pub part: f64,
+    pub fraction: f64,
     pub text: String,
 }
 
@@ -69,7 +69,7 @@ impl Axis {
         let [start, end] = [start, end].map(|value| value.clamp(-LARGEST, LARGEST));
         let size = start.abs().max(end.abs());
         let extent = (end - start).abs();
-        // An extent that is rounding is none.
+        // An extent that is only rounding counts as zero.
         let (start, end) = if extent > 1e-12 * size && extent > f64::MIN_POSITIVE {
             (start, end)
         } else if size > f64::MIN_POSITIVE {
@@ -83,26 +83,26 @@ impl Axis {
             start,
             end,
             ticks: Ticks::Round,
-            apart: None,
+            tick_spacing: None,
             labelled: true,
-            stresses_zero: false,
+            emphasizes_zero: false,
         }
     }
 
-    /// A linear axis that holds these values with some air.
+    /// A linear axis that covers these values, with padding.
     pub fn holding(name: &str, values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = extent(values.filter(|value| value.abs() < LARGEST)).unwrap_or_default();
         let axis = Axis::linear(name, low, high);
-        let air = AIR * (axis.end - axis.start);
+        let padding = PADDING * (axis.end - axis.start);
         Axis {
-            start: axis.start - air,
-            end: axis.end + air,
-            stresses_zero: true,
+            start: axis.start - padding,
+            end: axis.end + padding,
+            emphasizes_zero: true,
             ..axis
         }
     }
 
-    /// The same axis, of at least this extent: what varies less is rounding.
+    /// The same axis with at least this extent: smaller variations are rounding.
     pub fn at_least(self, extent: f64) -> Self {
         let lacking = extent - (self.end - self.start);
         if lacking.is_nan() || lacking <= 0.0 {
@@ -115,15 +115,15 @@ impl Axis {
         }
     }
 
-    /// A logarithmic axis of at least so many decades that holds those of
-    /// these values that are positive, with some air.
+    /// A logarithmic axis of at least `fewest` decades that covers the positive ones of
+    /// these values, with padding.
     pub fn logarithmic(name: &str, values: impl Iterator<Item = f64>, fewest: f64) -> Self {
         let drawable = values.filter(|value| value.is_normal() && *value > 0.0);
         let (start, end) = match extent(drawable.map(f64::log10)) {
             Some((low, high)) => {
                 let low = low.max(high - MOST_DECADES);
-                let air = (0.5 * (fewest - (high - low))).max(DECADES_OF_AIR);
-                (low - air, high + air)
+                let padding = (0.5 * (fewest - (high - low))).max(PADDING_DECADES);
+                (low - padding, high + padding)
             }
             None => (-fewest, 0.0),
         };
@@ -133,7 +133,18 @@ impl Axis {
         }
     }
 
-    /// The name, with the power of ten in which values are given.
+    /// An axis that covers these values: linear or, given their sign, logarithmic.
+    pub fn covering(name: &str, values: impl Iterator<Item = f64>, sign: Option<f64>) -> Self {
+        match sign {
+            None => Axis::holding(name, values),
+            Some(sign) => Axis {
+                sign: Some(sign),
+                ..Axis::logarithmic(name, values.map(|value| sign * value), 1.0)
+            },
+        }
+    }
+
+    /// The name, with the power of ten by which values are multiplied.
     pub fn title(&self) -> String {
         match self.power() {
             _ if self.name.is_empty() => String::new(),
@@ -142,7 +153,7 @@ impl Axis {
         }
     }
 
-    /// Values are given in this power of ten.
+    /// The power of ten that is the unit of the tick labels.
     fn power(&self) -> i32 {
         let size = self.start.abs().max(self.end.abs()).log10();
         match (self.sign, &self.ticks) {
@@ -152,8 +163,8 @@ impl Axis {
     }
 
     /// Where a value is, from 0 at the start to 1 at the end; not finite if it
-    /// has no place.
-    pub fn part(&self, value: f64) -> f64 {
+    /// cannot be drawn.
+    pub fn fraction(&self, value: f64) -> f64 {
         let at = match self.sign {
             Some(sign) => (sign * value).log10(),
             None if value.abs() < LARGEST => value,
@@ -162,35 +173,35 @@ impl Axis {
         (at - self.start) / (self.end - self.start)
     }
 
-    /// As many ticks as can be read on an axis of this length.
+    /// As many ticks as are readable on an axis of this length.
     pub fn ticks(&self, length: f64, direction: Direction) -> Vec<Tick> {
-        let usual = match self.ticks {
+        let default = match self.ticks {
             Ticks::Round if self.sign.is_none() => LINEAR,
             _ => LOGARITHMIC,
         };
         let font = Font::embedded();
-        let taken = |tick: &Tick| match direction {
+        let size = |tick: &Tick| match direction {
             Direction::Across => font.width(&tick.text, TICK_SIZE),
             Direction::Up => TICK_SIZE,
         };
-        let apart = |pair: &[Tick]| {
-            let distance = length * (pair[1].part - pair[0].part).abs();
-            distance - 0.5 * (taken(&pair[0]) + taken(&pair[1])) > BETWEEN_LABELS
+        let separate = |pair: &[Tick]| {
+            let distance = length * (pair[1].fraction - pair[0].fraction).abs();
+            distance - 0.5 * (size(&pair[0]) + size(&pair[1])) > BETWEEN_LABELS
         };
-        let mut room = self.apart.unwrap_or(usual[direction as usize]);
+        let mut spacing = self.tick_spacing.unwrap_or(default[direction as usize]);
         loop {
-            let ticks = self.ticks_apart(room / length);
-            if !self.labelled || room > length || ticks.windows(2).all(apart) {
+            let ticks = self.ticks_spaced(spacing / length);
+            if !self.labelled || spacing > length || ticks.windows(2).all(separate) {
                 return ticks;
             }
-            room *= 1.25;
+            spacing *= 1.25;
         }
     }
 
-    /// Ticks about this part of the axis apart.
-    fn ticks_apart(&self, part: f64) -> Vec<Tick> {
+    /// Ticks spaced by about this fraction of the axis.
+    fn ticks_spaced(&self, spacing: f64) -> Vec<Tick> {
         let (low, high) = (self.start.min(self.end), self.start.max(self.end));
-        let every = |count: usize| (count as f64 * part).ceil().max(1.0) as usize;
+        let every = |count: usize| (count as f64 * spacing).ceil().max(1.0) as usize;
         let ticks = match (&self.ticks, self.sign) {
             (Ticks::At(values), _) => {
                 let kept = values.iter().step_by(every(values.len()));
@@ -202,22 +213,23 @@ impl Axis {
             }
             (Ticks::Round | Ticks::Times, None) => {
                 let unit = 10f64.powi(self.power());
-                let step = round_step((high - low) * part / unit);
+                let step = round_step((high - low) * spacing / unit);
                 let found = multiples(low / unit, high / unit, step).into_iter();
                 found.map(|(value, text)| (value * unit, text)).collect()
             }
         };
         let tick = |(value, text): (f64, String)| Tick {
             value,
-            part: self.part(value),
+            fraction: self.fraction(value),
             text,
         };
         // Beyond the largest number there is no power of ten.
         let ticks = ticks.into_iter().map(tick);
-        ticks.filter(|tick| tick.part.is_finite()).collect()
+        ticks.filter(|tick| tick.fraction.is_finite()).collect()
     }
 
-    /// Every so many-th power of ten or, where there are few, 1, 2 and 5 times these.
+    /// Powers of ten that are multiples of `every` or, if there are few, 1, 2 and 5 times
+    /// every power.
     fn decades(
         &self,
         range: RangeInclusive<f64>,
@@ -245,7 +257,7 @@ impl Axis {
             .collect()
     }
 
-    /// Parts at which long decades are divided: twice to nine times the power of ten.
+    /// Fractions at which long decades are subdivided: 2 to 9 times the power of ten.
     pub fn divisions(&self, length: f64) -> Vec<f64> {
         let (low, high) = (self.start.min(self.end), self.start.max(self.end));
         let divided = length > DIVIDED * (high - low) && !matches!(self.ticks, Ticks::At(_));
@@ -255,8 +267,8 @@ impl Axis {
         let powers = low.floor() as i32..=high.floor() as i32;
         let values =
             powers.flat_map(|power| (2..10).map(move |n| f64::from(n) * 10f64.powi(power)));
-        let parts = values.map(|value| self.part(sign * value));
-        parts.filter(|part| (0.0..=1.0).contains(part)).collect()
+        let fractions = values.map(|value| self.fraction(sign * value));
+        fractions.filter(|it| (0.0..=1.0).contains(it)).collect()
     }
 }
 
@@ -289,7 +301,7 @@ mod tests {
             assert!((3..=12).contains(&ticks.len()), "{low} {high}: {ticks:?}");
             for tick in ticks {
                 assert!(tick.text.chars().count() <= 6, "{tick:?}");
-                assert!((0.0..=1.0).contains(&tick.part), "{tick:?}");
+                assert!((0.0..=1.0).contains(&tick.fraction), "{tick:?}");
             }
         }
     }
@@ -315,22 +327,25 @@ mod tests {
     }
 
     #[test]
-    fn logarithmic_axes_hold_their_values_with_some_air() {
+    fn logarithmic_axes_cover_their_values_with_padding() {
         for values in [vec![1e-4, 3.0], vec![2.0, 2.1], vec![7.0], vec![1e-12, 0.0]] {
             for fewest in [1.0, 3.0] {
                 let axis = Axis::logarithmic("", values.iter().copied(), fewest);
                 for &value in values.iter().filter(|&&value| value > 0.0) {
                     assert!(
-                        (0.0..=1.0).contains(&axis.part(value)),
+                        (0.0..=1.0).contains(&axis.fraction(value)),
                         "{value} in {axis:?}"
                     );
                 }
                 assert!(axis.end - axis.start >= fewest - 1e-12);
-                assert!(!axis.part(0.0).is_finite());
+                assert!(!axis.fraction(0.0).is_finite());
             }
         }
         let axis = Axis::logarithmic("", [1e-300, 1e-3].into_iter(), 3.0);
-        assert!(axis.part(1e-300) < 0.0, "rounding of rounding is left out");
+        assert!(
+            axis.fraction(1e-300) < 0.0,
+            "rounding of rounding is left out"
+        );
     }
 
     #[test]
@@ -342,7 +357,7 @@ mod tests {
                 Axis::linear("t", values[0], *values.last().unwrap()),
             ] {
                 for tick in axis.ticks(300.0, Up) {
-                    assert!((0.0..=1.0).contains(&tick.part), "{tick:?} of {axis:?}");
+                    assert!((0.0..=1.0).contains(&tick.fraction), "{tick:?} of {axis:?}");
                 }
             }
         }
@@ -370,7 +385,10 @@ mod tests {
         assert_eq!(texts(&axis, 2000.0).len(), 40);
         let axis = Axis::linear("", 1000.001, 1000.009);
         for pair in axis.ticks(300.0, Across).windows(2) {
-            assert!(300.0 * (pair[1].part - pair[0].part) > 62.0, "{pair:?}");
+            assert!(
+                300.0 * (pair[1].fraction - pair[0].fraction) > 62.0,
+                "{pair:?}"
+            );
         }
     }
 }

@@ -1,5 +1,5 @@
 //! The boundary of stability: curves in the plane of two numbers, with the index on both
-//! sides, and leaves of either side.
+//! sides, and leaves from either side.
 
 use glam::DVec3;
 use std::collections::BTreeSet;
@@ -15,7 +15,7 @@ use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, TICK_SIZE, n
 use super::round::round_step;
 use super::setting::Setting;
 use super::small::SmallPanels;
-use super::veins::Veins;
+use super::veins::{Veins, length};
 use crate::branch::Kind;
 use crate::report::numbers::{power_of_ten, short};
 use crate::report::sides;
@@ -25,22 +25,22 @@ use crate::study::{Boundary, BoundaryMap, BoundaryPoint, LeafBeside};
 const DIAGRAM: f64 = 400.0;
 /// Right of the panel, for the key.
 const KEY: f64 = 210.0;
-/// A leaf that buckles by less than this part of its length is drawn enlarged.
+/// Displacements of a buckled leaf below this fraction of its length are magnified.
 const VISIBLE: f64 = 0.1;
-/// Curves named.
+/// Most curves that the key names.
 const MOST_NAMED: usize = 7;
 
 pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);
-    let shown: Vec<Shown> = (boundary.curves.iter())
-        .flat_map(|curve| curve.beside.iter().map(|leaf| Shown::of(curve.kind, leaf)))
+    let shown: Vec<DrawnLeaf> = (boundary.curves.iter())
+        .flat_map(|curve| (curve.beside.iter()).map(|leaf| DrawnLeaf::new(curve.kind, leaf)))
         .collect();
     let longest = shown.iter().flat_map(|it| &it.leaf.curves);
     let longest = longest.map(|curve| length(curve)).fold(0.0, f64::max);
     let shapes: Vec<Veins> = (shown.iter())
         .map(|it| Veins::through(&it.curves, &it.tips, longest))
         .collect();
-    let diagram = Cell::beside_key(HEADER + PANEL_TITLE, DIAGRAM, KEY);
+    let diagram = Cell::left_of_key(HEADER + PANEL_TITLE, DIAGRAM, KEY);
     let below = diagram.end().y + PANEL_AXIS;
     let panels = SmallPanels::holding(shapes.iter(), shown.len(), &setting).below(below);
     let name = format!("{}: where the index changes", boundary.scenario);
@@ -52,7 +52,7 @@ pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
     drawing.group("leaves", |page| {
         for (number, (veins, shown)) in shapes.iter().zip(&shown).enumerate() {
             let [first, second] = shown.leaf.values.map(short);
-            let text = format!("{}, ({first}, {second})", shown.what);
+            let text = format!("{}, ({first}, {second})", shown.caption);
             panels.draw(
                 page,
                 number,
@@ -65,64 +65,60 @@ pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
     drawing
 }
 
-/// A leaf beside a curve, as it is drawn.
-struct Shown<'b> {
+/// A leaf next to a curve, as it is drawn.
+struct DrawnLeaf<'b> {
     leaf: &'b LeafBeside,
-    what: String,
+    caption: String,
     curves: Vec<Vec<DVec3>>,
     tips: Vec<DVec3>,
 }
 
-impl<'b> Shown<'b> {
-    fn of(kind: Kind, leaf: &'b LeafBeside) -> Self {
-        let what = match (&leaf.fallen_from, kind, leaf.index) {
+impl<'b> DrawnLeaf<'b> {
+    fn new(kind: Kind, leaf: &'b LeafBeside) -> Self {
+        let caption = match (&leaf.fallen_from, kind, leaf.index) {
             (None, _, 0) => "stable".into(),
             (None, _, index) => format!("index {index}"),
             (Some(_), Kind::Fold, _) => "snapped".into(),
-            (Some(from), Kind::Branching, _) => return Shown::buckled(leaf, from),
+            (Some(from), Kind::Branching, _) => return DrawnLeaf::buckled(leaf, from),
         };
-        Shown {
+        DrawnLeaf {
             leaf,
-            what,
+            caption,
             curves: leaf.curves.clone(),
             tips: leaf.tips.clone(),
         }
     }
 
-    /// Next to a crossing of branches a leaf buckles little: that is drawn enlarged until it
-    /// can be seen.
+    /// Next to a crossing of branches a leaf buckles only little: its displacements are
+    /// magnified until they are visible.
     fn buckled(leaf: &'b LeafBeside, from: &[Vec<DVec3>]) -> Self {
         let mut curves = leaf.curves.clone();
         let largest = curves.iter().flatten().zip(from.iter().flatten());
         let largest = largest.map(|(x, y)| x.distance(*y)).fold(0.0, f64::max);
         let longest = curves.iter().map(|curve| length(curve));
         let visible = VISIBLE * longest.fold(0.0, f64::max);
-        let mut what = "buckled".to_string();
+        let mut caption = "buckled".to_string();
         if 0.0 < largest && largest < visible {
-            let times = round_step(visible / largest);
+            let factor = round_step(visible / largest);
             for (x, from) in curves.iter_mut().flatten().zip(from.iter().flatten()) {
-                *x = *from + times * (*x - *from);
+                *x = *from + factor * (*x - *from);
             }
-            what += &format!(" ×{}", short(times));
+            caption += &format!(" ×{}", short(factor));
         }
         let ends = curves.iter().take(leaf.tips.len());
         let tips = ends.filter_map(|curve| curve.last().copied()).collect();
-        Shown {
+        DrawnLeaf {
             leaf,
-            what,
+            caption,
             curves,
             tips,
         }
     }
 }
 
-/// What a leaf is called in the diagram.
+/// The letter of a leaf in the diagram.
 fn letter(number: usize) -> String {
     char::from(b'a' + number as u8).into()
-}
-
-fn length(curve: &[DVec3]) -> f64 {
-    curve.windows(2).map(|w| w[0].distance(w[1])).sum()
 }
 
 fn notes(boundary: &Boundary) -> Vec<String> {
@@ -145,7 +141,7 @@ fn notes(boundary: &Boundary) -> Vec<String> {
     notes
 }
 
-fn draw_curves(page: &mut Drawing, boundary: &Boundary, shown: &[Shown], cell: Cell) {
+fn draw_curves(page: &mut Drawing, boundary: &Boundary, shown: &[DrawnLeaf], cell: Cell) {
     let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
     let axes = Axes {
         cell,
@@ -184,7 +180,7 @@ fn draw_curves(page: &mut Drawing, boundary: &Boundary, shown: &[Shown], cell: C
     draw_key(page, boundary, cell);
 }
 
-/// The cells of the map, each in the colour of its index.
+/// Draws the cells of the map, each in the colour of its index.
 fn draw_cells(page: &mut Drawing, axes: &Axes, boundary: &Boundary, map: &BoundaryMap) {
     let edges = |which: usize, cells: usize| -> Vec<f64> {
         let [from, to] = boundary.ranges[which];
@@ -217,24 +213,17 @@ fn draw_cells(page: &mut Drawing, axes: &Axes, boundary: &Boundary, map: &Bounda
     }
 }
 
-/// An axis over the whole range, logarithmic if the number's logarithm varies evenly;
-/// from small to large.
+/// An axis over the whole range, logarithmic if the values are spaced logarithmically;
+/// values increase along it.
 fn axis(boundary: &Boundary, which: usize, values: impl Iterator<Item = f64>) -> Axis {
     let name = name(&boundary.keys[which].to_string());
     let ends = boundary.ranges[which];
-    let values = values.chain(ends);
-    if !boundary.log[which] {
-        return Axis::holding(&name, values);
-    }
-    let sign = ends[0].signum();
-    Axis {
-        sign: Some(sign),
-        ..Axis::logarithmic(&name, values.map(|value| sign * value), 1.0)
-    }
+    let sign = boundary.log[which].then(|| ends[0].signum());
+    Axis::covering(&name, values.chain(ends), sign)
 }
 
 fn draw_key(page: &mut Drawing, boundary: &Boundary, cell: Cell) {
-    let mut key = Key::beside(cell);
+    let mut key = Key::right_of(cell);
     for (c, curve) in boundary.curves.iter().enumerate().take(MOST_NAMED) {
         let stroke = Stroke::new(CURVES[c % CURVES.len()], 1.8);
         let what = sides(curve).unwrap_or_else(|| "not verified".into());

@@ -1,5 +1,5 @@
 //! Speed against accuracy: error against time, and time against the number of
-//! veins, of every way to bring a leaf to rest.
+//! veins, for every method of relaxation.
 
 use super::axis::{Axis, Ticks};
 use super::chart_panel::{ChartPanel, Failure, Point, Series};
@@ -11,8 +11,8 @@ use crate::report::numbers::power_of_ten;
 use crate::report::words::contender;
 use crate::study::{Chart, Contender, Peer, Row, Scaling};
 
-/// Colours of the peers that come with this crate, so that they are the same in
-/// every chart; and of others, in turn.
+/// Fixed colours of the peers that come with this crate, the same in every chart;
+/// other peers take the rest in turn.
 const KNOWN_PEERS: [(&str, Color); 3] = [
     ("solve_bvp", Color(120, 120, 128)),
     ("exudyn", Color(150, 105, 60)),
@@ -24,7 +24,7 @@ const OTHER_PEERS: [Color; 3] = [
     Color(165, 120, 130),
 ];
 
-/// The smallest error that is drawn: what is smaller is put there.
+/// Smaller errors are drawn here.
 const SMALLEST: f64 = 1e-17;
 const FEWEST_DECADES: f64 = 1.0;
 
@@ -105,13 +105,13 @@ fn page(title: &str, notes: &[String], panel: &ChartPanel) -> Drawing {
     drawing
 }
 
-/// Where the points of all series are, across and up.
+/// Coordinates of the points of all series, across and up.
 fn places(series: &[Series]) -> (Vec<f64>, Vec<f64>) {
     let points = series.iter().flat_map(|series| &series.points);
     points.map(|point| point.at).unzip()
 }
 
-/// Colour, the same for methods of one kind, and marker of a contender.
+/// Colour and marker of a contender.
 fn style(who: Contender) -> (Color, Marker) {
     match (who.method, who.one_grid) {
         (Method::SemiImplicit(_), false) => (BLUE, Marker::Circle),
@@ -124,8 +124,8 @@ fn style(who: Contender) -> (Color, Marker) {
     }
 }
 
-/// The lines of all contenders that took part: seconds over veins, or errors
-/// over seconds. Each row comes with its number of veins.
+/// A series for each contender with results: seconds over veins, or errors over
+/// seconds. Each row comes with its number of veins.
 fn contenders(rows: &[(usize, &Row)], over_veins: bool) -> Vec<Series> {
     let of = |who: Contender| {
         let (color, marker) = style(who);
@@ -152,7 +152,7 @@ fn contenders(rows: &[(usize, &Row)], over_veins: bool) -> Vec<Series> {
                     spread: [seconds.q1, seconds.q3].map(|time| place(time, error)),
                     front: row.pareto == Some(true),
                 }),
-                // Failures are where their leaf is, run or not.
+                // Over veins a failure has a position even if it was not run.
                 None => series.failures.push(Failure {
                     x: match over_veins {
                         true => Some(rods),
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reference_that_is_not_confirmed_is_called_so() {
+    fn an_unconfirmed_reference_is_reported() {
         let mut chart = sample::chart();
         chart.reference.as_mut().unwrap().confirmed = false;
         assert!(svg(&chart).contains("NOT confirmed"));

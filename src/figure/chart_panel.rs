@@ -1,4 +1,4 @@
-//! The panel of a chart: one line for each series, failures in lanes above.
+//! The panel of a chart: one line per series, with failures in lanes above.
 
 use glam::DVec2;
 
@@ -14,9 +14,9 @@ const FRAME_HEIGHT: f64 = 430.0;
 const KEY: f64 = 252.0;
 const LANE: f64 = 16.0;
 const LANE_GAP: f64 = 7.0;
-/// Points on the Pareto front, and the band that joins them.
+/// Colour of the points on the Pareto front and of the band that joins them.
 const FRONT: Color = Color(247, 205, 92);
-/// What cannot be told from zero.
+/// Colour of the area below the accuracy of the reference.
 const FLOOR: Color = Color(240, 240, 243);
 const LANES: Color = Color(250, 240, 238);
 
@@ -24,15 +24,15 @@ const LANES: Color = Color(250, 240, 238);
 #[derive(Clone, Copy, Debug)]
 pub struct Point {
     pub at: (f64, f64),
-    /// From here to there it was spread in repeated measurements.
+    /// Ends of its spread in repeated measurements.
     pub spread: [(f64, f64); 2],
     pub front: bool,
 }
 
-/// A run that has no place among the points.
+/// A run without a point.
 #[derive(Clone, Debug)]
 pub struct Failure {
-    /// Where it is on the axis across; `None`: nowhere.
+    /// Where it is on the horizontal axis; `None`: not known.
     pub x: Option<f64>,
     pub word: String,
 }
@@ -75,7 +75,8 @@ impl ChartPanel {
         lanes
     }
 
-    fn above(&self) -> f64 {
+    /// Height of the lanes.
+    fn lanes_height(&self) -> f64 {
         match self.lanes().len() {
             0 => 0.0,
             lanes => lanes as f64 * LANE + LANE_GAP,
@@ -84,12 +85,12 @@ impl ChartPanel {
 
     /// Height of the panel with lanes and axis.
     pub fn height(&self) -> f64 {
-        self.above() + FRAME_HEIGHT + PANEL_AXIS
+        self.lanes_height() + FRAME_HEIGHT + PANEL_AXIS
     }
 
     pub fn draw(&self, page: &mut Drawing, start: f64) {
         let axes = Axes {
-            cell: Cell::beside_key(start + self.above(), FRAME_HEIGHT, KEY),
+            cell: Cell::left_of_key(start + self.lanes_height(), FRAME_HEIGHT, KEY),
             across: self.across.clone(),
             up: self.up.clone(),
         };
@@ -114,7 +115,7 @@ impl ChartPanel {
 
     fn draw_floor(&self, page: &mut Drawing, cell: Cell) {
         let Some(floor) = self.floor else { return };
-        let height = cell.size.y * self.up.part(floor).clamp(0.0, 1.0);
+        let height = cell.size.y * self.up.fraction(floor).clamp(0.0, 1.0);
         let start = DVec2::new(cell.corner.x, cell.end().y - height);
         let area = DVec2::new(cell.size.x, height);
         page.shape(rectangle(start, area), FLOOR, None);
@@ -133,17 +134,17 @@ impl ChartPanel {
         }
     }
 
-    /// Crosses for the runs that failed in this way, and its name.
+    /// Draws crosses for the runs that failed with this word, and the word.
     fn draw_lane(&self, page: &mut Drawing, cell: Cell, top: f64, word: &str) {
-        const ROOM: f64 = 11.0;
+        const SPACING: f64 = 11.0;
         let (left, right) = (cell.corner.x, cell.end().x);
         let middle = top + 0.5 * LANE;
         let area = DVec2::new(cell.size.x, LANE - 2.0);
         let start = DVec2::new(left, top + 1.0);
         page.shape(rectangle(start, area), LANES, None);
         let name = Font::embedded().shortened(word, TICK_SIZE, KEY - 14.0);
-        let beside = DVec2::new(right + 10.0, middle);
-        page.beside(beside, &name, TICK_SIZE, Anchor::Start, NOTE);
+        let at = DVec2::new(right + 10.0, middle);
+        page.centered_label(at, &name, TICK_SIZE, Anchor::Start, NOTE);
         let mut from_right = right;
         for series in &self.series {
             let failures = || {
@@ -152,20 +153,20 @@ impl ChartPanel {
                     .iter()
                     .filter(|failure| failure.word == word)
             };
-            let parts = failures().filter_map(|failure| Some(self.across.part(failure.x?)));
-            for part in parts.filter(|part| part.is_finite()) {
-                let x = left + part.clamp(0.0, 1.0) * cell.size.x;
+            let places = failures().filter_map(|it| Some(self.across.fraction(it.x?)));
+            for fraction in places.filter(|fraction| fraction.is_finite()) {
+                let x = left + fraction.clamp(0.0, 1.0) * cell.size.x;
                 Marker::Cross.draw(page, DVec2::new(x, middle), series.color);
             }
             if failures().any(|failure| failure.x.is_none()) {
-                from_right -= ROOM;
+                from_right -= SPACING;
                 Marker::Cross.draw(page, DVec2::new(from_right, middle), series.color);
             }
         }
     }
 
     fn draw_key(&self, page: &mut Drawing, cell: Cell) {
-        let mut key = Key::beside(cell);
+        let mut key = Key::right_of(cell);
         for series in &self.series {
             key.entry(page, &series.name, "", |page, cell| {
                 cell.line(page, series.stroke());

@@ -1,5 +1,5 @@
 //! The figure of a check: the relaxed leaf as lines, the boundary-value
-//! solution as dots, and how far they are apart.
+//! solution as dots, and their differences.
 
 use glam::DVec2;
 
@@ -21,7 +21,7 @@ pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
     let setting = Setting::of(scenario);
     let mut veins = Veins::of(&check.relaxed);
     if let Some(solution) = check.solution() {
-        veins.dot(&solution.rods);
+        veins.add_dots(&solution.rods);
     }
     let title = format!("{}: {}", check.relaxed.scenario, headline(&check.verdict));
     // Why the solutions could not be compared.
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_second_solution_the_reason_is_told() {
+    fn without_a_second_solution_the_reason_is_given() {
         let mut check = sample::check(5, 8, 0.0);
         let reason = "the relaxation did not come to rest: ".repeat(6);
         check.shot = None;

@@ -1,4 +1,4 @@
-//! The panel that shows along the veins how far two solutions are apart.
+//! The panel that shows the differences of two solutions along the veins.
 
 use glam::DVec2;
 
@@ -15,13 +15,12 @@ const FRAME_HEIGHT: f64 = 216.0;
 const KEY: f64 = 212.0;
 pub const HEIGHT: f64 = PANEL_TITLE + FRAME_HEIGHT + PANEL_AXIS;
 const FEWEST_DECADES: f64 = 3.0;
-/// Below, for differences of exactly zero: one lane for each quantity.
+/// Height of the strip below for differences of exactly zero: one lane per quantity.
 const ZERO_STRIP: f64 = 30.0;
 const MOST_MARKED: usize = 70;
 
-/// A quantity along the veins, and up to which difference of it the solutions
-/// are called the same. Positions are in units of `unit`, the rest in the
-/// scenario's.
+/// Differences of a quantity along the veins, and the largest one at which the
+/// solutions agree. Positions are in units of `unit`, the rest in the scenario's.
 fn curve(quantity: Quantity, check: &Check, unit: f64, color: Color) -> (Curve, Option<f64>) {
     let (name, unit, allowed) = match quantity {
         Quantity::Position => ("position, in lengths L", unit, Some(check.allowed() / unit)),
@@ -45,11 +44,11 @@ pub fn draw(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
     let (curves, allowed): (Vec<Curve>, Vec<Option<f64>>) = quantities
         .map(|(quantity, color)| curve(quantity, check, unit, color))
         .unzip();
-    let mut cell = Cell::beside_key(start + PANEL_TITLE, FRAME_HEIGHT, KEY);
+    let mut cell = Cell::left_of_key(start + PANEL_TITLE, FRAME_HEIGHT, KEY);
     let what = "largest difference of all veins at each station";
     title(page, cell.corner, "(e)", what);
     let stations = Axis {
-        apart: Some(50.0),
+        tick_spacing: Some(50.0),
         ..Axis::linear("σ, fraction of each vein's length", 0.0, 1.0)
     };
     let mut across = stations.clone();
@@ -82,7 +81,8 @@ pub fn draw(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
     draw_key(page, &curves, cell);
 }
 
-/// Differences that a logarithmic axis has no place for, in a strip below it.
+/// Draws differences of zero, which have no place on a logarithmic axis, in a strip
+/// below it.
 fn draw_zeros(page: &mut Drawing, curves: &[Curve], above: Cell, stations: Axis) {
     let strip = Axes {
         cell: Cell {
@@ -104,16 +104,13 @@ fn draw_zeros(page: &mut Drawing, curves: &[Curve], above: Cell, stations: Axis)
 }
 
 fn draw_key(page: &mut Drawing, curves: &[Curve], cell: Cell) {
-    let mut key = Key::beside(cell);
+    let mut key = Key::right_of(cell);
     for curve in curves {
         let largest = match curve.values().fold(0.0, f64::max) {
             0.0 => "no difference".into(),
             largest => format!("≤ {}", power_of_ten(largest)),
         };
-        key.entry(page, curve.name, &largest, |page, cell| {
-            cell.line(page, Stroke::new(curve.color, 1.6));
-            Marker::Dot.draw(page, cell.middle(), curve.color);
-        });
+        key.marked_line(page, curve.name, &largest, curve.color);
     }
     let dashed = Stroke::new(NOTE, 1.0).dashed(true);
     key.line(page, "allowed difference", "", dashed);

@@ -1,5 +1,5 @@
-//! What a picture is made of: shapes and labels on a page whose unit is 1/96
-//! inch, x to the right and y down, and their colours.
+//! Elements of a picture: shapes and labels on a page, and their colours. The unit
+//! is 1/96 inch, x points to the right and y down.
 
 use glam::DVec2;
 
@@ -13,7 +13,7 @@ pub struct Drawing {
 }
 
 pub enum Mark {
-    /// Begins a named group: for whoever edits the SVG.
+    /// Begins a named group, for editing the SVG.
     Group(&'static str),
     EndGroup,
     Shape {
@@ -74,11 +74,11 @@ pub struct Label {
     pub size: f64,
     pub anchor: Anchor,
     pub color: Color,
-    /// Written from below to above.
-    pub upright: bool,
+    /// Rotated to read from bottom to top.
+    pub rotated: bool,
 }
 
-/// From the base line to the middle of digits and capitals, in font sizes.
+/// Height of the middle of digits and capitals above the base line, in font sizes.
 const HALF_CAPITAL: f64 = 0.36;
 
 impl Drawing {
@@ -111,32 +111,47 @@ impl Drawing {
         self.stroke(vec![Step::Move(from), Step::Line(to)], stroke);
     }
 
-    /// Adds a label, if it says anything.
-    fn add(&mut self, at: DVec2, text: &str, size: f64, anchor: Anchor, color: Color, up: bool) {
-        if !text.is_empty() {
-            self.marks.push(Mark::Label(Label {
-                at,
-                text: text.into(),
-                size,
-                anchor,
-                color,
-                upright: up,
-            }));
+    fn add(&mut self, label: Label) {
+        if !label.text.is_empty() {
+            self.marks.push(Mark::Label(label));
         }
     }
 
+    /// Adds a label unless it is empty.
     pub fn label(&mut self, at: DVec2, text: &str, size: f64, anchor: Anchor, color: Color) {
-        self.add(at, text, size, anchor, color, false);
+        self.add(Label {
+            at,
+            text: text.into(),
+            size,
+            anchor,
+            color,
+            rotated: false,
+        });
     }
 
-    /// A label whose digits and capitals have their middle at the height of `at`.
-    pub fn beside(&mut self, at: DVec2, text: &str, size: f64, anchor: Anchor, color: Color) {
+    /// Adds a label that is vertically centred at `at`.
+    pub fn centered_label(
+        &mut self,
+        at: DVec2,
+        text: &str,
+        size: f64,
+        anchor: Anchor,
+        color: Color,
+    ) {
         let base = at + DVec2::new(0.0, HALF_CAPITAL * size);
         self.label(base, text, size, anchor, color);
     }
 
-    pub fn upright_label(&mut self, at: DVec2, text: &str, size: f64, color: Color) {
-        self.add(at, text, size, Anchor::Middle, color, true);
+    /// Adds a label that reads from bottom to top.
+    pub fn rotated_label(&mut self, at: DVec2, text: &str, size: f64, color: Color) {
+        self.add(Label {
+            at,
+            text: text.into(),
+            size,
+            anchor: Anchor::Middle,
+            color,
+            rotated: true,
+        });
     }
 }
 
@@ -191,7 +206,7 @@ pub const FLOOR: Color = Color(247, 247, 249);
 /// Shadows on that floor.
 pub const SHADOW: Color = Color(212, 213, 220);
 pub const DOT: Color = Color(213, 60, 30);
-/// Colours that must be told apart, also by the colour-blind (after Okabe and Ito).
+/// Colours that the colour-blind can distinguish, too (after Okabe and Ito).
 pub const BLUE: Color = Color(0, 114, 178);
 pub const SKY: Color = Color(86, 170, 225);
 pub const GREEN: Color = Color(0, 158, 115);
@@ -200,10 +215,10 @@ pub const PURPLE: Color = Color(170, 90, 150);
 pub const ORANGE: Color = Color(230, 159, 0);
 pub const BROWN: Color = Color(120, 80, 45);
 pub const SLATE: Color = Color(60, 60, 66);
-/// Of curves in one panel, in this order.
+/// Colours of the curves in one panel, in this order.
 pub const CURVES: [Color; 8] = [BLUE, GREEN, VERMILION, PURPLE, ORANGE, SKY, BROWN, SLATE];
 
-/// Viridis (Smith and van der Walt, matplotlib) at equal distances.
+/// Viridis (Smith and van der Walt, matplotlib), equally spaced.
 const VIRIDIS: [Color; 11] = [
     Color(68, 1, 84),
     Color(72, 36, 117),
@@ -231,4 +246,12 @@ pub fn vein_color(t: f64) -> Color {
         (a + (place - left as f64) * (b - a)).round() as u8
     };
     Color(mix(a.0, b.0), mix(a.1, b.1), mix(a.2, b.2))
+}
+
+/// The colour of one of `count` veins.
+pub fn color_of_vein(index: usize, count: usize) -> Color {
+    match count {
+        0 | 1 => vein_color(0.3),
+        _ => vein_color(index as f64 / (count - 1) as f64),
+    }
 }

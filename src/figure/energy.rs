@@ -1,4 +1,4 @@
-//! Where the energy of a moving leaf is, and where its tip, in time.
+//! The energies of a moving leaf and the position of its tip over time.
 
 use super::axes::{Axes, Curve};
 use super::axis::Axis;
@@ -13,7 +13,7 @@ use crate::simulate::Record;
 const ENERGIES: f64 = 300.0;
 const BALANCE: f64 = 120.0;
 const TIP: f64 = 200.0;
-/// Above the lower panel, which has its ticks labelled as the upper.
+/// Gap above the lower panels, for the tick labels of the upper ones.
 const BETWEEN: f64 = 30.0;
 const BOTTOM: f64 = 4.0;
 /// Right of the panels, for the key.
@@ -48,26 +48,24 @@ pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
     let unit = scenario.units.energy();
     let energy = with_unit("energy", unit.as_deref());
     let axes = Axes {
-        cell: Cell::beside_key(upper, ENERGIES, KEY),
+        cell: Cell::left_of_key(upper, ENERGIES, KEY),
         across: Axis::linear("", 0.0, end),
         up: Axis::holding(&energy, values.chain([0.0])),
     };
     drawing.group("energies", |page| {
         title(page, axes.cell.corner, "(a)", "where the energy is");
         axes.draw(page);
-        // The balance, which should be zero, under all others.
+        // In reverse, so that the balance, which should be zero, is below all others.
         for curve in curves.iter().rev() {
             axes.curve(page, &curve.points, Stroke::new(curve.color, 1.6));
         }
-        let mut key = Key::beside(axes.cell);
+        let mut key = Key::right_of(axes.cell);
         for curve in &curves {
-            let last = curve.points.last().map_or(0.0, |point| point.1);
-            let note = format!("at the end {}", short(last));
-            key.line(page, curve.name, &note, Stroke::new(curve.color, 1.6));
+            draw_key_line(page, &mut key, curve);
         }
     });
     let axes = Axes {
-        cell: Cell::beside_key(lower, BALANCE, KEY),
+        cell: Cell::left_of_key(lower, BALANCE, KEY),
         across: Axis::linear("", 0.0, end),
         up: Axis::holding(
             &with_unit("balance", unit.as_deref()),
@@ -81,14 +79,14 @@ pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
         axes.draw(page);
         axes.curve(page, &balance.points, Stroke::new(INK, 1.3));
     });
-    let cell = Cell::beside_key(lowest, TIP, KEY);
+    let cell = Cell::left_of_key(lowest, TIP, KEY);
     drawing.group("tip", |page| {
         draw_tip(page, record, &scenario.units, cell, end)
     });
     drawing
 }
 
-/// The coordinates of the joint tip, or the means of free ones.
+/// Draws the coordinates of the joint tip, or the means of free ones.
 fn draw_tip(page: &mut Drawing, record: &Record, units: &Units, cell: Cell, end: f64) {
     let coordinate = |axis: usize| Curve {
         name: ["x", "y", "z"][axis],
@@ -112,16 +110,21 @@ fn draw_tip(page: &mut Drawing, record: &Record, units: &Units, cell: Cell, end:
     };
     title(page, cell.corner, "(c)", what);
     axes.draw(page);
-    let mut key = Key::beside(cell);
+    let mut key = Key::right_of(cell);
     for curve in &curves {
         axes.curve(page, &curve.points, Stroke::new(curve.color, 1.6));
-        let last = curve.points.last().map_or(0.0, |point| point.1);
-        let note = format!("at the end {}", short(last));
-        key.line(page, curve.name, &note, Stroke::new(curve.color, 1.6));
+        draw_key_line(page, &mut key, curve);
     }
 }
 
-/// All energies but those that are always zero; last their balance.
+/// Draws the line of a curve in the key, with its last value.
+fn draw_key_line(page: &mut Drawing, key: &mut Key, curve: &Curve) {
+    let last = curve.points.last().map_or(0.0, |point| point.1);
+    let note = format!("at the end {}", short(last));
+    key.line(page, curve.name, &note, Stroke::new(curve.color, 1.6));
+}
+
+/// All energies except those that are always zero; their balance last.
 fn curves(record: &Record) -> Vec<Curve> {
     let first = record.moments.first().map(|moment| moment.energy);
     let first = first.unwrap_or_default();

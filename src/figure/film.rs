@@ -1,4 +1,4 @@
-//! A leaf that moves as a GIF, seen as in the film strip.
+//! A moving leaf as a GIF, in the same view as the film strip.
 
 use std::collections::HashMap;
 use std::io::{self, Write};
@@ -11,34 +11,33 @@ use super::drawing::{Anchor, Color, DOT, Drawing, INK, NOTE, WHITE, vein_color};
 use super::page::{Cell, TEXT_SIZE};
 use super::png::paint;
 use super::setting::Setting;
-use super::space::{Room, Scene, View, surrounding_box};
+use super::space::{Margins, Scene, View, common_box};
 use super::veins::Veins;
 use crate::report::numbers::short;
 use crate::report::{Document, Format};
 use crate::simulate::{Record, Still};
 
-/// How long the film lasts, in hundredths of a second, and of how many pictures.
+/// Duration of the film in hundredths of a second, and its most pictures.
 const DURATION: f64 = 1000.0;
 const MOST_PICTURES: usize = 140;
-/// Browsers show shorter pictures for longer.
+/// Delays of a picture: browsers show shorter ones for longer.
 const SHORTEST: usize = 2;
 const LONGEST: usize = 100;
 
-/// Half its pixels.
+/// Size of the page: half as many as it has pixels.
 const SIZE: DVec2 = DVec2::new(320.0, 240.0);
 const TITLE: f64 = 26.0;
 
-const ROOM: Room = Room {
+const MARGINS: Margins = Margins {
     left: 46.0,
     right: 42.0,
     below: 42.0,
 };
 
-/// Stands for a pixel that is as before.
+/// Index of a pixel that has not changed.
 const SAME: u8 = 255;
 
-/// The film in a file of this name; nothing but one picture where nothing is known to
-/// move.
+/// The film as a file of this name; a single picture where no motion is recorded.
 pub struct Film(pub &'static str);
 
 impl Format<Record> for Film {
@@ -56,42 +55,40 @@ fn write(record: &Record, setting: &Setting, out: &mut dyn Write) -> io::Result<
         [] => &record.stills,
         film => film,
     };
-    let shown = chosen(film);
-    let shapes: Vec<Veins> = shown.iter().map(|still| veins(record, still)).collect();
-    let boxes = shapes.iter().map(|veins| (veins.low, veins.high));
-    let all = boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-    let (low, high) = all.unwrap_or_default();
-    let bounds = surrounding_box(low, high);
-    let pictures: Vec<Vec<u8>> = (shapes.par_iter().zip(&shown))
-        .map_init(Palette::new, |palette, (veins, still)| {
-            let time = record.moments.get(still.moment).map_or(0.0, |m| m.time);
-            let text = format!("{}, t = {}", record.scenario, short(time));
-            palette.indices(&paint(&picture(veins, bounds, setting, &text)))
-        })
+    let shown = sampled(film);
+    let shapes: Vec<Veins> = (shown.iter())
+        .map(|still| Veins::at_instant(record, still))
         .collect();
+    let bounds = common_box(shapes.iter());
     let times: Vec<f64> = (shown.iter())
         .map(|still| record.moments.get(still.moment).map_or(0.0, |m| m.time))
+        .collect();
+    let pictures: Vec<Vec<u8>> = (shapes.par_iter().zip(&times))
+        .map_init(Palette::new, |palette, (veins, time)| {
+            let text = format!("{}, t = {}", record.scenario, short(*time));
+            palette.indices(&paint(&picture(veins, bounds, setting, &text)))
+        })
         .collect();
     encode(&pictures, &delays(&times), out).map_err(io::Error::other)
 }
 
-/// As many of the shapes as make a film, the first and the last among them.
-fn chosen(film: &[Still]) -> Vec<&Still> {
+/// At most [`MOST_PICTURES`] of the shapes, including the first and the last.
+fn sampled(film: &[Still]) -> Vec<&Still> {
     let count = film.len().min(MOST_PICTURES);
     let last = film.len().saturating_sub(1);
     let place = |k: usize| k * last / (count - 1).max(1);
     (0..count).map(|k| &film[place(k)]).collect()
 }
 
-/// How long each picture is seen, in hundredths of a second: as its time is a part of
-/// the whole, the last as long as one is on average.
+/// How long each picture is shown, in hundredths of a second: in proportion to the time
+/// until the next, the last as long as the average.
 fn delays(times: &[f64]) -> Vec<u16> {
     let [Some(from), Some(to)] = [times.first(), times.last()] else {
         return Vec::new();
     };
     let count = times.len() as f64;
     let moving = DURATION * (count - 1.0) / count;
-    let mut seen = 0;
+    let mut elapsed = 0;
     let ends = times[1..]
         .iter()
         .map(|time| moving * (time - from) / (to - from));
@@ -102,18 +99,11 @@ fn delays(times: &[f64]) -> Vec<u16> {
             } else {
                 0
             };
-            let delay = end.saturating_sub(seen).clamp(SHORTEST, LONGEST);
-            seen += delay;
+            let delay = end.saturating_sub(elapsed).clamp(SHORTEST, LONGEST);
+            elapsed += delay;
             delay as u16
         })
         .collect()
-}
-
-fn veins(record: &Record, still: &Still) -> Veins {
-    let joined = if record.joined { 1 } else { still.curves.len() };
-    let ends = still.curves.iter().take(joined);
-    let tips: Vec<DVec3> = ends.filter_map(|curve| curve.last()).copied().collect();
-    Veins::through(&still.curves, &tips, record.length)
 }
 
 fn picture(veins: &Veins, bounds: [DVec3; 2], setting: &Setting, text: &str) -> Drawing {
@@ -123,7 +113,7 @@ fn picture(veins: &Veins, bounds: [DVec3; 2], setting: &Setting, text: &str) -> 
         corner: DVec2::new(0.0, TITLE),
         size: SIZE - DVec2::new(0.0, TITLE),
     };
-    let scene = Scene::new(bounds, setting, View::Oblique, cell, ROOM, None);
+    let scene = Scene::new(bounds, setting, View::Oblique, cell, MARGINS, None);
     scene.draw_box(&mut page);
     scene.draw_labels(&mut page);
     scene.draw_names(&mut page, 36.0, true);
@@ -134,9 +124,10 @@ fn picture(veins: &Veins, bounds: [DVec3; 2], setting: &Setting, text: &str) -> 
     page
 }
 
-/// Colours of veins between white and full, greys, and those of markers.
+/// Vein colours in several tints, greys, and the colours of markers.
 struct Palette {
     colors: Vec<Color>,
+    /// Indices found so far.
     known: HashMap<[u8; 3], u8>,
 }
 
@@ -161,21 +152,21 @@ impl Palette {
         }
     }
 
-    /// The nearest colour of every pixel.
+    /// The index of the nearest colour for every pixel.
     fn indices(&mut self, pixels: &Pixmap) -> Vec<u8> {
         let rgb = pixels.data().chunks_exact(4);
         rgb.map(|rgba| {
             let rgb = [rgba[0], rgba[1], rgba[2]];
             *self.known.entry(rgb).or_insert_with(|| {
-                let far = |Color(r, g, b): &Color| {
-                    let by = |a: u8, b: u8| (i32::from(a) - i32::from(b)).pow(2);
-                    by(*r, rgb[0]) + by(*g, rgb[1]) + by(*b, rgb[2])
+                let distance = |Color(r, g, b): &Color| {
+                    let squared = |a: u8, b: u8| (i32::from(a) - i32::from(b)).pow(2);
+                    squared(*r, rgb[0]) + squared(*g, rgb[1]) + squared(*b, rgb[2])
                 };
                 let nearest = self
                     .colors
                     .iter()
                     .enumerate()
-                    .min_by_key(|(_, color)| far(color));
+                    .min_by_key(|(_, color)| distance(color));
                 nearest.map_or(0, |(index, _)| index as u8)
             })
         })
@@ -183,7 +174,7 @@ impl Palette {
     }
 }
 
-/// Of each picture only what differs from the one before.
+/// Encodes of each picture only what differs from the one before.
 fn encode(
     pictures: &[Vec<u8>],
     delays: &[u16],
@@ -245,7 +236,7 @@ mod tests {
     use crate::report::sample;
     use std::collections::HashSet;
 
-    /// A film of the swinging leaf, decoded: delays and whole pictures as RGBA.
+    /// A decoded film: its repetition, delays, and whole pictures as RGBA.
     fn decoded(bytes: &[u8]) -> (gif::Repeat, Vec<u16>, Vec<Vec<u8>>) {
         let mut options = gif::DecodeOptions::new();
         options.set_color_output(gif::ColorOutput::RGBA);
@@ -290,32 +281,20 @@ mod tests {
             delays.iter().map(|&delay| u32::from(delay)).sum::<u32>(),
             1000
         );
-        // Every picture is that of its instant, in colours that are close enough.
-        let bounds = {
-            let shapes: Vec<Veins> = record
-                .film
-                .iter()
-                .map(|still| veins(&record, still))
-                .collect();
-            let low = shapes
-                .iter()
-                .fold(DVec3::ZERO, |low, veins| low.min(veins.low));
-            let high = shapes
-                .iter()
-                .fold(DVec3::ZERO, |high, veins| high.max(veins.high));
-            surrounding_box(low, high)
-        };
+        // Every picture shows its instant, in colours that are close enough.
+        let stills = record.film.iter();
+        let shapes: Vec<Veins> = stills.map(|it| Veins::at_instant(&record, it)).collect();
+        let bounds = common_box(shapes.iter());
         for k in [0, 50, 100] {
             let time = short(record.moments[k].time);
-            let shape = veins(&record, &record.film[k]);
             let text = format!("{}, t = {time}", record.scenario);
-            let painted = paint(&picture(&shape, bounds, &setting, &text));
+            let painted = paint(&picture(&shapes[k], bounds, &setting, &text));
             let pairs = pictures[k]
                 .chunks_exact(4)
                 .zip(painted.data().chunks_exact(4));
-            let far =
+            let difference =
                 |(a, b): (&[u8], &[u8])| (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap_or(0);
-            let off: Vec<u8> = pairs.map(far).collect();
+            let off: Vec<u8> = pairs.map(difference).collect();
             let worst = off.iter().filter(|&&off| off > 48).count();
             assert!(
                 worst < off.len() / 2000,
@@ -336,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_are_seen_as_long_as_their_times_last() {
+    fn delays_are_proportional_to_times() {
         assert_eq!(delays(&[0.0, 1.0, 2.0, 4.0]), [100, 100, 100, 100]);
         let even: Vec<f64> = (0..140).map(f64::from).collect();
         let delays = delays(&even);

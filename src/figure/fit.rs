@@ -1,5 +1,5 @@
-//! A fit: results of experiments with the model and its band, traced points over the
-//! veins, and the residuals of all data.
+//! A fit: results of experiments with the model and its confidence band, measured points
+//! over the veins, and the residuals of all data.
 
 use glam::{DVec2, DVec3};
 
@@ -19,7 +19,7 @@ const VEINS: f64 = 300.0;
 /// Right of the panels, for the key.
 const KEY: f64 = 190.0;
 const BOTTOM: f64 = 4.0;
-/// Kinds of results that are drawn, and leaves.
+/// Most kinds of results, and most leaves, that are drawn.
 const MOST_RESULTS: usize = 6;
 const MOST_LEAVES: usize = 3;
 /// Between the two views of a leaf.
@@ -41,7 +41,7 @@ pub fn draw(fit: &Fit) -> Drawing {
     let mut page = new_page(LEFT, &name, &notes, None);
     let mut top = HEADER;
     let mut letter = b'a';
-    let mut next = || {
+    let mut next_letter = || {
         let this = format!("({})", char::from(letter));
         letter = (letter + 1).min(b'z');
         this
@@ -60,7 +60,7 @@ pub fn draw(fit: &Fit) -> Drawing {
         let of: Vec<&FitResidual> = (fit.residuals.iter())
             .filter(|residual| residual.rod.is_none() && residual.what == kind)
             .collect();
-        let letter = next();
+        let letter = next_letter();
         page.group("result", |page| draw_result(page, top, &letter, kind, &of));
         top += PANEL_TITLE + RESULT + PANEL_AXIS;
     }
@@ -69,13 +69,13 @@ pub fn draw(fit: &Fit) -> Drawing {
         .iter()
         .filter(|(_, leaf)| !leaf.traced.is_empty());
     for (experiment, leaf) in traced.take(MOST_LEAVES) {
-        let letter = next();
+        let letter = next_letter();
         page.group("veins", |page| {
             draw_veins(page, top, &letter, experiment, leaf)
         });
         top += PANEL_TITLE + VEINS + PANEL_AXIS;
     }
-    let letter = next();
+    let letter = next_letter();
     page.group("residuals", |page| draw_residuals(page, top, &letter, fit));
     page.height = (top + PANEL_TITLE + RESIDUALS + PANEL_AXIS + BOTTOM).ceil();
     page
@@ -91,7 +91,7 @@ fn numbers(name: &str, count: usize) -> Axis {
 }
 
 fn draw_result(page: &mut Drawing, top: f64, letter: &str, kind: &str, of: &[&FitResidual]) {
-    let cell = Cell::beside_key(top + PANEL_TITLE, RESULT, KEY);
+    let cell = Cell::left_of_key(top + PANEL_TITLE, RESULT, KEY);
     title(
         page,
         cell.corner,
@@ -103,7 +103,7 @@ fn draw_result(page: &mut Drawing, top: f64, letter: &str, kind: &str, of: &[&Fi
         [r.data - sd, r.data + sd, r.model - band, r.model + band]
     });
     let mut up = Axis::holding(kind, values);
-    up.stresses_zero = false;
+    up.emphasizes_zero = false;
     let axes = Axes {
         cell,
         across: numbers("experiment", of.len()),
@@ -124,7 +124,7 @@ fn draw_result(page: &mut Drawing, top: f64, letter: &str, kind: &str, of: &[&Fi
         axes.curve(page, &bar, Stroke::new(DOT, 1.0));
     }
     axes.markers(page, line(&|r| r.data), Marker::Dot, DOT);
-    let mut key = Key::beside(cell);
+    let mut key = Key::right_of(cell);
     key.marker(
         page,
         "data",
@@ -135,7 +135,7 @@ fn draw_result(page: &mut Drawing, top: f64, letter: &str, kind: &str, of: &[&Fi
     key.line(page, "95 % band", "what the data leave open", dashed);
 }
 
-/// A leaf from above and from the side, with the points that were traced.
+/// Draws a leaf from above and from the side, with the measured points.
 fn draw_veins(page: &mut Drawing, top: f64, letter: &str, experiment: &str, leaf: &FitLeaf) {
     let width = 0.5 * (WIDTH - LEFT - RIGHT - GAP);
     for (k, (view, axes)) in [("from above", [0, 1]), ("from the side", [0, 2])]
@@ -176,20 +176,20 @@ fn draw_veins(page: &mut Drawing, top: f64, letter: &str, experiment: &str, leaf
     }
 }
 
-/// The axes, one widened so that both have the same pixels per length.
+/// The axes, one widened so that both have the same number of pixels per length.
 fn equal_scales(mut across: Axis, mut up: Axis, size: DVec2) -> (Axis, Axis) {
     let extents = [across.end - across.start, up.end - up.start];
     let unit = (extents[0] / size.x).max(extents[1] / size.y);
     for (axis, pixels) in [(&mut across, size.x), (&mut up, size.y)] {
         let (middle, half) = (0.5 * (axis.start + axis.end), 0.5 * unit * pixels);
         (axis.start, axis.end) = (middle - half, middle + half);
-        axis.stresses_zero = false;
+        axis.emphasizes_zero = false;
     }
     (across, up)
 }
 
 fn draw_residuals(page: &mut Drawing, top: f64, letter: &str, fit: &Fit) {
-    let cell = Cell::beside_key(top + PANEL_TITLE, RESIDUALS, KEY);
+    let cell = Cell::left_of_key(top + PANEL_TITLE, RESIDUALS, KEY);
     title(
         page,
         cell.corner,
@@ -211,7 +211,7 @@ fn draw_residuals(page: &mut Drawing, top: f64, letter: &str, fit: &Fit) {
         axes.curve(page, &line, Stroke::new(NOTE, 1.0).dashed(true));
     }
     axes.markers(page, points, Marker::Dot, INK);
-    let mut key = Key::beside(cell);
+    let mut key = Key::right_of(cell);
     let freedom = fit.degrees_of_freedom;
     let sum = format!(
         "sum of squares {} for {freedom} degrees of freedom",

@@ -25,7 +25,7 @@ impl Font {
             * self.scale(size)
     }
 
-    /// The text in lines that are no wider than `width`, if no word is.
+    /// The text in lines no wider than `width`, unless a single word is.
     pub fn wrapped(&self, text: &str, size: f64, width: f64) -> Vec<String> {
         let mut lines: Vec<String> = Vec::new();
         for word in text.split_whitespace() {
@@ -41,7 +41,7 @@ impl Font {
         lines
     }
 
-    /// The text, or as much of it as fits, with an ellipsis.
+    /// The text, cut off with an ellipsis where it does not fit.
     pub fn shortened(&self, text: &str, size: f64, width: f64) -> String {
         let mut shown: String = text.chars().filter(|c| !c.is_control()).collect();
         if self.width(&shown, size) <= width {
@@ -81,8 +81,8 @@ impl Font {
     }
 }
 
-/// Glyphs on the way into a path, scaled, turned upside down (y is down on the
-/// page) and moved along the base line.
+/// Collects the outlines of glyphs: scaled, with y down as on the page, and moved along
+/// the base line.
 struct Outline {
     scale: f64,
     start: f64,
@@ -113,7 +113,7 @@ impl OutlineBuilder for Outline {
         let from = self.at;
         let control = self.place(x1, y1);
         let to = self.place(x, y);
-        // The same curve as a cubic one.
+        // The equivalent cubic curve.
         let (a, b) = (from.lerp(control, 2.0 / 3.0), to.lerp(control, 2.0 / 3.0));
         self.path.push(Step::Cubic(a, b, to));
     }
@@ -134,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_sign_of_the_figure_is_in_the_font() {
+    fn the_font_has_every_character_of_the_figures() {
         let font = Font::embedded();
         for c in "ξηζσω=xyz/L(abcd)0123456789.−×⁻⁰¹²³⁴⁵⁶⁷⁸⁹·≤∞…".chars()
         {
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_as_long_as_they_may_be() {
+    fn lines_are_filled_up_to_the_width() {
         let font = Font::embedded();
         let width = font.width("use more", 12.0) + 0.1;
         let lines = font.wrapped("use more intervals or more", 12.0, width);

@@ -1,30 +1,30 @@
-//! The direction of gravity, drawn into a corner of a view.
+//! The direction of gravity, drawn in a corner of a view.
 
 use glam::DVec2;
 
 use super::drawing::{Anchor, Drawing, INK, NOTE, Stroke, circle, polygon};
 use super::page::{Cell, TICK_SIZE};
 
-/// Pixels of an arrow in the plane of the page.
+/// Length in pixels of an arrow that lies in the plane of the page.
 const ARROW: f64 = 30.0;
-/// A shorter arrow is seen from its end.
+/// A shorter arrow is drawn end-on.
 const END_ON: f64 = 0.2;
 /// From the sides of a panel to the middle of the arrow.
 const INSET: DVec2 = DVec2::new(28.0, 32.0);
 
-/// Draws it with its name into the corner of a panel that is farthest from all these
-/// points. `way` is what of a unit vector lies in the plane of the page, `toward`
-/// whether it points out of it.
+/// Draws it with its name in the corner of a panel that is farthest from the points
+/// `taken`. `direction` is the projection of its unit vector onto the page, `toward`
+/// whether it points towards the viewer.
 pub fn draw(
     page: &mut Drawing,
     cell: Cell,
     taken: impl Iterator<Item = DVec2>,
-    way: DVec2,
+    direction: DVec2,
     toward: bool,
 ) {
     let at = cell.free_corner(INSET, taken);
     let stroke = Stroke::new(INK, 1.3);
-    if way.length() < END_ON {
+    if direction.length() < END_ON {
         page.stroke(circle(at, 6.0), stroke);
         match toward {
             true => page.shape(circle(at, 1.8), INK, None),
@@ -35,13 +35,13 @@ pub fn draw(
             }
         }
     } else {
-        let (half, along) = (0.5 * ARROW * way, way.normalize());
+        let (half, along) = (0.5 * ARROW * direction, direction.normalize());
         let (end, across) = (at + half, 3.4 * along.perp());
         let neck = end - 8.0 * along;
         page.line(at - half, neck, stroke);
         page.shape(polygon(&[end, neck + across, neck - across]), INK, None);
     }
-    let below = 0.5 * ARROW * way.y.abs().max(0.4) + 11.0;
+    let below = 0.5 * ARROW * direction.y.abs().max(0.4) + 11.0;
     let name = at + DVec2::new(0.0, below);
     page.label(name, "gravity", TICK_SIZE, Anchor::Middle, NOTE);
 }

@@ -1,4 +1,4 @@
-//! Labels beside points of a panel, where they cover neither curves nor each other.
+//! Labels next to points of a panel, where they cover neither curves nor each other.
 
 use glam::DVec2;
 
@@ -7,25 +7,25 @@ use super::drawing::{Anchor, Color, Drawing, INK};
 use super::font::Font;
 use super::page::{Cell, TICK_SIZE};
 
-/// Pixels between the places along a curve that labels keep clear of.
-const APART: f64 = 4.0;
-/// More places say no more.
+/// Spacing in pixels of the points on curves that labels keep clear of.
+const SPACING: f64 = 4.0;
+/// Most of these points.
 const MOST_PLACES: usize = 20_000;
 /// From a point to the middle of its label.
 const DISTANCES: [f64; 3] = [11.0, 16.0, 24.0];
 const DIRECTIONS: usize = 16;
-/// Clear enough.
+/// A clearance that is large enough.
 pub const CLEAR: f64 = 5.0;
-/// Points closer than this have one label.
+/// Points closer than this share a label.
 const CLOSE: f64 = 10.0;
 
 pub struct Labels {
     cell: Cell,
-    /// Where curves are.
+    /// Points on curves.
     taken: Vec<DVec2>,
-    /// Where labels are.
+    /// Labels drawn so far.
     drawn: Vec<Cell>,
-    /// Points with their texts.
+    /// Points that are still to be labelled.
     wanted: Vec<(DVec2, String)>,
 }
 
@@ -39,12 +39,12 @@ impl Labels {
         }
     }
 
-    /// Keeps clear of a curve through these points.
+    /// Makes labels keep clear of a curve through these points.
     pub fn avoid(&mut self, axes: &Axes, points: &[(f64, f64)]) {
         let places: Vec<DVec2> = points.iter().filter_map(|&point| axes.at(point)).collect();
         self.taken.extend(places.first());
         for pair in places.windows(2) {
-            let parts = (pair[0].distance(pair[1]) / APART).ceil().max(1.0);
+            let parts = (pair[0].distance(pair[1]) / SPACING).ceil().max(1.0);
             let room = MOST_PLACES.saturating_sub(self.taken.len());
             let parts = (parts as usize).min(room);
             let place = |k: usize| pair[0].lerp(pair[1], k as f64 / parts as f64);
@@ -52,7 +52,7 @@ impl Labels {
         }
     }
 
-    /// Asks for a label beside a point; points close to each other share one.
+    /// Requests a label next to a point; points close to each other share one.
     pub fn add(&mut self, at: DVec2, text: &str) {
         match self
             .wanted
@@ -64,7 +64,7 @@ impl Labels {
         }
     }
 
-    /// Draws all that were asked for.
+    /// Draws all requested labels.
     pub fn draw(&mut self, page: &mut Drawing) {
         self.taken.extend(self.wanted.iter().map(|(at, _)| *at));
         for (at, text) in std::mem::take(&mut self.wanted) {
@@ -77,11 +77,11 @@ impl Labels {
                 })
             });
             let mut best: Option<(f64, Cell)> = None;
-            for way in places {
-                // Wide labels stand farther to the side.
-                let side = DVec2::new(0.5 * (size.x - size.y).max(0.0) * way.normalize().x, 0.0);
+            for offset in places {
+                // Wide labels are placed farther to the side.
+                let side = DVec2::new(0.5 * (size.x - size.y).max(0.0) * offset.normalize().x, 0.0);
                 let cell = Cell {
-                    corner: at + way + side - 0.5 * size,
+                    corner: at + offset + side - 0.5 * size,
                     size,
                 };
                 let clear = self.clearance(&cell);
@@ -98,14 +98,14 @@ impl Labels {
         }
     }
 
-    /// Writes a text where it has its place.
+    /// Draws a label in a cell.
     pub fn write(&mut self, page: &mut Drawing, cell: Cell, text: &str, color: Color) {
-        page.beside(cell.middle(), text, TICK_SIZE, Anchor::Middle, color);
+        page.centered_label(cell.middle(), text, TICK_SIZE, Anchor::Middle, color);
         self.drawn.push(cell);
     }
 
-    /// How far a label stays from curves, up to what is clear enough; less than
-    /// nothing where it leaves the panel or covers another.
+    /// The distance of a label from curves, at most [`CLEAR`]; negative where it leaves
+    /// the panel or covers another label.
     pub fn clearance(&self, label: &Cell) -> f64 {
         let inside = label.corner.cmpge(self.cell.corner + 2.0).all()
             && label.end().cmple(self.cell.end() - 2.0).all();
@@ -122,7 +122,7 @@ impl Labels {
     }
 }
 
-/// The room of a text.
+/// The size of a label.
 pub fn size(text: &str) -> DVec2 {
     DVec2::new(Font::embedded().width(text, TICK_SIZE), TICK_SIZE)
 }

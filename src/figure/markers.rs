@@ -1,5 +1,5 @@
-//! Markers: of points in a panel, of the clamp and the tips of a leaf, and of
-//! points of a second solution.
+//! Markers of points in a panel, of the clamp and the tips of a leaf, and of points of
+//! a second solution.
 
 use glam::{DVec2, DVec3};
 
@@ -46,20 +46,20 @@ impl Marker {
     }
 }
 
-/// Where the rods are clamped; larger than the tip's marker, which may cover it.
+/// Marks where the rods are clamped; larger than the tip's marker, which may cover it.
 pub fn clamp_marker(page: &mut Drawing, at: DVec2) {
     let half = DVec2::splat(4.2);
     let rim = Some(Stroke::new(WHITE, 1.0));
     page.shape(rectangle(at - half, 2.0 * half), INK, rim);
 }
 
-/// The joint tip, or the tip of a single rod.
+/// Marks the joint tip, or the tip of a single rod.
 pub fn tip_marker(page: &mut Drawing, at: DVec2) {
     Marker::Ring.draw(page, at, INK);
 }
 
-/// What is marked on a leaf: points of a second solution, the clamp and all
-/// tips, small if there are many.
+/// Draws the markers of a leaf: points of a second solution, the clamp and all tips,
+/// small if there are many.
 pub fn leaf_markers(page: &mut Drawing, veins: &Veins, place: impl Fn(DVec3) -> DVec2) {
     let radius = 0.7 + 0.6 * veins.line_width();
     for &point in &veins.dots {
@@ -76,7 +76,7 @@ pub fn leaf_markers(page: &mut Drawing, veins: &Veins, place: impl Fn(DVec3) -> 
     }
 }
 
-/// A point of a second solution: a colour that no vein has.
+/// Marks a point of a second solution, in a colour that no vein has.
 pub fn dot(page: &mut Drawing, at: DVec2, radius: f64) {
     page.shape(circle(at, radius), DOT, None);
 }

@@ -1,12 +1,11 @@
-//! Figures: a leaf from above, from the side, from the front and in space; of a
-//! check also how far both solutions are apart; of a motion the energies in
-//! time, and the leaf at some instants; of a chart speed against accuracy, and
+//! Figures: a leaf from above, from the side, from the front and in space; for a
+//! check also the differences of both solutions; for a motion the energies over
+//! time, and the leaf at several instants; for a chart speed against accuracy, and
 //! cost against the number of veins; and the modes of a leaf at rest.
 //!
-//! Each picture's file says what it shows and fills a [`drawing::Drawing`]: a
-//! page with a header, panels between axes ([`axes`]) or in space ([`space`]),
-//! and keys. `svg` writes it down and `png` paints it, so that both files are
-//! the same picture.
+//! Each kind of picture has a file that fills a [`drawing::Drawing`]: a page with a
+//! header, panels with axes ([`axes`]) or in space ([`space`]), and keys. `svg` and
+//! `png` write the same drawing in both formats.
 
 mod all;
 mod axes;
@@ -62,6 +61,7 @@ use crate::report::{Document, Format};
 use crate::scenario::Scenario;
 use drawing::Drawing;
 
+/// A figure as a file of this name.
 pub struct Picture<R> {
     file: &'static str,
     draw: fn(&R, &Scenario) -> Drawing,
@@ -69,13 +69,13 @@ pub struct Picture<R> {
 }
 
 impl<R> Picture<R> {
-    /// As text that any browser or editor opens.
+    /// A vector image.
     pub const fn svg(file: &'static str, draw: fn(&R, &Scenario) -> Drawing) -> Self {
         let write = svg::write;
         Picture { file, draw, write }
     }
 
-    /// As pixels.
+    /// A raster image.
     pub const fn png(file: &'static str, draw: fn(&R, &Scenario) -> Drawing) -> Self {
         let write = png::write;
         Picture { file, draw, write }
@@ -127,7 +127,7 @@ mod tests {
         }
     }
 
-    /// A scenario with units and a gravity across its plane.
+    /// A scenario with units.
     fn in_cm() -> Scenario {
         let mut scenario = scenario();
         scenario.units.length = Some("cm".into());
@@ -209,20 +209,20 @@ mod tests {
     }
 
     #[test]
-    fn an_early_end_is_told() {
+    fn an_early_end_is_reported() {
         let mut record = sample::record(5, 8);
         record.stopped = Some(Stopped::Diverged {
             otherwise: "the semi-implicit method",
             time: 10.1,
             percent: 70.0,
         });
-        let told = |svg: String| svg.contains("ended early: diverged");
-        assert!(motion(&record).into_iter().all(told));
+        let reported = |svg: String| svg.contains("ended early: diverged");
+        assert!(motion(&record).into_iter().all(reported));
     }
 
     #[test]
-    fn numbers_gone_wild_are_drawn_without_a_panic() {
-        let wild = [
+    fn extreme_numbers_are_drawn_without_a_panic() {
+        let values = [
             f64::NAN,
             f64::INFINITY,
             1e300,
@@ -232,20 +232,20 @@ mod tests {
             -1.0,
             0.0,
         ];
-        for wild in wild {
-            draw_wild_leaf(wild);
-            draw_wild_check(wild);
-            draw_wild_chart(wild);
-            draw_wild_motion(wild);
+        for value in values {
+            draw_extreme_leaf(value);
+            draw_extreme_check(value);
+            draw_extreme_chart(value);
+            draw_extreme_motion(value);
         }
-        draw_wild_motion(1e308);
+        draw_extreme_motion(1e308);
     }
 
-    fn draw_wild_leaf(wild: f64) {
+    fn draw_extreme_leaf(value: f64) {
         let mut fan = sample::fan(3, 8);
-        let shape = vec![vec![wild * DVec3::Z; 9]; 3];
+        let shape = vec![vec![value * DVec3::Z; 9]; 3];
         fan.stability.modes = Some(vec![Mode {
-            eigenvalue: wild,
+            eigenvalue: value,
             error: Some(1e-9),
             displacement: shape.clone(),
             rotation: shape,
@@ -254,58 +254,58 @@ mod tests {
         fan.shape
             .curves
             .iter_mut()
-            .for_each(|curve| curve[4].z = wild);
-        fan.tips[0].x = wild;
+            .for_each(|curve| curve[4].z = value);
+        fan.tips[0].x = value;
         leaf(&fan, &scenario());
         fan.shape
             .curves
             .iter_mut()
-            .for_each(|curve| curve.fill(DVec3::splat(wild)));
+            .for_each(|curve| curve.fill(DVec3::splat(value)));
         leaf(&fan, &scenario());
         fan.shape.curves.clear();
         leaf(&fan, &scenario());
     }
 
-    fn draw_wild_check(wild: f64) {
+    fn draw_extreme_check(value: f64) {
         let mut found = sample::check(3, 8, 0.0);
         for difference in &mut found.along {
-            difference.position = wild;
-            difference.moment = wild;
+            difference.position = value;
+            difference.moment = value;
         }
-        found.along[3].force = wild;
+        found.along[3].force = value;
         if let Some(Ok(solution)) = found.shot.as_mut().map(|shot| shot.found.as_mut()) {
-            solution.rods[1].nodes[4].position = DVec3::splat(wild);
+            solution.rods[1].nodes[4].position = DVec3::splat(value);
         }
         svg::text(&check(&found, &scenario()));
-        let wildest = found.along[0];
-        found.along.fill(wildest);
-        found.tolerance = wild;
+        let worst = found.along[0];
+        found.along.fill(worst);
+        found.tolerance = value;
         svg::text(&check(&found, &scenario()));
     }
 
-    fn draw_wild_chart(wild: f64) {
+    fn draw_extreme_chart(value: f64) {
         let mut found = sample::chart();
-        found.rows[0].true_error = Some(wild);
+        found.rows[0].true_error = Some(value);
         if let Some(spread) = &mut found.rows[1].seconds {
-            spread.median = wild;
+            spread.median = value;
         }
-        found.reference.as_mut().unwrap().known_within = wild;
+        found.reference.as_mut().unwrap().known_within = value;
         svg::text(&chart(&found));
     }
 
-    fn draw_wild_motion(wild: f64) {
+    fn draw_extreme_motion(value: f64) {
         let mut record = sample::record(3, 8);
-        record.stills[3].curves[1][4].z = wild;
-        record.moments[70].energy.kinetic = wild;
-        record.moments[71].tip.x = wild;
+        record.stills[3].curves[1][4].z = value;
+        record.moments[70].energy.kinetic = value;
+        record.moments[71].tip.x = value;
         motion(&record);
         for moment in &mut record.moments {
-            moment.energy.kinetic = wild;
-            moment.energy.potential = -wild;
-            moment.tip = DVec3::splat(wild);
+            moment.energy.kinetic = value;
+            moment.energy.potential = -value;
+            moment.tip = DVec3::splat(value);
         }
         let curves = record.stills.iter_mut().flat_map(|still| &mut still.curves);
-        curves.for_each(|curve| curve.fill(DVec3::splat(wild)));
+        curves.for_each(|curve| curve.fill(DVec3::splat(value)));
         motion(&record);
     }
 

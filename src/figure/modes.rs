@@ -1,4 +1,4 @@
-//! The modes of a leaf at rest: the leaf and, over it, its shape in each mode.
+//! The modes of a leaf at rest: each mode drawn over the leaf.
 
 use glam::DVec3;
 
@@ -7,16 +7,16 @@ use super::page::new_page;
 use super::setting::Setting;
 use super::small::{SIDE, SmallPanels};
 use super::space::{Scene, View};
-use super::veins::Veins;
+use super::veins::{Veins, tips};
 use crate::relax::{Equilibrium, Mode};
 use crate::report::numbers::short;
 use crate::report::words::verdict;
 use crate::scenario::Scenario;
 
 const MOST: usize = 12;
-/// What moves towards one viewer moves across the other's sight.
+/// A motion towards the viewer in one view is visible in the other.
 const VIEWS: [View; 2] = [View::Oblique, View::Front];
-/// Largest displacement drawn, as a part of the leaf's extent.
+/// Largest displacement drawn, as a fraction of the leaf's extent.
 const AMPLITUDE: f64 = 0.2;
 
 pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
@@ -29,7 +29,7 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
         .iter()
         .map(|mode| displaced(equilibrium, &rest, mode))
         .collect();
-    // Every mode from two sides.
+    // Every mode in two views.
     let count = VIEWS.len() * drawn.len();
     let panels = SmallPanels::holding(shapes.iter().chain([&rest]), count, &setting);
     let mut notes = vec![format!("N = {}", rest.count), verdict(equilibrium)];
@@ -66,7 +66,7 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     drawing
 }
 
-/// The frequency of a mode; of an unstable one its growth, in red.
+/// The frequency of a mode or, if it is unstable, its growth rate in red.
 fn caption(mode: &Mode) -> (String, Color) {
     match (mode.is_neutral(), mode.growth()) {
         (true, _) => ("neutral: ω = 0".into(), NOTE),
@@ -79,10 +79,10 @@ fn caption(mode: &Mode) -> (String, Color) {
 }
 
 fn displaced(equilibrium: &Equilibrium, rest: &Veins, mode: &Mode) -> Veins {
-    let far = |shape: &[DVec3]| shape.iter().fold(0.0_f64, |m, d| m.max(d.length()));
-    let largest = mode.displacement.iter().fold(0.0, |m, d| far(d).max(m));
+    let most = |shape: &[DVec3]| shape.iter().fold(0.0_f64, |m, d| m.max(d.length()));
+    let largest = mode.displacement.iter().fold(0.0, |m, d| most(d).max(m));
     let size = match largest > 0.0 {
-        // Never larger than it is handed out: a mode of rotation alone.
+        // Never magnified: displacements are small in a mode of rotation alone.
         true => (AMPLITUDE * rest.extent() * rest.unit / largest).min(1.0),
         false => 0.0,
     };
@@ -91,10 +91,7 @@ fn displaced(equilibrium: &Equilibrium, rest: &Veins, mode: &Mode) -> Veins {
     let curves: Vec<Vec<DVec3>> = moved
         .map(|(curve, by)| curve.iter().zip(by).map(|(x, d)| x + size * d).collect())
         .collect();
-    let joined = if shape.joined { 1 } else { curves.len() };
-    let ends = curves.iter().take(joined);
-    let tips: Vec<DVec3> = ends.filter_map(|curve| curve.last()).copied().collect();
-    Veins::through(&curves, &tips, rest.unit)
+    Veins::through(&curves, &tips(&curves, shape.joined), rest.unit)
 }
 
 #[cfg(test)]
@@ -104,8 +101,8 @@ mod tests {
     use crate::report::sample;
 
     #[test]
-    fn frequencies_growth_and_neutral_modes_are_told() {
-        for (eigenvalue, told) in [
+    fn frequencies_growth_and_neutral_modes_are_captioned() {
+        for (eigenvalue, caption) in [
             (4.0, "ω = 2<"),
             (-9.0, "unstable: grows at 3<"),
             (1e-10, "neutral"),
@@ -120,9 +117,9 @@ mod tests {
             };
             leaf.stability.modes = Some(vec![mode; 14]);
             let svg = text(&draw(&leaf, &sample::scenario("fan", 3)));
-            assert_eq!(svg.matches(told).count(), MOST, "{told}");
+            assert_eq!(svg.matches(caption).count(), MOST, "{caption}");
             assert!(svg.contains("the lowest 12 of 14"));
-            // Every mode from a second side.
+            // Every mode in a second view.
             assert_eq!(svg.matches(">from the front<").count(), MOST);
         }
     }

@@ -1,5 +1,4 @@
-//! How pages are laid out: sizes, cells and titles of panels, the header, and
-//! keys to what is drawn.
+//! Page layout: sizes, cells and titles of panels, the header, and keys.
 
 use super::drawing::{Anchor, Color, Drawing, INK, NOTE, Stroke, rectangle, vein_color};
 use super::font::Font;
@@ -13,9 +12,9 @@ pub const LEFT: f64 = 64.0;
 pub const RIGHT: f64 = 22.0;
 /// Where the title and the notes end and the panels may begin.
 pub const HEADER: f64 = 74.0;
-/// Above a panel, for its title.
+/// Room above a panel, for its title.
 pub const PANEL_TITLE: f64 = 24.0;
-/// Below a panel, for its axis.
+/// Room below a panel, for its axis.
 pub const PANEL_AXIS: f64 = 48.0;
 pub const TITLE_SIZE: f64 = 19.0;
 pub const TEXT_SIZE: f64 = 12.0;
@@ -28,8 +27,8 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// As wide as the page but for its margins and room for a key.
-    pub fn beside_key(top: f64, height: f64, key: f64) -> Self {
+    /// A panel across the page that leaves this width on the right for a key.
+    pub fn left_of_key(top: f64, height: f64, key: f64) -> Self {
         Cell {
             corner: DVec2::new(LEFT, top),
             size: DVec2::new(WIDTH - LEFT - RIGHT - key, height),
@@ -40,7 +39,8 @@ impl Cell {
         self.corner + self.size
     }
 
-    /// Of the four places this far from its sides the one farthest from all of these.
+    /// Of the four points at this inset from its corners, the one farthest from all points
+    /// `taken`.
     pub fn free_corner(&self, inset: DVec2, taken: impl Iterator<Item = DVec2>) -> DVec2 {
         let (low, high) = (self.corner + inset, self.end() - inset);
         let places = [low.with_x(high.x), low, high, high.with_x(low.x)];
@@ -72,7 +72,7 @@ impl Cell {
     }
 }
 
-/// A panel's title, above its frame.
+/// Draws a panel's title above its frame.
 pub fn title(page: &mut Drawing, corner: DVec2, letter: &str, text: &str) {
     title_in(page, corner, letter, text, NOTE);
 }
@@ -89,15 +89,15 @@ const TITLE_BASE: f64 = 38.0;
 /// Base line of the notes.
 pub const NOTE_BASE: f64 = 60.0;
 
-/// A page as wide as usual whose header says this; its text begins at `left`.
+/// A page of the default width with a header whose text begins at `left`.
 pub fn new_page(left: f64, title: &str, notes: &[String], leaf: Option<&Veins>) -> Drawing {
     let mut drawing = Drawing::new(WIDTH, title);
     drawing.group("header", |page| header(page, left, title, notes, leaf));
     drawing
 }
 
-/// Draws the title, as much of it as fits, the notes and, of a leaf, the key to
-/// its veins. The text begins at `left`.
+/// Draws the title, cut off where it does not fit, the notes and, given a leaf, the key
+/// to its veins. The text begins at `left`.
 pub fn header(page: &mut Drawing, left: f64, title: &str, notes: &[String], leaf: Option<&Veins>) {
     let font = Font::embedded();
     let right = match leaf {
@@ -120,7 +120,7 @@ fn key(page: &mut Drawing, veins: &Veins, font: &Font) -> f64 {
     const BAR_STEPS: u32 = 60;
     let mut x = page.width - RIGHT;
     let text_before = |page: &mut Drawing, x: &mut f64, text: &str| {
-        page.beside(DVec2::new(*x, MIDDLE), text, TEXT_SIZE, Anchor::End, NOTE);
+        page.centered_label(DVec2::new(*x, MIDDLE), text, TEXT_SIZE, Anchor::End, NOTE);
         *x -= font.width(text, TEXT_SIZE) + 6.0;
     };
     if veins.count > 1 {
@@ -130,7 +130,7 @@ fn key(page: &mut Drawing, veins: &Veins, font: &Font) -> f64 {
         let part = DVec2::new(BAR.x / f64::from(BAR_STEPS), BAR.y);
         for i in 0..BAR_STEPS {
             let color = vein_color(f64::from(i) / f64::from(BAR_STEPS - 1));
-            // Each part reaches under the next: no gaps between them.
+            // Each part extends below the next, so that there are no gaps.
             let overlap = if i + 1 < BAR_STEPS { 0.5 } else { 0.0 };
             let start = corner + f64::from(i) * DVec2::new(part.x, 0.0);
             let size = part + DVec2::new(overlap, 0.0);
@@ -152,13 +152,13 @@ fn key(page: &mut Drawing, veins: &Veins, font: &Font) -> f64 {
 /// Between a sample and its name.
 const GAP: f64 = 7.0;
 const LINE: f64 = 15.0;
-/// Between entries, one below the other or one beside the other.
-const BETWEEN: f64 = 7.0;
-const BESIDE: f64 = 20.0;
+/// Between the entries of a column, and of a row.
+const ENTRY_GAP: f64 = 7.0;
+const ROW_ENTRY_GAP: f64 = 20.0;
 const ROW: f64 = 20.0;
 const SAMPLE_HEIGHT: f64 = 12.0;
 
-/// Samples with their names, one below the other beside a panel.
+/// The key of a panel: a column of samples with their names.
 pub struct Key {
     /// Left end and middle of the next entry's first line.
     at: DVec2,
@@ -167,14 +167,13 @@ pub struct Key {
 impl Key {
     const SAMPLE: f64 = 26.0;
 
-    pub fn beside(panel: Cell) -> Self {
+    pub fn right_of(panel: Cell) -> Self {
         Key {
             at: DVec2::new(panel.end().x + 14.0, panel.corner.y + 8.0),
         }
     }
 
-    /// A sample, what it is, and what else there is to say, in as many lines as
-    /// these need.
+    /// Adds a sample with a name and a note, in as many lines as they need.
     pub fn entry(
         &mut self,
         page: &mut Drawing,
@@ -190,19 +189,27 @@ impl Key {
             for line in font.wrapped(text, TICK_SIZE, room) {
                 let line = font.shortened(&line, TICK_SIZE, room);
                 let at = DVec2::new(left, self.at.y);
-                page.beside(at, &line, TICK_SIZE, Anchor::Start, color);
+                page.centered_label(at, &line, TICK_SIZE, Anchor::Start, color);
                 self.at.y += LINE;
             }
         }
-        self.at.y += BETWEEN;
+        self.at.y += ENTRY_GAP;
     }
 
-    /// The same of a line.
+    /// Adds a line.
     pub fn line(&mut self, page: &mut Drawing, name: &str, note: &str, stroke: Stroke) {
         self.entry(page, name, note, |page, cell| cell.line(page, stroke));
     }
 
-    /// The same of marked points.
+    /// Adds a line with marked points.
+    pub fn marked_line(&mut self, page: &mut Drawing, name: &str, note: &str, color: Color) {
+        self.entry(page, name, note, |page, cell| {
+            cell.line(page, Stroke::new(color, 1.6));
+            Marker::Dot.draw(page, cell.middle(), color);
+        });
+    }
+
+    /// Adds a marker.
     pub fn marker(&mut self, page: &mut Drawing, name: &str, note: &str, marker: (Marker, Color)) {
         let (marker, color) = marker;
         self.entry(page, name, note, |page, cell| {
@@ -211,7 +218,7 @@ impl Key {
     }
 }
 
-/// Samples with their names, one after the other in rows above the panels.
+/// A key above the panels: rows of samples with their names.
 pub struct KeyRows {
     left: f64,
     at: DVec2,
@@ -219,8 +226,8 @@ pub struct KeyRows {
 }
 
 impl KeyRows {
-    /// Rows from `left` on whose first has its base line at `base`, with samples of this
-    /// width.
+    /// Rows that begin at `left`, the first with its base line at `base`, with samples of
+    /// this width.
     pub fn at(left: f64, base: f64, sample: f64) -> Self {
         KeyRows {
             left,
@@ -241,8 +248,8 @@ impl KeyRows {
         }
         sample(page, sample_cell(self.at, self.sample));
         let text = self.at + DVec2::new(self.sample + GAP, 0.0);
-        page.beside(text, name, TEXT_SIZE, Anchor::Start, INK);
-        self.at.x += width + BESIDE;
+        page.centered_label(text, name, TEXT_SIZE, Anchor::Start, INK);
+        self.at.x += width + ROW_ENTRY_GAP;
     }
 
     pub fn end(&self) -> f64 {

@@ -1,8 +1,8 @@
 //! The four panels of a leaf: along each axis, and in space.
 //!
-//! The three flat panels are drawn to one scale and placed as in a technical
-//! drawing: the side view under the top view with the same xi axis, the front
-//! view beside the side view with the same zeta axis.
+//! The three flat panels have one scale and are placed as in a technical drawing:
+//! the side view below the top view with the same xi axis, the front view to the
+//! right of the side view with the same zeta axis.
 
 use glam::{DVec2, DVec3};
 
@@ -13,33 +13,33 @@ use super::gravity;
 use super::markers::leaf_markers;
 use super::page::{Cell, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, title};
 use super::setting::Setting;
-use super::space::{Room, Scene, View, surrounding_box};
+use super::space::{Margins, Scene, View, surrounding_box};
 use super::veins::{Vein, Veins};
 
 const BOTTOM: f64 = 4.0;
 /// Between the columns, for the right one's axis.
 const COLUMN_GAP: f64 = 74.0;
 const COLUMNS: f64 = WIDTH - LEFT - RIGHT - COLUMN_GAP;
-/// Panels do not get smaller than this, however flat the leaf.
+/// Panels are at least this large, however flat the leaf is.
 const NARROWEST_COLUMN: f64 = 340.0;
 const LOWEST_TOP: f64 = 270.0;
 const LOWEST_BOTTOM: f64 = 130.0;
-/// Both rows together do not get higher than this, however tall the leaf.
+/// Both rows together are at most this high, however tall the leaf is.
 const HIGHEST_ROWS: f64 = 800.0;
-/// Air around the leaf, as a fraction of its largest extent.
-const AIR: f64 = 0.06;
-/// Distance between grid lines at least.
+/// Padding around the leaf, as a fraction of its largest extent.
+const PADDING: f64 = 0.06;
+/// Least distance between grid lines.
 const TICK_DISTANCE: f64 = 36.0;
 
-/// Around the panel in space.
-const ROOM: Room = Room {
+/// Of the panel in space.
+const MARGINS: Margins = Margins {
     left: 56.0,
     right: 22.0,
     below: 36.0,
 };
 
-/// Draws a flat panel with `scale` pixels per length, the leaf in its middle, over two
-/// of its axes.
+/// Draws the projection of the leaf onto two axes, centred, with `scale` pixels per
+/// length.
 fn draw_flat(
     page: &mut Drawing,
     veins: &Veins,
@@ -54,7 +54,7 @@ fn draw_flat(
     let (low, high) = (middle - half, middle + half);
     let shown = setting.scale();
     let axis = |which: usize, low: f64, high: f64| Axis {
-        apart: Some(TICK_DISTANCE),
+        tick_spacing: Some(TICK_DISTANCE),
         ..Axis::linear(&setting.axis(which), shown * low, shown * high)
     };
     let axes = Axes {
@@ -83,12 +83,12 @@ fn draw_flat(
     }
     leaf_markers(page, veins, place);
     if let Some(gravity) = setting.gravity {
-        let way = DVec2::new(gravity[across], -gravity[up]);
+        let direction = DVec2::new(gravity[across], -gravity[up]);
         gravity::draw(
             page,
             cell,
             veins.points().map(place),
-            way,
+            direction,
             toward.dot(gravity) > 0.0,
         );
     }
@@ -105,7 +105,8 @@ pub struct Panels {
 impl Panels {
     /// The panels of these veins, placed below `start`.
     pub fn below(start: f64, veins: &Veins) -> Self {
-        let DVec3 { x, y, z } = veins.high - veins.low + DVec3::splat(2.0 * AIR * veins.extent());
+        let DVec3 { x, y, z } =
+            veins.high - veins.low + DVec3::splat(2.0 * PADDING * veins.extent());
         // The largest scale that lets every panel hold the leaf.
         let scale = [
             COLUMNS / (x + y),
@@ -133,7 +134,7 @@ impl Panels {
         }
     }
 
-    /// Where the page may go on.
+    /// Where the panels end.
     pub fn end(&self) -> f64 {
         self.rows[1].0 + self.rows[1].1 + PANEL_AXIS + BOTTOM
     }
@@ -145,7 +146,7 @@ impl Panels {
             corner: DVec2::new(column.0, row.0),
             size: DVec2::new(column.1, row.1),
         };
-        for (name, letter, text, cell, ways) in [
+        for (name, letter, text, cell, axes) in [
             ("top", "(a)", "from above", cell(left, top), [0, 1]),
             ("side", "(b)", "from the side", cell(left, bottom), [0, 2]),
             (
@@ -158,10 +159,10 @@ impl Panels {
         ] {
             drawing.group(name, |page| {
                 title(page, cell.corner, letter, text);
-                draw_flat(page, veins, setting, cell, self.scale, ways);
+                draw_flat(page, veins, setting, cell, self.scale, axes);
             });
         }
-        // Nothing stands left of the panel in space: it takes half of the gap.
+        // The panel in space has no axis on its left: it takes half of the gap.
         let shift = 0.5 * COLUMN_GAP;
         let cell = cell(
             (right.0 - shift, right.1 + shift),
@@ -169,7 +170,7 @@ impl Panels {
         );
         drawing.group("space", |page| {
             let bounds = surrounding_box(veins.low, veins.high);
-            let scene = Scene::new(bounds, setting, View::Oblique, cell, ROOM, None);
+            let scene = Scene::new(bounds, setting, View::Oblique, cell, MARGINS, None);
             title(page, cell.corner, "(d)", "in space");
             scene.draw_box(page);
             scene.draw_labels(page);

@@ -1,4 +1,4 @@
-//! The drawing painted, twice as fine as a screen of 96 dots per inch.
+//! PNG files: the drawing at 192 dots per inch.
 
 use std::io::{self, Write};
 use std::ops::Range;
@@ -12,12 +12,12 @@ use super::drawing::{Anchor, Color, DASHES, Drawing, Label, Mark, Path, Step, St
 use super::font::Font;
 
 const SCALE: f64 = 2.0;
-/// Bytes of a chunk of the file.
+/// Bytes per chunk of the file.
 const CHUNK: usize = 1 << 16;
-/// 192 dots per inch, as the file says them: dots per metre.
+/// 192 dots per inch, in dots per metre as the file states it.
 const DOTS_PER_METRE: u32 = 7559;
 
-/// Rows that are painted together, bands side by side.
+/// Rows of a band; bands are painted in parallel.
 const BAND: u32 = 320;
 
 pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
@@ -37,12 +37,12 @@ fn size(drawing: &Drawing) -> [u32; 2] {
     [drawing.width, drawing.height].map(|length| (length * SCALE).ceil() as u32)
 }
 
-/// The drawing as pixels.
+/// Paints the whole drawing.
 pub fn paint(drawing: &Drawing) -> Pixmap {
     paint_rows(drawing, 0..size(drawing)[1])
 }
 
-/// Some rows of it.
+/// Paints some rows of the drawing.
 fn paint_rows(drawing: &Drawing, rows: Range<u32>) -> Pixmap {
     let mut canvas = Pixmap::new(size(drawing)[0], rows.end - rows.start)
         .expect("a page has a width and a height");
@@ -80,7 +80,7 @@ fn paint_rows(drawing: &Drawing, rows: Range<u32>) -> Pixmap {
             Mark::Label(label) => {
                 let far = 2.0 * label.size;
                 let outside = label.at.y + far < top || label.at.y - far > bottom;
-                if label.upright || !outside {
+                if label.rotated || !outside {
                     paint_label(&mut canvas, label, &font, place);
                 }
             }
@@ -89,7 +89,7 @@ fn paint_rows(drawing: &Drawing, rows: Range<u32>) -> Pixmap {
     canvas
 }
 
-/// Heights between which a step stays.
+/// Heights of the points of a step, which bound it.
 fn heights(step: Step) -> impl Iterator<Item = f64> {
     let heights = match step {
         Step::Move(to) | Step::Line(to) => [Some(to.y), None, None],
@@ -103,7 +103,7 @@ fn page_to_pixels() -> Transform {
     Transform::from_scale(SCALE as f32, SCALE as f32)
 }
 
-/// The path; `None` of one that has nothing to paint, like a single point.
+/// The path; `None` if there is nothing to paint, as for a single point.
 fn outline(path: &Path) -> Option<tiny_skia::Path> {
     let mut builder = PathBuilder::with_capacity(path.len(), 3 * path.len());
     for step in path {
@@ -151,7 +151,7 @@ fn paint_label(canvas: &mut Pixmap, label: &Label, font: &Font, page: Transform)
         Anchor::Middle => 0.5,
         Anchor::End => 1.0,
     } * font.width(&label.text, label.size);
-    let turn = if label.upright { -90.0 } else { 0.0 };
+    let turn = if label.rotated { -90.0 } else { 0.0 };
     let place = page
         .pre_translate(label.at.x as f32, label.at.y as f32)
         .pre_rotate(turn)
@@ -159,7 +159,7 @@ fn paint_label(canvas: &mut Pixmap, label: &Label, font: &Font, page: Transform)
     fill_path(canvas, &path, label.color, place);
 }
 
-/// Writes rows from the first on as they come.
+/// Writes rows as they are painted.
 fn encode(
     [width, height]: [u32; 2],
     bands: impl Iterator<Item = Pixmap>,
@@ -177,13 +177,13 @@ fn encode(
         yppu: DOTS_PER_METRE,
         unit: png::Unit::Meter,
     }));
-    // Row by row: buffers of the whole page cost more than what is done with them.
+    // Row by row: buffers of the whole page would cost more than the encoding.
     let mut writer = encoder.write_header()?;
     let mut rows = writer.stream_writer_with_size(CHUNK)?;
     let mut rgb = vec![[0; 3]; width as usize];
     for band in bands {
         for row in band.data().chunks_exact(4 * width as usize) {
-            // The page is opaque: its transparency need not be stored.
+            // The page is opaque: alpha need not be stored.
             let pixels = rgb.iter_mut().zip(row.as_chunks::<4>().0);
             pixels.for_each(|(to, [red, green, blue, _])| *to = [*red, *green, *blue]);
             rows.write_all(rgb.as_flattened())?;
@@ -213,7 +213,7 @@ mod tests {
             let at = DVec2::new(30.0 + 10.0 * f64::from(k), 50.0 * f64::from(k));
             page.stroke(circle(at, 45.0), Stroke::new(INK, 3.0));
             page.label(at, "name", 20.0, Anchor::Start, INK);
-            page.upright_label(at, "a long name of an axis", 20.0, INK);
+            page.rotated_label(at, "a long name of an axis", 20.0, INK);
         }
         page.line(
             DVec2::new(0.0, 10.0),
@@ -229,7 +229,7 @@ mod tests {
         reader.next_frame(&mut pixels).unwrap();
         let whole = paint(&page);
         assert_eq!(4 * pixels.len(), 3 * whole.data().len());
-        // But for rounding where edges are smoothed, in four parts of a pixel each way.
+        // Up to rounding at antialiased edges, by four subpixels each way.
         let pairs = pixels.chunks_exact(3).zip(whole.data().chunks_exact(4));
         let off = |(a, b): (&[u8], &[u8])| (0..3).map(|c| a[c].abs_diff(b[c])).max();
         let off: Vec<u8> = pairs.filter_map(off).collect();

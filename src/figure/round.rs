@@ -5,7 +5,7 @@ use crate::report::numbers::fixed;
 /// The smallest of 1, 2 or 5 times a power of ten that is at least `smallest`.
 pub fn round_step(smallest: f64) -> f64 {
     let decade = 10f64.powf(smallest.log10().floor());
-    // A hair of slack, so that 0.2 asked for is 0.2 and not 0.5.
+    // Tolerates rounding: 0.2 must yield 0.2 and not 0.5.
     let wanted = smallest * (1.0 - 1e-9);
     [1.0, 2.0, 5.0]
         .into_iter()
@@ -14,7 +14,7 @@ pub fn round_step(smallest: f64) -> f64 {
         .unwrap_or(10.0 * decade)
 }
 
-/// Multiples of `step` from `low` to `high`, and how each is written.
+/// Multiples of `step` from `low` to `high`, each with its text.
 pub fn multiples(low: f64, high: f64, step: f64) -> Vec<(f64, String)> {
     let slack = 1e-9;
     let first = (low / step - slack).ceil() as i64;

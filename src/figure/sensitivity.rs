@@ -1,4 +1,4 @@
-//! How far the tip of a leaf moves by a hundredth of each number, largest first.
+//! How far the tip of a leaf moves when a number changes by 1 %, largest first.
 
 use glam::DVec2;
 
@@ -10,7 +10,7 @@ use super::page::{
 };
 use crate::relax::{Equilibrium, Sensitivity};
 
-/// Left of the panel, for the keys.
+/// Room left of the panel, for the keys.
 const NAMES: f64 = 190.0;
 const ROW: f64 = 22.0;
 const BAR: f64 = 12.0;
@@ -65,11 +65,11 @@ pub fn draw(leaf: &Equilibrium) -> Drawing {
         for (k, (key, value)) in rows.iter().enumerate() {
             let middle = cell.corner.y + ROW * (k as f64 + 0.5);
             let at = DVec2::new(cell.corner.x - 8.0, middle);
-            page.beside(at, key, TICK_SIZE, Anchor::End, INK);
-            let part = axes.across.part(*value);
-            if part.is_finite() && part > 0.0 {
+            page.centered_label(at, key, TICK_SIZE, Anchor::End, INK);
+            let fraction = axes.across.fraction(*value);
+            if fraction.is_finite() && fraction > 0.0 {
                 let corner = DVec2::new(cell.corner.x, middle - 0.5 * BAR);
-                let size = DVec2::new(part.min(1.0) * cell.size.x, BAR);
+                let size = DVec2::new(fraction.min(1.0) * cell.size.x, BAR);
                 page.shape(rectangle(corner, size), BLUE, None);
             }
         }

@@ -1,4 +1,4 @@
-//! What figures take from the scenario: how lengths are shown, and gravity.
+//! Settings of figures from the scenario: units of length, and gravity.
 
 use glam::DVec3;
 
@@ -12,7 +12,7 @@ pub struct Setting {
     units: Units,
     /// The longest rod, in the scenario's unit.
     length: f64,
-    /// Its direction; none without gravity.
+    /// Direction of gravity, if there is any.
     pub gravity: Option<DVec3>,
 }
 
@@ -29,7 +29,7 @@ impl Setting {
         }
     }
 
-    /// What is shown for a length of 1.
+    /// The value shown for a drawn length of 1.
     pub fn scale(&self) -> f64 {
         match self.units.length {
             Some(_) if self.length.is_normal() => self.length,
@@ -37,7 +37,7 @@ impl Setting {
         }
     }
 
-    /// The name of an axis, where its values stand.
+    /// The name of an axis whose values are shown.
     pub fn axis(&self, axis: usize) -> String {
         match (&self.units.length, FRACTIONS[axis]) {
             (Some(unit), _) => with_unit(COORDINATES[axis], Some(unit)),
@@ -45,7 +45,7 @@ impl Setting {
         }
     }
 
-    /// The same where there is little room: with the unit only if values stand there.
+    /// A shorter name, with the unit only if values are shown.
     pub fn brief_axis(&self, axis: usize, values: bool) -> String {
         match (&self.units.length, values) {
             (Some(_), true) => self.axis(axis),
@@ -54,7 +54,7 @@ impl Setting {
         }
     }
 
-    /// The longest rod.
+    /// The length of the longest rod, as text.
     pub fn length(&self) -> String {
         match &self.units.length {
             Some(unit) => format!("{} {unit}", self.length),
@@ -62,7 +62,7 @@ impl Setting {
         }
     }
 
-    /// A drawn length as it is shown, and its unit.
+    /// The value shown for a drawn length, and its unit.
     pub fn in_unit(&self, length: f64) -> (f64, &str) {
         (
             self.scale() * length,
@@ -70,8 +70,8 @@ impl Setting {
         )
     }
 
-    /// How a drawn length is told.
-    pub fn told(&self, length: f64) -> String {
+    /// Formats a drawn length with its unit.
+    pub fn format_length(&self, length: f64) -> String {
         let (shown, unit) = self.in_unit(length);
         format!("{} {unit}", short(shown))
     }

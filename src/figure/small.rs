@@ -6,22 +6,22 @@ use super::drawing::{Color, Drawing};
 use super::page::{Cell, HEADER, PANEL_TITLE, WIDTH, title_in};
 use super::round::round_step;
 use super::setting::Setting;
-use super::space::{Camera, Room, Scene, View, surrounding_box};
+use super::space::{Camera, Margins, Scene, View, common_box};
 use super::veins::Veins;
 
 const COLUMNS: usize = 4;
-/// Beside the panels.
+/// Margin to the left and right of the panels.
 pub const SIDE: f64 = 22.0;
 const GAP: f64 = 12.0;
 const LOWEST: f64 = 110.0;
 const HIGHEST: f64 = 330.0;
 const BOTTOM: f64 = 10.0;
-/// Pixels between grid lines at least.
+/// Least pixels between grid lines.
 const GRID: f64 = 17.0;
-/// Veins are thinner in small panels.
+/// Factor of the line width of veins in small panels.
 const THINNER: f64 = 0.75;
 
-const ROOM: Room = Room {
+const MARGINS: Margins = Margins {
     left: 14.0,
     right: 14.0,
     below: 14.0,
@@ -31,7 +31,7 @@ const ROOM: Room = Room {
 pub struct SmallPanels {
     bounds: [DVec3; 2],
     setting: Setting,
-    /// Width of a square of the grid, as it is shown.
+    /// Displayed width of a square of the grid.
     step: f64,
     size: DVec2,
     top: f64,
@@ -39,23 +39,20 @@ pub struct SmallPanels {
 }
 
 impl SmallPanels {
-    /// So many panels that hold all of these shapes.
+    /// `count` panels that can hold any of these shapes.
     pub fn holding<'a>(
         shapes: impl Iterator<Item = &'a Veins>,
         count: usize,
         setting: &Setting,
     ) -> Self {
-        let boxes = shapes.map(|veins| (veins.low, veins.high));
-        let all = boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-        let (low, high) = all.unwrap_or_default();
-        let bounds = surrounding_box(low, high);
+        let bounds = common_box(shapes);
         let width = (WIDTH - 2.0 * SIDE - (COLUMNS - 1) as f64 * GAP) / COLUMNS as f64;
         let size = DVec2::new(width, height(bounds, width));
         let any = Cell {
             corner: DVec2::ZERO,
             size,
         };
-        let scale = Camera::facing(bounds, View::Oblique, any, ROOM).scale;
+        let scale = Camera::facing(bounds, View::Oblique, any, MARGINS).scale;
         SmallPanels {
             bounds,
             step: round_step(setting.scale() * GRID / scale),
@@ -66,9 +63,9 @@ impl SmallPanels {
         }
     }
 
-    /// How wide a square of the grid is.
-    pub fn square(&self) -> String {
-        self.setting.told(self.step / self.setting.scale())
+    /// Formats the width of a square of the grid.
+    pub fn grid_width(&self) -> String {
+        self.setting.format_length(self.step / self.setting.scale())
     }
 
     pub fn below(self, top: f64) -> Self {
@@ -90,9 +87,9 @@ impl SmallPanels {
         (self.top + rows as f64 * row + BOTTOM).ceil()
     }
 
-    /// Draws a leaf with its letter and title into its panel, over what `under`
-    /// draws there with lines of this width. The first panel's axes are named, and
-    /// gravity is drawn in it.
+    /// Draws a leaf with its letter and title in its panel, above what `under` draws
+    /// with lines of a given width. The first panel also shows the names of the axes and
+    /// gravity.
     pub fn draw(
         &self,
         page: &mut Drawing,
@@ -111,7 +108,7 @@ impl SmallPanels {
         );
     }
 
-    /// The same, seen from elsewhere.
+    /// The same in another view.
     pub fn draw_from(
         &self,
         view: View,
@@ -128,7 +125,7 @@ impl SmallPanels {
             &self.setting,
             view,
             cell,
-            ROOM,
+            MARGINS,
             Some(self.step),
         );
         scene.draw_box(page);
@@ -142,13 +139,13 @@ impl SmallPanels {
     }
 }
 
-/// As high as the box needs in a panel of this width.
+/// The height that the box needs in a panel of this width.
 fn height(bounds: [DVec3; 2], width: f64) -> f64 {
     let any = Cell {
         corner: DVec2::ZERO,
-        size: DVec2::ONE * (ROOM.left + ROOM.right + 1.0),
+        size: DVec2::ONE * (MARGINS.left + MARGINS.right + 1.0),
     };
-    let (first, last) = Camera::facing(bounds, View::Oblique, any, ROOM).outline(bounds);
-    let needed = (last - first).y / (last - first).x * (width - ROOM.left - ROOM.right);
-    (needed + ROOM.below).clamp(LOWEST, HIGHEST)
+    let (first, last) = Camera::facing(bounds, View::Oblique, any, MARGINS).outline(bounds);
+    let needed = (last - first).y / (last - first).x * (width - MARGINS.left - MARGINS.right);
+    (needed + MARGINS.below).clamp(LOWEST, HIGHEST)
 }

@@ -1,5 +1,5 @@
-//! The panel in space: seen from far away, with parallel rays, in a box whose
-//! floor catches the leaf's shadow.
+//! The panel in space: a parallel projection of the leaf in a box, with its shadow
+//! on the floor.
 
 use glam::{DVec2, DVec3};
 
@@ -13,7 +13,7 @@ use super::round::{multiples, round_step};
 use super::setting::Setting;
 use super::veins::{Piece, Vein, Veins};
 
-/// From where the box is seen.
+/// The direction from which the box is seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum View {
     /// From above one of its edges.
@@ -23,7 +23,7 @@ pub enum View {
 }
 
 impl View {
-    /// Degrees from the xi axis, and above the floor.
+    /// Azimuth from the xi axis and elevation above the floor, in degrees.
     fn angles(self) -> [f64; 2] {
         match self {
             View::Oblique => [-55.0, 28.0],
@@ -32,50 +32,58 @@ impl View {
     }
 }
 
-/// No side of the box is shorter than this part of its longest.
+/// No side of the box is shorter than this fraction of the longest.
 const SHORTEST_SIDE: f64 = 0.4;
-/// Air around the leaf, as a fraction of its largest extent.
-const AIR: f64 = 0.06;
+/// Padding around the leaf, as a fraction of its largest extent.
+const PADDING: f64 = 0.06;
 
-/// Room around the box, for the labels of its axes.
+/// Margins around the box, for the labels of its axes.
 #[derive(Clone, Copy)]
-pub struct Room {
+pub struct Margins {
     pub left: f64,
     pub right: f64,
     pub below: f64,
 }
 
-/// Distance between the ticks of an axis at least.
+/// Least distance between the ticks of an axis.
 const TICK_DISTANCE: f64 = 30.0;
 
-/// From the top of an upright edge to its name.
+/// From the top of a vertical edge to its name.
 const ABOVE: DVec2 = DVec2::new(6.0, -12.0);
 
-/// The leaf with air around it, no side too short to see.
+/// A box around all of these shapes.
+pub fn common_box<'a>(shapes: impl Iterator<Item = &'a Veins>) -> [DVec3; 2] {
+    let boxes = shapes.map(|veins| (veins.low, veins.high));
+    let all = boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let (low, high) = all.unwrap_or_default();
+    surrounding_box(low, high)
+}
+
+/// The box with padding around it, and no side too short.
 pub fn surrounding_box(low: DVec3, high: DVec3) -> [DVec3; 2] {
     let extent = (high - low).max_element();
-    let air = DVec3::splat(AIR * if extent > 1e-9 { extent } else { 1.0 });
-    let (low, high) = (low - air, high + air);
+    let padding = DVec3::splat(PADDING * if extent > 1e-9 { extent } else { 1.0 });
+    let (low, high) = (low - padding, high + padding);
     let middle = 0.5 * (low + high);
     let sides = high - low;
     let half = 0.5 * sides.max(DVec3::splat(SHORTEST_SIDE * sides.max_element()));
     [middle - half, middle + half]
 }
 
-/// A view with parallel rays, centred in a cell.
+/// A parallel projection, centred in a cell.
 pub struct Camera {
     right: DVec3,
     up: DVec3,
     toward: DVec3,
     /// Pixels per length.
     pub scale: f64,
-    /// Where the origin is on the page.
+    /// The origin on the page.
     origin: DVec2,
 }
 
 impl Camera {
-    /// Sees the whole box in a cell that also has room for labels.
-    pub fn facing([low, high]: [DVec3; 2], view: View, cell: Cell, room: Room) -> Self {
+    /// Shows the whole box in a cell with these margins.
+    pub fn facing([low, high]: [DVec3; 2], view: View, cell: Cell, margins: Margins) -> Self {
         let [(sin_a, cos_a), (sin_e, cos_e)] =
             view.angles().map(|angle| angle.to_radians().sin_cos());
         let mut camera = Camera {
@@ -86,15 +94,15 @@ impl Camera {
             origin: DVec2::ZERO,
         };
         let (first, last) = camera.outline([low, high]);
-        let free = cell.size - DVec2::new(room.left + room.right, room.below);
+        let free = cell.size - DVec2::new(margins.left + margins.right, margins.below);
         camera.scale = (free / (last - first)).min_element();
-        let shift = DVec2::new(room.left - room.right, -room.below);
+        let shift = DVec2::new(margins.left - margins.right, -margins.below);
         let middle = cell.corner + 0.5 * cell.size + 0.5 * shift;
         camera.origin = middle - camera.scale * 0.5 * (first + last);
         camera
     }
 
-    /// Corners of the rectangle on the page that holds a box.
+    /// Corners of the bounding rectangle of a box on the page.
     pub fn outline(&self, [low, high]: [DVec3; 2]) -> (DVec2, DVec2) {
         let corners = (0..8).map(|corner| {
             let side = |axis: usize| [low, high][corner >> axis & 1][axis];
@@ -119,11 +127,12 @@ struct Edge {
     high: f64,
     /// Away from the box, in the plane the labels lie in.
     outward: DVec3,
-    /// Where the two walls on which its grid lines run end.
+    /// Offsets from a point on the edge along its grid lines: to the corner between the two
+    /// walls, and to the end of the second.
     walls: [DVec3; 2],
-    /// Between ticks, as they are shown, and what is shown for a length of 1.
+    /// Displayed value between ticks, and that of a length of 1.
     step: f64,
-    shown: f64,
+    unit: f64,
 }
 
 impl Edge {
@@ -132,18 +141,18 @@ impl Edge {
     }
 
     fn ticks(&self) -> Vec<(f64, String)> {
-        let room = 0.02 * (self.high - self.low);
-        let ends = [self.low + room, self.high - room].map(|end| self.shown * end);
+        let inset = 0.02 * (self.high - self.low);
+        let ends = [self.low + inset, self.high - inset].map(|end| self.unit * end);
         let found = multiples(ends[0], ends[1], self.step).into_iter();
         found
-            .map(|(value, text)| (value / self.shown, text))
+            .map(|(value, text)| (value / self.unit, text))
             .collect()
     }
 }
 
-/// Edges along the three axes, each with ticks this far apart or, without a
-/// step, as fine as can be read.
-fn edges(camera: &Camera, low: DVec3, high: DVec3, shown: f64, step: Option<f64>) -> [Edge; 3] {
+/// Edges along the three axes, with ticks spaced by `step` or, without it, as close as is
+/// readable.
+fn edges(camera: &Camera, low: DVec3, high: DVec3, unit: f64, step: Option<f64>) -> [Edge; 3] {
     let sides = high - low;
     let edge = |axis, direction: DVec3, at, outward, walls| Edge {
         axis,
@@ -154,18 +163,14 @@ fn edges(camera: &Camera, low: DVec3, high: DVec3, shown: f64, step: Option<f64>
         outward,
         walls,
         step: step.unwrap_or_else(|| {
-            let seen = camera.place(direction).distance(camera.place(DVec3::ZERO));
-            round_step(shown * TICK_DISTANCE / seen)
+            let length = camera.place(direction).distance(camera.place(DVec3::ZERO));
+            round_step(unit * TICK_DISTANCE / length)
         }),
-        shown,
+        unit,
     };
     let side = |axis: DVec3| sides * axis;
-    let (behind, up, left) = (side(DVec3::Y), side(DVec3::Z), side(DVec3::NEG_X));
-    let walls = [
-        [behind, behind + up],
-        [left, left + up],
-        [behind, behind - left],
-    ];
+    let (back, up, left) = (side(DVec3::Y), side(DVec3::Z), side(DVec3::NEG_X));
+    let walls = [[back, back + up], [left, left + up], [back, back - left]];
     [
         edge(0, DVec3::X, low, DVec3::NEG_Y, walls[0]),
         edge(1, DVec3::Y, low.with_x(high.x), DVec3::X, walls[1]),
@@ -183,17 +188,17 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The box in a cell with room for labels; its grid is so wide or, without
-    /// a step, as fine as can be read.
+    /// The box in a cell with these margins; its grid is spaced by `step` or, without it,
+    /// as close as is readable.
     pub fn new(
         [low, high]: [DVec3; 2],
         setting: &Setting,
         view: View,
         cell: Cell,
-        room: Room,
+        margins: Margins,
         step: Option<f64>,
     ) -> Self {
-        let camera = Camera::facing([low, high], view, cell, room);
+        let camera = Camera::facing([low, high], view, cell, margins);
         let edges = edges(&camera, low, high, setting.scale(), step);
         Scene {
             low,
@@ -209,11 +214,11 @@ impl Scene {
         self.camera.place(point)
     }
 
-    /// The floor, the two walls behind the leaf, and their grid.
+    /// Draws the floor, the two walls behind the leaf, and their grid.
     pub fn draw_box(&self, page: &mut Drawing) {
         let (low, high) = (self.low, self.high);
-        // The viewer stands at large xi and small eta: the walls at small xi and
-        // large eta are behind the leaf.
+        // Seen from large xi and small eta, the walls at small xi and large eta are
+        // behind the leaf.
         let near = DVec3::new(high.x, low.y, low.z);
         let far = DVec3::new(low.x, high.y, low.z);
         let right = near.with_y(high.y);
@@ -249,30 +254,31 @@ impl Scene {
             for (value, text) in edge.ticks() {
                 let foot = self.place(edge.point(value));
                 page.line(foot, foot + 4.0 * out, Stroke::new(FRAME, 0.8));
-                let at = foot + away(out, 17.0);
-                page.beside(at, &text, TICK_SIZE, Anchor::Middle, NOTE);
+                let at = foot + label_offset(out, 17.0);
+                page.centered_label(at, &text, TICK_SIZE, Anchor::Middle, NOTE);
             }
         }
     }
 
-    /// Names all axes, so far from their edges; with units if values stand there.
+    /// Draws the names of all axes at a distance from their edges, with units if values
+    /// are shown.
     pub fn draw_names(&self, page: &mut Drawing, distance: f64, values: bool) {
         for edge in &self.edges {
             let middle = self.place(edge.point(0.5 * (edge.low + edge.high)));
-            let at = middle + away(self.outward(edge), distance);
+            let at = middle + label_offset(self.outward(edge), distance);
             let name = self.setting.brief_axis(edge.axis, values);
-            // A long name reaches away from its edge, or stands on top of it.
+            // A long name extends away from its edge, or is placed on top of it.
             let (at, anchor) = match edge.axis {
                 _ if name.chars().count() < 3 => (at, Anchor::Middle),
                 0 => (at, Anchor::End),
                 1 => (at, Anchor::Start),
                 _ => (self.place(edge.point(edge.high)) + ABOVE, Anchor::End),
             };
-            page.beside(at, &name, TEXT_SIZE + 1.0, anchor, INK);
+            page.centered_label(at, &name, TEXT_SIZE + 1.0, anchor, INK);
         }
     }
 
-    /// Draws the direction of gravity, if there is any, beside the box.
+    /// Draws the direction of gravity, if there is any, outside the box.
     pub fn draw_gravity(&self, page: &mut Drawing) {
         let Some(gravity) = self.setting.gravity else {
             return;
@@ -280,29 +286,29 @@ impl Scene {
         let Camera {
             right, up, toward, ..
         } = self.camera;
-        let way = DVec2::new(right.dot(gravity), -up.dot(gravity));
+        let direction = DVec2::new(right.dot(gravity), -up.dot(gravity));
         let ends = [self.low, self.high];
         let corner = |k: usize| DVec3::new(ends[k & 1].x, ends[k >> 1 & 1].y, ends[k >> 2].z);
         let corners = (0..8).map(|k| self.place(corner(k)));
-        let named = self
+        let names = self
             .edges
             .iter()
             .map(|edge| self.place(edge.point(0.5 * (edge.low + edge.high))));
         gravity::draw(
             page,
             self.cell,
-            corners.chain(named),
-            way,
+            corners.chain(names),
+            direction,
             toward.dot(gravity) > 0.0,
         );
     }
 
-    /// Away from the box, on the page.
+    /// The outward direction of an edge on the page.
     fn outward(&self, edge: &Edge) -> DVec2 {
         (self.place(edge.outward) - self.place(DVec3::ZERO)).normalize()
     }
 
-    /// The shadow of all veins on the floor, the veins piece by piece, those
+    /// Draws the shadows of all veins on the floor, the pieces of the veins, those
     /// farther away first, and the leaf's markers.
     pub fn draw_leaf(&self, page: &mut Drawing, veins: &Veins, width: f64) {
         for vein in &veins.veins {
@@ -326,7 +332,8 @@ impl Scene {
     }
 }
 
-/// Labels are wider than high: those beside an axis stand farther away.
-fn away(out: DVec2, distance: f64) -> DVec2 {
+/// Where a label is relative to its axis: labels are wider than high and need more distance
+/// to the side.
+fn label_offset(out: DVec2, distance: f64) -> DVec2 {
     distance * out + DVec2::new(5.0 * out.x, 0.0)
 }

@@ -1,4 +1,4 @@
-//! The drawing as text that any browser or editor opens.
+//! SVG files.
 
 use std::io::{self, Write};
 
@@ -57,7 +57,7 @@ pub fn write(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
 
 fn write_label(label: &Label, out: &mut dyn Write) -> io::Result<()> {
     let (x, y) = (number(label.at.x), number(label.at.y));
-    match label.upright {
+    match label.rotated {
         true => write!(out, "<text transform=\"translate({x} {y}) rotate(-90)\"")?,
         false => write!(out, "<text x=\"{x}\" y=\"{y}\"")?,
     }
@@ -74,7 +74,7 @@ fn point(point: &DVec2) -> String {
     format!("{} {}", number(point.x), number(point.y))
 }
 
-/// To a hundredth of a pixel, without idle zeros.
+/// Rounds to a hundredth of a pixel, without trailing zeros.
 fn number(value: f64) -> String {
     let hundredths = (value * 100.0).round() / 100.0;
     // Adding zero turns -0 into 0.
@@ -85,7 +85,7 @@ pub fn hex(Color(red, green, blue): Color) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
-/// Text as XML allows it: markup escaped, control characters left out.
+/// Escapes text for XML and leaves out control characters.
 pub fn escaped(text: &str) -> String {
     text.chars()
         .filter(|c| !c.is_control())
@@ -98,7 +98,7 @@ pub fn escaped(text: &str) -> String {
         .collect()
 }
 
-/// The picture as text, of which no number and no group is broken.
+/// The picture as text; checks that groups are closed and numbers are finite.
 #[cfg(test)]
 pub fn text(drawing: &Drawing) -> String {
     let mut bytes = Vec::new();

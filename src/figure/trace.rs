@@ -11,10 +11,10 @@ use super::markers::Marker;
 use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, new_page, title};
 use super::setting::{Setting, with_unit};
 use super::small::SmallPanels;
-use super::veins::Veins;
-use crate::report::looked_at;
+use super::veins::{Veins, length};
 use crate::report::numbers::{power_of_ten, short};
 use crate::report::words::branch_end;
+use crate::report::{error_location, slope_unit};
 use crate::scenario::{Scenario, Units};
 use crate::study::{Law, PointKind, Trace, TraceBranch, TracePoint, TraceShow};
 
@@ -25,18 +25,18 @@ const MORE: f64 = 220.0;
 const KEY: f64 = 190.0;
 const LAW: f64 = 240.0;
 const BETWEEN: f64 = 26.0;
-/// Leaves drawn, and branches named.
+/// Most leaves drawn, and most branches named.
 const MOST_LEAVES: usize = 8;
 const MOST_NAMED: usize = 7;
-/// Smaller differences are not seen in small panels: in lengths, and as a part of the
-/// largest.
-const SEEN: f64 = 0.04;
-const PART_SEEN: f64 = 0.25;
-/// Parts of a vein between the places at which leaves are compared.
+/// Smaller differences are invisible in small panels: in lengths, and as a fraction of
+/// the largest.
+const VISIBLE: f64 = 0.04;
+const VISIBLE_FRACTION: f64 = 0.25;
+/// Equal parts of each vein at whose ends leaves are compared.
 const PARTS: usize = 8;
-/// Where the components of the reaction begin among what may be shown.
+/// Index of the first component of the reaction in [`TraceShow::ALL`].
 const REACTION: usize = 3;
-/// Smaller twists, in radians, and ways of tips, in lengths, are rounding.
+/// Smaller twists, in radians, and displacements of tips, in lengths, are rounding.
 const ROUNDING: f64 = 1e-7;
 
 pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
@@ -49,7 +49,7 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
         .map(|point| Veins::through(&point.curves, &point.tips, longest))
         .collect();
     let quantities = match trace.show.as_slice() {
-        [] => vec![farthest(trace)],
+        [] => vec![most_varying(trace)],
         asked => asked.to_vec(),
     };
     let name = format!("{}: equilibria along {}", trace.scenario, trace.keys);
@@ -59,7 +59,7 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     let mut below = HEADER;
     for (place, &quantity) in quantities.iter().enumerate() {
         let height = if place == 0 { DIAGRAM } else { MORE };
-        let cell = Cell::beside_key(below + PANEL_TITLE, height, KEY);
+        let cell = Cell::left_of_key(below + PANEL_TITLE, height, KEY);
         drawing.group("branches", |page| {
             draw_branches(page, trace, quantity, &shown, (cell, &letter()));
             if place == 0 {
@@ -69,7 +69,7 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
         below = cell.end().y + PANEL_AXIS;
     }
     if let (Some(law), Some(branch)) = (&trace.law, trace.branches.first()) {
-        let cell = Cell::beside_key(below + BETWEEN + PANEL_TITLE, LAW, KEY);
+        let cell = Cell::left_of_key(below + BETWEEN + PANEL_TITLE, LAW, KEY);
         drawing.group("law", |page| {
             draw_law(page, trace, law, branch, (cell, &letter()))
         });
@@ -79,15 +79,14 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     drawing.height = panels.end();
     drawing.group("leaves", |page| {
         for (index, (veins, at)) in shapes.iter().zip(&shown).enumerate() {
-            let (number, text) = ((index + 1).to_string(), format!("at {}", what(point(at))));
+            let (number, text) = (
+                (index + 1).to_string(),
+                format!("at {}", caption(point(at))),
+            );
             panels.draw(page, index, veins, (&number, &text, NOTE), |_, _, _| ());
         }
     });
     drawing
-}
-
-fn length(curve: &[DVec3]) -> f64 {
-    curve.windows(2).map(|w| w[0].distance(w[1])).sum()
 }
 
 fn notes(trace: &Trace) -> Vec<String> {
@@ -108,15 +107,15 @@ fn notes(trace: &Trace) -> Vec<String> {
     if worst > 0.0 {
         notes.push(format!(
             "{} within {}",
-            looked_at(trace),
+            error_location(trace),
             power_of_ten(worst)
         ));
     }
     notes
 }
 
-/// The points whose leaves are drawn: where branches begin and end, where the index
-/// changes, and in the middle of branches; of leaves that look the same the first.
+/// The points whose leaves are drawn: the ends of branches, points where the index
+/// changes, and the middles of branches; only the first of leaves that look the same.
 fn shown(trace: &Trace) -> Vec<[usize; 2]> {
     let mut wanted: Vec<(usize, [usize; 2])> = Vec::new();
     for (b, branch) in trace.branches.iter().enumerate() {
@@ -133,12 +132,15 @@ fn shown(trace: &Trace) -> Vec<[usize; 2]> {
     wanted.sort_by_key(|&(rank, _)| rank);
     let point = |[b, p]: [usize; 2]| &trace.branches[b].points[p];
     let first = wanted.first().map(|&(_, at)| at);
-    let away = |at: [usize; 2]| first.map_or(0.0, |first| apart(point(at), point(first)));
-    let farthest = wanted.iter().map(|&(_, at)| away(at)).fold(0.0, f64::max);
-    let seen = SEEN.min(PART_SEEN * farthest);
+    let distance = |at: [usize; 2]| first.map_or(0.0, |first| difference(point(at), point(first)));
+    let farthest = wanted
+        .iter()
+        .map(|&(_, at)| distance(at))
+        .fold(0.0, f64::max);
+    let visible = VISIBLE.min(VISIBLE_FRACTION * farthest);
     let mut shown: Vec<[usize; 2]> = Vec::new();
     for (_, at) in wanted {
-        let alike = |&other: &[usize; 2]| apart(point(at), point(other)) <= seen;
+        let alike = |&other: &[usize; 2]| difference(point(at), point(other)) <= visible;
         if shown.len() < MOST_LEAVES && !shown.iter().any(alike) {
             shown.push(at);
         }
@@ -147,20 +149,20 @@ fn shown(trace: &Trace) -> Vec<[usize; 2]> {
     shown
 }
 
-/// How far two leaves are apart at most, in lengths; their grids may differ.
-fn apart(one: &TracePoint, other: &TracePoint) -> f64 {
+/// Largest distance between two leaves, in lengths; their grids may differ.
+fn difference(one: &TracePoint, other: &TracePoint) -> f64 {
     let at = |curve: &[DVec3], part: usize| {
         let last = curve.len().saturating_sub(1);
         curve.get((part * last + PARTS / 2) / PARTS).copied()
     };
     let pairs = || one.curves.iter().zip(&other.curves);
     let points = pairs().flat_map(|(a, b)| (0..=PARTS).map(move |k| at(a, k).zip(at(b, k))));
-    let far = points.flatten().map(|(a, b)| a.distance(b));
+    let distances = points.flatten().map(|(a, b)| a.distance(b));
     let size = pairs().map(|(a, b)| length(a).max(length(b)));
-    far.fold(0.0, f64::max) / size.fold(f64::MIN_POSITIVE, f64::max)
+    distances.fold(0.0, f64::max) / size.fold(f64::MIN_POSITIVE, f64::max)
 }
 
-fn what(point: &TracePoint) -> String {
+fn caption(point: &TracePoint) -> String {
     let kind = match (point.kind, point.index) {
         (PointKind::Regular, 0) => "stable".into(),
         (PointKind::Regular, index) => format!("index {index}"),
@@ -169,18 +171,18 @@ fn what(point: &TracePoint) -> String {
     format!("{}, {kind}", short(point.value))
 }
 
-/// The coordinate along which the tip goes farthest; of a held one the component of the
-/// reaction that changes most.
-fn farthest(trace: &Trace) -> TraceShow {
+/// The coordinate of the tip that varies most; for a held tip the component of the
+/// reaction that does.
+fn most_varying(trace: &Trace) -> TraceShow {
     let points = trace.branches.iter().flat_map(|branch| &branch.points);
     let of = |point: &TracePoint| point.reaction.or(point.tips.first().copied());
     let values = points.filter_map(|point| of(point).map(|it| (it, it)));
     let extent = values.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
     let (low, high) = extent.unwrap_or_default();
-    let way = high - low;
-    let longest = (0..3).max_by(|&a, &b| way[a].total_cmp(&way[b]));
+    let change = high - low;
+    let largest = (0..3).max_by(|&a, &b| change[a].total_cmp(&change[b]));
     let first = if trace.held { REACTION } else { 0 };
-    TraceShow::ALL[first + longest.unwrap_or(2)]
+    TraceShow::ALL[first + largest.unwrap_or(2)]
 }
 
 /// A quantity with its unit.
@@ -196,7 +198,7 @@ fn name(quantity: TraceShow, units: &Units) -> String {
     }
 }
 
-/// Its axis, wide enough that rounding is none of it.
+/// Its axis, wide enough that rounding is invisible.
 fn axis_of(trace: &Trace, quantity: TraceShow) -> Axis {
     let points = || trace.branches.iter().flat_map(|branch| &branch.points);
     let values = points().map(|point| quantity.of(point));
@@ -232,12 +234,14 @@ fn draw_branches(
         }
         other => other,
     };
+    // Logarithmic if the values are spaced logarithmically; they increase along the axis.
+    let sign = trace.log.then(|| trace.range[0].signum());
     let axes = Axes {
         cell,
-        across: across_axis(trace, &across, all().map(|point| at(point).0)),
+        across: Axis::covering(&across, all().map(|point| at(point).0), sign),
         up: axis_of(trace, quantity),
     };
-    // Only what there is.
+    // The title names only the kinds that occur.
     let indices = [true, false].map(|stable| all().any(|point| (point.index == 0) == stable));
     let what = match indices {
         [true, true] => "equilibria: stable drawn solid, unstable dashed",
@@ -248,8 +252,8 @@ fn draw_branches(
     axes.draw(page);
     let mut labels = Labels::within(cell);
     for (b, branch) in trace.branches.iter().enumerate() {
-        let entrance = branch.from.map(|[b, p]| &trace.branches[b].points[p]);
-        for (points, stable) in pieces(entrance, branch) {
+        let origin = branch.from.map(|[b, p]| &trace.branches[b].points[p]);
+        for (points, stable) in pieces(origin, branch) {
             let line: Vec<(f64, f64)> = points.into_iter().map(at).collect();
             let width = if stable { 2.0 } else { 1.2 };
             let stroke = Stroke::new(CURVES[b % CURVES.len()], width).dashed(!stable);
@@ -270,22 +274,9 @@ fn draw_branches(
     labels.draw(page);
 }
 
-/// The axis of what varies: logarithmic if its logarithm varies evenly, and from small
-/// to large.
-fn across_axis(trace: &Trace, name: &str, values: impl Iterator<Item = f64>) -> Axis {
-    if !trace.log {
-        return Axis::holding(name, values);
-    }
-    let sign = trace.range[0].signum();
-    Axis {
-        sign: Some(sign),
-        ..Axis::logarithmic(name, values.map(|value| sign * value), 1.0)
-    }
-}
-
-/// The branches and the kinds of points that there are.
+/// Draws the key: the branches, and the kinds of points that occur.
 fn draw_key(page: &mut Drawing, trace: &Trace, cell: Cell) {
-    let mut key = Key::beside(cell);
+    let mut key = Key::right_of(cell);
     for (b, branch) in trace.branches.iter().enumerate().take(MOST_NAMED) {
         let name = match branch.from {
             None => "first branch".into(),
@@ -308,18 +299,18 @@ fn draw_key(page: &mut Drawing, trace: &Trace, cell: Cell) {
     }
 }
 
-/// The points of a branch, with that from which it was entered, in pieces of one
-/// stability each; a piece begins where the one before it ends.
+/// The points of a branch, after the one where it leaves another branch, split into pieces
+/// of equal stability; a piece begins where the one before it ends.
 fn pieces<'t>(
-    entrance: Option<&'t TracePoint>,
+    origin: Option<&'t TracePoint>,
     branch: &'t TraceBranch,
 ) -> Vec<(Vec<&'t TracePoint>, bool)> {
     let mut pieces: Vec<(Vec<&TracePoint>, bool)> = Vec::new();
-    if let (Some(entrance), Some(first)) = (entrance, branch.points.first()) {
-        pieces.push((vec![entrance, first], first.index == 0));
+    if let (Some(origin), Some(first)) = (origin, branch.points.first()) {
+        pieces.push((vec![origin, first], first.index == 0));
     }
     for pair in branch.points.windows(2) {
-        // The index of a critical point is that behind it.
+        // The index of a critical point is the one after it.
         let stable = pair[0].index == 0;
         match pieces.last_mut() {
             Some((points, same)) if *same == stable => points.push(&pair[1]),
@@ -329,7 +320,7 @@ fn pieces<'t>(
     pieces
 }
 
-/// Force against displacement of the tip, and the line through it.
+/// Draws force against displacement of the tip, and the fitted line.
 fn draw_law(
     page: &mut Drawing,
     trace: &Trace,
@@ -352,7 +343,7 @@ fn draw_law(
         let across = end.map_or(0.0, |p| p.0);
         (across, y + law.slope * (across - x))
     });
-    // The line leaves the range of the points.
+    // The line may leave the range of the points.
     let drawn = || points.iter().chain(&ends);
     let axes = Axes {
         cell,
@@ -365,14 +356,10 @@ fn draw_law(
     let line = Stroke::new(CURVES[2], 1.4);
     axes.curve(page, &ends, line);
     axes.markers(page, points, Marker::Dot, CURVES[0]);
-    let unit = match (&units.force, &units.length) {
-        (Some(force), Some(length)) => format!(" {force}/{length}"),
-        _ => String::new(),
-    };
-    let mut key = Key::beside(cell);
+    let mut key = Key::right_of(cell);
     let which = "of the first branch";
     key.marker(page, "equilibria", which, (Marker::Dot, CURVES[0]));
-    let slope = format!("slope {}{unit}", short(law.slope));
+    let slope = format!("slope {}{}", short(law.slope), slope_unit(units));
     key.line(page, "line of least squares", &slope, line);
     let off = format!("off by {} % at most", short(100.0 * law.deviation));
     key.entry(page, &format!("R² = {:.6}", law.r_squared), &off, |_, _| ());

@@ -1,23 +1,23 @@
-//! The veins as smooth curves, in units of the largest rod length.
+//! Veins as smooth curves, in units of the largest rod length.
 
 use glam::{DVec2, DVec3};
 
-use super::drawing::{Color, Path, Step, vein_color};
+use super::drawing::{Color, Path, Step, color_of_vein};
 use super::setting::Setting;
 use crate::relax::{Equilibrium, RodShape};
+use crate::simulate::{Record, Still};
 
-/// Of a wider leaf, only some veins are drawn: more would not be told apart.
+/// Of a wider leaf only some veins are drawn: more could not be distinguished.
 const MOST_VEINS: usize = 200;
-/// Farther away than this many lengths a point is a number gone wild.
+/// Points farther away than this many lengths are diverged and not drawn.
 const FARTHEST: f64 = 1e4;
-/// How far a drawn curve may be from the computed points, in lengths: a
+/// Largest distance of a drawn curve from the computed points, in lengths: a
 /// quarter of a pixel.
-const DRAWN_WITHIN: f64 = 3e-4;
-/// No curve is drawn with fewer pieces than this, if it has them.
+const MAX_DEVIATION: f64 = 3e-4;
+/// Curves are drawn with at least this many pieces, if they have as many segments.
 const FEWEST_PIECES: usize = 8;
-/// Dots of a second solution: on about so many veins at most, about so many in
-/// all, as far apart as this many are on the leaf's extent, and no fewer on a
-/// vein if it has them.
+/// Dots of a second solution: about the most veins with dots, about the most dots in
+/// total, dots per extent of the leaf, and the fewest on a vein that has as many nodes.
 const MOST_DOTTED: usize = 24;
 const MOST_DOTS: usize = 160;
 const DOTS_PER_EXTENT: f64 = 14.0;
@@ -42,11 +42,11 @@ impl Vein {
 pub struct Veins {
     pub veins: Vec<Vein>,
     pub count: usize,
-    /// Every so many-th vein is drawn.
+    /// Stride of the veins that are drawn.
     pub every: usize,
     pub dots: Vec<DVec3>,
     pub tips: Vec<(DVec3, Color)>,
-    /// Corners of the box that holds all of it; the clamp is at the origin.
+    /// Corners of the bounding box; the clamp is at the origin.
     pub low: DVec3,
     pub high: DVec3,
     /// The largest rod length, in the scenario's units.
@@ -59,30 +59,29 @@ impl Veins {
         Veins::through(&shape.curves, &equilibrium.tips, shape.longest())
     }
 
+    /// The veins of a moving leaf at one instant.
+    pub fn at_instant(record: &Record, still: &Still) -> Self {
+        let tips = tips(&still.curves, record.joined);
+        Veins::through(&still.curves, &tips, record.length)
+    }
+
     /// Veins through these points, with the longest rod as the unit.
     pub fn through(curves: &[Vec<DVec3>], tips: &[DVec3], longest: f64) -> Self {
         let usable = longest.is_finite() && longest > 0.0;
         let unit = if usable { longest } else { 1.0 };
         let count = curves.len();
-        let every = count.div_ceil(MOST_VEINS).max(1);
-        let color = |index: usize| match count {
-            0 | 1 => vein_color(0.3),
-            _ => vein_color(index as f64 / (count - 1) as f64),
-        };
-
-        let chosen = |index: usize| index.is_multiple_of(every) || index + 1 == count;
-        let drawn = (0..count).filter(|&index| chosen(index));
+        let drawn = (0..count).filter(|&index| is_drawn(index, count));
         let veins: Vec<Vein> = drawn
             .map(|index| Vein {
-                pieces: smooth(&drawable(&curves[index], unit)),
-                color: color(index),
+                pieces: smooth(&drawable_part(&curves[index], unit)),
+                color: color_of_vein(index, count),
             })
             .collect();
         let joined = tips.len() == 1;
         let tips = (0..tips.len())
-            .filter(|&index| joined || chosen(index))
-            .map(|index| (tips[index] / unit, color(index)))
-            .filter(|(tip, _)| is_near(*tip))
+            .filter(|&index| joined || is_drawn(index, count))
+            .map(|index| (tips[index] / unit, color_of_vein(index, count)))
+            .filter(|(tip, _)| is_drawable(*tip))
             .collect();
 
         let pieces = veins.iter().flat_map(|vein| &vein.pieces);
@@ -93,7 +92,7 @@ impl Veins {
         Veins {
             veins,
             count,
-            every,
+            every: stride(count),
             dots: Vec::new(),
             tips,
             low,
@@ -102,12 +101,12 @@ impl Veins {
         }
     }
 
-    /// Adds a second solution as dots: on as many veins, at as many places as
-    /// can be told apart.
-    pub fn dot(&mut self, rods: &[RodShape]) {
+    /// Adds a second solution as dots, on as many veins and at as many nodes as can be
+    /// distinguished.
+    pub fn add_dots(&mut self, rods: &[RodShape]) {
         let every = self.count.div_ceil(MOST_DOTTED).max(1);
         let most = (MOST_DOTS / rods.len().div_ceil(every).max(1)).max(FEWEST_DOTS);
-        // A vein that is wound up is longer than the leaf.
+        // A coiled vein is longer than the leaf.
         let lengths = 1.0 / self.extent();
         let wanted = (DOTS_PER_EXTENT * lengths).ceil() as usize;
         let dots = wanted.clamp(FEWEST_DOTS, most);
@@ -116,7 +115,7 @@ impl Veins {
             // The base is under the clamp's marker.
             let nodes = rod.nodes.iter().skip(stride).step_by(stride);
             let points = nodes.map(|node| node.position / self.unit);
-            self.dots.extend(points.filter(|&point| is_near(point)));
+            self.dots.extend(points.filter(|&point| is_drawable(point)));
         }
         for &point in &self.dots {
             (self.low, self.high) = (self.low.min(point), self.high.max(point));
@@ -156,18 +155,40 @@ impl Veins {
     }
 }
 
-pub fn is_near(point: DVec3) -> bool {
+fn stride(count: usize) -> usize {
+    count.div_ceil(MOST_VEINS).max(1)
+}
+
+/// Whether a vein is drawn: of a wide leaf only every n-th vein and the last are.
+pub fn is_drawn(index: usize, count: usize) -> bool {
+    index.is_multiple_of(stride(count)) || index + 1 == count
+}
+
+/// The last point of the first curve if the tips are joined, otherwise of all curves.
+pub fn tips(curves: &[Vec<DVec3>], joined: bool) -> Vec<DVec3> {
+    let count = if joined { 1 } else { curves.len() };
+    let ends = curves.iter().take(count);
+    ends.filter_map(|curve| curve.last()).copied().collect()
+}
+
+/// The length of a polyline.
+pub fn length(curve: &[DVec3]) -> f64 {
+    curve.windows(2).map(|w| w[0].distance(w[1])).sum()
+}
+
+/// Whether a point is finite and not too far away to be drawn.
+pub fn is_drawable(point: DVec3) -> bool {
     point.is_finite() && point.abs().max_element() < FARTHEST
 }
 
 /// The points up to the first that cannot be drawn.
-fn drawable(curve: &[DVec3], unit: f64) -> Vec<DVec3> {
+fn drawable_part(curve: &[DVec3], unit: f64) -> Vec<DVec3> {
     let points = curve.iter().map(|&point| point / unit);
-    points.take_while(|&point| is_near(point)).collect()
+    points.take_while(|&point| is_drawable(point)).collect()
 }
 
-/// Smooth pieces through the points: through every second, fourth, ... of
-/// them as long as the others are not missed.
+/// Smooth pieces through every second, fourth, ... of the points, as long as the curve
+/// stays close to the others.
 fn smooth(points: &[DVec3]) -> Vec<Piece> {
     let segments = points.len().saturating_sub(1);
     let mut stride = 1;
@@ -177,23 +198,23 @@ fn smooth(points: &[DVec3]) -> Vec<Piece> {
     loop {
         let kept: Vec<DVec3> = points.iter().copied().step_by(stride).collect();
         let pieces = through(&kept);
-        if stride == 1 || largest_miss(&pieces, points, stride) < DRAWN_WITHIN {
+        if stride == 1 || max_deviation(&pieces, points, stride) < MAX_DEVIATION {
             return pieces;
         }
         stride /= 2;
     }
 }
 
-fn largest_miss(pieces: &[Piece], points: &[DVec3], stride: usize) -> f64 {
-    let miss = |(index, &point): (usize, &DVec3)| {
+fn max_deviation(pieces: &[Piece], points: &[DVec3], stride: usize) -> f64 {
+    let deviation = |(index, &point): (usize, &DVec3)| {
         let place = (index / stride).min(pieces.len() - 1);
         let t = index as f64 / stride as f64 - place as f64;
-        at(&pieces[place], t).distance(point)
+        bezier(&pieces[place], t).distance(point)
     };
-    points.iter().enumerate().map(miss).fold(0.0, f64::max)
+    points.iter().enumerate().map(deviation).fold(0.0, f64::max)
 }
 
-fn at(piece: &Piece, t: f64) -> DVec3 {
+fn bezier(piece: &Piece, t: f64) -> DVec3 {
     let [a, b, c, d] = *piece;
     let s = 1.0 - t;
     s * s * s * a + 3.0 * s * s * t * b + 3.0 * s * t * t * c + t * t * t * d
@@ -235,7 +256,7 @@ mod tests {
         assert!(pieces.len() <= 16, "{}", pieces.len());
         for piece in &pieces {
             for t in [0.25, 0.5, 0.75] {
-                assert!((at(piece, t).length() * PI - 1.0).abs() < 2e-3);
+                assert!((bezier(piece, t).length() * PI - 1.0).abs() < 2e-3);
             }
         }
     }
@@ -248,23 +269,23 @@ mod tests {
     }
 
     #[test]
-    fn dots_can_be_told_apart() {
+    fn dots_are_few_enough_to_be_distinguished() {
         for (rods, dots) in [(1, 14), (5, 5 * 14), (21, 21 * 8), (200, 23 * 8)] {
             let leaf = sample::fan(rods, 64);
             let mut veins = Veins::of(&leaf);
-            veins.dot(&leaf.shape.rods);
+            veins.add_dots(&leaf.shape.rods);
             assert!(veins.dots.len() <= dots, "{rods}: {}", veins.dots.len());
             assert!(veins.dots.len() > dots / 2, "{rods}: {}", veins.dots.len());
         }
     }
 
     #[test]
-    fn dots_beside_the_leaf_are_in_the_box() {
+    fn dots_away_from_the_leaf_are_in_the_box() {
         let leaf = sample::fan(3, 8);
         let mut veins = Veins::of(&leaf);
         let mut rods = leaf.shape.rods.clone();
         rods[1].nodes[8].position.z = 3.0;
-        veins.dot(&rods);
+        veins.add_dots(&rods);
         assert_eq!(veins.high.z, 3.0);
     }
 }

@@ -1,5 +1,5 @@
 //! Files that are complete or absent: each is written under another name in
-//! its folder and renamed when it is whole.
+//! its folder and renamed when it is complete.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -10,23 +10,23 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::report::FileError;
 
-/// Large enough that a centerline file of a wide leaf is not written in crumbs.
+/// Large enough to write the centerline file of a wide leaf in few pieces.
 const BUFFER_BYTES: usize = 1 << 16;
 
-/// Drafts that are not renamed yet.
+/// Drafts that have not been renamed yet.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
-    // A list of paths is whole whatever its last user did.
+    // A list of paths is valid even if the lock is poisoned.
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes the files that were begun and not finished, and keeps other threads
-/// from beginning or finishing one ever after: for a program about to exit.
+/// Removes all unfinished files, and blocks other threads that try to begin or finish one
+/// from now on: for a program about to exit.
 pub fn abandon_unfinished() {
     let mut paths = unfinished();
     for path in paths.drain(..) {
-        // Nothing is left to do about a file that cannot be removed.
+        // A file that cannot be removed is left behind.
         let _ = fs::remove_file(path);
     }
     mem::forget(paths);
@@ -45,8 +45,8 @@ pub(super) fn write_file(
     rename(draft.path(), file)
 }
 
-/// The path of a file that is being written. What was begun and not renamed is
-/// removed when this is dropped.
+/// The path of a file that is being written. A file begun here and not renamed is removed
+/// when this is dropped.
 pub(super) struct Draft(PathBuf);
 
 impl Draft {
@@ -59,7 +59,7 @@ impl Draft {
         Ok((Draft(path), created))
     }
 
-    /// A draft that an earlier process has left, and that is left again.
+    /// A draft left by an earlier process, which is kept when this is dropped.
     pub fn resume(path: &Path) -> Self {
         Draft(path.into())
     }
@@ -73,13 +73,13 @@ impl Drop for Draft {
     fn drop(&mut self) {
         let mut paths = unfinished();
         if let Some(at) = paths.iter().position(|path| *path == self.0) {
-            // Nothing is left to do about a file that cannot be removed.
+            // A file that cannot be removed is left behind.
             let _ = fs::remove_file(paths.swap_remove(at));
         }
     }
 }
 
-/// Gives a draft the name by which it is found.
+/// Gives a draft its final name.
 pub(super) fn rename(draft: &Path, file: &Path) -> io::Result<()> {
     let mut paths = unfinished();
     fs::rename(draft, file)?;
@@ -87,32 +87,32 @@ pub(super) fn rename(draft: &Path, file: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// A hidden name beside `file` that no other process uses.
+/// A hidden name in the folder of `file` that no other process uses.
 fn draft_path(file: &Path) -> PathBuf {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     file.with_file_name(format!(".{name}.{}.part", process::id()))
 }
 
-/// Makes the output folder and those above it.
+/// Creates the output folder and its parents.
 pub(super) fn make_folder(folder: &Path) -> Result<(), FileError> {
     match fs::create_dir_all(folder) {
         Ok(()) => Ok(()),
-        Err(reason) => Err(blocked(folder, nearest_existing(folder), reason)),
+        Err(reason) => Err(not_writable(folder, nearest_existing(folder), reason)),
     }
 }
 
-/// Whether files could be written to `folder`, without leaving anything
-/// there: a long computation should not end at a closed door.
+/// Checks that files can be written to `folder`, without leaving anything there, before
+/// a long computation.
 pub fn check_writable(folder: &Path) -> Result<(), FileError> {
     let existing = nearest_existing(folder);
     let probe = draft_path(&existing.join("probe"));
     match File::create(&probe).and_then(|_| fs::remove_file(&probe)) {
         Ok(()) => Ok(()),
-        Err(reason) => Err(blocked(folder, existing, reason)),
+        Err(reason) => Err(not_writable(folder, existing, reason)),
     }
 }
 
-fn blocked(folder: &Path, existing: PathBuf, reason: io::Error) -> FileError {
+fn not_writable(folder: &Path, existing: PathBuf, reason: io::Error) -> FileError {
     let (folder, obstacle) = (folder.display(), existing.display());
     FileError(match existing.is_dir() {
         true => format!(
@@ -124,7 +124,7 @@ fn blocked(folder: &Path, existing: PathBuf, reason: io::Error) -> FileError {
     })
 }
 
-/// `path`, or the nearest thing above it that exists.
+/// `path`, or its nearest ancestor that exists.
 fn nearest_existing(path: &Path) -> PathBuf {
     path.ancestors()
         .find(|ancestor| ancestor.exists())

@@ -1,13 +1,13 @@
-//! Whether bytes are still those that were written.
+//! Checksums of files, to detect damage.
 
 use std::fmt::{self, Display};
 
-/// The hash FNV-1a of 64 bits: finds damage, not malice.
+/// The 64-bit FNV-1a hash: detects damage, not malice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Checksum(u64);
 
 impl Checksum {
-    /// Of nothing yet.
+    /// The checksum of no bytes.
     pub fn new() -> Self {
         Checksum(0xcbf2_9ce4_8422_2325)
     }
@@ -18,7 +18,7 @@ impl Checksum {
         }
     }
 
-    /// Of a text, which need not exist as a whole.
+    /// The checksum of a formatted text, which is never assembled.
     pub fn of(text: fmt::Arguments) -> Self {
         let mut sum = Checksum::new();
         // Adding to a sum cannot fail.

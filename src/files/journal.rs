@@ -1,5 +1,5 @@
-//! The rows of a map on the way: what is finished is on the disk, and a later
-//! run goes on from there.
+//! The rows of a map while it is computed: finished rows are on disk, and a later
+//! run continues from there.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
@@ -7,15 +7,14 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::files::{atomic, write_table};
+use crate::files::{atomic, write_named, write_table};
 use crate::report::{Document, FileError, json, lines, table};
 use crate::study::{Map, MapRequest, MapRow};
 
-/// What says which map the rows beside it are of.
+/// The file that identifies the map of the rows in its folder.
 const JSON: &str = "map.json";
 
-/// Whether a folder can be this map's: `map.json` there says which map it has,
-/// and another one's is refused. `false`: it has none yet.
+/// Whether `map.json` in a folder is of this map; `false` if the folder has no map yet.
 ///
 /// # Errors
 /// If the folder has another map.
@@ -28,9 +27,9 @@ pub fn belongs(folder: &Path, request: &MapRequest) -> Result<bool, FileError> {
     };
     match fs::read(&file) {
         Ok(bytes) => {
-            let there: Value = serde_json::from_slice(&bytes).unwrap_or_default();
+            let theirs: Value = serde_json::from_slice(&bytes).unwrap_or_default();
             let ours = serde_json::to_value(request).unwrap_or_default();
-            match difference(&there["request"], &ours) {
+            match difference(&theirs["request"], &ours) {
                 None => Ok(true),
                 Some(what) => other(&file, &what),
             }
@@ -46,8 +45,8 @@ pub fn belongs(folder: &Path, request: &MapRequest) -> Result<bool, FileError> {
     }
 }
 
-/// Claims a folder for this map before there are rows in it. Jobs that share a
-/// map write the same.
+/// Claims a folder for this map before there are rows in it. Jobs that share a map write
+/// the same claim.
 ///
 /// # Errors
 /// If the folder has another map, or cannot be written to.
@@ -55,22 +54,20 @@ pub fn claim(folder: &Path, map: &Document<Map>) -> Result<(), FileError> {
     if belongs(folder, &map.result.request)? {
         return Ok(());
     }
-    let file = folder.join(JSON);
     atomic::make_folder(folder)?;
-    atomic::write_file(&file, |out| json::write(map, out))
-        .map_err(|reason| FileError::write(&file, reason))
+    write_named(folder, JSON, |out| json::write(map, out)).map(drop)
 }
 
-/// The first key whose values are not the same.
-fn difference(there: &Value, ours: &Value) -> Option<String> {
-    if there == ours {
+/// The first key whose values differ.
+fn difference(theirs: &Value, ours: &Value) -> Option<String> {
+    if theirs == ours {
         return None;
     }
     let keys = ours
         .as_object()
         .into_iter()
         .flat_map(|object| object.keys());
-    let other = keys.into_iter().find(|key| there[*key] != ours[*key]);
+    let other = keys.into_iter().find(|key| theirs[*key] != ours[*key]);
     Some(other.map_or("request", |key| key.as_str()).to_string())
 }
 
@@ -81,8 +78,7 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Begins or goes on: the file is written whole with what is known, and
-    /// open for more.
+    /// Begins or continues a file: writes it with the known rows and opens it for more.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -100,7 +96,7 @@ impl Journal {
         }
     }
 
-    /// Adds rows, in one piece.
+    /// Appends rows with a single write.
     ///
     /// # Errors
     /// If they cannot be written.
@@ -110,7 +106,7 @@ impl Journal {
     }
 }
 
-/// Writes a file of rows whole.
+/// Writes a complete file of rows.
 ///
 /// # Errors
 /// If it cannot be written.

@@ -1,4 +1,5 @@
-//! Files: each complete or absent, never half written, and recordings that grow.
+//! Output files: each complete or absent, never half written; and recordings, which grow
+//! during a run.
 
 mod atomic;
 mod checksum;
@@ -138,7 +139,7 @@ impl Written for Chart {
     ];
 }
 
-/// Its numbers are also in the JSON of its chart.
+/// The JSON of the chart includes its numbers.
 impl Written for Scaling {
     const JSON: Option<&'static str> = None;
     const FORMATS: &'static [&'static dyn Format<Self>] = &[
@@ -148,13 +149,13 @@ impl Written for Scaling {
     ];
 }
 
-/// What is written of a result.
+/// Which files of a result are written.
 #[derive(Clone, Debug)]
 pub struct Selection {
     /// Kinds of files.
     pub kinds: Vec<Kind>,
-    /// So many parts of equal length lie between the stations of every vein; left
-    /// out: as the grid has them.
+    /// The number of equal parts into which stations divide every vein; left out: the nodes
+    /// of the grid.
     pub stations: Option<usize>,
 }
 
@@ -174,7 +175,7 @@ pub fn names<R: Written>(result: &R) -> Vec<&'static str> {
     R::JSON.into_iter().chain(others).collect()
 }
 
-/// What would stand in the file of this name of a result, if it has such a file.
+/// The content of a result's file of this name, if it has such a file.
 ///
 /// ```
 /// # use leafdyn::{files::{self, Document}, scenario::Scenario};
@@ -197,8 +198,8 @@ pub fn contents<R: Written>(document: &Document<R>, name: &str) -> Option<Vec<u8
     Some(bytes)
 }
 
-/// Writes a result into `folder`, which is made if it is not there, as files of
-/// these kinds, and returns their paths. Files of other kinds stay as they are.
+/// Writes a result into `folder`, which is created if missing, as files of these kinds,
+/// and returns their paths. Files of other kinds are not changed.
 ///
 /// # Errors
 /// If one cannot be written.
@@ -211,19 +212,12 @@ pub fn write_all<R: Written>(
         return Ok(Vec::new());
     }
     atomic::make_folder(folder)?;
-    let write = |name: &str, fill: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
-        let file = folder.join(name);
-        match atomic::write_file(&file, fill) {
-            Ok(()) => Ok(file),
-            Err(reason) => Err(FileError::write(&file, reason)),
-        }
-    };
     let result = document.result;
     let formats = result.formats(kinds);
     let (json, others) = rayon::join(
         || {
             let name = R::JSON.filter(|_| kinds.contains(&Kind::Json))?;
-            Some(write(name, &|out| json::write(document, out)))
+            Some(write_named(folder, name, |out| json::write(document, out)))
         },
         || -> Vec<_> {
             let formats = formats.par_iter();
@@ -235,30 +229,40 @@ pub fn write_all<R: Written>(
                         atomic::make_folder(part.parent().unwrap_or(folder))?;
                     }
                     for (part, fill) in &parts {
-                        write(part, fill)?;
+                        write_named(folder, part, fill)?;
                     }
-                    write(format.file_name(), &|out| format.write(document, out))
+                    let name = format.file_name();
+                    write_named(folder, name, |out| format.write(document, out))
                 })
                 .collect()
         },
     );
     for name in R::MORE.iter().map(|format| format.file_name()) {
         if !result.has_more(name) {
-            // Of another result. That there is none is the rule.
+            // Left by another result; usually there is none.
             let _ = fs::remove_file(folder.join(name));
         }
     }
     json.into_iter().chain(others).collect()
 }
 
-/// Writes a table whole into `folder`, which is made if it is not there.
+/// Writes a complete table into `folder`, which is created if missing.
 ///
 /// # Errors
 /// If it cannot be written.
 pub fn write_table(folder: &Path, name: &str, rows: &[u8]) -> Result<PathBuf, FileError> {
     atomic::make_folder(folder)?;
+    write_named(folder, name, |out| out.write_all(rows))
+}
+
+/// Writes a complete file into `folder`, and returns its path.
+fn write_named(
+    folder: &Path,
+    name: &str,
+    fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<PathBuf, FileError> {
     let file = folder.join(name);
-    match atomic::write_file(&file, |out| out.write_all(rows)) {
+    match atomic::write_file(&file, fill) {
         Ok(()) => Ok(file),
         Err(reason) => Err(FileError::write(&file, reason)),
     }

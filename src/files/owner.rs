@@ -1,4 +1,4 @@
-//! Whose results a folder holds: the JSON files in it name the scenario's file.
+//! The scenario whose results a folder holds: the JSON files in it name its file.
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -22,8 +22,8 @@ const FILES: [Option<&str>; 8] = [
     Chart::JSON,
 ];
 
-/// How a result in `folder` names the file of its scenario: the way there from
-/// the folder, so that both can move together.
+/// How a result in `folder` names the file of its scenario: by the relative path, so
+/// that both can be moved together.
 pub fn source(folder: &Path, file: &Path) -> String {
     let [Ok(folder), Ok(file)] = [folder, file].map(|path| absolute(path).map(without_dots)) else {
         return file.display().to_string();
@@ -31,10 +31,10 @@ pub fn source(folder: &Path, file: &Path) -> String {
     let [from, to] = [&folder, &file].map(|path| path.components().collect::<Vec<_>>());
     let shared = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
     let up = from[shared..].iter().map(|_| OsStr::new(".."));
-    let way: PathBuf = up
+    let relative: PathBuf = up
         .chain(to[shared..].iter().map(|c| c.as_os_str()))
         .collect();
-    way.display().to_string()
+    relative.display().to_string()
 }
 
 /// The path without `..`.
@@ -72,9 +72,9 @@ pub fn check_owner(folder: &Path, source: &str) -> Result<(), FileError> {
     Ok(())
 }
 
-/// The source that a JSON file names, if there is one that does.
+/// The source that a JSON file names, if any.
 fn source_in(file: &Path) -> Option<String> {
-    // It is one of the first lines; others are as long as the leaf is large.
+    // It is among the first lines; later ones can be very long.
     let lines = BufReader::new(File::open(file).ok()?.take(1 << 12)).lines();
     let mut lines = lines.map_while(Result::ok);
     let line = lines.find_map(|line| Some(line.strip_prefix("  \"source\": ")?.to_string()))?;
@@ -86,14 +86,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_way_to_a_scenario_starts_at_the_folder() {
-        for (folder, file, way) in [
+    fn sources_are_relative_to_the_folder() {
+        for (folder, file, relative) in [
             ("/a/out/b", "/a/b.toml", "../../b.toml"),
             ("/a/out", "/a/out/c/d.json", "c/d.json"),
             ("/a/x/../out", "/a/./b.toml", "../b.toml"),
             ("/", "/b.toml", "b.toml"),
         ] {
-            assert_eq!(source(Path::new(folder), Path::new(file)), way);
+            assert_eq!(source(Path::new(folder), Path::new(file)), relative);
         }
         assert_eq!(
             source(Path::new("out"), Path::new("s/a.toml")),

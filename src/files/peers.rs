@@ -16,7 +16,7 @@ const COLUMNS: [&str; 7] = [
 /// Most bytes of a table.
 const MOST_BYTES: u64 = 16 << 20;
 
-/// Most rows: a chart of more says nothing.
+/// Most rows: a chart of more is unreadable.
 const MOST_ROWS: usize = 10_000;
 
 /// Most programs in one chart, each a marker and a line of the key.
@@ -44,12 +44,12 @@ pub fn read_peers(file: &Path) -> Result<Vec<PeerRow>, FileError> {
     parse(&bytes).map_err(|(line, problem)| refused(format!("{shown}:{line}: {problem}")))
 }
 
-/// Rows, or a line and what is wrong with it.
+/// Parses the rows; an error has the line and the problem.
 fn parse(bytes: &[u8]) -> Result<Vec<PeerRow>, (u64, String)> {
     let mut table = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
     let header = match table.headers() {
         Ok(header) => header.clone(),
-        Err(error) => return Err((1, said(&error))),
+        Err(error) => return Err((1, message(&error))),
     };
     let mut columns = [0; COLUMNS.len()];
     for (column, name) in columns.iter_mut().zip(COLUMNS) {
@@ -70,7 +70,7 @@ fn parse(bytes: &[u8]) -> Result<Vec<PeerRow>, (u64, String)> {
     for record in table.records() {
         let record = record.map_err(|error| {
             let line = error.position().map_or(0, csv::Position::line);
-            (line, said(&error))
+            (line, message(&error))
         })?;
         let line = record.position().map_or(0, csv::Position::line);
         if record.len() != header.len() {
@@ -102,8 +102,8 @@ fn parse(bytes: &[u8]) -> Result<Vec<PeerRow>, (u64, String)> {
     Ok(rows)
 }
 
-/// An error of the table without its own idea of the place.
-fn said(error: &csv::Error) -> String {
+/// The message of a CSV error, without its position.
+fn message(error: &csv::Error) -> String {
     match error.kind() {
         csv::ErrorKind::Utf8 { .. } => "not UTF-8".into(),
         _ => error.to_string(),

@@ -1,4 +1,4 @@
-//! The equilibria of a leaf as people read them.
+//! The text report of all equilibria of a leaf.
 
 use crate::report::numbers::power_of_ten;
 use crate::study::{All, Found};
@@ -14,7 +14,7 @@ pub fn report(all: &All, files: Option<String>) -> String {
     lay_out(&heading, &lines(all, files))
 }
 
-/// The lines of it.
+/// The lines of the report.
 pub fn lines(all: &All, files: Option<String>) -> Lines {
     let mut lines = Lines::new();
     for (number, found) in all.found.iter().enumerate() {

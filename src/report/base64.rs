@@ -1,17 +1,17 @@
-//! Base64 as of RFC 4648, section 4: arrays in files of text.
+//! Base64 according to RFC 4648, section 4, for arrays in text files.
 
-/// Bytes as text, four digits for three of them.
+/// Encodes bytes as text, every three as four digits.
 pub fn encode(bytes: impl Iterator<Item = u8>) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let bytes: Vec<u8> = bytes.collect();
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for three in bytes.chunks(3) {
+    for chunk in bytes.chunks(3) {
         let mut bits = [0; 4];
-        bits[1..=three.len()].copy_from_slice(three);
+        bits[1..=chunk.len()].copy_from_slice(chunk);
         let bits = u32::from_be_bytes(bits);
         for k in 0..4 {
             let digit = DIGITS[(bits >> (18 - 6 * k)) as usize & 63];
-            text.push(if k <= three.len() { digit } else { b'=' }.into());
+            text.push(if k <= chunk.len() { digit } else { b'=' }.into());
         }
     }
     text

@@ -1,11 +1,11 @@
-//! The summary of a boundary that people read, and its rows in CSV.
+//! The text report of a boundary, and its rows in CSV.
 
 use std::io::{self, Write};
 
 use crate::study::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint};
 
 use super::numbers::{brief, power_of_ten, seconds, veins_of};
-use super::table::{Lines, lay_out, under};
+use super::table::{Lines, csv_without_header, labelled, lay_out};
 
 /// The curves, their ends and their special points.
 pub fn report(boundary: &Boundary, files: Option<String>) -> String {
@@ -14,19 +14,19 @@ pub fn report(boundary: &Boundary, files: Option<String>) -> String {
     lay_out(&heading, &lines(boundary, files))
 }
 
-/// The lines of it.
+/// The lines of the report.
 pub fn lines(boundary: &Boundary, files: Option<String>) -> Lines {
     let vary = (0..2).map(|i| {
         let (keys, [from, to]) = (&boundary.keys[i], boundary.ranges[i]);
         format!("{keys} from {} to {}", keys.text(from), keys.text(to))
     });
-    let mut lines = under("vary", vary.collect());
+    let mut lines = labelled("vary", vary.collect());
     let second = &boundary.keys[1];
     let start = format!("at {second} = {}", second.text(boundary.start));
     lines.push(("begun", start));
     let curves = boundary.curves.iter().enumerate();
     let curves = curves.flat_map(|(number, curve)| curve_lines(boundary, number, curve));
-    lines.extend(under("curve", curves.collect()));
+    lines.extend(labelled("curve", curves.collect()));
     let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
     lines.extend(
         points()
@@ -34,22 +34,22 @@ pub fn lines(boundary: &Boundary, files: Option<String>) -> Lines {
             .reduce(f64::max)
             .map(|worst| ("error", format!("tips within {}", power_of_ten(worst)))),
     );
-    lines.extend((boundary.map.iter()).flat_map(|map| under("map", map_lines(map))));
+    lines.extend((boundary.map.iter()).flat_map(|map| labelled("map", map_lines(map))));
     lines.push(("work", format!("{} in all", seconds(boundary.wall_seconds))));
     lines.extend(files.map(|files| ("written", files)));
     lines.extend((boundary.remark.iter()).map(|remark| ("remark", remark.clone())));
     lines
 }
 
-/// What a curve is, where it begins and ends, and what is special between.
+/// The kind of a curve, its ends and its special points.
 fn curve_lines(boundary: &Boundary, number: usize, curve: &BoundaryCurve) -> Vec<String> {
     let what = sides(curve).unwrap_or_else(|| "no point verified".into());
     let (number, points) = (number + 1, curve.points.len());
     let mut lines = vec![format!("{number}: {points} points, {what}")];
-    let end = |way: &str, point: Option<&BoundaryPoint>, end: usize| {
+    let end = |label: &str, point: Option<&BoundaryPoint>, end: usize| {
         let phrase = curve.ends[end].phrase();
         let at = point.map_or(String::new(), |point| place(boundary, point));
-        format!("  {way} {at}: {phrase}")
+        format!("  {label} {at}: {phrase}")
     };
     lines.push(end("from", curve.points.first(), 0));
     let special = curve.points.iter().filter(|point| is_special(point));
@@ -58,7 +58,7 @@ fn curve_lines(boundary: &Boundary, number: usize, curve: &BoundaryCurve) -> Vec
     lines
 }
 
-/// Cells named of those that disagree.
+/// Most disagreeing cells that are listed.
 const MOST_NAMED: usize = 5;
 
 /// Whether the map agrees with the curves.
@@ -82,7 +82,7 @@ fn map_lines(map: &BoundaryMap) -> Vec<String> {
     lines
 }
 
-/// What becomes of the index on a curve.
+/// How the index changes across a curve.
 pub fn sides(curve: &BoundaryCurve) -> Option<String> {
     let point = curve.points.first()?;
     let what = match (point.kind, curve.multiplicity) {
@@ -90,11 +90,11 @@ pub fn sides(curve: &BoundaryCurve) -> Option<String> {
         (_, 1) => "branches cross".into(),
         (_, modes) => format!("branches cross in {modes} directions"),
     };
-    let (before, behind) = (point.index_before, point.index_behind);
-    Some(format!("{what}: index {before} to {behind}"))
+    let (before, after) = (point.index_before, point.index_behind);
+    Some(format!("{what}: index {before} to {after}"))
 }
 
-/// Whether a point is more than one of a curve.
+/// Whether a point is a cusp or a crossing.
 pub fn is_special(point: &BoundaryPoint) -> bool {
     matches!(point.kind, "cusp" | "crossing")
 }
@@ -112,9 +112,7 @@ fn place(boundary: &Boundary, point: &BoundaryPoint) -> String {
 
 /// `boundary.csv`: one row per curve and point, with columns named by the keys.
 pub fn boundary_table(boundary: &Boundary, out: &mut dyn Write) -> io::Result<()> {
-    let mut table = csv::WriterBuilder::new()
-        .has_headers(false)
-        .from_writer(out);
+    let mut table = csv_without_header(out);
     let keys = boundary.keys.each_ref().map(ToString::to_string);
     table.serialize((
         ["curve", "point", "kind"],

@@ -5,10 +5,11 @@ use std::io::{self, Write};
 
 use glam::DVec3;
 
+use super::table::csv_without_header;
 use crate::relax::{Equilibrium, NodeState};
 use crate::shape::weights;
 
-/// Nodes of a cubic between those of the finest grid.
+/// Nodes of the finest grid that a cubic interpolates.
 const CUBIC: usize = 4;
 
 /// Names of the columns. Rods are numbered from 1; strains and stress
@@ -20,9 +21,7 @@ const HEADER: [&str; 22] = [
 
 /// `centerlines.csv`: one row per rod and station.
 pub fn centerlines(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
-    let mut table = csv::WriterBuilder::new()
-        .has_headers(false)
-        .from_writer(out);
+    let mut table = csv_without_header(out);
     table.write_record(HEADER)?;
     for (index, rod) in equilibrium.shape.rods.iter().enumerate() {
         for (&sigma, node) in equilibrium.shape.stations.iter().zip(&rod.nodes) {
@@ -51,9 +50,7 @@ const MODES_HEADER: [&str; 12] = [
 
 /// `modes.csv`: one row per mode, rod and station.
 pub fn modes_table(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
-    let mut table = csv::WriterBuilder::new()
-        .has_headers(false)
-        .from_writer(out);
+    let mut table = csv_without_header(out);
     table.write_record(MODES_HEADER)?;
     let shape = &equilibrium.shape;
     let place = |&at: &f64| (at, weights(&shape.curve_stations, at, CUBIC));
@@ -76,7 +73,7 @@ pub fn modes_table(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result
     table.flush()
 }
 
-/// The columns from `x` on.
+/// The columns from `x` onwards.
 fn columns(node: &NodeState) -> [f64; 19] {
     let NodeState {
         position: r,

@@ -1,23 +1,23 @@
-//! The summary of a chart that people read.
+//! The text report of a chart.
 
 use crate::report::numbers::power_of_ten;
 use crate::report::words::contender;
 use crate::study::{Chart, Decade, Peer, Reference, Row, Scaling};
 
 use super::numbers::{seconds, veins_of};
-use super::table::{lay_out, under};
+use super::table::{labelled, lay_out};
 
-/// What errors are measured against, the Pareto front, the fastest way to every
-/// accuracy, and peers.
+/// The reference for errors, the Pareto front, the fastest method for every accuracy,
+/// and peers.
 pub fn report(chart: &Chart, files: Vec<String>) -> String {
-    let mut lines = under("errors", reference(chart.reference.as_ref()));
+    let mut lines = labelled("errors", reference(chart.reference.as_ref()));
     lines.push(("measured", measured(chart)));
-    lines.extend(under("front", front(chart)));
-    lines.extend(under("fastest", fastest(chart)));
-    lines.extend(under("failed", failed(chart)));
-    lines.extend(under("peers", peers(chart)));
+    lines.extend(labelled("front", front(chart)));
+    lines.extend(labelled("fastest", fastest(chart)));
+    lines.extend(labelled("failed", failed(chart)));
+    lines.extend(labelled("peers", peers(chart)));
     if let Some(scaling) = &chart.scaling {
-        lines.extend(under("veins", veins(scaling)));
+        lines.extend(labelled("veins", veins(scaling)));
     }
     lines.extend(
         chart
@@ -25,7 +25,7 @@ pub fn report(chart: &Chart, files: Vec<String>) -> String {
             .iter()
             .map(|remark| ("remark", remark.clone())),
     );
-    lines.extend(under("written", files));
+    lines.extend(labelled("written", files));
     let veins = veins_of(chart.rods, chart.joined);
     let heading = format!("{}: {veins}, speed against accuracy", chart.scenario);
     lay_out(&heading, &lines)
@@ -36,17 +36,20 @@ fn reference(reference: Option<&Reference>) -> Vec<String> {
         return vec!["not known: no equilibrium was found to measure them against".into()];
     };
     let within = power_of_ten(found.known_within);
-    let told = match found.confirmed {
+    let accuracy = match found.confirmed {
         true => format!("against a solution known within {within} of the longest vein"),
         false => format!(
             "against a solution that is NOT CONFIRMED, taken to be within {within} of the longest vein"
         ),
     };
-    let apart = match found.difference {
-        Some(apart) => format!("{}; they differ by {}", found.told, power_of_ten(apart)),
+    let agreement = match found.difference {
+        Some(difference) => {
+            let difference = power_of_ten(difference);
+            format!("{}; they differ by {difference}", found.told)
+        }
         None => found.told.clone(),
     };
-    vec![told, apart]
+    vec![accuracy, agreement]
 }
 
 fn measured(chart: &Chart) -> String {
@@ -59,10 +62,10 @@ fn measured(chart: &Chart) -> String {
     )
 }
 
-/// A line of a table: time, error, who, how.
-fn entry((time, error): (f64, f64), who: &str, knob: &str) -> String {
+/// A line of a table: time, error, method and setting.
+fn entry((time, error): (f64, f64), method: &str, knob: &str) -> String {
     format!(
-        "{:>10}  {:<9} {who}, {knob}",
+        "{:>10}  {:<9} {method}, {knob}",
         seconds(time),
         power_of_ten(error)
     )
@@ -107,7 +110,7 @@ fn fastest(chart: &Chart) -> Vec<String> {
     chart.decades.iter().filter_map(line).collect()
 }
 
-/// Failures, one line for each contender and way to fail.
+/// Failures, one line for each contender and kind of failure.
 fn failed(chart: &Chart) -> Vec<String> {
     let mut kinds: Vec<(&Row, Vec<String>)> = Vec::new();
     for row in chart.rows.iter().filter(|row| !row.ending.is_success()) {
@@ -134,7 +137,7 @@ fn failed(chart: &Chart) -> Vec<String> {
     kinds.into_iter().map(line).collect()
 }
 
-/// Settings of one knob, its name only once.
+/// Values of one setting, with its name only once.
 fn listed(knobs: &[String]) -> String {
     let values = knobs.iter().map(|knob| match knob.split_once('=') {
         Some((_, value)) => value,
@@ -158,8 +161,8 @@ fn peers(chart: &Chart) -> Vec<String> {
     }
     let mut lines = Vec::new();
     for name in names {
-        let of_it = || chart.peers.iter().filter(|peer| peer.name == name);
-        let mut measured: Vec<(&Peer, f64)> = of_it()
+        let rows = || chart.peers.iter().filter(|peer| peer.name == name);
+        let mut measured: Vec<(&Peer, f64)> = rows()
             .filter_map(|peer| Some((peer, peer.true_error?)))
             .collect();
         measured.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -171,7 +174,7 @@ fn peers(chart: &Chart) -> Vec<String> {
             let line = entry((peer.seconds.median, error), name, &peer.knob);
             lines.push(format!("{line}: {ratio}"));
         }
-        for peer in of_it().filter(|peer| peer.true_error.is_none()) {
+        for peer in rows().filter(|peer| peer.true_error.is_none()) {
             let time = seconds(peer.seconds.median);
             lines.push(format!(
                 "{time:>10}  {name}, {}, {}",
@@ -182,7 +185,7 @@ fn peers(chart: &Chart) -> Vec<String> {
     lines
 }
 
-/// Two digits, or all before the point.
+/// Two digits, or all digits before the decimal point.
 fn rounded(ratio: f64) -> String {
     match ratio {
         ratio if ratio >= 10.0 => format!("{ratio:.0}"),
@@ -225,7 +228,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_confirmed_is_told_and_failures_of_a_kind_are_one_line() {
+    fn unconfirmed_references_are_reported_and_failures_of_a_kind_are_one_line() {
         let mut chart = sample::chart();
         if let Some(reference) = &mut chart.reference {
             reference.confirmed = false;
@@ -233,15 +236,15 @@ mod tests {
         for row in chart.rows.iter_mut().take(2) {
             row.ending = Ending::OtherEquilibrium;
         }
-        let said = report(&chart, Vec::new());
-        assert!(said.contains("that is NOT CONFIRMED"), "{said}");
+        let text = report(&chart, Vec::new());
+        assert!(text.contains("that is NOT CONFIRMED"), "{text}");
         let failed = "semi-implicit, extrapolated, tolerance=1e-2,1e-6, other-equilibrium\n";
-        assert!(said.contains(failed), "{said}");
+        assert!(text.contains(failed), "{text}");
         chart.reference = None;
-        let said = report(&chart, Vec::new());
+        let text = report(&chart, Vec::new());
         assert!(
-            said.contains("  errors   not known: no equilibrium was found"),
-            "{said}"
+            text.contains("  errors   not known: no equilibrium was found"),
+            "{text}"
         );
     }
 }

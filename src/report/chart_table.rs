@@ -1,5 +1,5 @@
 //! `chart.csv` and `chart_rods.csv`: one row per measurement, for spreadsheets
-//! and scripts. What the columns say is in `chart.json` by the same names.
+//! and scripts. `chart.json` has the same values under the same names.
 
 use std::io::{self, Write};
 
@@ -8,8 +8,8 @@ use serde_json::Value;
 
 use crate::study::{Chart, Scaling};
 
-/// Names of the columns of both, but for the first of `chart_rods.csv` and the
-/// last of `chart.csv`.
+/// Names of the columns of both files; `chart.csv` lacks the first, `chart_rods.csv`
+/// the last.
 const COLUMNS: [&str; 15] = [
     "rods",
     "method",
@@ -49,7 +49,7 @@ fn object(row: &impl Serialize) -> Value {
     serde_json::to_value(row).unwrap_or_default()
 }
 
-/// What a row does not tell, or is no number, is an empty cell.
+/// Writes these columns; missing values, and numbers that are not finite, are empty cells.
 fn write_columns(
     columns: &[&str],
     rows: impl Iterator<Item = Value>,

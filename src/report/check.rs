@@ -1,4 +1,4 @@
-//! The summary of a check that people read.
+//! The text report of a check.
 
 use glam::DVec3;
 
@@ -9,20 +9,20 @@ use super::numbers::{
     bound, decimals, eigenvalues, grids, point, power_of_ten, seconds, significant, veins,
 };
 use super::relax::found;
-use super::table::{Lines, lay_out, under};
+use super::table::{Lines, labelled, lay_out};
 use super::words::{equilibrium_of_index, headline, shooting};
 
-/// The verdict, what both methods found, and how far they are apart.
+/// The verdict, the results of both methods, and their differences.
 pub fn report(check: &Check, files: Option<String>) -> String {
     let relaxed = &check.relaxed;
     let mut lines = vec![("verdict", judgement(check))];
-    lines.extend(both(check));
-    lines.extend(under("differ", differences(check)));
-    lines.extend(under("error", errors(check)));
+    lines.extend(results(check));
+    lines.extend(labelled("differ", differences(check)));
+    lines.extend(labelled("error", errors(check)));
     if let Some(solution) = check.solution() {
-        lines.extend(shooting_itself(solution));
+        lines.extend(shooting_details(solution));
     }
-    // Why the leaf is not at rest is in the verdict.
+    // Otherwise the verdict explains why the leaf is not at rest.
     if let (Some(remark), true) = (&relaxed.remark, check.shot.is_some()) {
         lines.push(("remark", remark.clone()));
     }
@@ -46,8 +46,8 @@ fn judgement(check: &Check) -> String {
     }
 }
 
-/// What each method found, and when.
-fn both(check: &Check) -> Lines {
+/// The result and the time of each method.
+fn results(check: &Check) -> Lines {
     let relaxed = &check.relaxed;
     let found = format!("{} in {}", found(relaxed), seconds(relaxed.wall_seconds));
     let mut lines = vec![("relaxed", found)];
@@ -101,7 +101,7 @@ fn differences(check: &Check) -> Vec<String> {
     Quantity::ALL.into_iter().map(line).collect()
 }
 
-/// What both methods say about their own errors.
+/// The error estimates of both methods.
 fn errors(check: &Check) -> Vec<String> {
     let relaxed = &check.relaxed;
     let mut lines = vec![match relaxed.accuracy.error_estimate {
@@ -126,8 +126,8 @@ fn errors(check: &Check) -> Vec<String> {
     lines
 }
 
-/// How the shooting went.
-fn shooting_itself(solution: &Solution) -> Lines {
+/// Growth of perturbations, defect and conditioning of the shooting.
+fn shooting_details(solution: &Solution) -> Lines {
     let mut lines = vec![
         (
             "growth",

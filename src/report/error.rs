@@ -1,4 +1,4 @@
-//! Why files could not be written or read.
+//! Errors of reading and writing files.
 
 use std::io;
 use std::path::Path;
@@ -9,8 +9,7 @@ use std::path::Path;
 pub struct FileError(pub String);
 
 impl FileError {
-    /// The system's reason why a file cannot be written. What may have been there
-    /// before is untouched.
+    /// A file cannot be written, for the system's reason. A previous file is unchanged.
     pub fn write(file: &Path, reason: io::Error) -> Self {
         let file = file.display();
         FileError(format!(
@@ -18,12 +17,12 @@ impl FileError {
         ))
     }
 
-    /// The system's reason why a file cannot be read.
+    /// A file cannot be read, for the system's reason.
     pub fn read(file: &Path, reason: io::Error) -> Self {
         FileError(format!("cannot read {}: {reason}", file.display()))
     }
 
-    /// A file that is not of this run or map, or damaged.
+    /// A file belongs to another run or map, or is damaged.
     pub fn unfit(file: &Path, why: &str) -> Self {
         FileError(format!("{} {why}", file.display()))
     }

@@ -1,16 +1,16 @@
-//! A fit as people read it, and as a table.
+//! The text report of a fit, and its table.
 
 use std::io::{self, Write};
 
 use crate::study::{Fit, FitOutcome, FitParameter};
 
 use super::numbers::{brief, seconds};
-use super::table::{Lines, lay_out, under, write_csv};
+use super::table::{Lines, labelled, lay_out, write_csv};
 
-/// Candidates that are told.
+/// Most candidates that are listed.
 const CANDIDATES: usize = 5;
 
-/// What was found and what it is worth.
+/// The fitted numbers and how well the data determine them.
 pub fn report(fit: &Fit, files: Option<String>) -> String {
     let found = match fit.outcome {
         FitOutcome::Converged => "a minimum; the data determine every free number",
@@ -18,11 +18,11 @@ pub fn report(fit: &Fit, files: Option<String>) -> String {
         FitOutcome::NotConverged => "no minimum",
     };
     let mut lines: Lines = vec![("found", found.into())];
-    lines.extend(under(
+    lines.extend(labelled(
         "numbers",
         fit.parameters.iter().map(number).collect(),
     ));
-    lines.extend(under("data say", fit.says.clone()));
+    lines.extend(labelled("data say", fit.says.clone()));
     let (count, freedom) = (fit.residuals.len(), fit.degrees_of_freedom);
     lines.push((
         "misfit",
@@ -38,16 +38,16 @@ pub fn report(fit: &Fit, files: Option<String>) -> String {
         },
     ));
     let candidates = fit.candidates.iter().take(CANDIDATES).map(|candidate| {
-        let said = match &candidate.remark {
+        let text = match &candidate.remark {
             Some(remark) => remark.clone(),
             None => format!(
                 "{:.1} bits; what is least known shrinks to {:.2} of it",
                 candidate.bits, candidate.shrinks
             ),
         };
-        format!("{}: {said}", candidate.experiment)
+        format!("{}: {text}", candidate.experiment)
     });
-    lines.extend(under("measure", candidates.collect()));
+    lines.extend(labelled("measure", candidates.collect()));
     let time = seconds(fit.wall_seconds);
     let evaluations = fit.work.evaluations;
     lines.push((
@@ -55,7 +55,7 @@ pub fn report(fit: &Fit, files: Option<String>) -> String {
         format!("all leaves brought to rest {evaluations} times in {time}"),
     ));
     lines.extend(files.map(|files| ("written", files)));
-    lines.extend(under("remark", fit.remarks.clone()));
+    lines.extend(labelled("remark", fit.remarks.clone()));
     lay_out(
         &format!(
             "{}: fit of {} numbers to {count} data",
@@ -76,12 +76,12 @@ fn number(parameter: &FitParameter) -> String {
     }
 }
 
-/// `fit.csv`: one row a datum.
+/// `fit.csv`: one row per datum.
 pub fn table(fit: &Fit, out: &mut dyn Write) -> io::Result<()> {
     write_csv(&fit.residuals, out)
 }
 
-/// `fitted.toml`: the scenario with the values in place.
+/// `fitted.toml`: the scenario with the fitted values.
 pub fn fitted(fit: &Fit, out: &mut dyn Write) -> io::Result<()> {
     out.write_all(fit.fitted.as_bytes())
 }

@@ -1,29 +1,29 @@
-//! The summary of a map that people read.
+//! The text report of a map.
 
 use std::fmt::Write;
 
 use crate::study::{Map, MapOutcome};
 
 use super::numbers::{brief, seconds};
-use super::table::{lay_out, under};
+use super::table::{labelled, lay_out};
 use super::words;
 
-/// Jumps that are listed.
+/// Most jumps that are listed.
 const JUMPS: usize = 5;
 
-/// What was done for it.
+/// The work done for a map.
 #[derive(Clone, Copy)]
-pub struct Told {
-    /// Rows that were there.
+pub struct Work {
+    /// Rows that were known before.
     pub known: usize,
     /// Rows that were computed.
     pub computed: usize,
-    /// Time of all.
+    /// Total time.
     pub seconds: f64,
 }
 
-/// What varies, what was done, and how often each method had each outcome.
-pub fn report(map: &Map, told: Told, files: Option<String>) -> String {
+/// The varied numbers, the work, and how often each method had each outcome.
+pub fn report(map: &Map, work: Work, files: Option<String>) -> String {
     let request = &map.request;
     let mut lines: Vec<(&str, String)> = Vec::new();
     for axis in &request.axes {
@@ -44,13 +44,13 @@ pub fn report(map: &Map, told: Told, files: Option<String>) -> String {
         "rows",
         format!(
             "{} were there, {} computed in {}",
-            told.known,
-            told.computed,
-            seconds(told.seconds)
+            work.known,
+            work.computed,
+            seconds(work.seconds)
         ),
     ));
-    lines.extend(under("found", counts(map)));
-    lines.extend(under("jumps", jumps(map)));
+    lines.extend(labelled("found", counts(map)));
+    lines.extend(labelled("jumps", jumps(map)));
     lines.extend(files.map(|files| ("written", files)));
     lay_out(
         &format!(
@@ -62,7 +62,7 @@ pub fn report(map: &Map, told: Told, files: Option<String>) -> String {
     )
 }
 
-/// Between which cells the leaf jumps to another equilibrium; of many the first few.
+/// The first few pairs of cells between which the leaf jumps to another equilibrium.
 fn jumps(map: &Map) -> Vec<String> {
     let all = map.jumps.as_deref().unwrap_or_default();
     let mut lines: Vec<String> = (all.iter().take(JUMPS))

@@ -1,4 +1,4 @@
-//! Rows of a map as CSV, to and fro.
+//! Writes and reads the rows of a map as CSV.
 
 use std::collections::HashMap;
 use std::fs;
@@ -8,6 +8,7 @@ use std::path::Path;
 use csv::StringRecord;
 
 use super::FileError;
+use super::table::csv_without_header;
 use crate::study::{Map, MapRequest, MapRow};
 
 /// The columns after those of the varied keys.
@@ -41,9 +42,7 @@ fn header(request: &MapRequest) -> StringRecord {
 
 /// The header and all rows.
 pub fn table(request: &MapRequest, rows: &[MapRow]) -> io::Result<Vec<u8>> {
-    let mut table = csv::WriterBuilder::new()
-        .has_headers(false)
-        .from_writer(Vec::new());
+    let mut table = csv_without_header(Vec::new());
     table.write_record(&header(request))?;
     let mut bytes = table.into_inner().map_err(|error| error.into_error())?;
     bytes.extend(lines(request, rows)?);
@@ -52,9 +51,7 @@ pub fn table(request: &MapRequest, rows: &[MapRow]) -> io::Result<Vec<u8>> {
 
 /// The rows alone, each a whole line.
 pub fn lines(request: &MapRequest, rows: &[MapRow]) -> io::Result<Vec<u8>> {
-    let mut table = csv::WriterBuilder::new()
-        .has_headers(false)
-        .from_writer(Vec::new());
+    let mut table = csv_without_header(Vec::new());
     for row in rows {
         // The columns of the axes, then those of the row.
         table.serialize((request.texts(row.cell), row))?;
@@ -62,9 +59,8 @@ pub fn lines(request: &MapRequest, rows: &[MapRow]) -> io::Result<Vec<u8>> {
     table.into_inner().map_err(|error| error.into_error())
 }
 
-/// Reads the rows of a file; header lines may repeat, as in files that were
-/// joined. A last line without an end is what a run that was killed was about
-/// to write, and is left out.
+/// Reads the rows of a file. Header lines may repeat, as in concatenated files. An
+/// unterminated last line, as left by a killed run, is ignored.
 pub fn read_rows(file: &Path, request: &MapRequest) -> Result<Vec<MapRow>, FileError> {
     let bytes = fs::read(file).map_err(|reason| FileError::read(file, reason))?;
     let whole = bytes.iter().rposition(|&byte| byte == b'\n');

@@ -1,4 +1,4 @@
-//! How far a leaf is from losing its stability, in words.
+//! The text report of the stability margin of a leaf.
 
 use glam::DVec3;
 
@@ -6,17 +6,17 @@ use crate::relax::{Barrier, Direction, Fate, Loss, Margin, Push};
 
 use super::numbers::{bound, brief, point};
 
-/// Decimals of positions that are known on one grid.
+/// Decimals of positions that were found on one grid.
 const DECIMALS: usize = 3;
 
-/// The lines of it, the least push first.
+/// The lines of the report, the smallest push first.
 pub fn lines(margin: &Margin) -> Vec<String> {
     let lost = margin.pushes.iter().filter(|push| push.force.is_some());
     let mut lines: Vec<String> = lost
         .filter(|push| !push.mirrored)
-        .map(|push| lost_by(margin, push))
+        .map(|push| destabilizing_push(margin, push))
         .collect();
-    lines.extend(none_met(margin));
+    lines.extend(stable_directions(margin));
     let unknown = margin.pushes.iter();
     let unknown = unknown.filter(|push| push.kind == Loss::Unknown && !push.mirrored);
     lines.extend(unknown.map(|push| {
@@ -38,7 +38,7 @@ pub fn lines(margin: &Margin) -> Vec<String> {
 }
 
 /// A push under which stability is lost.
-fn lost_by(margin: &Margin, push: &Push) -> String {
+fn destabilizing_push(margin: &Margin, push: &Push) -> String {
     let at = force(margin, push.force.unwrap_or_default());
     let then = match push.then {
         Some(Fate::BendsAside) => "makes it bend aside",
@@ -63,8 +63,8 @@ fn lost_by(margin: &Margin, push: &Push) -> String {
     )
 }
 
-/// Directions in which no push up to the largest unseats the leaf.
-fn none_met(margin: &Margin) -> Option<String> {
+/// Directions in which the leaf stays stable up to the largest push.
+fn stable_directions(margin: &Margin) -> Option<String> {
     let none = margin
         .pushes
         .iter()

@@ -1,4 +1,4 @@
-//! Results shown: as lines on the console, as rows of tables, as JSON.
+//! Output of results: as lines on the console, as rows of tables, as JSON.
 
 mod all;
 pub mod base64;
@@ -40,29 +40,29 @@ pub use chart_table::{chart_table, scaling_table};
 pub use check::report as check_report;
 pub use error::FileError;
 pub use fit::{fitted, report as fit_report, table as fit_table};
-pub use map::{Told as MapTold, report as map_report};
+pub use map::{Work as MapWork, report as map_report};
 pub use map_table::{lines, map_table, read_rows, table};
 pub use relax::{lines as relax_lines, report as relax_report};
 pub use sensitivity::table as sensitivity_table;
 pub use simulate::{lines as simulate_lines, report as simulate_report};
-pub use trace::{lines as trace_lines, looked_at, report as trace_report};
+pub use trace::{error_location, lines as trace_lines, report as trace_report, slope_unit};
 pub use trace_table::trace_table;
 
-/// One way to write a result down.
+/// A file format of a result.
 pub trait Format<R>: Sync {
-    /// Name of the file, the same from release to release.
+    /// Name of the file, which does not change between releases.
     fn file_name(&self) -> &'static str;
 
     /// Writes the whole file. The only errors are those of `out`.
     fn write(&self, document: &Document<R>, out: &mut dyn Write) -> io::Result<()>;
 
-    /// Files that this one lists, which are written before it.
+    /// Files that this one refers to, which are written before it.
     fn parts<'d>(&self, _document: &'d Document<R>) -> Vec<Part<'d>> {
         Vec::new()
     }
 }
 
-/// A file that another one lists: its name within the folder, and what writes it.
+/// A file that another one refers to: its name within the folder, and what writes it.
 pub type Part<'d> = (
     String,
     Box<dyn Fn(&mut dyn Write) -> io::Result<()> + Sync + 'd>,
@@ -70,20 +70,20 @@ pub type Part<'d> = (
 
 /// A result that is written to a folder.
 pub trait Written: Serialize + Sync + Sized + 'static {
-    /// Name of its JSON file, which is also shown on request.
+    /// Name of its JSON file, which is also printed on request.
     const JSON: Option<&'static str>;
 
     /// Every other format, in the order in which files are named.
     const FORMATS: &'static [&'static dyn Format<Self>];
 
-    /// Kinds of files that are written on the way to the result.
+    /// Kinds of files that are written while the result is computed.
     const GROWING: &'static [Kind] = &[];
 
-    /// Formats of what not every result has, written after the others. Of those that
-    /// this one has not, what an earlier run has left is removed.
+    /// Formats of optional parts of a result, written after the others. Where a result
+    /// lacks a part, a file left by an earlier run is removed.
     const MORE: &'static [&'static dyn Format<Self>] = &[];
 
-    /// Whether it has what the one of these in a file of this name shows.
+    /// Whether it has the optional part that a file of this name shows.
     fn has_more(&self, _file: &str) -> bool {
         false
     }
@@ -109,16 +109,16 @@ pub trait Written: Serialize + Sync + Sized + 'static {
     }
 }
 
-/// A kind of files: what `--write` lists.
+/// A kind of file, as listed by `--write`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// The result itself.
     Json,
-    /// Tables; large ones as arrays of NumPy.
+    /// Tables; large ones as NumPy arrays.
     Csv,
-    /// Figures as text.
+    /// Vector figures.
     Svg,
-    /// Figures as pixels.
+    /// Raster figures.
     Png,
     /// A page that shows the leaf in space.
     Html,
@@ -143,10 +143,10 @@ impl Kind {
         Kind::Gif,
     ];
 
-    /// Those for which a motion is kept as a film.
+    /// Those that need a motion as a film.
     pub const FILMS: [Kind; 4] = [Kind::Html, Kind::Vtk, Kind::Glb, Kind::Gif];
 
-    /// Those that are written unasked.
+    /// Those that are written by default.
     pub const USUAL: [Kind; 4] = [Kind::Json, Kind::Csv, Kind::Svg, Kind::Png];
 
     /// Its word.
@@ -163,7 +163,7 @@ impl Kind {
         }
     }
 
-    /// That of a file, by the end of its name.
+    /// The kind of a file, by the extension of its name.
     pub fn of(file: &str) -> Kind {
         let end = file.rsplit('.').next();
         let named = Kind::ALL.into_iter().find(|kind| Some(kind.word()) == end);
@@ -174,22 +174,22 @@ impl Kind {
     }
 }
 
-/// A result with what it was made from, as it stands in JSON: what the file of a
-/// verb holds and `--json` prints.
+/// A result with its input, as JSON: the content of a verb's file, and the output of
+/// `--json`.
 #[derive(Serialize)]
 pub struct Document<'a, R> {
     /// Of the program.
     version: &'static str,
-    /// The way from the folder of the files to that of the scenario, if it is
-    /// known: by this a folder knows whose results it holds.
+    /// The relative path from the output folder to the scenario's file, if known: it
+    /// identifies the scenario whose results a folder holds.
     #[serde(skip_serializing_if = "Option::is_none")]
     source: Option<&'a str>,
     /// The result.
     #[serde(flatten)]
     pub result: &'a R,
-    /// The scenario, every entry in place that was left out or overridden.
+    /// The scenario, with all defaults and overrides.
     pub input: &'a Scenario,
-    /// Why its files could not be written, and the exit status then.
+    /// Why its files could not be written, with the exit status.
     #[serde(flatten)]
     pub refused: Option<Refused>,
 }
@@ -204,7 +204,7 @@ pub struct Refused {
 }
 
 impl Refused {
-    /// Of a request, or of a file that could not be written.
+    /// For a refused request, or a file that could not be written.
     pub fn new(error: &str) -> Self {
         Refused {
             error: printable(error).into(),
@@ -214,7 +214,7 @@ impl Refused {
 }
 
 impl<'a, R> Document<'a, R> {
-    /// Of a scenario, whose file is there.
+    /// A result of a scenario in the file `source`.
     pub fn new(result: &'a R, input: &'a Scenario, source: Option<&'a str>) -> Self {
         Document {
             result,

@@ -1,17 +1,17 @@
-//! The only place that writes numbers for people to read, with [`crate::numbers`].
+//! Formats numbers for people, together with [`crate::numbers`]; nothing else does.
 
 pub use crate::numbers::{power_of_ten, superscript};
 use crate::relax::Equilibrium;
 
-/// Digits after the first that a result without an error estimate shows.
+/// Digits shown after the first for a result without an error estimate.
 const DIGITS: i32 = 9;
 
-/// How many veins, and how their tips are.
+/// The number of veins, and whether their tips are joined.
 pub fn veins(equilibrium: &Equilibrium) -> String {
     veins_of(equilibrium.shape.rods.len(), equilibrium.shape.joined)
 }
 
-/// The same, of any leaf.
+/// The same for any leaf.
 pub fn veins_of(count: usize, joined: bool) -> String {
     match count {
         1 => "1 vein".to_string(),
@@ -20,7 +20,7 @@ pub fn veins_of(count: usize, joined: bool) -> String {
     }
 }
 
-/// A count in brackets, where there is one.
+/// The number of negative eigenvalues in brackets, if known.
 pub fn eigenvalues(count: Option<usize>) -> String {
     match count {
         Some(1) => " (1 negative eigenvalue)".into(),
@@ -40,7 +40,7 @@ pub fn grids(equilibrium: &Equilibrium) -> String {
     format!("grids of {} segments a vein", grids.join(", "))
 }
 
-/// An upper bound; zero is as good as the digits are.
+/// An upper bound; zero means up to rounding.
 pub fn bound(bound: f64) -> String {
     match bound {
         0.0 => "rounding".into(),
@@ -56,7 +56,7 @@ pub fn seconds(time: f64) -> String {
     }
 }
 
-/// As many decimals of a position as the error leaves, and one more.
+/// The number of decimals of a position that its error leaves, and one more.
 pub fn decimals(equilibrium: &Equilibrium) -> usize {
     let relative = 10f64.powi(-DIGITS) * equilibrium.shape.longest();
     let error = equilibrium
@@ -67,16 +67,16 @@ pub fn decimals(equilibrium: &Equilibrium) -> usize {
     (1.0 - error.log10().ceil()).clamp(0.0, 15.0) as usize
 }
 
-/// A position with so many decimals.
+/// A position with `decimals` decimals.
 pub fn point(point: [f64; 3], decimals: usize) -> String {
     let unit = 0.5 * 10f64.powi(-(decimals as i32));
-    // What would be written as -0.000 is zero.
-    let tidy = |value: f64| if value.abs() < unit { 0.0 } else { value };
-    let [x, y, z] = point.map(|value| format!("{:.decimals$}", tidy(value)));
+    // Avoids -0.000.
+    let positive_zero = |value: f64| if value.abs() < unit { 0.0 } else { value };
+    let [x, y, z] = point.map(|value| format!("{:.decimals$}", positive_zero(value)));
     format!("({x}, {y}, {z})")
 }
 
-/// Ten significant digits.
+/// A number with ten significant digits.
 pub fn significant(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
@@ -88,22 +88,22 @@ pub fn significant(value: f64) -> String {
     format!("{value:.*}", (DIGITS - exponent) as usize)
 }
 
-/// Five digits at most.
+/// A number with at most five digits.
 pub fn brief(value: f64) -> String {
     match value.abs() {
         0.0 => "0".into(),
         size if (1e-3..1e5).contains(&size) => {
             let decimals = (4 - size.log10().floor() as i32).max(0) as usize;
-            without_idle_zeros(&format!("{value:.decimals$}")).into()
+            without_trailing_zeros(&format!("{value:.decimals$}")).into()
         }
         _ => match format!("{value:.4e}").split_once('e') {
-            Some((digits, power)) => format!("{}e{power}", without_idle_zeros(digits)),
+            Some((digits, power)) => format!("{}e{power}", without_trailing_zeros(digits)),
             None => value.to_string(),
         },
     }
 }
 
-/// Four digits at most, for figures.
+/// A number with at most four digits, for figures.
 pub fn short(value: f64) -> String {
     let minus = minus(value);
     let size = value.abs();
@@ -120,15 +120,15 @@ pub fn short(value: f64) -> String {
     }
     let decimals = (3 - exponent).max(0) as usize;
     let digits = format!("{size:.decimals$}");
-    format!("{minus}{}", without_idle_zeros(&digits))
+    format!("{minus}{}", without_trailing_zeros(&digits))
 }
 
-/// With so many decimals, for axes.
+/// A number with `decimals` decimals, for axes.
 pub fn fixed(value: f64, decimals: usize) -> String {
     format!("{}{:.decimals$}", minus(value), value.abs())
 }
 
-/// A minus sign as wide as a plus sign, of negative values.
+/// The minus sign (U+2212) of negative values.
 fn minus(value: f64) -> &'static str {
     if value < 0.0 { "\u{2212}" } else { "" }
 }
@@ -138,7 +138,7 @@ pub fn decade(sign: f64, power: i32) -> String {
     format!("{}10{}", minus(sign), superscript(power))
 }
 
-/// A digit times a power of ten, written out where that is short.
+/// A digit times a power of ten, as a plain number where that is short.
 pub fn digit_of_decade(digit: f64, power: i32) -> String {
     let (minus, digit) = (minus(digit), digit.abs());
     match power {
@@ -157,7 +157,7 @@ pub fn time_of_decade(digit: f64, power: i32) -> String {
     format!("{:.decimals$} {unit}", digit * 10f64.powi(power))
 }
 
-fn without_idle_zeros(digits: &str) -> &str {
+fn without_trailing_zeros(digits: &str) -> &str {
     match digits.contains('.') {
         true => digits.trim_end_matches('0').trim_end_matches('.'),
         false => digits,

@@ -1,4 +1,4 @@
-//! The summary of a relaxation that people read.
+//! The text report of a relaxation.
 
 use crate::relax::{Equilibrium, Mode, Outcome, Sensitivity};
 use crate::report::words::{shooting, verdict};
@@ -7,12 +7,12 @@ use super::margin;
 use super::numbers::{
     bound, brief, decimals, eigenvalues, grids, point, seconds, significant, veins,
 };
-use super::table::{Lines, lay_out, under};
+use super::table::{Lines, labelled, lay_out};
 
-/// Modes whose numbers are told.
-const MODES_TOLD: usize = 6;
+/// Most modes that are listed.
+const MOST_MODES: usize = 6;
 
-/// What was solved, what was found, how well, and where the files are.
+/// The method, the result, its accuracy, and the files.
 pub fn report(equilibrium: &Equilibrium, files: Option<String>) -> String {
     let heading = format!(
         "{}: {}, method {}",
@@ -23,7 +23,7 @@ pub fn report(equilibrium: &Equilibrium, files: Option<String>) -> String {
     lay_out(&heading, &lines(equilibrium, files))
 }
 
-/// The lines of it.
+/// The lines of the report.
 pub fn lines(equilibrium: &Equilibrium, files: Option<String>) -> Lines {
     let mut lines = vec![("found", found(equilibrium))];
     if let Some(saddle) = &equilibrium.stability.saddle {
@@ -37,8 +37,8 @@ pub fn lines(equilibrium: &Equilibrium, files: Option<String>) -> Lines {
             ),
         ));
     }
-    // Where shooting came no further, the shape is not yet this leaf's: it has
-    // no energy, and its tip says nothing.
+    // Where shooting failed, the shape is not that of the leaf: it has no energy, and
+    // its tip is meaningless.
     if let Some(energy) = equilibrium.energy.filter(|energy| energy.is_finite()) {
         if let [tip] = equilibrium.tips.as_slice() {
             lines.push(("tip", point(tip.to_array(), decimals(equilibrium))));
@@ -52,20 +52,20 @@ pub fn lines(equilibrium: &Equilibrium, files: Option<String>) -> Lines {
     lines.extend(waves(equilibrium).map(|waves| ("waves", waves)));
     lines.push(("error", error(equilibrium)));
     lines.extend(modes(equilibrium).map(|modes| ("modes", modes)));
-    lines.extend(under("changes", changes(equilibrium)));
+    lines.extend(labelled("changes", changes(equilibrium)));
     let margin = equilibrium.margin.as_ref().map(margin::lines);
-    lines.extend(under("margin", margin.unwrap_or_default()));
+    lines.extend(labelled("margin", margin.unwrap_or_default()));
     if !equilibrium.accuracy.segments.is_empty() {
         lines.push(("model", equilibrium.model.description.clone()));
     }
     lines.push(("work", work(equilibrium)));
     lines.extend(files.map(|files| ("written", files)));
     lines.extend((equilibrium.remark.iter()).map(|remark| ("remark", remark.clone())));
-    lines.extend(under("doubtful", equilibrium.doubts.clone()));
+    lines.extend(labelled("doubtful", equilibrium.doubts.clone()));
     lines
 }
 
-/// The kind of equilibrium, or how far from one.
+/// The kind of equilibrium, or the residual.
 pub fn found(equilibrium: &Equilibrium) -> String {
     let verdict = verdict(equilibrium);
     let residual = equilibrium.accuracy.residual.filter(|it| it.is_finite());
@@ -95,7 +95,7 @@ fn error(equilibrium: &Equilibrium) -> String {
     }
 }
 
-/// What the margins do, where some vein waves.
+/// The waves along the margins, if any vein has waves.
 fn waves(equilibrium: &Equilibrium) -> Option<String> {
     let undulation = &equilibrium.undulation;
     let margin = undulation.margin()?;
@@ -132,8 +132,8 @@ fn modes(equilibrium: &Equilibrium) -> Option<String> {
     };
     let unstable = |mode: &&Mode| mode.growth().is_some() && !mode.is_neutral();
     let list = |values: &mut dyn Iterator<Item = f64>| {
-        let told: Vec<String> = values.take(MODES_TOLD).map(brief).collect();
-        told.join(", ")
+        let listed: Vec<String> = values.take(MOST_MODES).map(brief).collect();
+        listed.join(", ")
     };
     let growth = list(&mut modes.iter().filter(unstable).filter_map(Mode::growth));
     let frequencies = modes.iter().filter(|mode| !unstable(mode));
@@ -146,15 +146,15 @@ fn modes(equilibrium: &Equilibrium) -> Option<String> {
         ("lowest frequencies", frequencies),
     ];
     let phrases = phrases.iter().filter(|(_, list)| !list.is_empty());
-    let told: Vec<String> = phrases
+    let phrases: Vec<String> = phrases
         .map(|(what, list)| format!("{what} {list}"))
         .collect();
-    let unjudged = modes.iter().any(|mode| mode.error.is_none());
-    let roughly = if unjudged { " (on one grid)" } else { "" };
-    (!told.is_empty()).then(|| told.join("; ") + roughly)
+    let one_grid = modes.iter().any(|mode| mode.error.is_none());
+    let note = if one_grid { " (on one grid)" } else { "" };
+    (!phrases.is_empty()).then(|| phrases.join("; ") + note)
 }
 
-/// What a hundredth of each number, or of its unit if it is zero, does to the tip.
+/// How the tip moves when each number changes by 1 %, or by its unit if it is zero.
 fn changes(equilibrium: &Equilibrium) -> Vec<String> {
     let change = |found: &Sensitivity| {
         let (by, what) = match found.value == 0.0 {

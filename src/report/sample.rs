@@ -1,5 +1,5 @@
-//! Results to test reports and figures with: a small leaf at rest and in motion,
-//! and studies of it that are made up.
+//! Sample results for the tests of reports and figures: a small leaf at rest and in
+//! motion, and made-up studies of it.
 
 use glam::{DQuat, DVec3};
 
@@ -13,7 +13,7 @@ use crate::study::{
     Reference, Row, Scaling, ScalingRow, Setting, Shot, Spread,
 };
 
-/// The scenario of all of these.
+/// The scenario of most samples.
 pub fn scenario(name: &str, rods: usize) -> Scenario {
     let text = format!(
         r#"
@@ -32,7 +32,7 @@ pub fn scenario(name: &str, rods: usize) -> Scenario {
     Scenario::from_toml(&text).unwrap()
 }
 
-/// A leaf at rest on one grid, with an error estimate as of several.
+/// A leaf at rest on one grid, with an error estimate as if from several.
 pub fn fan(rods: usize, segments: usize) -> Equilibrium {
     let options = relax::Options {
         method: Method::default().on_grid(Some(segments)),
@@ -53,7 +53,7 @@ pub fn check(rods: usize, segments: usize, angle: f64) -> Check {
         node.position = turn * node.position;
         node.rotation = turn * node.rotation;
     }
-    let still = vec![DVec3::ZERO; segments + 1];
+    let zero = vec![DVec3::ZERO; segments + 1];
     let solution = Solution {
         stations: relaxed.shape.stations.clone(),
         rods: shapes,
@@ -70,7 +70,7 @@ pub fn check(rods: usize, segments: usize, angle: f64) -> Check {
         condition: 1e-10,
         neutral: Some(Neutral {
             ratio: 1e-10,
-            displacement: vec![still; rods],
+            displacement: vec![zero; rods],
         }),
         work: bvp::Work::default(),
     };
@@ -154,7 +154,7 @@ pub fn map() -> Map {
     Map::new(request, rows.collect())
 }
 
-/// That leaf let go, and followed for 10 units of time.
+/// The same leaf released, and followed for 10 units of time.
 pub fn swing(rods: usize, segments: usize) -> (Simulation, Vec<Frame>) {
     let options = simulate::Options {
         segments: Some(segments),
@@ -168,7 +168,7 @@ pub fn swing(rods: usize, segments: usize) -> (Simulation, Vec<Frame>) {
     (swing, frames)
 }
 
-/// The record of it.
+/// The record of that motion.
 pub fn record(rods: usize, segments: usize) -> Record {
     let (swing, frames) = swing(rods, segments);
     let moments: Vec<Moment> = frames.iter().map(|frame| Moment::of(frame, true)).collect();

@@ -1,4 +1,4 @@
-//! Derivatives of the stations as a table.
+//! `sensitivity.csv`: derivatives of the positions at all stations.
 
 use std::io::{self, Write};
 
@@ -8,7 +8,7 @@ use crate::relax::{Equilibrium, Sensitivity};
 
 use super::table::write_csv;
 
-/// How a station moves with a number, by one of its units.
+/// The derivative of a station's position with respect to a number.
 #[derive(Serialize)]
 struct Row<'s> {
     key: &'s str,
@@ -22,8 +22,8 @@ struct Row<'s> {
     error: Option<f64>,
 }
 
-/// `sensitivity.csv`: a row for every number and station; where only the tips are known,
-/// for these.
+/// `sensitivity.csv`: a row for every number and station, or for the tips where only
+/// they are known.
 pub fn table(leaf: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
     let all = leaf.sensitivities.iter().flatten();
     write_csv(all.flat_map(rows), out)

@@ -1,4 +1,4 @@
-//! The summary of a simulation that people read.
+//! The text report of a simulation.
 
 use crate::report::numbers::power_of_ten;
 use crate::simulate::Record;
@@ -9,7 +9,7 @@ use super::table::{Lines, lay_out};
 /// Decimals of a position, relative to the longest rod.
 const DECIMALS: f64 = 7.0;
 
-/// How far the leaf came, with what steps, and where its energy went.
+/// The time reached, the steps, and the energies.
 pub fn report(record: &Record, files: Option<String>) -> String {
     let heading = format!(
         "{}: {}, method {}",
@@ -20,7 +20,7 @@ pub fn report(record: &Record, files: Option<String>) -> String {
     lay_out(&heading, &lines(record, files))
 }
 
-/// The lines of it.
+/// The lines of the report.
 pub fn lines(record: &Record, files: Option<String>) -> Lines {
     let mut lines = vec![
         ("moved", moved(record)),
@@ -39,15 +39,15 @@ pub fn lines(record: &Record, files: Option<String>) -> Lines {
 
 fn moved(record: &Record) -> String {
     let steps = record.moments.last().map_or(0, |moment| moment.steps);
-    let way = format!(
+    let reached = format!(
         "t = {} in {steps} steps, {} outputs",
         brief(record.time),
         record.moments.len()
     );
     match record.stopped {
-        None => format!("to {way}"),
+        None => format!("to {reached}"),
         Some(_) => format!(
-            "{}: only to {way}, of t = {}",
+            "{}: only to {reached}, of t = {}",
             record.outcome(),
             brief(record.duration)
         ),
@@ -71,7 +71,7 @@ fn step(record: &Record) -> String {
     }
 }
 
-/// The energies at the end, and what should not have changed.
+/// The energies at the end, and their balance, which should not have changed.
 fn energy(record: &Record) -> Lines {
     let (Some(first), Some(last)) = (record.moments.first(), record.moments.last()) else {
         return Vec::new();

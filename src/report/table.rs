@@ -1,4 +1,4 @@
-//! How results are laid out: named lines for the console, rows for CSV.
+//! Layout of results: labelled lines for the console, rows for CSV.
 
 use std::collections::HashMap;
 use std::fmt::{self, Write as _};
@@ -10,17 +10,17 @@ use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Vis
 
 use super::{Document, Format};
 
-/// Lines of a report, each with its name; one without a name continues the one
+/// Lines of a report, each with its label; one without a label continues the one
 /// above.
 pub type Lines = Vec<(&'static str, String)>;
 
-/// Lines of which only the first has a name.
-pub fn under(name: &'static str, lines: Vec<String>) -> Lines {
+/// Lines of which only the first is labelled.
+pub fn labelled(name: &'static str, lines: Vec<String>) -> Lines {
     let names = std::iter::once(name).chain(std::iter::repeat(""));
     names.zip(lines).collect()
 }
 
-/// Named lines under a heading.
+/// Formats labelled lines under a heading.
 pub fn lay_out(heading: &str, lines: &[(&str, String)]) -> String {
     let mut text = format!("{heading}\n");
     for (name, line) in lines {
@@ -30,14 +30,14 @@ pub fn lay_out(heading: &str, lines: &[(&str, String)]) -> String {
     text
 }
 
-/// Files in a folder.
-pub fn named(folder: &Path, files: &[PathBuf]) -> String {
+/// Lists files in a folder.
+pub fn list_files(folder: &Path, files: &[PathBuf]) -> String {
     let names = files.iter().filter_map(|file| file.file_name());
     let names: Vec<_> = names.map(|name| name.to_string_lossy()).collect();
     format!("{}: {}", folder.display(), names.join(", "))
 }
 
-/// A table of a result, or another text or array, in a file of this name.
+/// A table of a result, or another text or array, as a file of this name.
 pub struct Table<R>(
     pub &'static str,
     pub fn(&R, &mut dyn Write) -> io::Result<()>,
@@ -72,8 +72,13 @@ pub fn append_csv<R: Serialize>(
     rows: impl IntoIterator<Item = R>,
     out: &mut dyn Write,
 ) -> io::Result<()> {
-    let mut table = csv::WriterBuilder::new();
-    write_rows(table.has_headers(false).from_writer(out), rows)
+    write_rows(csv_without_header(out), rows)
+}
+
+/// A CSV writer that writes no header by itself.
+pub fn csv_without_header<W: Write>(out: W) -> csv::Writer<W> {
+    let mut builder = csv::WriterBuilder::new();
+    builder.has_headers(false).from_writer(out)
 }
 
 fn write_rows<R: Serialize>(
@@ -86,12 +91,12 @@ fn write_rows<R: Serialize>(
     table.flush()
 }
 
-/// Results in one table: of each the file it is of, the exit status and its JSON,
-/// from which every number and word is taken. Columns are named by their keys, of
-/// objects within by both (`work_steps`); lists are left out, but for tips.
+/// One table of several results, each given as its scenario's file, its exit status and
+/// its JSON, whose scalar values are the cells. Columns are named by their keys, those of
+/// nested objects by both keys (`work_steps`); lists are left out, except tips.
 ///
 /// # Errors
-/// If the JSON is none.
+/// If a text is not JSON.
 pub fn rows_of_json(results: &[(String, i32, Vec<u8>)]) -> io::Result<Vec<u8>> {
     let mut columns: Vec<String> = Vec::new();
     let mut rows: Vec<HashMap<String, String>> = Vec::new();
@@ -126,7 +131,7 @@ pub fn rows_of_json(results: &[(String, i32, Vec<u8>)]) -> io::Result<Vec<u8>> {
     table.into_inner().map_err(|error| error.into_error())
 }
 
-/// What a JSON value says in cells, each with its name; a number or a word has none.
+/// A JSON value as named cells; that of a scalar has no name.
 struct Flat(Vec<(String, String)>);
 
 impl<'de> Deserialize<'de> for Flat {
@@ -209,7 +214,7 @@ impl<'de> Deserialize<'de> for Flat {
     }
 }
 
-/// The header of a table of such rows, which may have none yet.
+/// The header of a table of such rows.
 pub fn header(row: impl Serialize) -> Vec<u8> {
     let mut table = Vec::new();
     // Writing to memory cannot fail.

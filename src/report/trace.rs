@@ -1,9 +1,10 @@
-//! The summary of a trace that people read.
+//! The text report of a trace.
 
+use crate::scenario::Units;
 use crate::study::{Law, PointKind, Trace, TraceBranch, TracePoint};
 
 use super::numbers::{power_of_ten, seconds, short, veins_of};
-use super::table::{Lines, lay_out, under};
+use super::table::{Lines, labelled, lay_out};
 use super::words::branch_end;
 
 /// The branches, their ends, and where the index changes.
@@ -13,21 +14,21 @@ pub fn report(trace: &Trace, files: Option<String>) -> String {
     lay_out(&heading, &lines(trace, files))
 }
 
-/// The lines of it.
+/// The lines of the report.
 pub fn lines(trace: &Trace, files: Option<String>) -> Lines {
     let [from, to] = trace.range.map(|value| trace.keys.text(value));
     let mut lines = vec![("vary", format!("{} from {from} to {to}", trace.keys))];
     let branches = trace.branches.iter().enumerate();
     let branches = branches.flat_map(|(number, branch)| branch_lines(trace, number, branch));
-    lines.extend(under("branch", branches.collect()));
+    lines.extend(labelled("branch", branches.collect()));
     if let Some(law) = &trace.law {
-        lines.extend(under("law", law_lines(trace, law)));
+        lines.extend(labelled("law", law_lines(trace, law)));
     }
     let errors = trace.branches.iter().flat_map(|branch| &branch.points);
     let errors = errors.filter_map(|point| point.error);
     lines.extend(errors.reduce(f64::max).map(|worst| {
         let (worst, segments) = (power_of_ten(worst), trace.segments);
-        let what = looked_at(trace);
+        let what = error_location(trace);
         let error = format!("{what} within {worst}, followed on {segments} segments a vein");
         ("error", error)
     }));
@@ -66,12 +67,9 @@ fn branch_lines(trace: &Trace, number: usize, branch: &TraceBranch) -> Vec<Strin
     lines
 }
 
-/// Hooke's law, and Young's modulus by it.
+/// The fitted line of force against displacement, and Young's modulus from its slope.
 fn law_lines(trace: &Trace, law: &Law) -> Vec<String> {
-    let unit = match (&trace.units.force, &trace.units.length) {
-        (Some(force), Some(length)) => format!(" {force}/{length}"),
-        _ => String::new(),
-    };
+    let unit = slope_unit(&trace.units);
     let mut lines = vec![format!(
         "force against displacement along {}: slope {:.6}{unit}, R² = {:.7}, off the line by {:.2} % at most",
         ['x', 'y', 'z'][law.axis],
@@ -85,8 +83,16 @@ fn law_lines(trace: &Trace, law: &Law) -> Vec<String> {
     lines
 }
 
-/// What errors are those of.
-pub fn looked_at(trace: &Trace) -> &'static str {
+/// The unit of force per displacement after a blank, or nothing if it is not known.
+pub fn slope_unit(units: &Units) -> String {
+    match (&units.force, &units.length) {
+        (Some(force), Some(length)) => format!(" {force}/{length}"),
+        _ => String::new(),
+    }
+}
+
+/// Where the errors are measured.
+pub fn error_location(trace: &Trace) -> &'static str {
     match trace.held {
         true => "middles of the veins",
         false => "tips",

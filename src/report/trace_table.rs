@@ -7,8 +7,8 @@ use serde::Serialize;
 use super::table::{append_csv, header};
 use crate::study::{PointKind, Trace, TracePoint};
 
-/// A row; the number that varies stands in `value`. Branches and points are
-/// numbered from 1. The tip is the joint one, or the first rod's.
+/// A row; `value` is that of the varied number. Branches and points are numbered
+/// from 1. The tip is the joint one, or the first rod's.
 #[derive(Default, Serialize)]
 struct Row {
     branch: usize,
@@ -29,19 +29,19 @@ struct Row {
     twist: f64,
 }
 
-/// What a row goes on with if tips are held: the force that their holder feels.
+/// Further columns if tips are held: the force on their holder.
 #[derive(Default, Serialize)]
-struct Held {
+struct Reaction {
     reaction_x: f64,
     reaction_y: f64,
     reaction_z: f64,
 }
 
-impl Held {
+impl Reaction {
     fn of(point: &TracePoint) -> Self {
         let [reaction_x, reaction_y, reaction_z] =
             (point.reaction.unwrap_or_default().to_array()).map(|x| x + 0.0);
-        Held {
+        Reaction {
             reaction_x,
             reaction_y,
             reaction_z,
@@ -84,15 +84,15 @@ impl Row {
 pub fn trace_table(trace: &Trace, out: &mut dyn Write) -> io::Result<()> {
     let branches = trace.branches.iter().enumerate();
     let points = branches.flat_map(|(b, branch)| branch.points.iter().map(move |p| (b, p)));
-    // Even of a trace without points.
+    // A trace without points has a header, too.
     match trace.held {
         false => {
             out.write_all(&header(Row::default()))?;
             append_csv(points.map(|(b, p)| Row::of(b, p)), out)
         }
         true => {
-            out.write_all(&header((Row::default(), Held::default())))?;
-            append_csv(points.map(|(b, p)| (Row::of(b, p), Held::of(p))), out)
+            out.write_all(&header((Row::default(), Reaction::default())))?;
+            append_csv(points.map(|(b, p)| (Row::of(b, p), Reaction::of(p))), out)
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Sentences about a result that the figure and the command line share.
+//! Phrases about results that figures and the command line share.
 
 use crate::branch::{End, Stuck};
 use crate::relax::{Equilibrium, Method, Outcome};
@@ -31,7 +31,7 @@ fn at_rest(equilibrium: &Equilibrium) -> String {
     equilibrium_of_index(equilibrium.stability.negative_eigenvalues)
 }
 
-/// What a map shows.
+/// The title of what a map shows.
 pub fn map_shows(show: MapShow) -> &'static str {
     match show {
         MapShow::Outcomes => "where methods fail",
@@ -39,7 +39,7 @@ pub fn map_shows(show: MapShow) -> &'static str {
     }
 }
 
-/// What kind of equilibrium has so many negative eigenvalues.
+/// The kind of equilibrium with this number of negative eigenvalues.
 pub fn equilibrium_of_index(negative_eigenvalues: Option<usize>) -> String {
     match negative_eigenvalues {
         Some(0) => "stable equilibrium".into(),
@@ -56,7 +56,7 @@ pub fn shooting(intervals: usize) -> String {
     }
 }
 
-/// What a check says, in one phrase.
+/// The verdict of a check, in one phrase.
 pub fn headline(verdict: &Verdict) -> &'static str {
     match verdict {
         Verdict::Agree => "both methods agree",
@@ -65,7 +65,7 @@ pub fn headline(verdict: &Verdict) -> &'static str {
     }
 }
 
-/// A way to bring a leaf to rest, as a chart names it.
+/// The name of a contender in a chart.
 pub fn contender(contender: Contender) -> &'static str {
     match (contender.method, contender.one_grid) {
         (Method::SemiImplicit(_), false) => "semi-implicit, extrapolated",

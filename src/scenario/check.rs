@@ -1,6 +1,5 @@
-//! From the scenario as written to a scenario that can be trusted: the
-//! meaning of every value. Limits that several values set together are in
-//! `limits`.
+//! Turns a scenario as written into a checked [`Scenario`]: interprets every value.
+//! Limits on combinations of values are in `limits`.
 
 use std::f64::consts::PI;
 
@@ -16,13 +15,13 @@ type Result<T> = std::result::Result<T, ScenarioError>;
 /// Most rods: a leaf of 100,000 rods and eight segments already has five
 /// million unknowns.
 pub const MOST_RODS: usize = 100_000;
-/// Longest name: a folder of it, and files in that, must be allowed everywhere.
+/// Longest name: it must be allowed everywhere as the name of a folder with files.
 const LONGEST_NAME: usize = 100;
-/// Longest name of a unit: it stands beside axes.
+/// Longest name of a unit, which figures show at their axes.
 const LONGEST_UNIT: usize = 20;
-/// What is left of double precision after a solve on a fine grid.
+/// The accuracy that double precision leaves after a solve on a fine grid.
 const TOLERANCE_LEAST: f64 = 1e-12;
-/// A tenth of the length is no longer an accuracy.
+/// An error of a tenth of the length is no accuracy.
 const TOLERANCE_MOST: f64 = 0.1;
 
 pub(super) fn check(raw: &Raw) -> Result<Scenario> {
@@ -102,14 +101,14 @@ fn veins(raw: &Raw, rods: usize, sections: Option<&Sections>) -> Result<Vec<Rod>
         None => (triple(Key::COUPLE)?, triple(Key::FORCE)?),
     };
     let rest = triple(Key::REST)?;
-    let of = |all: &[Vec<Profile>; 3], rod: usize| all.each_ref().map(|one| one[rod].clone());
+    let pick = |all: &[Vec<Profile>; 3], rod: usize| all.each_ref().map(|one| one[rod].clone());
     Ok((0..rods)
         .map(|rod| Rod {
             length: length[rod],
             angle: angle[rod],
-            couple_stiffness: of(&couple, rod),
-            force_stiffness: of(&force, rod),
-            rest_curvature: of(&rest, rod),
+            couple_stiffness: pick(&couple, rod),
+            force_stiffness: pick(&force, rod),
+            rest_curvature: pick(&rest, rod),
             rest_stretch: stretch[rod].clone(),
         })
         .collect())
@@ -196,10 +195,10 @@ fn dynamics(
         None => Dynamics::default_for(rods),
     }
     .with_loads(gravity, tip_force, tip_moment);
-    let number = |key, otherwise| raw.given(key).map_or(Ok(otherwise), |item| item.number());
-    let load = |key, otherwise| match raw.given(key) {
+    let number = |key, default| raw.given(key).map_or(Ok(default), |item| item.number());
+    let load = |key, default| match raw.given(key) {
         Some(item) => item.vectors_in_time(),
-        None => Ok(otherwise),
+        None => Ok(default),
     };
     let duration = number(Key::Duration, preset.duration)?;
     let section = rotary_inertia(raw, &preset.density)?;

@@ -1,10 +1,9 @@
-//! How a leaf moves: its mass, what damps it, how long it is followed, and
-//! what changes in time.
+//! The motion of a leaf: its mass, damping and duration, and loads that change in time.
 
 use super::{Profile, Rod, Scale, Schedule};
 
-/// Radius of the section over the length of the longest rod: its radius of
-/// gyration, half of this, is the relaxation's.
+/// Radius of the section over the length of the longest rod: half of it, the radius of
+/// gyration, is that of the relaxation.
 const RADIUS: f64 = 0.2;
 /// Frequency of the lowest mode of a clamped rod, in units of sqrt(A/(rho L^4)).
 const LOWEST_FREQUENCY: f64 = 3.516;
@@ -33,10 +32,10 @@ pub struct Dynamics {
     /// rho I, the moment of inertia per unit reference length about d2 and
     /// about d3, one per rod; positive.
     pub rotary_inertia: Vec<Profile>,
-    /// By what part of it that about d1 is larger: 1 of a section that is
-    /// given, as for every round one; 0 where none is given and a vein turns
-    /// with its strip of blade as it does on its way to rest
-    /// ([`crate::relax`]), about all axes alike.
+    /// Excess of the inertia about d1 over `rotary_inertia`, as a fraction of it: 1 if a
+    /// section is given, as for every round one; 0 otherwise, where a vein turns with its
+    /// strip of blade and has the same inertia about all axes, as in the relaxation
+    /// ([`crate::relax`]).
     pub polar_excess: f64,
     /// Viscous force per unit reference length and velocity. Rotation is damped
     /// at the same rate: by this over the density times the angular momentum.
@@ -63,8 +62,8 @@ pub struct Dynamics {
 }
 
 impl Dynamics {
-    /// What holds for these rods where a scenario says nothing of motion, but
-    /// without loads: see [`Dynamics::with_loads`]. There is at least one rod.
+    /// The default for these rods, of which there is at least one, without loads: see
+    /// [`Dynamics::with_loads`].
     ///
     /// ```
     /// use leafdyn::scenario::{Dynamics, Profile, Rod};
@@ -89,7 +88,7 @@ impl Dynamics {
         Dynamics::of_density(rods, vec![Profile::Constant(density); rods.len()])
     }
 
-    /// The same motion under loads that do not change.
+    /// The same under constant loads.
     pub fn with_loads(
         self,
         gravity: [f64; 3],
@@ -104,12 +103,12 @@ impl Dynamics {
         }
     }
 
-    /// rho: mean of the densities of the rods, mid-rod; mass per length.
+    /// rho: the mean of the mid-rod densities of the rods, mass per length.
     pub fn mean_density(&self) -> f64 {
         mean_of(&self.density)
     }
 
-    /// The same for rods of these densities.
+    /// The default for rods of these densities.
     pub(super) fn of_density(rods: &[Rod], density: Vec<Profile>) -> Dynamics {
         let scale = Scale::of(rods);
         let time = time(scale, &density);
@@ -134,7 +133,7 @@ impl Dynamics {
     }
 }
 
-/// Mean over the rods, mid-rod; exact where all are equal.
+/// Mean of the mid-rod values; exact if all are equal.
 fn mean_of(profiles: &[Profile]) -> f64 {
     let counted = profiles.iter().zip(1..);
     counted.fold(0.0, |mean, (profile, count)| {
@@ -147,10 +146,9 @@ pub(super) fn time(scale: Scale, density: &[Profile]) -> f64 {
     (mean_of(density) / (scale.stiffness / scale.length.powi(4))).sqrt()
 }
 
-/// Moment of inertia of a round section: rho I = density radius^2/4 at all
-/// knots of both profiles, and linear between them. Where the radius varies
-/// this is a cubic along the rod, and more than it between knots: whoever
-/// minds gives the radius at more knots.
+/// Moment of inertia of a round section: rho I = density radius^2/4 at all knots of
+/// both profiles, and linear between them. Where the radius varies the exact value is a
+/// cubic, which lies below: more knots of the radius reduce the difference.
 pub(super) fn round_inertia(density: &Profile, radius: &Profile) -> Profile {
     let at_fraction = |sigma: f64| density.at(sigma) * radius.at(sigma).powi(2) / 4.0;
     if let (Profile::Constant(_), Profile::Constant(_)) = (density, radius) {

@@ -1,11 +1,12 @@
-//! The entries of a scenario as values, and what is replaced in them: whole entries,
-//! or parts ([`Part`]). Numbers are put into a scenario here without its text being
-//! read again.
+//! The entries of a scenario as values, and replacements of whole entries or parts of
+//! them ([`Part`]). A scenario with other numbers is made from these without parsing its
+//! text again.
 
 use std::sync::{Arc, LazyLock};
 
 use toml::{Table, Value};
 
+use super::check::MOST_RODS;
 use super::error::{Place, ScenarioError};
 use super::excerpt::shorten;
 use super::form::from_json;
@@ -13,7 +14,7 @@ use super::key::{Form, Key, LeftOut};
 use super::node::number;
 use super::part::Part;
 
-/// The entries of a scenario that are written, by their keys.
+/// The entries given in a scenario, by their keys.
 ///
 /// ```
 /// use leafdyn::scenario::{Entries, Value};
@@ -40,8 +41,8 @@ pub(crate) struct Override {
     pub value: String,
 }
 
-/// Overrides of whole entries, from those of parts of entries of the scenario in
-/// `text`, which may have errors that are found elsewhere.
+/// Turns overrides of parts of entries of the scenario in `text` into overrides of whole
+/// entries. Errors in the text itself are found elsewhere.
 pub(crate) fn resolve(text: &str, overrides: &[String]) -> Result<Vec<Override>, ScenarioError> {
     let mut resolved: Vec<Override> = Vec::new();
     let mut entries: Option<Entries> = None;
@@ -66,7 +67,7 @@ pub(crate) fn resolve(text: &str, overrides: &[String]) -> Result<Vec<Override>,
                     key: Some(part.key),
                     ..refuse(format!("{part}: {why}"))
                 };
-                let entries = entries.get_or_insert_with(|| Entries::as_far(text, &resolved));
+                let entries = entries.get_or_insert_with(|| Entries::readable(text, &resolved));
                 let value = value.trim();
                 let new = value_of(value).ok_or(format!("{} is no value", shorten(value)));
                 let whole = new.and_then(|new| entries.changed(part, new));
@@ -105,8 +106,8 @@ pub(crate) fn with_overrides(text: &str, overrides: &[String]) -> Option<String>
 }
 
 impl Entries {
-    /// Adds an entry of a table, which is empty for what stands outside of them; returns
-    /// whether there is such a key.
+    /// Adds an entry of a table, whose name is empty for entries at the top; returns whether
+    /// there is such a key.
     pub fn insert(&mut self, table: &str, name: &str, value: Value) -> bool {
         let key = Key::from_parts(table, name);
         if let Some(key) = key {
@@ -120,17 +121,17 @@ impl Entries {
         Key::table(name).is_some()
     }
 
-    /// Those of the scenario in `text`, which is checked elsewhere; none where it cannot be
-    /// read.
+    /// The entries of the scenario in `text`, which is checked elsewhere; `None` if it cannot
+    /// be parsed.
     pub fn of_text(text: &str) -> Option<Self> {
         let toml = from_json(text, "").and_then(Result::ok);
         let text = toml.as_deref().unwrap_or(text);
         Some(Entries::of(&text.parse().ok()?))
     }
 
-    /// The same with entries replaced, or parts of them, as in
-    /// [`Scenario::from_toml_with`](super::Scenario::from_toml_with); none where one
-    /// cannot be.
+    /// The same with entries or parts of them replaced, as in
+    /// [`Scenario::from_toml_with`](super::Scenario::from_toml_with); `None` if one cannot
+    /// be.
     pub fn replaced(&self, overrides: &[String]) -> Option<Self> {
         let mut entries = self.clone();
         for given in overrides {
@@ -140,8 +141,9 @@ impl Entries {
         Some(entries)
     }
 
-    /// The same as far as they can be read.
-    fn as_far(text: &str, overrides: &[Override]) -> Self {
+    /// The entries of the scenario in `text` with these overrides, as far as they can be
+    /// parsed.
+    fn readable(text: &str, overrides: &[Override]) -> Self {
         let mut entries = Entries::of(&text.parse().unwrap_or_default());
         for given in overrides {
             if let Some(value) = value_of(&given.value) {
@@ -165,12 +167,12 @@ impl Entries {
         entries
     }
 
-    /// Those that are written.
+    /// The given entries.
     pub(super) fn given(&self) -> impl Iterator<Item = (Key, &Value)> {
         Key::all().filter_map(|key| Some((key, self.0[key as usize].as_deref()?)))
     }
 
-    /// The value of a key, also of one that is left out and has one all the same.
+    /// The value of a key, or its default.
     fn get(&self, key: Key) -> Option<&Value> {
         self.0[key as usize].as_deref().or_else(|| left_out(key))
     }
@@ -179,7 +181,7 @@ impl Entries {
         self.0[key as usize] = Some(Arc::new(value));
     }
 
-    /// Puts a value into a part, as an override does; none where it cannot be put.
+    /// Replaces a part by a value, as an override does; `None` if that is impossible.
     pub(crate) fn set(&mut self, part: Part, value: Value) -> Option<()> {
         let whole = match part.is_whole() {
             true => value,
@@ -196,7 +198,7 @@ impl Entries {
             place = place.get(list)?;
         }
         for index in part.indices.into_iter().flatten() {
-            // One number for all rods is that of each.
+            // A single number holds for all rods.
             if number(place).is_none() {
                 place = place.get(index)?;
             }
@@ -204,7 +206,7 @@ impl Entries {
         Some(place)
     }
 
-    /// The number that a part has, if it is one; a factor is 1.
+    /// The number that a part is, if any; that of a scale is 1.
     pub(crate) fn number_at(&self, part: Part) -> Option<f64> {
         match part.scale {
             true => Some(1.0),
@@ -212,7 +214,7 @@ impl Entries {
         }
     }
 
-    /// The whole value of a key of which a part is new.
+    /// The whole value of a key after a part of it is replaced.
     fn changed(&self, part: Part, new: Value) -> Result<Value, String> {
         let whole = self.get(part.key);
         let mut whole = whole
@@ -242,7 +244,7 @@ impl Entries {
         Ok(whole)
     }
 
-    /// Turns a number for all rods, or gaps, into a list.
+    /// Turns a single number for all rods, or gaps, into a list.
     fn spread(&self, part: Part, place: &mut Value) -> Result<(), String> {
         if number(place).is_some() {
             let rods = self.get(Key::Rods).and_then(Value::as_integer);
@@ -259,10 +261,7 @@ impl Entries {
     }
 }
 
-/// Most entries that a number is spread to; a scenario with more is refused.
-const MOST_RODS: usize = 100_000;
-
-/// What holds where a key is left out.
+/// The default value of a key that is left out, if it has one.
 pub(super) fn left_out(key: Key) -> Option<&'static Value> {
     static VALUES: LazyLock<Vec<Option<Value>>> = LazyLock::new(|| {
         let value = |key: Key| match key.left_out() {

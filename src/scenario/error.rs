@@ -1,25 +1,25 @@
-//! Why a scenario is refused: one message for a person, and where it points.
+//! The error of a refused scenario: one message for people, and its place.
 
 use std::fmt;
 
 use super::excerpt::printable;
 use super::key::Key;
 
-/// Why a scenario was refused. Its text is the whole message: where, which
-/// key, what was found, and what to change.
+/// Why a scenario was refused. Its text is the whole message: the place, the key, the
+/// value found, and what to change.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}", printable(&format!("{place}: {problem}")))]
 pub struct ScenarioError {
     /// Where.
     pub place: Place,
-    /// The key it is about, if the format has it.
+    /// The key, if it is one of the format.
     pub key: Option<Key>,
     /// The rest of the message.
     pub problem: String,
 }
 
 impl ScenarioError {
-    /// The same of a file that is no TOML itself: its lines are others.
+    /// The error for a file that is not TOML itself, whose lines differ.
     pub(super) fn without_line(mut self) -> Self {
         if let Place::File { line, .. } = &mut self.place {
             *line = None;
@@ -37,7 +37,7 @@ pub enum Place {
     File {
         /// The file.
         file: String,
-        /// The line, counted from 1; none where it is the whole file.
+        /// The line, counted from 1; `None` for the whole file.
         line: Option<usize>,
     },
     /// In an override.

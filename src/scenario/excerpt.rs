@@ -1,21 +1,20 @@
-//! Texts of users as messages show them.
+//! Excerpts of user input for messages.
 
 use std::borrow::Cow;
 
-/// A message with what a terminal would obey instead of showing it, control
-/// characters but line ends and tabs, and marks of the direction of writing, as
-/// escapes.
+/// Escapes characters that a terminal would interpret: control characters other than
+/// line ends and tabs, and marks of the writing direction.
 pub(crate) fn printable(message: &str) -> Cow<'_, str> {
-    let obeyed = |c: char| {
+    let interpreted = |c: char| {
         c.is_control() && !matches!(c, '\n' | '\t')
             || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
     };
-    if !message.contains(obeyed) {
+    if !message.contains(interpreted) {
         return message.into();
     }
     let mut shown = String::new();
     for c in message.chars() {
-        match obeyed(c) {
+        match interpreted(c) {
             true => shown.extend(c.escape_default()),
             false => shown.push(c),
         }

@@ -1,5 +1,5 @@
-//! A checked scenario in the form in which it is written: as JSON, which can be
-//! read in place of TOML.
+//! Serializes a checked scenario as JSON of the same form as the TOML, which can be read
+//! in place of it.
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
@@ -8,7 +8,7 @@ use super::key::Range;
 use super::section::{Outline, Section};
 use super::{Key, Profile, Rod, Scenario, Schedule, Start};
 
-/// A value as it is written.
+/// A value to be written.
 enum Written<'a> {
     Text(&'a str),
     Switch(bool),
@@ -39,7 +39,7 @@ impl Serialize for Written<'_> {
     }
 }
 
-/// Every entry with its value, those left out included: a JSON object from which
+/// All entries with their values, including defaults: a JSON object from which
 /// [`Scenario::from_toml`] makes an equal scenario. An infinite stiffness is
 /// `"inf"`.
 impl Serialize for Scenario {
@@ -62,7 +62,7 @@ impl Serialize for Scenario {
 }
 
 impl Scenario {
-    /// The value of a key; `None` where others say it.
+    /// The value of a key; `None` if other keys determine it.
     fn written(&self, key: Key) -> Option<Written<'_>> {
         let text = |text: &'static str| Some(Written::Text(text));
         let dynamics = &self.dynamics;
@@ -71,7 +71,7 @@ impl Scenario {
             Key::UnitLength => Written::Text(self.units.length.as_deref()?),
             Key::UnitForce => Written::Text(self.units.force.as_deref()?),
             Key::Rods => Written::Whole(self.rods.len()),
-            Key::Length => each(self.rods.iter().map(|rod| rod.length)),
+            Key::Length => number_or_list(self.rods.iter().map(|rod| rod.length)),
             Key::Fan => list(self.rods.iter().map(|rod| rod.angle)),
             Key::Joined => Written::Switch(self.joined),
             Key::SectionShape
@@ -105,9 +105,9 @@ impl Scenario {
             }
             Key::RestStretch => quantity(self.rods.iter().map(|rod| &rod.rest_stretch)),
             Key::CouplingX | Key::CouplingY | Key::CouplingZ => {
-                // A single rod has no gap: any number says so.
+                // A single rod has no gaps: any number will do.
                 let axis = Key::COUPLING.iter().position(|axis| *axis == key)?;
-                each(self.coupling.iter().map(|gap| gap[axis]))
+                number_or_list(self.coupling.iter().map(|gap| gap[axis]))
             }
             Key::Gravity => list(self.gravity),
             Key::TipForce => list(self.tip_force),
@@ -119,13 +119,13 @@ impl Scenario {
                     Key::TipHeld if clamps.is_some() => return text("clamped"),
                     Key::TipHeld => return text("pinned"),
                     Key::TipPosition => list(held.position),
-                    Key::TipAngles => each(clamps?.iter().map(|clamp| clamp.angle)),
-                    _ => each(clamps?.iter().map(|clamp| clamp.twist)),
+                    Key::TipAngles => number_or_list(clamps?.iter().map(|clamp| clamp.angle)),
+                    _ => number_or_list(clamps?.iter().map(|clamp| clamp.twist)),
                 }
             }
             Key::Tolerance => Written::Number(self.tolerance),
             Key::Density => quantity(dynamics.density.iter()),
-            // Left out it is not the same about d1.
+            // If given, it would be larger about d1.
             Key::RotaryInertia if dynamics.polar_excess == 0.0 => return None,
             Key::RotaryInertia => quantity(dynamics.rotary_inertia.iter()),
             Key::SectionRadius => return None,
@@ -150,8 +150,8 @@ impl Scenario {
         section_of(&self.rods[rod].couple_stiffness[0])
     }
 
-    /// What is written of sections that change along the rods; of others their
-    /// stiffnesses are.
+    /// The value of a key of sections that change along the rods; for constant ones the
+    /// stiffnesses are written instead.
     fn of_section(&self, key: Key) -> Option<Written<'_>> {
         let outline = self.section(0)?.outline;
         let sections = || (0..self.rods.len()).filter_map(|rod| self.section(rod));
@@ -172,7 +172,7 @@ impl Scenario {
         })
     }
 
-    /// One of three quantities.
+    /// One of three quantities of all rods.
     fn of_rods(
         &self,
         keys: [Key; 3],
@@ -195,8 +195,8 @@ fn list(numbers: impl IntoIterator<Item = f64>) -> Written<'static> {
     Written::List(numbers.into_iter().map(Written::Number).collect())
 }
 
-/// One number if all are the same, which has no list of its own.
-fn each(numbers: impl Iterator<Item = f64>) -> Written<'static> {
+/// A single number if all are the same.
+fn number_or_list(numbers: impl Iterator<Item = f64>) -> Written<'static> {
     let numbers: Vec<f64> = numbers.collect();
     let first = numbers.first().copied().unwrap_or(0.0);
     match numbers.iter().all(|number| *number == first) {
@@ -205,11 +205,11 @@ fn each(numbers: impl Iterator<Item = f64>) -> Written<'static> {
     }
 }
 
-/// A quantity of all rods, as briefly as it can be written.
+/// A quantity of all rods, in the shortest form.
 fn quantity<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Written<'static> {
     let profiles: Vec<&Profile> = profiles.collect();
     if profiles.iter().all(|it| matches!(it, Profile::Constant(_))) {
-        return each(profiles.iter().map(|profile| profile.at(0.0)));
+        return number_or_list(profiles.iter().map(|profile| profile.at(0.0)));
     }
     let kinks = profiles.iter().flat_map(|profile| profile.kinks());
     let mut at: Vec<f64> = [0.0, 1.0].iter().chain(kinks).copied().collect();
@@ -223,7 +223,7 @@ fn quantity<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Written<'static>
     Written::Table(vec![("at", list(at.iter().copied())), ("value", value)])
 }
 
-/// What changes in time; `None` if it is what holds at rest.
+/// A quantity in time; `None` if it is always the one at rest.
 fn in_time<T: Copy + PartialEq>(
     schedule: &Schedule<T>,
     at_rest: T,
@@ -238,8 +238,8 @@ fn in_time<T: Copy + PartialEq>(
     (*schedule != Schedule::constant(at_rest)).then(table)
 }
 
-/// A scenario in JSON as TOML, or what is in `input` of a result; `None` if the
-/// text is no JSON object.
+/// Converts a scenario in JSON, or the `input` of a result, to TOML; `None` if the text
+/// is not a JSON object.
 pub(super) fn from_json(text: &str, file: &str) -> Option<Result<String, ScenarioError>> {
     // No TOML begins like this.
     if !text.trim_start().starts_with('{') {
@@ -267,17 +267,17 @@ pub(super) fn from_json(text: &str, file: &str) -> Option<Result<String, Scenari
         for key in Key::all().filter(|key| key.form().range() == Range::PositiveOrInfinite) {
             let (table, name) = key.parts();
             let value = form.get_mut(table).and_then(|table| table.get_mut(name));
-            value.into_iter().for_each(say_infinite);
+            value.into_iter().for_each(restore_infinity);
         }
         Ok(form.to_string())
     }))
 }
 
 /// Turns `"inf"`, for which JSON has no number, into the number.
-fn say_infinite(value: &mut toml::Value) {
+fn restore_infinity(value: &mut toml::Value) {
     match value {
         toml::Value::String(text) if text == "inf" => *value = toml::Value::Float(f64::INFINITY),
-        toml::Value::Array(list) => list.iter_mut().for_each(say_infinite),
+        toml::Value::Array(list) => list.iter_mut().for_each(restore_infinity),
         _ => (),
     }
 }
@@ -286,7 +286,7 @@ fn say_infinite(value: &mut toml::Value) {
 mod tests {
     use super::*;
 
-    /// Everything that the format can say.
+    /// Uses every feature of the format.
     const FULL: &str = r#"
         name = "full"
         units = { length = "cm", force = "N" }
@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn slips_in_json_are_refused() {
+    fn errors_in_json_are_refused() {
         for (text, part) in [
             ("{", "not valid JSON"),
             (r#"{"name": null}"#, "is no scenario"),

@@ -1,14 +1,14 @@
-//! The table of keys: everything that a scenario may say, one row a key.
+//! The table of the keys that a scenario may have, one row per key.
 //!
-//! A new key is a row here, a field of the checked scenario, and the line in
-//! `check` that reads the one into the other.
+//! A new key needs a row here, a field of the checked scenario, and a line in `check`
+//! that reads it.
 
 use super::excerpt::shorten;
 use Form::*;
 use LeftOut::*;
 use Range::*;
 
-/// What a key takes.
+/// The form of a key's value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Form {
     Text,
@@ -42,19 +42,19 @@ pub(crate) enum Range {
     PositiveOrInfinite,
 }
 
-/// What holds where a key is left out.
+/// What applies if a key is left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LeftOut {
-    /// It must not be; an example of its value for the message.
+    /// It is required; the message gives this example of a value.
     Refused(&'static str),
-    /// This value.
+    /// This default value.
     Means(&'static str),
-    /// What follows from other values, or nothing.
+    /// A value that follows from others, or none.
     Follows,
 }
 
 impl Form {
-    /// What its numbers may be.
+    /// The range of its numbers.
     pub(super) fn range(self) -> Range {
         match self {
             Number(range) | PerRod(range) | Quantity(range) | PerGap(range) => range,
@@ -66,7 +66,7 @@ impl Form {
 struct Row {
     key: Key,
     path: &'static str,
-    /// Where the name begins in the path, behind the table's name and a dot.
+    /// Where the name begins in the path, after the table's name and a dot.
     name: usize,
     description: &'static str,
     form: Form,
@@ -83,8 +83,8 @@ const fn name(path: &str) -> usize {
     at
 }
 
-/// Rows of `Key "path": form, [exponents of length, force, time], left out;`
-/// below the line that describes the key.
+/// Rows of the form `Key "path": form, [exponents of length, force, time], left out;`,
+/// each below the description of the key.
 macro_rules! keys {
     ($($(#[doc = $doc:literal])+ $key:ident $path:literal: $form:expr, $dimension:expr, $left_out:expr;)+) => {
         /// A key of the scenario format.
@@ -206,9 +206,9 @@ keys! {
 
 impl Key {
     pub(super) const COUNT: usize = FORMAT.len();
-    /// Of torsion and bending, in the order of the directors.
+    /// Stiffnesses in torsion and bending, in the order of the directors.
     pub(super) const COUPLE: [Key; 3] = [Key::Torsion, Key::Bending2, Key::Bending3];
-    /// Of stretch and shear.
+    /// Stiffnesses in stretch and shear.
     pub(super) const FORCE: [Key; 3] = [Key::Axial, Key::Shear2, Key::Shear3];
     pub(super) const REST: [Key; 3] = [Key::RestTwist, Key::RestBend2, Key::RestBend3];
     pub(super) const COUPLING: [Key; 3] = [Key::CouplingX, Key::CouplingY, Key::CouplingZ];
@@ -217,17 +217,17 @@ impl Key {
         &FORMAT[self as usize]
     }
 
-    /// As `--set` takes it: `table.key`, or `name`.
+    /// As in `--set`: `table.key`, or `name`.
     pub fn path(self) -> &'static str {
         self.row().path
     }
 
-    /// What it is, in a few words.
+    /// A short description.
     pub fn description(self) -> &'static str {
         self.row().description.trim()
     }
 
-    /// What it takes.
+    /// The form of its value.
     pub(crate) fn form(self) -> Form {
         self.row().form
     }
@@ -237,22 +237,22 @@ impl Key {
         self.row().dimension
     }
 
-    /// What holds where it is left out.
+    /// What applies if it is left out.
     pub(crate) fn left_out(self) -> LeftOut {
         self.row().left_out
     }
 
-    /// Whether its numbers are greater than zero, or not below it.
+    /// Whether its numbers are positive, or not negative.
     pub(crate) fn is_positive(self) -> bool {
         self.form().range() != Finite
     }
 
-    /// Whether what the scenario is made of changes in proportion to its numbers.
+    /// Whether the quantities of the leaf are proportional to its numbers.
     pub(crate) fn is_linear(self) -> bool {
         self.parts().0 != "section"
     }
 
-    /// The table it stands in, empty at the top, and its name within that.
+    /// Its table, empty at the top, and its name within that.
     pub(super) fn parts(self) -> (&'static str, &'static str) {
         let Row { path, name, .. } = self.row();
         (&path[..name.saturating_sub(1)], &path[*name..])
@@ -262,12 +262,12 @@ impl Key {
         FORMAT.iter().map(|row| row.key)
     }
 
-    /// That of a path, if it is one's.
+    /// The key with this path, if any.
     pub fn from_path(path: &str) -> Option<Key> {
         Key::all().find(|key| key.path() == path)
     }
 
-    /// By its table, empty at the top, and its name within that.
+    /// The key with this table, empty at the top, and this name within it.
     pub(super) fn from_parts(table: &str, name: &str) -> Option<Key> {
         let length = name.len() + if table.is_empty() { 0 } else { table.len() + 1 };
         let mut long = FORMAT.iter().filter(|row| row.path.len() == length);
@@ -275,7 +275,7 @@ impl Key {
         Some(row.key)
     }
 
-    /// A table of this name.
+    /// The table of this name, if any.
     pub(super) fn table(name: &str) -> Option<&'static str> {
         let mut tables = Key::all().map(|key| key.parts().0);
         tables.find(|table| *table == name && !name.is_empty())
@@ -289,7 +289,7 @@ impl Key {
         tables
     }
 
-    /// What may be written in `table`; at the top ("") the tables as well.
+    /// The names allowed in `table`; at the top ("") also those of the tables.
     pub(super) fn allowed_in(table: &str) -> Vec<&'static str> {
         let keys = Key::all().map(Key::parts).filter(|parts| parts.0 == table);
         let mut allowed: Vec<_> = keys.map(|parts| parts.1).collect();
@@ -307,7 +307,7 @@ pub(crate) fn nearest(path: &str) -> Option<&'static str> {
     if let Some(key) = Key::all().find(|key| key.parts().1 == name) {
         return Some(key.path());
     }
-    // No key is as long as this.
+    // No key is longer than this.
     let path: String = path.chars().take(80).collect();
     let most = 1 + path.chars().count().min(40) / 5;
     let candidates = Key::all().map(Key::path).chain(Key::tables());
@@ -316,7 +316,7 @@ pub(crate) fn nearest(path: &str) -> Option<&'static str> {
     (edits <= most).then_some(candidate)
 }
 
-/// What is wrong with a path that is no key's, and what was probably meant.
+/// The message for an unknown key, with what was probably meant.
 pub(super) fn unknown(path: &str) -> String {
     let found = shorten(path);
     match nearest(path) {
@@ -356,15 +356,15 @@ mod tests {
     }
 
     #[test]
-    fn a_slip_finds_its_key() {
-        for (slip, key) in [
+    fn misspelt_keys_are_recognized() {
+        for (misspelt, key) in [
             ("stiffness.bending2", Some("stiffness.bending_2")),
             ("gravity", Some("load.gravity")),
             ("dynamics.gravty", Some("dynamics.gravity")),
             ("leaf.rod", Some("leaf.rods")),
             ("monsoon", None),
         ] {
-            assert_eq!(nearest(slip), key);
+            assert_eq!(nearest(misspelt), key);
         }
     }
 }

@@ -1,6 +1,6 @@
-//! Limits that several values set together, all free of units: beyond them
-//! the numbers of a scenario are a slip, or no grid could resolve its shape.
-//! Only what was given can be beyond them, never what was left out.
+//! Limits on dimensionless combinations of values: beyond them the numbers of a scenario
+//! are a mistake, or no grid could resolve its shape. Only given values are checked;
+//! defaults are always within the limits.
 
 use super::error::ScenarioError;
 use super::key::{Form, Key};
@@ -11,7 +11,7 @@ use super::{Profile, Rod, Scale, Scenario};
 
 type Result = std::result::Result<(), ScenarioError>;
 
-/// The range of a number free of units.
+/// The range of a dimensionless number.
 struct Limit {
     /// The number.
     formula: &'static str,
@@ -56,8 +56,8 @@ const fn near_one(formula: &'static str, most: f64, because: &'static str) -> Li
 
 /// Longest to shortest rod.
 const LENGTHS: Limit = most("L_max/L", 1e3, SHORT);
-/// Largest to smallest torsion or bending stiffness: leaves four of the
-/// sixteen digits of double precision.
+/// Largest to smallest torsion or bending stiffness: leaves four of the 16 digits of
+/// double precision.
 const STIFFNESSES: Limit = most("A_max/A", 1e12, UNEVEN_STIFFNESS);
 /// An angle in radians: 160 coils.
 const REST_ANGLE: Limit = most("|u0| L", 1e3, CURLED);
@@ -78,10 +78,10 @@ const KAPPA: Limit = most("kappa L^4/A", 1e12, COUPLED);
 const GRAVITY: Limit = most("|g| L^3/A", 1e8, CONFINED);
 const TIP_FORCE: Limit = most("|F| L^2/A", 1e8, CONFINED);
 const TIP_MOMENT: Limit = most("|M| L/A", 1e8, WOUND);
-/// Masses, damping and times in their natural units: what is twelve orders
-/// apart hardly meets in double precision, which has 16. A radius enters by
-/// its square, and by itself: beside a small density its moment of inertia is
-/// small, too.
+/// Masses, damping and times in their natural units: values that differ by twelve orders
+/// of magnitude hardly affect each other in double precision, which has 16 digits. A
+/// radius is limited by itself, as it enters by its square and, with a small density,
+/// gives a small moment of inertia.
 const DYNAMICS: [(Key, Limit); 6] = [
     (Key::Density, near_one("rho/rho_mean", 1e12, UNEVEN_DENSITY)),
     (
@@ -138,7 +138,7 @@ pub(super) fn check(raw: &Raw, scenario: &Scenario) -> Result {
         (Key::TipMoment, scenario.tip_moment, TIP_MOMENT),
     ] {
         if let Some(item) = raw.given(key) {
-            limit.check(item, norm(load) * longest_arm(key, &scenario.rods))?;
+            limit.check(item, norm(load) * largest_factor(key, &scenario.rods))?;
         }
     }
     coupling(raw, scenario)?;
@@ -156,21 +156,23 @@ fn softest(rod: &Rod) -> Scale {
     }
 }
 
-/// A quantity of this key in these units is a number free of units if it is
-/// multiplied by this; times are in units of `time`.
-fn per(key: Key, scale: Scale, time: f64) -> f64 {
+/// The factor that makes a quantity of this key dimensionless in these units, with times
+/// in units of `time`.
+fn natural_factor(key: Key, scale: Scale, time: f64) -> f64 {
     let [length, force, times] = key.dimension();
     scale.per(length, force) / time.powi(times)
 }
 
-/// The same for the rod of which it is largest.
-fn longest_arm(key: Key, rods: &[Rod]) -> f64 {
-    let arms = rods.iter().map(|rod| per(key, softest(rod), 1.0));
-    arms.fold(0.0, f64::max)
+/// The largest such factor of all rods.
+fn largest_factor(key: Key, rods: &[Rod]) -> f64 {
+    let factors = rods
+        .iter()
+        .map(|rod| natural_factor(key, softest(rod), 1.0));
+    factors.fold(0.0, f64::max)
 }
 
 fn norm([x, y, z]: [f64; 3]) -> f64 {
-    // hypot: squares of large components overflow.
+    // hypot avoids overflow of the squares of large components.
     x.hypot(y).hypot(z)
 }
 
@@ -187,7 +189,7 @@ fn rods(raw: &Raw, rods: &[Rod]) -> Result {
     let stiffest = stiffnesses.fold(0.0, |most: f64, stiffness| most.max(stiffness.max_abs()));
     for (index, rod) in rods.iter().enumerate() {
         let scale = softest(rod);
-        let natural = |key, value| value * per(key, scale, 1.0);
+        let natural = |key, value| value * natural_factor(key, scale, 1.0);
         for (key, stiffness) in Key::COUPLE.into_iter().zip(&rod.couple_stiffness) {
             check(key, index, &STIFFNESSES, stiffest / stiffness.min())?;
         }
@@ -223,7 +225,7 @@ fn coupling(raw: &Raw, scenario: &Scenario) -> Result {
         };
         for (key, stiffness) in Key::COUPLING.into_iter().zip(stiffness) {
             if let Some(item) = raw.given(key) {
-                KAPPA.check(item.entry(gap), stiffness * per(key, both, 1.0))?;
+                KAPPA.check(item.entry(gap), stiffness * natural_factor(key, both, 1.0))?;
             }
         }
     }
@@ -236,7 +238,7 @@ fn dynamics(raw: &Raw, scenario: &Scenario) -> Result {
         let Some(item) = raw.given(*key) else {
             continue;
         };
-        let natural = per(*key, scale, time);
+        let natural = natural_factor(*key, scale, time);
         let Form::Quantity(_) = key.form() else {
             limit.check(item, item.number()? * natural)?;
             continue;
@@ -266,7 +268,7 @@ fn masses(raw: &Raw, scenario: &Scenario) -> Result {
             &dynamics.rotary_inertia,
         ),
     ] {
-        let natural = per(key, scale, time);
+        let natural = natural_factor(key, scale, time);
         for (index, profile) in profiles.iter().enumerate() {
             for value in [profile.min(), profile.max_abs()] {
                 limit.check(item.entry(index), value * natural)?;
@@ -279,7 +281,7 @@ fn masses(raw: &Raw, scenario: &Scenario) -> Result {
 fn in_time(raw: &Raw, scenario: &Scenario) -> Result {
     let (dynamics, rods, time) = (&scenario.dynamics, &scenario.rods, scenario.time());
     if let Some(item) = raw.given(Key::OutputInterval) {
-        // What rounding adds to a quotient is no output.
+        // Rounding of the quotient must not count as an output.
         let outputs = (dynamics.duration / dynamics.output_interval).floor();
         OUTPUTS.check(item, outputs)?;
     }
@@ -302,9 +304,9 @@ fn in_time(raw: &Raw, scenario: &Scenario) -> Result {
         (Key::TipMomentInTime, &dynamics.tip_moment, TIP_MOMENT),
     ] {
         if let Some(list) = list(key, "value") {
-            let arm = longest_arm(key, rods);
+            let factor = largest_factor(key, rods);
             for (index, &value) in load.value.iter().enumerate() {
-                limit.check(list.entry(index), norm(value) * arm)?;
+                limit.check(list.entry(index), norm(value) * factor)?;
             }
         }
     }

@@ -1,4 +1,4 @@
-//! The table `[section]`: sections as written to stiffnesses and masses.
+//! The table `[section]`: computes stiffnesses and masses from sections.
 
 use std::sync::Arc;
 
@@ -22,13 +22,13 @@ const TABLE: [Key; 7] = [
     Key::MassDensity,
 ];
 
-/// The sections of the rods, if stiffnesses are to follow from them.
+/// The sections of the rods, if they determine the stiffnesses.
 pub(super) struct Sections {
     sections: Vec<Arc<Section>>,
     has_mass: bool,
 }
 
-/// The entry that says how large the sections are.
+/// The entry with the size of the sections.
 pub(super) fn size<'r>(raw: &'r Raw) -> Option<Item<'r>> {
     let given = |key| raw.given(key);
     given(Key::Diameter).or_else(|| given(Key::Thickness))
@@ -73,7 +73,7 @@ impl Sections {
         Ok(Some(sections))
     }
 
-    /// Refuses numbers too large or too small to be computed with.
+    /// Refuses stiffnesses and masses that are too large or too small.
     fn check(&self, raw: &Raw) -> Result<()> {
         let Some(item) = size(raw) else {
             return Ok(());
@@ -110,7 +110,7 @@ impl Sections {
         self.sections.iter().map(profile).collect()
     }
 
-    /// How thick they are.
+    /// The radii, for pictures.
     pub(super) fn radii(&self) -> Radii {
         Radii::of(&self.sections)
     }

@@ -1,6 +1,6 @@
-//! A scenario: what a leaf is made of, as read from TOML and checked once.
+//! A scenario: the description of a leaf, read from TOML and checked once.
 //!
-//! Everything below this module trusts a [`Scenario`]: lengths of lists agree,
+//! All other modules rely on a [`Scenario`] being valid: lengths of lists agree,
 //! stiffnesses are positive, angles finite.
 
 mod check;
@@ -58,7 +58,7 @@ pub struct Scenario {
     pub units: Units,
     /// The veins, from one edge of the leaf to the other; at least one.
     pub rods: Vec<Rod>,
-    /// How thick they are, where sections are given: for pictures.
+    /// Radii of the veins where sections are given: for pictures.
     pub radii: Radii,
     /// Whether all tips share one point.
     pub joined: bool,
@@ -76,17 +76,17 @@ pub struct Scenario {
     pub held_tip: Option<HeldTip>,
     /// Wanted accuracy of the centerlines, relative to the largest rod length.
     pub tolerance: f64,
-    /// How the leaf moves; what is at rest does not depend on it.
+    /// How the leaf moves; equilibria do not depend on it.
     pub dynamics: Dynamics,
 }
 
 impl Scenario {
-    /// The units in which it is dimensionless.
+    /// The units that make it dimensionless.
     pub fn scale(&self) -> Scale {
         Scale::of(&self.rods)
     }
 
-    /// What a quantity of this key is measured by.
+    /// The natural unit of a quantity of this key.
     pub(crate) fn unit(&self, key: Key) -> f64 {
         let [length, force, time] = key.dimension();
         let scale = self.scale();
@@ -102,14 +102,14 @@ impl Scenario {
 /// Names of the units a scenario is written in.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Units {
-    /// Of lengths.
+    /// The unit of lengths.
     pub length: Option<String>,
-    /// Of forces.
+    /// The unit of forces.
     pub force: Option<String>,
 }
 
 impl Units {
-    /// Of energies and moments, if those of forces and lengths are named.
+    /// The unit of energies and moments, if those of forces and lengths are named.
     pub fn energy(&self) -> Option<String> {
         let (force, length) = (self.force.as_ref()?, self.length.as_ref()?);
         Some(format!("{force} {length}"))

@@ -1,4 +1,4 @@
-//! A value as written, wherever it is from: read from a text, or a value alone.
+//! A value of a scenario from either source: parsed from a text, or given as a value.
 
 use std::ops::Range;
 
@@ -10,49 +10,49 @@ use super::excerpt::shorten;
 /// A value, or a part of one.
 #[derive(Clone, Copy)]
 pub(super) enum Node<'e> {
-    /// As it stands in a text.
-    Read(&'e Spanned<DeValue<'e>>),
-    /// Of no text.
-    Alone(&'e Value),
+    /// Parsed from a text.
+    Parsed(&'e Spanned<DeValue<'e>>),
+    /// Not from a text.
+    Bare(&'e Value),
 }
 
-/// A number is larger than numbers can be.
+/// The error that a number is too large for a floating-point number.
 pub(super) struct TooLarge;
 
 impl<'e> Node<'e> {
     pub(super) fn text(self) -> Option<&'e str> {
         match self {
-            Node::Read(value) => value.get_ref().as_str(),
-            Node::Alone(value) => value.as_str(),
+            Node::Parsed(value) => value.get_ref().as_str(),
+            Node::Bare(value) => value.as_str(),
         }
     }
 
     pub(super) fn switch(self) -> Option<bool> {
         match self {
-            Node::Read(value) => value.get_ref().as_bool(),
-            Node::Alone(value) => value.as_bool(),
+            Node::Parsed(value) => value.get_ref().as_bool(),
+            Node::Bare(value) => value.as_bool(),
         }
     }
 
     /// A whole number that is not negative.
     pub(super) fn whole(self) -> Option<usize> {
         match self {
-            Node::Read(value) => {
+            Node::Parsed(value) => {
                 let integer = value.get_ref().as_integer()?;
                 usize::from_str_radix(integer.as_str(), integer.radix()).ok()
             }
-            Node::Alone(value) => value.as_integer()?.try_into().ok(),
+            Node::Bare(value) => value.as_integer()?.try_into().ok(),
         }
     }
 
     /// A number.
     pub(super) fn number(self) -> Option<Result<f64, TooLarge>> {
         let value = match self {
-            Node::Alone(value) => return number(value).map(Ok),
-            Node::Read(value) => value.get_ref(),
+            Node::Bare(value) => return number(value).map(Ok),
+            Node::Parsed(value) => value.get_ref(),
         };
-        // 1e999 parses to infinity, which nobody wrote.
-        let (value, says_infinite) = match value {
+        // 1e999 parses to infinity, but only `inf` means it.
+        let (value, is_inf) = match value {
             DeValue::Integer(integer) if integer.radix() == 10 => {
                 (integer.as_str().parse().ok(), false)
             }
@@ -63,58 +63,58 @@ impl<'e> Node<'e> {
             DeValue::Float(float) => (float.as_str().parse().ok(), float.as_str().contains("inf")),
             _ => return None,
         };
-        let value = value.filter(|value| says_infinite || !f64::is_infinite(*value));
+        let value = value.filter(|value| is_inf || !f64::is_infinite(*value));
         Some(value.ok_or(TooLarge))
     }
 
-    /// How many entries a list has.
+    /// The length of a list.
     pub(super) fn length(self) -> Option<usize> {
         match self {
-            Node::Read(value) => value.get_ref().as_array().map(|list| list.len()),
-            Node::Alone(value) => value.as_array().map(Vec::len),
+            Node::Parsed(value) => value.get_ref().as_array().map(|list| list.len()),
+            Node::Bare(value) => value.as_array().map(Vec::len),
         }
     }
 
     /// An entry of a list.
     pub(super) fn entry(self, index: usize) -> Option<Node<'e>> {
         match self {
-            Node::Read(value) => value.get_ref().get(index).map(Node::Read),
-            Node::Alone(value) => value.get(index).map(Node::Alone),
+            Node::Parsed(value) => value.get_ref().get(index).map(Node::Parsed),
+            Node::Bare(value) => value.get(index).map(Node::Bare),
         }
     }
 
     /// The names of the entries of a table.
     pub(super) fn names(self) -> Option<Vec<&'e str>> {
         match self {
-            Node::Read(value) => {
+            Node::Parsed(value) => {
                 let table = value.get_ref().as_table()?;
                 Some(table.keys().map(|name| name.get_ref().as_ref()).collect())
             }
-            Node::Alone(value) => Some(value.as_table()?.keys().map(String::as_str).collect()),
+            Node::Bare(value) => Some(value.as_table()?.keys().map(String::as_str).collect()),
         }
     }
 
     /// An entry of a table.
     pub(super) fn named(self, name: &str) -> Option<Node<'e>> {
         match self {
-            Node::Read(value) => value.get_ref().get(name).map(Node::Read),
-            Node::Alone(value) => value.get(name).map(Node::Alone),
+            Node::Parsed(value) => value.get_ref().get(name).map(Node::Parsed),
+            Node::Bare(value) => value.get(name).map(Node::Bare),
         }
     }
 
-    /// Where it stands in its text.
+    /// Its span in the text.
     pub(super) fn span(self) -> Range<usize> {
         match self {
-            Node::Read(value) => value.span(),
-            Node::Alone(_) => 0..0,
+            Node::Parsed(value) => value.span(),
+            Node::Bare(_) => 0..0,
         }
     }
 
-    /// As it is written in `text`, or would be, in short.
+    /// Its text, from `text` or as it would be written, shortened.
     pub(super) fn shown(self, text: &str) -> String {
         match self {
-            Node::Read(value) => shorten(text.get(value.span()).unwrap_or("")),
-            Node::Alone(value) => shorten(&value.to_string()),
+            Node::Parsed(value) => shorten(text.get(value.span()).unwrap_or("")),
+            Node::Bare(value) => shorten(&value.to_string()),
         }
     }
 }

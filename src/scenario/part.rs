@@ -10,8 +10,8 @@ use super::key::{Form, Key, unknown};
 /// Lists that a table can have.
 const LISTS: [&str; 3] = ["at", "value", "factor"];
 
-/// What is set: an entry of a scenario, one of its lists, one entry of that, or
-/// all numbers of one of these, which are multiplied.
+/// The target of an override: an entry of a scenario, one of its lists, one entry of
+/// that, or all numbers of one of these, which are then multiplied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part {
     /// The key.
@@ -20,12 +20,12 @@ pub struct Part {
     pub(crate) list: Option<&'static str>,
     /// Which entry of the list, and which of that, counted from 0.
     pub(crate) indices: [Option<usize>; 2],
-    /// Whether its numbers are multiplied, and not replaced.
+    /// Whether its numbers are multiplied instead of replaced.
     pub(crate) scale: bool,
 }
 
 impl Part {
-    /// Reads it; otherwise why it is none.
+    /// Parses a part; an error says what is wrong.
     pub(crate) fn parse(text: &str) -> Result<Part, String> {
         let (scale, rest) = match text.trim().strip_prefix("scale:") {
             Some(rest) => (true, rest.trim()),
@@ -44,14 +44,19 @@ impl Part {
             }
         };
         let mut indices = [None; 2];
-        let wrong = || "an index is a whole number from 0, as in load.gravity[2]".to_string();
+        let invalid_index =
+            || "an index is a whole number from 0, as in load.gravity[2]".to_string();
         for (place, index) in brackets.split_terminator(']').enumerate() {
-            let index = index.trim().strip_prefix('[').ok_or_else(wrong)?.trim();
-            let index = index.parse().map_err(|_| wrong())?;
-            *indices.get_mut(place).ok_or_else(wrong)? = Some(index);
+            let index = index
+                .trim()
+                .strip_prefix('[')
+                .ok_or_else(invalid_index)?
+                .trim();
+            let index = index.parse().map_err(|_| invalid_index())?;
+            *indices.get_mut(place).ok_or_else(invalid_index)? = Some(index);
         }
         if !brackets.is_empty() && !brackets.ends_with(']') {
-            return Err(wrong());
+            return Err(invalid_index());
         }
         let part = Part {
             key,
@@ -63,7 +68,7 @@ impl Part {
         Ok(part)
     }
 
-    /// Refuses what no entry of this form has.
+    /// Refuses parts that entries of this form do not have.
     fn check(&self) -> Result<(), String> {
         let (form, path, index) = (self.key.form(), self.key.path(), self.indices[0]);
         let single = matches!(form, Form::Text | Form::Switch | Form::Whole);
@@ -80,7 +85,7 @@ impl Part {
         }
     }
 
-    /// Whether it is one number, or one for all rods, that can take any value.
+    /// Checks that it is a single number, or one for all rods, that can vary.
     pub(crate) fn is_number(&self) -> Result<(), String> {
         let path = self.key.path();
         let within = self
@@ -99,7 +104,7 @@ impl Part {
         }
     }
 
-    /// Whether it is the whole of its key.
+    /// Whether it is the whole value of its key.
     pub(super) fn is_whole(&self) -> bool {
         self.list.is_none() && self.indices[0].is_none() && !self.scale
     }
@@ -116,7 +121,8 @@ impl fmt::Display for Part {
 }
 
 impl Part {
-    /// The parts that are numbers: of a list or a profile with this value every entry.
+    /// Splits it into parts that are numbers, given its value: every entry of a list or a
+    /// profile.
     pub(crate) fn numbers(self, value: &Value) -> Vec<Part> {
         let depth = self.indices.iter().flatten().count();
         match value {
@@ -140,7 +146,7 @@ impl Part {
         }
     }
 
-    /// Whether some number is of both.
+    /// Whether both contain some number.
     pub(crate) fn overlaps(&self, other: &Part) -> bool {
         let same =
             |one: Option<usize>, two: Option<usize>| one.is_none() || two.is_none() || one == two;

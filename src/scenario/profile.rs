@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::section::{Property, Section};
 
 /// A quantity along a rod: constant, linear between knots given at fractions
-/// sigma = s/L of the rod's length, or what follows from its section.
+/// sigma = s/L of the rod's length, or determined by its section.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Profile {
     /// The same value everywhere; may be infinite where the quantity allows it.
@@ -23,7 +23,7 @@ pub enum Profile {
         section: Arc<Section>,
         /// The property.
         property: Property,
-        /// Times which it is taken.
+        /// A factor of the property.
         factor: f64,
     },
 }
@@ -47,7 +47,7 @@ impl Profile {
                 let right = right.clamp(1, at.len() - 1);
                 let t = (sigma - at[right - 1]) / (at[right] - at[right - 1]);
                 if t >= 1.0 {
-                    // Next to a large value the sum below would lose a small one.
+                    // The sum below would lose a small value next to a large one.
                     return value[right];
                 }
                 value[right - 1] + t.max(0.0) * (value[right] - value[right - 1])
@@ -125,7 +125,7 @@ impl Profile {
         }
     }
 
-    /// Folds values among which the extremes are.
+    /// Folds values that include the extremes.
     fn fold(&self, start: f64, with: impl Fn(f64, f64) -> f64) -> f64 {
         match self {
             Profile::Constant(value) => with(start, *value),
@@ -174,7 +174,7 @@ mod tests {
         assert_eq!(integrals, [0.0, 0.1875, 0.5, -0.625]);
         assert_eq!(tent.kinks(), [0.25]);
         assert_eq!((tent.max_abs(), tent.min()), (6.0, -6.0));
-        // A small value at a knot is not lost beside large ones.
+        // A small value at a knot is not lost next to large ones.
         assert_eq!(linear([0.0, 0.5, 1.0], [1e9, 1e-9, 1e9]).at(0.5), 1e-9);
     }
 }

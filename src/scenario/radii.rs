@@ -1,11 +1,11 @@
-//! How thick veins are, where a scenario says so: for pictures.
+//! Radii of veins whose sections are given: for pictures.
 
 use std::sync::Arc;
 
 use super::Section;
 
-/// Radii of the veins, from their sections. Nothing is computed with them: leaves that
-/// differ in nothing else are equal.
+/// Radii of the veins, from their sections. No computation uses them: scenarios that
+/// differ only in radii are equal.
 #[derive(Clone, Debug, Default)]
 pub struct Radii(Vec<Arc<Section>>);
 
@@ -14,8 +14,8 @@ impl Radii {
         Radii(sections.to_vec())
     }
 
-    /// That of a rod at a fraction of its length: of a circle of the same area as its
-    /// section. `None` where stiffnesses are given, and no sections.
+    /// The radius of a rod at a fraction of its length: that of a circle with the area of
+    /// its section. `None` if stiffnesses are given in place of sections.
     pub fn at(&self, rod: usize, sigma: f64) -> Option<f64> {
         let section = self.0.get(rod)?;
         Some((section.area(sigma) / std::f64::consts::PI).sqrt())

@@ -1,5 +1,5 @@
-//! A scenario as written: which key has which value, and where it stands.
-//! Nothing here knows what the values mean.
+//! A scenario as written: the values of the keys and their positions in the text, without
+//! interpretation.
 
 use std::fmt::Display;
 
@@ -12,25 +12,25 @@ use super::excerpt::{line_of, shorten, snippet};
 use super::key::{Form, Key, LeftOut, nearest};
 use super::node::Node;
 
-/// All entries of a scenario, those of `--set` in place of the file's.
+/// All entries of a scenario, with those of `--set` replacing those of the file.
 pub(super) struct Raw<'a> {
     file: &'a str,
     entries: [Option<Entry<'a>>; Key::COUNT],
-    /// Which tables the file has.
+    /// The tables that the file has.
     tables: Vec<&'static str>,
 }
 
 struct Entry<'a> {
-    value: Held<'a>,
+    value: EntryValue<'a>,
     source: Source<'a>,
 }
 
-enum Held<'a> {
-    Read(Spanned<DeValue<'a>>),
-    Alone(&'a Value),
+enum EntryValue<'a> {
+    Parsed(Spanned<DeValue<'a>>),
+    Bare(&'a Value),
 }
 
-/// The text an entry was read from; spans count in `text`.
+/// The text from which an entry was parsed, and in which spans count.
 #[derive(Clone, Copy)]
 struct Source<'a> {
     text: &'a str,
@@ -42,7 +42,7 @@ enum Origin<'a> {
     File(&'a str),
     /// The whole `KEY=VALUE`.
     Set(&'a str),
-    /// What holds where nothing is written.
+    /// A default.
     LeftOut,
 }
 
@@ -63,7 +63,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The line around `span`, where the text has lines.
+    /// The line around `span`, if the text is that of a file.
     fn snippet(&self, span: std::ops::Range<usize>) -> String {
         match self.origin {
             Origin::File(_) => snippet(self.text, span),
@@ -71,7 +71,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// A refusal of what is not the value of a key.
+    /// An error that is not about the value of a key.
     fn refuse(&self, at: usize, problem: String) -> ScenarioError {
         ScenarioError {
             place: self.place(at),
@@ -104,7 +104,7 @@ impl<'a> Source<'a> {
 }
 
 impl<'a> Raw<'a> {
-    /// Reads `text`, then lays `overrides` over it.
+    /// Parses `text`, then applies `overrides`.
     pub(super) fn parse(
         text: &'a str,
         file: &'a str,
@@ -122,11 +122,11 @@ impl<'a> Raw<'a> {
         for given in overrides {
             raw.set(given)?;
         }
-        raw.fill();
+        raw.fill_in_defaults();
         Ok(raw)
     }
 
-    /// The same of values that are in no text: where one is refused nobody can be told.
+    /// The same from values without a text; errors then have no useful place.
     pub(super) fn of(entries: &'a Entries) -> Raw<'a> {
         let mut raw = Raw {
             file: "",
@@ -138,15 +138,15 @@ impl<'a> Raw<'a> {
             origin: Origin::File(""),
         };
         for (key, value) in entries.given() {
-            let value = Held::Alone(value);
+            let value = EntryValue::Bare(value);
             raw.entries[key as usize] = Some(Entry { value, source });
         }
-        raw.fill();
+        raw.fill_in_defaults();
         raw
     }
 
-    /// What holds where nothing is written.
-    fn fill(&mut self) {
+    /// Adds the defaults of missing entries.
+    fn fill_in_defaults(&mut self) {
         for key in Key::all() {
             let entry = &mut self.entries[key as usize];
             if let (None, Some(value)) = (&entry, left_out(key)) {
@@ -154,7 +154,7 @@ impl<'a> Raw<'a> {
                     text: "",
                     origin: Origin::LeftOut,
                 };
-                let value = Held::Alone(value);
+                let value = EntryValue::Bare(value);
                 *entry = Some(Entry { value, source });
             }
         }
@@ -169,7 +169,7 @@ impl<'a> Raw<'a> {
         for (key, value) in table {
             let here = (name, key.get_ref().as_ref());
             if let Some(known) = Key::from_parts(here.0, here.1) {
-                let value = Held::Read(value);
+                let value = EntryValue::Parsed(value);
                 self.entries[known as usize] = Some(Entry { value, source });
                 continue;
             }
@@ -196,7 +196,7 @@ impl<'a> Raw<'a> {
         Ok(())
     }
 
-    /// Takes one override. The value is TOML; what cannot be is taken as text.
+    /// Applies one override. The value is TOML; anything else is taken as text.
     fn set(&mut self, given: &'a Override) -> Result<(), ScenarioError> {
         let text = given.value.as_str();
         let origin = Origin::Set(&given.given);
@@ -207,18 +207,18 @@ impl<'a> Raw<'a> {
             }
             parsed => source.parse(parsed)?,
         };
-        let value = Held::Read(value);
+        let value = EntryValue::Parsed(value);
         self.entries[given.key as usize] = Some(Entry { value, source });
         Ok(())
     }
 
-    /// The value of a key, if it is written.
+    /// The value of a key, if it is given.
     pub(super) fn given(&self, key: Key) -> Option<Item<'_>> {
         self.entry(key)
             .filter(|item| !matches!(item.source.origin, Origin::LeftOut))
     }
 
-    /// The value of a key as written, or the one that holds where it is left out.
+    /// The value of a key as given, or its default.
     pub(super) fn item(&self, key: Key) -> Result<Item<'_>, ScenarioError> {
         self.entry(key).ok_or_else(|| {
             let (table, name) = key.parts();
@@ -247,8 +247,7 @@ impl<'a> Raw<'a> {
         })
     }
 
-    /// Keys that every scenario needs and this one has not: of stiffnesses, one whose
-    /// rods have no section.
+    /// Required keys that are missing; stiffnesses are required unless sections are given.
     fn missing(&self) -> impl Iterator<Item = Key> {
         let section = self.tables.contains(&"section");
         let needed = move |key: &Key| {
@@ -271,15 +270,15 @@ impl<'a> Raw<'a> {
             list: "",
             indices: [None; 2],
             node: match &entry.value {
-                Held::Read(value) => Node::Read(value),
-                Held::Alone(value) => Node::Alone(value),
+                EntryValue::Parsed(value) => Node::Parsed(value),
+                EntryValue::Bare(value) => Node::Bare(value),
             },
             source: entry.source,
         })
     }
 }
 
-/// The value of a key, or a part of one, that knows where it stands.
+/// The value of a key, or a part of it, with its place.
 #[derive(Clone, Copy)]
 pub(super) struct Item<'e> {
     key: Key,
@@ -310,7 +309,7 @@ impl<'e> Item<'e> {
         })
     }
 
-    /// An entry of a list; of what is no list, or too short, the whole.
+    /// An entry of a list; the value itself if it is not a list or too short.
     pub(super) fn entry(&self, index: usize) -> Item<'e> {
         let Some(node) = self.node.entry(index) else {
             return *self;
@@ -326,7 +325,7 @@ impl<'e> Item<'e> {
         }
     }
 
-    /// The two lists of a table that has no others, `at` and this one. `form`
+    /// The two lists, `at` and `other`, of a table that may have no others. `form`
     /// describes such a table.
     pub(super) fn pair(
         &self,

@@ -1,4 +1,4 @@
-//! Reading a scenario: from a file, or from text.
+//! Reads a scenario from a file or from text.
 
 use std::fs::File;
 use std::io::{ErrorKind, Read};
@@ -12,7 +12,7 @@ use super::raw::Raw;
 use super::{Scenario, check};
 use crate::memory::Request;
 
-/// Most bytes of a file; 100,000 rods with every quantity listed stay below.
+/// Most bytes of a file; 100,000 rods with every quantity listed need fewer.
 pub(crate) const MOST_BYTES: u64 = 64 << 20;
 
 impl Scenario {
@@ -36,8 +36,8 @@ impl Scenario {
     }
 
     /// As [`Scenario::from_toml`], with the entries `overrides` replaced
-    /// (`KEY=VALUE`, such as `load.gravity=[0,0,-0.5]`; the value is TOML, and
-    /// what is no TOML is taken as text), or parts of them: one entry of a list
+    /// (`KEY=VALUE`, such as `load.gravity=[0,0,-0.5]`; the value is TOML, anything
+    /// else is taken as text), or parts of them: one entry of a list
     /// (`load.gravity[2]=-1`, `stiffness.bending_2.value[0]=2`), or every number of
     /// a key multiplied (`scale:load.gravity=2`). Messages call the text `file`.
     pub fn from_toml_with(
@@ -67,17 +67,17 @@ impl Scenario {
 }
 
 impl Entries {
-    /// Checks these entries; none if they are refused, which [`Scenario::from_toml`] of
-    /// them as a text explains.
+    /// Checks these entries; `None` if they are refused: [`Scenario::from_toml`] with the
+    /// same entries as text gives the reason.
     pub fn scenario(&self) -> Option<Scenario> {
         check::check(&Raw::of(self)).ok()
     }
 }
 
-/// The text of a scenario's file, as it is written.
+/// Reads the text of a scenario's file.
 ///
 /// # Errors
-/// If it cannot be read, or is no text.
+/// If it cannot be read, or is not text.
 pub fn text(path: &Path) -> Result<String, ScenarioError> {
     let file = path.display().to_string();
     let mut bytes = Vec::new();
@@ -93,7 +93,7 @@ pub fn text(path: &Path) -> Result<String, ScenarioError> {
     utf8(bytes, &file)
 }
 
-/// The text of a scenario's `file`, of whose bytes these are the first.
+/// Decodes the text of a scenario's `file` from its first bytes.
 pub(crate) fn utf8(bytes: Vec<u8>, file: &str) -> Result<String, ScenarioError> {
     if bytes.len() as u64 > MOST_BYTES {
         let problem = format!("is larger than {MOST_BYTES} bytes: this is no scenario");

@@ -2,9 +2,9 @@
 
 use super::Rod;
 
-/// Units in which a leaf is dimensionless: lengths in units of `length`,
-/// couple stiffnesses in units of `stiffness`, hence forces in A/L^2, moments
-/// and energies in A/L and A/L.
+/// Units that make a leaf dimensionless: lengths in units of `length`, couple
+/// stiffnesses in units of `stiffness`, hence forces in A/L^2, moments and energies in
+/// A/L.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
     /// L: the largest rod length.
@@ -15,7 +15,7 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Of these rods, of which there is at least one.
+    /// The units of these rods, of which there is at least one.
     pub fn of(rods: &[Rod]) -> Scale {
         let logs: f64 = rods
             .iter()
@@ -37,8 +37,8 @@ impl Scale {
         self.stiffness / self.length
     }
 
-    /// What to multiply a quantity by to have it in these units, if its own
-    /// is a product of powers of length and force with these exponents.
+    /// The factor that converts a quantity to these units, if its own unit is a product of
+    /// powers of length and force with these exponents.
     pub(super) fn per(&self, length: i32, force: i32) -> f64 {
         self.length.powi(2 * force - length) / self.stiffness.powi(force)
     }

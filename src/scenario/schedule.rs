@@ -4,7 +4,7 @@
 /// and after the last.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule<T> {
-    /// Times, at least one, rising strictly.
+    /// At least one time, strictly increasing.
     pub at: Vec<f64>,
     /// Values at these times; same length as `at`.
     pub value: Vec<T>,
@@ -27,7 +27,7 @@ impl<T> Schedule<T> {
         self.value.windows(2).all(|pair| pair[0] == pair[1])
     }
 
-    /// The values to both sides of `time`, and how far between them it is.
+    /// The values on both sides of `time`, and the fraction of the step between them.
     fn around(&self, time: f64) -> (&T, &T, f64) {
         let last = self.at.len() - 1;
         match self.at.partition_point(|&known| known <= time) {

@@ -1,11 +1,11 @@
-//! The JSON schema of scenarios, made from the table of keys.
+//! The JSON schema of scenarios, generated from the table of keys.
 
 use serde_json::{Map, Value, json};
 
 use super::key::{Form, Key, LeftOut, Range};
 
 /// The schema of scenarios (JSON Schema, draft 7), for editors that complete and check
-/// them. Rules that hold between entries are checked by the program alone.
+/// them. Rules between entries are checked only by the program.
 pub fn schema() -> Value {
     let mut tables: Vec<(&str, Map<String, Value>, Vec<&str>)> = vec![("", Map::new(), Vec::new())];
     for key in Key::all() {
@@ -16,7 +16,7 @@ pub fn schema() -> Value {
         for (known, properties, required) in &mut tables {
             if *known == table {
                 properties.insert(name.into(), entry(key));
-                // Of alternatives none is required here.
+                // Alternatives, such as stiffnesses and sections, are not required here.
                 if matches!(key.left_out(), LeftOut::Refused(_)) && matches!(table, "" | "leaf") {
                     required.push(name);
                 }
@@ -45,7 +45,7 @@ pub fn schema() -> Value {
     schema
 }
 
-/// What a key takes, with what it means.
+/// The schema of a key's value, with its description.
 fn entry(key: Key) -> Value {
     let mut entry = match key.form() {
         Form::Text => json!({ "type": "string" }),
@@ -71,7 +71,7 @@ fn entry(key: Key) -> Value {
         Form::FactorInTime => knots("factor", list(number(Range::Finite))),
     };
     entry["description"] = json!(key.description());
-    // Defaults are TOML; those that JSON reads alike are told.
+    // Defaults are TOML; those that are also JSON are included.
     if let LeftOut::Means(text) = key.left_out()
         && let Ok(value) = serde_json::from_str::<Value>(text)
     {
@@ -80,7 +80,7 @@ fn entry(key: Key) -> Value {
     entry
 }
 
-/// JSON knows no infinite number: editors take `inf` of TOML for a number.
+/// A number. JSON has no infinity; editors accept TOML's `inf` as a number.
 fn number(range: Range) -> Value {
     match range {
         Range::Finite => json!({ "type": "number" }),
@@ -99,7 +99,7 @@ fn vector() -> Value {
     json!({ "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 })
 }
 
-/// Places or times, and what is there.
+/// Knots or times, and the values there.
 fn knots(name: &str, values: Value) -> Value {
     json!({
         "type": "object",

@@ -19,20 +19,19 @@ use std::f64::consts::PI;
 
 use super::Profile;
 
-/// Points between two knots at which extremes are looked for.
+/// Steps between two knots in the search for extremes.
 const SAMPLES: usize = 16;
 
 /// The outline of a section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outline {
-    /// A circle, or an ellipse, of which the width is along d2 and the thickness
-    /// along d3.
+    /// A circle, or an ellipse with its width along d2 and its thickness along d3.
     Ellipse,
     /// A rectangle with the same sides.
     Rectangle,
 }
 
-/// What follows from a section.
+/// A property that a section determines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Property {
     /// A1, A2 and A3, by index.
@@ -41,8 +40,8 @@ pub enum Property {
     Force(usize),
     /// Mass per length.
     Density,
-    /// Moment of inertia per length: the mean of those about d2 and about d3, so
-    /// that twice it is that about d1.
+    /// Moment of inertia per length: the mean of those about d2 and d3, which is half of
+    /// that about d1.
     RotaryInertia,
 }
 
@@ -56,7 +55,7 @@ pub struct Section {
     pub(super) poisson: Profile,
     /// Mass per volume; zero where it is not given.
     pub(super) mass_density: Profile,
-    /// Fractions inside (0, 1) where the slope of one of them may jump.
+    /// Fractions inside (0, 1) where the slope of one of these may jump.
     kinks: Vec<f64>,
 }
 
@@ -154,18 +153,18 @@ impl Outline {
         match self {
             Outline::Ellipse => {
                 let (a, b) = (width / 2.0, thickness / 2.0);
-                // In this order equal sides give the circle's to the last bit but one.
+                // In this order equal sides give the circle's value to the last bit but one.
                 PI * a * b * (a * b) * ((a * b) / (a * a + b * b))
             }
             Outline::Rectangle => {
                 let (long, short) = (width.max(thickness), width.min(thickness));
                 let term = |n: f64| (n * PI * long / (2.0 * short)).tanh() / n.powi(5);
-                // From n = 17 on every tanh is 1: the rest of the sum is known
-                // (zeta(5) times 31/32, less the terms before).
+                // From n = 17 on every tanh is 1, so the rest of the sum is known (zeta(5)
+                // times 31/32, less the terms before).
                 let all = 31.0 / 32.0 * 1.036_927_755_143_37;
                 let odd = (0..8).map(|k| (2 * k + 1) as f64);
-                let short_of_one: f64 = odd.map(|n| n.powi(-5) - term(n)).sum();
-                let sum = all - short_of_one;
+                let deficit: f64 = odd.map(|n| n.powi(-5) - term(n)).sum();
+                let sum = all - deficit;
                 long * short.powi(3) * (1.0 / 3.0 - 64.0 / PI.powi(5) * short / long * sum)
             }
         }
@@ -199,8 +198,8 @@ mod tests {
         assert!((found / wanted - 1.0).abs() < relative, "{found} {wanted}");
     }
 
-    /// Table 6 of Timoshenko and Goodier, art. 109, beyond its digits by summing the
-    /// series term by term, and the thin strip.
+    /// Table 6 of Timoshenko and Goodier, art. 109, with more digits from summing the series
+    /// term by term, and the thin strip.
     #[test]
     fn torsion_of_rectangles() {
         for (sides, constant) in [

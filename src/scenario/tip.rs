@@ -9,8 +9,8 @@ use super::key::Key;
 use super::raw::{Item, Raw};
 use super::{Rod, longest};
 
-/// Farther from the base than this, in lengths of the longest rod with its
-/// growth, no rod is meant to reach.
+/// Largest distance of a held tip from the base, in lengths of the longest rod with its
+/// growth.
 const FARTHEST: f64 = 10.0;
 
 /// Largest angle and twist, in turns.
@@ -19,9 +19,9 @@ const MOST_TURNS: f64 = 100.0;
 /// A tip that is held: of a joined leaf, or of a single rod.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeldTip {
-    /// Where.
+    /// Its position.
     pub position: [f64; 3],
-    /// If the directions are held, too, one a rod; `None`: pinned.
+    /// The directions of the rods if these are held, too; `None`: pinned.
     pub clamps: Option<Vec<Clamp>>,
 }
 
@@ -30,7 +30,7 @@ pub struct HeldTip {
 pub struct Clamp {
     /// Angle of d1 in the e1-e2 plane, radians.
     pub angle: f64,
-    /// By how much the section is then turned about d1, radians.
+    /// Angle by which the section is then turned about d1, radians.
     pub twist: f64,
 }
 
@@ -107,7 +107,7 @@ pub(super) fn held(
     Ok(Some(HeldTip { position, clamps }))
 }
 
-/// Refuses places that rods cannot reach.
+/// Refuses positions that the rods cannot reach.
 fn check_reach(at: &Item, [x, y, z]: [f64; 3], rods: &[Rod]) -> Result<(), ScenarioError> {
     let distance = x.hypot(y).hypot(z);
     let reach = |rod: &Rod| rod.length * rod.rest_stretch.integral(1.0);

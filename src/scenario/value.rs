@@ -1,4 +1,4 @@
-//! From a value as written to numbers: every form that a key can take.
+//! Converts values as written to numbers, for every form that a key can have.
 
 use super::error::ScenarioError;
 use super::key::{Form, Range};
@@ -7,8 +7,8 @@ use super::{Profile, Schedule};
 
 type Result<T> = std::result::Result<T, ScenarioError>;
 
-/// Lengths and stiffnesses lie between these: fourth powers of lengths and
-/// quotients of stiffnesses must not overflow.
+/// Range of lengths and stiffnesses: fourth powers of lengths and quotients of
+/// stiffnesses must not overflow.
 pub(super) const MAGNITUDES: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
 
 const INFINITE: &str = "must be a finite number; inf (rigid) is allowed for stiffness.axial, \
@@ -104,7 +104,7 @@ impl<'e> Item<'e> {
             return Ok(numbers.into_iter().map(Profile::Constant).collect());
         }
         let [at, value] = self.pair("value", PROFILE_IS)?;
-        let at = at.rising(true)?;
+        let at = at.increasing(true)?;
         let needed = format!("a list of numbers, or a list of {rods} such lists (one per rod)");
         let mut list = value.array(&needed)?;
         if (list.next()).is_none_or(|first| first.node().length().is_none()) {
@@ -116,7 +116,7 @@ impl<'e> Item<'e> {
 
     /// A profile that has these values at the knots `at`.
     fn linear(&self, at: &[f64]) -> Result<Profile> {
-        // Infinite has no place between knots: it cannot be interpolated.
+        // Infinity cannot be interpolated between knots.
         let range = match self.key().form().range() {
             Range::PositiveOrInfinite => Range::Positive,
             range => range,
@@ -132,7 +132,7 @@ impl<'e> Item<'e> {
     /// A load in time.
     pub(super) fn vectors_in_time(&self) -> Result<Schedule<[f64; 3]>> {
         let [at, value] = self.pair("value", LOAD_IN_TIME)?;
-        let at = at.rising(false)?;
+        let at = at.increasing(false)?;
         let needed = "a list of lists of three numbers [x, y, z]";
         let value = value.list_of(at.len(), ONE_PER_KNOT, needed)?;
         let value = value.map(|item| item.vector()).collect::<Result<_>>()?;
@@ -142,14 +142,14 @@ impl<'e> Item<'e> {
     /// A factor in time.
     pub(super) fn factors_in_time(&self) -> Result<Schedule<f64>> {
         let [at, factor] = self.pair("factor", FACTOR_IN_TIME)?;
-        let at = at.rising(false)?;
+        let at = at.increasing(false)?;
         let value = factor.list_of(at.len(), ONE_PER_KNOT, LIST_OF_NUMBERS)?;
         let value = value.map(|item| item.number()).collect::<Result<_>>()?;
         Ok(Schedule { at, value })
     }
 
-    /// Numbers that rise strictly: fractions of the length, from 0 to 1, or times.
-    fn rising(&self, fractions: bool) -> Result<Vec<f64>> {
+    /// Strictly increasing numbers: fractions of the length from 0 to 1, or times.
+    fn increasing(&self, fractions: bool) -> Result<Vec<f64>> {
         let (what, least, too_few) = match fractions {
             true => (
                 "knots",
@@ -182,7 +182,7 @@ impl<'e> Item<'e> {
         Ok(at)
     }
 
-    /// The entries of a list; `needed` says what is refused for being none.
+    /// The entries of a list; `needed` describes it in the error if it is not one.
     fn array(&self, needed: &str) -> Result<impl ExactSizeIterator<Item = Item<'e>> + use<'e>> {
         let Some(length) = self.node().length() else {
             return Err(self.refuse(format_args!("must be {needed}")));
@@ -191,7 +191,7 @@ impl<'e> Item<'e> {
         Ok((0..length).map(move |index| whole.entry(index)))
     }
 
-    /// The same of a list that must have `count` entries.
+    /// The same for a list that must have `count` entries.
     fn list_of(
         &self,
         count: usize,

@@ -1,5 +1,5 @@
-//! What one method finds along one axis, as curves below its strip of outcomes: the tip
-//! and the energy or, where waves are shown, these and the twist.
+//! Results of one method along one axis, as curves below its strip of outcomes: the tip
+//! and the energy or, where waves are shown, the waves and the twist.
 
 use glam::DVec2;
 
@@ -12,19 +12,19 @@ use crate::figure::page::{Cell, Key, PANEL_AXIS, PANEL_TITLE, title};
 use crate::figure::setting::with_unit;
 use crate::study::{Map, MapRow, MapShow};
 
-/// What varies less is rounding.
+/// Smaller variations are rounding.
 const ROUNDING: f64 = 1e-9;
 const TALL: f64 = 260.0;
 const LOW: f64 = 150.0;
 
-/// A curve: its name, its colour, and what it is of a row.
-type Of<'a> = (&'a str, Color, fn(&MapRow) -> Option<f64>);
+/// A curve: its name, its colour, and its value in a row.
+type Quantity<'a> = (&'a str, Color, fn(&MapRow) -> Option<f64>);
 
-/// Below `start`, as wide as the strip from `left` on. Returns where they end.
+/// Draws the curves below `start`, as wide as the strip. Returns where they end.
 pub fn draw(page: &mut Drawing, map: &Map, x: &Varied, strip: Cell, start: f64) -> f64 {
     let units = &map.request.base.scenario().units;
     let length = units.length.as_deref();
-    let panels: Vec<(&str, String, Vec<Of>)> = match map.show {
+    let panels: Vec<(&str, String, Vec<Quantity>)> = match map.show {
         MapShow::Outcomes => vec![
             (
                 "where the tip is",
@@ -83,7 +83,7 @@ fn draw_panel(
     x: &Varied,
     cell: Cell,
     (what, name): (&str, &str),
-    curves: &[Of],
+    curves: &[Quantity],
 ) {
     let values = &map.request.axes[0].values;
     let lines: Vec<Vec<(f64, f64)>> = (curves.iter())
@@ -103,13 +103,10 @@ fn draw_panel(
     };
     title(page, cell.corner, "", what);
     axes.draw(page);
-    let mut key = Key::beside(cell);
+    let mut key = Key::right_of(cell);
     for ((name, color, _), line) in curves.iter().zip(lines) {
         axes.curve(page, &line, Stroke::new(*color, 1.6));
         axes.markers(page, line, Marker::Dot, *color);
-        key.entry(page, name, "", |page, cell| {
-            cell.line(page, Stroke::new(*color, 1.6));
-            Marker::Dot.draw(page, cell.middle(), *color);
-        });
+        key.marked_line(page, name, "", *color);
     }
 }

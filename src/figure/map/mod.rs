@@ -1,5 +1,5 @@
-//! A map: one panel a method, one colour an outcome or, of stable leaves if
-//! that is asked for, a number of waves.
+//! A map: one panel per method and one colour per outcome or, if waves are shown, per
+//! number of waves of stable leaves.
 
 mod curves;
 mod panel;
@@ -17,23 +17,24 @@ pub use panel::{DARKEST_INDEX, fill_index, name};
 use panel::{Panel, Tile, Varied};
 
 const SWATCH: f64 = 12.0;
-/// Below each panel, for ticks and, below the last, the name of the axis.
+/// Room below each panel for ticks and, below the last, for the name of the axis.
 const TICKS: f64 = 26.0;
 const NAME: f64 = 26.0;
 /// Between panels, for the ticks of the right one.
 const GAP: f64 = 44.0;
 const MOST_COLUMNS: usize = 3;
 const WIDEST: f64 = 470.0;
-/// What a map of waves shows.
+/// Explains a map of waves.
 const MEANING: &str = "Colours and numbers: how often the margins of a stable leaf wave out of its surface, \
     of both the margin that waves more. Two half-waves, between changes of the side to which it bends, are one wave.";
 /// Width of a page with one panel.
 const NARROW: f64 = 600.0;
-/// Between the strip of one method and its curves.
-const ALONE: f64 = 12.0;
+/// Between the strip of a single method and its curves.
+const CURVES_GAP: f64 = 12.0;
 /// Height over width of a panel.
-const SHAPE: f64 = 0.86;
-/// With one axis: height of a method's strip, and room for its name and count.
+const ASPECT: f64 = 0.86;
+/// With one axis: height of a method's strip, the gap below it, and room for its name
+/// and count.
 const STRIP: f64 = 30.0;
 const STRIP_GAP: f64 = 9.0;
 const METHOD: f64 = 130.0;
@@ -82,7 +83,7 @@ fn notes(map: &Map) -> Vec<String> {
     notes
 }
 
-/// The outcomes and marks that occur; returns where it ends.
+/// Draws the key of the outcomes and marks that occur; returns where it ends.
 fn draw_key(page: &mut Drawing, map: &Map, base: f64) -> f64 {
     let mut key = KeyRows::at(LEFT, base, SWATCH);
     for outcome in MapOutcome::ALL {
@@ -124,7 +125,7 @@ fn draw_key(page: &mut Drawing, map: &Map, base: f64) -> f64 {
     key.end()
 }
 
-/// What colours and numbers of waves mean; returns where that ends.
+/// Draws the explanation of a map of waves; returns where it ends.
 fn draw_meaning(page: &mut Drawing, mut top: f64) -> f64 {
     let room = page.width - LEFT - RIGHT;
     for line in Font::embedded().wrapped(MEANING, TICK_SIZE, room) {
@@ -142,7 +143,7 @@ fn has_step_axis(map: &Map) -> bool {
         && axes.any(|axis| axis.keys.sets(Knob::Step))
 }
 
-/// What is known of a method, cell by cell.
+/// The results of a method, cell by cell.
 fn tiles(map: &Map, method: MapMethod) -> Vec<Option<Tile>> {
     let mut tiles = vec![None; map.request.cells()];
     for row in map.rows.iter().filter(|row| row.method == method) {
@@ -169,7 +170,7 @@ fn count(map: &Map, method: MapMethod) -> String {
     format!("{count} of {} {what}", map.request.cells())
 }
 
-/// A panel for every method or, with one axis, a strip. Returns the height of
+/// Draws a panel for every method or, with one axis, a strip. Returns the height of
 /// the page.
 fn draw_panels(
     drawing: &mut Drawing,
@@ -185,7 +186,7 @@ fn draw_panels(
             let left = LEFT + 18.0;
             let room = WIDTH - RIGHT - left - (columns - 1) as f64 * GAP;
             let width = (room / columns as f64).min(WIDEST);
-            let size = DVec2::new(width, SHAPE * width);
+            let size = DVec2::new(width, ASPECT * width);
             let pitch = size + DVec2::new(GAP, PANEL_TITLE + TICKS + 6.0);
             (DVec2::new(left, start + PANEL_TITLE), size, pitch)
         }
@@ -203,7 +204,7 @@ fn draw_panels(
             corner: corner + place * pitch,
             size,
         };
-        // One strip has its axis below the curves.
+        // A single strip has its axis below the curves.
         let labelled = y.is_some() || (i + 1 == methods.len() && i > 0);
         drawing.group(method.word(), |page| {
             draw_method(page, map, method, cell, y.is_some());
@@ -216,20 +217,20 @@ fn draw_panels(
         last = cell;
     }
     if let (None, [_]) = (y, methods.as_slice()) {
-        return curves::draw(drawing, map, x, last, last.end().y + ALONE);
+        return curves::draw(drawing, map, x, last, last.end().y + CURVES_GAP);
     }
     let end = last.end().y + TICKS;
     let across = columns as f64 * (size.x + GAP) - GAP;
     let below = DVec2::new(corner.x + 0.5 * across, end + 12.0);
     drawing.label(below, &x.axis.title(), TEXT_SIZE, Anchor::Middle, INK);
     if let Some(y) = y {
-        let beside = DVec2::new(24.0, 0.5 * (corner.y + last.end().y));
-        drawing.upright_label(beside, &y.axis.title(), TEXT_SIZE, INK);
+        let middle = DVec2::new(24.0, 0.5 * (corner.y + last.end().y));
+        drawing.rotated_label(middle, &y.axis.title(), TEXT_SIZE, INK);
     }
     end + NAME
 }
 
-/// A method's name and how often it was right, above a panel or beside a strip.
+/// Draws a method's name and count, above a panel or to both sides of a strip.
 fn draw_method(page: &mut Drawing, map: &Map, method: MapMethod, cell: Cell, above: bool) {
     let (name, count) = (method.word(), count(map, method));
     if above {
@@ -239,9 +240,9 @@ fn draw_method(page: &mut Drawing, map: &Map, method: MapMethod, cell: Cell, abo
         return page.label(base, &count, TICK_SIZE, Anchor::End, NOTE);
     }
     let [left, right] = cell.midline();
-    let air = DVec2::new(10.0, 0.0);
-    page.beside(left - air, name, TEXT_SIZE, Anchor::End, INK);
-    page.beside(right + air, &count, TICK_SIZE, Anchor::Start, NOTE);
+    let gap = DVec2::new(10.0, 0.0);
+    page.centered_label(left - gap, name, TEXT_SIZE, Anchor::End, INK);
+    page.centered_label(right + gap, &count, TICK_SIZE, Anchor::Start, NOTE);
 }
 
 #[cfg(test)]

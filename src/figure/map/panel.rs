@@ -10,13 +10,13 @@ use crate::figure::drawing::{
 use crate::figure::page::Cell;
 use crate::study::{Confidence, Knob, MapOutcome, MapRequest, Vary};
 
-/// Cells smaller than this are not set apart, and bear no marks.
-const APART: f64 = 5.0;
-/// And no numbers, if smaller than this.
+/// Smaller cells have no gaps between them and no marks.
+const SEPARATE: f64 = 5.0;
+/// Smaller cells have no numbers.
 const NUMBERED: f64 = 13.0;
 const NUMBER_SIZE: f64 = 8.0;
 const PALE: Color = Color(226, 236, 226);
-/// Waves beyond which colours do not change any more.
+/// More waves than this have the same colour.
 const MOST_WAVES: f64 = 2.5;
 
 #[derive(Clone, Copy)]
@@ -28,8 +28,8 @@ pub struct Tile {
     pub waves: Option<f64>,
 }
 
-/// Colours that the colour-blind can tell apart (Okabe and Ito), right ones
-/// light and calm.
+/// Colours that the colour-blind can distinguish (Okabe and Ito); that of right answers is
+/// light.
 fn color(outcome: MapOutcome) -> Color {
     match outcome {
         MapOutcome::Right => Color(170, 214, 240),
@@ -46,7 +46,7 @@ fn color(outcome: MapOutcome) -> Color {
 /// Fills a cell; one that was refused is crossed out.
 pub fn fill(page: &mut Drawing, cell: Cell, outcome: MapOutcome) {
     page.shape(rectangle(cell.corner, cell.size), color(outcome), None);
-    if outcome == MapOutcome::Refused && cell.size.min_element() >= APART {
+    if outcome == MapOutcome::Refused && cell.size.min_element() >= SEPARATE {
         let inset = 0.25 * cell.size;
         let (low, high) = (cell.corner + inset, cell.end() - inset);
         let thin = Stroke::new(FRAME, 0.8);
@@ -63,7 +63,7 @@ pub fn fill_waves(page: &mut Drawing, cell: Cell, waves: f64) {
     page.shape(rectangle(cell.corner, cell.size), color, None);
 }
 
-/// From this index on all have one colour.
+/// Indices from this one on have the same colour.
 pub const DARKEST_INDEX: usize = 4;
 
 /// Fills a cell lightly by the index of its equilibrium: the more, the darker.
@@ -91,12 +91,12 @@ pub fn mark(page: &mut Drawing, cell: Cell, reference: Confidence) {
     page.shape(circle(at, radius), color, Some(rim));
 }
 
-/// How the longest stable step is drawn.
+/// Stroke of the longest stable step.
 pub const BOUND: Stroke = Stroke::new(Color(170, 0, 60), 2.0);
 
 pub struct Varied {
     pub axis: Axis,
-    /// Where cells end, as parts of the axis: one more than there are cells.
+    /// Edges of the cells, as fractions of the axis: one more than there are cells.
     edges: Vec<f64>,
 }
 
@@ -191,11 +191,11 @@ impl<'a> Panel<'a> {
 
     fn draw_tile(&self, page: &mut Drawing, i: usize, tile: Tile) {
         let mut cell = self.rectangle(i);
-        let large = cell.size.min_element() >= APART;
+        let large = cell.size.min_element() >= SEPARATE;
         if large {
-            let air = DVec2::splat(0.4);
-            cell.corner += air;
-            cell.size -= 2.0 * air;
+            let inset = DVec2::splat(0.4);
+            cell.corner += inset;
+            cell.size -= 2.0 * inset;
         }
         match tile.waves {
             Some(waves) => fill_waves(page, cell, waves),
@@ -210,14 +210,14 @@ impl<'a> Panel<'a> {
             _ => return,
         };
         if cell.size.min_element() >= NUMBERED {
-            page.beside(cell.middle(), &number, NUMBER_SIZE, Anchor::Middle, WHITE);
+            page.centered_label(cell.middle(), &number, NUMBER_SIZE, Anchor::Middle, WHITE);
         }
     }
 
     /// Draws the longest step known to be stable, across every row or column.
     pub fn draw_bound(&self, page: &mut Drawing, request: &MapRequest) {
         let along_x = request.axes[0].keys.sets(Knob::Step);
-        let inside = |part: &f64| (0.0..=1.0).contains(part);
+        let inside = |fraction: &f64| (0.0..=1.0).contains(fraction);
         for i in 0..request.cells() {
             let (column, row) = self.place(i);
             let (first, axis) = match along_x {
@@ -225,12 +225,12 @@ impl<'a> Panel<'a> {
                 false => (row == 0, &self.axes.up),
             };
             let step = request.stable_step(i).filter(|_| first);
-            let part = step.map(|step| axis.part(step));
-            let Some(part) = part.filter(inside) else {
+            let fraction = step.map(|step| axis.fraction(step));
+            let Some(fraction) = fraction.filter(inside) else {
                 continue;
             };
             let (tile, Cell { corner, size }) = (self.rectangle(i), self.axes.cell);
-            let place = corner + size * DVec2::new(part, 1.0 - part);
+            let place = corner + size * DVec2::new(fraction, 1.0 - fraction);
             let (from, to) = match along_x {
                 true => (tile.corner.with_x(place.x), tile.end().with_x(place.x)),
                 false => (tile.corner.with_y(place.y), tile.end().with_y(place.y)),
@@ -240,10 +240,10 @@ impl<'a> Panel<'a> {
     }
 }
 
-/// Of more keys than these the first and the last are named.
+/// Of more keys than this only the first and the last are named.
 const NAMED: usize = 4;
 
-/// Keys of one table are told with its name once: `stiffness: axial = shear_2`.
+/// The name of an axis. Keys of one table share its name: `stiffness: axial = shear_2`.
 pub fn name(keys: &str) -> String {
     let keys: Vec<&str> = keys.split('+').collect();
     let table = |key: &str| key.split('.').next().unwrap_or_default().to_string();
@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_is_told_once() {
+    fn a_shared_table_is_named_once() {
         let h = "stiffness.axial+stiffness.shear_2";
         assert_eq!(name(h), "stiffness: axial = shear_2");
         let many: Vec<String> = (0..6).map(|i| format!("rest.twist[{i}]")).collect();

@@ -9,7 +9,7 @@ use crate::report::{boundary_lines, is_special};
 use crate::scenario::Scenario;
 use crate::study::{Boundary, BoundaryCurve, BoundaryPoint};
 
-/// Nodes of a vein that are drawn, but for the first.
+/// Most segments of a vein that are drawn.
 const MOST_NODES: usize = 32;
 
 impl Viewed for Boundary {
@@ -47,7 +47,7 @@ fn leaf(point: &BoundaryPoint, drawn: &[usize]) -> Leaf {
     )
 }
 
-/// The plane: the second number upwards, or its logarithm.
+/// The plane: the second number, or its logarithm, against the first.
 fn chart(boundary: &Boundary) -> Chart {
     let up = boundary.keys[1].to_string();
     let mut first = 0;

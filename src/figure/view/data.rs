@@ -1,11 +1,11 @@
-//! What the page is given: results as they are, thinned to what can be seen, with
-//! large arrays as base64 of little-endian numbers.
+//! The data of the page: results, thinned to what is visible, with large arrays as
+//! base64 of little-endian numbers.
 
 use glam::DVec3;
 use serde::Serialize;
 
 use crate::figure::setting::with_unit;
-use crate::figure::veins::is_near;
+use crate::figure::veins::is_drawable;
 use crate::relax::RodShape;
 use crate::report::base64::encode as base64;
 use crate::scenario::Units;
@@ -19,10 +19,10 @@ pub struct View {
     /// `leaf`, `motion`, `trace` or `equilibria`.
     pub kind: &'static str,
     pub title: String,
-    /// The result in a phrase, and whether it is as it was asked for.
+    /// The result in a phrase, and whether it is a success.
     pub verdict: String,
     pub success: bool,
-    /// Its numbers: names and what is said of them.
+    /// Names and texts of its numbers.
     pub summary: Vec<(&'static str, String)>,
     /// Names of the units of length and force, if there are any.
     pub units: [Option<String>; 2],
@@ -31,8 +31,8 @@ pub struct View {
     /// The longest vein.
     pub longest: f64,
     pub joined: bool,
-    /// Number of veins; those that are drawn, counted from 1, with their lengths
-    /// and colours.
+    /// The number of veins, and the numbers from 1, lengths and colours of those that are
+    /// drawn.
     pub rods: usize,
     pub drawn: Vec<usize>,
     pub lengths: Vec<f64>,
@@ -40,14 +40,14 @@ pub struct View {
     /// The leaves: one, or all equilibria, points of a trace, instants of a motion.
     pub leaves: Vec<Leaf>,
     pub modes: Vec<ModeShape>,
-    /// What is drawn beside the leaf of a motion or trace.
+    /// The chart next to the leaf of a motion or trace.
     pub chart: Option<Chart>,
 }
 
 /// A shape of the leaf.
 #[derive(Serialize)]
 pub struct Leaf {
-    /// What it is, in a few words, and its numbers where they are its own.
+    /// A short description, and the numbers of this leaf alone.
     pub label: String,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub summary: Vec<(&'static str, String)>,
@@ -57,16 +57,16 @@ pub struct Leaf {
     /// Fractions of the length, where they are known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stations: Option<Vec<f64>>,
-    /// Nodes of a vein.
+    /// Nodes per vein.
     pub nodes: usize,
     /// Positions, vein by vein.
     pub points: Points,
-    /// [`STATE`] numbers a node.
+    /// [`STATE`] numbers per node.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub state: Option<String>,
 }
 
-/// Positions: as they are, or as 65,536 steps of the box that holds them.
+/// Positions: in full, or rounded to 65,536 steps over their bounding box.
 #[derive(Serialize)]
 #[serde(untagged)]
 pub enum Points {
@@ -78,18 +78,18 @@ pub enum Points {
 #[derive(Serialize)]
 pub struct ModeShape {
     pub label: String,
-    /// Nodes of a vein; their positions at rest, and displacements.
+    /// Nodes per vein, their positions at rest, and their displacements.
     pub nodes: usize,
     pub rest: String,
     pub displacement: String,
 }
 
-/// Curves, one of whose coordinates is chosen.
+/// Curves of quantities, one of which is chosen.
 #[derive(Serialize)]
 pub struct Chart {
     pub across: String,
     pub log: bool,
-    /// Names of what can be drawn upwards.
+    /// Names of the quantities that can be drawn upwards.
     pub choices: Vec<String>,
     pub curves: Vec<Curve>,
 }
@@ -105,7 +105,7 @@ pub struct Curve {
     /// The leaf that belongs to each point; empty: the nearest in time.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub leaves: Vec<usize>,
-    /// Which points are unstable, and which are special, with a word.
+    /// Which points are unstable, and the indices and kinds of special ones.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unstable: Vec<bool>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -113,8 +113,7 @@ pub struct Curve {
 }
 
 impl View {
-    /// A quantity's name with the unit of its values, if that is known: of a length or,
-    /// otherwise, of an energy.
+    /// The name of a quantity, a length or else an energy, with its unit if that is known.
     pub fn with_unit(&self, name: &str, is_length: bool) -> String {
         let [length, force] = self.units.clone();
         let unit = match is_length {
@@ -126,8 +125,8 @@ impl View {
 }
 
 impl Leaf {
-    /// Of veins in full, with strains and forces; `drawn` are the numbers of those
-    /// that are shown.
+    /// A leaf in full, with strains and forces; `drawn` are the numbers of the veins that
+    /// are drawn.
     pub fn full(label: String, stations: &[f64], rods: &[RodShape], drawn: &[usize]) -> Self {
         let shown = || drawn.iter().flat_map(|&number| &rods[number - 1].nodes);
         let mut state = Vec::with_capacity(STATE * stations.len() * drawn.len());
@@ -151,7 +150,7 @@ impl Leaf {
         }
     }
 
-    /// Of centrelines, for one of many.
+    /// A leaf as coarse centrelines, for one of many.
     pub fn coarse(
         label: String,
         stations: &[f64],
@@ -161,7 +160,7 @@ impl Leaf {
     ) -> Self {
         let nodes = curves.first().map_or(0, Vec::len);
         let stride = nodes.saturating_sub(1).div_ceil(most).max(1);
-        // The tip is among them.
+        // The tip must remain.
         let stride = (stride..nodes)
             .find(|k| (nodes - 1).is_multiple_of(*k))
             .unwrap_or(1);
@@ -169,12 +168,12 @@ impl Leaf {
             let curves = drawn.iter().map(|&number| &curves[number - 1]);
             curves.flat_map(move |curve| curve.iter().step_by(stride).copied())
         };
-        let near = || shown().filter(|point| is_near(*point));
+        let near = || shown().filter(|point| is_drawable(*point));
         let low = near().reduce(DVec3::min).unwrap_or_default();
         let high = near().reduce(DVec3::max).unwrap_or_default();
         let size = (high - low).max_element().max(f64::MIN_POSITIVE);
         let step = |point: DVec3| ((point - low) / size * 65535.0).round().to_array();
-        // What is no number becomes a corner of the box.
+        // NaN becomes a corner of the box.
         let steps = shown()
             .flat_map(step)
             .flat_map(|x| (x as u16).to_le_bytes());
@@ -203,7 +202,7 @@ impl Leaf {
     }
 }
 
-/// Whether these are not equally far apart, as the page takes them to be unless told.
+/// Whether these are not equally spaced, which the page assumes by default.
 fn uneven(stations: &[f64]) -> bool {
     let last = stations.len().saturating_sub(1).max(1) as f64;
     let mut stations = stations.iter().enumerate();

@@ -9,7 +9,7 @@ use crate::report::{all_lines, relax_lines};
 use crate::scenario::Scenario;
 use crate::study::{All, Found};
 
-/// More would not be told apart side by side.
+/// More could not be distinguished side by side.
 const MOST: usize = 24;
 
 impl Viewed for All {

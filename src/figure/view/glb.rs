@@ -1,4 +1,4 @@
-//! Veins as tubes for Blender and others: binary glTF 2.0, the motion as an
+//! Veins as tubes for Blender and other programs: binary glTF 2.0, with a motion as an
 //! animation of morph targets.
 //!
 //! Source: Khronos Group, "glTF 2.0 Specification" (ISO/IEC 12113:2022).
@@ -9,18 +9,18 @@ use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
 
 use super::tubes::Tubes;
-use crate::figure::drawing::{Color, vein_color};
-use crate::figure::veins::is_near;
+use crate::figure::drawing::{Color, color_of_vein};
+use crate::figure::veins::is_drawable;
 use crate::relax::Equilibrium;
 use crate::simulate::{Record, Still};
 
-/// A film has no more shapes than this: each has all vertices.
+/// Most shapes of a film: each has all vertices.
 const MOST_SHAPES: usize = 61;
-/// Nor a vein more points, but for the first.
-const MOST_POINTS: usize = 32;
-/// Length of a film in seconds: what the unit of time is, nobody knows.
+/// Most segments of a vein.
+const MOST_SEGMENTS: usize = 32;
+/// Length of a film in seconds, as the unit of time is not known.
 const SECONDS: f64 = 10.0;
-/// Half the width of a vein, as part of the longest.
+/// Radius of a vein, as a fraction of the longest.
 const RADIUS: f64 = 0.004;
 
 const FLOAT: u32 = 5126;
@@ -39,7 +39,7 @@ pub fn leaf(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
     write(&equilibrium.scenario, &[(0.0, &curves[..])], radius, out)
 }
 
-/// A leaf that moves.
+/// A moving leaf.
 ///
 /// # Errors
 /// Those of `out`.
@@ -50,22 +50,22 @@ pub fn motion(record: &Record, out: &mut dyn Write) -> io::Result<()> {
         .saturating_sub(1)
         .div_ceil(MOST_SHAPES - 1)
         .max(1);
-    let shape = |still: &'_ Still| record.moments[still.moment].time;
+    let time = |still: &'_ Still| record.moments[still.moment].time;
     let mut shapes: Vec<(f64, &[Vec<DVec3>])> = film
         .iter()
         .step_by(stride)
-        .map(|still| (shape(still), &still.curves[..]))
+        .map(|still| (time(still), &still.curves[..]))
         .collect();
     if let Some(last) = film
         .last()
         .filter(|_| !(film.len().saturating_sub(1)).is_multiple_of(stride))
     {
-        shapes.push((shape(last), &last.curves[..]));
+        shapes.push((time(last), &last.curves[..]));
     }
     write(&record.scenario, &shapes, RADIUS * record.length, out)
 }
 
-/// The document, and the bytes that it is about.
+/// The buffer, with its views and accessors.
 #[derive(Default)]
 struct File {
     bytes: Vec<u8>,
@@ -74,7 +74,7 @@ struct File {
 }
 
 impl File {
-    /// Adds an array, and returns its number.
+    /// Adds an array, and returns the index of its accessor.
     fn add(
         &mut self,
         bytes: impl IntoIterator<Item = u8>,
@@ -130,7 +130,7 @@ impl File {
     }
 }
 
-/// Shapes at times; the first is the one that the others are morphed from.
+/// Writes shapes at times; the first is the base of the morph targets.
 fn write(
     name: &str,
     shapes: &[(f64, &[Vec<DVec3>])],
@@ -149,11 +149,7 @@ fn write(
     let mut file = File::default();
     let (position, normal) = (file.vectors(&base.positions), file.vectors(&base.normals));
     let colors = (0..veins).flat_map(|vein| {
-        let color = linear(vein_color(if veins > 1 {
-            vein as f64 / (veins - 1) as f64
-        } else {
-            0.3
-        }));
+        let color = linear(color_of_vein(vein, veins));
         std::iter::repeat_n(color, Tubes::vertices(points)).flatten()
     });
     let count = base.positions.len();
@@ -191,7 +187,7 @@ fn write(
     finish(name, &file, mesh, animation, out)
 }
 
-/// At the time of a shape its weight is one, and all others are zero.
+/// The animation: at the time of a shape its weight is one and all others are zero.
 fn animate(file: &mut File, shapes: &[(f64, &[Vec<DVec3>])]) -> Value {
     let (start, end) = (shapes[0].0, shapes[shapes.len() - 1].0);
     let rate = if end > start {
@@ -214,7 +210,7 @@ fn animate(file: &mut File, shapes: &[(f64, &[Vec<DVec3>])]) -> Value {
     }])
 }
 
-/// The header, the document and the bytes.
+/// Writes the header, the document and the buffer.
 fn finish(
     name: &str,
     file: &File,
@@ -265,26 +261,27 @@ fn finish(
     Ok(())
 }
 
-/// Fewer points of every vein, the tip among them; numbers gone wild end it.
+/// Fewer points of every vein, including the tip; points that cannot be drawn repeat the
+/// one before.
 fn thin(curves: &[Vec<DVec3>]) -> Vec<Vec<DVec3>> {
     let last = curves
         .first()
         .map_or(0, |curve| curve.len().saturating_sub(1));
-    let stride = (last.div_ceil(MOST_POINTS).max(1)..=last.max(1))
+    let stride = (last.div_ceil(MOST_SEGMENTS).max(1)..=last.max(1))
         .find(|stride| last.is_multiple_of(*stride));
-    let near = |mut curve: Vec<DVec3>| {
+    let drawable = |mut curve: Vec<DVec3>| {
         for i in 0..curve.len() {
-            if !is_near(curve[i]) {
+            if !is_drawable(curve[i]) {
                 curve[i] = if i > 0 { curve[i - 1] } else { DVec3::ZERO };
             }
         }
         curve
     };
     let kept = |curve: &Vec<DVec3>| curve.iter().copied().step_by(stride.unwrap_or(1)).collect();
-    curves.iter().map(|curve| near(kept(curve))).collect()
+    curves.iter().map(|curve| drawable(kept(curve))).collect()
 }
 
-/// From the colour of a screen to that which light is reckoned with, opaque.
+/// Converts a colour from sRGB to linear RGB, opaque.
 fn linear(Color(red, green, blue): Color) -> [u8; 4] {
     let of = |value: u8| {
         let value = f64::from(value) / 255.0;

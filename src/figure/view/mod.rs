@@ -1,7 +1,7 @@
 //! Leaves in space for browsers ([`page`]), ParaView ([`vtk`]) and Blender ([`glb`]).
 //!
-//! The page is a leaf to be turned, played and asked for its numbers, as one HTML file
-//! that needs nothing else.
+//! The page shows a leaf that can be rotated, played and inspected, as one self-contained
+//! HTML file.
 //!
 //! ```
 //! use leafdyn::relax::{Options, relax};
@@ -15,8 +15,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! `data.rs` says what the page is given, one file each how a result gives it; the
-//! scripts draw it. `three/` holds what is used of three.js, and how it is bundled.
+//! `data.rs` defines the data of the page, one file per kind of result fills it in, and the
+//! scripts draw it. `three/` holds the part of three.js that is used, and how it is bundled.
 
 mod boundary;
 mod data;
@@ -28,8 +28,9 @@ mod trace;
 mod tubes;
 pub mod vtk;
 
-use super::drawing::{Drawing, vein_color};
+use super::drawing::{Drawing, color_of_vein};
 use super::svg::{self, hex};
+use super::veins::is_drawn;
 use crate::report::{Document, Format, Part, json};
 use crate::scenario::{self, Scenario};
 use crate::simulate::Record;
@@ -38,9 +39,6 @@ use data::View;
 use glam::DVec3;
 use std::io::{self, Write};
 use std::path::Path;
-
-/// More veins would not be told apart.
-const MOST_VEINS: usize = 200;
 
 const FRAME: &str = include_str!("page.html");
 const STYLE: &str = include_str!("page.css");
@@ -55,11 +53,11 @@ const SCRIPTS: [&str; 5] = [
 
 /// A result that has a page.
 pub trait Viewed {
-    /// What the page is given.
+    /// Fills in the data of the page.
     #[doc(hidden)]
     fn fill(&self, view: &mut View);
 
-    /// The figure that stands in its place where a browser draws nothing in space.
+    /// The figure that replaces it in a browser without 3D graphics.
     #[doc(hidden)]
     fn still(&self, scenario: &Scenario) -> Drawing;
 }
@@ -77,10 +75,10 @@ impl<R: Viewed> Format<R> for Page {
     }
 }
 
-/// One of several: its time, or number, its stations and its centrelines.
+/// One of several shapes: its time or number, its stations and its centrelines.
 pub(crate) struct Shape<'r>(f64, &'r [f64], &'r [Vec<DVec3>]);
 
-/// Shapes for ParaView: a list of this name, and a folder of them beside it.
+/// Shapes for ParaView: a list of this name, and a folder with the shapes next to it.
 pub(crate) struct Series<R>(pub &'static str, pub fn(&R) -> Vec<Shape<'_>>);
 
 impl<R> Series<R> {
@@ -134,16 +132,13 @@ pub(crate) fn points(trace: &Trace) -> Vec<Shape<'_>> {
         .collect()
 }
 
-/// The page of a result of this scenario: a whole HTML file, which loads nothing.
+/// The page of a result of this scenario: a self-contained HTML file.
 pub fn page(result: &impl Viewed, scenario: &Scenario) -> String {
     let count = scenario.rods.len();
-    let every = count.div_ceil(MOST_VEINS).max(1);
-    let chosen = |number: &usize| (number - 1).is_multiple_of(every) || *number == count;
-    let drawn: Vec<usize> = (1..=count).filter(chosen).collect();
-    let color = |&number: &usize| match count {
-        1 => hex(vein_color(0.3)),
-        _ => hex(vein_color((number - 1) as f64 / (count - 1) as f64)),
-    };
+    let drawn: Vec<usize> = (1..=count)
+        .filter(|number| is_drawn(number - 1, count))
+        .collect();
+    let color = |&number: &usize| hex(color_of_vein(number - 1, count));
     let mut view = View {
         kind: "leaf",
         title: scenario.name.clone(),
@@ -171,9 +166,9 @@ fn assemble(view: &View, still: &Drawing) -> String {
     // Writing to memory cannot fail.
     let _ = json::write(view, &mut data);
     let _ = svg::write(still, &mut figure);
-    // In a script only `</script` and `<!--` would end the text.
+    // Within a script only `</script` and `<!--` are special.
     let data = String::from_utf8_lossy(&data).replace('<', "\\u003c");
-    // The page has names of its own.
+    // Its ids must not clash with those of the page.
     let figure = String::from_utf8_lossy(&figure).replace("<g id=", "<g class=");
     let scripts = SCRIPTS.concat();
     let parts = [
@@ -187,7 +182,7 @@ fn assemble(view: &View, still: &Drawing) -> String {
     let size: usize = parts.iter().map(|(_, part)| part.len()).sum();
     let mut page = String::with_capacity(FRAME.len() + size);
     let mut rest = FRAME;
-    // What is put in is not searched for further places.
+    // Inserted text is not searched for placeholders.
     while let Some((before, after)) = rest.split_once("{{") {
         let Some((name, after)) = after.split_once("}}") else {
             break;
@@ -220,7 +215,7 @@ mod tests {
         scenario
     }
 
-    /// What a page was given.
+    /// The data of a page.
     fn data(page: &str) -> Value {
         let (_, rest) = page.split_once("type=\"application/json\">").unwrap();
         serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
@@ -281,16 +276,16 @@ mod tests {
     }
 
     #[test]
-    fn numbers_gone_wild_make_a_page() {
-        for wild in [f64::NAN, f64::INFINITY, 1e300] {
+    fn extreme_numbers_make_a_page() {
+        for value in [f64::NAN, f64::INFINITY, 1e300] {
             let mut leaf = sample::fan(3, 8);
-            leaf.shape.rods[1].nodes[3].position.z = wild;
-            leaf.energy = Some(wild);
+            leaf.shape.rods[1].nodes[3].position.z = value;
+            leaf.energy = Some(value);
             data(&page(&leaf, &scenario(3)));
             let mut record = sample::record(3, 8);
-            record.moments[3].energy.kinetic = wild;
+            record.moments[3].energy.kinetic = value;
             record.film = record.stills.clone();
-            record.film[1].curves[0][2].x = wild;
+            record.film[1].curves[0][2].x = value;
             data(&page(&record, &scenario(3)));
         }
     }

@@ -1,4 +1,4 @@
-//! The page of a leaf that moves.
+//! The page of a moving leaf.
 
 use super::Viewed;
 use super::data::{Chart, Curve, Leaf, View};
@@ -8,10 +8,10 @@ use crate::report::simulate_lines;
 use crate::scenario::Scenario;
 use crate::simulate::{Moment, Record};
 
-/// Nodes of a vein that are drawn, but for the first.
+/// Most segments of a vein that are drawn.
 const MOST_NODES: usize = 64;
 
-/// Points of a curve.
+/// Most points of a curve.
 const MOST_POINTS: usize = 1000;
 
 impl Viewed for Record {
@@ -51,7 +51,7 @@ impl Viewed for Record {
     }
 }
 
-/// Energies and the tip in time.
+/// Energies and the tip over time.
 fn chart(moments: &[Moment], view: &View) -> Chart {
     let stride = moments.len().div_ceil(MOST_POINTS).max(1);
     let shown = || moments.iter().step_by(stride);
@@ -78,7 +78,7 @@ fn chart(moments: &[Moment], view: &View) -> Chart {
     let mut curves: Vec<Curve> = Vec::new();
     for (color, (name, of)) in energies.into_iter().enumerate() {
         let curve = curve(0, color, name, &of);
-        // What is not there needs no curve.
+        // An energy that is always zero needs no curve.
         if curve.y.iter().any(|&y| y != 0.0) {
             curves.push(curve);
         }

@@ -9,7 +9,7 @@ use crate::report::words::equilibrium_of_index;
 use crate::scenario::Scenario;
 use crate::study::{PointKind, Trace, TraceBranch, TracePoint};
 
-/// Nodes of a vein that are drawn, but for the first.
+/// Most segments of a vein that are drawn.
 const MOST_NODES: usize = 32;
 
 impl Viewed for Trace {
@@ -54,10 +54,10 @@ fn leaf(trace: &Trace, point: &TracePoint, drawn: &[usize]) -> Leaf {
     }
 }
 
-/// Coordinates of the tip and the energy against what varies.
+/// Coordinates of the tip and the energy against the varied number.
 fn chart(trace: &Trace, view: &View) -> Chart {
     type Of = fn(&TracePoint) -> f64;
-    // Of free tips the first speaks for all.
+    // Of free tips the first represents all.
     fn tip(point: &TracePoint, axis: usize) -> f64 {
         point.tips.first().map_or(f64::NAN, |tip| tip[axis])
     }

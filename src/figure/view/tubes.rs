@@ -1,4 +1,4 @@
-//! Veins as tubes: what programs need that know of no curves.
+//! Veins as tubes, for programs that do not render curves.
 
 use glam::{DVec3, Vec3};
 
@@ -12,7 +12,7 @@ pub struct Tubes {
 }
 
 impl Tubes {
-    /// Around `curves`, each with rings that are carried along without twist.
+    /// Tubes around `curves`, whose rings are transported along each curve without twist.
     pub fn around(curves: &[Vec<DVec3>], radius: f64) -> Self {
         let (mut positions, mut normals) = (Vec::new(), Vec::new());
         for curve in curves {
@@ -22,14 +22,14 @@ impl Tubes {
                 let tangent = (curve[after] - curve[before]).normalize_or(DVec3::X);
                 across = across.reject_from_normalized(tangent);
                 if across.length() < 0.1 {
-                    // Straight up, or a sharp kink: any direction across will do.
+                    // Vertical, or a sharp kink: any perpendicular direction will do.
                     across = tangent.any_orthonormal_vector();
                 }
                 across = across.normalize();
-                let beside = tangent.cross(across);
+                let binormal = tangent.cross(across);
                 for side in 0..SIDES {
                     let angle = std::f64::consts::TAU * side as f64 / SIDES as f64;
-                    let normal = angle.cos() * across + angle.sin() * beside;
+                    let normal = angle.cos() * across + angle.sin() * binormal;
                     positions.push((point + radius * normal).as_vec3());
                     normals.push(normal.as_vec3().normalize_or(Vec3::X));
                 }
@@ -38,8 +38,8 @@ impl Tubes {
         Tubes { positions, normals }
     }
 
-    /// Corners of the triangles of so many tubes around so many points each; their
-    /// ends stay open.
+    /// Corners of the triangles of `tubes` tubes around `points` points each, with open
+    /// ends.
     pub fn triangles(tubes: usize, points: usize) -> Vec<u32> {
         let ring = |tube: usize, point: usize| (tube * points + point) * SIDES;
         let mut corners = Vec::new();
@@ -57,7 +57,7 @@ impl Tubes {
         corners
     }
 
-    /// Vertices of a tube around so many points.
+    /// Vertices of a tube around `points` points.
     pub fn vertices(points: usize) -> usize {
         points * SIDES
     }

@@ -13,10 +13,10 @@ use crate::report::{Document, Format, base64};
 use crate::scenario::Radii;
 use crate::shape::NodeState;
 
-/// Numbers at all nodes, vein by vein: name, numbers a node, all of them.
+/// Values at all nodes, vein by vein: name, values per node, all values.
 struct Array<'a>(&'a str, usize, Vec<f64>);
 
-/// A leaf at rest in a file of this name: per node its vein, place along it, directors,
+/// A leaf at rest as a file of this name: per node its vein, place along it, directors,
 /// strains, forces and moments, and the radius where sections are given.
 pub(crate) struct Lines(pub &'static str);
 
@@ -79,7 +79,7 @@ fn radius(rods: usize, stations: &[f64], radii: &Radii) -> Option<Array<'static>
     radius.map(|radius| Array("radius", 1, radius))
 }
 
-/// Files that belong to values of time, or of what varies in its place.
+/// Lists files by time, or by a number that varies in its place.
 ///
 /// # Errors
 /// Those of `out`.
@@ -158,7 +158,7 @@ fn integers(
     array("Int64", name, 1, bytes.collect(), out)
 }
 
-/// The number of bytes, and these, as one text.
+/// Writes the number of bytes and the bytes as one base64 text.
 fn array(
     kind: &str,
     name: &str,

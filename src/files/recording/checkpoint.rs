@@ -1,7 +1,7 @@
-//! `checkpoint.json`: where a simulation was stopped, to go on from there.
+//! `checkpoint.json`: the state in which a simulation was stopped, to resume it.
 //!
-//! Numbers on which the motion depends are written as the hexadecimal digits
-//! of their bits: no rounding, and no doubt about it.
+//! Numbers on which the motion depends are written as the hexadecimal digits of their
+//! bits, so that they are restored exactly.
 
 use std::fs;
 use std::io::{self, Write};
@@ -17,7 +17,7 @@ pub const FILE_NAME: &str = "checkpoint.json";
 
 const BEGIN_ANEW: &str = "leave out --resume to begin anew";
 
-/// A file is not what was written: how that is known.
+/// The error that a file is damaged, with the evidence.
 pub fn damaged(file: &Path, what: &str) -> FileError {
     let file = file.display();
     FileError(format!(
@@ -25,26 +25,26 @@ pub fn damaged(file: &Path, what: &str) -> FileError {
     ))
 }
 
-/// A file cannot be read or written.
+/// The error that a file cannot be read or written.
 pub fn unreadable(file: &Path, reason: io::Error) -> FileError {
     FileError(format!("cannot resume: {}: {reason}", file.display()))
 }
 
-/// Digits of a number.
+/// Hexadecimal digits per number.
 const DIGITS: usize = 16;
 
-/// What is asked of a run: two with the same identity are the same.
+/// The identity of a run: runs with the same scenario and options are the same.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Identity {
     version: String,
     scenario: String,
-    /// Of all that the scenario says, overrides included.
+    /// Checksum of the whole scenario, overrides included.
     content: String,
     method: String,
     segments: usize,
     step: Option<String>,
     tolerance: String,
-    /// Of `--stations`.
+    /// The value of `--stations`.
     stations: Option<usize>,
 }
 
@@ -64,8 +64,8 @@ impl Identity {
         }
     }
 
-    /// What tells runs apart, with numbers as people read them.
-    fn described(&self) -> [(&'static str, String); 8] {
+    /// The properties that distinguish runs, as readable text.
+    fn descriptions(&self) -> [(&'static str, String); 8] {
         let number = |digits: &str| number(digits).map_or("?".into(), |number| number.to_string());
         let step = self.step.as_deref();
         [
@@ -86,9 +86,9 @@ impl Identity {
         ]
     }
 
-    /// The first difference from what is asked for now, in words.
+    /// Describes the first difference from the requested run.
     fn difference(&self, asked: &Identity) -> Option<String> {
-        let mut both = self.described().into_iter().zip(asked.described());
+        let mut both = self.descriptions().into_iter().zip(asked.descriptions());
         let ((what, its), (_, now)) = both.find(|(its, now)| its != now)?;
         Some(match what {
             "content" => "the scenario, or an override of it, has changed".into(),
@@ -97,7 +97,7 @@ impl Identity {
     }
 }
 
-/// How much of a file was written, as a checkpoint has it.
+/// The extent of a file at a checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Extent {
     pub file: String,
@@ -108,7 +108,7 @@ pub struct Extent {
 /// The keys, in the order in which they are written.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoint {
-    /// For people: `state` has it to the last digit.
+    /// For people only: `state` has the exact time.
     pub time: f64,
     run: Identity,
     pub motion: Extent,
@@ -119,7 +119,7 @@ pub struct Checkpoint {
 }
 
 impl Checkpoint {
-    /// Where a run is whose files have these extents, without its state.
+    /// A checkpoint without the state of the motion.
     pub fn new(
         run: Identity,
         [motion, energy]: [Extent; 2],
@@ -137,7 +137,7 @@ impl Checkpoint {
         }
     }
 
-    /// The same with the state of the motion.
+    /// Adds the state of the motion, and the checksum.
     pub fn with_state(mut self, state: &[f64]) -> Self {
         self.state = state.iter().map(|&number| digits(number)).collect();
         self.checksum = self.sum();
@@ -148,7 +148,7 @@ impl Checkpoint {
         json::write(self, out)
     }
 
-    /// The checkpoint in a folder, if it is whole and of the run asked for.
+    /// Reads the checkpoint in a folder; refused if it is damaged or of another run.
     pub fn read(folder: &Path, asked: &Identity) -> Result<Self, FileError> {
         let file = &folder.join(FILE_NAME);
         let text = fs::read(file).map_err(|reason| match reason.kind() {
@@ -173,15 +173,15 @@ impl Checkpoint {
         }
     }
 
-    /// The state of the motion; `None` if it is not one.
+    /// The state of the motion; `None` if it is malformed.
     pub fn state(&self) -> Option<Vec<f64>> {
-        let whole = self.state.is_ascii() && self.state.len().is_multiple_of(DIGITS);
+        let well_formed = self.state.is_ascii() && self.state.len().is_multiple_of(DIGITS);
         let starts = (0..self.state.len()).step_by(DIGITS);
         let numbers = starts.map(|at| number(self.state.get(at..at + DIGITS)?));
-        whole.then(|| numbers.collect())?
+        well_formed.then(|| numbers.collect())?
     }
 
-    /// Of all that the motion and its files depend on.
+    /// The checksum of everything on which the motion and its files depend.
     fn sum(&self) -> String {
         let Checkpoint {
             run,
@@ -268,18 +268,18 @@ mod tests {
     }
 
     #[test]
-    fn what_is_different_is_told() {
+    fn differences_are_reported() {
         let (folder, _) = written();
         let mut asked = identity();
-        let told = |asked: &Identity| {
+        let message = |asked: &Identity| {
             let read = Checkpoint::read(folder.path(), asked);
             read.unwrap_err().to_string()
         };
         asked.step = None;
-        assert!(told(&asked).contains(", now left to the tolerance;"));
+        assert!(message(&asked).contains(", now left to the tolerance;"));
         asked.content = "1".into();
-        assert!(told(&asked).contains(": the scenario, or an override of it, has changed;"));
+        assert!(message(&asked).contains(": the scenario, or an override of it, has changed;"));
         asked.version = "9.0.0".into();
-        assert!(told(&asked).contains(", now 9.0.0; ask for the same run"));
+        assert!(message(&asked).contains(", now 9.0.0; ask for the same run"));
     }
 }

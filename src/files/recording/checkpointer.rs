@@ -1,4 +1,4 @@
-//! What another thread needs to write a checkpoint of a simulation.
+//! Writes checkpoints of a simulation from another thread.
 
 use std::mem;
 use std::path::PathBuf;
@@ -9,12 +9,12 @@ use super::growing::Unfinished;
 use crate::files::atomic;
 use crate::report::FileError;
 
-/// Where a simulation was at its last output.
+/// The state of a simulation at its last output.
 pub struct Latest {
     pub folder: PathBuf,
     pub files: [Unfinished; 2],
     pub checkpoint: Checkpoint,
-    /// Of the motion.
+    /// The state of the motion.
     pub state: Vec<f64>,
 }
 
@@ -24,19 +24,19 @@ pub struct Checkpointer(Arc<Mutex<Option<Latest>>>);
 
 impl Checkpointer {
     pub(super) fn latest(&self) -> MutexGuard<'_, Option<Latest>> {
-        // It is replaced as a whole: whatever its last user did, it is sound.
+        // It is only replaced as a whole, so it is valid even if the lock is poisoned.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Writes `checkpoint.json`, and gives the unfinished files the names under
-    /// which a resumed run looks for them. Returns the time of the checkpoint;
-    /// `None` if there is nothing to go on from.
+    /// Writes `checkpoint.json`, and gives the unfinished files the names under which a
+    /// resumed run looks for them. Returns the time of the checkpoint; `None` if there is
+    /// nothing to resume.
     pub fn write(&self) -> Option<Result<f64, FileError>> {
         write(&mut self.latest())
     }
 
-    /// As [`Checkpointer::write`], and no recording goes on ever after: for a
-    /// program about to exit.
+    /// As [`Checkpointer::write`], and blocks all recordings from now on: for a program
+    /// about to exit.
     pub fn write_and_stop(&self) -> Option<Result<f64, FileError>> {
         let mut latest = self.latest();
         let written = write(&mut latest);
@@ -52,8 +52,8 @@ fn write(latest: &mut Option<Latest>) -> Option<Result<f64, FileError>> {
     let written = atomic::write_file(&file, |out| {
         checkpoint.write(out)?;
         out.flush()?;
-        // Only now: an older checkpoint needs the files it goes with until
-        // nothing but renaming is left to be done.
+        // Last, because an older checkpoint needs its files until this one is written and
+        // only has to be renamed.
         latest.files.iter().try_for_each(Unfinished::keep)
     });
     Some(match written {

@@ -73,7 +73,7 @@ pub fn write(moment: &Moment, out: &mut Vec<u8>) -> io::Result<()> {
     append_csv([Row::from(moment)], out)
 }
 
-/// All rows, the same as when they were written.
+/// Reads all rows, exactly as they were written.
 pub fn read(file: impl Read) -> io::Result<Vec<Moment>> {
     let mut table = csv::Reader::from_reader(file);
     let rows = table.deserialize::<Row>();

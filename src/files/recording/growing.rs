@@ -1,5 +1,5 @@
-//! A file that grows during a run, and that can be left unfinished, to be
-//! continued by another process.
+//! A file that grows during a run, and that can be left unfinished for another process
+//! to continue.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
@@ -18,11 +18,11 @@ pub struct GrowingFile {
     out: File,
     bytes: u64,
     checksum: Checksum,
-    /// What is to be appended.
+    /// Data to be appended.
     buffer: Vec<u8>,
 }
 
-/// Where an unfinished file is, and where another process looks for it.
+/// The path of an unfinished file, and the one where another process looks for it.
 #[derive(Clone, Debug)]
 pub struct Unfinished {
     draft: PathBuf,
@@ -30,7 +30,7 @@ pub struct Unfinished {
 }
 
 impl Unfinished {
-    /// Gives the file the name by which another process finds it.
+    /// Renames the file so that another process finds it.
     pub fn keep(&self) -> io::Result<()> {
         atomic::rename(&self.draft, &self.kept)
     }
@@ -61,8 +61,8 @@ impl GrowingFile {
         Ok(begun)
     }
 
-    /// Goes on with a kept file where it had this extent. Nothing is changed if it
-    /// is not what was kept.
+    /// Continues a kept file after this extent. It is not changed if its content differs
+    /// from what was kept.
     pub fn resume(file: PathBuf, extent: &Extent) -> Result<Self, FileError> {
         let kept = kept_path(&file);
         let resume = || -> io::Result<Option<Self>> {
@@ -125,13 +125,13 @@ impl GrowingFile {
         Ok(())
     }
 
-    /// Replaces the beginning of the file, as the last thing that is written.
+    /// Replaces the beginning of the file; nothing can be appended after that.
     pub fn replace_start(&mut self, bytes: &[u8]) -> Result<(), FileError> {
         let replaced = self.out.rewind().and_then(|()| self.out.write_all(bytes));
         replaced.map_err(|reason| self.failed(reason))
     }
 
-    /// Reads what was written so far.
+    /// Reads the data written so far.
     pub fn read<T>(
         &self,
         read: impl FnOnce(BufReader<File>) -> io::Result<T>,
@@ -140,7 +140,7 @@ impl GrowingFile {
         opened.and_then(read).map_err(|reason| self.failed(reason))
     }
 
-    /// Gives the file its name, and returns its path.
+    /// Gives the file its final name, and returns its path.
     pub fn finish(&mut self) -> Result<PathBuf, FileError> {
         let finished = atomic::rename(self.draft.path(), &self.file);
         finished.map_err(|reason| self.failed(reason))?;

@@ -1,9 +1,9 @@
 //! The files of a simulation, which grow while it runs.
 //!
-//! `motion.csv` (or `motion.npy`) and `energy.csv` get every output at once,
-//! under names of their own, so that memory does not grow with them. When the
-//! run has ended they get their names, and pictures and a summary are made of
-//! them. A run that is stopped can be kept instead, and resumed.
+//! Every output is written at once to `motion.csv` (or `motion.npy`) and `energy.csv`,
+//! under temporary names, so that memory does not grow. At the end of the run the files
+//! get their final names, and figures and a summary are made from them. A run that is
+//! stopped can be kept instead, and resumed.
 
 mod checkpoint;
 mod checkpointer;
@@ -34,7 +34,7 @@ use motion::{Form, Size};
 /// Shapes that a film strip shows.
 const STILLS: usize = 8;
 
-/// The files of a simulation that is under way.
+/// The files of a running simulation.
 ///
 /// ```
 /// use leafdyn::files::{Document, Recording, Selection};
@@ -68,21 +68,21 @@ pub struct Recording {
     size: Size,
     stations: Vec<f64>,
     joined: bool,
-    /// `motion` and `energy`, where they are wanted or figures are made of them.
+    /// `motion` and `energy`, if they are selected or needed for figures.
     growing: Option<[GrowingFile; 2]>,
     selection: Selection,
-    /// Positions at the last output.
+    /// Positions at the last output, if there are no growing files.
     last: Vec<DVec3>,
     moments: Vec<Moment>,
-    /// Time on the clock in processes before this one.
+    /// Wall time in earlier processes.
     wall: Duration,
     checkpointer: Checkpointer,
 }
 
 impl Recording {
-    /// Begins the files of a simulation in `folder`, which is made if it is
-    /// not there, with the leaf as it is now. Without tables and figures nothing
-    /// is written on the way, and there is nothing to resume.
+    /// Begins the files of a simulation in `folder`, which is created if missing, with the
+    /// current state of the leaf. Without tables and figures nothing is written during
+    /// the run, and there is nothing to resume.
     ///
     /// # Errors
     /// If they cannot be written.
@@ -91,7 +91,7 @@ impl Recording {
         simulation: &mut Simulation,
         selection: &Selection,
     ) -> Result<Self, FileError> {
-        let mut recording = Recording::with(folder, simulation, selection);
+        let mut recording = Recording::new(folder, simulation, selection);
         if selection.kinds.iter().any(|kind| *kind != Kind::Json) {
             atomic::make_folder(folder)?;
             let form = recording.form;
@@ -106,18 +106,17 @@ impl Recording {
         Ok(recording)
     }
 
-    /// Goes on where a simulation of the same leaf and options was stopped with a
-    /// checkpoint in `folder`: the simulation is brought there, too.
+    /// Resumes a simulation of the same leaf and options that was stopped with a checkpoint
+    /// in `folder`; also restores the state of `simulation`.
     ///
     /// # Errors
-    /// If there is no checkpoint, or it does not fit. Nothing that was kept is
-    /// lost then.
+    /// If there is no checkpoint, or it does not fit; the kept files are not changed then.
     pub fn resume(
         folder: &Path,
         simulation: &mut Simulation,
         selection: &Selection,
     ) -> Result<Self, FileError> {
-        let mut recording = Recording::with(folder, simulation, selection);
+        let mut recording = Recording::new(folder, simulation, selection);
         let found = Checkpoint::read(folder, &recording.run)?;
         let state = found.state().filter(|state| simulation.restore(state));
         state.ok_or_else(|| {
@@ -139,7 +138,7 @@ impl Recording {
         Ok(recording)
     }
 
-    fn with(folder: &Path, simulation: &Simulation, selection: &Selection) -> Self {
+    fn new(folder: &Path, simulation: &Simulation, selection: &Selection) -> Self {
         let stations = match selection.stations {
             Some(count) => equally_spaced(count),
             None => simulation.stations().to_vec(),
@@ -164,12 +163,12 @@ impl Recording {
         }
     }
 
-    /// What writes a checkpoint when the program is stopped.
+    /// Writes checkpoints of this recording, e.g. when the program is stopped.
     pub fn checkpointer(&self) -> Checkpointer {
         self.checkpointer.clone()
     }
 
-    /// Adds an output: the leaf of `simulation` now.
+    /// Adds an output: the current state of `simulation`.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -180,11 +179,11 @@ impl Recording {
             return Ok(());
         };
         let (form, stations) = (self.form, &self.stations);
-        let there = match self.selection.stations {
+        let frame = match self.selection.stations {
             Some(_) => &frame.at(simulation.stations(), stations),
             None => frame,
         };
-        motion.append(|out| form.write(there, stations, out))?;
+        motion.append(|out| form.write(frame, stations, out))?;
         if let Some(moment) = self.moments.last() {
             energy.append(|out| energy::write(moment, out))?;
         }
@@ -208,37 +207,29 @@ impl Recording {
         });
     }
 
-    /// What is known of a simulation that has ended here; nothing can be added
-    /// after that.
+    /// The record of a simulation that has ended; nothing can be added after that.
     ///
     /// # Errors
-    /// If what was written cannot be read.
+    /// If the files written so far cannot be read.
     pub fn record(
         &mut self,
         simulation: &Simulation,
         stopped: Option<Stopped>,
     ) -> Result<Record, FileError> {
         let longest = scenario::longest(&simulation.leaf().scenario().rods);
-        let (form, size) = (self.form, self.size);
-        let (chosen, shapes, nodes) = match &self.growing {
-            Some([motion, _]) => {
-                let chosen = stills(&self.moments, STILLS, longest);
-                let shapes = motion.read(|file| form.positions(size, &chosen, file))?;
-                (chosen, shapes, size.nodes)
-            }
+        let stills = match &self.growing {
+            Some(files) => self.read_stills(files, &stills(&self.moments, STILLS, longest))?,
             None => {
-                let nodes = self.last.len() / size.rods;
                 let last = self.moments.len().saturating_sub(1);
-                (vec![last], mem::take(&mut self.last), nodes)
+                let nodes = self.last.len() / self.size.rods;
+                split(
+                    &[last],
+                    &mem::take(&mut self.last),
+                    Size { nodes, ..self.size },
+                )
             }
         };
-        let still = |(moment, shape): (usize, &[DVec3])| Still {
-            moment,
-            curves: shape.chunks(nodes).map(<[DVec3]>::to_vec).collect(),
-        };
-        let stills = chosen.into_iter().zip(shapes.chunks(nodes * size.rods));
         let moments = mem::take(&mut self.moments);
-        let stills = stills.map(still).collect();
         let mut record = Record::new(simulation, stopped, moments, stills);
         if self.growing.is_some() {
             record.stations.clone_from(&self.stations);
@@ -248,29 +239,30 @@ impl Recording {
         Ok(record)
     }
 
-    /// The shapes of a film of so many outputs, if one is wanted.
+    /// The shapes of a film of this number of outputs, if one is selected.
     fn film(&self, outputs: usize) -> Result<Vec<Still>, FileError> {
-        let wanted = |kind: &Kind| Kind::FILMS.contains(kind);
-        let (Some([motion, _]), true) = (&self.growing, self.selection.kinds.iter().any(wanted))
-        else {
-            return Ok(Vec::new());
-        };
-        let (form, size) = (self.form, self.size);
-        let chosen = film(outputs, size.rows());
-        let shapes = motion.read(|file| form.positions(size, &chosen, file))?;
-        let still = |(moment, shape): (usize, &[DVec3])| Still {
-            moment,
-            curves: shape.chunks(size.nodes).map(<[DVec3]>::to_vec).collect(),
-        };
-        Ok(chosen
-            .into_iter()
-            .zip(shapes.chunks(size.rows()))
-            .map(still)
-            .collect())
+        let selected = |kind: &Kind| Kind::FILMS.contains(kind);
+        match &self.growing {
+            Some(files) if self.selection.kinds.iter().any(selected) => {
+                self.read_stills(files, &film(outputs, self.size.rows()))
+            }
+            _ => Ok(Vec::new()),
+        }
     }
 
-    /// Writes all else about the simulation, gives all files their names, and
-    /// removes what a run that was stopped has left. Returns the files.
+    /// Reads the shapes at these outputs.
+    fn read_stills(
+        &self,
+        [motion, _]: &[GrowingFile; 2],
+        outputs: &[usize],
+    ) -> Result<Vec<Still>, FileError> {
+        let (form, size) = (self.form, self.size);
+        let positions = motion.read(|file| form.positions(size, outputs, file))?;
+        Ok(split(outputs, &positions, size))
+    }
+
+    /// Writes the remaining files, gives all files their final names, and removes those left
+    /// by a stopped run. Returns the files.
     ///
     /// # Errors
     /// If a file cannot be written; a checkpoint can then still be.
@@ -280,7 +272,7 @@ impl Recording {
         let Some([motion, energy]) = &mut self.growing else {
             return Ok(files);
         };
-        // From here on there is nothing left to go on from.
+        // From here on there is nothing to resume.
         let mut latest = self.checkpointer.latest();
         if kinds.contains(&Kind::Csv) {
             let outputs = record.result.moments.len();
@@ -292,24 +284,34 @@ impl Recording {
         drop(latest);
         let file = |name: &str| self.folder.join(name);
         let other = file(self.form.other().file_name());
-        let mut left = vec![
+        let mut obsolete = vec![
             file(checkpoint::FILE_NAME),
             kept_path(&file(self.form.file_name())),
             kept_path(&other),
             kept_path(&file(energy::FILE_NAME)),
         ];
         if kinds.contains(&Kind::Csv) {
-            left.push(other);
+            obsolete.push(other);
         }
-        for left in left {
-            // What is not there need not be removed.
-            let _ = fs::remove_file(left);
+        for file in obsolete {
+            // It may not exist.
+            let _ = fs::remove_file(file);
         }
         Ok(files)
     }
 }
 
-/// Outputs of a simulation, the first and the last included.
+/// Splits the positions of all nodes at these outputs into shapes.
+fn split(outputs: &[usize], positions: &[DVec3], size: Size) -> Vec<Still> {
+    let shapes = outputs.iter().zip(positions.chunks(size.rows()));
+    let still = |(&moment, shape): (&usize, &[DVec3])| Still {
+        moment,
+        curves: shape.chunks(size.nodes).map(<[DVec3]>::to_vec).collect(),
+    };
+    shapes.map(still).collect()
+}
+
+/// The number of outputs of a simulation, including the first and the last.
 fn outputs(simulation: &Simulation) -> usize {
     simulation.frames().0 + 1
 }

@@ -1,5 +1,4 @@
-//! The leaf at all outputs: `motion.csv`, or where that would be long
-//! `motion.npy`.
+//! The leaf at all outputs: `motion.csv`, or `motion.npy` for long motions.
 
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
@@ -37,10 +36,10 @@ struct Row {
 /// Numbers per node of a NumPy array: the columns from `x` on.
 const NUMBERS: usize = 13;
 
-/// Bytes before them.
+/// Bytes of the header of the array.
 const NPY_HEADER: usize = 128;
 
-/// How the leaf is written down.
+/// The file format of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     Table,
@@ -51,7 +50,7 @@ pub enum Form {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
     pub rods: usize,
-    /// Of each rod.
+    /// Nodes of each rod.
     pub nodes: usize,
 }
 
@@ -63,7 +62,7 @@ impl Size {
 }
 
 impl Form {
-    /// The form in which so many outputs are written.
+    /// The format for this number of outputs.
     pub fn of(size: Size, outputs: usize) -> Self {
         match size.rows().saturating_mul(outputs) {
             0..=MOST_ROWS => Form::Table,
@@ -85,7 +84,7 @@ impl Form {
         }
     }
 
-    /// What stands before the first of so many outputs.
+    /// The header of a file with this number of outputs.
     pub fn start(self, size: Size, outputs: usize) -> Vec<u8> {
         match self {
             Form::Table => header(Row::default()),
@@ -106,7 +105,7 @@ impl Form {
         }
     }
 
-    /// The positions of all nodes at some of the outputs, in rising order.
+    /// Reads the positions of all nodes at some outputs, given in increasing order.
     pub fn positions(
         self,
         size: Size,
@@ -173,7 +172,7 @@ fn read_rows(size: Size, outputs: &[usize], file: impl Read) -> io::Result<Vec<D
     Ok(points)
 }
 
-/// Format 1.0: magic, version, length of the rest, and the rest in Python.
+/// Format 1.0: magic bytes, version, length of the rest, and a Python dictionary.
 fn npy_header(size: Size, outputs: usize) -> Vec<u8> {
     let Size { rods, nodes } = size;
     let shape = format!("({outputs}, {rods}, {nodes}, {NUMBERS})");

@@ -50,7 +50,7 @@ mod tests {
     use super::*;
     use crate::report::sample;
 
-    /// And numbers keep every digit, or are null.
+    /// Numbers keep every digit, or are null.
     #[test]
     fn keys_and_their_order_are_fixed() {
         let wanted = [

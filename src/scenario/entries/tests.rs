@@ -22,7 +22,7 @@ fn with(overrides: &[&str]) -> Result<Scenario, ScenarioError> {
     Scenario::from_toml_with(TEXT, "three.toml", &overrides)
 }
 
-/// A part against the whole value that it makes.
+/// Compares overrides of parts with those of whole values.
 #[test]
 fn parts_and_scales_are_whole_values() {
     for (parts, whole) in [
@@ -161,8 +161,8 @@ fn slips_are_explained() {
     }
 }
 
-/// What is made of values alone, as of a dictionary, is what the text says; and what
-/// is replaced there, what is replaced in the text.
+/// Values without a text, as from a dictionary, give the same scenario as the text, also
+/// with overrides.
 #[test]
 fn entries_are_those_of_the_text() {
     let texts = [
