@@ -240,7 +240,10 @@ fn a_folder_belongs_to_one_scenario() {
     let place = Workplace::new();
     fs::create_dir(place.path("other")).unwrap();
     fs::write(place.path("other/leaf.toml"), leaf("small", 3)).unwrap();
+    let tips = "load.tip_force[2],tip_z,sd_tip_z\n0.0,-0.12,0.01\n0.2,-0.1,0.01\n";
+    fs::write(place.path("tips.csv"), tips).unwrap();
     for (first, file) in [
+        ("fit --data tips.csv --free stiffness.bending_2", "fit"),
         ("check", "check"),
         ("relax", "summary"),
         ("relax --all", "equilibria"),

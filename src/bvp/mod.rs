@@ -38,11 +38,11 @@
 //! the direction in which the leaf can move without resistance.
 
 mod arcs;
-mod condensed;
 mod continuation;
 mod dop853;
 mod equations;
 mod intervals;
+mod march;
 mod neutral;
 mod newton;
 mod propagate;

@@ -6,10 +6,10 @@
 //! corrections with corrections, and is therefore independent of the scaling of the
 //! equations and of their conditioning.
 
-use super::condensed::Condensed;
 use super::dop853::Unbounded;
 use super::equations::{Equations, RodState};
 use super::intervals::{Integrated, Units, choose_intervals, integrate, responses, sensitivities};
+use super::march::March;
 use super::solution::{Correction, Log, Reason};
 use super::trajectory::{Nodes, Trajectory};
 use crate::memory::Request;
@@ -48,7 +48,7 @@ pub struct Newton<'e, 'a, 'p> {
     /// Whether to solve without damping, only if the start is near the solution.
     pub only_near: bool,
     /// The last linearisation.
-    pub condensed: Option<Condensed>,
+    pub condensed: Option<March>,
     /// Growth of perturbations over each interval, at that linearisation.
     pub growth: Vec<f64>,
     /// Largest defect at the last evaluation, in the units.
@@ -196,7 +196,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         };
         let maps = sensitivities(self.equations, &self.units, &responses, &mut self.growth);
         self.log.work.linearizations += 1;
-        self.condensed = Condensed::new(self.equations, &self.units, maps);
+        self.condensed = March::new(self.equations, &self.units, maps);
         match self.condensed {
             Some(_) => Ok(residuals),
             None => Err(NewtonFailure::NoProgress(f64::INFINITY)),
@@ -258,7 +258,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
 }
 
 impl Residuals {
-    fn largest(&self, condensed: Option<&Condensed>) -> f64 {
+    fn largest(&self, condensed: Option<&March>) -> f64 {
         let tip = condensed.map(|condensed| condensed.scaled(&self.conditions));
         let defects = self.defects.iter().chain(&tip).flatten();
         defects.fold(0.0, |m, value| value.abs().max(m))

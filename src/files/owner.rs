@@ -8,10 +8,10 @@ use std::path::{Component, Path, PathBuf, absolute};
 use crate::relax::Equilibrium;
 use crate::report::{FileError, Written};
 use crate::simulate::Record;
-use crate::study::{All, Boundary, Chart, Check, Map, Trace};
+use crate::study::{All, Boundary, Chart, Check, Fit, Map, Trace};
 
 /// The JSON files of all verbs.
-const FILES: [Option<&str>; 8] = [
+const FILES: [Option<&str>; 9] = [
     Equilibrium::JSON,
     All::JSON,
     Check::JSON,
@@ -20,6 +20,7 @@ const FILES: [Option<&str>; 8] = [
     Boundary::JSON,
     Map::JSON,
     Chart::JSON,
+    Fit::JSON,
 ];
 
 /// How a result in `folder` names the file of its scenario: by the relative path, so

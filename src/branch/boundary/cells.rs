@@ -1,7 +1,7 @@
 //! Equilibria at points of the parameter plane, each continued from a neighbouring one.
 
+use super::manifold::Solution;
 use super::plane::Plane;
-use super::sheet::Solution;
 use crate::branch::Point;
 use crate::branch::critical::Critical;
 use crate::branch::equations::{Equations, Stuck};

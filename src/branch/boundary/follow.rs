@@ -4,10 +4,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use super::halt::Halt;
-use super::place::{Seed, SingularPoint};
+use super::manifold::Manifold;
 use super::plane::Plane;
 use super::search::NotFound;
-use super::sheet::Manifold;
+use super::singular_point::{Seed, SingularPoint};
 use super::table::Verified;
 use super::walk::{Walk, WalkOptions};
 use crate::branch::critical::Kind;

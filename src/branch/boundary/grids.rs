@@ -1,9 +1,9 @@
 //! Transfer of boundary points to finer and coarser grids.
 
-use super::place::SingularPoint;
+use super::manifold::{Direction, Manifold, Solution};
 use super::plane::Plane;
 use super::search::NotFound;
-use super::sheet::{Direction, Manifold, Solution};
+use super::singular_point::SingularPoint;
 use crate::branch::field::prolong as prolong_field;
 use crate::leaf::{Field, Grid, State};
 use crate::relax::prolong::prolong;

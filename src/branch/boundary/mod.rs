@@ -27,30 +27,30 @@
 //! along that; in the same plane across the curve, where it goes along neither), and
 //! extrapolated.
 
-mod beside;
 mod cells;
 mod follow;
 mod grids;
 mod halt;
-mod place;
+mod manifold;
+mod neighbours;
 mod plane;
 mod refine;
 mod search;
-mod sheet;
+mod singular_point;
 mod special;
 mod table;
 mod walk;
 
-pub use beside::{Neighbour, beside};
 pub use cells::{AtRest, Path, follow_path, recount, refine_on_path};
 pub use follow::{Boundary, follow};
 pub use halt::Halt;
-pub use place::Seed;
+#[cfg(test)]
+pub use manifold::Direction;
+pub use manifold::Solution;
+pub use neighbours::{Neighbour, beside};
 pub use plane::Plane;
 pub use refine::Accuracy;
-#[cfg(test)]
-pub use sheet::Direction;
-pub use sheet::Solution;
+pub use singular_point::Seed;
 pub use special::Special;
 pub use table::Verified;
 pub use walk::WalkOptions;

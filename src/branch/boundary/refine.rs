@@ -1,10 +1,10 @@
 //! Points of a boundary on finer and finer grids: extrapolated and thereby verified.
 
 use super::grids::{on_coarser, on_finer};
-use super::place::SingularPoint;
+use super::manifold::{Direction, Manifold, Solution};
 use super::plane::Plane;
 use super::search::{Found, NotFound, Search};
-use super::sheet::{Direction, Manifold, Solution};
+use super::singular_point::SingularPoint;
 use super::special::{Special, locate_near};
 use super::table::{Parameters, Table, Verified};
 use crate::branch::critical::Kind;

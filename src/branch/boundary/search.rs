@@ -1,6 +1,6 @@
 //! The search for a point of a boundary: the zero of an eigenvalue across it.
 
-use super::sheet::{Direction, Manifold, Sample, Solution};
+use super::manifold::{Direction, Manifold, Sample, Solution};
 use crate::branch::equations::{ITERATIONS, LARGEST, Stuck};
 use crate::branch::field::{add, combined, dot, is_finite, largest, times};
 use crate::leaf::Field;

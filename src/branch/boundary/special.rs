@@ -1,8 +1,8 @@
 //! Special points of a boundary: cusps, and crossings with another boundary.
 
-use super::place::SingularPoint;
+use super::manifold::Manifold;
 use super::search::{NotFound, Search};
-use super::sheet::Manifold;
+use super::singular_point::SingularPoint;
 use crate::branch::critical::Kind;
 use crate::branch::equations::Stuck;
 

@@ -1,8 +1,8 @@
 //! A point of a boundary, extrapolated over finer and finer grids.
 
-use super::place::SingularPoint;
+use super::manifold::{Direction, Manifold};
 use super::search::NotFound;
-use super::sheet::{Direction, Manifold};
+use super::singular_point::SingularPoint;
 use super::special::Special;
 use crate::branch::critical::Kind;
 use crate::leaf::State;

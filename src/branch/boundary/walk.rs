@@ -4,11 +4,11 @@ use rayon::prelude::*;
 
 use super::grids::on_finer;
 use super::halt::Halt;
-use super::place::SingularPoint;
+use super::manifold::Manifold;
 use super::plane::Plane;
 use super::refine::{Accuracy, Step, refine};
 use super::search::NotFound;
-use super::sheet::Manifold;
+use super::singular_point::SingularPoint;
 use super::special::{at_distance, at_value, special_between};
 use super::table::Verified;
 use crate::branch::equations::Stuck;

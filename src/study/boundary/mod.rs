@@ -1,9 +1,9 @@
 //! `trace` over two parameters: the boundary of stability as curves in their plane.
 
-mod beside;
 mod compare;
 mod known;
 mod map;
+mod neighbours;
 mod result;
 mod run;
 

@@ -4,9 +4,9 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::beside::add_leaves;
 use super::known::{Start, coarsened, remove_known, traced};
 use super::map::{Cells, Unexplained};
+use super::neighbours::add_leaves;
 use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, CurveEnd, word};
 use super::{BoundaryRequest, MOST_CURVES};
 use crate::branch::Family;

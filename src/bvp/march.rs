@@ -16,7 +16,7 @@ use super::intervals::Units;
 pub const SINGULAR: f64 = 1e-10;
 
 /// The condensed equations, factorised.
-pub struct Condensed {
+pub struct March {
     maps: Vec<Mat<f64>>,
     /// Orthonormal bases of the free perturbations at the inner nodes.
     bases: Vec<Mat<f64>>,
@@ -30,7 +30,7 @@ pub struct Condensed {
     units: Units,
 }
 
-impl Condensed {
+impl March {
     /// Propagates the sensitivities to the tip. `None` if they are not finite.
     pub fn new(equations: &Equations, units: &Units, maps: Vec<Mat<f64>>) -> Option<Self> {
         let (mut bases, mut growths) = (Vec::new(), Vec::new());
@@ -51,7 +51,7 @@ impl Condensed {
             return None;
         }
         let svd = conditions.svd().ok()?;
-        Some(Condensed {
+        Some(March {
             maps,
             bases,
             growths,
@@ -198,11 +198,11 @@ mod tests {
         Scenario::from_toml(&text).unwrap()
     }
 
-    fn condensed(joined: bool, maps: Vec<Mat<f64>>) -> Option<Condensed> {
+    fn condensed(joined: bool, maps: Vec<Mat<f64>>) -> Option<March> {
         let scenario = scenario(joined);
         let equations = Equations::new(&scenario);
         let units = Units::new(&equations, &Trajectory::straight(&equations));
-        Condensed::new(&equations, &units, maps)
+        March::new(&equations, &units, maps)
     }
 
     /// Pseudo-random numbers in -1..1.

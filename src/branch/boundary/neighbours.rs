@@ -4,9 +4,9 @@ use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use super::grids::{every_second, state_on_coarser};
+use super::manifold::{Direction, Manifold, Solution};
 use super::plane::Plane;
 use super::search::NotFound;
-use super::sheet::{Direction, Manifold, Solution};
 use super::table::Verified;
 use crate::branch::critical::Kind;
 use crate::leaf::{Grid, Leaf, State};

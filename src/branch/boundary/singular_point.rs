@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
+use super::manifold::{Direction, Manifold, Sample, Solution};
 use super::search::{self, Eigen, Found, NotFound, Search};
-use super::sheet::{Direction, Manifold, Sample, Solution};
 use crate::branch::critical::{Critical, Kind};
 use crate::branch::deflation::STIFF;
 use crate::branch::equations::Stuck;
