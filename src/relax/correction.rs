@@ -91,7 +91,7 @@ impl<'a> Tangents<'a> {
         jumps.iter().enumerate().map(ends).collect()
     }
 
-    /// At the beginning of part `k` of rod `j`, as [`node`](crate::relax::shape::node) takes
+    /// At the beginning of part `k` of rod `j`, as [`resultants`](crate::relax::shape::resultants) takes
     /// forces and moments: from the segment before it.
     fn change(
         &self,

@@ -4,7 +4,6 @@ use crate::leaf::RodFields;
 use crate::relax::level::Level;
 use crate::relax::richardson::Richardson;
 use crate::relax::shape;
-use crate::shape::NodeState;
 use glam::{DQuat, DVec3};
 
 /// Values carried per node through the extrapolation: position, quaternion, n, m.
@@ -54,21 +53,25 @@ impl<'l> RodNodes<'l> {
         }
     }
 
-    /// The fields at the ends of `n` parts, from those grids that have them.
-    pub fn extrapolated(&mut self, n: usize) -> Vec<Node> {
+    /// The fields at the ends of so many `parts`, from those grids that have them.
+    pub fn extrapolated(&mut self, parts: usize) -> Vec<Node> {
         let (rod, signs) = (self.rod, &self.signs);
         let mut table = Richardson::default();
         let mut count = 0;
         for (level, known) in &mut self.levels {
             let segments = level.leaf.segments();
-            if !segments.is_multiple_of(n) {
+            if !segments.is_multiple_of(parts) {
                 continue;
             }
-            let stride = segments / n;
-            let values = (0..=n).flat_map(|i| {
+            let stride = segments / parts;
+            let values = (0..=parts).flat_map(|i| {
                 *known[i * stride].get_or_insert_with(|| {
-                    let node = shape::node(&level.leaf, &level.state, rod, i * stride);
-                    pack(&node, signs[i * ((signs.len() - 1) / n)])
+                    let state = &level.state;
+                    let k = state.base(rod) + i * stride;
+                    let [n, m] = shape::resultants(&level.leaf, state, rod, i * stride);
+                    // A rotation's two quaternions must not be mixed up between grids.
+                    let q = alike(state.q[k], signs[i * ((signs.len() - 1) / parts)]);
+                    numbers(state.x[k], q, n, m)
                 })
             });
             table.push(segments, values.collect());
@@ -86,12 +89,6 @@ fn rotations(level: &Level, j: usize) -> Vec<DQuat> {
         rotations.push(alike(q, rotations.last().copied().unwrap_or(q)));
     }
     rotations
-}
-
-fn pack(node: &NodeState, reference: DQuat) -> Node {
-    // A rotation's two quaternions must not be mixed up between grids.
-    let q = alike(node.rotation, reference);
-    numbers(node.position, q, node.n, node.m)
 }
 
 /// The numbers of a node, forces and moments along its directors.

@@ -4,15 +4,29 @@ use crate::leaf::{DiscreteLeaf, Leaf, State};
 use crate::shape::NodeState;
 use glam::DVec3;
 
-/// The state of node `i` of rod `j`, dimensionless.
-///
-/// Forces and moments are taken from the balance of the node's half-cell and
-/// the end moments of the adjoining segment, strains from them by eqs (5) and
-/// (6): all of them then have the clean ds^2 series of the positions.
+/// The state of node `i` of rod `j`, dimensionless: strains follow from the stress
+/// resultants by eqs (5) and (6).
 pub fn node(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> NodeState {
-    let n = leaf.segments();
+    let [n, m] = resultants(leaf, state, j, i);
     let k = state.base(j) + i;
-    let to_directors = state.q[k].conjugate();
+    let mut node = NodeState {
+        position: state.x[k],
+        rotation: state.q[k],
+        v: DVec3::X,
+        u: DVec3::ZERO,
+        n,
+        m,
+    };
+    strains(&leaf.leaf, j, leaf.grid.sigma()[i], &mut node);
+    node
+}
+
+/// Stress resultant n and couple m at node `i` of rod `j` along its directors, dimensionless:
+/// from the balance of the node's half-cell and the end moments of the adjoining segment, so
+/// that they have the clean ds^2 series of the positions.
+pub fn resultants(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> [DVec3; 2] {
+    let n = leaf.segments();
+    let to_directors = state.q[state.base(j) + i].conjugate();
     let carried = |i: usize| state.n[j * n + i];
     let segment = |i: usize| {
         leaf.segment(state, j, i, carried(i))
@@ -31,16 +45,7 @@ pub fn node(leaf: &DiscreteLeaf, state: &State, j: usize, i: usize) -> NodeState
         let force = carried(i - 1) - load * (left / (left + right));
         (force, segment(i - 1).2)
     };
-    let mut node = NodeState {
-        position: state.x[k],
-        rotation: state.q[k],
-        v: DVec3::X,
-        u: DVec3::ZERO,
-        n: to_directors * force,
-        m: to_directors * moment,
-    };
-    strains(&leaf.leaf, j, leaf.grid.sigma()[i], &mut node);
-    node
+    [force, moment].map(|vector| to_directors * vector)
 }
 
 /// Sets v and u of a node from its n and m by the constitutive law.
