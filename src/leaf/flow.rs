@@ -97,7 +97,7 @@ impl<'a> Flow<'a> {
 
     /// Writes down what each rod, which is as `begin` says at sigma = `from`, is after every
     /// one of so many equal steps to `to` as there are slices.
-    pub fn carry(
+    pub fn integrate(
         &mut self,
         begin: impl Fn(usize) -> RodFields,
         [from, to]: [f64; 2],
@@ -258,7 +258,7 @@ mod tests {
             m: CURVATURE * DVec3::Z,
         };
         let mut after = vec![Slice::default(); steps];
-        Flow::new(&leaf).carry(begin, [0.0, 1.0], &mut after);
+        Flow::new(&leaf).integrate(begin, [0.0, 1.0], &mut after);
         let off = |(k, slice): (usize, &Slice)| {
             let angle = CURVATURE * (k + 1) as f64 / steps as f64;
             let circle = DVec3::new(angle.sin(), 1.0 - angle.cos(), 0.0) / CURVATURE;

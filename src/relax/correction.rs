@@ -12,27 +12,27 @@ const ACCURACY: f64 = 1e-6;
 /// Changes of position, rotation, force and moment.
 pub type Change = [DVec3; 4];
 
-/// The linear equations of a leaf on a grid that is divided into equal parts of `part`
-/// segments, at the midpoints of which its fields jump.
+/// The linearised equations of a leaf on a grid that is divided into equal parts of `part`
+/// segments; its fields may jump at their midpoints.
 pub struct Tangents<'a> {
     level: &'a Level,
     part: usize,
-    /// The segments that begin at the midpoints, rod after rod.
+    /// The segments just beyond the midpoints, rod after rod.
     behind: Vec<Vec<Tangent>>,
-    /// The first segment, and those that end where parts do: once they are asked for.
+    /// The first segment and the last of every part; computed on first use.
     at_ends: Vec<Vec<Tangent>>,
 }
 
 /// The first-order response to jumps.
 pub struct Response {
-    /// Displacements and turns of all nodes but the bases.
+    /// Displacements and rotations of all nodes but the bases.
     solution: Field,
     at_ends: f64,
     between: f64,
 }
 
 impl<'a> Tangents<'a> {
-    /// Of the leaf of `level`, in so many parts.
+    /// Of the leaf of `level`, divided into `parts` parts.
     pub fn new(level: &'a Level, parts: usize) -> Self {
         let Level { leaf, state } = level;
         let part = leaf.segments() / parts;
@@ -73,7 +73,7 @@ impl<'a> Tangents<'a> {
         })
     }
 
-    /// The changes of all fields that belong to a response, at the ends of the parts.
+    /// The changes of all fields in a response, at the ends of the parts.
     pub fn changes(&mut self, response: &Response, jumps: &[Vec<Jump>]) -> Vec<Vec<Change>> {
         let Level { leaf, state } = self.level;
         if self.at_ends.is_empty() {
@@ -106,7 +106,7 @@ impl<'a> Tangents<'a> {
         let ([begin, mut a], [end, b]) = (response.at(j, s), response.at(j, s + 1));
         let mut across = end - begin;
         if s % self.part == self.part / 2 {
-            // That segment begins behind the jump at the midpoint.
+            // This segment begins just beyond the jump at the midpoint.
             let [shift, turn, ..] = jumps[s / self.part];
             a += turn;
             across -= shift;
@@ -114,10 +114,11 @@ impl<'a> Tangents<'a> {
         let tangent = &self.at_ends[j][k];
         let (segment, second, (_, g_a, g_b)) = (&tangent.segment, &tangent.second, tangent.first);
         let (section, zero) = (leaf.section(j, s), DVec3::ZERO);
-        // Without the part that closes the remaining gap of the segment.
+        // Without the part that closes the segment's remaining gap (residual of its
+        // constitutive law).
         let force = segment.force_increment(section, across, a, b)
             - segment.force_increment(section, zero, zero, zero);
-        // A moment along the lab axes does not turn with its node.
+        // A moment with fixed lab components does not rotate with its node.
         if i == 0 {
             let moment = second.xa.transpose() * across + second.aa * a + second.ab * b;
             return [zero, zero, force, -moment - 0.5 * a.cross(g_a)];
@@ -136,12 +137,12 @@ impl<'a> Tangents<'a> {
 }
 
 impl Response {
-    /// The largest displacements at the ends of the parts, and at the midpoints on either side.
+    /// The largest displacements at the ends of the parts, and on either side of the midpoints.
     pub fn largest(&self) -> [f64; 2] {
         [self.at_ends, self.between]
     }
 
-    /// Displacement and turn of node `i` of rod `j`.
+    /// Displacement and rotation of node `i` of rod `j`.
     fn at(&self, j: usize, i: usize) -> [DVec3; 2] {
         match i {
             0 => [DVec3::ZERO; 2],
@@ -150,8 +151,8 @@ impl Response {
     }
 }
 
-/// The largest turn, and the largest change of a force or moment.
-pub fn largest_others(changes: &[Vec<Change>]) -> [f64; 2] {
+/// The largest rotation, and the largest change of a force or moment.
+pub fn largest_rotation_and_stress(changes: &[Vec<Change>]) -> [f64; 2] {
     let most = |of: fn(&Change) -> f64| changes.iter().flatten().map(of).fold(0.0, larger);
     [
         most(|[_, turn, ..]| turn.length()),
@@ -170,7 +171,7 @@ pub fn apply(changes: &[Vec<Change>], known: &mut [Vec<RodFields>]) {
     }
 }
 
-/// The larger of two; NaN if one is.
+/// The larger of two numbers; the second if either is NaN.
 pub fn larger(a: f64, b: f64) -> f64 {
     if b <= a { a } else { b }
 }

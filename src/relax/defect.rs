@@ -14,23 +14,23 @@
 
 use crate::leaf::{DiscreteLeaf, Flow, Grid, Jump, RodFields, Slice, System};
 use crate::newton::Work;
-use crate::relax::correction::{Response, Tangents, apply, larger, largest_others};
+use crate::relax::correction::{Response, Tangents, apply, larger, largest_rotation_and_stress};
 use crate::relax::level::Level;
 use crate::relax::nodes::nodes;
 use crate::rotation;
 use glam::DVec3;
 
-/// The linear equations are those of so many grids before the finest, but not of the
+/// The linear equations are those of the grid so many levels below the finest, but not of the
 /// coarsest.
 const COARSER: usize = 2;
 
-/// The part of the error that remains after a correction, before it has been measured; and
-/// the largest part with which corrections go on.
+/// The part of the error assumed to remain after a correction before it has been measured, and
+/// the largest measured part with which corrections continue.
 const CONTRACTION: f64 = 0.01;
 const SLOWEST: f64 = 0.2;
 
-/// So many times the error of the positions may be that of rotations, and of forces and
-/// moments, of a corrected leaf, dimensionless: as it is of one that is extrapolated.
+/// Errors of rotations, and of forces and moments, allowed in a corrected leaf, in multiples
+/// of that of the positions (dimensionless): as they are in an extrapolated one.
 const TURNS: f64 = 10.0;
 const FORCES: f64 = 50.0;
 
@@ -44,15 +44,15 @@ pub struct Linear {
 pub struct Estimate {
     /// The largest error of a position at the nodes of the coarsest grid.
     pub at_nodes: f64,
-    /// The largest at the midpoints between them, on either side.
+    /// The largest error on either side of the midpoints between them.
     pub between: f64,
     /// The leaf at the nodes of `grid`, rod after rod, dimensionless.
     pub rods: Vec<Vec<RodFields>>,
     /// Its potential energy, dimensionless.
     pub energy: f64,
-    /// The finest grid or, of a corrected leaf, with as many segments as its accuracy needs.
+    /// The finest grid or, for a corrected leaf, one with as many segments as its accuracy needs.
     pub grid: Grid,
-    /// How often the leaf was corrected.
+    /// Number of corrections.
     pub corrections: usize,
 }
 
@@ -92,8 +92,8 @@ pub fn estimate(
     let estimate = |round: &Round, corrections: usize, halvings: usize| Estimate {
         at_nodes: round.largest[0],
         between: round.largest[1],
-        rods: round.carried.rods(&round.known),
-        energy: round.carried.energy,
+        rods: round.integrated.rods(&round.known),
+        energy: round.integrated.energy,
         grid: (0..halvings).fold(finest_grid.clone(), |grid, _| grid.refined()),
         corrections,
     };
@@ -108,8 +108,8 @@ pub fn estimate(
             break;
         };
         let largest = larger(round.largest[0], round.largest[1]);
-        // Halved steps reveal the error of the integration before, which says nothing about
-        // the contraction.
+        // With halved steps the estimate includes the integration error of the longer steps:
+        // its ratio is no measure of the contraction.
         let contraction = match corrections == 0 || halved {
             true => CONTRACTION,
             false => largest / before,
@@ -125,7 +125,7 @@ pub fn estimate(
         }
         let changes = match last {
             true => Vec::new(),
-            false => tangents.changes(&response, &round.carried.jumps),
+            false => tangents.changes(&response, &round.integrated.jumps),
         };
         if last {
             return Some(estimate(&round, corrections, halvings));
@@ -133,8 +133,8 @@ pub fn estimate(
         if corrections == 0 {
             uncorrected = Some(round);
         } else if largest <= enough && halved {
-            // Halved steps have revealed the error of the integration, too.
-            let [turn, stress] = largest_others(&changes);
+            // The halved steps have accounted for the integration error, too.
+            let [turn, stress] = largest_rotation_and_stress(&changes);
             if larger(turn / TURNS, stress / FORCES) <= enough {
                 return Some(estimate(&round, corrections, halvings));
             }
@@ -147,16 +147,16 @@ pub fn estimate(
     uncorrected.map(|round| estimate(&round, 0, 0))
 }
 
-/// A leaf at the nodes of the coarsest grid, carried along its rods, and its largest
+/// A leaf given at the nodes of the coarsest grid, integrated along its rods, with its largest
 /// errors at these nodes and at the midpoints between them.
 struct Round {
     known: Vec<Vec<RodFields>>,
-    carried: Carried,
+    integrated: Integrated,
     largest: [f64; 2],
 }
 
-/// The leaf `known`, carried in so many `steps` from every node to the midpoints, and its
-/// response to the jumps there. `None` where the linear equations cannot be solved.
+/// The leaf `known`, integrated in `steps` steps from every node to the midpoints, and its
+/// response to the jumps there. `None` if the linear equations cannot be solved.
 fn round(
     first: &DiscreteLeaf,
     flow: &mut Flow,
@@ -164,18 +164,18 @@ fn round(
     steps: usize,
     (tangents, system): (&Tangents, &mut System),
 ) -> Option<(Response, Round)> {
-    let carried = carried(first, flow, known, steps);
-    let response = tangents.response(system, &carried.jumps)?;
+    let integrated = integrated(first, flow, known, steps);
+    let response = tangents.response(system, &integrated.jumps)?;
     let round = Round {
         known: known.to_vec(),
-        carried,
+        integrated,
         largest: response.largest(),
     };
     Some((response, round))
 }
 
-/// The equations at rest: those of the last Newton step have the forces before it, which
-/// differ where rods are rigid.
+/// Assembled anew at rest: the equations of the last Newton step have the forces before it,
+/// which differ where rods are rigid.
 fn factorized(level: &Level, work: &mut Work) -> Option<System> {
     let mut system = System::new(&level.leaf);
     work.force_evaluations += 1;
@@ -188,22 +188,22 @@ fn factorized(level: &Level, work: &mut Work) -> Option<System> {
     regular.then_some(system)
 }
 
-/// A leaf along its rods.
-struct Carried {
+/// A leaf integrated along its rods.
+struct Integrated {
     /// After every step from the two ends of a part to its midpoint, part after part.
     slices: Vec<[Vec<Slice>; 2]>,
     jumps: Vec<Vec<Jump>>,
     energy: f64,
 }
 
-/// The leaf `known` at the nodes of the coarsest grid carried from there to the midpoints
-/// between them in so many `steps`, and the jumps there.
-fn carried(
+/// The leaf `known` at the nodes of the coarsest grid, integrated from there to the midpoints
+/// between them in `steps` steps, and the jumps there.
+fn integrated(
     first: &DiscreteLeaf,
     flow: &mut Flow,
     known: &[Vec<RodFields>],
     steps: usize,
-) -> Carried {
+) -> Integrated {
     let (grid, n) = (&first.grid, first.segments());
     let mut slices = vec![[(); 2].map(|()| vec![Slice::default(); steps]); n];
     let mut jumps = vec![Vec::with_capacity(n); first.rods()];
@@ -211,13 +211,13 @@ fn carried(
     for (i, ends) in slices.iter_mut().enumerate() {
         let [before, behind] = &mut *ends;
         for (k, after, sign) in [(i, before, 1.0), (i + 1, behind, -1.0)] {
-            flow.carry(|j| known[j][k], [grid.sigma()[k], grid.middle(i)], after);
+            flow.integrate(|j| known[j][k], [grid.sigma()[k], grid.middle(i)], after);
             energy += sign * flow.energy();
         }
         for (j, jumps) in jumps.iter_mut().enumerate() {
             let [a, b] = at_midpoint(ends, j);
             let jump = jump(&a, &b);
-            // Less the work of closing the jump: the energy then has a second-order error only.
+            // Minus the work of closing the jump: the energy error is then of second order.
             energy -= a.n.dot(jump[0]) + a.m.dot(jump[1]);
             jumps.push(jump);
         }
@@ -227,21 +227,21 @@ fn carried(
             .last()
             .map_or(0.0, |tip| first.tip_force(j).dot(tip.x));
     }
-    Carried {
+    Integrated {
         slices,
         jumps,
         energy,
     }
 }
 
-/// Rod `j` at the midpoint of a part, carried there from either end.
+/// Rod `j` at the midpoint of a part, integrated from either end.
 fn at_midpoint(ends: &[Vec<Slice>; 2], j: usize) -> [RodFields; 2] {
     ends.each_ref()
         .map(|slices| slices.last().expect("a step at least").rod(j))
 }
 
-impl Carried {
-    /// All rods at the ends of all steps from `known`; at midpoints the mean of both sides.
+impl Integrated {
+    /// All rods at the ends of all steps from `known`; at midpoints the mean of the two sides.
     fn rods(&self, known: &[Vec<RodFields>]) -> Vec<Vec<RodFields>> {
         let rod = |(j, known): (usize, &Vec<RodFields>)| {
             let steps = self.slices.first().map_or(0, |[before, _]| before.len());
@@ -262,8 +262,8 @@ impl Carried {
 }
 
 /// Makes forces and moments at the tips satisfy the end conditions, which unfinished
-/// iterations violate slightly: the linear equations take them for satisfied. Those of a rod
-/// in the mirror plane are made to keep it there.
+/// iterations violate slightly: the linear equations assume them. For a rod in the mirror
+/// plane the components that would move it out of the plane are set to zero.
 fn satisfy_tip_conditions(leaf: &DiscreteLeaf, known: &mut [Vec<RodFields>]) {
     for (j, rod) in known.iter_mut().enumerate() {
         for node in rod.iter_mut().filter(|_| leaf.leaf.in_plane(j)) {
@@ -322,7 +322,7 @@ mod tests {
     "#;
 
     /// The linear equations are factorised once for all rounds, and each of these leaves less
-    /// than a thirtieth: of rods that are rigid in stretch or not.
+    /// than a thirtieth of the error, for rods that are rigid in stretch or not.
     #[test]
     fn every_round_leaves_a_small_part() {
         for axial in ["inf", "100.0"] {
@@ -334,7 +334,7 @@ mod tests {
                 estimate(&levels, 1, (enough, most), &mut linear, &mut work).unwrap()
             };
             let first = estimated(0.0, 0).largest();
-            // The last is the one that verifies.
+            // The last round only verifies.
             for most in 2..=4_usize {
                 let enough = first * 30.0_f64.powi(1 - most as i32);
                 let estimate = estimated(enough, most);

@@ -1,4 +1,4 @@
-//! What a relaxation returns: the shape, and everything that judges it.
+//! The result of a relaxation: the shape, its accuracy and its stability.
 
 use crate::newton::Work;
 use crate::numbers::power_of_ten;
@@ -19,12 +19,11 @@ pub enum Outcome {
     /// As `Converged`, but a saddle was met before: the leaf was pushed
     /// off along the unstable mode and came to rest elsewhere.
     ConvergedAfterSaddle,
-    /// At rest within the tolerance in an unstable equilibrium, and kept
-    /// there because that was asked for.
+    /// At rest within the tolerance in an unstable equilibrium, as allowed by the options.
     Saddle,
     /// At rest, but the finest grid allowed does not reach the tolerance.
     ToleranceNotReached,
-    /// The step limit came before rest.
+    /// The step limit was reached before rest.
     NotAtRest,
     /// The equations are singular: at a bifurcation, or where the leaf can move
     /// without resistance.
@@ -34,7 +33,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// The word used in `summary.json`.
+    /// The name used in `summary.json`.
     pub fn word(self) -> &'static str {
         match self {
             Outcome::Converged => "converged",
@@ -61,22 +60,22 @@ impl Outcome {
     }
 }
 
-/// What was solved, and what it shows to be dispensable.
+/// The model that was solved, and the effects of shear and stretch.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Model {
     /// Rods solved for; the others are their mirror images.
     #[serde(skip)]
     pub rods: usize,
-    /// Whether in their plane, which the leaf does not leave.
+    /// Whether the leaf was solved in its plane, which it does not leave.
     #[serde(skip)]
     pub planar: bool,
-    /// All of it in words, with the grids.
+    /// A description of the model, with the grids.
     #[serde(rename = "model")]
     pub description: String,
     /// Largest displacement, in units of length, that would follow from
     /// neglecting shear, to first order, on the coarsest grid.
     pub shear_effect: Option<f64>,
-    /// The same of stretch.
+    /// The same for stretch.
     pub stretch_effect: Option<f64>,
 }
 
@@ -123,19 +122,18 @@ impl Model {
     }
 }
 
-/// A way in which the leaf moves by itself, without damping and by so little
-/// that forces change in proportion: sin(omega t) times its shape, or
-/// exp(gamma t) where the equilibrium is unstable.
+/// A mode of small free vibration without damping: sin(omega t) times its shape, or exp(gamma
+/// t) where the equilibrium is unstable.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mode {
-    /// omega^2, or -gamma^2 if negative: the eigenvalue of the energy's Hessian
-    /// over the masses, per time squared.
+    /// omega^2, or -gamma^2 if negative: the eigenvalue of the energy's Hessian with respect
+    /// to the masses, per time squared.
     pub eigenvalue: f64,
     /// Bound on its error; `None` on a single grid.
     pub error: Option<f64>,
-    /// Displacement of the nodes of [`Shape::curves`], one list per rod.
-    /// The largest is as long as the longest rod, but of a mode that turns the
-    /// rods without displacing them, of which the largest rotation is 1.
+    /// Displacement of the nodes of [`Shape::curves`], one list per rod. The largest is as
+    /// long as the longest rod; for a mode that rotates the rods without displacing them, the
+    /// largest rotation is 1.
     pub displacement: Vec<Vec<DVec3>>,
     /// Rotation vector of these nodes, along the lab axes, radians.
     pub rotation: Vec<Vec<DVec3>>,
@@ -152,29 +150,27 @@ impl Mode {
         (self.eigenvalue < 0.0).then(|| (-self.eigenvalue).sqrt())
     }
 
-    /// Whether the eigenvalue cannot be told from zero.
+    /// Whether the eigenvalue is zero within its error.
     pub fn is_neutral(&self) -> bool {
         (self.error).is_some_and(|error| self.eigenvalue.abs() <= error)
     }
 }
 
-/// How accurate a result is, and what was asked.
+/// The accuracy of a result, and that requested.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Accuracy {
-    /// Segments per rod of each grid used, coarse to fine; none if shot.
+    /// Segments per rod of each grid used, coarse to fine; none for shooting.
     pub segments: Vec<usize>,
     /// Intervals of the shooting.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub intervals: Option<usize>,
-    /// Wanted accuracy, relative to the largest rod length.
+    /// Requested accuracy, relative to the largest rod length.
     pub tolerance: f64,
-    /// Largest unbalanced nodal force or moment, in units of A/L^2 and A/L
-    /// (A: the leaf's mean bending stiffness, L: largest rod length). Of the
-    /// shooting: the largest defect ([`crate::bvp::Solution::defect`]), if it found
-    /// a solution.
+    /// Largest unbalanced nodal force or moment, in units of A/L^2 and A/L (A: the leaf's mean
+    /// bending stiffness, L: largest rod length). For shooting: the largest defect
+    /// ([`crate::bvp::Solution::defect`]), if it found a solution.
     pub residual: Option<f64>,
-    /// Bound on the error of the positions, in units of length; `None` on a
-    /// single grid, which has nothing to compare with.
+    /// Bound on the error of the positions, in units of length; `None` on a single grid.
     pub error_estimate: Option<f64>,
 }
 
@@ -185,25 +181,25 @@ pub struct Stability {
     /// the leaf is not at rest.
     #[serde(flatten, serialize_with = "serialize_index")]
     pub negative_eigenvalues: Option<usize>,
-    /// The lowest modes, ascending, none left out. `None` if they were not asked
-    /// for or not found, the leaf is not at rest, or it was shot.
+    /// The lowest modes, ascending, without omissions. `None` if they were not requested or
+    /// not found, if the leaf is not at rest, or for shooting.
     #[serde(flatten, serialize_with = "serialize_eigenvalues")]
     pub modes: Option<Vec<Mode>>,
-    /// Whether the shapes of the modes were asked for.
+    /// Whether the shapes of the modes were requested.
     #[serde(skip)]
     pub mode_shapes: bool,
-    /// A saddle that was met and left.
+    /// A saddle that was reached and left.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub saddle: Option<Saddle>,
 }
 
-/// What the holder of a held tip feels.
+/// The reaction at a held tip: what the leaf exerts on its holder.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Reaction {
     /// The force.
     #[serde(rename = "tip_reaction")]
     pub force: DVec3,
-    /// Of a clamp, the moments of the rods, about the tip.
+    /// For a clamp, the moments of the rods about the tip.
     #[serde(
         rename = "tip_reaction_moments",
         skip_serializing_if = "Option::is_none"
@@ -211,32 +207,32 @@ pub struct Reaction {
     pub moments: Option<Vec<DVec3>>,
 }
 
-/// How the results of a leaf at rest change with a number of its scenario: by one
-/// of its units, in those of the scenario.
+/// Derivatives of the results of a leaf at rest with respect to a number of its scenario, in
+/// the scenario's units.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sensitivity {
     /// The number.
     pub key: String,
     /// Its value.
     pub value: f64,
-    /// Change of the joint tip alone, or one per rod.
+    /// Derivative of the joint tip alone, or one per rod.
     #[serde(flatten, serialize_with = "shape::serialize_tips")]
     pub tips: Vec<DVec3>,
     /// Bound on its error; `None` on a single grid.
     pub tip_error: Option<f64>,
-    /// Change of the energy.
+    /// Derivative of the energy.
     pub energy: f64,
     /// Bound on its error.
     pub energy_error: Option<f64>,
-    /// Change of the lowest eigenvalue, if that is known: of the squared frequency.
+    /// Derivative of the lowest eigenvalue (the squared frequency), if it is known.
     pub lowest_eigenvalue: Option<f64>,
     /// Bound on its error.
     pub lowest_eigenvalue_error: Option<f64>,
-    /// Changes of the frequencies of the modes that were asked for, in cycles per time;
-    /// of an unstable one there is none, and of a nearly rigid leaf only the lowest.
+    /// Derivatives of the frequencies of the requested modes, in cycles per time; none for an
+    /// unstable mode, and for a nearly rigid leaf only the lowest.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub frequencies: Vec<Option<f64>>,
-    /// Change of what the holder of the tip feels, if it is held.
+    /// Derivative of the reaction at the tip, if it is held.
     #[serde(flatten)]
     pub reaction: Option<Reaction>,
     /// Bound on the error of its force.
@@ -245,8 +241,8 @@ pub struct Sensitivity {
     /// Fractions of the length that the nodes of all grids have in common.
     #[serde(skip)]
     pub stations: Vec<f64>,
-    /// Changes of the positions there, rod after rod; none where more numbers are asked
-    /// for than equations are solved for.
+    /// Derivatives of the positions there, rod after rod; none if too many numbers are
+    /// requested to solve the equations for each.
     #[serde(skip)]
     pub positions: Vec<Vec<DVec3>>,
     /// Bound on their error.
@@ -259,7 +255,7 @@ pub struct Sensitivity {
 pub struct Shape {
     /// Fractions of the length at which `rods` are given, base to tip.
     pub stations: Vec<f64>,
-    /// Best values at the stations, extrapolated where several grids were used.
+    /// Nodes at the stations, extrapolated if several grids were used.
     #[serde(rename = "positions", serialize_with = "shape::serialize_positions")]
     pub rods: Vec<RodShape>,
     /// Whether the tips share one point.
@@ -280,8 +276,8 @@ impl Shape {
     }
 }
 
-/// A leaf at rest (or as far as it came), in the units of its scenario. As JSON
-/// it is `summary.json`.
+/// A leaf at rest (or in its last state), in the units of its scenario. As JSON it is
+/// `summary.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Equilibrium {
     /// Name of the scenario.
@@ -290,11 +286,11 @@ pub struct Equilibrium {
     pub method: Method,
     /// How the run ended.
     pub outcome: Outcome,
-    /// What would help, when the run did not succeed: one sentence for the user.
+    /// Advice if the run did not succeed: one sentence for the user.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,
-    /// What about it can hardly be meant: a leaf that is stretched far, turned through
-    /// itself, or longer than any can be by its own numbers.
+    /// Implausible properties: a leaf that is stretched far, inverted, or too long for its
+    /// weight and stiffness; and an uncertain stability.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub doubts: Vec<String>,
     /// Number of rods.
@@ -310,21 +306,21 @@ pub struct Equilibrium {
     pub tips: Vec<DVec3>,
     /// Sum over the rods of the force each passes to its tip.
     pub tip_force_sum: DVec3,
-    /// What the holder of the tip feels, if it is held.
+    /// The reaction at the tip, if it is held.
     #[serde(flatten)]
     pub reaction: Option<Reaction>,
     /// Whether it is stable.
     #[serde(flatten)]
     pub stability: Stability,
-    /// How the results change with numbers of the scenario, of those asked for.
+    /// Derivatives of the results with respect to the requested numbers of the scenario.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensitivities: Option<Vec<Sensitivity>>,
-    /// How far it is from losing its stability, if that was asked for.
+    /// The stability margin, if it was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub margin: Option<Margin>,
     /// Waves and twist of the veins on the finest grid.
     pub undulation: Undulation,
-    /// What was solved.
+    /// The model that was solved.
     #[serde(flatten)]
     pub model: Model,
     /// Work done.
@@ -360,8 +356,8 @@ pub fn serialize_index<S: Serializer>(
     .serialize(serializer)
 }
 
-/// Modes as the keys `lowest_eigenvalues` and `eigenvalue_errors`, which are given
-/// only all together.
+/// Modes as the keys `lowest_eigenvalues` and `eigenvalue_errors`; errors are given only if
+/// all are known.
 fn serialize_eigenvalues<S: Serializer>(
     modes: &Option<Vec<Mode>>,
     serializer: S,

@@ -1,4 +1,4 @@
-//! Where a leaf comes to rest from a given state, on one grid.
+//! The equilibrium that a leaf reaches from a given state, on one grid.
 
 use crate::leaf::{Grid, Leaf, State};
 use crate::limit::Limit;
@@ -6,11 +6,11 @@ use crate::relax::options::{Options, Progress};
 use crate::relax::run::Run;
 use crate::relax::settle::InitialGuess;
 
-/// Accuracy to which it comes to rest.
+/// Accuracy of the equilibrium.
 const TOLERANCE: f64 = 1e-6;
 
-/// Where a leaf comes to rest that sets out from a state on a grid, with no motion: at a
-/// saddle it does not stay. None if it does not come to rest.
+/// The stable equilibrium that a leaf reaches from a state on a grid without initial velocity:
+/// saddles are left. `None` if it does not come to rest.
 pub fn settle_from(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -> Option<State> {
     let options = Options {
         limit: limit.clone(),
@@ -21,6 +21,6 @@ pub fn settle_from(leaf: &Leaf, grid: &Grid, state: State, limit: &Limit) -> Opt
     let settled = run.settle(grid.clone(), InitialGuess::Pushed(state));
     settled.rest.ok()?;
     run.push(settled.level);
-    while !run.judge_stability().ok()? {}
+    while !run.check_stability().ok()? {}
     run.levels.pop().map(|level| level.state)
 }

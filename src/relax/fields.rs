@@ -3,37 +3,36 @@
 use crate::leaf::{Grid, Leaf, RodFields};
 use crate::relax::defect::Estimate;
 use crate::relax::level::Level;
-use crate::relax::nodes::{Node, RodNodes, alike, numbers};
-use crate::relax::place::{Measures, Place, Values};
+use crate::relax::nodes::{Node, RodNodes, components, with_sign_of};
+use crate::relax::place::{ErrorMeasures, Place, Values};
 use crate::relax::shape;
 use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};
 
-/// In the interval at an end, the error of the polynomial is this part of that at a
-/// known node without its own value, if the difference is smooth: the ratio of the
-/// products of distances, 14.8 to 120.
+/// In an end interval, the error of the polynomial is this part of the leave-one-out error at
+/// a known node, if the difference is smooth: the ratio of the products of distances, 14.8 to
+/// 120.
 const AT_ENDS: f64 = 0.125;
 
-/// Segments of the coarsest grid whose nodes are stations enough.
+/// Segments of the coarsest grid from which on its nodes are enough stations.
 const STATIONS: usize = 8;
 
 /// A leaf at the stations of one of its grids, in the scenario's units.
 pub struct Fields {
     pub stations: Vec<f64>,
     pub rods: Vec<RodShape>,
-    /// What positions may be wrong by beside the error at the coarsest grid's
-    /// nodes, dimensionless.
+    /// Error of the positions in addition to that at the coarsest grid's nodes, dimensionless.
     pub between: f64,
 }
 
-/// All nodal fields with `columns` extrapolations, at the nodes of the coarsest grid, or
-/// if these are few of the next; if every node is asked for of the finest. Where the
-/// leaf was `integrated` to the tolerance (with that error) the fields are those of the
-/// integration, of a corrected leaf at every node of its grid. Otherwise they are returned
-/// only at nodes that keep the tolerance as those of the coarsest grid do, which have that
-/// `error`: nodes of the coarsest grid have the whole extrapolation, those that a finer grid
-/// adds have that of the grids from there on, and the remainder of the coarser ones'
-/// correction, which is small and smooth, interpolated.
+/// All nodal fields after `columns` extrapolations, at the nodes of the coarsest grid or, if
+/// these are few, of the next; if every node is requested, of the finest. If the leaf was
+/// `integrated` to the tolerance (with that error) the fields are those of the integration,
+/// for a corrected leaf at every node of its grid. Otherwise they are returned only at nodes
+/// that satisfy the tolerance as those of the coarsest grid do, which have the given `error`:
+/// nodes of the coarsest grid have the whole extrapolation, nodes added by a finer grid have
+/// that of the grids from there on, plus the interpolated remainder of the coarser grids'
+/// correction, which is small and smooth.
 pub fn fields(
     levels: &[&Level],
     columns: usize,
@@ -55,7 +54,7 @@ pub fn fields(
             true => &estimate.grid,
             false => &wanted.leaf.grid,
         };
-        return Fields::new(leaf, wanted, &thinned(estimate, wanted, finest), between);
+        return Fields::new(leaf, wanted, &sampled(estimate, wanted, finest), between);
     }
     let used = &levels[levels.len() - 1 - columns..];
     let rods = 0..first.leaf.rods();
@@ -77,21 +76,23 @@ pub fn fields(
         let known = reported.leaf.grid.sigma();
         let place = |at: f64| Place::new(known, leaf.kinks(), at);
         let weights = |(k, at): (usize, &f64)| match k.is_multiple_of(stride) {
-            // That node is known.
+            // The node belongs to the coarser grid.
             true => Values::new(),
             false => place(*at).lagrange(),
         };
         let weights = finer.leaf.grid.sigma().iter().enumerate().map(weights);
         let weights: Vec<_> = weights.collect();
         let others = known.iter().map(|at| place(*at));
-        let others: Vec<_> = others.map(|place| (place.first, place.others())).collect();
+        let others: Vec<_> = others
+            .map(|place| (place.first, place.leave_one_out()))
+            .collect();
         let mut added = on(finer);
         let mut error = 0.0_f64;
         for (added, nodes) in added.iter_mut().zip(&nodes) {
             error = error.max(correct(added, nodes, stride, &weights, &others));
         }
         let error = match coarse == first.leaf.segments() {
-            true => error + known_error * (hidden(levels) - 1.0),
+            true => error + known_error * (layer_ratio(levels) - 1.0),
             false => error,
         };
         if known_error <= tolerance && known_error + between + error > tolerance {
@@ -122,25 +123,25 @@ impl Fields {
     }
 }
 
-/// The integrated leaf at the nodes that are wanted; rotations have the signs of the `finest` grid.
-fn thinned(estimate: &Estimate, wanted: &Grid, finest: &Level) -> Vec<Vec<Node>> {
+/// The integrated leaf at the requested nodes; quaternions have the signs of the `finest` grid.
+fn sampled(estimate: &Estimate, wanted: &Grid, finest: &Level) -> Vec<Vec<Node>> {
     let stride = estimate.grid.segments() / wanted.segments();
     let rod = |(j, rod): (usize, &Vec<RodFields>)| {
         let mut sign = finest.state.q[finest.state.base(j)];
         let node = |node: &RodFields| {
-            sign = alike(node.q, sign);
+            sign = with_sign_of(node.q, sign);
             let (n, m) = (sign.inverse() * node.n, sign.inverse() * node.m);
-            numbers(node.x, sign, n, m)
+            components(node.x, sign, n, m)
         };
         rod.iter().step_by(stride).map(node).collect()
     };
     estimate.rods.iter().enumerate().map(rod).collect()
 }
 
-/// How many times more the last grid changed the positions at the nodes of the one
-/// before than at those of the first: as much more may be wrong there, as it is where
-/// a boundary layer hides between the nodes of the first.
-fn hidden(levels: &[&Level]) -> f64 {
+/// Ratio, at least one, of the largest changes of positions by the last grid at the other
+/// nodes of the grid before and at the nodes of the first: errors may be larger by it, as with
+/// a boundary layer between the nodes of the first grid.
+fn layer_ratio(levels: &[&Level]) -> f64 {
     let (first, finest) = (levels[0], levels[levels.len() - 1]);
     let n = finest.leaf.segments();
     let before = levels.iter().rev().skip(1);
@@ -167,10 +168,9 @@ fn hidden(levels: &[&Level]) -> f64 {
     }
 }
 
-/// Puts `known` at every `stride`th node of a finer grid, and between these the
-/// difference interpolated. Returns how much that may be wrong by in the positions: as
-/// much as the difference at a known node is from what its neighbours say, which lie
-/// further apart.
+/// Sets every `stride`th node of a finer grid to `known`, and adds the interpolated difference
+/// between these. Returns an error estimate of the positions: the leave-one-out error of the
+/// difference at known nodes, whose neighbours are further apart.
 fn correct(
     nodes: &mut [Node],
     known: &[Node],
@@ -183,7 +183,7 @@ fn correct(
     let position = |node: &Node| DVec3::from_slice(node);
     let term = |&(i, weight): &(usize, f64)| weight * position(&corrections[i]);
     let interpolated = |weights: &Values| -> DVec3 { weights.iter().map(term).sum() };
-    let mut errors = Measures::new(known.len());
+    let mut errors = ErrorMeasures::new(known.len());
     for (correction, (first, others)) in corrections.iter().zip(others) {
         let off = |weights: &Values| (interpolated(weights) - position(correction)).length();
         errors.add(*first, others.each_ref().map(off));

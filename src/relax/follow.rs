@@ -1,5 +1,5 @@
-//! An equilibrium followed as its scenario changes a little, on the same grids, and
-//! never into another valley.
+//! Continuation of an equilibrium under a small change of its scenario, on the same grids,
+//! without jumps to another equilibrium.
 
 use crate::leaf::{Leaf, Response, State};
 use crate::newton::{Stop, Work};
@@ -14,41 +14,41 @@ use crate::scenario::Scenario;
 use glam::DVec3;
 use std::sync::Arc;
 
-/// How far from where it was expected an equilibrium may be: of the way that was
-/// expected, and in lengths of the leaf. Farther away it may be another one.
-const OFF_THE_WAY: f64 = 0.5;
-const NEARBY: f64 = 0.02;
+/// Largest distance of an equilibrium from its prediction, as a part of the predicted displacement
+/// plus a length (in lengths of the leaf). Farther away it may be another equilibrium.
+const DRIFT: f64 = 0.5;
+const DRIFT_LENGTH: f64 = 0.02;
 
 /// A stable leaf at rest on nested grids.
 #[derive(Clone)]
 pub(crate) struct AtRest {
     /// The grids that are extrapolated, from coarse to fine.
     pub levels: Vec<Level>,
-    /// What each contributes to the best values.
+    /// Weight of each in the extrapolated values.
     pub weights: Vec<f64>,
     pub work: Work,
 }
 
-/// The grids on which an equilibrium is followed.
+/// The grids on which an equilibrium is continued.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Grids {
-    /// Finer ones too, where the tolerance needs them.
+    /// The present ones, and finer ones where the tolerance requires them.
     AsNeeded,
-    /// The same.
+    /// The present ones only.
     These,
 }
 
-/// Why there is no equilibrium to go on with.
+/// Why a continuation ended without an equilibrium.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Lost {
-    /// The leaf does not come to rest; why.
+    /// The leaf does not come to rest, with the reason.
     NotAtRest(String),
-    /// It would have to jump.
+    /// The equilibrium found is not the continuation of this one: the leaf would have to jump.
     Elsewhere,
 }
 
 impl AtRest {
-    /// From the start of the scenario.
+    /// By relaxation from the start of the scenario.
     pub fn find(
         scenario: &Scenario,
         options: &Options,
@@ -79,8 +79,8 @@ impl AtRest {
         }
     }
 
-    /// The same on the coarsest `count` grids alone; `None` if these are not halved
-    /// from one to the next.
+    /// The same on the coarsest `count` grids alone; `None` unless each of them halves the
+    /// segments of the one before.
     pub fn coarsest(&self, count: usize) -> Option<AtRest> {
         let levels = self.levels.get(..count)?;
         let halved = |pair: &[Level]| pair[1].leaf.segments() == 2 * pair[0].leaf.segments();
@@ -88,12 +88,12 @@ impl AtRest {
         nested.then(|| AtRest::on(levels.to_vec(), self.work))
     }
 
-    /// The equilibrium of a scenario that differs a little: from this one, moved as it
-    /// answers the difference on each grid.
+    /// The equilibrium of a slightly different scenario, starting on each grid from this one
+    /// plus its linear response to the difference.
     pub fn follow(
         &self,
         scenario: Arc<Scenario>,
-        answer: &[Response],
+        response: &[Response],
         (options, grids): (&Options, Grids),
     ) -> Result<AtRest, Lost> {
         let scale = scenario.scale();
@@ -101,7 +101,7 @@ impl AtRest {
         let leaf = Leaf::in_units(scenario, scale);
         let guesses: Vec<_> = (self.levels.iter().enumerate())
             .map(|(k, level)| {
-                let mut state = moved(level, &leaf, &answer[k]);
+                let mut state = moved(level, &leaf, &response[k]);
                 leaf.hold_tips(&mut state);
                 (level.leaf.grid.clone(), state)
             })
@@ -109,7 +109,7 @@ impl AtRest {
         let expected: Vec<State> = guesses.iter().map(|(_, state)| state.clone()).collect();
         let ignored: &mut dyn FnMut(&Progress) = &mut |_| {};
         let mut run = Run::new(&leaf, options, tolerance, ignored);
-        // As of a reduced leaf: it gives up where the leaf would have to move far.
+        // As for a reduced leaf: the run fails if the leaf would have to move far.
         run.whole = Some(&leaf);
         let followed = match grids {
             Grids::AsNeeded => run.follow(guesses).map(|_| ()),
@@ -117,14 +117,14 @@ impl AtRest {
         };
         match followed {
             Ok(()) => {}
-            Err(Stop::StepLimit) if run.late() => {
+            Err(Stop::StepLimit) if run.out_of_time() => {
                 return Err(Lost::NotAtRest("the time allowed was over".into()));
             }
             Err(_) => return Err(Lost::Elsewhere),
         }
         for ((level, expected), before) in run.levels.iter().zip(&expected).zip(&self.levels) {
-            let way = rescaled(before, before.state.clone(), &leaf).shift_to(expected);
-            if level.state.shift_to(expected) > OFF_THE_WAY * way + NEARBY {
+            let predicted = rescaled(before, before.state.clone(), &leaf).shift_to(expected);
+            if level.state.shift_to(expected) > DRIFT * predicted + DRIFT_LENGTH {
                 return Err(Lost::Elsewhere);
             }
         }
@@ -132,7 +132,7 @@ impl AtRest {
         Ok(AtRest::on(run.levels, work))
     }
 
-    /// The best value of what is `on` each grid.
+    /// The extrapolated value of a quantity given by `on` on each grid.
     pub fn best(&self, on: impl Fn(usize, &Level) -> DVec3) -> DVec3 {
         let levels = self.levels.iter().zip(&self.weights).enumerate();
         let known = levels.filter(|(_, (_, weight))| **weight != 0.0);
@@ -141,17 +141,16 @@ impl AtRest {
             .sum()
     }
 
-    /// Nodes and weights on each grid by which values at nodes are interpolated at the
-    /// fraction `sigma`, and the derivatives of the weights with it; beyond the ends the
-    /// values go on linearly.
+    /// Interpolation stencils of each grid at the fraction `sigma`, with the derivatives of
+    /// their weights; extrapolation beyond the ends is linear.
     pub fn stencils(&self, sigma: f64) -> Vec<Stencil> {
         let on = |level: &Level| Stencil::new(&level.leaf, sigma);
         self.levels.iter().map(on).collect()
     }
 }
 
-/// The weights of grids in the values from which `columns` terms of the series in
-/// ds^2 are removed.
+/// The weights of the grids in Richardson extrapolation that removes `columns` terms of the
+/// series in ds^2.
 pub(crate) fn extrapolation(segments: &[usize], columns: usize) -> Vec<f64> {
     let first = segments.len().saturating_sub(columns + 1);
     let squares: Vec<f64> = segments.iter().map(|&n| (n as f64).powi(2)).collect();
@@ -165,7 +164,7 @@ pub(crate) fn extrapolation(segments: &[usize], columns: usize) -> Vec<f64> {
     (0..segments.len()).map(weight).collect()
 }
 
-/// A state of a level in the units of another leaf, whose bases hold it.
+/// A state of a level in the units of another leaf, with the base rotations of that leaf.
 fn rescaled(level: &Level, mut state: State, leaf: &Leaf) -> State {
     let (from, to) = (level.leaf.leaf.scale, leaf.scale);
     let (length, force) = (from.length / to.length, from.force() / to.force());
@@ -178,16 +177,16 @@ fn rescaled(level: &Level, mut state: State, leaf: &Leaf) -> State {
     state
 }
 
-/// A state moved along an answer, in the units of another leaf.
-fn moved(level: &Level, leaf: &Leaf, answer: &Response) -> State {
+/// A state displaced by a linear response, in the units of another leaf.
+fn moved(level: &Level, leaf: &Leaf, response: &Response) -> State {
     let mut state = level.state.clone();
-    for (j, rod) in answer.nodes.iter().enumerate() {
+    for (j, rod) in response.nodes.iter().enumerate() {
         let base = state.base(j);
         for (i, increment) in rod.iter().enumerate() {
             state.advance(base + i + 1, increment, 1.0);
         }
     }
-    let forces = state.n.iter_mut().zip(&answer.carried);
+    let forces = state.n.iter_mut().zip(&response.carried);
     forces.for_each(|(force, change)| *force += *change);
     rescaled(level, state, leaf)
 }

@@ -12,12 +12,12 @@ use crate::relax::run::{BUDGET, Run};
 use crate::relax::segments::{COARSEST_TURN, FINEST};
 use crate::relax::settle::{InitialGuess, Settled};
 
-/// Two grids on which the leaf moved far are said to have settled in the same place
-/// if no coordinate of a station differs by more than this, in lengths.
+/// Two grids on which the leaf moved far count as settled at the same equilibrium if no
+/// coordinate of a common node differs by more than this, in lengths.
 const SAME_PLACE: f64 = 0.05;
 
-/// The finest grid on which such places are compared.
-const FINEST_LANDING: usize = 256;
+/// The finest grid for this comparison.
+const FINEST_COMPARED: usize = 256;
 
 /// The finest grid that is tried when coarser ones do not resolve the bending.
 const FINEST_RESOLVING: usize = 2048;
@@ -30,14 +30,14 @@ impl Run<'_, '_> {
         self.refine()
     }
 
-    /// The same from guesses on nested grids, near which the leaf is at rest.
+    /// The same from initial guesses on nested grids, each close to an equilibrium.
     pub fn follow(&mut self, guesses: Vec<(Grid, State)>) -> Result<bool, Stop> {
         self.follow_on_these(guesses)?;
         self.refine()
     }
 
-    /// The same on these grids alone, however accurate they are; the leaf is at rest
-    /// where its energy has a minimum for all that the iteration sees.
+    /// The same on these grids alone, whatever their accuracy; stability is not checked beyond
+    /// the positive definite matrix of the iteration.
     pub fn follow_on_these(&mut self, guesses: Vec<(Grid, State)>) -> Result<(), Stop> {
         for (grid, state) in guesses {
             let Settled { level, rest, .. } = self.settle(grid, InitialGuess::Coarser(state));
@@ -50,43 +50,44 @@ impl Run<'_, '_> {
     /// Refines until the tolerance is reached.
     pub fn refine(&mut self) -> Result<bool, Stop> {
         loop {
-            self.judge_accuracy();
-            if self.accurate() && self.judge_stability()? && !self.needs_another_grid() {
+            self.estimate_accuracy();
+            if self.accurate() && self.check_stability()? && !self.needs_another_grid() {
                 return Ok(true);
             }
-            if self.late() {
+            if self.out_of_time() {
                 return Err(Stop::StepLimit);
             }
             let Some(finer) = self.finer() else {
-                self.judge_stability()?;
+                self.check_stability()?;
                 return Ok(false);
             };
             self.settle_on(finer)?;
         }
     }
 
-    /// Whether the nodes of the finest grid are requested and the leaf is not accurate
-    /// enough there: one more grid is added for them.
+    /// Whether all nodes of the finest grid are requested and the leaf is not accurate enough
+    /// there; then one more grid is added.
     fn needs_another_grid(&mut self) -> bool {
         let enough = !self.options.every_node || self.integrated().is_some();
-        if enough || self.for_nodes || self.finer().is_none() {
+        if enough || self.added_for_nodes || self.finer().is_none() {
             return false;
         }
         let levels: Vec<&Level> = self.levels.iter().collect();
         let columns = self.table.best().map_or(0, |best| best.columns);
         let fields = fields(&levels, columns, (self.error(), self.tolerance), true, None);
-        self.for_nodes = fields.stations.len() <= levels[levels.len() - 1].leaf.segments();
-        self.for_nodes
+        self.added_for_nodes = fields.stations.len() <= levels[levels.len() - 1].leaf.segments();
+        self.added_for_nodes
     }
 
-    /// Goes on, with all unknowns of a leaf at rest, to a `finer` grid.
-    pub fn go_on(&mut self, finer: Grid) -> Result<bool, Stop> {
+    /// Continues to a `finer` grid with all unknowns of a leaf at rest.
+    pub fn continue_on(&mut self, finer: Grid) -> Result<bool, Stop> {
         (self.solved, self.planar) = (self.leaf.rods(), self.leaf.planar());
         self.settle_on(finer)?;
         self.refine()
     }
 
-    /// The next finer grid, if there may be one.
+    /// The next finer grid, if the limits on its size allow it and rounding leaves something
+    /// to gain.
     pub fn finer(&self) -> Option<Grid> {
         let grid = self.levels.last()?.leaf.grid.refined();
         let (rods, segments) = (self.leaf.rods(), grid.segments());
@@ -98,11 +99,11 @@ impl Run<'_, '_> {
         allowed.then_some(grid)
     }
 
-    /// The leaf at rest on the next finer grid, from where it rests on those before.
+    /// Settles the leaf on the next finer grid, from a guess by the grids before.
     pub fn settle_on(&mut self, finer: Grid) -> Result<(), Stop> {
         let level = self.levels.last().expect("the leaf has settled");
         let mut state = prolong(&level.leaf, &level.state);
-        let guess = match self.predicting().as_slice() {
+        let guess = match self.levels_for_prediction().as_slice() {
             [_] => InitialGuess::Coarser(state),
             levels => {
                 predict(levels, &mut state);
@@ -114,21 +115,21 @@ impl Run<'_, '_> {
         rest.map(drop)
     }
 
-    /// The levels from which the next one is predicted: those used by the extrapolation,
-    /// but at least the finest two.
-    fn predicting(&self) -> Vec<&Level> {
+    /// The levels from which the next one is predicted: those of the extrapolation, but at
+    /// least the finest two where there are two.
+    fn levels_for_prediction(&self) -> Vec<&Level> {
         let columns = self.table.best().map_or(0, |best| best.columns);
         let count = (columns + 1).max(2).min(self.levels.len());
         self.levels[self.levels.len() - count..].iter().collect()
     }
 
-    /// Whether the tolerance is reached; a fixed grid always is.
+    /// Whether the tolerance is reached; always true on a fixed grid.
     fn accurate(&self) -> bool {
         self.segments().is_some() || self.error().is_some_and(|error| error <= self.tolerance)
     }
 
-    /// From the start to rest on the first grid that resolves it. A leaf that
-    /// had to move far must settle in the same place on two grids.
+    /// From the start to rest on the first grid that resolves it. A leaf that had to move far
+    /// must reach the same equilibrium on two grids.
     fn settle_from_start(&mut self, mut grid: Grid) -> Result<(), Stop> {
         let mut before: Option<Level> = None;
         let mut failed: Vec<Grid> = Vec::new();
@@ -137,9 +138,9 @@ impl Run<'_, '_> {
             let Settled { level, rest, moved } = settled;
             let finer = grid.refined();
             let fixed = self.segments().is_some();
-            let last = fixed || finer.segments() > FINEST_LANDING || self.late();
+            let last = fixed || finer.segments() > FINEST_COMPARED || self.out_of_time();
             match rest {
-                // So coarse a grid cannot decide where a leaf that moves settles.
+                // On so coarse a grid the equilibrium that a moving leaf reaches is not reliable.
                 _ if self.too_coarse(level.leaf.segments())
                     && (moved || rest.is_err() || largest_turn(&level) > COARSEST_TURN) => {}
                 Ok(_) if !moved || last || self.by_steps => {
@@ -156,7 +157,7 @@ impl Run<'_, '_> {
                     }
                     if before.is_none()
                         && let [.., coarse, _] = failed.as_slice()
-                        && self.settles_alike(&level, coarse.tripled())
+                        && self.is_confirmed_on(&level, coarse.tripled())
                     {
                         self.push(level);
                         self.add_coarser(&failed);
@@ -165,14 +166,14 @@ impl Run<'_, '_> {
                     before = Some(level);
                 }
                 Err(stop) => {
-                    let given_up = self.spent > BUDGET
+                    let at_limit = self.spent > BUDGET
                         || match stop {
                             Stop::Unresolved => {
-                                fixed || finer.segments() > FINEST_RESOLVING || self.late()
+                                fixed || finer.segments() > FINEST_RESOLVING || self.out_of_time()
                             }
                             _ => last,
                         };
-                    if self.whole.is_some() || given_up {
+                    if self.whole.is_some() || at_limit {
                         self.push(level);
                         return Err(stop);
                     }
@@ -184,9 +185,9 @@ impl Run<'_, '_> {
         }
     }
 
-    /// Whether the leaf moves to the same place on a grid with three quarters of the
+    /// Whether the leaf reaches the same equilibrium on a grid with three quarters of the
     /// segments.
-    fn settles_alike(&mut self, level: &Level, grid: Grid) -> bool {
+    fn is_confirmed_on(&mut self, level: &Level, grid: Grid) -> bool {
         let Settled {
             level: other, rest, ..
         } = self.settle(grid, InitialGuess::Start);
@@ -194,8 +195,8 @@ impl Run<'_, '_> {
         rest.is_ok() && distance(&a, &b) < SAME_PLACE
     }
 
-    /// Lets the leaf settle where it did on the only grid on coarser ones, too, on which
-    /// it did not get there by itself: up to two, the finest last.
+    /// Adds up to two of the coarser grids that failed from the start, settled from the
+    /// restricted equilibrium of the only grid so far.
     fn add_coarser(&mut self, grids: &[Grid]) {
         for grid in grids.iter().rev().take(2) {
             let fine = &self.levels[0];
@@ -220,7 +221,7 @@ fn largest_turn(level: &Level) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Largest difference between coordinates of places.
+/// Largest difference between corresponding coordinates.
 fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
 }

@@ -1,9 +1,9 @@
-//! From a free start to tips that are held: the grips are led there.
+//! From a free start to held tips: the grips are moved quasi-statically.
 //!
-//! Many shapes may join a base to a tip that is held. Which one a leaf takes
-//! depends on how it got there, and it gets there as in a testing machine: it is
-//! gripped where a free start has its tips, and the grips move and turn evenly to
-//! where they are to be, slowly enough for the leaf to rest at every step.
+//! A leaf with a held tip may have many equilibria, and the one it reaches depends on the
+//! loading path. The path here is that of a testing machine: the leaf is gripped where a free
+//! start has its tips, and the grips move and rotate uniformly to their final positions, with
+//! the leaf at rest at every step.
 
 use crate::leaf::{DiscreteLeaf, State, System};
 use crate::newton::{Definite, Stop};
@@ -14,61 +14,60 @@ use crate::rotation;
 use glam::{DQuat, DVec3};
 use std::f64::consts::{PI, TAU};
 
-/// The grips move by no more than this in a step (lengths), nor turn by more
-/// (radians).
+/// Largest displacement (lengths) and rotation (radians) of the grips in a step.
 const SHIFT: f64 = 0.1;
 const TURN: f64 = 0.4;
 
-/// Accuracy to which the leaf is settled on the way.
+/// Accuracy of the equilibria along the path.
 const ACCURACY: f64 = 1e-2;
 
 /// Saddles that are left in a step.
 const PUSHES: i32 = 3;
 
-/// What leading the grips led to.
-pub struct Led {
+/// The result of moving the grips.
+pub struct GripEnd {
     pub state: State,
     /// Whether the leaf rests there.
     pub at_rest: bool,
-    /// Whether its energy was not convex on the way.
+    /// Whether its energy was not convex along the path.
     pub moved: bool,
 }
 
 impl Run<'_, '_> {
-    /// Leads the tips from where `state` has them to where they are held.
-    pub fn lead_grips(&mut self, leaf: &DiscreteLeaf, state: State) -> Led {
-        let mut led = Led {
+    /// Moves the tips from their positions in `state` to those where they are held.
+    pub fn move_grips(&mut self, leaf: &DiscreteLeaf, state: State) -> GripEnd {
+        let mut end = GripEnd {
             state,
             at_rest: false,
             moved: false,
         };
-        let Some(paths) = paths(leaf, &led.state) else {
-            return led;
+        let Some(paths) = paths(leaf, &end.state) else {
+            return end;
         };
         let steps = paths.iter().map(Path::steps).fold(1.0, f64::max);
         let mut system = System::new(leaf);
         for step in 1..=steps as usize {
-            if self.late() {
+            if self.out_of_time() {
                 break;
             }
             for (j, path) in paths.iter().enumerate() {
-                path.lead(leaf, j, step as f64 / steps, &mut led.state);
+                path.move_tip(leaf, j, step as f64 / steps, &mut end.state);
             }
-            led.at_rest = self.follow_grips(leaf, &mut system, &mut led);
+            end.at_rest = self.settle_held(leaf, &mut system, &mut end);
         }
-        leaf.hold_tips(&mut led.state);
-        led
+        leaf.hold_tips(&mut end.state);
+        end
     }
 
-    /// Lets the leaf come to rest roughly, with its tips where they are.
-    fn follow_grips(&mut self, leaf: &DiscreteLeaf, system: &mut System, led: &mut Led) -> bool {
+    /// Brings the leaf roughly to rest with its tips fixed.
+    fn settle_held(&mut self, leaf: &DiscreteLeaf, system: &mut System, end: &mut GripEnd) -> bool {
         for pushes in 0..PUSHES {
             let mut relaxation = Relaxation {
-                state: led.state.clone(),
+                state: end.state.clone(),
                 accuracy: ACCURACY,
                 work: &mut self.work,
                 progress: &mut |_, _| {},
-                near_rest: led.at_rest,
+                near_rest: end.at_rest,
                 cg_tolerance: ACCURACY,
                 pushes,
                 solver: Definite::default(),
@@ -78,33 +77,33 @@ impl Run<'_, '_> {
                 moved: false,
                 by_steps: false,
                 moved_softened: false,
-                part: 0.0,
+                load_part: 0.0,
             };
             let before = relaxation.work.force_evaluations;
             let rest = relaxation.settle(leaf, system);
-            led.state = relaxation.state;
-            led.moved |= relaxation.moved;
+            end.state = relaxation.state;
+            end.moved |= relaxation.moved;
             let spent = relaxation.work.force_evaluations - before;
             self.spent += leaf.rods() * leaf.segments() * spent;
             if rest != Err(Stop::Saddle) || self.keeps_unstable() {
                 return rest.is_ok();
             }
-            saddle::push_off(leaf, &mut led.state, system, &mut self.work);
+            saddle::push_off(leaf, &mut end.state, system, &mut self.work);
         }
         false
     }
 }
 
-/// The way of the tip of a rod from a free start to its holder.
+/// The path of the tip of a rod from a free start to its holder.
 struct Path {
     from: DVec3,
     to: DVec3,
-    /// Of a clamp: the angle of d1 about e3, the twist about d1, and what of the
-    /// start's rotation is neither, which is undone on the way.
+    /// Of a clamp: the angle of d1 about e3 at both ends, the final twist about d1, and the
+    /// rest of the start's rotation, which is removed along the path.
     clamp: Option<([f64; 2], f64, DVec3)>,
 }
 
-/// The ways of all tips; `None` if they are free.
+/// The paths of all tips; `None` if they are free.
 fn paths(leaf: &DiscreteLeaf, start: &State) -> Option<Vec<Path>> {
     let held = leaf.leaf.held.as_ref()?;
     let path = |j: usize| Path {
@@ -125,8 +124,8 @@ fn paths(leaf: &DiscreteLeaf, start: &State) -> Option<Vec<Path>> {
     Some((0..leaf.rods()).map(path).collect())
 }
 
-/// The angle of d1 about e3 at the last of these nodes, of which it is followed
-/// from the first: more than a turn counts.
+/// The angle of d1 about e3 at the last of these nodes, continued from the first: full turns
+/// count.
 fn heading(rod: &[DQuat]) -> f64 {
     let angle = |q: &DQuat| {
         let d1 = *q * DVec3::X;
@@ -140,7 +139,7 @@ fn heading(rod: &[DQuat]) -> f64 {
 }
 
 impl Path {
-    /// In how many steps it is taken.
+    /// The number of steps along the path.
     fn steps(&self) -> f64 {
         let turn = self.clamp.map_or(0.0, |([from, to], twist, other)| {
             (to - from).abs() + twist.abs() + other.length()
@@ -150,9 +149,9 @@ impl Path {
             .ceil()
     }
 
-    /// Moves the tip of rod `j` to a part of the way, and every node with it by its
-    /// part of the length.
-    fn lead(&self, leaf: &DiscreteLeaf, j: usize, part: f64, state: &mut State) {
+    /// Moves the tip of rod `j` to the fraction `part` of the path, and every node with it in
+    /// proportion to its distance from the base.
+    fn move_tip(&self, leaf: &DiscreteLeaf, j: usize, part: f64, state: &mut State) {
         let base = state.base(j);
         let tip = base + leaf.segments();
         let shift = self.from.lerp(self.to, part) - state.x[tip];

@@ -1,4 +1,4 @@
-//! The Morse index of a shape found by other means.
+//! The Morse index of an equilibrium that was not found by relaxation.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
 use crate::newton::Work;
@@ -11,11 +11,10 @@ use glam::DVec3;
 /// The finest grid on which eigenvalues are counted.
 const FINEST: usize = 1024;
 
-/// Number of negative eigenvalues of the energy's Hessian at the equilibrium
-/// near `rods`, given at the nodes of `grid` in the scenario's units. Counted on
-/// finer and finer grids until it does not change any more. `None` under a dead
-/// moment, which has no energy, and if there is no equilibrium nearby or the
-/// count does not settle.
+/// Number of negative eigenvalues of the energy's Hessian at the equilibrium near `rods`,
+/// given at the nodes of `grid` in the scenario's units. Counted on successively refined grids
+/// until two agree. `None` under a dead moment, which has no potential, and if the counts
+/// never agree (Newton's method may not find an equilibrium nearby).
 pub fn index_near(scenario: &Scenario, grid: Grid, rods: &[RodShape]) -> Option<usize> {
     let leaf = Leaf::new(scenario);
     if leaf.loads.tip_moment != DVec3::ZERO {

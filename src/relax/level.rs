@@ -9,7 +9,7 @@ pub struct Level {
     pub state: State,
 }
 
-/// The leaf with all of its unknowns, of which `reduced` is settled.
+/// The level of the whole leaf from that of the reduced one.
 pub fn complete(reduced: &Leaf, whole: &Leaf, level: &Level) -> Level {
     Level {
         leaf: match reduced.rods() == whole.rods() {

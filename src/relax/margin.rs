@@ -1,4 +1,4 @@
-//! How far a stable leaf is from losing its stability.
+//! The stability margin of a stable leaf.
 
 use crate::relax::saddle::Saddle;
 use crate::scenario::Units;
@@ -7,9 +7,8 @@ use glam::DVec3;
 use serde::{Serialize, Serializer};
 use std::fmt;
 
-/// How far a stable leaf is from losing its stability: under a force at its tip, and by
-/// the energy of the pass to another equilibrium. As JSON it is `margin` in
-/// `summary.json`.
+/// How far a stable leaf is from losing its stability: the critical forces at its tip, and the
+/// energy barrier to another equilibrium. As JSON it is `margin` in `summary.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Margin {
     /// Names of the units, if the scenario gives any.
@@ -22,14 +21,14 @@ pub struct Margin {
     pub every_tip: bool,
     /// The largest push that was tried.
     pub largest_push: Option<f64>,
-    /// Pushes at the tip, along the axes and against them, the least first; none of a
-    /// tip that is held.
+    /// Pushes at the tip, along the axes and against them, the least first; none for a held
+    /// tip.
     pub pushes: Vec<Push>,
-    /// The lowest pass to another equilibrium, of those found.
+    /// The lowest energy barrier to another equilibrium, of those found.
     pub barrier: Option<Barrier>,
-    /// From so many places a pass was looked for.
+    /// Number of starting points of the search for saddles.
     pub climbs: usize,
-    /// Why something of it is missing.
+    /// Why a part of it is missing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,
     /// Time of all that is not the solve itself, in seconds.
@@ -37,7 +36,7 @@ pub struct Margin {
 }
 
 impl Margin {
-    /// Of a leaf that has none, and why.
+    /// No margin, with the reason.
     pub fn none(remark: &str) -> Self {
         Margin {
             remark: Some(remark.into()),
@@ -66,7 +65,7 @@ impl Direction {
         if self.negative { -1.0 } else { 1.0 }
     }
 
-    /// The other way.
+    /// The opposite direction.
     pub fn opposite(self) -> Direction {
         Direction {
             negative: !self.negative,
@@ -88,7 +87,7 @@ impl Serialize for Direction {
     }
 }
 
-/// What a dead force at the tip does that grows from zero in one direction.
+/// The effect of a dead force at the tip that grows from zero in one direction.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Push {
     /// The direction.
@@ -96,24 +95,24 @@ pub struct Push {
     pub direction: Direction,
     /// What ends the stability.
     pub kind: Loss,
-    /// The force at which that is.
+    /// The force at which stability is lost.
     pub force: Option<f64>,
     /// Bound on its error.
     pub error: Option<f64>,
     /// The same in weights of the leaf, if it has any.
     pub per_weight: Option<f64>,
-    /// The leaf is stable up to this force, where none was met.
+    /// If no loss was found, the force up to which the leaf is stable.
     pub more_than: Option<f64>,
-    /// What the leaf does there.
+    /// What the leaf does when stability is lost.
     pub then: Option<Fate>,
-    /// Where it comes to rest under this force, if it snaps at a fold.
+    /// The equilibrium it reaches under this force, if it snaps at a fold.
     pub neighbour: Option<Neighbour>,
-    /// Where the tips are then.
+    /// Positions of the tips then.
     #[serde(flatten, serialize_with = "serialize_tips")]
     pub tips: Vec<DVec3>,
-    /// Whether this is the mirror image of the push the other way, and known by that.
+    /// Whether this was obtained as the mirror image of the opposite push.
     pub mirrored: bool,
-    /// Why it is not known, if it is not.
+    /// Why it is not known, if that is so.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,
 }
@@ -126,41 +125,42 @@ pub enum Loss {
     Fold,
     /// Other branches cross.
     BranchPoint,
-    /// It is not lost up to the largest push that was tried.
+    /// Stability is not lost up to the largest push that was tried.
     NoneUpTo,
-    /// It is not known beyond some push.
+    /// Unknown beyond some push.
     Unknown,
 }
 
-/// What a leaf does that has lost its stability.
+/// The behaviour of a leaf that has lost its stability.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fate {
     /// It jumps to another equilibrium.
     Snaps,
-    /// It bends aside as the force grows on, to a stable shape beside the unstable one.
+    /// It bends aside continuously as the force grows, to a stable shape close to the unstable
+    /// one.
     BendsAside,
 }
 
-/// The pass from a stable leaf to another equilibrium: an equilibrium of index one
-/// that the leaf leaves to the one on one side and to the other on the other.
+/// The energy barrier between a stable leaf and another equilibrium: a saddle of index one
+/// from which the leaf falls to one of them on either side.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Barrier {
     /// Its energy above the leaf's.
     pub energy: f64,
     /// Bound on the error, if it is known on more than one grid.
     pub error: Option<f64>,
-    /// By how much the whole leaf would have to be lifted for that: energy over weight.
+    /// Height by which the whole leaf would have to be lifted for that energy: energy over weight.
     pub height: Option<f64>,
     /// That height over the longest rod's length.
     pub relative: Option<f64>,
-    /// The equilibrium on the pass.
+    /// The saddle.
     pub saddle: Saddle,
-    /// Where the leaf comes to rest behind it.
+    /// The equilibrium on its other side.
     pub neighbour: Neighbour,
 }
 
-/// The equilibrium behind a pass, or behind a fold.
+/// The equilibrium beyond a barrier, or beyond a fold.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Neighbour {
     /// Its energy.

@@ -10,7 +10,7 @@ use serde::{Serialize, Serializer};
 pub enum Method {
     /// Linearly implicit damped motion that turns into Newton's method.
     SemiImplicit(SemiImplicit),
-    /// Explicit damped motion, then with masses and damping chosen for speed.
+    /// Explicit damped motion, then accelerated descent with fictitious masses and damping.
     /// Not for rigid rods.
     Explicit {
         /// One grid of so many segments a rod, without extrapolation; `None`: as
@@ -42,15 +42,15 @@ pub struct SemiImplicit {
     /// One grid of so many segments a rod, without extrapolation; `None`: as fine
     /// as the tolerance needs.
     pub segments: Option<usize>,
-    /// Whether to stop at a saddle instead of leaving it. Newton's method is
-    /// then not steered towards stable equilibria at all.
+    /// Whether to stop at a saddle instead of leaving it. Newton's method then converges to
+    /// equilibria of any kind.
     pub keep_unstable: bool,
-    /// Whether to solve for the whole leaf, in space, where half of it or its
-    /// plane would do.
+    /// Whether to solve for the whole leaf in space even where symmetry allows half of it or
+    /// its plane.
     pub full_model: bool,
-    /// Begin not in the plain start but in the one of this number in an endless
-    /// series of disturbed ones: the leaf thrown out of its plane, each in its own
-    /// way, a number and the next to opposite sides.
+    /// Start from the state of this number in an unlimited series of disturbed ones: each
+    /// displaces the leaf out of its plane in a different pattern, consecutive numbers to
+    /// opposite sides.
     pub disturbance: Option<usize>,
 }
 
@@ -61,7 +61,7 @@ impl Default for Method {
 }
 
 impl Method {
-    /// All of them, with nothing special asked of them.
+    /// All of them, with default options.
     pub const ALL: [Method; 5] = [
         Method::SemiImplicit(SemiImplicit {
             segments: None,
@@ -75,7 +75,7 @@ impl Method {
         Method::ShootingFromRest { intervals: None },
     ];
 
-    /// The word for it on the command line and in files.
+    /// Its name on the command line and in files.
     pub fn word(self) -> &'static str {
         match self {
             Method::SemiImplicit(_) => "semi-implicit",
@@ -86,8 +86,8 @@ impl Method {
         }
     }
 
-    /// The method of this word, with nothing special asked of it. Words that
-    /// earlier releases used are understood too.
+    /// The method of this name, with default options. Names of earlier releases are accepted
+    /// too.
     pub fn named(word: &str) -> Option<Method> {
         let word = match word {
             "multiple-shooting" => "shooting",
@@ -97,7 +97,7 @@ impl Method {
         Method::ALL.into_iter().find(|method| method.word() == word)
     }
 
-    /// The only grid of a method that is to use one, in segments a rod.
+    /// Segments per rod of a fixed grid, if the method has one.
     pub fn segments(self) -> Option<usize> {
         match self {
             Method::SemiImplicit(SemiImplicit { segments, .. }) | Method::Explicit { segments } => {
@@ -107,8 +107,8 @@ impl Method {
         }
     }
 
-    /// The same method on one grid of so many segments a rod, or on as many grids
-    /// as it needs; nothing changes for a method without grids.
+    /// The same method on one grid of so many segments a rod or, without a number, on as many
+    /// grids as it needs; no change for a method without grids.
     pub fn on_grid(self, segments: Option<usize>) -> Method {
         match self {
             Method::SemiImplicit(how) => Method::SemiImplicit(SemiImplicit { segments, ..how }),
@@ -117,10 +117,9 @@ impl Method {
         }
     }
 
-    /// The same method with what was set for it by name.
+    /// The same method with the given settings.
     ///
-    /// # Errors
-    /// Of a setting that the method does not have.
+    /// # Errors If the method does not have one of the settings.
     pub fn with(self, settings: Settings) -> Result<Method, Unfit> {
         let Settings {
             segments,
@@ -212,11 +211,11 @@ pub struct Unfit {
     pub why: &'static str,
 }
 
-/// A word that names no method.
+/// An unknown method name.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{found}: must be one of {}", Method::ALL.map(Method::word).join(", "))]
 pub struct UnknownMethod {
-    /// The word.
+    /// The name.
     pub found: String,
 }
 

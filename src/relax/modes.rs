@@ -1,4 +1,4 @@
-//! The modes of the settled leaf: from nested grids to the units of the
+//! The modes of the settled leaf, extrapolated over nested grids, in the units of the
 //! scenario.
 
 use crate::leaf::{DiscreteLeaf, Grid, Increment, Leaf, System, shift, turn};
@@ -15,80 +15,79 @@ use crate::relax::saddle::ANY_SIGN;
 use crate::relax::stencil::Stencil;
 use glam::DVec3;
 
-/// Unknowns of the finest grid on which modes are looked for unless their
-/// shapes are asked for: about a second.
+/// Largest number of unknowns of the finest grid for which modes are computed without their
+/// shapes: about a second.
 const FEW_UNKNOWNS: usize = 20_000;
 
-/// Without their shapes coarser grids of a stable leaf will do, with fewer
-/// unknowns than this if there are such: about as long as a relaxation.
-const AT_A_GLANCE: usize = 4_000;
+/// Without their shapes the grids of a stable leaf with fewer unknowns than this suffice, if
+/// there are any: about as long as a relaxation.
+const QUICK_UNKNOWNS: usize = 4_000;
 
-/// Unknowns of the finest grid beyond those of the relaxation, which is there to
-/// make eigenvalues accurate.
+/// Largest number of unknowns of grids that are added for the accuracy of the eigenvalues.
 const MANY_MORE_UNKNOWNS: usize = 200_000;
 
-/// Grids that are extrapolated, at most, and those of them that may be beyond
-/// those of the relaxation.
+/// Largest number of grids that are extrapolated, and of grids finer than those of the
+/// relaxation.
 const GRIDS: usize = 4;
 const MORE_GRIDS: usize = 6;
 
-/// Smaller eigenvalues than this part of the largest are as accurate as that.
+/// Eigenvalues below this part of the largest have errors relative to that part.
 const SMALL: f64 = 1e-3;
 
-/// Safety factor on the errors of eigenvalues, each of which is a single number: its
-/// last change may be small by chance. It is taken to be at least this part of the
-/// change before it, and not much smaller than that of the other eigenvalues. Of 12,600
-/// eigenvalues of 600 random leaves none was off by more.
+/// Safety factor on the errors of eigenvalues, and lower bound of the last change of an
+/// eigenvalue as a part of the change before: that of a single number may be small by chance,
+/// and is also combined with those of the other eigenvalues. Of 12,600 eigenvalues of 600
+/// random leaves none had a larger error.
 const SAFETY: f64 = 2.0;
-const BY_CHANCE: f64 = 0.1;
+const LEAST_CHANGE: f64 = 0.1;
 
-/// How much more noise an eigenvalue has on the next grid.
+/// Growth of the rounding error of an eigenvalue from grid to grid.
 const FINER_NOISE: f64 = 4.0;
 
-/// An error of no more times that of rounding does not become smaller on finer grids.
-const ZERO: f64 = 4.0;
+/// An error of up to this many times that of rounding does not decrease on finer grids.
+const NOISE: f64 = 4.0;
 
 /// Relative error of an eigenvalue by unfinished iterations, as a part of the tolerance.
 const UNFINISHED: f64 = 2e-3;
 
-/// The tolerance of modes of which the signs alone are wanted.
-const SIGNS: f64 = 1e-2;
+/// The tolerance if only the signs of the eigenvalues are needed.
+const SIGN_TOLERANCE: f64 = 1e-2;
 
-/// Accuracy of eigenvectors, times the root of the tolerance: that of eigenvalues is the
-/// square of it. No better than this.
+/// Accuracy of eigenvectors over the root of the tolerance (that of eigenvalues is its
+/// square), and its lower limit.
 const ACCURACY: f64 = 5e-3;
 const LEAST_ACCURACY: f64 = 1e-7;
 
-/// Newton iterations on a further grid, and how far they may move a node, in
-/// lengths: farther away is another equilibrium.
+/// Newton iterations on a further grid, and the largest displacement of a node, in lengths:
+/// farther away is another equilibrium.
 const ITERATIONS: usize = 12;
 const SAME_PLACE: f64 = 0.02;
 
-/// A mode that moves less than this, in lengths per radian of its rotation,
-/// is one of rotation alone.
-const STILL: f64 = 1e-6;
+/// A mode with smaller displacements than this, in lengths per radian of its rotation, is one
+/// of rotation alone.
+const NO_DISPLACEMENT: f64 = 1e-6;
 
 /// The lowest modes of a settled leaf.
 pub struct Lowest {
     pub modes: Vec<Mode>,
-    /// The size, or error, of eigenvalues whose signs may contradict the Morse index. An
-    /// eigenvalue that is zero to the accuracy asked for belongs to a leaf that may move
-    /// freely.
+    /// The smallest size, or error, of eigenvalues whose signs may contradict the Morse index.
+    /// An eigenvalue that is zero to the accuracy required does not count: the leaf may have a
+    /// free motion.
     pub undecided: Option<f64>,
 }
 
-/// The lowest modes. `None` where they cannot be found: too large a leaf, unless they are
-/// needed (`anyway`), or too many modes on a coarse grid.
-pub fn lowest(run: &Run, count: usize, anyway: bool) -> Option<Lowest> {
+/// The lowest modes. `None` if they cannot be computed: the leaf is too large, unless they are
+/// `required`, or more modes are requested than a coarse grid has.
+pub fn lowest(run: &Run, count: usize, required: bool) -> Option<Lowest> {
     let options = run.options;
     let finest = run.levels.last()?;
-    let large = unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes && !anyway;
+    let large = unknowns(&finest.leaf) > FEW_UNKNOWNS && !options.mode_shapes && !required;
     if count == 0 || finest.leaf.tip_moment() != DVec3::ZERO || large {
         return None;
     }
     let physics = Physics::new(run.leaf);
     let tolerance = match options.modes {
-        0 => SIGNS,
+        0 => SIGN_TOLERANCE,
         _ => run.tolerance,
     };
     let on = |level: &Level, near: &[Eigenpair]| {
@@ -107,14 +106,14 @@ pub fn lowest(run: &Run, count: usize, anyway: bool) -> Option<Lowest> {
         rounding: 0.0,
     };
     let mut before: Option<(&Level, Vec<Eigenpair>)> = None;
-    let enough = enough(run);
+    let sufficient_grids = sufficient_grids(run);
     for (k, level) in run
         .levels
         .iter()
         .enumerate()
-        .skip(enough.saturating_sub(GRIDS))
+        .skip(sufficient_grids.saturating_sub(GRIDS))
     {
-        if k >= enough && series.undecided().is_none() {
+        if k >= sufficient_grids && series.undecided().is_none() {
             break;
         }
         let near = |(coarse, pairs): (&Level, Vec<Eigenpair>)| {
@@ -125,7 +124,7 @@ pub fn lowest(run: &Run, count: usize, anyway: bool) -> Option<Lowest> {
         series.rounding = modes::rounding(&level.leaf);
         match &found {
             Some(pairs) => series.push(pairs),
-            // Grids must follow each other.
+            // The series needs consecutive grids.
             None => series.grids.clear(),
         }
         before = found.map(|pairs| (level, pairs));
@@ -144,41 +143,41 @@ pub fn lowest(run: &Run, count: usize, anyway: bool) -> Option<Lowest> {
             rotation,
         };
     Some(Lowest {
-        modes: series.judged().into_iter().zip(shapes).map(mode).collect(),
+        modes: series.values().into_iter().zip(shapes).map(mode).collect(),
         undecided: series.undecided(),
     })
 }
 
-/// Number of grids that suffice for modes whose signs they determine.
-fn enough(run: &Run) -> usize {
+/// Number of grids that suffice if they determine the signs of the eigenvalues.
+fn sufficient_grids(run: &Run) -> usize {
     if run.options.mode_shapes || run.index != Some(0) {
         return run.levels.len();
     }
-    let few = |level: &&Level| unknowns(&level.leaf) < AT_A_GLANCE;
+    let few = |level: &&Level| unknowns(&level.leaf) < QUICK_UNKNOWNS;
     let few = run.levels.iter().take_while(few).count();
     few.max(2).min(run.levels.len())
 }
 
-/// Whether modes on this grid are worth their time.
-fn within_reach(leaf: &Leaf, grid: &Grid) -> bool {
+/// Whether the cost of modes on this grid is acceptable.
+fn is_affordable(leaf: &Leaf, grid: &Grid) -> bool {
     6 * leaf.rods() * grid.segments() <= MANY_MORE_UNKNOWNS
 }
 
-/// The next grid, which may determine the signs of lowest modes that are still undecided:
-/// not one whose rounding is larger.
+/// The next grid, if it may decide the signs of the lowest eigenvalues that are still
+/// undecided, that is if its rounding error is small enough.
 pub fn deciding_grid(run: &Run, lowest: Option<&Lowest>) -> Option<Grid> {
     let size = lowest?.undecided?;
     let noise = run.levels.last()?.leaf.neutral_shift();
-    let finer = run.finer().filter(|grid| within_reach(run.leaf, grid))?;
-    (size > FINER_NOISE * noise && !run.late()).then_some(finer)
+    let finer = run.finer().filter(|grid| is_affordable(run.leaf, grid))?;
+    (size > FINER_NOISE * noise && !run.out_of_time()).then_some(finer)
 }
 
 fn unknowns(leaf: &DiscreteLeaf) -> usize {
     6 * leaf.rods() * leaf.segments()
 }
 
-/// Goes on to finer grids until the eigenvalues are as accurate as the shape, or as
-/// far as it goes.
+/// Adds finer grids until the eigenvalues are as accurate as the shape, or the limits are
+/// reached.
 fn refine(
     run: &Run,
     series: &mut Series,
@@ -186,10 +185,10 @@ fn refine(
     on: impl Fn(&Level, &[Eigenpair]) -> Option<Vec<Eigenpair>>,
 ) -> Option<()> {
     let mut finer: Vec<Level> = Vec::new();
-    while finer.len() < MORE_GRIDS && !series.accurate() && !run.late() {
+    while finer.len() < MORE_GRIDS && !series.accurate() && !run.out_of_time() {
         let levels: Vec<&Level> = run.levels.iter().chain(&finer).collect();
         let last = levels.last()?;
-        if !within_reach(run.leaf, &last.leaf.grid.refined()) {
+        if !is_affordable(run.leaf, &last.leaf.grid.refined()) {
             break;
         }
         let next = settle(&levels[levels.len().saturating_sub(2)..], run.tolerance)?;
@@ -201,7 +200,7 @@ fn refine(
     Some(())
 }
 
-/// Modes of a leaf on a finer grid.
+/// Modes interpolated to a finer grid.
 fn interpolated(coarse: &DiscreteLeaf, pairs: &[Eigenpair], fine: &DiscreteLeaf) -> Vec<Eigenpair> {
     let nodes = fine.grid.sigma().iter();
     let stencils: Vec<Stencil> = nodes.map(|&sigma| Stencil::new(coarse, sigma)).collect();
@@ -246,11 +245,11 @@ fn settle(levels: &[&Level], tolerance: f64) -> Option<Level> {
 
 /// Eigenvalues on nested grids, each extrapolated on its own.
 struct Series {
-    /// How many are negative on the finest grid.
+    /// Number of negative eigenvalues on the finest grid.
     index: usize,
     grids: Vec<Vec<f64>>,
     tolerance: f64,
-    /// What rounding may do to one on the finest grid.
+    /// Rounding error of an eigenvalue on the finest grid.
     rounding: f64,
 }
 
@@ -260,7 +259,7 @@ impl Series {
         self.grids.push(values.collect());
     }
 
-    /// The size an eigenvalue's error is measured with.
+    /// The unit of an eigenvalue's error.
     fn unit(&self, k: usize) -> f64 {
         let finest = &self.grids[self.grids.len() - 1];
         let largest = finest.iter().fold(0.0_f64, |m, value| m.max(value.abs()));
@@ -268,8 +267,8 @@ impl Series {
         if unit > 0.0 { unit } else { 1.0 }
     }
 
-    /// Best values, and their errors if there are two grids.
-    fn judged(&self) -> Vec<(f64, Option<f64>)> {
+    /// Extrapolated values, and their errors if there are at least two grids.
+    fn values(&self) -> Vec<(f64, Option<f64>)> {
         let judge = |k: usize| {
             // A coarse grid may have fewer modes.
             let values = self.grids.iter().filter_map(|grid| grid.get(k));
@@ -282,7 +281,7 @@ impl Series {
             let value = table.column(best.map_or(0, |best| best.columns))[0];
             let error = |best: Best| {
                 best.error
-                    .max(BY_CHANCE * table.change_before(best.columns))
+                    .max(LEAST_CHANGE * table.change_before(best.columns))
             };
             (value, best.map(error))
         };
@@ -302,28 +301,28 @@ impl Series {
         found.iter().enumerate().map(in_units).collect()
     }
 
-    /// Whether all frequencies are known to this part of them.
+    /// Whether the relative error of all frequencies is within the tolerance.
     fn accurate(&self) -> bool {
         let known = |(k, (_, error)): (usize, (f64, Option<f64>))| {
             let wanted = 2.0 * self.tolerance * self.unit(k);
             error.is_some_and(|error| error <= wanted + self.rounding)
         };
-        self.judged().into_iter().enumerate().all(known)
+        self.values().into_iter().enumerate().all(known)
     }
 
-    /// Size of the smallest, or of its error, whose sign is not known to be the one on the
-    /// finest grid. One that is zero to the tolerance may have either.
+    /// The smallest size, or error, of eigenvalues whose sign may differ from that on the
+    /// finest grid. One that is zero to the tolerance may have either sign.
     fn undecided(&self) -> Option<f64> {
         let unknown = |(k, (value, error)): (usize, (f64, Option<f64>))| {
             let (size, error) = (value.abs(), error?);
-            let zero = 2.0 * self.tolerance * self.unit(k).max(SMALL) + ZERO * self.rounding;
+            let zero = 2.0 * self.tolerance * self.unit(k).max(SMALL) + NOISE * self.rounding;
             let decided = match size > error {
                 true => (value < 0.0) == (k < self.index),
                 false => error <= zero,
             };
             (!decided).then_some(size.max(error))
         };
-        let unknown = self.judged().into_iter().enumerate().filter_map(unknown);
+        let unknown = self.values().into_iter().enumerate().filter_map(unknown);
         unknown.reduce(f64::min)
     }
 }
@@ -331,8 +330,8 @@ impl Series {
 /// Displacements and rotations of all nodes, rod by rod.
 type Shape = (Vec<Vec<DVec3>>, Vec<Vec<DVec3>>);
 
-/// Shapes as they are handed out: scaled so that the largest displacement is
-/// the longest rod, and the last of the largest components is positive.
+/// Normalised shapes: the largest displacement is the longest rod's length, and the last of
+/// the largest components is positive.
 fn shapes(level: &Level, pairs: &[Eigenpair]) -> Vec<Shape> {
     let length = level.leaf.leaf.scale.length;
     let nodes = level.leaf.segments() + 1;
@@ -342,13 +341,13 @@ fn shapes(level: &Level, pairs: &[Eigenpair]) -> Vec<Shape> {
             lengths.fold(0.0, f64::max)
         };
         let (far, turned) = (largest(shift), largest(turn));
-        let (size, part): (f64, fn(&[f64; 6]) -> DVec3) = match far > STILL * turned {
+        let (size, part): (f64, fn(&[f64; 6]) -> DVec3) = match far > NO_DISPLACEMENT * turned {
             true => (far, shift),
             false => (turned, turn),
         };
         let components = || pair.shape.iter().flat_map(|node| part(node).to_array());
         let most = components().fold(0.0_f64, |m, c| m.max(c.abs()));
-        // The last of those that are equal but for rounding: a tip's.
+        // The last of those that are equal up to rounding: a tip's.
         let sign = components()
             .rfind(|c| c.abs() > 0.99 * most)
             .map_or(1.0, f64::signum);

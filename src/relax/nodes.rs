@@ -11,7 +11,7 @@ const FIELDS: usize = 13;
 
 pub type Node = [f64; FIELDS];
 
-/// What the leaf is, with `columns` extrapolations, at the nodes of the coarsest grid, rod
+/// The leaf's fields after `columns` extrapolations at the nodes of the coarsest grid, rod
 /// after rod, dimensionless.
 pub fn nodes(levels: &[Level], columns: usize) -> Vec<Vec<RodFields>> {
     let (first, finest) = (&levels[0], &levels[levels.len() - 1]);
@@ -33,11 +33,11 @@ pub fn nodes(levels: &[Level], columns: usize) -> Vec<Vec<RodFields>> {
     (0..first.leaf.rods()).map(rod).collect()
 }
 
-/// The nodes of a rod on several grids, each computed when it is first asked for: those
-/// that grids have in common are asked for again and again.
+/// The nodes of a rod on several grids, each computed on first use and cached: nodes common to
+/// several grids are used repeatedly.
 pub struct RodNodes<'l> {
     rod: usize,
-    /// Rotations on the finest grid, of a continuous sign.
+    /// Quaternions on the finest grid, continuous in sign.
     signs: Vec<DQuat>,
     levels: Vec<(&'l Level, Vec<Option<Node>>)>,
 }
@@ -53,7 +53,8 @@ impl<'l> RodNodes<'l> {
         }
     }
 
-    /// The fields at the ends of so many `parts`, from those grids that have them.
+    /// The extrapolated fields at the ends of `parts` equal parts of the grid, from the grids
+    /// that have these nodes.
     pub fn extrapolated(&mut self, parts: usize) -> Vec<Node> {
         let (rod, signs) = (self.rod, &self.signs);
         let mut table = Richardson::default();
@@ -69,9 +70,9 @@ impl<'l> RodNodes<'l> {
                     let state = &level.state;
                     let k = state.base(rod) + i * stride;
                     let [n, m] = shape::resultants(&level.leaf, state, rod, i * stride);
-                    // A rotation's two quaternions must not be mixed up between grids.
-                    let q = alike(state.q[k], signs[i * ((signs.len() - 1) / parts)]);
-                    numbers(state.x[k], q, n, m)
+                    // q and -q are the same rotation: all grids must use the same sign.
+                    let q = with_sign_of(state.q[k], signs[i * ((signs.len() - 1) / parts)]);
+                    components(state.x[k], q, n, m)
                 })
             });
             table.push(segments, values.collect());
@@ -81,24 +82,24 @@ impl<'l> RodNodes<'l> {
     }
 }
 
-/// Rotations of rod `j` at all nodes, of a continuous sign.
+/// Quaternions of rod `j` at all nodes, continuous in sign.
 fn rotations(level: &Level, j: usize) -> Vec<DQuat> {
     let base = level.state.base(j);
     let mut rotations: Vec<DQuat> = Vec::with_capacity(level.leaf.segments() + 1);
     for &q in &level.state.q[base..=base + level.leaf.segments()] {
-        rotations.push(alike(q, rotations.last().copied().unwrap_or(q)));
+        rotations.push(with_sign_of(q, rotations.last().copied().unwrap_or(q)));
     }
     rotations
 }
 
-/// The numbers of a node, forces and moments along its directors.
-pub fn numbers(x: DVec3, q: DQuat, n: DVec3, m: DVec3) -> Node {
+/// The components of a node's fields, with force and moment along its directors.
+pub fn components(x: DVec3, q: DQuat, n: DVec3, m: DVec3) -> Node {
     [
         x.x, x.y, x.z, q.x, q.y, q.z, q.w, n.x, n.y, n.z, m.x, m.y, m.z,
     ]
 }
 
-/// That quaternion of a rotation which is nearer to another.
-pub fn alike(q: DQuat, other: DQuat) -> DQuat {
+/// Of q and -q the one nearer to `other`.
+pub fn with_sign_of(q: DQuat, other: DQuat) -> DQuat {
     if q.dot(other) < 0.0 { -q } else { q }
 }

@@ -1,19 +1,20 @@
-//! A number of a scenario, and how the scenario changes with it.
+//! A parameter of a scenario, and finite differences of the scenario with respect to it.
 
 use crate::scenario::Scenario;
 use std::sync::Arc;
 
-/// Step by which a scenario is differenced with a number in which it is linear, as
-/// a part of the number: large, as only rounding makes an error.
+/// Relative step of finite differences with respect to a parameter on which the scenario
+/// depends linearly: large, since rounding is the only error.
 const LINEAR: f64 = 0.125;
 
-/// And with others, where four differences leave an error of the fourth order.
-const CURVED: f64 = 1e-3;
+/// Relative step for other parameters, with differences of fourth order.
+const NONLINEAR: f64 = 1e-3;
 
-/// Step of differences of what the matrix gives, whose modes may be close together.
-const SMALL: f64 = 3e-4;
+/// Relative step of differences of eigenvalues, whose modes may be close together, and of
+/// clamp moments.
+const NEIGHBOURING: f64 = 3e-4;
 
-/// Weights of differences at -2, -1, 1, 2 steps, and at 0 to 4 steps.
+/// Offsets (in steps) and weights of the central and the one-sided fourth-order differences.
 const CENTRAL: [(f64, f64); 4] = [
     (-2.0, 1.0 / 12.0),
     (-1.0, -2.0 / 3.0),
@@ -28,13 +29,13 @@ const ONE_SIDED: [(f64, f64); 5] = [
     (4.0, -0.25),
 ];
 
-/// A number of a scenario.
+/// A numerical parameter of a scenario.
 pub(crate) struct Number<'a> {
-    /// The scenario with another value of it, if there can be such.
+    /// The scenario with another value of the parameter, if that is admissible.
     pub make: &'a (dyn Fn(f64) -> Option<Scenario> + Sync),
     /// Its value.
     pub value: f64,
-    /// What it is measured by where it is zero.
+    /// Size used for the step where the value is zero.
     pub unit: f64,
     /// Whether the scenario is linear in it.
     pub linear: bool,
@@ -48,9 +49,9 @@ impl Number<'_> {
         }
     }
 
-    /// Scenarios with their offsets and weights, by the first of these rules that
-    /// asks for none that cannot be.
-    fn by(&self, step: f64, rules: &[&[(f64, f64)]]) -> Option<Vec<(f64, f64, Scenario)>> {
+    /// Scenarios with their offsets and weights by the first of these rules, in either
+    /// direction, all of whose scenarios are admissible.
+    fn differences(&self, step: f64, rules: &[&[(f64, f64)]]) -> Option<Vec<(f64, f64, Scenario)>> {
         let signs = [1.0, -1.0];
         let mut tried = (rules.iter()).flat_map(|rule| signs.map(|sign| (*rule, sign)));
         tried.find_map(|(rule, sign)| {
@@ -64,11 +65,11 @@ impl Number<'_> {
         })
     }
 
-    /// The change of the scenario: scenarios with weights.
+    /// The derivative of the scenario as a weighted sum of scenarios.
     pub fn rate(&self) -> Option<Vec<(f64, Scenario)>> {
         let found = match self.linear {
-            true => self.by(LINEAR * self.size(), &[&[(0.0, -1.0), (1.0, 1.0)]]),
-            false => self.by(CURVED * self.size(), &[&CENTRAL, &ONE_SIDED]),
+            true => self.differences(LINEAR * self.size(), &[&[(0.0, -1.0), (1.0, 1.0)]]),
+            false => self.differences(NONLINEAR * self.size(), &[&CENTRAL, &ONE_SIDED]),
         };
         let terms = found?.into_iter();
         Some(
@@ -78,10 +79,10 @@ impl Number<'_> {
         )
     }
 
-    /// Scenarios nearby, with their offsets and the weights by which a function of
-    /// them is differenced.
+    /// Neighbouring scenarios with their offsets and the finite-difference weights for a
+    /// function of the scenario.
     pub fn nearby(&self) -> Option<Vec<(f64, f64, Arc<Scenario>)>> {
-        let found = self.by(SMALL * self.size(), &[&CENTRAL, &ONE_SIDED])?;
+        let found = self.differences(NEIGHBOURING * self.size(), &[&CENTRAL, &ONE_SIDED])?;
         let shared = |(offset, weight, scenario)| (offset, weight, Arc::new(scenario));
         Some(found.into_iter().map(shared).collect())
     }

@@ -1,4 +1,4 @@
-//! What is asked of a relaxation, and what cannot be asked.
+//! Options of a relaxation, and the errors of requests that cannot be met.
 
 use std::fmt;
 
@@ -7,28 +7,28 @@ use crate::limit::Limit;
 use crate::memory::TooMuch;
 use crate::relax::method::Method;
 
-/// What is asked of a relaxation.
+/// Options of a relaxation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// The method.
     pub method: Method,
     /// Replaces the scenario's tolerance.
     pub tolerance: Option<f64>,
-    /// How many of the lowest modes are looked for once the leaf is at rest, at
-    /// most [`MOST_MODES`]; that is no part of the time measured. 0: none. Their signs
-    /// are compared with the Morse index, and finer grids are asked where they differ.
+    /// Number of lowest modes to compute once the leaf is at rest, at most [`MOST_MODES`];
+    /// their time is not measured. 0: none. The signs of their eigenvalues are compared with
+    /// the Morse index, and finer grids decide where they differ.
     pub modes: usize,
-    /// Whether their shapes are wanted. Without them modes are left out where
-    /// the leaf is large, and are known a little less accurately.
+    /// Whether their shapes are requested. Without them modes of large leaves are left out,
+    /// and eigenvalues are slightly less accurate.
     pub mode_shapes: bool,
-    /// Whether the leaf is wanted at the nodes of the finest grid, not only at those
-    /// of the coarsest, of the semi-implicit and the explicit method.
+    /// Whether the leaf is requested at the nodes of the finest grid, not only at those of the
+    /// coarsest (semi-implicit and explicit method).
     pub every_node: bool,
-    /// When to give up, at rest or not: the leaf is then not at rest.
+    /// Time limit and cancellation: a run that is stopped ends not at rest.
     pub limit: Limit,
 }
 
-/// How far a run has come.
+/// Progress of a run.
 #[derive(Clone, Copy, Debug)]
 pub enum Progress {
     /// Of a relaxation.
@@ -80,22 +80,21 @@ impl fmt::Display for Progress {
 /// Smallest tolerance that double precision can keep.
 pub const SMALLEST_TOLERANCE: f64 = 1e-12;
 
-/// Largest tolerance that still means something.
+/// Largest meaningful tolerance.
 pub const LARGEST_TOLERANCE: f64 = 0.1;
 
-/// Most nodes of a leaf, all rods together: about 1.5 kB each.
+/// Largest number of nodes of a leaf, all rods together: about 1.5 kB each.
 pub const MAX_NODES: usize = 4_000_000;
 
-/// Most modes.
+/// Largest number of modes.
 pub const MOST_MODES: usize = 100;
 
-/// Most intervals of a shooting.
+/// Largest number of intervals of a shooting.
 pub const MAX_INTERVALS: usize = 4096;
 
-/// Refuses a tolerance that is out of range.
+/// Checks that a tolerance is in range.
 ///
-/// # Errors
-/// If it is.
+/// # Errors If it is not.
 pub fn check_tolerance(tolerance: f64) -> Result<(), RelaxError> {
     match (SMALLEST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
         true => Ok(()),
@@ -145,13 +144,12 @@ pub enum RelaxError {
         "method = explicit: a stiffness is inf, and no time step is short enough for rigid rods; give a number, or use semi-implicit"
     )]
     Rigid,
-    /// The explicit method follows forces, and a dead moment may feed a motion
-    /// without end.
+    /// The explicit method integrates a motion, which a dead moment may drive forever.
     #[error(
         "method = explicit: under load.tip_moment, which has no potential, motion need not come to rest; use semi-implicit, or shooting"
     )]
     Follows,
-    /// Shooting from arcs knows no way to where a tip is held.
+    /// Shooting from arcs has no continuation to a held tip.
     #[error(
         "method = {found}: a tip that is held (tip.held) is led there by the relaxation; use shooting-from-rest"
     )]

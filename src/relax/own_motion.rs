@@ -1,11 +1,11 @@
-//! The landing place of a leaf that moved while it was softer than it is: that of its
-//! own motion in time.
+//! The equilibrium of a leaf that moved while softened, checked against its motion in time
+//! with its own stiffness.
 //!
-//! Stiff rods are softened while a leaf moves ([`super::methods`]), and softened it may
-//! come to rest in another valley of its energy. Where that can have happened, the
-//! damped motion of the leaf with its own stiffness, from the start and with the mass
-//! and damping that a relaxation has, is followed on one grid until it has settled in a
-//! valley; Newton's method goes on from there.
+//! Stiff rods are softened while a leaf moves ([`super::methods`]), and a softened leaf may
+//! come to rest in another valley (basin of attraction) of its energy. Where that is possible,
+//! the damped motion of the leaf with its own stiffness is integrated on one grid, from the
+//! start and with the mass and damping of a relaxation, until it has settled in a valley;
+//! Newton's method continues from there.
 
 use crate::leaf::{DiscreteLeaf, Grid, System};
 use crate::motion::{Method as _, Physics, SemiImplicit, Steps};
@@ -16,11 +16,11 @@ use crate::relax::run::Run;
 use crate::relax::saddle;
 use crate::relax::settle::InitialGuess;
 
-/// Segments of the grid, unless one is asked for.
+/// Segments of the grid, at least, unless a grid is requested.
 const SEGMENTS: usize = 32;
 
-/// Steps of the motion, errors in lengths and radians: of a first attempt, and where that
-/// ends elsewhere than the softened leaf, of a second one, which decides.
+/// Step control of the motion, errors in lengths and radians: of a first attempt and, if that
+/// ends at another equilibrium than the softened leaf, of a second, which decides.
 const STEPS: [Steps; 2] = [
     Steps::ToRest {
         error: 1e-2,
@@ -32,29 +32,29 @@ const STEPS: [Steps; 2] = [
     },
 ];
 
-/// Time between looks at the moving leaf, in units of sqrt(rho L^4/A).
-const LOOK: f64 = 0.25;
+/// Time between checks of the moving leaf, in units of sqrt(rho L^4/A).
+const CHECK_INTERVAL: f64 = 0.25;
 
-/// No more of the kinetic energy than this part is left where it may have settled, and
-/// where it rests, be it at a saddle.
+/// Kinetic energy, as a part of its maximum, below which the leaf may have settled in a
+/// valley, and below which it is at rest, possibly at a saddle.
 const SLOW: f64 = 1e-2;
-const STILL: f64 = 1e-9;
+const AT_REST: f64 = 1e-9;
 
-/// Nodes times factorisations after which it is given up: about a second.
+/// Limit on nodes times factorisations: about a second.
 const BUDGET: usize = 1_000_000;
 
-/// Largest distance of a node, in lengths, between states in one valley.
+/// Largest displacement of a node, in lengths, between states of the same valley.
 const SAME_PLACE: f64 = 0.02;
 
-/// Whether no node is beside the plane z = 0.
+/// Whether all nodes lie in the plane z = 0.
 fn flat(level: &Level) -> bool {
     level.state.x.iter().all(|x| x.z == 0.0)
 }
 
 impl Run<'_, '_> {
-    /// The end of a run, or, where the leaf had to move while softened and its own
-    /// motion comes to rest elsewhere, that of a run from there.
-    pub fn land_by_own_motion(
+    /// The end of a run or, if the leaf moved while softened and its own motion comes to rest
+    /// at another equilibrium, the end of a run that starts there.
+    pub fn settle_by_own_motion(
         &mut self,
         grid: &Grid,
         end: Result<bool, Stop>,
@@ -66,42 +66,42 @@ impl Run<'_, '_> {
                 ..
             })
         );
-        // Tips that are held were led to their places: that is no motion in time.
+        // Held tips were moved quasi-statically to their positions, not by a motion in time.
         let held = self.leaf.held.is_some();
         if end.is_err() || !self.moved_softened || disturbed || held {
             return end;
         }
         let effects = self.effects;
         let softened = std::mem::take(&mut self.levels);
-        let mut landed = None;
+        let mut different = None;
         for steps in STEPS {
             let Some(there) = self.follow_own_motion(grid.clone(), steps) else {
                 break;
             };
-            // In its plane a motion stays, stable or not: that decides nothing.
+            // A planar motion stays planar, stable or not: it decides nothing.
             if flat(&there) && softened.last().is_some_and(|level| !flat(level)) {
                 break;
             }
             self.moved_softened = false;
             let elsewhere = |here: &Level| here.state.shift_to(&there.state) > SAME_PLACE;
-            landed = softened.last().is_some_and(elsewhere).then_some(there);
-            if landed.is_none() {
+            different = softened.last().is_some_and(elsewhere).then_some(there);
+            if different.is_none() {
                 break;
             }
         }
-        let Some(level) = landed else {
+        let Some(level) = different else {
             (self.levels, self.effects) = (softened, effects);
             return end;
         };
         let effects = self.effects;
-        self.begin_anew();
+        self.restart();
         self.effects = effects;
         self.push(level);
         self.refine()
     }
 
-    /// The leaf at rest in the valley in which its own motion ends; `None` if that takes
-    /// too long, or ends at a saddle.
+    /// The equilibrium in the valley where the leaf's own motion ends; `None` if that takes
+    /// too long or ends at a saddle.
     fn follow_own_motion(&mut self, mut grid: Grid, steps: Steps) -> Option<Level> {
         while self.segments().is_none() && grid.segments() < SEGMENTS {
             grid = grid.refined();
@@ -111,17 +111,17 @@ impl Run<'_, '_> {
         let mut system = System::new(&leaf);
         let (physics, start) = (Physics::at_rest(self.leaf), self.start(&leaf));
         let mut motion = SemiImplicit::new(leaf.clone(), physics, &start, steps);
-        let (mut next_look, mut fastest) = (LOOK, 0.0_f64);
+        let (mut next_check, mut fastest) = (CHECK_INTERVAL, 0.0_f64);
         let mut settled = None;
         let softened = self.moved_softened;
-        while settled.is_none() && motion.factorizations < most && !self.late() {
+        while settled.is_none() && motion.factorizations < most && !self.out_of_time() {
             if motion.step_towards(f64::INFINITY).is_err() {
                 break;
             }
-            if motion.time() < next_look {
+            if motion.time() < next_check {
                 continue;
             }
-            next_look = motion.time() + LOOK;
+            next_check = motion.time() + CHECK_INTERVAL;
             let now = motion.snapshot();
             let kinetic = now.energy.kinetic;
             fastest = fastest.max(kinetic);
@@ -137,7 +137,7 @@ impl Run<'_, '_> {
                 let stays = !found.moved && !self.moved_softened && found.rest.is_ok();
                 let near = found.level.state.shift_to(&now.state) < SAME_PLACE;
                 settled = (stays && near).then_some(found.level);
-            } else if kinetic <= STILL * fastest {
+            } else if kinetic <= AT_REST * fastest {
                 break;
             }
         }

@@ -1,4 +1,4 @@
-//! Places between the stations where fields along a vein are known.
+//! Interpolation of fields along a vein between the stations where they are known.
 
 use std::collections::BTreeMap;
 
@@ -6,34 +6,35 @@ use glam::DVec3;
 
 use crate::shape::weights;
 
-/// Most nodes that a polynomial goes through whose slopes there are known.
+/// Largest number of nodes of a Hermite polynomial.
 const HERMITE: usize = 4;
 
-/// One more station gains so many times less than the one before it did, at least.
-const GAIN: f64 = 4.0;
+/// Each further station reduces the error by a factor that is smaller than that of the one
+/// before by this, at least.
+const LEAST_GAIN: f64 = 4.0;
 
-/// Most nodes of one whose slopes are not known.
+/// Largest number of nodes of a Lagrange polynomial.
 const LAGRANGE: usize = 6;
 
-/// A place along the veins, and the stations around it.
+/// A point along the veins, and the stations around it.
 pub struct Place {
-    /// The station that it is.
+    /// The station at this point, if there is one.
     pub node: Option<usize>,
     pub at: f64,
     /// Stations between the same knots.
     near: Vec<f64>,
-    /// The first of them.
+    /// Index of the first of them.
     pub first: usize,
 }
 
-/// Weights of the values at stations.
+/// Stations with the weights of the values there.
 pub type Values = Vec<(usize, f64)>;
 
-/// Weights of a value and of its slope at a station.
+/// Stations with the weights of the value and of the slope there.
 pub type Slopes = Vec<(usize, f64, f64)>;
 
 impl Place {
-    /// `at` between the stations `known`, with kinks of profiles at `kinks`.
+    /// The point `at` among the stations `known`, with kinks of profiles at `kinks`.
     pub fn new(known: &[f64], kinks: &[f64], at: f64) -> Self {
         let node = known
             .iter()
@@ -52,28 +53,27 @@ impl Place {
         }
     }
 
-    /// The polynomial with the values and slopes at the nearest stations, as many as can
-    /// be.
+    /// The Hermite polynomial through values and slopes at the nearest stations, as many as
+    /// possible.
     pub fn hermite(&self) -> Slopes {
-        self.fewer(0)
+        self.reduced_hermite(0)
     }
 
-    /// How many stations that of so many fewer goes through.
+    /// The number of stations of the Hermite polynomial with `fewer` stations less.
     fn count(&self, fewer: usize) -> usize {
         HERMITE.min(self.near.len()).saturating_sub(fewer).max(1)
     }
 
-    /// That which vanishes there with its slope, and the highest power of which has
-    /// the coefficient one.
-    fn vanishing(&self, fewer: usize) -> f64 {
+    /// The monic polynomial that vanishes at these stations together with its slope.
+    fn node_polynomial(&self, fewer: usize) -> f64 {
         let count = self.count(fewer);
         let (first, _) = weights(&self.near, self.at, count);
         let near = &self.near[first..first + count];
         near.iter().map(|node| (self.at - node).powi(2)).product()
     }
 
-    /// The polynomial through so many fewer.
-    fn fewer(&self, fewer: usize) -> Slopes {
+    /// The Hermite polynomial through `fewer` stations less.
+    fn reduced_hermite(&self, fewer: usize) -> Slopes {
         let count = self.count(fewer);
         let (first, lagrange) = weights(&self.near, self.at, count);
         let near = &self.near[first..first + count];
@@ -87,15 +87,15 @@ impl Place {
         each.collect()
     }
 
-    /// The polynomial with the values at the nearest stations.
+    /// The Lagrange polynomial through the nearest stations.
     pub fn lagrange(&self) -> Values {
         let (first, weights) = weights(&self.near, self.at, LAGRANGE);
         (self.first + first..).zip(weights).collect()
     }
 
-    /// The polynomial with the values at the nearest other stations, and that with
-    /// those of two fewer.
-    pub fn others(&self) -> [Values; 2] {
+    /// The Lagrange polynomial through the nearest stations other than this one, and that of
+    /// two fewer.
+    pub fn leave_one_out(&self) -> [Values; 2] {
         let mut near = self.near.clone();
         let own = near.iter().position(|at| *at == self.at);
         own.map(|own| near.remove(own));
@@ -107,13 +107,13 @@ impl Place {
     }
 }
 
-/// What polynomials with values and slopes may be wrong by between the same knots of a
-/// rod: as much as they differ from those through one station less, times what one more
-/// station gains. Both are taken from the differences of three of them, largest
-/// coefficients of what vanishes at their stations.
+/// Error estimate of Hermite polynomials between two knots of a rod: their difference from
+/// those through one station less, times the reduction by one more station. Both follow from
+/// the differences of three of them, as largest coefficients of the polynomials that vanish at
+/// their stations.
 #[derive(Default)]
 pub struct Differences {
-    /// By the first station between those knots.
+    /// Keyed by the first station between two knots.
     panels: BTreeMap<usize, Panel>,
 }
 
@@ -122,17 +122,18 @@ struct Panel {
     /// Largest coefficients of the difference of the second and third polynomial, and of
     /// the first and second.
     coefficients: [f64; 2],
-    /// What vanishes at the stations of the second, and of the first, at every place.
+    /// Values, at every point, of the polynomials that vanish at the stations of the second,
+    /// and of the first.
     vanishing: Vec<[f64; 2]>,
 }
 
 impl Differences {
-    /// Adds those at a place, of values interpolated with weights.
+    /// Adds the differences at a point, of values interpolated with the given weights.
     pub fn add(&mut self, place: &Place, value: impl Fn(&Slopes) -> DVec3) {
         let panel = self.panels.entry(place.first).or_default();
-        let [best, second, third] = [0, 1, 2].map(|fewer| value(&place.fewer(fewer)));
+        let [best, second, third] = [0, 1, 2].map(|fewer| value(&place.reduced_hermite(fewer)));
         let [first_vanishes, second_vanishes, third_vanishes] =
-            [0, 1, 2].map(|fewer| place.vanishing(fewer));
+            [0, 1, 2].map(|fewer| place.node_polynomial(fewer));
         let coefficients = [
             (second - third).length() / third_vanishes,
             (best - second).length() / second_vanishes,
@@ -147,32 +148,32 @@ impl Differences {
         let errors = self.panels.values().flat_map(|panel| {
             let [before, last] = panel.coefficients;
             (panel.vanishing.iter()).map(move |[second, first]| {
-                // Without a third polynomial nothing is known of the gain.
-                let gain = GAIN * last * first / (before * second);
-                last * second * if gain < 1.0 { gain } else { 1.0 }
+                // Without a third polynomial the reduction is not known.
+                let reduction = LEAST_GAIN * last * first / (before * second);
+                last * second * if reduction < 1.0 { reduction } else { 1.0 }
             })
         });
         errors.fold(0.0, f64::max)
     }
 }
 
-/// Largest measures of what polynomials between the same knots may be wrong by, and the
-/// same of those of lower order: between other knots the order may be another.
-pub struct Measures(Vec<[f64; 2]>);
+/// Largest error measures of the polynomials between two knots, and of those of lower order,
+/// kept knot by knot since the order may differ.
+pub struct ErrorMeasures(Vec<[f64; 2]>);
 
-impl Measures {
-    /// Of none yet, of so many stations.
+impl ErrorMeasures {
+    /// Zero, for so many stations.
     pub fn new(stations: usize) -> Self {
-        Measures(vec![[0.0; 2]; stations])
+        ErrorMeasures(vec![[0.0; 2]; stations])
     }
 
-    /// Adds those at a place between the knots whose first station is `first`.
+    /// Adds the measures at a point between the knots whose first station is `first`.
     pub fn add(&mut self, first: usize, measures: [f64; 2]) {
         let largest = self.0[first].iter_mut().zip(measures);
         largest.for_each(|(largest, measure)| *largest = largest.max(measure));
     }
 
-    /// What the polynomials may be wrong by, no less than `part` of the measures.
+    /// The error estimate of the polynomials, no less than `part` of the measures.
     pub fn error(&self, part: f64) -> f64 {
         let error = |&[best, second]: &[f64; 2]| match second > best {
             true => best * (best / second).max(part),

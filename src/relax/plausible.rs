@@ -1,26 +1,26 @@
-//! Remarks on a leaf at rest that can hardly be meant.
+//! Plausibility checks of a leaf at rest: remarks on results that indicate wrong input.
 
 use crate::relax::equilibrium::Equilibrium;
 use crate::scenario::{Rod, Scenario};
 use crate::shape::RodShape;
 use glam::DVec3;
 
-/// A vein that is longer by more than this part somewhere than it rests at.
+/// Largest plausible stretch of a vein relative to its rest stretch.
 const STRETCHED: f64 = 0.2;
 
-/// A leaf so many times longer than (A/q)^(1/3) hangs like a thread: a column stands under
-/// its weight up to 1.99 of it (Greenhill 1881, Proc. Camb. Phil. Soc. 4).
+/// A leaf so many times longer than (A/q)^(1/3) hangs like a thread: a column is stable under
+/// its own weight up to 1.99 times that length (Greenhill 1881, Proc. Camb. Phil. Soc. 4).
 const TOO_LONG: f64 = 30.0;
 
-/// What gravity is where it is entered as an acceleration, in units of metres and seconds,
-/// and the part by which numbers that are meant so differ.
+/// Gravity if entered by mistake as an acceleration in metres and seconds, and the relative
+/// tolerance with which that number is recognised.
 const ACCELERATION: f64 = 9.81;
 const ROUNDED: f64 = 2e-3;
 
-/// From this many times that length on, gravity of such a size is such a slip.
+/// Multiple of that length from which on such a number is taken for this mistake.
 const SUSPICIOUS: f64 = 5.0;
 
-/// What is hardly meant about a leaf at rest, one short sentence each.
+/// The implausible properties of a leaf at rest, one short sentence each.
 pub fn doubts(scenario: &Scenario, leaf: &Equilibrium) -> Vec<String> {
     if !leaf.outcome.is_at_rest() {
         return Vec::new();
@@ -34,7 +34,7 @@ pub fn doubts(scenario: &Scenario, leaf: &Equilibrium) -> Vec<String> {
     all
 }
 
-/// Stretch less that at rest over it, with the vein and the fraction of its length.
+/// Relative stretch beyond the rest stretch, with the vein and the fraction of its length.
 fn strains<'l>(
     scenario: &'l Scenario,
     rods: &'l [RodShape],
@@ -59,7 +59,7 @@ fn stretched(strains: impl Iterator<Item = (f64, usize, f64)>) -> Option<String>
     })
 }
 
-/// A vein whose elements point backwards.
+/// A vein with inverted elements (non-positive stretch).
 fn inverted(rods: &[RodShape], stations: &[f64]) -> Option<String> {
     let backwards = |rod: &RodShape| rod.nodes.iter().position(|node| node.v.x <= 0.0);
     let mut rods = rods.iter().enumerate();
@@ -72,8 +72,7 @@ fn inverted(rods: &[RodShape], stations: &[f64]) -> Option<String> {
     })
 }
 
-/// A leaf that is longer than any can be by its own weight and stiffness, if nothing but its
-/// base holds it.
+/// A leaf that is too long for its weight and stiffness, if only its base is held.
 fn too_long(scenario: &Scenario) -> Option<String> {
     if scenario.held_tip.is_some() {
         return None;
@@ -91,7 +90,7 @@ fn too_long(scenario: &Scenario) -> Option<String> {
         .iter()
         .map(times)
         .fold(f64::INFINITY, f64::min);
-    // 9.81, and with other units of length a power of ten of it.
+    // 9.81 times a power of ten, for other units of length.
     let digits = weight / 10_f64.powf((weight / ACCELERATION).log10().round());
     let slip = (digits / ACCELERATION - 1.0).abs() < ROUNDED;
     if weight == 0.0 || shortest < if slip { SUSPICIOUS } else { TOO_LONG } {

@@ -1,4 +1,4 @@
-//! The leaf at rest on a finer grid predicted from those on nested coarser grids.
+//! Prediction of the leaf at rest on a finer grid from those on nested coarser grids.
 
 use crate::leaf::{Grid, State};
 use crate::relax::level::Level;
@@ -6,17 +6,17 @@ use crate::relax::prolong::lagrange;
 use crate::rotation;
 use glam::{DQuat, DVec3};
 
-/// Most points that a polynomial along a panel goes through.
+/// Largest number of points of a polynomial along a panel.
 const POINTS: usize = 7;
 
 /// Segments of a panel from which on such polynomials are better than cubic Hermite
 /// interpolants.
 const SEGMENTS: usize = 4;
 
-/// Predicts the state on the finest grid refined: the polynomial in ds^2 through the states
-/// on nested `levels`, from coarse to fine. Along the panels between kinks these are polynomials as well; in
-/// panels of few segments `state`, the finest one prolonged, is kept as the finest
-/// grid's part of it.
+/// Predicts the state on the finest grid refined: the polynomial in ds^2 through the states on
+/// nested `levels`, from coarse to fine. Interpolation along the panels between kinks is
+/// polynomial as well; in panels of few segments the finest grid contributes `state`, its
+/// prolongation.
 pub fn predict(levels: &[&Level], state: &mut State) {
     let [coarser @ .., finest] = levels else {
         return;
@@ -42,8 +42,8 @@ pub fn predict(levels: &[&Level], state: &mut State) {
     }
 }
 
-/// Weights of values on grids of so many segments in that of another, by the polynomial in
-/// ds^2 through all of them.
+/// Weights of values on grids of so many segments in the value on another, by the polynomial
+/// in ds^2 through all of them.
 pub fn weights(segments: &[usize], target: usize) -> Vec<f64> {
     let square = |segments: usize| (segments as f64).powi(-2);
     let weight = |own: &usize| {
@@ -64,8 +64,8 @@ fn edges(grid: &Grid, kinks: &[f64]) -> Vec<usize> {
         .collect()
 }
 
-/// The part of the rods between two kinks: segments `first` to `last` of `coarsest`
-/// ones on the coarsest grid.
+/// The part of the rods between two kinks: from node `first` to node `last` of the coarsest
+/// grid, which has `coarsest` segments.
 struct Panel {
     first: usize,
     last: usize,
@@ -83,7 +83,7 @@ impl Panel {
         (self.last - self.first) * state.segments() / self.coarsest
     }
 
-    /// Polynomials through its nodes on a grid at those on another.
+    /// Interpolation from its nodes on one grid to those on another.
     fn nodes(&self, from: &State, to: &State) -> Vec<Polynomial> {
         let (have, want) = (self.count(from), self.count(to));
         let place = |k: usize| (k * have) as f64 / want as f64;
@@ -91,7 +91,7 @@ impl Panel {
         (0..=want).map(through).collect()
     }
 
-    /// The same with the middles of segments.
+    /// The same for midpoints of segments.
     fn middles(&self, from: &State, to: &State) -> Vec<Polynomial> {
         let (have, want) = (self.count(from), self.count(to));
         let place = |i: usize| (i as f64 + 0.5) * have as f64 / want as f64 - 0.5;
@@ -99,14 +99,14 @@ impl Panel {
         (0..want).map(through).collect()
     }
 
-    /// Writes the values of the polynomials through the state on one grid.
+    /// Interpolates the state on one grid to another.
     fn interpolate(&self, from: &State, to: &mut State) {
         let (nodes, middles) = (self.nodes(from, to), self.middles(from, to));
         for j in 0..from.rods() {
             let base = from.base(j);
             let first = to.base(j) + self.first(to);
             for (k, node) in nodes.iter().enumerate() {
-                // Neighbours are less than half a turn apart, others need not be.
+                // Neighbours differ by less than half a turn; more distant nodes may not.
                 let mut before = from.q[base + node.first];
                 let mut sum = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
                 for (i, weight) in node.terms() {
@@ -140,7 +140,7 @@ impl Panel {
             };
             let changes: Vec<_> = (start..=start + count).map(change).collect();
             let first = to.base(j) + self.first(to);
-            // The first node is the base, or at a kink and done.
+            // The first node is the base, or was the last of the panel before.
             for (k, node) in nodes.iter().enumerate().skip(1) {
                 let turn = node.value(|i| changes[i - start].1);
                 to.x[first + k] += node.value(|i| changes[i - start].0);
@@ -160,7 +160,7 @@ impl Panel {
     }
 }
 
-/// A value of the polynomial through points next to each other.
+/// The weights of a value of the polynomial through adjacent points.
 struct Polynomial {
     first: usize,
     count: usize,

@@ -1,18 +1,18 @@
-//! From a grid to the one with all segments halved, and back.
+//! Prolongation to the grid with all segments halved, and restriction.
 
 use crate::leaf::{DiscreteLeaf, State};
 use glam::{DQuat, DVec3};
 
-/// The state on the refined grid: nodes in common are kept, new ones lie on
-/// cubic Hermite interpolants of position and quaternion. Forces are linear
-/// between the middles of the segments.
+/// The state on the refined grid: nodes in common are kept, new ones lie on cubic Hermite
+/// interpolants of position and quaternion. Forces are interpolated linearly between the
+/// midpoints of the segments.
 pub fn prolong(leaf: &DiscreteLeaf, state: &State) -> State {
     let n = leaf.segments();
     let (mut x, mut q, mut forces) = (Vec::new(), Vec::new(), Vec::new());
     for j in 0..leaf.rods() {
         let force = |i: usize| state.n[j * n + i];
-        // Spatial curvature and force at a node: from the segments beside it,
-        // or extrapolated from the two next to an end.
+        // Spatial curvature and force at a node: from the adjacent segments, or extrapolated
+        // from the two nearest to an end.
         let curved = |i: usize| {
             let segment = leaf.segment(state, j, i, force(i));
             segment.frame * segment.u
@@ -60,8 +60,7 @@ pub fn prolong(leaf: &DiscreteLeaf, state: &State) -> State {
     fine
 }
 
-/// The state on the grid of which this one is the refined one: forces are means of both
-/// halves of a segment.
+/// The state on the next coarser grid: forces are means over the two halves of a segment.
 pub fn restrict(fine: &State) -> State {
     let (mut x, mut q) = (Vec::new(), Vec::new());
     for j in 0..fine.rods() {

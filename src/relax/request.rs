@@ -1,4 +1,4 @@
-//! A relaxation as a user of the library asks for it.
+//! The builder of a relaxation for users of the library.
 
 use crate::relax::equilibrium::Equilibrium;
 use crate::relax::method::Method;
@@ -9,8 +9,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-/// A relaxation to be: what is not said is as the scenario and the program's
-/// defaults have it. Made by [`Scenario::relaxation`].
+/// A relaxation to be run, with the defaults of scenario and program for what is not set. Made
+/// by [`Scenario::relaxation`].
 #[must_use = "nothing is solved before `run`"]
 pub struct Relaxation<'a> {
     scenario: &'a Scenario,
@@ -19,10 +19,9 @@ pub struct Relaxation<'a> {
 }
 
 impl Scenario {
-    /// Finds how the leaf comes to rest, to the scenario's tolerance.
+    /// Brings the leaf to rest, to the scenario's tolerance.
     ///
-    /// # Errors
-    /// Requests that cannot be met; how the run itself ended is the result's
+    /// # Errors Requests that cannot be met; the end of the run itself is the result's
     /// [`Outcome`](crate::relax::Outcome).
     pub fn relax(&self) -> Result<Equilibrium, RelaxError> {
         self.relaxation().run()
@@ -58,58 +57,57 @@ impl Scenario {
 }
 
 impl<'a> Relaxation<'a> {
-    /// By this method, with its options.
+    /// Sets the method, with its options.
     pub fn method(mut self, method: Method) -> Self {
         self.options.method = method;
         self
     }
 
-    /// On one grid of so many segments a rod, without extrapolation and so without
-    /// an error estimate.
+    /// Uses one grid of so many segments a rod, without extrapolation and hence without an
+    /// error estimate.
     pub fn grid(mut self, segments: usize) -> Self {
         self.options.method = self.options.method.on_grid(Some(segments));
         self
     }
 
-    /// To this accuracy of the centerlines, relative to the longest rod.
+    /// Sets the accuracy of the centerlines, relative to the longest rod.
     pub fn tolerance(mut self, tolerance: f64) -> Self {
         self.options.tolerance = Some(tolerance);
         self
     }
 
-    /// With so many of the lowest modes of vibration.
+    /// Requests so many of the lowest modes of vibration.
     pub fn modes(mut self, count: usize) -> Self {
         self.options.modes = count;
         self.options.mode_shapes = count > 0;
         self
     }
 
-    /// At the nodes of the finest grid, not only at those of the coarsest.
+    /// Requests the leaf at the nodes of the finest grid, not only at those of the coarsest.
     pub fn every_node(mut self) -> Self {
         self.options.every_node = true;
         self
     }
 
-    /// Giving up, not at rest, when so much time is over.
+    /// Stops the run, not at rest, after this time.
     pub fn time_limit(mut self, time: Duration) -> Self {
         self.options.limit.deadline = Some(Instant::now() + time);
         self
     }
 
-    /// Giving up, not at rest, as soon as `cancel` is `true`, which another thread
-    /// may make it.
+    /// Stops the run, not at rest, as soon as `cancel` is `true`; another thread may set it.
     pub fn cancel(mut self, cancel: Arc<AtomicBool>) -> Self {
         self.options.limit.cancel = Some(cancel);
         self
     }
 
-    /// Saying how far it has come in every step.
+    /// Calls `progress` in every step.
     pub fn progress(mut self, progress: impl FnMut(&Progress) + 'a) -> Self {
         self.progress = Box::new(progress);
         self
     }
 
-    /// Lets the leaf come to rest.
+    /// Runs the relaxation.
     ///
     /// # Errors
     /// As [`Scenario::relax`].

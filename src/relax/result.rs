@@ -92,7 +92,7 @@ pub fn equilibrium(
     }
 }
 
-/// What the holder of a held tip feels, with `columns` extrapolations.
+/// The reaction at a held tip, after `columns` extrapolations.
 fn reaction(levels: &[&Level], columns: usize) -> Option<Reaction> {
     let leaf = &levels[0].leaf.leaf;
     let held = leaf.held.as_ref()?;
@@ -119,8 +119,8 @@ fn reaction(levels: &[&Level], columns: usize) -> Option<Reaction> {
     })
 }
 
-/// The potential energy: integrated along the leaf, with an error of second order, or with
-/// `columns` extrapolations.
+/// The potential energy: integrated along the leaf, with an error of second order in the
+/// defect, or after `columns` extrapolations.
 fn potential(run: &Run, columns: usize) -> f64 {
     if let Some(estimate) = &run.estimate {
         return estimate.energy;
@@ -132,8 +132,8 @@ fn potential(run: &Run, columns: usize) -> f64 {
     energies.column(columns)[0]
 }
 
-/// The centerlines at all nodes of the finest grid or, of a corrected leaf, of the grid
-/// of the integration, in units of the scenario.
+/// The centerlines at all nodes of the finest grid or, for a corrected leaf, of the grid of
+/// the integration, in units of the scenario.
 fn centerlines<'r>(run: &'r Run, finest: &'r Level) -> (&'r Grid, Vec<Centerline>) {
     let length = run.leaf.scale.length;
     if let Some(estimate) = run.corrected() {
@@ -147,12 +147,12 @@ fn centerlines<'r>(run: &'r Run, finest: &'r Level) -> (&'r Grid, Vec<Centerline
     (&finest.leaf.grid, lines.collect())
 }
 
-/// Of a leaf that moved far while it was softer than it is.
+/// Remark on a leaf that moved far while softened.
 const SOFTENED: &str = "stiff rods were softened while the leaf moved: \
      where it has several equilibria, its own motion may end in another; simulate shows it";
 
-/// How a run ended, at rest (to the tolerance or not) or stopped before: a word, and
-/// a sentence where one helps.
+/// The outcome of a run, at rest (to the tolerance or not) or stopped before, with a sentence
+/// of advice where one helps.
 pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) {
     let finest = run.levels.last().map_or(0, |level| level.leaf.segments());
     let explicit = matches!(run.options.method, Method::Explicit { .. });
@@ -182,13 +182,13 @@ pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) 
             Outcome::Diverged,
             Some(format!(
                 "no step lowers the energy on {finest} segments{}",
-                what_to_change(run)
+                advice(run)
             )),
         ),
         Err(stop) => (
             Outcome::NotAtRest,
             Some(match stop {
-                Stop::StepLimit if run.late() => format!(
+                Stop::StepLimit if run.out_of_time() => format!(
                     "the time allowed was over before rest on {finest} segments: allow more"
                 ),
                 Stop::StepLimit if explicit => format!(
@@ -196,20 +196,20 @@ pub fn outcome(run: &Run, end: Result<bool, Stop>) -> (Outcome, Option<String>) 
                 ),
                 Stop::Unresolved => format!(
                     "a vein bends by more than a right angle within one of {finest} segments{}",
-                    what_to_change(run)
+                    advice(run)
                 ),
                 _ => format!(
                     "the step limit came before rest on {finest} segments: the load may admit no stable equilibrium{}",
-                    what_to_change(run)
+                    advice(run)
                 ),
             }),
         ),
     }
 }
 
-/// How far a leaf came that did not come to rest, and what about it may be changed:
-/// the larger of its loads, and the softest stiffness of the vein that bends most.
-fn what_to_change(run: &Run) -> String {
+/// Advice for a leaf that did not come to rest: the part of the loads it reached, the largest
+/// of its loads, and the softest stiffness of the vein that bends most.
+fn advice(run: &Run) -> String {
     let Some(level) = run.levels.last() else {
         return String::new();
     };
@@ -240,7 +240,7 @@ fn what_to_change(run: &Run) -> String {
         false if tip > 0.0 => "lower load.tip_force",
         false => "lower the curvatures at rest",
     };
-    let reached = match run.part {
+    let reached = match run.load_part {
         part if part > 0.0 && part < 0.995 => {
             format!(" (it rests under {:.2} % of the loads)", 100.0 * part)
         }

@@ -8,8 +8,8 @@ const ORDER_SLACK: f64 = 1.5;
 /// order indicates are not those of a ds^2 series either.
 const LEAST_RATIO: f64 = 0.68;
 
-/// A further column that changes the values by more than this part of what the
-/// one before it did has nothing left to remove.
+/// A further column is rejected if it changes the values by more than this part of the change
+/// by the column before it: it has nothing left to remove.
 const WORTHLESS: f64 = 0.1;
 
 /// Safety factor on the last change of a column without a proven order.
@@ -23,7 +23,7 @@ const ROUNDING: f64 = 1e-13;
 const SLOPE: f64 = 30.0;
 const SAFETY: (f64, f64) = (1.3, 10.0);
 
-/// The column of a table that is believed, and its error.
+/// The selected column of a table, and its error estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Best {
     /// Terms of the ds^2 series removed.
@@ -32,7 +32,7 @@ pub struct Best {
     pub error: f64,
 }
 
-/// Values on ever finer grids, extrapolated over the series in ds^2.
+/// Values on successively refined grids, extrapolated over the series in ds^2.
 #[derive(Clone, Debug, Default)]
 pub struct Richardson {
     /// Rows of the table, one per grid; column m has the terms up to ds^(2m) removed.
@@ -64,7 +64,7 @@ impl Richardson {
         self.segments.push(segments);
     }
 
-    /// The same table, of values that have so much rounding in them.
+    /// The same table, of values with rounding errors of this size.
     pub fn with_noise(self, noise: f64) -> Self {
         Richardson { noise, ..self }
     }
@@ -72,14 +72,13 @@ impl Richardson {
     /// The best column on the finest grid and the estimate of its largest
     /// error. `None` before there are two grids.
     ///
-    /// Let D_m be the change that column m makes on the finest grid: it is the
-    /// error of column m - 1. Of a clean series the error of column m is a small
-    /// part of D_m, the smaller the more D_m fell below D_{m-1}; the estimate is
-    /// D_m times a safety factor that rises with sqrt(D_m/D_{m-1}). The numbers
-    /// were set on some 700 runs: random leaves, the paper's, textbook problems,
-    /// boundary layers. Where the
-    /// first column is not of second order (the grids do not resolve the
-    /// solution yet) the finest grid itself is returned, its last change as error.
+    /// Let D_m be the change by column m on the finest grid: it is the error of column m - 1.
+    /// For a clean series the error of column m is a small part of D_m, the smaller the ratio
+    /// D_m/D_{m-1} the smaller; the estimate is D_m times a safety factor that rises with
+    /// sqrt(D_m/D_{m-1}). The numbers were set on some 700 runs: random leaves, the paper's,
+    /// textbook problems, boundary layers. Where the first column is not of second order (the
+    /// grids do not resolve the solution yet) the finest grid itself is returned, its last
+    /// change as error.
     pub fn best(&self) -> Option<Best> {
         let row = self.table.last()?;
         let before = &self.table[self.table.len().checked_sub(2)?];
@@ -108,12 +107,12 @@ impl Richardson {
             columns -= 1;
         }
         if columns < last {
-            // Not proven to have an order of its own: judged by its last change.
+            // Its order is not confirmed: the error estimate is its last change.
             let change = distance(&row[columns], &before[columns]);
             let error = (UNORDERED * change).max(SAFETY.1 * correction(columns));
             return Some(Best { columns, error });
         }
-        // Two grids have only the size of the leaf, one, to compare with.
+        // With two grids the only reference is the size of the leaf, one.
         let previous = if last > 1 { correction(last - 1) } else { 1.0 };
         let ratio = correction(last) / previous.max(ROUNDING);
         let safety = (SLOPE * ratio.sqrt()).clamp(SAFETY.0, SAFETY.1);
@@ -123,9 +122,9 @@ impl Richardson {
         })
     }
 
-    /// The change before the one that judges the best column, `columns`: of the finest
-    /// grid by the column before or, of a column that is no further extrapolated, from
-    /// grid to grid. Zero if there is none.
+    /// The change preceding the one in the error estimate of the best column, `columns`: on
+    /// the finest grid by the column before or, if nothing is extrapolated, from grid to grid.
+    /// Zero if there is none.
     pub fn change_before(&self, columns: usize) -> f64 {
         match self.table.as_slice() {
             [.., row] if columns > 1 && columns + 1 == row.len() => {
@@ -136,9 +135,9 @@ impl Richardson {
         }
     }
 
-    /// Ratio of the last two changes of column `m` from grid to grid if its error
-    /// is in proportion to the first term that is left: to the product of ds^2 of
-    /// the grids it joins.
+    /// Expected ratio of the last two changes of column `m` from grid to grid, if its error is
+    /// proportional to the first remaining term: to the product of ds^2 of the grids it
+    /// combines.
     fn order(&self, m: usize) -> f64 {
         let last = self.segments.len() - 1;
         let unit = self.segments[last] as f64;
@@ -157,8 +156,8 @@ impl Richardson {
     }
 }
 
-/// Largest distance between the points of which the values are components,
-/// three by three: a measure that does not depend on the axes.
+/// Largest distance between points whose components are three consecutive values each:
+/// invariant under rotation of the axes.
 fn distance(a: &[f64], b: &[f64]) -> f64 {
     let square =
         |(a, b): (&[f64], &[f64])| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();

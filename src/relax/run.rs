@@ -1,5 +1,5 @@
-//! A run over nested grids: what is asked, the grids the leaf has settled on,
-//! and the error estimate of their extrapolation.
+//! A run over nested grids: its options, the grids on which the leaf has settled, and the
+//! error estimate of their extrapolation.
 
 use crate::leaf::{DiscreteLeaf, Leaf, System, whole_fields};
 use crate::newton::{Contraction, Work};
@@ -14,81 +14,83 @@ use glam::DVec3;
 /// Segments of the coarsest grid, in two panels or more if profiles have kinks.
 pub const COARSEST: usize = 8;
 
-/// Growth of errors of single grids by extrapolation, sum of the weights at most.
+/// Amplification of errors on single grids by extrapolation: bound on the sum of the weights'
+/// absolute values.
 const EXTRAPOLATED: f64 = 2.0;
 
 /// Safety factor on the error estimated from the defect of the extrapolated leaf.
 const SAFETY: f64 = 2.0;
 
-/// It is at most so many times the error estimated from the last extrapolation: the response
-/// of a neutral mode to rounding is no error.
+/// Upper bound of that estimate in units of the error estimated from the last extrapolation:
+/// the response of a neutral mode to rounding is not an error.
 const LARGEST: f64 = 10.0;
 
-/// Where the last extrapolation changed the leaf by so many times the tolerance the defect is
+/// If the error estimated by extrapolation exceeds the tolerance by this factor, the defect is
 /// not computed: it would hardly be small enough.
 const OUT_OF_REACH: f64 = 3e3;
 
-/// How often the estimated error is subtracted, at most, and the part that remains at best.
+/// Largest number of corrections by the estimated error, and the part of the error that each
+/// leaves at best.
 const CORRECTIONS: usize = 4;
 const CORRECTED: f64 = 1e-2;
 
-/// Of a leaf with more nodes than this no equations are kept while others are solved: less
-/// memory for a factorisation more of a coarse grid.
+/// For leaves with more nodes than this no equations are kept while others are solved, which
+/// saves memory at the cost of another factorisation on a coarse grid.
 const MANY_NODES: usize = 50_000;
 
-/// Part of the rounding error that grows with the number of segments.
+/// Rounding error per segment.
 const ROUNDING: f64 = 4e-15;
 
-/// Nodes times force evaluations after which a leaf that has not come to rest
-/// is given up: some seconds.
+/// Limit on nodes times force evaluations for a leaf to come to rest: some seconds.
 pub const BUDGET: usize = 4_000_000;
 
-/// What is asked, and what was found so far.
+/// The state of a run.
 pub struct Run<'a, 'o> {
     pub leaf: &'a Leaf,
-    /// The leaf with all of its unknowns, if `leaf` is half of it or in its plane.
+    /// The full leaf, if `leaf` is half of it or restricted to its plane.
     pub whole: Option<&'a Leaf>,
     /// Rods solved for.
     pub solved: usize,
-    /// Whether in their plane.
+    /// Whether they are solved for in their plane.
     pub planar: bool,
-    /// What neglecting shear, and stretch, would change.
+    /// Displacements that would follow from neglecting shear, and stretch.
     pub effects: [Option<f64>; 2],
     pub options: &'o Options,
     pub tolerance: f64,
-    /// Whether nothing but the shape and its stability is asked for: forces on the grids,
-    /// eigenvalues and derivatives are not.
+    /// Whether only the shape and its stability are requested, without forces on the grids,
+    /// eigenvalues or derivatives.
     pub shape_alone: bool,
     pub progress: &'o mut dyn FnMut(&Progress),
     pub work: Work,
     pub saddle: Option<Saddle>,
     pub levels: Vec<Level>,
     pub table: Richardson,
-    /// The error estimated from the defect of the best values, if it is known, and the linear
-    /// equations for it.
+    /// The error estimated from the defect of the extrapolated values, if it is known, and the
+    /// linear equations for it.
     pub estimate: Option<Estimate>,
     pub linear: Option<Linear>,
-    /// Room for the equations of the grid that was settled on last.
-    pub room: Option<System>,
+    /// The linear system of the last grid, for reuse.
+    pub spare_system: Option<System>,
     /// Whether a grid was added for the nodes of the finest one.
-    pub for_nodes: bool,
+    pub added_for_nodes: bool,
     pub index: Option<usize>,
     /// Whether the lowest eigenvalue is clearly positive.
-    pub clearly: bool,
-    /// Largest iteration error left on any grid.
+    pub clearly_stable: bool,
+    /// Largest remaining iteration error on any grid.
     pub remaining: f64,
-    /// Of Newton's method on the grids so far.
+    /// Convergence of Newton's method on the grids so far.
     pub contraction: Contraction,
     /// Nodes times force evaluations so far.
     pub spent: usize,
-    /// Saddles left that were only noticed by their index.
+    /// Number of pushes off saddles at which the iteration had converged (found by their Morse
+    /// index).
     pub pushes: i32,
     /// Whether the leaf did not come to rest in a first attempt.
     pub by_steps: bool,
-    /// Whether it had to move while it was softer than it is.
+    /// Whether it moved through states of non-convex energy while softened.
     pub moved_softened: bool,
-    /// Part of the loads under which it then came to rest.
-    pub part: f64,
+    /// Part of the loads under which it came to rest in the second attempt.
+    pub load_part: f64,
 }
 
 impl<'a, 'o> Run<'a, 'o> {
@@ -115,31 +117,31 @@ impl<'a, 'o> Run<'a, 'o> {
             table: Richardson::default(),
             estimate: None,
             linear: None,
-            room: None,
-            for_nodes: false,
+            spare_system: None,
+            added_for_nodes: false,
             index: None,
-            clearly: false,
+            clearly_stable: false,
             remaining: 0.0,
             contraction: Contraction::default(),
             spent: 0,
             pushes: 0,
             by_steps: false,
             moved_softened: false,
-            part: 0.0,
+            load_part: 0.0,
         }
     }
 
-    /// Forgets all grids, to begin anew by steps of loads and stiffness.
-    pub fn begin_by_steps(&mut self) {
+    /// Discards all grids and restarts by continuation in loads and stiffness.
+    pub fn restart_by_steps(&mut self) {
         if !self.by_steps {
             self.spent = BUDGET / 2;
         }
         self.by_steps = true;
-        self.begin_anew();
+        self.restart();
     }
 
-    /// Forgets all grids and what was found on them.
-    pub fn begin_anew(&mut self) {
+    /// Discards all grids and the results on them.
+    pub fn restart(&mut self) {
         self.moved_softened = false;
         self.saddle = None;
         self.levels.clear();
@@ -151,7 +153,7 @@ impl<'a, 'o> Run<'a, 'o> {
         self.pushes = 0;
     }
 
-    /// The run as if it had been one of the whole leaf.
+    /// The run of a reduced leaf converted to one of the whole leaf.
     pub fn completed(mut self, whole: &'a Leaf) -> Self {
         let reduced = self.leaf;
         let complete = |level: &Level| complete(reduced, whole, level);
@@ -166,16 +168,16 @@ impl<'a, 'o> Run<'a, 'o> {
         });
         self.tabulate();
         // The equations are those of the reduced leaf.
-        (self.linear, self.room) = (None, None);
+        (self.linear, self.spare_system) = (None, None);
         Run { estimate, ..self }
     }
 
-    /// Segments of the only grid, if there is to be one.
+    /// Segments of the fixed grid, if there is one.
     pub fn segments(&self) -> Option<usize> {
         self.options.method.segments()
     }
 
-    /// Whether an unstable equilibrium is wanted as much as a stable one.
+    /// Whether unstable equilibria are accepted.
     pub fn keeps_unstable(&self) -> bool {
         matches!(self.options.method, Method::SemiImplicit(how) if how.keep_unstable)
     }
@@ -184,18 +186,18 @@ impl<'a, 'o> Run<'a, 'o> {
     pub fn may_go_by_steps(&self) -> bool {
         let settles =
             matches!(self.options.method, Method::SemiImplicit(how) if !how.keep_unstable);
-        // A tip that is held is led to its place by steps already.
+        // A held tip has been moved to its position by steps already.
         let free = self.leaf.held.is_none() && self.leaf.loads.tip_moment == DVec3::ZERO;
-        settles && free && !self.late()
+        settles && free && !self.out_of_time()
     }
 
-    /// Whether the time allowed is over.
-    pub fn late(&self) -> bool {
+    /// Whether the time limit is reached or the run is cancelled.
+    pub fn out_of_time(&self) -> bool {
         self.options.limit.reached()
     }
 
-    /// Estimate of the error of the best values, relative to the leaf's length:
-    /// of the extrapolation, of unfinished iterations, and of rounding.
+    /// Error estimate of the extrapolated values, relative to the leaf's length:
+    /// extrapolation, unfinished iterations and rounding.
     pub fn error(&self) -> Option<f64> {
         let segments = self.levels.last()?.leaf.segments();
         let best = self.table.best()?.error;
@@ -205,7 +207,7 @@ impl<'a, 'o> Run<'a, 'o> {
                 let segments = self.levels[0].leaf.segments() as f64;
                 return Some(SAFETY * estimate.largest() + ROUNDING * segments);
             }
-            // Where nodes are few the midpoints are stations, too.
+            // If nodes are few the midpoints are stations, too.
             Some(estimate) if self.too_coarse(self.levels[0].leaf.segments()) => {
                 (SAFETY * estimate.largest()).min(LARGEST * best)
             }
@@ -215,13 +217,13 @@ impl<'a, 'o> Run<'a, 'o> {
         Some(extrapolation + self.unfinished(segments))
     }
 
-    /// Error of unfinished iterations and of rounding on a grid of so many segments.
+    /// Error by unfinished iterations and rounding on a grid of `segments` segments.
     fn unfinished(&self, segments: usize) -> f64 {
         EXTRAPOLATED * self.remaining + ROUNDING * segments as f64
     }
 
     /// The leaf integrated to the nodes of the finest grid, or of a finer one if it was
-    /// corrected, and its error, if that is within the tolerance.
+    /// corrected, and its error, if that is within the tolerance or the leaf was corrected.
     pub fn integrated(&self) -> Option<(&Estimate, f64)> {
         let (estimate, segments) = (self.estimate.as_ref()?, self.levels.last()?.leaf.segments());
         let error = match estimate.corrections {
@@ -238,7 +240,7 @@ impl<'a, 'o> Run<'a, 'o> {
             .filter(|estimate| estimate.corrections > 0)
     }
 
-    /// How often the error may be corrected.
+    /// The largest number of corrections.
     fn corrections(&self) -> usize {
         let grids = matches!(self.options.method, Method::SemiImplicit(_));
         let free = self.leaf.held.is_none() && self.segments().is_none();
@@ -248,9 +250,9 @@ impl<'a, 'o> Run<'a, 'o> {
         }
     }
 
-    /// Estimates the error of the best values from their defect, and corrects it if that
-    /// makes them accurate enough.
-    pub fn judge_accuracy(&mut self) {
+    /// Estimates the error of the extrapolated values from their defect, and corrects it if
+    /// that makes them accurate enough.
+    pub fn estimate_accuracy(&mut self) {
         let most = self.corrections();
         let farthest = OUT_OF_REACH * CORRECTED.powi(-(most as i32));
         let best = self.table.best();
@@ -264,15 +266,16 @@ impl<'a, 'o> Run<'a, 'o> {
         }
     }
 
-    /// Whether unfinished iterations and rounding alone are more than the
-    /// tolerance on a grid of so many `segments`, and already on the present one
-    /// most of the error: no refinement helps then.
+    /// Whether errors by unfinished iterations and rounding alone exceed the tolerance on a
+    /// grid of so many `segments` and are already at least half of the present error:
+    /// refinement does not help then.
     pub fn beyond_rounding(&self, segments: usize) -> bool {
         let floor = self.unfinished(segments);
         floor > self.tolerance && self.error().is_some_and(|error| error <= 2.0 * floor)
     }
 
-    /// Whether a grid is one for leaves only that settle where they start.
+    /// Whether a grid is so coarse that it only serves leaves that settle in the valley they
+    /// start in.
     pub fn too_coarse(&self, segments: usize) -> bool {
         self.segments().is_none() && segments < COARSEST
     }
@@ -283,7 +286,7 @@ impl<'a, 'o> Run<'a, 'o> {
         self.tabulate();
     }
 
-    /// Tabulates the positions on all grids, and forgets estimates made before.
+    /// Tabulates the positions on all grids, and discards earlier estimates.
     pub fn tabulate(&mut self) {
         let mut table = Richardson::default();
         for level in &self.levels {
@@ -299,7 +302,7 @@ impl<'a, 'o> Run<'a, 'o> {
     }
 }
 
-/// Whether the equations of a leaf fill much of the memory.
+/// Whether the equations of a leaf need much memory.
 pub fn is_large(leaf: &DiscreteLeaf) -> bool {
     leaf.rods() * leaf.segments() > MANY_NODES
 }

@@ -1,4 +1,4 @@
-//! Saddles: counting their negative eigenvalues, finding them, leaving them.
+//! Saddles: their Morse index, their refinement by Newton's method, and leaving them.
 
 use crate::leaf::{DiscreteLeaf, Solved, SparsePattern, State, System};
 use crate::newton::{Equations, Newton, Work};
@@ -9,21 +9,21 @@ use serde::Serialize;
 /// (lengths) along the unstable mode.
 const PUSH: f64 = 0.03;
 
-/// Steps of inverse iteration; the mode need not be accurate, only unstable.
+/// Steps of inverse iteration; the mode must be unstable, not accurate.
 const MODE_ITERATIONS: usize = 6;
 
-/// Largest rotation or displacement in one of them.
+/// Largest rotation or displacement in a Newton step towards an equilibrium of any kind.
 const MAX_STEP: f64 = 0.5;
 
-/// Of a clearly stable leaf the lowest eigenvalue (over the masses; that of a clamped rod
-/// is 12) is larger than this on one grid: next to a fold it changes with the shape.
-const CLEARLY: f64 = 0.1;
+/// Lower bound on the lowest eigenvalue (with respect to the masses; 12 for a clamped rod) on
+/// one grid of a leaf that counts as clearly stable: near a fold it changes with the shape.
+const CLEARLY_POSITIVE: f64 = 0.1;
 
-/// So many times the stiffness that the elements may have too much: their forces are those
-/// of the grid.
-const EXCESS: f64 = 3.0;
+/// Safety factor on the excess stiffness of the elements, which is computed with the forces on
+/// the grid.
+const EXCESS_SAFETY: f64 = 3.0;
 
-/// A saddle that was met before rest, and left.
+/// A saddle that the leaf reached and left before it came to rest.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Saddle {
     /// Its energy.
@@ -34,10 +34,10 @@ pub struct Saddle {
     pub tip: DVec3,
 }
 
-/// Morse index of a state at rest: the number of negative eigenvalues of the
-/// Hessian of its energy (the symmetric part of it, under a dead moment).
-/// Eigenvalues (over the masses) between -`shift` and zero do not count. `None` if
-/// the factorisation does not fit into memory.
+/// Morse index of a state at rest: the number of negative eigenvalues of the Hessian of its
+/// energy (the symmetric part of it, under a dead moment). Eigenvalues (with respect to the
+/// masses) between -`shift` and zero do not count. `None` if the factorisation does not fit
+/// into memory.
 pub fn index(
     leaf: &DiscreteLeaf,
     state: &State,
@@ -51,7 +51,7 @@ pub fn index(
         work.factorizations += 1;
     };
     assemble(system);
-    // One linear-time factorisation proves most leaves stable.
+    // For most stable leaves one linear-time factorisation is enough.
     if system.stable_without_coupling(shift) {
         return Some(0);
     }
@@ -66,8 +66,8 @@ fn negative(system: &System, shift: f64) -> Option<usize> {
 }
 
 /// Whether a state at rest on a grid may be expected to be stable on finer ones as well: its
-/// Hessian is positive definite less [`EXCESS`] times the stiffness by which elements may
-/// exceed the rods and [`CLEARLY`] times the mass matrix.
+/// Hessian minus [`EXCESS_SAFETY`] times the excess stiffness of the elements over the rods
+/// and minus [`CLEARLY_POSITIVE`] times the mass matrix is positive definite.
 pub fn clearly_stable(
     leaf: &DiscreteLeaf,
     state: &State,
@@ -76,36 +76,36 @@ pub fn clearly_stable(
 ) -> bool {
     let mut assemble = |system: &mut System| {
         leaf.assemble(state, system);
-        leaf.subtract_excess_stiffness(state, system, EXCESS);
+        leaf.subtract_excess_stiffness(state, system, EXCESS_SAFETY);
         work.force_evaluations += 1;
         work.factorizations += 1;
     };
     assemble(system);
-    if system.stable_without_coupling(-CLEARLY) {
+    if system.stable_without_coupling(-CLEARLY_POSITIVE) {
         return true;
     }
     if !system.coupled() {
         return false;
     }
     assemble(system);
-    negative(system, -CLEARLY) == Some(0)
+    negative(system, -CLEARLY_POSITIVE) == Some(0)
 }
 
-/// Whatever the signs of the pivots, with steps of bounded size.
+/// Newton's equations with pivots of any sign, and steps of bounded size.
 pub const ANY_SIGN: Equations = Equations::AnySign { largest: MAX_STEP };
 
-/// Newton iterations that make a saddle exact.
+/// Newton iterations to converge at a saddle.
 const POLISH_ITERATIONS: usize = 20;
 
-/// Accuracy of a polished state: rounding.
+/// Accuracy of a converged saddle: rounding.
 const POLISH_ACCURACY: f64 = 1e-13;
 
-/// How far a saddle may be from where it was noticed, in lengths.
+/// Largest distance of a saddle from the state at which it was noticed, in lengths.
 const POLISH_DISTANCE: f64 = 0.1;
 
-/// Makes a state near a saddle exact and counts its Morse index, a neutral mode
-/// not counting as negative. `None` if Newton's method leads elsewhere, with the
-/// state unchanged, or if the index is not known.
+/// Converges a state near a saddle to rounding by Newton's method and counts its Morse index,
+/// a neutral mode not counting as negative. `None` if Newton's method leads elsewhere, with
+/// the state unchanged, or if the index is not known.
 pub fn polish(
     leaf: &DiscreteLeaf,
     state: &mut State,
@@ -127,8 +127,8 @@ pub fn polish(
     index(leaf, state, system, leaf.neutral_shift(), work)
 }
 
-/// Pushes a state at a saddle along its most unstable mode, by inverse
-/// iteration with the smallest shift that makes the matrix positive definite.
+/// Displaces a state at a saddle along its most unstable mode, found by inverse iteration with
+/// the first shift, doubled from 1e-4, that makes the matrix positive definite.
 pub fn push_off(leaf: &DiscreteLeaf, state: &mut State, system: &mut System, work: &mut Work) {
     leaf.assemble(state, system);
     work.force_evaluations += 1;

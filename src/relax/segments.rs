@@ -1,4 +1,4 @@
-//! Segments of the coarsest grid, as wanted or as needed.
+//! Segments of the coarsest grid, as requested or as needed.
 
 use crate::leaf::Leaf;
 use crate::memory::Request;
@@ -10,25 +10,24 @@ use crate::relax::run::COARSEST;
 /// Segments of the finest grid.
 pub const FINEST: usize = 16_384;
 
-/// Segments of the coarsest grid if the tolerance is loose, that is if it is at
-/// least so large, or positions are all that is asked for (forces and eigenvalues have
-/// larger errors), and the leaf settles in the valley it starts in.
+/// Segments of the coarsest grid for a loose tolerance: if it is at least [`LOOSE`] or only
+/// the shape is requested (forces and eigenvalues have larger errors), and the leaf settles in
+/// the valley it starts in.
 const COARSEST_OF_LOOSE: usize = 4;
 const LOOSE: f64 = 1e-3;
 
-/// Rotation per segment (radians) that the coarsest grid must resolve where
-/// rest curvature and tip moment alone determine it, and the most that one of a loose
-/// tolerance may come to.
+/// Rotation per segment (radians) that the coarsest grid must resolve where rest curvature and
+/// tip moment alone determine it, and the largest allowed at rest on the coarsest grid of a
+/// loose tolerance.
 pub const COARSEST_TURN: f64 = 0.8;
 
-/// Whether the leaf settles in the valley it starts in: where the path to rest is
-/// Newton's, nothing keeps it from leaving saddles, and nothing disturbs it.
+/// Whether the method may settle in the valley it starts in: semi-implicit, free to leave
+/// saddles, and not disturbed.
 fn settles_where_it_starts(method: Method) -> bool {
     matches!(method, Method::SemiImplicit(how) if !how.keep_unstable && how.disturbance.is_none())
 }
 
-/// Whether half of a leaf, or the leaf in its plane, may be solved for the
-/// whole.
+/// Whether half of a leaf, or the leaf in its plane, may be solved in place of the whole.
 pub fn reducible(method: Method) -> bool {
     settles_where_it_starts(method)
         && matches!(method, Method::SemiImplicit(how) if !how.full_model)
@@ -43,15 +42,15 @@ pub fn least(method: Method, tolerance: f64, shape_alone: bool) -> usize {
     }
 }
 
-/// Segments of a grid: so many as asked for, or at least `least`, as many as
-/// the kinks of the profiles, the rest shape and the tip moment need.
+/// Segments of a grid: as requested, or at least `least` and as many as the kinks of the
+/// profiles, the rest shape and the tip moment need.
 pub fn check_segments(
     leaf: &Leaf,
-    asked: Option<usize>,
+    requested: Option<usize>,
     least: usize,
 ) -> Result<usize, RelaxError> {
     let panels = leaf.kinks().len() + 1;
-    let found = asked.unwrap_or_else(|| coarsest(leaf, least).max(panels));
+    let found = requested.unwrap_or_else(|| coarsest(leaf, least).max(panels));
     let (rods, segments, least) = (leaf.rods(), found, panels);
     let nodes = rods.saturating_mul(segments);
     if found < least {

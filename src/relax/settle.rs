@@ -1,4 +1,4 @@
-//! Settling on one grid.
+//! The iteration to equilibrium on one grid.
 
 use crate::leaf::{DiscreteLeaf, Grid, Solved, State, System, half_of};
 use crate::newton::{Definite, Newton, Stop};
@@ -12,56 +12,56 @@ use crate::relax::saddle::{self, saddle_of};
 use crate::relax::start::{disturb, start};
 use glam::DVec3;
 
-/// Iteration error allowed on each grid, as a part of the tolerance: after so
-/// coarse a first grid a little more saves a step on the finest.
+/// Iteration error allowed on each grid, as a part of the tolerance: if the first grid is very
+/// coarse, a looser one saves a step on the finest.
 const ITERATION_PART: f64 = 1e-3;
 const ITERATION_PART_FROM_COARSE: f64 = 5e-3;
 
-/// Iteration error allowed on a fixed grid, which is there to be compared.
+/// Iteration error allowed on a fixed grid, whose results are meant for comparisons.
 const FIXED_ACCURACY: f64 = 1e-12;
 
 /// Accuracy of the first solutions with conjugate gradients far from rest.
 const FAR_FROM_REST: f64 = 1e-2;
 
-/// Force evaluations that even the largest leaf is granted on every grid,
-/// whatever was spent before; on one of more segments than [`COARSE`] in proportion
-/// fewer, but never less than the second number.
+/// Force evaluations that any leaf may use on every grid, whatever was spent before; on grids
+/// of more segments than [`COARSE`] proportionally fewer, but no less than the second number.
 const LEAST_EVALUATIONS: (usize, usize) = (600, 100);
 const COARSE: usize = 64;
 
 /// Newton iterations towards an equilibrium of any kind.
 const MAX_ITERATIONS: usize = 200;
 
-/// Saddles that are left before the run is given up.
+/// Saddles that are left before the run fails.
 pub const MAX_SADDLES: i32 = 10;
 
-/// Accuracy, in the energy norm, of the effects of shear and stretch: most of
-/// that norm is stretch itself, and displacements are a small part of it.
+/// Accuracy, in the energy norm, of the effects of shear and stretch: stretch dominates this
+/// norm, to which displacements contribute little.
 const EFFECT_ACCURACY: f64 = 1e-5;
 
-/// Where settling on a grid begins.
+/// The initial guess of the iteration on a grid.
 pub enum InitialGuess {
-    /// The start of the scenario, disturbed if that is asked for.
+    /// The start of the scenario, disturbed if requested.
     Start,
     /// The equilibrium of the next coarser grid, prolonged.
     Coarser(State),
     /// The equilibrium predicted from those on several coarser grids.
     Predicted(State),
-    /// A saddle the leaf was pushed off.
+    /// A state displaced from a saddle along its unstable mode.
     Pushed(State),
 }
 
-/// A leaf that has settled on a grid, or not.
+/// The end of the iteration on a grid, converged or not.
 pub struct Settled {
     pub level: Level,
-    /// The error that is left of the iteration.
+    /// The remaining iteration error.
     pub rest: Result<f64, Stop>,
-    /// Whether it had to move, not only to settle in the valley it was in.
+    /// Whether it had to move through states of non-convex energy, instead of settling in the
+    /// valley of the initial guess.
     pub moved: bool,
 }
 
 impl Run<'_, '_> {
-    /// Settles on one grid; leaves saddles unless they are wanted.
+    /// Settles on one grid; leaves saddles unless they are accepted.
     pub fn settle(&mut self, grid: Grid, guess: InitialGuess) -> Settled {
         let mut leaf = DiscreteLeaf::new(self.leaf, grid);
         let mut near_rest = matches!(guess, InitialGuess::Coarser(_) | InitialGuess::Predicted(_));
@@ -70,8 +70,8 @@ impl Run<'_, '_> {
         let cg_tolerance = match guess {
             InitialGuess::Start | InitialGuess::Pushed(_) => FAR_FROM_REST,
             InitialGuess::Coarser(_) => 1e-4,
-            // The error of interpolation is one of stiff modes, the error that
-            // is to be removed one of soft ones: a small part of the energy.
+            // The interpolation error is dominated by stiff modes; the error to be removed is
+            // one of soft modes, a small part of the energy.
             InitialGuess::Predicted(_) => 1e-8,
         };
         let mut state = match guess {
@@ -82,18 +82,18 @@ impl Run<'_, '_> {
         };
         let mut moved = false;
         if grip {
-            let led = self.lead_grips(&leaf, state);
-            (state, near_rest, moved) = (led.state, led.at_rest, led.moved);
+            let end = self.move_grips(&leaf, state);
+            (state, near_rest, moved) = (end.state, end.at_rest, end.moved);
         }
         let explicit = matches!(self.options.method, Method::Explicit { .. });
-        let follows = leaf.tip_moment() != DVec3::ZERO;
-        if !explicit && !follows && !self.keeps_unstable() {
+        let dead_moment = leaf.tip_moment() != DVec3::ZERO;
+        if !explicit && !dead_moment && !self.keeps_unstable() {
             let by_steps = self.by_steps && from_start;
             let how = (near_rest, by_steps, cg_tolerance);
-            self.room = None;
+            self.spare_system = None;
             let mut system = System::new(&leaf);
-            let settled = self.settle_in_a_valley(leaf, state, &mut system, how);
-            self.room = (!is_large(&settled.level.leaf)).then_some(system);
+            let settled = self.settle_semi_implicit(leaf, state, &mut system, how);
+            self.spare_system = (!is_large(&settled.level.leaf)).then_some(system);
             return Settled {
                 moved: moved || settled.moved,
                 ..settled
@@ -123,7 +123,7 @@ impl Run<'_, '_> {
                 work,
                 progress,
             };
-            match follows {
+            match dead_moment {
                 true => {
                     let limit = &self.options.limit;
                     moment::settle(&mut leaf, &mut state, &mut system, near_rest, limit, newton)
@@ -136,7 +136,7 @@ impl Run<'_, '_> {
         Settled { level, rest, moved }
     }
 
-    /// Where a leaf starts that nothing is known of.
+    /// The start of a leaf without an initial guess.
     pub(super) fn start(&self, leaf: &DiscreteLeaf) -> State {
         if let Some(whole) = self.whole {
             let whole = DiscreteLeaf::new(whole, leaf.grid.clone());
@@ -164,7 +164,7 @@ impl Run<'_, '_> {
     }
 
     /// Settles by the semi-implicit method.
-    fn settle_in_a_valley(
+    fn settle_semi_implicit(
         &mut self,
         leaf: DiscreteLeaf,
         mut state: State,
@@ -179,7 +179,7 @@ impl Run<'_, '_> {
         let allowed = (BUDGET.saturating_sub(self.spent) / nodes).max(granted);
         let begun = self.work.force_evaluations;
         let mut moved = false;
-        // Where it was pushed off saddles at rest before, softened it came back to one.
+        // After earlier pushes off saddles at rest, the softened leaf returned to one.
         for pushes in self.pushes..self.pushes + MAX_SADDLES {
             let mut relaxation = Relaxation {
                 state,
@@ -201,7 +201,7 @@ impl Run<'_, '_> {
                 moved: false,
                 by_steps,
                 moved_softened: false,
-                part: 0.0,
+                load_part: 0.0,
             };
             let before = relaxation.work.force_evaluations;
             let rest = relaxation.settle(&leaf, system);
@@ -209,7 +209,7 @@ impl Run<'_, '_> {
             moved |= relaxation.moved;
             let direct = relaxation.solver.direct.is_some();
             self.contraction = relaxation.solver.contraction;
-            self.part = relaxation.part.max(self.part);
+            self.load_part = relaxation.load_part.max(self.load_part);
             self.moved_softened |= relaxation.moved_softened;
             state = relaxation.state;
             self.spent += nodes * spent;
@@ -239,7 +239,7 @@ impl Run<'_, '_> {
     }
 }
 
-/// Reports the steps on a grid of so many segments.
+/// Reports the steps on a grid of `grid` segments.
 fn step_reporter(
     progress: &mut dyn FnMut(&Progress),
     grid: usize,
@@ -253,8 +253,8 @@ fn step_reporter(
     }
 }
 
-/// Largest displacements if the leaf neither sheared, or did not stretch, to
-/// first order; with the factorisation that the last iteration left.
+/// Largest displacements, to first order, if shear, or stretch, were suppressed; uses the
+/// factorisation of the last iteration.
 fn effects(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> [Option<f64>; 2] {
     [DVec3::new(0.0, 1.0, 1.0), DVec3::X].map(|dropped| {
         leaf.assemble_stiffening(state, dropped, system);

@@ -1,4 +1,4 @@
-//! From a scenario and what is asked to the leaf at rest.
+//! From a scenario and options to the leaf at rest.
 
 use crate::bvp::Start;
 use crate::leaf::{Grid, Leaf};
@@ -64,13 +64,13 @@ pub fn relax(
     Ok(found)
 }
 
-/// The coarsest and the finest grid on which a leaf that did not come to rest is
-/// loaded and stiffened by steps.
+/// The coarsest and the finest grid of the second attempt, by continuation in loads and
+/// stiffness.
 const COARSEST_BY_STEPS: usize = 32;
 const FINEST_BY_STEPS: usize = 512;
 
-/// Relaxes on nested grids; returns also the leaf on each that was extrapolated, from
-/// coarse to fine: fine enough for more than its shape.
+/// Relaxes on nested grids, fine enough for forces and eigenvalues too; also returns the leaf
+/// on each grid that was extrapolated, from coarse to fine.
 pub(crate) fn relax_on_grids(
     scenario: &Scenario,
     options: &Options,
@@ -80,7 +80,7 @@ pub(crate) fn relax_on_grids(
     on_grids(scenario, options, (tolerance, false), progress)
 }
 
-/// The same, or fine enough for its shape alone.
+/// The same, or on grids fine enough for the shape alone.
 fn on_grids(
     scenario: &Scenario,
     options: &Options,
@@ -93,7 +93,7 @@ fn on_grids(
         explicit::check(&leaf)?;
     }
     let method = options.method;
-    // Four segments are too few to be shared out among panels.
+    // Four segments are too few to be divided among panels.
     let least = least(method, tolerance, shape_alone && leaf.kinks().is_empty());
     let first = check_segments(&leaf, method.segments(), least)?;
     let reduced = reducible(method).then(|| leaf.reduced()).flatten();
@@ -107,26 +107,26 @@ fn on_grids(
         if end.is_ok() && run.index == Some(0) {
             return Ok(finished(run.completed(&leaf), end, clock));
         }
-        // The reduced model fails, as the leaf moves out of its valley, breaks the
-        // mirror, or leaves the plane: solve the full leaf.
+        // The reduced model fails, as the leaf leaves its valley, breaks the mirror symmetry,
+        // or leaves the plane: solve the full leaf.
         work = run.work;
     }
     let mut run = Run::new(&leaf, options, tolerance, progress);
     run.work = work;
     run.shape_alone = shape_alone;
     let mut end = run.solve(grid.clone());
-    end = run.land_by_own_motion(&grid, end);
+    end = run.settle_by_own_motion(&grid, end);
     let mut next = Some(grid);
     while end.is_err()
         && run.may_go_by_steps()
         && let Some(mut grid) = next
     {
-        // On the grid that is asked for, or each time on a finer one.
+        // On the requested grid, or on a finer grid in each attempt.
         let fixed = run.segments().is_some();
         while !fixed && grid.segments() < COARSEST_BY_STEPS {
             grid = grid.refined();
         }
-        run.begin_by_steps();
+        run.restart_by_steps();
         end = run.solve(grid);
         let failed = run.levels.last().filter(|_| !fixed);
         next = failed
@@ -137,18 +137,18 @@ fn on_grids(
     Ok(finished(run, end, clock))
 }
 
-/// The result of a run, and of a leaf at rest its modes: those that are asked for are not
-/// counted in the time of the solution.
+/// The result of a run, with the modes of a leaf at rest: requested modes are not counted in
+/// the time of the solution.
 fn finished(
     mut run: Run,
     mut end: Result<bool, Stop>,
     clock: Instant,
 ) -> (Equilibrium, Vec<Level>) {
-    let asked = run.options.modes;
+    let requested = run.options.modes;
     let count = match run.index {
-        // On a single grid nothing can be compared.
-        Some(0) if !run.clearly && run.segments().is_none() => asked.max(1),
-        _ => asked,
+        // A single grid allows no comparison.
+        Some(0) if !run.clearly_stable && run.segments().is_none() => requested.max(1),
+        _ => requested,
     };
     let result = |run: &Run, end: Result<bool, Stop>| {
         let (outcome, remark) = result::outcome(run, end);
@@ -156,23 +156,23 @@ fn finished(
     };
     let mut found = result(&run, end);
     let mut lowest = end.ok().and_then(|_| modes::lowest(&run, count, false));
-    // Next to a bifurcation a grid may count what the leaf has not.
+    // Near a bifurcation the Morse index on a grid may differ from that of the leaf.
     while let Some(finer) = modes::deciding_grid(&run, lowest.as_ref()) {
-        end = run.go_on(finer);
+        end = run.continue_on(finer);
         found = result(&run, end);
         lowest = end.ok().and_then(|_| modes::lowest(&run, count, true));
     }
-    if asked == 0 {
+    if requested == 0 {
         found.wall_seconds = clock.elapsed().as_secs_f64();
     }
     found.doubts = plausible::doubts(run.leaf.scenario(), &found);
     if lowest.as_ref().is_some_and(|it| it.undecided.is_some()) {
         found.doubts.push(UNDECIDED.to_owned());
     }
-    found.stability.modes = lowest.map(|it| it.modes).filter(|_| asked > 0);
+    found.stability.modes = lowest.map(|it| it.modes).filter(|_| requested > 0);
     (found, run.levels)
 }
 
-/// Of a leaf with an eigenvalue that may have either sign.
+/// Remark on a leaf with an eigenvalue that may have either sign.
 const UNDECIDED: &str = "an eigenvalue may be negative or positive for all that these grids tell: \
      whether the leaf is stable is not certain";

@@ -1,4 +1,4 @@
-//! Judging the stability of a leaf at rest, and leaving saddles.
+//! The stability of a leaf at rest, and pushes off saddles.
 
 use crate::leaf::System;
 use crate::newton::Stop;
@@ -9,21 +9,21 @@ use crate::relax::settle::{InitialGuess, MAX_SADDLES, Settled};
 use glam::DVec3;
 
 impl Run<'_, '_> {
-    /// Negative eigenvalues on one grid; notes whether they are clearly none.
-    fn count(&mut self, level: &Level, system: &mut System) -> Option<usize> {
+    /// Number of negative eigenvalues on one grid; also stores whether the leaf is clearly stable.
+    fn count_negative(&mut self, level: &Level, system: &mut System) -> Option<usize> {
         let Level { leaf, state } = level;
-        self.clearly = saddle::clearly_stable(leaf, state, system, &mut self.work);
-        match self.clearly {
+        self.clearly_stable = saddle::clearly_stable(leaf, state, system, &mut self.work);
+        match self.clearly_stable {
             true => Some(0),
             false => saddle::index(leaf, state, system, 0.0, &mut self.work),
         }
     }
 
-    /// Counts the negative eigenvalues on the finest grid. At a wanted saddle
-    /// they must be as many as on the grid before. At one that is not wanted,
-    /// the leaf is pushed off and the grids begin anew from where it lands. Returns
-    /// whether stability is known, as far as it can be: else finer grids are needed.
-    pub fn judge_stability(&mut self) -> Result<bool, Stop> {
+    /// Counts the negative eigenvalues on the finest grid. If saddles are accepted the number
+    /// must be that on the grid before. Otherwise the leaf is pushed off a saddle, and the
+    /// grids start again from the equilibrium reached. Returns whether stability is known, as
+    /// far as possible: if not, finer grids are needed.
+    pub fn check_stability(&mut self) -> Result<bool, Stop> {
         let level = self.levels.last().expect("the leaf has settled");
         if level.leaf.tip_moment() != DVec3::ZERO {
             return Ok(true);
@@ -31,7 +31,7 @@ impl Run<'_, '_> {
         if let Some(whole) = self.whole {
             let level = complete(self.leaf, whole, level);
             let mut system = System::new(&level.leaf);
-            self.index = self.count(&level, &mut system);
+            self.index = self.count_negative(&level, &mut system);
             return match self.index {
                 Some(0) => Ok(true),
                 _ => Err(Stop::Saddle),
@@ -39,10 +39,10 @@ impl Run<'_, '_> {
         }
         let before = self.index;
         let level = self.levels.pop().expect("the leaf has settled");
-        let room = self.room.take();
-        let room = room.filter(|room| room.is_for(&level.leaf));
-        let mut system = room.unwrap_or_else(|| System::new(&level.leaf));
-        self.index = self.count(&level, &mut system);
+        let spare_system = self.spare_system.take();
+        let spare_system = spare_system.filter(|spare_system| spare_system.is_for(&level.leaf));
+        let mut system = spare_system.unwrap_or_else(|| System::new(&level.leaf));
+        self.index = self.count_negative(&level, &mut system);
         self.levels.push(level);
         if !matches!(self.index, Some(1..)) {
             return Ok(true);
@@ -71,7 +71,7 @@ impl Run<'_, '_> {
         self.push(level);
         rest?;
         match self.segments() {
-            Some(_) => self.judge_stability(),
+            Some(_) => self.check_stability(),
             None => Ok(false),
         }
     }

@@ -1,12 +1,12 @@
-//! Where a relaxation begins.
+//! The initial state of a relaxation.
 
 use crate::leaf::{DiscreteLeaf, State};
 use crate::rotation;
 use glam::{DQuat, DVec3};
 use std::f64::consts::PI;
 
-/// The start of a relaxation: circular arcs that leave the base as the fan
-/// says and meet in a common tip; free rods start from their rest shapes.
+/// The initial state of a relaxation: circular arcs that leave the base in the directions of
+/// the fan and meet in a common tip; free rods start from their rest shapes.
 pub fn start(leaf: &DiscreteLeaf) -> State {
     if leaf.leaf.joined() && leaf.rods() > 1 {
         arcs(leaf)
@@ -15,8 +15,8 @@ pub fn start(leaf: &DiscreteLeaf) -> State {
     }
 }
 
-/// Arcs in the plane of the fan, symmetric about the mean base direction. Their
-/// chords differ: what is missing to the mean chord is made up by stretching.
+/// Arcs in the plane of the fan, symmetric about the mean base direction. Their chords differ:
+/// each is stretched to the mean chord.
 fn arcs(leaf: &DiscreteLeaf) -> State {
     let model = &leaf.leaf;
     let rods = &model.scenario().rods;
@@ -40,10 +40,10 @@ fn arcs(leaf: &DiscreteLeaf) -> State {
     let (mut x, mut q) = (Vec::new(), Vec::new());
     for (j, &phi) in angles.iter().enumerate() {
         let (delta, length) = (opening(phi), model.grown(j, 1.0));
-        // The turn is spread evenly over the length the vein has grown to.
+        // The rotation is uniform over the grown length of the vein.
         let part = |sigma: f64| model.grown(j, sigma) / length;
         let arc = |sigma: f64| {
-            // A chord leaves half-way between the tangents at its ends.
+            // A chord's direction is half-way between the tangents at its ends.
             towards(phi - delta * sigma) * (length * sigma * sinc(delta * sigma))
         };
         let missing = tip - arc(1.0);
@@ -76,7 +76,7 @@ fn rest_shapes(leaf: &DiscreteLeaf) -> State {
     State::new(leaf.segments(), xs, qs)
 }
 
-/// Largest slope of a disturbance, and how many sizes there are.
+/// Largest slope of a disturbance, and the number of amplitudes.
 const STEEPEST: f64 = 0.8;
 const SIZES: usize = 4;
 
@@ -84,12 +84,12 @@ const SIZES: usize = 4;
 const ALONG: usize = 3;
 const ACROSS: usize = 3;
 
-/// Lifts the nodes of a start out of the plane of the fan, and turns them as
-/// the lift requires: a smooth pattern that is another for every number but the
-/// sign, which alternates, and the same on all grids. A joint tip stays joint.
+/// Lifts the nodes of an initial state out of the plane of the fan, and rotates them
+/// accordingly: a smooth pattern, the same on all grids, that differs for every second number,
+/// with alternating sign. A joint tip stays joint.
 pub fn disturb(leaf: &DiscreteLeaf, number: usize, state: &mut State) {
     let (pattern, sign) = (number / 2, [1.0, -1.0][number % 2]);
-    // Multiples of the golden ratio spread evenly: no chance.
+    // Multiples of the golden ratio are equidistributed: a deterministic pseudo-random sequence.
     let golden = |k: usize| 2.0 * (k as f64 * 0.618_033_988_749_895).fract() - 1.0;
     let size = sign * STEEPEST * (1 + pattern % SIZES) as f64 / SIZES as f64;
     let rods = leaf.rods();
@@ -106,7 +106,7 @@ pub fn disturb(leaf: &DiscreteLeaf, number: usize, state: &mut State) {
                 for l in 0..ACROSS {
                     let part = golden(1 + 13 * pattern + ALONG * l + k) / (k * (l + 1)) as f64;
                     let part = part * (PI * l as f64 * across).cos();
-                    // Flat at the base; what differs across ends at the tip.
+                    // Zero slope at the base; waves across the leaf vanish at a joint tip.
                     let (wave, k) = (PI * k as f64 * sigma, k as f64);
                     let end = if joined && l > 0 { 1.0 - sigma } else { 1.0 };
                     let fall = if joined && l > 0 { 1.0 } else { 0.0 };

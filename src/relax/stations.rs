@@ -1,4 +1,4 @@
-//! A leaf at rest at other stations than it was found at.
+//! Interpolation of a leaf at rest to other stations.
 
 use crate::leaf::Leaf;
 use crate::relax::equilibrium::{Equilibrium, Outcome, Shape};
@@ -7,23 +7,23 @@ use crate::scenario::{Profile, Rod, Scenario};
 use crate::shape::{NodeState, RodShape, equally_spaced};
 use glam::{DQuat, DVec3};
 
-/// Parts that the stations of a result cut a vein into, at least.
+/// Smallest number of parts into which the stations of a result divide a vein.
 const PARTS: usize = 16;
 
-/// What helps where stations between those that were solved for are less accurate.
+/// Advice if interpolated stations are less accurate than the tolerance.
 const BETWEEN: &str = "the tolerance is kept where the leaf was solved for, but not at all of the \
     stations between: ask for a smaller tolerance, or for other stations";
 
 impl Equilibrium {
-    /// The same at stations that cut every vein into so many equal parts; `None`:
-    /// at the nodes of the finest grid, and as many between them as make at least
-    /// 17 stations.
+    /// The same at stations that divide every vein into so many equal parts; `None`: at the
+    /// nodes of the finest grid, with its segments halved until there are at least 17
+    /// stations.
     ///
-    /// Between the stations where it was found, a vein is the polynomial that has
-    /// its positions and tangents there, and rotations and moments with the slopes
-    /// that the equations give; never across a knot of a profile. What this may be
-    /// wrong by is added to the error estimate; where that is more than the tolerance
-    /// then, the outcome says so, but stations that were not asked for are left out.
+    /// Between the stations of the solution, positions, rotations and moments are Hermite
+    /// polynomials with the slopes of the equations; never across a knot of a profile. The
+    /// interpolation error is added to the error estimate; if that then exceeds the tolerance,
+    /// the outcome becomes [`Outcome::ToleranceNotReached`], or without `parts` the stations
+    /// stay as they are.
     #[must_use]
     pub fn at_stations(self, scenario: &Scenario, parts: Option<usize>) -> Self {
         let within = |leaf: &Equilibrium| {
@@ -65,7 +65,7 @@ impl Equilibrium {
         };
         let mut between = 0.0_f64;
         let rods = self.shape.rods.iter().enumerate().map(|(j, rod)| {
-            let known = Known::new(rod);
+            let known = NodalFields::new(rod);
             let mut differences = Differences::default();
             let nodes = places.iter().map(|place| {
                 if let Some(node) = place.node {
@@ -96,7 +96,7 @@ impl Equilibrium {
     }
 }
 
-/// Nodes of the finest grid, with every segment halved until there are enough.
+/// Nodes of the finest grid, with all segments halved until there are enough.
 fn finest(shape: &Shape) -> Vec<f64> {
     let mut stations = shape.curve_stations.clone();
     while (2..=PARTS).contains(&stations.len()) {
@@ -108,9 +108,9 @@ fn finest(shape: &Shape) -> Vec<f64> {
     stations
 }
 
-/// What is known of a vein at its stations, along the lab axes, with slopes by the
-/// fraction of the length.
-struct Known {
+/// The fields of a vein at its stations along the lab axes, with derivatives with respect to
+/// the fraction of the length.
+struct NodalFields {
     positions: Vec<DVec3>,
     tangents: Vec<DVec3>,
     rotations: Vec<[f64; 4]>,
@@ -120,13 +120,13 @@ struct Known {
     torques: Vec<DVec3>,
 }
 
-impl Known {
+impl NodalFields {
     fn new(rod: &RodShape) -> Self {
         let each = |of: &dyn Fn(&NodeState) -> DVec3| rod.nodes.iter().map(of).collect::<Vec<_>>();
         let tangent = |node: &NodeState| node.rotation * node.v * rod.length;
         let mut rotations: Vec<DQuat> = Vec::new();
         for node in &rod.nodes {
-            // Of a continuous sign.
+            // Continuous in sign.
             let before = rotations.last().copied().unwrap_or(node.rotation);
             let same = before.dot(node.rotation) >= 0.0;
             rotations.push(if same { node.rotation } else { -node.rotation });
@@ -135,7 +135,7 @@ impl Known {
             let u = node.u * (0.5 * rod.length);
             (*q * DQuat::from_xyzw(u.x, u.y, u.z, 0.0)).to_array()
         };
-        Known {
+        NodalFields {
             positions: each(&|node| node.position),
             tangents: each(&tangent),
             turns: rotations.iter().zip(&rod.nodes).map(turn).collect(),
@@ -147,8 +147,8 @@ impl Known {
         }
     }
 
-    /// The state at a place, without its strains. Without equilibrium slopes are
-    /// not what the equations say.
+    /// The state at a point, without its strains. Away from equilibrium the equations do not
+    /// give the slopes.
     fn at(&self, place: &Place, at_rest: bool) -> NodeState {
         let lagrange: Slopes = (place.lagrange().into_iter())
             .map(|(i, weight)| (i, weight, 0.0))
@@ -183,7 +183,7 @@ fn sum(weights: &Slopes, values: &[DVec3], slopes: &[DVec3]) -> DVec3 {
         .sum()
 }
 
-/// Sets the strains that the constitutive law gives.
+/// Sets the strains by the constitutive law.
 fn strains(rod: &Rod, at: f64, node: &mut NodeState) {
     let triple = |of: &[Profile; 3]| DVec3::from_array(of.each_ref().map(|it| it.at(at)));
     node.v = rod.rest_stretch.at(at) * DVec3::X + node.n / triple(&rod.force_stiffness);
@@ -194,8 +194,7 @@ fn strains(rod: &Rod, at: f64, node: &mut NodeState) {
 mod tests {
     use super::*;
 
-    /// A tapering vein with a knot, against itself solved on a grid that has the
-    /// stations.
+    /// A tapering vein with a knot, compared with an accurate solution at the same stations.
     #[test]
     fn stations_between_are_as_accurate_as_those_that_were_solved_for() {
         let scenario = Scenario::from_toml(

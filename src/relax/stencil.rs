@@ -1,12 +1,12 @@
-//! Values between the nodes of a grid.
+//! Interpolation between the nodes of a grid.
 
 use crate::leaf::DiscreteLeaf;
 use glam::DVec3;
 
-/// Nodes between which a position along a vein is interpolated.
+/// Largest number of nodes of a stencil.
 const NODES: usize = 7;
 
-/// Nodes of a grid and their weights in a value between them.
+/// Nodes of a grid with their weights in an interpolated value.
 pub(crate) struct Stencil {
     first: usize,
     count: usize,
@@ -16,8 +16,8 @@ pub(crate) struct Stencil {
 }
 
 impl Stencil {
-    /// Of the polynomial through the nodes around a fraction of the length; beyond the
-    /// ends of the rod it goes on linearly.
+    /// Of the polynomial through the nodes around a fraction of the length; linear
+    /// extrapolation beyond the ends of the rod.
     pub fn new(leaf: &DiscreteLeaf, sigma: f64) -> Stencil {
         let (beyond, sigma) = (sigma - sigma.clamp(0.0, 1.0), sigma.clamp(0.0, 1.0));
         let nodes = leaf.grid.sigma();
@@ -26,7 +26,7 @@ impl Stencil {
         let panel = kinks.partition_point(|&kink| kink < sigma);
         let low = panel.checked_sub(1).map_or(0.0, |k| kinks[k]);
         let high = kinks.get(panel).copied().unwrap_or(1.0);
-        // A node at a kink is there but for rounding.
+        // A node at a kink agrees with it up to rounding.
         let node = |kink: f64| nodes.partition_point(|&node| node < kink - 1e-12);
         let (low, high) = (node(low), node(high));
         let count = NODES.min(high - low + 1);
@@ -47,12 +47,12 @@ impl Stencil {
         }
     }
 
-    /// Of values at nodes from 0 on.
+    /// The interpolated value, of values at nodes numbered from 0.
     pub fn value(&self, at: impl Fn(usize) -> DVec3) -> DVec3 {
         self.sum(&self.weights, at)
     }
 
-    /// The derivative of that with sigma.
+    /// Its derivative with respect to sigma.
     pub fn slope(&self, at: impl Fn(usize) -> DVec3) -> DVec3 {
         self.sum(&self.slopes, at)
     }
@@ -73,7 +73,7 @@ fn lagrange(count: usize, t: f64) -> ([f64; NODES], [f64; NODES]) {
     let mut below = 1.0;
     for a in 0..count {
         (weights[a], slopes[a]) = left;
-        // a! (-1)^(count - 1 - a) (count - 1 - a)! is what divides.
+        // The denominator is a! (-1)^(count - 1 - a) (count - 1 - a)!.
         let factorial: f64 = (1..count - a).map(|k| -(k as f64)).product();
         below *= if a > 0 { a as f64 } else { 1.0 };
         weights[a] /= below * factorial;
@@ -96,7 +96,7 @@ fn lagrange(count: usize, t: f64) -> ([f64; NODES], [f64; NODES]) {
 mod tests {
     use super::*;
 
-    /// Of polynomials up to the degree the weights give value and derivative.
+    /// The weights reproduce value and derivative of polynomials up to their degree.
     #[test]
     fn polynomials_are_met() {
         for count in 2..=NODES {

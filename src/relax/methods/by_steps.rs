@@ -1,13 +1,12 @@
-//! A second attempt for a leaf that did not come to rest: by steps of its loads and
-//! of its stiffness.
+//! A second attempt for a leaf that did not come to rest: continuation in its loads and its
+//! stiffness.
 //!
-//! Of rods that are joined and stiff, or pulled strongly, the energy alone does not
-//! say what is progress: nearly all of it is that of constraints not yet met. The
-//! leaf is therefore brought to rest under a part of its loads and with rods that
-//! stretch and shear more easily, by damped motion under the exact forces of its
-//! strains; then loads and stiffness grow in ratio, each time followed by Newton's
-//! method in the mixed form, to which constraints are equations like the others.
-//! Where there is no equilibrium nearby any more the leaf moves on.
+//! For rods that are joined and stiff, or pulled strongly, the energy is a poor measure of
+//! progress: nearly all of it comes from constraints not yet satisfied. The leaf is therefore
+//! brought to rest under a part of its loads and with rods that stretch and shear more easily, by
+//! damped motion under the exact forces of its strains; then loads and stiffness are increased by
+//! factors, with Newton's method in the mixed form after each step, in which constraints are
+//! equations like all others. Where no equilibrium is found nearby, the damped motion is repeated.
 
 use crate::leaf::{DiscreteLeaf, System};
 use crate::newton::{Equations, Newton, Stop, at_saddle};
@@ -16,42 +15,43 @@ use crate::relax::methods::semi_implicit::{
 };
 use crate::relax::saddle;
 
-/// Longest and shortest step in the logarithm of loads and stiffness; while the
-/// loads grow, a leaf snaps again and again, and the shortest one is longer.
+/// Longest and shortest step in the logarithm of loads and stiffness; the shortest is longer
+/// while the loads grow, since a leaf then snaps repeatedly.
 const LONGEST: f64 = 1.2;
 const SHORTEST: f64 = 0.05;
 const SHORTEST_LOADING: f64 = 0.3;
 
-/// Saddles that are left on the way at one place.
+/// Saddles that are left in one damped motion.
 const SADDLES: usize = 4;
 
-/// Rates (squared frequencies; the lowest of a clamped rod is 12) of steps: the
-/// first, by what they rise after a step that fails and fall at most after one that
-/// succeeds, below which there is none, and where motion ends, resolved or not.
+/// Spring rates (squared frequencies; the lowest of a clamped rod is 12) of the proximal
+/// steps: the first, the factors by which they rise after a failed step and fall at most after
+/// a successful one, the rate below which there are no springs, and the rates above which the
+/// motion fails, in general and where segments are unresolved.
 const FIRST_RATE: f64 = 10.0;
-const HARDER: f64 = 8.0;
-const LARGEST_EASE: f64 = 8.0;
+const RATE_INCREASE: f64 = 8.0;
+const LARGEST_RATE_DECREASE: f64 = 8.0;
 const LEAST_RATE: f64 = 0.1;
 const LARGEST_RATE: f64 = 1e12;
 const LARGEST_UNRESOLVED: f64 = 1e6;
 
-/// Newton iterations of a step, their accuracy, and the largest of them (radians,
+/// Newton iterations of a step, their accuracy, and their largest increment (radians,
 /// lengths).
 const ITERATIONS: usize = 12;
 const STEP_ACCURACY: f64 = 1e-3;
 const LARGEST_STEP: f64 = 1.5;
 
-/// The leaves on the way, by the logarithm of what has grown.
-struct Way<'a> {
+/// The leaves of the continuation, by the logarithm of the growth of loads and stiffness.
+struct Continuation<'a> {
     leaf: &'a DiscreteLeaf,
-    /// Until here the loads grow, and with them the stiffness.
+    /// Up to here loads and stiffness grow, beyond it the stiffness alone.
     loaded: f64,
     end: f64,
 }
 
-impl Way<'_> {
-    /// Part of the loads that acts.
-    fn part(&self, at: f64) -> f64 {
+impl Continuation<'_> {
+    /// Part of the loads that acts at a point of the continuation.
+    fn load_part(&self, at: f64) -> f64 {
         (at - self.loaded).min(0.0).exp()
     }
 
@@ -60,14 +60,14 @@ impl Way<'_> {
             return self.leaf.clone();
         }
         let mut leaf = self.leaf.softened(MOVING_COMPLIANCE * (-at).exp());
-        leaf.load_factor = self.part(at);
+        leaf.load_factor = self.load_part(at);
         leaf
     }
 }
 
 impl Relaxation<'_> {
-    /// Lets the leaf come to rest under a part of the loads, softened, and follows it
-    /// to all of them and its own stiffness.
+    /// Brings the softened leaf to rest under a part of the loads, and continues it to the
+    /// full loads and its own stiffness.
     pub(super) fn settle_by_steps(
         &mut self,
         leaf: &DiscreteLeaf,
@@ -78,7 +78,7 @@ impl Relaxation<'_> {
         let part = (MOVING_STRETCH / (MOVING_COMPLIANCE * load)).min(1.0);
         let stiffest = leaf.stiffest().max(SMALLEST_MOVING_COMPLIANCE);
         let loaded = -part.ln();
-        let way = Way {
+        let continuation = Continuation {
             leaf,
             loaded,
             end: loaded + (MOVING_COMPLIANCE * part / stiffest).ln().max(0.0),
@@ -88,20 +88,20 @@ impl Relaxation<'_> {
         first.load_factor = part;
         self.move_from(&first, system)?;
         loop {
-            self.part = way.part(reached);
+            self.load_part = continuation.load_part(reached);
             let next = match reached + step {
-                next if next < way.end - SHORTEST => next,
-                _ => way.end,
+                next if next < continuation.end - SHORTEST => next,
+                _ => continuation.end,
             };
-            let there = way.leaf(next);
-            let wanted = match next == way.end {
+            let next_leaf = continuation.leaf(next);
+            let wanted = match next == continuation.end {
                 true => self.accuracy,
                 false => SOFT_ACCURACY,
             };
             let before = self.state.clone();
-            let found = self.newton(&there, system, wanted);
+            let found = self.newton(&next_leaf, system, wanted);
             match found {
-                Ok(remaining) if next == way.end => return Ok(remaining),
+                Ok(remaining) if next == continuation.end => return Ok(remaining),
                 Ok(_) => {
                     reached = next;
                     step = (2.0 * step).min(LONGEST);
@@ -112,7 +112,7 @@ impl Relaxation<'_> {
             if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
                 return Err(Stop::StepLimit);
             }
-            let shortest = match reached < way.loaded {
+            let shortest = match reached < continuation.loaded {
                 true => SHORTEST_LOADING,
                 false => SHORTEST,
             };
@@ -120,22 +120,22 @@ impl Relaxation<'_> {
                 step /= 2.0;
                 continue;
             }
-            // The end itself is reached by Newton's method alone.
+            // The end point itself is reached by Newton's method only.
             reached = (reached + 2.0 * shortest)
-                .min(way.end - SHORTEST)
+                .min(continuation.end - SHORTEST)
                 .max(reached);
-            self.move_from(&way.leaf(reached), system)?;
+            self.move_from(&continuation.leaf(reached), system)?;
             step = LONGEST / 2.0;
         }
     }
 
-    /// Moves a softened leaf to rest, off saddles too: down its energy, by steps of
-    /// implicit Euler without inertia. Each is solved to its end, so that segments
-    /// carry the forces of their strains however stiff they are; without end in
-    /// time such a step is Newton's.
+    /// Moves a softened leaf to rest, leaving saddles: down its energy by implicit Euler steps
+    /// without inertia. Each is solved to convergence, so that segments carry the forces of
+    /// their strains however stiff they are; in the limit of long time steps it is Newton's
+    /// method.
     fn move_from(&mut self, leaf: &DiscreteLeaf, system: &mut System) -> Result<(), Stop> {
         leaf.strain_forces(&mut self.state);
-        let (mut rate, mut ease): (f64, f64) = (0.0, 1.0);
+        let (mut rate, mut decrease): (f64, f64) = (0.0, 1.0);
         let mut saddles = 0;
         while self.work.force_evaluations <= self.most_evaluations && !self.limit.reached() {
             let from = self.state.clone();
@@ -167,16 +167,16 @@ impl Relaxation<'_> {
                     leaf.strain_forces(&mut self.state);
                 }
                 Ok(_) => {
-                    rate /= ease;
-                    ease = (2.0 * ease).min(LARGEST_EASE);
+                    rate /= decrease;
+                    decrease = (2.0 * decrease).min(LARGEST_RATE_DECREASE);
                     if rate < LEAST_RATE {
                         rate = 0.0;
                     }
                 }
                 Err(stop) => {
                     self.state = from;
-                    rate = (HARDER * rate).max(FIRST_RATE);
-                    ease = 1.0;
+                    rate = (RATE_INCREASE * rate).max(FIRST_RATE);
+                    decrease = 1.0;
                     if rate > LARGEST_RATE || stop == Stop::Unresolved && rate > LARGEST_UNRESOLVED
                     {
                         return Err(stop);

@@ -1,16 +1,15 @@
-//! Rest by explicit motion.
+//! The explicit method: dynamic relaxation.
 //!
-//! First the leaf moves as the relaxation's leaf does, with true masses and
-//! damping and every motion resolved, until it is in a valley of its energy:
-//! that decides which equilibrium it finds. Then only the descent to the bottom
-//! matters, and masses and damping are chosen for speed: masses that make the
-//! fastest motions of all segments alike ([`crate::motion`]), and damping at the
-//! rate 3/t, begun anew whenever the leaf moves uphill. (So damped, motion comes
-//! to rest as an accelerated descent does, without its lowest frequency being
-//! known: Su, Boyd and Candes, J. Mach. Learn. Res. 17, 2016; O'Donoghue and
-//! Candes, Found. Comput. Math. 15, 2015.) Measured on the paper's leaves it takes
-//! fewer steps than kinetic damping, up to six times fewer, and as many as
-//! constant damping when that was chosen best.
+//! First the leaf moves with the true masses and damping of a relaxation, every motion
+//! resolved, until it is in a valley (basin of attraction) of its energy: that decides which
+//! equilibrium it finds. Then only the descent to the minimum matters, and masses and damping
+//! are chosen for speed: fictitious masses that equalise the highest frequencies of all
+//! segments ([`crate::motion`]), and damping at the rate 3/t, restarted whenever the leaf
+//! moves uphill. (Such damping makes the motion an accelerated gradient descent, without
+//! knowledge of its lowest frequency: Su, Boyd and Candes, J. Mach. Learn. Res. 17, 2016;
+//! O'Donoghue and Candes, Found. Comput. Math. 15, 2015.) Measured on the paper's leaves it
+//! takes fewer steps than kinetic damping, up to six times fewer, and as many as constant
+//! damping when that was chosen best.
 
 use crate::leaf::{DiscreteLeaf, Leaf, SparsePattern, State, System};
 use crate::limit::Limit;
@@ -21,60 +20,58 @@ use crate::relax::saddle;
 use crate::scenario::Rod;
 use glam::DVec3;
 
-/// Time between looks at the moving leaf, in units of sqrt(rho L^4/A).
-const LOOK: f64 = 0.25;
+/// Time between checks of the moving leaf, in units of sqrt(rho L^4/A).
+const CHECK_INTERVAL: f64 = 0.25;
 
-/// It is in a valley if its energy is convex at so many looks in a row, and
-/// no more of its motion than this part is left.
+/// It is in a valley if its energy is convex in so many checks in a row and its kinetic energy
+/// is at most this part of the maximum.
 const CONVEX: usize = 3;
 const SLOW: f64 = 1e-2;
 
-/// Time after which it need not be: soft modes take longer to decide.
+/// Time after which the descent begins in any case: soft modes take longer to decide.
 const LONGEST_MOTION: f64 = 100.0;
 
-/// Time step with the masses chosen for speed; the stable one is one.
+/// Time step with fictitious masses, as a part of the stability limit.
 const STEP: f64 = 0.95;
 
-/// Steps between looks at what is unbalanced.
-const STEPS_PER_LOOK: usize = 200;
+/// Steps between evaluations of the residual.
+const STEPS_PER_CHECK: usize = 200;
 
-/// Steps of the motion into the valley between looks at the clock.
+/// Steps of the motion into the valley between checks of the time limit.
 const STEPS_PER_PIECE: f64 = 2000.0;
 
-/// And nodes times steps: a tenth of a second.
+/// Limit on nodes times steps in between: a tenth of a second.
 const NODES_PER_PIECE: f64 = 5e6;
 
-/// Accuracy that rounding allows.
+/// Best accuracy that rounding allows.
 const LEAST_ACCURACY: f64 = 1e-10;
 
-/// Unbalanced forces at which the remaining distance is first measured, over the
-/// accuracy wanted.
+/// Residual at which the remaining distance is first measured, over the accuracy required.
 const FIRST_BALANCE: f64 = 0.1;
 
-/// Looks without progress after which only rounding is left, if the remaining
-/// distance is no longer than this.
+/// Evaluations without progress after which only rounding is left, if the remaining distance
+/// is no longer than this.
 const STAGNATION: usize = 50;
 const LONGEST_REMAINING: f64 = 1e-6;
 
-/// Nodes times steps after which a leaf that has not come to rest is given up:
-/// some ten seconds.
+/// Limit on nodes times steps: some ten seconds.
 const BUDGET: usize = 600_000_000;
 
-/// What is asked and counted.
+/// Requirements and counters of a run.
 pub struct Request<'a> {
     /// Of positions and rotations.
     pub accuracy: f64,
-    /// Whether the state only has to be corrected.
+    /// Whether the state is close to equilibrium already.
     pub near_rest: bool,
     pub work: &'a mut Work,
     /// Receives steps and the largest unbalanced force or moment.
     pub progress: &'a mut dyn FnMut(usize, f64),
-    /// Whether the leaf's energy was not convex where it moved.
+    /// Set if the leaf moved through states of non-convex energy.
     pub moved: bool,
     pub limit: &'a Limit,
 }
 
-/// Refuses what explicit motion cannot do.
+/// Refuses leaves that the explicit method cannot treat.
 pub fn check(leaf: &Leaf) -> Result<(), RelaxError> {
     let rigid = |rod: &Rod| {
         let stiffest = (rod.force_stiffness.iter()).fold(0.0_f64, |m, h| m.max(h.max_abs()));
@@ -110,7 +107,7 @@ pub fn settle(
     settled
 }
 
-/// Damped motion into the valley in which the leaf will come to rest.
+/// Damped motion into the valley of the equilibrium.
 fn find_valley(
     leaf: &DiscreteLeaf,
     motion: &mut Explicit,
@@ -120,7 +117,7 @@ fn find_valley(
 ) -> Result<(), Stop> {
     let (mut fastest, mut convex) = (0.0_f64, 0);
     while motion.time() < LONGEST_MOTION {
-        look_ahead(motion, leaf.rods() * leaf.segments(), request.limit)?;
+        move_to_next_check(motion, leaf.rods() * leaf.segments(), request.limit)?;
         let now = motion.snapshot();
         fastest = fastest.max(now.energy.kinetic);
         let slow = now.energy.kinetic <= SLOW * fastest;
@@ -139,18 +136,18 @@ fn find_valley(
     Ok(())
 }
 
-/// Moves on to the next look. On fine grids of stiff rods that takes long: with
-/// a limit it is made in pieces.
-fn look_ahead(motion: &mut Explicit, nodes: usize, limit: &Limit) -> Result<(), Stop> {
+/// Moves to the time of the next check. On fine grids of stiff rods that takes long: if there
+/// is a time limit, it is checked in between.
+fn move_to_next_check(motion: &mut Explicit, nodes: usize, limit: &Limit) -> Result<(), Stop> {
     let begin = motion.time();
     let steps = STEPS_PER_PIECE.min((NODES_PER_PIECE / nodes as f64).max(1.0));
     let pieces = match limit.is_none() {
-        false => (LOOK / (steps * motion.longest_step())).ceil(),
+        false => (CHECK_INTERVAL / (steps * motion.longest_step())).ceil(),
         true => 1.0,
     };
     for piece in 1..=pieces as usize {
         motion
-            .advance(begin + LOOK * (piece as f64 / pieces))
+            .advance(begin + CHECK_INTERVAL * (piece as f64 / pieces))
             .map_err(|stopped| match stopped {
                 Stopped::Unresolved { .. } => Stop::Unresolved,
                 _ => Stop::Stuck,
@@ -162,7 +159,7 @@ fn look_ahead(motion: &mut Explicit, nodes: usize, limit: &Limit) -> Result<(), 
     Ok(())
 }
 
-/// To the bottom of the valley; returns the distance that is left.
+/// Descends to the minimum; returns the remaining distance.
 fn descend(
     leaf: &DiscreteLeaf,
     motion: &mut Explicit,
@@ -175,16 +172,16 @@ fn descend(
     motion.use_fictitious_masses();
     let mut balanced = FIRST_BALANCE * accuracy;
     let (mut since, mut before) = (0, 0.0);
-    let (mut best, mut looks_since_best) = (f64::INFINITY, 0);
+    let (mut best, mut checks_since_best) = (f64::INFINITY, 0);
     loop {
-        for _ in 0..STEPS_PER_LOOK {
+        for _ in 0..STEPS_PER_CHECK {
             if large && request.limit.reached() {
                 return Err(Stop::StepLimit);
             }
             let rate = 3.0 / (STEP * (since + 2) as f64);
             motion.set_damping(rate);
             let moving = motion.step(STEP);
-            // What the forces do: kinetic energy gained, and lost to damping.
+            // Power of the forces: rate of kinetic energy plus damping loss.
             let downhill = 0.5 * (moving - before) / STEP + rate * moving;
             (since, before) = (since + 1, moving);
             if downhill < 0.0 && since > 3 {
@@ -198,13 +195,13 @@ fn descend(
             return Err(Stop::Stuck);
         }
         (request.progress)(motion.steps(), residual);
-        looks_since_best += 1;
+        checks_since_best += 1;
         if residual < 0.5 * best {
-            (best, looks_since_best) = (residual, 0);
+            (best, checks_since_best) = (residual, 0);
         }
-        if residual <= balanced || looks_since_best > STAGNATION {
+        if residual <= balanced || checks_since_best > STAGNATION {
             let remaining = remaining(leaf, &state, system, request.work);
-            let stagnates = looks_since_best > STAGNATION;
+            let stagnates = checks_since_best > STAGNATION;
             if remaining <= accuracy || stagnates && remaining <= LONGEST_REMAINING {
                 return Ok(remaining);
             }
@@ -219,7 +216,7 @@ fn descend(
     }
 }
 
-/// How far it is to rest: the size of a Newton step, which is not made.
+/// Distance to equilibrium, measured by a Newton step that is not taken.
 fn remaining(leaf: &DiscreteLeaf, state: &State, system: &mut System, work: &mut Work) -> f64 {
     leaf.assemble(state, system);
     work.force_evaluations += 1;

@@ -1,4 +1,4 @@
-//! The methods that bring a leaf to rest, each on one grid, or without one.
+//! The solution methods, each on one grid or without a grid.
 
 mod by_steps;
 pub mod explicit;

@@ -6,8 +6,8 @@
 //! about one radian of tip rotation, each followed by Newton's method with the
 //! exact, unsymmetric tangent.
 //!
-//! Where that would be too many steps, the loads grow from the shape that the moment
-//! alone makes. It is the same along the whole rod, so that this shape follows
+//! Where that would take too many steps, the other loads grow from the shape under the moment
+//! alone. The moment is the same along the whole rod, so that this shape can be computed
 //! segment by segment from the clamp.
 
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State, System};
@@ -17,7 +17,7 @@ use crate::rod::{RESOLVED_TURN, Section};
 use crate::rotation;
 use glam::{DMat3, DQuat, DVec3};
 
-/// Rotation of the tip (radians) that one load step may bring about by bending.
+/// Rotation of the tip (radians) in one load step.
 const TURN_PER_STEP: f64 = 1.0;
 
 /// Newton iterations of a load step before it is halved.
@@ -29,18 +29,18 @@ const STEP_ACCURACY: f64 = 1e-3;
 /// Smallest load step, as a part of the load.
 const SMALLEST_STEP: f64 = 1e-6;
 
-/// Rotation (radians) from which on the moment is not applied by steps, and
-/// steps that the other loads may then take.
+/// Rotation (radians) beyond which the moment is not applied in steps, and the largest number
+/// of steps of the other loads in that case.
 const LARGEST_BY_STEPS: f64 = 250.0;
 const MAX_STEPS: usize = 100;
 
-/// Iterations for the turn of one segment, their accuracy relative to the moment,
-/// and the step of their differences, radians.
+/// Newton iterations for the rotation of one segment, the step (radians) at which they end,
+/// and the step of their finite differences, radians.
 const SEGMENT_ITERATIONS: usize = 20;
 const SEGMENT_ACCURACY: f64 = 1e-13;
 const DIFFERENCE: f64 = 1e-7;
 
-/// Squared half turn below which series replace quotients that tend to 0/0.
+/// Squared half rotation below which series replace quotients that tend to 0/0.
 const SMALL: f64 = 1e-5;
 
 /// Loads the rod from its rest shape, or corrects a state `near_rest`.
@@ -110,16 +110,16 @@ pub fn settle(
     Err(Stop::StepLimit)
 }
 
-/// At most so much (radians) the moment can turn the tip of a rod, if its softest
-/// stiffness took it all.
+/// Upper bound on the rotation of the tip (radians) by the moment: as if only the softest
+/// stiffness resisted it.
 fn largest_turn(leaf: &Leaf) -> f64 {
     let moment = leaf.loads.tip_moment.length();
     let softest = leaf.section(0, 0.5, 1.0).couple_stiffness.min_element();
     moment * leaf.length(0) / softest
 }
 
-/// The largest rate (radians a length) at which a large moment alone turns the
-/// rod; `None` if it is small, or too large for a grid of so many segments.
+/// The largest curvature (radians per length) of the rod under a large moment alone; `None` if
+/// the moment is small, or too large for a grid of so many segments.
 pub fn turning(leaf: &Leaf, segments: usize) -> Option<f64> {
     if largest_turn(leaf) <= LARGEST_BY_STEPS {
         return None;
@@ -135,7 +135,7 @@ pub fn turning(leaf: &Leaf, segments: usize) -> Option<f64> {
     Some(largest)
 }
 
-/// Gives the rod the shape that the moment alone makes.
+/// Sets the state to the shape under the moment alone.
 fn shape_by_moment(leaf: &DiscreteLeaf, state: &mut State) -> Result<(), Stop> {
     let mut turn = DVec3::ZERO;
     for (i, section) in leaf.sections.iter().enumerate() {
@@ -187,6 +187,6 @@ fn segment_turn(section: &Section, base: DQuat, moment: DVec3, near: DVec3) -> O
             return Some(psi);
         }
     }
-    // What is left is corrected with the forces.
+    // The remaining error is corrected by Newton's method for the whole rod.
     Some(psi)
 }

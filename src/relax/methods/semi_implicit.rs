@@ -6,11 +6,10 @@
 //!
 //! ((1/dt + c)/dt M + K) Delta = -g + M v/dt,   v <- Delta/dt,
 //!
-//! the linearly implicit Euler method. Time is in units of sqrt(rho L^4/A). As
-//! long as K is positive definite the leaf is in the valley it will come to
-//! rest in, and the step may be as long as the energy allows; where it is not,
-//! the motion decides where the leaf goes, and the step is kept short enough
-//! to follow it.
+//! the linearly implicit Euler method. Time is in units of sqrt(rho L^4/A). As long as K is
+//! positive definite the leaf is in the valley (basin of attraction) of its equilibrium, and
+//! the step may be as long as the energy allows; where it is not, the motion decides which
+//! equilibrium is reached, and the step is kept short enough to resolve it.
 
 use crate::leaf::{DiscreteLeaf, Increment, State, System};
 use crate::limit::Limit;
@@ -23,15 +22,13 @@ use crate::rod::RESOLVED_TURN;
 /// frequency is 3.516 (canonical value beta_1^2 of the clamped-free beam).
 const DAMPING: f64 = 2.0 * 3.516;
 
-/// First time step once an unlimited one has proved too long: a thirtieth of
-/// that mode's period.
+/// First finite time step, after a Newton step has failed: a thirtieth of that mode's period.
 const FIRST_STEP: f64 = 0.06;
 
-/// Shortest time step; a leaf that asks for less is not settling.
+/// Shortest time step; a leaf that needs a shorter one is not settling.
 const SHORTEST_STEP: f64 = 1e-7;
 
-/// Beyond this time step the inertial terms are below the accuracy anyone
-/// asks for: the step becomes Newton's.
+/// Beyond this time step inertia is negligible: the step becomes Newton's.
 const LONGEST_STEP: f64 = 1e3;
 
 /// Largest rotation of a node in one step, radians.
@@ -40,39 +37,39 @@ const MAX_TURN: f64 = 1.0;
 /// Largest displacement of a node in one step, in units of length.
 const MAX_SHIFT: f64 = 1.0;
 
-/// A last step of Newton's method that is smaller than this (radians, lengths) is not
-/// judged by the energy, of which it changes no more than rounding does.
+/// A last step of Newton's method that is smaller than this (radians, lengths) is accepted
+/// without a test of the energy, whose change is below rounding.
 const SMALL: f64 = 1e-3;
 
-/// Steps on one grid before the run is given up.
+/// Largest number of steps on one grid.
 const MAX_STEPS: usize = 2000;
 
-/// Growth of the time step from one good step to the next, at most.
+/// Largest growth factor of the time step.
 const MAX_GROWTH: f64 = 4.0;
 
-/// Relative growth of the energy that is put down to rounding.
+/// Relative growth of the energy that is attributed to rounding.
 const ENERGY_SLACK: f64 = 1e-9;
 
-/// Smallest compliance (units of L^2/A) of a leaf that is moved by its strain
-/// energy. A stiffer one is first settled with this compliance, which also
-/// gives the forces it carries, and then made stiff.
+/// Smallest compliance (units of L^2/A) of a leaf that moves with its strain energy. A stiffer
+/// one is first settled with this compliance, which also gives its segment forces, and then
+/// with its own.
 pub(super) const MOVING_COMPLIANCE: f64 = 2e-3;
 
-/// The load stretches a softened leaf by no more than about this.
+/// Approximate largest stretch of a softened leaf by its load.
 pub(super) const MOVING_STRETCH: f64 = 0.05;
 
 /// Accuracy to which a softened leaf is settled.
 pub(super) const SOFT_ACCURACY: f64 = 1e-1;
 
-/// Factor by which a softened leaf is made stiffer when Newton's method does not
-/// get from it to the stiffness wanted, and where that ends.
+/// Factor on the compliance of a softened leaf if Newton's method does not converge from it
+/// with the leaf's own stiffness, and its lower limit.
 const STIFFER: f64 = 0.1;
 pub(super) const SMALLEST_MOVING_COMPLIANCE: f64 = 1e-8;
 
-/// Newton iterations of a stiff leaf before it is made stiffer by steps.
+/// Newton iterations of a stiff leaf before it is stiffened in steps.
 const STIFF_ITERATIONS: usize = 12;
 
-/// The state of a leaf that is being relaxed on one grid, and what for.
+/// A relaxation on one grid: its state and its parameters.
 pub struct Relaxation<'a> {
     pub state: State,
     /// Of positions and rotations.
@@ -80,28 +77,27 @@ pub struct Relaxation<'a> {
     pub work: &'a mut Work,
     /// Receives the size of every step.
     pub progress: &'a mut dyn FnMut(usize, f64),
-    /// Whether the state is one that only has to be corrected: a stiff leaf is
-    /// then not softened first.
+    /// Whether the state is close to equilibrium: a stiff leaf is then not softened first.
     pub near_rest: bool,
     /// Relative accuracy of the conjugate gradients in the first step.
     pub cg_tolerance: f64,
-    /// How often it was pushed off saddles before: each time it is softened
-    /// less, since a softened leaf may return.
+    /// How often it was pushed off saddles before: each time it is softened less, since a
+    /// softened leaf may return to the saddle.
     pub pushes: i32,
     pub solver: Definite,
-    /// Count of force evaluations at which to give up.
+    /// Count of force evaluations at which the iteration ends without success.
     pub most_evaluations: usize,
     pub limit: &'a Limit,
-    /// Whether to give up at once if the leaf has to move.
+    /// Whether to fail at once where the energy is not convex.
     pub convex_only: bool,
-    /// Whether the leaf had to move: its energy was not convex where it moved.
+    /// Whether the leaf moved through states of non-convex energy.
     pub moved: bool,
-    /// Whether this is a second attempt, from the start.
+    /// Whether this is a second attempt, by continuation in loads and stiffness.
     pub by_steps: bool,
-    /// Whether it had to move while softened.
+    /// Whether it did so while softened.
     pub moved_softened: bool,
     /// Part of the loads under which the leaf came to rest, in such an attempt.
-    pub part: f64,
+    pub load_part: f64,
 }
 
 impl Relaxation<'_> {
@@ -112,18 +108,19 @@ impl Relaxation<'_> {
         }
         let stiffest = leaf.stiffest();
         let load = leaf.leaf.loads.tip_force.length() + leaf.leaf.loads.gravity.length();
-        let moving = (MOVING_COMPLIANCE * 0.1_f64.powi(self.pushes)).min(MOVING_STRETCH / load);
-        if stiffest >= moving {
+        let moving_compliance =
+            (MOVING_COMPLIANCE * 0.1_f64.powi(self.pushes)).min(MOVING_STRETCH / load);
+        if stiffest >= moving_compliance {
             return self.move_to_rest(leaf, system, self.accuracy);
         }
-        let mut floor = moving;
+        let mut compliance = moving_compliance;
         let mut soften = !self.near_rest;
         loop {
             if soften {
                 let moved = std::mem::take(&mut self.moved);
-                let soft = leaf.softened(floor);
+                let soft = leaf.softened(compliance);
                 if self.pushes > 0 {
-                    // The forces of the saddle are those of a stiffer leaf.
+                    // The segment forces at the saddle belong to a stiffer leaf.
                     soft.strain_forces(&mut self.state);
                 }
                 let rest = self.move_to_rest(&soft, system, SOFT_ACCURACY);
@@ -137,12 +134,12 @@ impl Relaxation<'_> {
                 settled => return settled,
             }
             if soften {
-                // From here to the stiffness wanted is too far: go on stiffer.
-                floor *= STIFFER;
-                if floor <= stiffest {
+                // The leaf's own stiffness is too far from this one: stiffen the leaf in steps.
+                compliance *= STIFFER;
+                if compliance <= stiffest {
                     return self.move_to_rest(leaf, system, self.accuracy);
                 }
-                if floor < SMALLEST_MOVING_COMPLIANCE {
+                if compliance < SMALLEST_MOVING_COMPLIANCE {
                     return Err(Stop::Stuck);
                 }
             }
@@ -198,7 +195,7 @@ impl Relaxation<'_> {
                     return Err(Stop::Saddle);
                 }
                 self.moved = true;
-                if self.convex_only || !motion.pace.shorten() {
+                if self.convex_only || !motion.time_step.shorten() {
                     return Err(Stop::Stuck);
                 }
             }
@@ -232,8 +229,8 @@ impl Relaxation<'_> {
             let next = leaf.assemble(&trial, system);
             self.work.force_evaluations += 1;
             (self.progress)(step, size);
-            if !motion.loses_energy(system, part, [sums.energy, next.energy]) {
-                if !motion.pace.shorten() {
+            if !motion.energy_does_not_grow(system, part, [sums.energy, next.energy]) {
+                if !motion.time_step.shorten() {
                     return Err(Stop::Stuck);
                 }
                 sums = leaf.assemble(&self.state, system);
@@ -254,7 +251,7 @@ impl Relaxation<'_> {
                     return Ok(remaining);
                 }
             } else {
-                resting = motion.goes_on(at_saddle(leaf, &self.state, size), part) || resting;
+                resting = motion.accept(at_saddle(leaf, &self.state, size), part) || resting;
             }
             previous = size;
             if system.coupled() {
@@ -264,9 +261,9 @@ impl Relaxation<'_> {
         Err(Stop::StepLimit)
     }
 
-    /// Factorises and solves for the next time step of a motion; false if the matrix is
-    /// not positive definite. A mode that is neutral up to rounding is left
-    /// where it is by a shift of that size.
+    /// Factorises and solves for the next time step of a motion; false if the matrix is not
+    /// positive definite. A small shift keeps modes that are neutral up to rounding from
+    /// moving.
     fn solve(
         &mut self,
         leaf: &DiscreteLeaf,
@@ -275,7 +272,7 @@ impl Relaxation<'_> {
         motion: &Motion,
         tolerance: f64,
     ) -> bool {
-        let (dt, velocity) = (motion.pace.dt, motion.velocity.as_slice());
+        let (dt, velocity) = (motion.time_step.dt, motion.velocity.as_slice());
         let inertia = dt.is_finite().then_some((velocity, 1.0 / dt));
         let shift = match dt.is_finite() {
             true => (1.0 / dt + DAMPING) / dt,
@@ -287,9 +284,9 @@ impl Relaxation<'_> {
     }
 }
 
-/// Velocities, and the time step; an infinite one is a step of Newton's method.
+/// Velocities, and the time step; an infinite time step is Newton's method.
 struct Motion {
-    pace: Pace,
+    time_step: TimeStep,
     velocity: Vec<Vec<Increment>>,
     next_velocity: Vec<Vec<Increment>>,
     /// Size of the last step if it was one of Newton's method.
@@ -301,7 +298,7 @@ impl Motion {
     fn new(leaf: &DiscreteLeaf) -> Self {
         let velocity = vec![vec![[0.0; 6]; leaf.segments()]; leaf.rods()];
         Motion {
-            pace: Pace {
+            time_step: TimeStep {
                 dt: f64::INFINITY,
                 growth: MAX_GROWTH,
             },
@@ -312,43 +309,44 @@ impl Motion {
     }
 
     fn is_newton(&self) -> bool {
-        self.pace.dt.is_infinite()
+        self.time_step.dt.is_infinite()
     }
 
-    /// Whether the total energy does not grow in a step, of which so great a `part` is taken,
-    /// between these potential energies.
-    fn loses_energy(&mut self, system: &System, part: f64, potential: [f64; 2]) -> bool {
+    /// Whether the total energy does not grow in a step, of which the fraction `part` is
+    /// taken, with these potential energies before and after it.
+    fn energy_does_not_grow(&mut self, system: &System, part: f64, potential: [f64; 2]) -> bool {
         let [mut energy, mut next_energy] = potential;
         if !self.is_newton() {
             energy += system.kinetic_energy(&self.velocity);
-            system.velocity(part, self.pace.dt, &mut self.next_velocity);
+            system.velocity(part, self.time_step.dt, &mut self.next_velocity);
             next_energy += system.kinetic_energy(&self.next_velocity);
         }
         let slack = ENERGY_SLACK * (1.0 + energy.abs());
         next_energy.is_finite() && next_energy <= energy + slack
     }
 
-    /// After a good step; returns whether the leaf, which may be at a saddle, goes on with
-    /// neither inertia nor damping: it then falls, or rests.
-    fn goes_on(&mut self, at_saddle: bool, part: f64) -> bool {
+    /// Updates velocity and time step after an accepted step. At a possible saddle the next
+    /// step is Newton's, without inertia or damping: it leaves the saddle, or shows that the
+    /// leaf is at rest. Returns whether that is so.
+    fn accept(&mut self, at_saddle: bool, part: f64) -> bool {
         std::mem::swap(&mut self.velocity, &mut self.next_velocity);
         if at_saddle {
-            self.pace.dt = f64::INFINITY;
+            self.time_step.dt = f64::INFINITY;
         } else if part == 1.0 {
-            self.pace.lengthen();
+            self.time_step.lengthen();
         }
         at_saddle
     }
 }
 
-/// The time step, and its growth after a good one.
-struct Pace {
+/// The time step, and its growth factor after an accepted step.
+struct TimeStep {
     dt: f64,
     growth: f64,
 }
 
-impl Pace {
-    /// Takes a shorter step; false if that is too short to be worth it.
+impl TimeStep {
+    /// Shortens the time step; false if it falls below [`SHORTEST_STEP`].
     fn shorten(&mut self) -> bool {
         self.dt = match self.dt.is_finite() {
             true => self.dt / 4.0,
@@ -358,7 +356,7 @@ impl Pace {
         self.dt >= SHORTEST_STEP
     }
 
-    /// After a good step, the more the more of them there were.
+    /// Lengthens the time step after an accepted step; the factor doubles up to [`MAX_GROWTH`].
     fn lengthen(&mut self) {
         self.dt *= self.growth;
         self.growth = (2.0 * self.growth).min(MAX_GROWTH);

@@ -1,4 +1,4 @@
-//! A boundary-value solution as the result of a relaxation.
+//! Shooting: a boundary-value solution as a result of the same type as a relaxation's.
 
 use crate::bvp::{self, Reason, Solution, Start};
 use crate::leaf::{Grid, Leaf};
@@ -16,22 +16,22 @@ use crate::undulation::Undulation;
 use glam::DVec3;
 use std::time::Instant;
 
-/// Segments between stations, at least.
+/// Smallest number of segments between stations.
 const SEGMENTS: usize = 32;
 
-/// Tolerance to which a leaf is relaxed that shooting starts from: the coarsest
-/// grids do, and Newton's method does the rest faster than finer ones.
+/// Tolerance of the relaxation that shooting starts from: the coarsest grids are enough, as
+/// Newton's method converges from there faster than finer grids.
 pub const START: f64 = 1e-3;
 
-/// The grid at whose nodes a boundary-value solution is given.
+/// The grid whose nodes are the stations of a boundary-value solution.
 fn station_grid(scenario: &Scenario) -> Grid {
     let leaf = Leaf::new(scenario);
     let segments = coarsest(&leaf, SEGMENTS).max(leaf.kinks().len() + 1);
     Grid::new(segments, leaf.kinks())
 }
 
-/// Refuses a number of intervals that cannot be, or that so many `rods` cannot be
-/// shot over; left out: one, as the fewest that will be chosen.
+/// Refuses a number of intervals that is out of range or needs too much memory for so many
+/// `rods`; without a number the check is for one interval, the fewest that will be chosen.
 pub fn check_intervals(rods: usize, intervals: Option<usize>) -> Result<(), RelaxError> {
     if let Some(found) = intervals.filter(|found| !(1..=MAX_INTERVALS).contains(found)) {
         return Err(RelaxError::Intervals { found });
@@ -40,8 +40,8 @@ pub fn check_intervals(rods: usize, intervals: Option<usize>) -> Result<(), Rela
     (Request::Shooting { rods, intervals }.weigh()).map_err(RelaxError::Memory)
 }
 
-/// Solves the boundary-value problem from a leaf that is roughly at `rest`; where
-/// it is not, that is the result.
+/// Solves the boundary-value problem starting from a relaxed leaf, `rest`; if that is not at
+/// rest it is returned.
 pub fn from_rest(
     scenario: &Scenario,
     options: &Options,
@@ -67,8 +67,8 @@ pub fn from_rest(
     found
 }
 
-/// What shooting does, in the words of a relaxation: corrections are steps,
-/// linearisations factorisations, evaluations of all slopes those of all forces.
+/// The work of shooting in terms of a relaxation: Newton corrections count as steps,
+/// linearisations as factorisations, evaluations of all slopes as force evaluations.
 impl From<bvp::Work> for Work {
     fn from(work: bvp::Work) -> Self {
         Work {
@@ -92,12 +92,12 @@ pub fn shoot(
     let clock = Instant::now();
     let grid = station_grid(scenario);
     let stations = grid.sigma().to_vec();
-    let asked = bvp::Options {
+    let bvp_options = bvp::Options {
         intervals,
         limit: options.limit.clone(),
         ..bvp::Options::new(start, &stations, bvp::Precision::Error(tolerance))
     };
-    let found = bvp::solve(scenario, &asked, &mut |step| {
+    let found = bvp::solve(scenario, &bvp_options, &mut |step| {
         progress(&Progress::Shooting(*step))
     });
     let mut accuracy = Accuracy {
@@ -115,10 +115,10 @@ pub fn shoot(
             accuracy.error_estimate = Some(solution.error.position);
             energy = Some(solution.energy);
             index = index_near(scenario, grid, &solution.rods);
-            let said = solved(scenario, &solution, index, tolerance);
-            (said, solution.work, solution.rods)
+            let outcome = outcome_of_solution(scenario, &solution, index, tolerance);
+            (outcome, solution.work, solution.rods)
         }
-        Err(failure) => (lost(&failure), failure.work, failure.rods),
+        Err(failure) => (outcome_of_failure(&failure), failure.work, failure.rods),
     };
     let tips: Vec<_> = rods.iter().filter_map(|rod| rod.nodes.last()).collect();
     let listed = if scenario.joined { 1 } else { tips.len() };
@@ -161,8 +161,8 @@ pub fn shoot(
     }
 }
 
-/// What a solution says.
-fn solved(
+/// The outcome of a solution.
+fn outcome_of_solution(
     scenario: &Scenario,
     solution: &Solution,
     index: Option<usize>,
@@ -187,8 +187,8 @@ fn solved(
     (outcome, remark.or(neutral))
 }
 
-/// What a failure says: how far it came, and why not further.
-fn lost(failure: &bvp::Failure) -> (Outcome, Option<String>) {
+/// The outcome of a failure: how far the continuation came, and why it ended.
+fn outcome_of_failure(failure: &bvp::Failure) -> (Outcome, Option<String>) {
     let way = match failure.part {
         part if part < 1.0 => format!(" (at {part:.4} of the way from arcs to this leaf)"),
         _ => String::new(),

@@ -1,6 +1,6 @@
-//! What a leaf at rest does when a number of its scenario changes: derivatives of
-//! its results, from the linearised equations on each grid, extrapolated like the
-//! results themselves.
+//! Sensitivities of a leaf at rest: derivatives of its results with respect to numbers of its
+//! scenario, from the linearised equations on each grid, extrapolated like the results
+//! themselves.
 
 mod nearby;
 mod response;
@@ -20,15 +20,15 @@ use crate::scenario::Scenario;
 use glam::DVec3;
 use std::sync::Arc;
 
-/// Numbers up to which the equations are solved for each, and everything is known
-/// of it; of more of them for each component of the tip.
-const EACH: usize = 100;
+/// Up to this many numbers the equations are solved for each, which gives all derivatives; for
+/// more of them adjoint solutions give those of tips and energy alone.
+const MOST_DIRECT: usize = 100;
 
-/// Unknowns of the finest grid on which eigenvalues are differenced, but for the
-/// first.
+/// Grids with fewer unknowns than this have their eigenvalues differentiated, and the coarsest
+/// in any case.
 const FEW_UNKNOWNS: usize = 4_000;
 
-/// A number by its name, the change of the scenario with it, and scenarios nearby, if these
+/// A number with its name, the derivative of the scenario, and neighbouring scenarios if they
 /// are needed.
 type Known<'n, 'a> = (
     &'n String,
@@ -37,7 +37,7 @@ type Known<'n, 'a> = (
     Vec<(f64, f64, Arc<Scenario>)>,
 );
 
-/// Changes on one grid, in the leaf's units.
+/// Derivatives on one grid, in the leaf's units.
 struct Changes {
     tips: Vec<DVec3>,
     energy: f64,
@@ -47,9 +47,9 @@ struct Changes {
     positions: Vec<DVec3>,
 }
 
-/// The derivatives of a leaf's results by these numbers, each of which has a name.
-/// `levels` are its grids from coarse to fine. A number of which the scenario cannot
-/// be differenced, and all where the leaf is at a singular point, are left out.
+/// The derivatives of a leaf's results by these numbers, each of which has a name. `levels`
+/// are its grids from coarse to fine. Left out are numbers for which the scenario has no
+/// admissible differences, and all numbers if the leaf is at a singular point.
 pub(crate) fn sensitivities(
     levels: &[Level],
     numbers: &[(String, Number)],
@@ -77,11 +77,11 @@ pub(crate) fn sensitivities(
     let mut eigenvalues: Vec<f64> = Vec::new();
     for (k, level) in levels.iter().enumerate() {
         let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
-        let vibrates = k == 0 || unknowns < FEW_UNKNOWNS;
+        let with_modes = k == 0 || unknowns < FEW_UNKNOWNS;
         let grid = Grid {
             level,
             tolerance,
-            modes: if vibrates { modes } else { 0 },
+            modes: if with_modes { modes } else { 0 },
             stride: level.leaf.segments() / coarsest.leaf.segments(),
         };
         let Some((squared, changes)) = grid.changes(&known, &rates) else {
@@ -96,9 +96,9 @@ pub(crate) fn sensitivities(
             let [tips, energy, eigenvalues, reaction, positions] = series;
             tips.push(segments, changes.tips);
             energy.push(segments, vec![DVec3::X * changes.energy]);
-            eigenvalues.push_any(segments, numbers(changes.eigenvalues).collect());
-            reaction.push_any(segments, changes.reaction);
-            positions.push_any(segments, changes.positions);
+            eigenvalues.push_if_complete(segments, numbers(changes.eigenvalues).collect());
+            reaction.push_if_complete(segments, changes.reaction);
+            positions.push_if_complete(segments, changes.positions);
         }
     }
     let context = Context {
@@ -111,9 +111,9 @@ pub(crate) fn sensitivities(
         .collect()
 }
 
-/// What derivatives are put together with.
+/// What all sensitivities are assembled with.
 struct Context<'l> {
-    /// The coarsest and the finest.
+    /// The coarsest and the finest grid.
     levels: [&'l Level; 2],
     tolerance: f64,
     eigenvalues: Vec<f64>,
@@ -124,7 +124,7 @@ impl Context<'_> {
         let leaf = &self.levels[1].leaf.leaf;
         let scale = leaf.scale;
         let [tips, energy, eigenvalues, reaction, positions] =
-            series.map(|series| series.judged(self.tolerance));
+            series.map(|series| series.extrapolated(self.tolerance));
         let of = |values: &[DVec3], unit: f64| -> Vec<DVec3> {
             values.iter().map(|value| *value * unit).collect()
         };
@@ -169,37 +169,37 @@ impl Context<'_> {
     }
 }
 
-/// A grid on which changes are looked for.
+/// A grid on which derivatives are computed.
 struct Grid<'l> {
     level: &'l Level,
     tolerance: f64,
     modes: usize,
-    /// From node to node of the coarsest grid.
+    /// Segments between neighbouring nodes of the coarsest grid.
     stride: usize,
 }
 
 impl Grid<'_> {
-    /// The squared frequencies, and the changes with each number.
+    /// The squared frequencies, and the derivatives with respect to each number.
     fn changes(&self, known: &[Known], rates: &[LeafRate]) -> Option<(Vec<f64>, Vec<Changes>)> {
         let (leaf, state) = (&self.level.leaf, &self.level.state);
         let mut linear = Linearized::new(self.level, self.tolerance);
         let forces = linear.forces(self.level, rates);
         let moment = leaf.tip_moment();
-        // A dead moment has no potential, and the matrix no real modes.
+        // A dead moment has no potential, and the unsymmetric matrix need not have real modes.
         let physics = Physics::new(&leaf.leaf);
         let modes = match self.modes > 0 && moment == DVec3::ZERO {
             true => modes::loaded(leaf, &physics, state, self.modes, &Limit::default()),
             false => None,
         };
         let modes = modes.unwrap_or_default();
-        // In the scenario's unit of time, as their changes are.
+        // In the scenario's unit of time, as their derivatives are.
         let squared = |mode: &modes::LoadedMode| mode.eigenvalue / physics.time.powi(2);
         let eigenvalues = modes.iter().map(squared).collect();
         let held = leaf.leaf.held.is_some();
-        if forces.len() > EACH && modes.is_empty() && moment == DVec3::ZERO && !held {
-            return Some((eigenvalues, self.of_tips(&mut linear, &forces)?));
+        if forces.len() > MOST_DIRECT && modes.is_empty() && moment == DVec3::ZERO && !held {
+            return Some((eigenvalues, self.tips_by_adjoint(&mut linear, &forces)?));
         }
-        let responses = linear.answers(self.level, &forces)?;
+        let responses = linear.responses(self.level, &forces)?;
         let each = known.iter().zip(rates).zip(forces.iter().zip(&responses));
         let changes = each.map(|(((_, _, _, near), rate), (forces, response))| {
             let change = (rate, response);
@@ -208,7 +208,7 @@ impl Grid<'_> {
             let of_modes = (near.iter())
                 .filter(|_| !rate.changes_moment())
                 .flat_map(|near| near.eigenvalue_rates(&modes));
-            // What a dead moment does is not balanced in the energy.
+            // The work of a dead moment is not part of the energy.
             let n = leaf.segments();
             let work = moment.dot(turn(&response.nodes[0][n - 1]));
             Changes {
@@ -256,11 +256,11 @@ impl Grid<'_> {
         rods.flat_map(of).collect()
     }
 
-    /// Changes of the tips and of the energy alone, by one solution for each component
-    /// of a tip.
-    fn of_tips(&self, linear: &mut Linearized, forces: &[Forces]) -> Option<Vec<Changes>> {
+    /// Derivatives of the tips and of the energy alone, by one adjoint solution for each
+    /// component of a tip.
+    fn tips_by_adjoint(&self, linear: &mut Linearized, forces: &[Forces]) -> Option<Vec<Changes>> {
         let units = unit_forces(&self.level.leaf, self.tips().len());
-        let adjoint = linear.answers(self.level, &units)?;
+        let adjoint = linear.responses(self.level, &units)?;
         let linear = &*linear;
         let component = |forces: &Forces, k: usize| linear.work(self.level, forces, &adjoint[k]);
         let tip = |forces: &Forces, tip: usize| {

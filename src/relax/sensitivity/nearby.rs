@@ -1,5 +1,5 @@
-//! Derivatives of what the matrix gives, and of the moments on a clamp: by differences
-//! along the response, from equilibrium to equilibrium.
+//! Derivatives of eigenvalues, and of the moments on a clamp, by finite differences between
+//! neighbouring equilibria, which are known to first order from the response.
 
 use crate::leaf::{DiscreteLeaf, Leaf, LeafRate, Response, State};
 use crate::modes::{self, LoadedMode};
@@ -10,8 +10,8 @@ use crate::scenario::Scenario;
 use glam::DVec3;
 use std::sync::Arc;
 
-/// The leaf for nearby values of a number, at rest there to first order, with the
-/// weights by which a function of it is differenced.
+/// The leaf for neighbouring values of a number, at rest to first order, with
+/// finite-difference weights.
 pub(crate) struct Nearby(Vec<Near>);
 
 struct Near {
@@ -21,8 +21,8 @@ struct Near {
     state: State,
 }
 
-/// Eigenvalues closer to each other than by this part are one, and their changes if
-/// closer than by the second; the third is the rounding error of an eigenvalue.
+/// Relative differences below which two eigenvalues, and their derivatives, count as equal;
+/// the third number bounds the error of eigenvalues by rounding, as a part of the first.
 const EQUAL: f64 = 1e-6;
 const SAME: f64 = 1e-3;
 const NOISE: f64 = 1e-3;
@@ -48,9 +48,8 @@ impl Nearby {
         Nearby(scenarios.iter().map(near).collect())
     }
 
-    /// The change of the eigenvalue of a mode, by its shape and its forces: that of its
-    /// quotient as the leaf goes from equilibrium to equilibrium, since its shape enters in
-    /// the second order only.
+    /// The derivative of the eigenvalue of a mode: that of its Rayleigh quotient between
+    /// neighbouring equilibria, as changes of its shape enter in second order only.
     pub fn eigenvalue_rate(&self, mode: &LoadedMode) -> f64 {
         let term = |near: &Near| {
             let physics = Physics::new(&near.leaf.leaf);
@@ -59,8 +58,8 @@ impl Nearby {
         self.0.iter().map(term).sum()
     }
 
-    /// The same of several modes. Not a number where modes of one eigenvalue change
-    /// differently: it splits, and the lower one is another mode to either side.
+    /// The same for several modes. NaN where a multiple eigenvalue splits: its modes change
+    /// differently, and the lower one is another mode on either side.
     pub fn eigenvalue_rates(&self, modes: &[LoadedMode]) -> Vec<f64> {
         let mut rates: Vec<f64> = modes
             .iter()
@@ -85,7 +84,7 @@ impl Nearby {
         rates
     }
 
-    /// The changes of the moments of the rods on a clamp.
+    /// The derivatives of the moments of the rods on a clamp.
     pub fn clamp_moment_rates(&self, level: &Level) -> Vec<DVec3> {
         let first = level.leaf.reaction(&level.state).1;
         let mut rates = vec![DVec3::ZERO; first.len()];

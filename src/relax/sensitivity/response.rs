@@ -1,4 +1,4 @@
-//! How a settled leaf answers forces, and changes of itself.
+//! The linear response of a settled leaf to forces, and to changes of its parameters.
 
 use crate::leaf::{
     DiscreteLeaf, Field, Forces, LeafRate, Response, Solved, SparseFactor, SparsePattern, State,
@@ -9,33 +9,34 @@ use crate::rod::Segment;
 use crate::rotation;
 use glam::DVec3;
 
-/// Relative accuracy of the conjugate gradients, as a part of the tolerance, and the
-/// best there is.
+/// Relative accuracy of the conjugate gradients, as a part of the tolerance, and its lower
+/// limit.
 const SOLUTION: f64 = 3e-3;
 const BEST_SOLUTION: f64 = 1e-11;
 
-/// Corrections where the forces of a stiff rod are condensed out with less than its
-/// stiffness; each gains many digits.
+/// Iterations where the forces of a stiff rod are condensed out with less than its stiffness,
+/// each of which gains many digits, and the relative size of the last correction.
 const CORRECTIONS: usize = 3;
 const CORRECTED: f64 = 1e-10;
 
-/// A settled leaf (all rods, in space) with its equations linearised and factorised, once
-/// for all that is asked of it.
+/// A settled leaf (all rods, in space) with its equations linearised and factorised once for
+/// all right-hand sides.
 pub(crate) struct Linearized {
     system: System,
     segments: Vec<Segment>,
     /// Relative accuracy of the conjugate gradients.
     accuracy: f64,
-    /// Whether the matrix is factorised rod by rod; else it is solved directly.
+    /// Whether the matrix is factorised rod by rod; otherwise a sparse direct factorisation is
+    /// used.
     factorized: bool,
-    /// Solutions so far.
+    /// Linear solutions so far.
     pub solves: usize,
     /// Factorisations so far.
     pub factorizations: usize,
 }
 
 impl Linearized {
-    /// About the state of a level.
+    /// Linearises about the state of a level.
     pub fn new(level: &Level, tolerance: f64) -> Linearized {
         let (leaf, state) = (&level.leaf, &level.state);
         let mut system = System::new(leaf);
@@ -54,19 +55,19 @@ impl Linearized {
         }
     }
 
-    /// What changes of the leaf do in that state.
+    /// The forces by which parameter changes of the leaf unbalance that state.
     pub fn forces(&self, level: &Level, rates: &[LeafRate]) -> Vec<Forces> {
         let force = |rate| level.leaf.rate(&level.state, &self.segments, rate);
         rates.iter().map(force).collect()
     }
 
-    /// The answers to forces. `None` where the matrix is singular.
-    pub fn answers(&mut self, level: &Level, loads: &[Forces]) -> Option<Vec<Response>> {
-        self.answers_to(level, loads, self.accuracy)
+    /// The responses to forces. `None` if the matrix is singular.
+    pub fn responses(&mut self, level: &Level, loads: &[Forces]) -> Option<Vec<Response>> {
+        self.responses_to(level, loads, self.accuracy)
     }
 
     /// The same to another relative accuracy.
-    pub fn answers_to(
+    pub fn responses_to(
         &mut self,
         level: &Level,
         loads: &[Forces],
@@ -84,7 +85,7 @@ impl Linearized {
                 }
             };
             let found: Option<Vec<_>> = (loads.iter())
-                .map(|load| answer(leaf, segments, load, &mut by_rods))
+                .map(|load| response(leaf, segments, load, &mut by_rods))
                 .collect();
             if found.is_some() {
                 return found;
@@ -100,18 +101,18 @@ impl Linearized {
             Some(factor.solve_bordered(rhs, &[]).increments)
         };
         (loads.iter())
-            .map(|load| answer(leaf, segments, load, &mut direct))
+            .map(|load| response(leaf, segments, load, &mut direct))
             .collect()
     }
 
-    /// The work of forces on the answer to others: by symmetry also that of the others
-    /// on the answer to these.
+    /// The work of forces on the response to others: by symmetry also that of the others on
+    /// the response to these.
     pub fn work(&self, level: &Level, forces: &Forces, response: &Response) -> f64 {
         level.leaf.work(&self.segments, forces, response)
     }
 }
 
-fn answer(
+fn response(
     leaf: &DiscreteLeaf,
     segments: &[Segment],
     load: &Forces,
@@ -142,7 +143,7 @@ fn answer(
         }
         rhs.iter_mut().flatten().for_each(|force| *force = [0.0; 6]);
     }
-    // A tip that is held goes where its holder goes.
+    // A held tip moves with its holder.
     for (rod, tip) in response.nodes.iter_mut().zip(&load.tips) {
         let last = rod.last_mut().into_iter().flatten();
         last.zip(tip).for_each(|(sum, value)| *sum += value);
@@ -175,7 +176,7 @@ mod tests {
     use crate::relax::{Options, relax_on_grids};
     use crate::scenario::Scenario;
 
-    /// A derivative costs one solution on a grid, and none a factorisation of its own.
+    /// A derivative costs one solution on each grid, and no factorisation of its own.
     #[test]
     fn a_number_costs_one_solution_on_a_grid() {
         let text = include_str!("../../../scenarios/paper/fig04.toml");
@@ -186,7 +187,7 @@ mod tests {
             let mut linear = Linearized::new(level, 1e-6);
             let units = super::super::unit_forces(&level.leaf, 1);
             let loads: Vec<Forces> = units.iter().cycle().take(10).cloned().collect();
-            assert_eq!(linear.answers(level, &loads).unwrap().len(), 10);
+            assert_eq!(linear.responses(level, &loads).unwrap().len(), 10);
             assert_eq!((linear.solves, linear.factorizations), (10, 1));
         }
     }

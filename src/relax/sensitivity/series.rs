@@ -1,18 +1,17 @@
-//! Derivatives on ever finer grids.
+//! Derivatives on successively refined grids.
 
 use crate::relax::richardson::Richardson;
 use glam::DVec3;
 
-/// Safety factor on the estimate for positions: errors of derivatives fall less
-/// regularly.
+/// Safety factor on the error estimate: errors of derivatives decrease less regularly than
+/// those of positions.
 const SAFETY: f64 = 3.0;
 
-/// Relative error that rounding leaves, and that which unfinished iterations leave as
-/// a part of the tolerance.
+/// Relative errors by rounding, and by unfinished iterations as a part of the tolerance.
 const ROUNDING: f64 = 1e-10;
 const UNFINISHED: f64 = 0.1;
 
-/// Values on ever finer grids, each extrapolated on its own.
+/// Values on successively refined grids, extrapolated together.
 pub(super) struct Series {
     segments: Vec<usize>,
     values: Vec<Vec<DVec3>>,
@@ -31,8 +30,8 @@ impl Series {
         self.values.push(values);
     }
 
-    /// The same if there are values: not all are known on every grid.
-    pub fn push_any(&mut self, segments: usize, values: Vec<DVec3>) {
+    /// The same if there are as many values as before: not all are known on every grid.
+    pub fn push_if_complete(&mut self, segments: usize, values: Vec<DVec3>) {
         let alike = self
             .values
             .last()
@@ -42,8 +41,8 @@ impl Series {
         }
     }
 
-    /// The best values, and a bound on the error of all.
-    pub fn judged(&self, tolerance: f64) -> (Vec<DVec3>, Option<f64>) {
+    /// The extrapolated values, and a common error bound.
+    pub fn extrapolated(&self, tolerance: f64) -> (Vec<DVec3>, Option<f64>) {
         let all = self.values.iter().flatten();
         let unit = all.fold(0.0_f64, |m, v| m.max(v.abs().max_element()));
         let count = self.values.last().map_or(0, Vec::len);

@@ -49,7 +49,7 @@ impl Responses {
             .get_mut()
             .unwrap_or_else(PoisonError::into_inner);
         for ((level, linear), forces) in levels.iter().zip(linear).zip(&self.forces) {
-            let responses = linear.answers(level, forces).ok_or_else(singular)?;
+            let responses = linear.responses(level, forces).ok_or_else(singular)?;
             for (all, answer) in all.iter_mut().zip(responses) {
                 all.push(answer);
             }
@@ -67,7 +67,7 @@ impl Responses {
     ) -> Result<Vec<Vec<f64>>, Lost> {
         let mut all = self.linear.lock().unwrap_or_else(PoisonError::into_inner);
         let linear = &mut all[k];
-        let responses = linear.answers(level, units).ok_or_else(singular)?;
+        let responses = linear.responses(level, units).ok_or_else(singular)?;
         let rates = |answer| {
             let forces = self.forces[k].iter();
             forces
@@ -93,7 +93,7 @@ impl Responses {
                 sum.add(*step, forces);
             }
             let mut all = self.linear.lock().unwrap_or_else(PoisonError::into_inner);
-            let answer = all[k].answers_to(level, &[sum], PREDICTED);
+            let answer = all[k].responses_to(level, &[sum], PREDICTED);
             let answer = answer.ok_or_else(singular)?;
             answer.into_iter().next().ok_or_else(singular)
         };
