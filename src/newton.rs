@@ -3,7 +3,7 @@
 
 mod convergence;
 
-pub use convergence::{Contraction, ROUNDING, at_saddle, closes, converged};
+pub use convergence::{Contraction, ROUNDING, at_saddle, converged, satisfies_lengths};
 
 use crate::leaf::{DiscreteLeaf, Field, Increment, Solved, SparsePattern, State, System};
 use crate::rod::RESOLVED_TURN;
@@ -11,24 +11,23 @@ use crate::rotation;
 use serde::Serialize;
 use std::ops::Add;
 
-/// Increments below this (radians, lengths) may be nothing but rounding that
-/// drives a neutral mode, if no force or moment above the second number (A/L^2,
-/// A/L) is unbalanced.
+/// Increments below this (radians, lengths) are attributed to rounding in a neutral mode if no
+/// force or moment above the second number (A/L^2, A/L) is unbalanced.
 const NEUTRAL_STEP: f64 = 1e-5;
 const BALANCED: f64 = 1e-9;
 
-/// Shift of the matrix (times the mass matrix, in squared frequencies; the
-/// lowest of a clamped rod is 12) that carries Newton's method of a stiff leaf
-/// over a region where its energy is not convex: the first tried, the one below
-/// which it is dropped, the one at which the attempt ends.
+/// Shift of the matrix (times the mass matrix, in squared frequencies; the lowest of a clamped
+/// rod is 12) that lets Newton's method of a stiff leaf cross a region where its energy is not
+/// convex: the first tried, the one below which it is set to zero, the one above which the
+/// iteration fails.
 const FIRST_SHIFT: f64 = 30.0;
 const LEAST_SHIFT: f64 = 1.0;
 const LARGEST_SHIFT: f64 = 1e6;
 
-/// Relative accuracy of the conjugate gradients for a leaf that is held.
-const HELD_ACCURACY: f64 = 1e-6;
+/// Relative accuracy of the conjugate gradients for a proximal step.
+const PROXIMAL_ACCURACY: f64 = 1e-6;
 
-/// Work done by a solver, counted so that tests can pin it.
+/// Work done by a solver; deterministic, so that tests can check it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Work {
     /// Accepted steps (time steps or Newton iterations).
@@ -54,35 +53,35 @@ impl Add for Work {
     }
 }
 
-/// Why an iteration or a motion on one grid did not come to a stable rest.
+/// Why an iteration or a motion on one grid did not reach a stable equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stop {
     /// At rest although the energy has a direction of descent there.
     Saddle,
     /// A segment bends by more than the grid can resolve.
     Unresolved,
-    /// The step limit came first.
+    /// The step limit was reached.
     StepLimit,
-    /// No step however short lowers the energy, or the matrix is singular.
+    /// No step lowers the energy, however short, or Newton's method fails.
     Stuck,
 }
 
-/// Relative accuracy of the conjugate gradients after an increment of size
-/// `previous`: an iteration is cheap beside a new assembly, so that the next
-/// step is never held up by them.
+/// Relative accuracy of the conjugate gradients after an increment of size `previous`: their
+/// iterations are cheap compared with an assembly, so that their error should not limit the
+/// next step.
 pub fn cg_tolerance(previous: f64, loosest: f64) -> f64 {
     (3e-3 * previous).clamp(1e-10, loosest)
 }
 
-/// Solves with matrices that must be positive definite: by conjugate gradients
-/// over the factorised rods, or directly from when on these proved too slow.
+/// Solver for matrices that must be positive definite: by conjugate gradients preconditioned
+/// by the factorised rods, or directly once these have proved too slow.
 #[derive(Default)]
 pub struct Definite {
-    /// What was seen of the iteration so far.
+    /// The observed convergence of Newton's method so far.
     pub contraction: Contraction,
     pub direct: Option<SparsePattern>,
-    /// Of a leaf in its plane: room for its matrix in space, which must be positive
-    /// definite wherever that in the plane is, lest the leaf in space move.
+    /// For a planar leaf: the system of the spatial leaf, whose matrix must be positive
+    /// definite too, as otherwise the spatial leaf would move differently.
     pub space: Option<System>,
 }
 
@@ -127,9 +126,8 @@ impl Definite {
         positive
     }
 
-    /// Whether K + `shift` M of the leaf in space, if that is asked for, is positive
-    /// definite rod by rod: then the leaf takes the step in its plane that it takes
-    /// in space.
+    /// Whether K + `shift` M of the leaf in space, if it is checked, is positive definite rod
+    /// by rod: then the step in the plane is that of the spatial leaf.
     pub fn convex_in_space(
         &mut self,
         leaf: Option<&DiscreteLeaf>,
@@ -147,27 +145,26 @@ impl Definite {
     }
 }
 
-/// The linear equations of an iteration, and what it makes of its increments.
+/// The linear equations of an iteration, and its limits on increments.
 pub enum Equations<'s> {
-    /// Whatever the signs of the pivots, by a sparse factorisation whose pattern
-    /// is kept; increments are shortened to the given size. It goes to the next
-    /// equilibrium, stable or not, as the solver of a boundary-value problem would.
+    /// With pivots of any sign, by a sparse factorisation whose pattern is reused; increments
+    /// are shortened to the given size. Converges to an equilibrium nearby, stable or not,
+    /// like a solver of boundary-value problems.
     AnySign { largest: f64 },
     /// Of a single rod under a dead moment: with the exact, unsymmetric matrix.
     Unsymmetric,
-    /// With a positive definite matrix, shifted where it is not; an increment
-    /// above the given size ends the iteration.
+    /// With a positive definite matrix, shifted where necessary; an increment above the given
+    /// size ends the iteration.
     Definite {
         solver: &'s mut Definite,
         largest: f64,
         /// Relative accuracy of the conjugate gradients in the first step.
         cg_tolerance: f64,
     },
-    /// Of a leaf whose nodes are held where they are in `at` by springs of `rate`
-    /// times their masses: a step of implicit Euler, or of the proximal point
-    /// method. The matrix must be positive definite; an increment above the given
-    /// size ends the iteration.
-    Held {
+    /// With springs of `rate` times the masses that hold the nodes at their places in `at`: a
+    /// step of implicit Euler without inertia, or of the proximal point method. The matrix
+    /// must be positive definite; an increment above the given size ends the iteration.
+    Proximal {
         solver: &'s mut Definite,
         at: &'s State,
         rate: f64,
@@ -176,19 +173,19 @@ pub enum Equations<'s> {
 }
 
 impl Equations<'_> {
-    /// Sizes to which an increment is shortened, and above which it is refused.
+    /// The size to which an increment is shortened, and that above which it is rejected.
     fn limits(&self) -> (f64, f64) {
         match self {
             Equations::AnySign { largest } => (*largest, f64::INFINITY),
             Equations::Unsymmetric => (f64::INFINITY, f64::INFINITY),
-            Equations::Definite { largest, .. } | Equations::Held { largest, .. } => {
+            Equations::Definite { largest, .. } | Equations::Proximal { largest, .. } => {
                 (f64::INFINITY, *largest)
             }
         }
     }
 }
 
-/// What is asked of an iteration.
+/// The parameters of a Newton iteration.
 pub struct Newton<'a> {
     /// Of positions and rotations.
     pub accuracy: f64,
@@ -198,21 +195,21 @@ pub struct Newton<'a> {
     pub progress: &'a mut dyn FnMut(usize, f64),
 }
 
-/// What is kept from one linear solution to the next.
+/// The data kept from one linear solution to the next.
 struct Linear<'s> {
     equations: Equations<'s>,
     pattern: Option<SparsePattern>,
-    /// The shift that leaves neutral modes where they are.
+    /// The shift that keeps neutral modes from moving.
     neutral: f64,
-    /// What is added to it to make the matrix positive definite.
+    /// The additional shift that makes the matrix positive definite.
     shift: f64,
-    /// Increments back to where nodes are held.
+    /// Increments back to the positions where springs hold the nodes.
     back: Field,
 }
 
 impl Newton<'_> {
-    /// Newton's method from a state: the error that is left of the iteration. The
-    /// last factorisation is left in the system.
+    /// Newton's method from a state; returns the remaining iteration error. The last
+    /// factorisation stays in the system.
     pub fn solve(
         self,
         leaf: &DiscreteLeaf,
@@ -262,17 +259,17 @@ impl Newton<'_> {
             } else if size < longest {
                 let first = match &mut linear.equations {
                     Equations::Definite { solver, .. } => {
-                        solver.contraction.learn(size, previous);
+                        solver.contraction.update(size, previous);
                         let force = state.force_change(&next);
-                        solver.contraction.after_first(size, force)
+                        solver.contraction.error_after_first(size, force)
                     }
-                    _ => Contraction::default().after_first(size, 0.0),
+                    _ => Contraction::default().error_after_first(size, 0.0),
                 };
                 let tolerances = [previous_tolerance, tolerance];
                 let accuracy = (self.accuracy, ROUNDING);
                 let remaining = converged(size, previous, tolerances, accuracy, first);
                 if let Some(remaining) = remaining
-                    && closes(leaf, state, self.accuracy)
+                    && satisfies_lengths(leaf, state, self.accuracy)
                 {
                     return Ok(remaining);
                 }
@@ -293,7 +290,7 @@ impl Newton<'_> {
     }
 }
 
-/// Writes the increments of all nodes but the bases from a state to another.
+/// Writes the increments of all nodes but the bases from one state to another.
 fn increments(from: &State, to: &State, field: &mut Field) {
     let n = from.segments();
     field.resize_with(from.rods(), || vec![[0.0; 6]; n]);
@@ -337,14 +334,14 @@ impl Linear<'_> {
                 system.solve(None, 0.0);
                 Some(0.0)
             }
-            Equations::Held {
+            Equations::Proximal {
                 solver, at, rate, ..
             } => {
                 increments(state, at, &mut self.back);
                 let springs = Some((self.back.as_slice(), *rate));
                 let shift = self.neutral + *rate;
-                let positive = solver.solve(system, shift, springs, HELD_ACCURACY, work);
-                positive.then_some(HELD_ACCURACY)
+                let positive = solver.solve(system, shift, springs, PROXIMAL_ACCURACY, work);
+                positive.then_some(PROXIMAL_ACCURACY)
             }
             Equations::Definite {
                 solver,

@@ -373,6 +373,6 @@ pub fn reversed(t: Tangent) -> Tangent {
 
 /// Whether the iteration has converged with a Newton step of this size after `previous`.
 pub(super) fn at_rest(size: f64, previous: f64) -> bool {
-    let first = Contraction::default().after_first(size, 0.0);
+    let first = Contraction::default().error_after_first(size, 0.0);
     converged(size, previous, [0.0; 2], (ACCURACY, ROUNDED), first).is_some()
 }

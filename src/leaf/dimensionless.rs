@@ -7,19 +7,19 @@ use crate::scenario::{Clamp, Dynamics, Profile, Rod, Scale, Scenario};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
-/// Stiffness in stretch and shear beyond which segment forces are condensed
-/// out with this one, in units of A/L^2 with the softest A of the leaf. Larger
-/// ones lose the soft modes to rounding, smaller ones cost iterations.
+/// Upper limit of the stiffness in stretch and shear with which segment forces are condensed
+/// out, in units of A/L^2 with the softest A of the leaf. Larger limits lose the soft modes to
+/// rounding, smaller ones cost iterations.
 const CONDENSING_STIFFNESS: f64 = 1e7;
 
-/// But never with less than this, in units of the mean A/L^2.
+/// Lower bound of that limit, in units of the mean A/L^2.
 const LEAST_CONDENSING: f64 = 1e5;
 
-/// A leaf with all quantities dimensionless, not yet discretised.
+/// A leaf with all quantities dimensionless, before discretisation.
 #[derive(Clone, Debug)]
 pub struct Leaf {
     scenario: Arc<Scenario>,
-    /// Whether this is half of a leaf that is its own mirror image.
+    /// Whether this is half of a mirror-symmetric leaf.
     pub(super) mirrored: bool,
     /// Whether it is solved in its plane.
     pub(super) planar: bool,
@@ -37,9 +37,9 @@ pub struct Leaf {
 /// A tip that is held.
 #[derive(Clone, Debug)]
 pub struct Held {
-    /// Where.
+    /// The position.
     pub position: DVec3,
-    /// If the directions are held, too, one a rod.
+    /// If rotations are held too, the clamps, one per rod.
     pub clamps: Option<Vec<Clamp>>,
 }
 
@@ -67,11 +67,11 @@ impl Leaf {
         Leaf::in_units(Arc::new(scenario.clone()), scenario.scale())
     }
 
-    /// The same in given units, in which leaves that differ in length or
-    /// stiffness can be compared.
+    /// The same in given units, so that leaves that differ in length or stiffness are
+    /// comparable.
     pub fn in_units(scenario: Arc<Scenario>, scale: Scale) -> Self {
         let profiles = scenario.rods.iter().flat_map(law);
-        // Those of the masses only matter to a leaf that moves.
+        // The profiles of the masses only matter for motions.
         let Dynamics {
             density,
             rotary_inertia,
@@ -108,7 +108,7 @@ impl Leaf {
         &self.scenario
     }
 
-    /// Number of rods: all, or those of the half.
+    /// Number of rods: of the whole leaf, or of the half.
     pub fn rods(&self) -> usize {
         let rods = self.scenario.rods.len();
         rods.div_ceil(if self.mirrored { 2 } else { 1 })
@@ -124,7 +124,7 @@ impl Leaf {
         self.mirrored
     }
 
-    /// Part of rod `j` that belongs to the leaf, or to its half.
+    /// Fraction of rod `j` that belongs to this leaf: one half for the midrib of half a leaf.
     pub fn share(&self, j: usize) -> f64 {
         if self.in_plane(j) { 0.5 } else { 1.0 }
     }
@@ -135,7 +135,7 @@ impl Leaf {
         self.mirrored && count % 2 == 1 && 2 * j + 1 == count
     }
 
-    /// Whether rod `j` of half a leaf has its image for a neighbour.
+    /// Whether rod `j` of half a leaf is next to its own mirror image.
     pub fn beside_image(&self, j: usize) -> bool {
         self.mirrored && 2 * (j + 1) == self.scenario.rods.len()
     }
@@ -169,7 +169,7 @@ impl Leaf {
         self.rod(j).length / self.scale.length
     }
 
-    /// Length at rest of rod `j` from the base up to `sigma`, with its growth.
+    /// Rest length of rod `j` from the base up to `sigma`, including growth.
     pub fn grown(&self, j: usize, sigma: f64) -> f64 {
         self.length(j) * self.rod(j).rest_stretch.integral(sigma)
     }
@@ -215,7 +215,7 @@ impl Leaf {
     }
 }
 
-/// All that the law of a rod is made of.
+/// All profiles in the constitutive law of a rod.
 fn law(rod: &Rod) -> impl Iterator<Item = &Profile> {
     let triples = [
         &rod.couple_stiffness,

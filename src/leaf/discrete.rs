@@ -9,9 +9,9 @@ use crate::rod::{Ends, Section, Segment};
 use glam::DVec3;
 use pulp::Scalar;
 
-/// Radius of gyration of a vein with the tissue it carries, in units of the
-/// leaf's length: its rotary inertia per unit length and mass is the square.
-/// A thin rod's own is smaller, but a vein turns with its strip of blade.
+/// Radius of gyration of a vein with the tissue it carries, in units of the leaf's length: its
+/// rotary inertia per unit length and mass is the square. A thin rod's own is smaller, but a
+/// vein rotates with its strip of blade.
 const RADIUS_OF_GYRATION: f64 = 0.1;
 
 /// A leaf on a grid.
@@ -28,7 +28,7 @@ pub struct DiscreteLeaf {
     coupling: Vec<DVec3>,
     /// Trapezoidal weights of the nodes as fractions of the length.
     weights: Vec<f64>,
-    /// Part of the loads that acts: one, but in the continuation to a dead moment.
+    /// Part of the loads that acts: one, except during continuation in the loads.
     pub load_factor: f64,
     /// The loads.
     pub loads: Loads,
@@ -64,7 +64,7 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The same, in space if it was in its plane.
+    /// The same without the restriction to its plane.
     pub fn in_space(&self) -> Self {
         let mut spatial = self.clone();
         spatial.leaf.planar = false;
@@ -90,7 +90,7 @@ impl DiscreteLeaf {
         soft
     }
 
-    /// Gives every segment the force of its strain, whatever it is.
+    /// Sets the force of every segment from its strain by the constitutive law.
     pub fn strain_forces(&self, state: &mut State) {
         let n = self.segments();
         for (j, i) in self.each(0..n) {
@@ -101,10 +101,10 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Whether the ends of nearly rigid segments are as far apart as their lengths say, to
-    /// `within` along a rod. Their forces are found by proximal steps: where no shape
-    /// nearby has their lengths these grow from step to step while no node moves.
-    pub fn closes(&self, state: &State, within: f64) -> bool {
+    /// Whether the ends of nearly rigid segments are apart by their lengths, with a total error of
+    /// at most `within` per rod. Their forces are found by proximal steps: if no shape nearby
+    /// satisfies the lengths, the forces grow from step to step while no node moves.
+    pub fn satisfies_lengths(&self, state: &State, within: f64) -> bool {
         let n = self.segments();
         let open = |j: usize| -> f64 {
             let gap = |i: usize| {
@@ -122,14 +122,14 @@ impl DiscreteLeaf {
         (0..self.rods()).all(|j| open(j) <= within)
     }
 
-    /// A shift of the matrix (times the mass matrix) that is far below the
-    /// squared frequency of any bending mode, and above what rounding and
-    /// unfinished iterations make of a neutral mode's zero.
+    /// A shift of the matrix (times the mass matrix) that is far below the squared frequency
+    /// of any bending mode, and above the error of a neutral mode's zero eigenvalue by
+    /// rounding and unfinished iterations.
     pub fn neutral_shift(&self) -> f64 {
         1e-7 + 4.0 * self.rounding()
     }
 
-    /// What rounding may do to the eigenvalues of the matrix.
+    /// Rounding error of the eigenvalues of the matrix.
     pub fn rounding(&self) -> f64 {
         let sections = self.sections.iter();
         let stiffest = sections.fold(0.0_f64, |m, s| m.max(s.condensing.max_element()));
@@ -146,8 +146,7 @@ impl DiscreteLeaf {
         self.leaf.rods()
     }
 
-    /// Rod and number of every node or segment, of those with the numbers `of` each
-    /// rod.
+    /// Rod and number of every node or segment whose number is in `of`.
     pub fn each<I: Iterator<Item = usize> + Clone>(
         &self,
         of: I,
@@ -181,8 +180,7 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Mass of the nodes of rod `j` at unit density, over their weights: rotary,
-    /// translational.
+    /// Mass of the nodes of rod `j` at unit density, per weight: rotary, translational.
     pub(super) fn mass_per_weight(&self, j: usize) -> [f64; 2] {
         let mass = self.leaf.length(j) * self.leaf.share(j);
         [RADIUS_OF_GYRATION * RADIUS_OF_GYRATION * mass, mass]
@@ -190,12 +188,11 @@ impl DiscreteLeaf {
 
     /// Whether all tips are one point that moves.
     pub fn tips_move_together(&self) -> bool {
-        // The tip of a single rod is its own, and one that is held does not move.
+        // The tip of a single rod is not shared, and a held tip does not move.
         self.leaf.joined() && self.rods() > 1 && self.leaf.held.is_none()
     }
 
-    /// Whether node `i` of the rods turns, and is displaced: a tip that is held is
-    /// not.
+    /// Whether node `i` of the rods may rotate, and be displaced; a held tip is constrained.
     pub fn moves(&self, i: usize) -> [bool; 2] {
         match &self.leaf.held {
             Some(held) if i == self.segments() => [held.clamps.is_none(), false],
@@ -208,8 +205,7 @@ impl DiscreteLeaf {
         self.leaf.hold_tips(state);
     }
 
-    /// The force that the holder of a held tip feels, and the moments of the rods
-    /// on a clamp.
+    /// The force on the holder of a held tip, and the moments of the rods on a clamp.
     pub fn reaction(&self, state: &State) -> (DVec3, Vec<DVec3>) {
         let n = self.segments();
         let mut force = DVec3::ZERO;
@@ -228,8 +224,7 @@ impl DiscreteLeaf {
         self.weights[i]
     }
 
-    /// Weight of node `i` in the masses: none where a tip is held, which has no part
-    /// in any motion.
+    /// Weight of node `i` in the masses: zero at a held tip, which does not move.
     pub(super) fn moving_weight(&self, i: usize) -> f64 {
         match self.leaf.held {
             Some(_) if i == self.segments() => 0.0,
@@ -253,7 +248,7 @@ impl DiscreteLeaf {
         &self.sections[j * self.segments() + i]
     }
 
-    /// Weight of the coupling of node `i`: none at a joint tip, which all rods share.
+    /// Weight of the coupling of node `i`: zero at a joint tip, which all rods share.
     pub(super) fn coupling_weight(&self, i: usize) -> f64 {
         match self.leaf.joined() && i == self.segments() {
             true => 0.0,
@@ -261,8 +256,8 @@ impl DiscreteLeaf {
         }
     }
 
-    /// What acts on rod `j`, per weight. The tip force acts on every free tip, and
-    /// once on a joint one, through the first rod.
+    /// Loads on rod `j`, per weight. The tip force acts on every free tip, and once on a joint
+    /// one, through the first rod.
     pub(super) fn rod_load(&self, j: usize) -> RodLoad {
         let (joined, mirrored) = (self.leaf.joined(), self.leaf.mirrored);
         let share = self.leaf.share(j);
@@ -324,7 +319,7 @@ impl DiscreteLeaf {
         0.5 * stretch.dot(self.spring(j, i) * stretch)
     }
 
-    /// Sets all rest curvatures to the leaf's times `factor`.
+    /// Sets all rest curvatures to `factor` times those of the leaf.
     pub fn set_rest(&mut self, factor: f64) {
         let n = self.segments();
         for (k, section) in self.sections.iter_mut().enumerate() {

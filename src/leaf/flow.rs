@@ -1,5 +1,5 @@
-//! The fields of a leaf carried along its rods by the equilibrium equations: by the
-//! explicit Runge-Kutta method of order 8 of Dormand and Prince, in equal steps.
+//! Integration of the equilibrium equations along the rods of a leaf, by the explicit
+//! Runge-Kutta method of order 8 of Dormand and Prince, in equal steps.
 
 use super::discrete::DiscreteLeaf;
 use super::loads::{GroupLoads, RodLoads, group_loads};
@@ -9,20 +9,20 @@ use crate::tableau::{A, B, C, STAGES};
 use glam::{DQuat, DVec3};
 use pulp::{Arch, Simd};
 
-/// One rod at one sigma, along the lab axes.
+/// The fields of one rod at one sigma, along the lab axes.
 #[derive(Clone, Copy, Debug)]
 pub struct RodFields {
     /// Position.
     pub x: DVec3,
     /// Rotation.
     pub q: DQuat,
-    /// Force that the part beyond exerts.
+    /// Force exerted by the part beyond.
     pub n: DVec3,
-    /// Moment that it exerts.
+    /// Moment exerted by the part beyond.
     pub m: DVec3,
 }
 
-/// All rods at one sigma, four at a time.
+/// The fields of all rods at one sigma, in groups of four.
 #[derive(Clone, Debug, Default)]
 pub struct Slice(Vec<GroupFields>);
 
@@ -47,24 +47,23 @@ pub struct Flow<'a> {
     loads: Vec<GroupLoads>,
     fields: Vec<GroupFields>,
     stage: Stage,
-    /// Of each stage, and group.
+    /// Slopes of each stage and group.
     slopes: Vec<Vec<GroupFields>>,
-    /// Where the slopes are taken, which is at all sigma alike where nothing changes along
-    /// the rods.
+    /// Constitutive laws at the present stage; constant if the rods are uniform.
     laws: Vec<GroupLaws>,
     uniform: bool,
 }
 
-/// Where slopes are taken.
+/// The fields of a Runge-Kutta stage.
 struct Stage {
     fields: Vec<GroupFields>,
-    /// Positions once more, each axis in a row, one place before the first rod and one
-    /// behind the last: those of neighbours stand beside them.
+    /// Positions again, contiguous for each axis, with padding before the first rod and behind
+    /// the last, so that those of neighbours are adjacent.
     x: [Vec<f64>; 3],
 }
 
 impl<'a> Flow<'a> {
-    /// Of the rods of `leaf`, on any grid.
+    /// For the rods of `leaf`, on any grid.
     pub fn new(leaf: &'a DiscreteLeaf) -> Self {
         let load = |j: usize| {
             let mut load = leaf.rod_load(j);
@@ -95,8 +94,8 @@ impl<'a> Flow<'a> {
         flow
     }
 
-    /// Writes down what each rod, which is as `begin` says at sigma = `from`, is after every
-    /// one of so many equal steps to `to` as there are slices.
+    /// Integrates all rods from the fields `begin` at sigma = `from` to `to` in equal steps,
+    /// one per slice of `after`, and writes the fields after every step.
     pub fn integrate(
         &mut self,
         begin: impl Fn(usize) -> RodFields,
@@ -124,8 +123,8 @@ impl<'a> Flow<'a> {
         }
     }
 
-    /// The potential energy of all rods between where they were carried from last and to,
-    /// without that of loads on the tips.
+    /// The potential energy of all rods over the interval of the last integration, without
+    /// that of loads on the tips.
     pub fn energy(&self) -> f64 {
         let energy = |j: usize| self.fields[j / GROUP][13].0[j % GROUP];
         (0..self.leaf.rods()).map(energy).sum()
@@ -149,7 +148,7 @@ impl<'a> Flow<'a> {
         std::mem::swap(&mut self.fields, &mut self.stage.fields);
     }
 
-    /// Makes the stage the fields plus h times the sum of weights times slopes.
+    /// Sets the stage to the fields plus h times the weighted sum of slopes.
     fn combine(&mut self, h: f64, weights: &[f64]) {
         let mut kernel = Combine {
             fields: &self.fields,
@@ -160,7 +159,7 @@ impl<'a> Flow<'a> {
         run(self.arch, &mut kernel);
     }
 
-    /// What all rods are made of at one sigma.
+    /// Looks up the constitutive laws of all rods at one sigma.
     fn look_up_laws(&mut self, sigma: f64) {
         let (leaf, rods) = (&self.leaf.leaf, self.leaf.rods());
         let group = |g: usize| {
@@ -246,7 +245,8 @@ mod tests {
         stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = inf, shear_2 = inf, shear_3 = inf }
     "#;
 
-    /// How far a rod that a moment of 3 A/L bends is from its circle after so many steps.
+    /// Largest distance from the exact circle of a rod bent by a moment of 3 A/L, integrated
+    /// in so many steps.
     fn off_circle(steps: usize) -> f64 {
         const CURVATURE: f64 = 3.0;
         let rod = Scenario::from_toml(ROD).unwrap();

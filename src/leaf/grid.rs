@@ -1,4 +1,4 @@
-//! Where the nodes lie along the rods.
+//! The grid: positions of the nodes along the rods.
 
 /// Nodes as fractions sigma = s/L of every rod's length, from 0 to 1, the same
 /// for all rods since the coupling joins equal fractions.
@@ -9,19 +9,19 @@
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     sigma: Vec<f64>,
-    /// Those of one panel to the last bit alike, as differences of sigma are not.
+    /// Widths within a panel are identical to the last bit, which differences of sigma are not.
     widths: Vec<f64>,
 }
 
 impl Grid {
-    /// `segments` segments shared out among the panels between `kinks`
-    /// (ascending, inside (0, 1)) by their widths, at least one each.
+    /// `segments` segments distributed over the panels between `kinks` (ascending, inside (0,
+    /// 1)) in proportion to their widths, at least one each.
     pub fn new(segments: usize, kinks: &[f64]) -> Self {
         let edges = [&[0.0], kinks, &[1.0]].concat();
         let widths: Vec<f64> = edges.windows(2).map(|w| w[1] - w[0]).collect();
         let mut counts = vec![1_usize; widths.len()];
         for _ in widths.len()..segments {
-            // The next segment goes where the segments are longest.
+            // The next segment goes to the panel with the longest segments.
             let width = |panel: usize| widths[panel] / counts[panel] as f64;
             let longest = (0..widths.len()).max_by(|&a, &b| width(a).total_cmp(&width(b)));
             counts[longest.expect("at least one panel")] += 1;
@@ -39,8 +39,8 @@ impl Grid {
         grid
     }
 
-    /// The grid whose nodes are `stations`: of so many segments, or of a half, a
-    /// quarter ... of these, refined. Between kinks that is not the same.
+    /// The grid whose nodes are `stations`: made with so many segments, or with a half, a
+    /// quarter ... of these and refined, which differs if there are kinks.
     pub fn through(stations: &[f64], kinks: &[f64]) -> Self {
         let segments = stations.len() - 1;
         let grid = Grid::new(segments, kinks);
@@ -68,7 +68,7 @@ impl Grid {
         self.cut(|a, b, third| [a, a + third, b - third])
     }
 
-    /// With every segment cut in N, at what `nodes` makes of its ends and the
+    /// With every segment divided in N: `nodes` gives its first nodes from its ends and the
     /// new width.
     fn cut<const N: usize>(&self, nodes: impl Fn(f64, f64, f64) -> [f64; N]) -> Self {
         let widths = self.widths.iter().map(|width| width / N as f64);

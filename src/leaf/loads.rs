@@ -1,27 +1,26 @@
-//! What acts on the nodes of several rods: dead loads, and the coupling with their
-//! neighbours.
+//! Loads on the nodes of several rods: dead loads, and the coupling with their neighbours.
 
 use crate::lanes::{Four, GROUP, Lanes, Vectors};
 use glam::DVec3;
 use pulp::Simd;
 
-/// What acts on a rod, per weight of its nodes but for the force on its tip.
+/// Loads on a rod per weight of its nodes, except the force on its tip.
 #[derive(Clone, Copy)]
 pub struct RodLoad {
     /// Dead load.
     pub dead: DVec3,
     /// Force on the tip.
     pub tip: DVec3,
-    /// Coupling with the rod before, with the one behind, and with its own image.
+    /// Coupling with the previous rod, with the next, and with its own mirror image.
     pub before: DVec3,
     pub behind: DVec3,
     pub image: DVec3,
 }
 
-/// The same of a group of rods, number by number.
+/// The same of a group of rods, component by component.
 pub type GroupLoads = [[Four; 3]; 5];
 
-/// What acts on the rods of a group.
+/// The loads on the rods of a group.
 #[inline(always)]
 pub fn group_loads(of: [RodLoad; GROUP]) -> GroupLoads {
     let vectors = |of_load: fn(&RodLoad) -> DVec3| {
@@ -41,7 +40,7 @@ pub fn group_loads(of: [RodLoad; GROUP]) -> GroupLoads {
     ]
 }
 
-/// The same of several rods.
+/// The loads on several rods.
 #[derive(Clone, Copy)]
 pub struct RodLoads<S: Simd> {
     dead: Vectors<S>,
@@ -68,9 +67,9 @@ impl<S: Simd> RodLoads<S> {
         }
     }
 
-    /// Forces on nodes, and their share of the potential energy (that of a gap
-    /// belongs to its lower rod): positions of the nodes before, of these and of
-    /// those behind; their weights in dead loads and in the coupling.
+    /// Forces on nodes, and their share of the potential energy (that of a gap belongs to its
+    /// lower rod), from the positions of the nodes on the previous rods, of these, and on the
+    /// next rods, and from their weights in dead loads and in the coupling.
     #[inline(always)]
     pub fn at(
         &self,
@@ -93,7 +92,7 @@ impl<S: Simd> RodLoads<S> {
         (force + pull - push - to_image, energy)
     }
 
-    /// What the coupling adds to the diagonal of nodes, per weight.
+    /// The contribution of the coupling to the diagonal of nodes, per weight.
     #[inline(always)]
     pub fn stiffness(&self) -> Vectors<S> {
         self.before + self.behind + self.image

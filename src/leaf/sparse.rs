@@ -17,11 +17,11 @@ use faer::{Conj, MatMut, Par, Side};
 /// The pattern of a leaf's matrix: ordering and symbolic factorisation.
 pub struct SparsePattern {
     symbolic: SymbolicCholesky<usize>,
-    /// Of the lower triangle, and where each of its [`entries`] stands.
+    /// Pattern of the lower triangle, and the position in it of each of the [`entries`].
     lower: SymbolicSparseColMat<usize>,
     places: Vec<usize>,
     unknowns: Unknowns,
-    /// First of the rows that border the matrix, behind all others.
+    /// Index of the first of the border rows, which follow all others.
     border: usize,
     size: usize,
 }
@@ -97,8 +97,8 @@ impl SparsePattern {
         self.size
     }
 
-    /// First unknown of the turn and of the shift of node `i` (from 1) of rod
-    /// `j`. A joint tip has one shift for all rods.
+    /// First unknown of the rotation and of the displacement of node `i` (from 1) of rod `j`.
+    /// A joint tip has one displacement for all rods.
     pub fn unknowns(&self, j: usize, i: usize) -> [usize; 2] {
         [0, 3].map(|c| self.unknowns.at(j, i - 1, c))
     }
@@ -136,7 +136,7 @@ impl SparsePattern {
         self.factorize_bordered(system, shift, &[])
     }
 
-    /// The same, bordered by as many rows as the pattern has, zero where they meet.
+    /// The same, bordered by as many rows as the pattern has, with a zero corner block.
     pub fn factorize_bordered(
         &self,
         system: &System,
@@ -228,7 +228,7 @@ impl SparseFactor<'_> {
         negative
     }
 
-    /// Solves in place, with unknowns numbered as by [`SparsePattern::unknowns`].
+    /// Solves in group_and_lane, with unknowns numbered as by [`SparsePattern::unknowns`].
     pub fn solve_vector(&mut self, b: &mut [f64]) {
         let mut x: Vec<f64> = self.forward.iter().map(|&k| b[k]).collect();
         let mut memory = std::mem::replace(&mut self.memory, MemBuffer::new(Default::default()));
@@ -244,8 +244,8 @@ impl SparseFactor<'_> {
         }
     }
 
-    /// Solves for the right-hand side assembled in `system` plus `inertia`
-    /// (see [`System::solve`]); the solution stands in `system` afterwards.
+    /// Solves for the right-hand side assembled in `system` plus `inertia` (see
+    /// [`System::solve`]); the solution is stored in `system`.
     pub fn solve(&mut self, system: &mut System, inertia: Option<(&[Vec<Increment>], f64)>) {
         let unknowns = &self.pattern.unknowns;
         let mut b = vec![0.0; self.pattern.size];

@@ -20,9 +20,9 @@ pub struct State {
 /// displacement.
 pub type Increment = [f64; 6];
 
-/// Increments, or the forces that are dual to them, of all nodes of a leaf but
-/// the bases: rods, then nodes 1 to n. With a joint tip the last displacement is
-/// the same in every rod, and the last force is every rod's share.
+/// Increments, or the forces that are dual to them, of all nodes of a leaf but the bases:
+/// rods, then nodes 1 to n. With a joint tip the last displacement is the same in every rod,
+/// and the last force is each rod's share.
 pub type Field = Vec<Vec<Increment>>;
 
 /// The rotation part of an increment.
@@ -70,9 +70,8 @@ impl State {
         self.x[self.base(j) + self.segments]
     }
 
-    /// The largest displacement between this state and another, at the nodes that
-    /// their grids have in common: one is the other with all segments halved, some
-    /// times or none.
+    /// The largest displacement between this state and another at the nodes common to both
+    /// grids, of which one is a repeated halving of the other (or the same).
     pub fn shift_to(&self, other: &State) -> f64 {
         let n = self.segments.min(other.segments);
         let distance = |j: usize, i: usize| {
@@ -90,7 +89,7 @@ impl State {
         changes.fold(0.0, f64::max)
     }
 
-    /// Turns and moves node `k` by `step` times the increment.
+    /// Rotates and displaces node `k` by `step` times the increment.
     #[inline]
     pub fn advance(&mut self, k: usize, increment: &Increment, step: f64) {
         self.q[k] = (rotation::exp(step * turn(increment)) * self.q[k]).normalize();

@@ -1,7 +1,7 @@
-//! Where the unknowns of the nodes and the entries of the matrix stand in the sparse
+//! Numbering of the unknowns, and positions of the matrix entries, in the sparse
 //! factorisation.
 
-use super::chain::place;
+use super::chain::group_and_lane;
 use super::state::{Field, Increment};
 use super::system::System;
 use faer::sparse::SymbolicSparseColMat;
@@ -9,14 +9,14 @@ use faer::sparse::SymbolicSparseColMat;
 /// Blocks of the grid of rods and nodes no larger than this are not dissected.
 const DISSECTION_LEAF: usize = 4;
 
-/// Where the unknowns of the nodes stand.
+/// The numbering of the unknowns of the nodes.
 pub struct Unknowns {
     /// First unknown of node i (from 0) of rod j, at j n + i.
     first: Vec<usize>,
     /// First unknown of the joint tip.
     pub tip: Option<usize>,
     pub segments: usize,
-    /// How many there are.
+    /// Number of unknowns.
     pub count: usize,
 }
 
@@ -50,19 +50,19 @@ impl Unknowns {
         }
     }
 
-    /// All six of a node.
+    /// All six unknowns of a node.
     fn of(&self, j: usize, i: usize) -> [usize; 6] {
         std::array::from_fn(|c| self.at(j, i, c))
     }
 
-    /// Adds the forces on a node.
+    /// Adds the forces on a node to a vector of all unknowns.
     pub fn gather(&self, j: usize, i: usize, forces: &Increment, all: &mut [f64]) {
         for c in 0..6 {
             all[self.at(j, i, c)] += forces[c];
         }
     }
 
-    /// What stands at all nodes.
+    /// The values at all nodes, from a vector of all unknowns.
     pub fn field(&self, all: &[f64]) -> Field {
         let node = |j: usize, i: usize| std::array::from_fn(|c| all[self.at(j, i, c)]);
         let rods = self.first.chunks_exact(self.segments).enumerate();
@@ -93,8 +93,8 @@ fn dissect(rods: (usize, usize), nodes: (usize, usize), order: &mut Vec<(usize, 
     }
 }
 
-/// Tells where one triangle of K and its border has entries, some in several parts, and
-/// how large they are: the same places in the same order for all systems of a pattern.
+/// Calls `add` with row, column and value of the entries of one triangle of K and its border, some
+/// of them in several parts: the same positions in the same order for all systems of a pattern.
 pub fn entries(
     system: &System,
     unknowns: &Unknowns,
@@ -105,7 +105,7 @@ pub fn entries(
 ) {
     let n = system.segments;
     for j in 0..system.rods() {
-        let (group, lane) = place(j);
+        let (group, lane) = group_and_lane(j);
         let chain = system.groups[group].matrix.spatial();
         for i in 0..n {
             let (own, next) = chain.blocks(i, lane);
@@ -141,8 +141,8 @@ pub fn entries(
     }
 }
 
-/// The pattern of a lower triangle with entries in these columns and rows, some of them
-/// twice or more, and where in it each of them stands.
+/// The pattern of a lower triangle with entries in these columns and rows, possibly repeated,
+/// and the position of each of them in it.
 pub fn lower_triangle(
     size: usize,
     entries: &[[usize; 2]],

@@ -1,64 +1,62 @@
-//! When Newton's method has converged, and to what.
+//! Convergence tests of Newton's method.
 
 use crate::leaf::{DiscreteLeaf, State};
 
-/// An increment (radians, lengths) below this that does not shrink is rounding.
+/// An increment (radians, lengths) below this that does not decrease is due to rounding.
 pub const ROUNDING: f64 = 1e-9;
 
-/// Increments below this (radians, lengths) show how fast Newton's method converges.
+/// Increments below this (radians, lengths) are used to measure quadratic convergence.
 const ASYMPTOTIC: f64 = 0.05;
 
-/// Safety factor on what a first increment leaves. Of some 1500 first increments from
-/// predicted states one in a hundred left more than thrice what is so expected.
-const FIRST: f64 = 10.0;
+/// Safety factor on the error after a first increment. Of some 1500 first increments from
+/// predicted states one in a hundred left more than three times the error expected.
+const FIRST_SAFETY: f64 = 10.0;
 
-/// Increments that do not shrink at least to this part are said not to shrink.
-const SHRINKS: f64 = 0.3;
+/// An increment counts as decreasing if it is at most this part of the one before.
+const DECREASING: f64 = 0.3;
 
-/// What the conjugate gradients may have left at most, in units of the accuracy: far
-/// more than they leave of most increments.
+/// Bound on the error left by the conjugate gradients, in units of the accuracy: far more than
+/// they usually leave.
 const BOUND: f64 = 5.0;
 
-/// A leaf that moves by less than this in a step (radians, lengths), while its
-/// matrix without inertia is not positive definite, may be at a saddle: it is,
-/// if no force or moment above the second number (A/L^2, A/L) is unbalanced.
+/// A leaf whose matrix without inertia is not positive definite is at a saddle if a step moves
+/// it by less than this (radians, lengths) and no force or moment above the second number
+/// (A/L^2, A/L) is unbalanced.
 const SADDLE_STEP: f64 = 1e-7;
 const SADDLE_RESIDUAL: f64 = 1e-6;
 
-/// By how much a nearly rigid rod may be too long or too short by rounding.
-const CLOSED: f64 = 1e-11;
+/// Length error of a nearly rigid rod that is attributed to rounding.
+const LENGTH_ROUNDING: f64 = 1e-11;
 
-/// How fast Newton's method converges: the largest ratio of an increment to the square of
-/// the one before it. Grids of the same leaf have it in common.
+/// The constant of quadratic convergence of Newton's method: the largest ratio of an increment
+/// to the square of the one before it. It is shared by all grids of a leaf.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Contraction(f64);
 
 impl Contraction {
-    /// Takes into account an increment after one of size `previous`.
-    pub fn learn(&mut self, size: f64, previous: f64) {
+    /// Updates the constant with an increment after one of size `previous`.
+    pub fn update(&mut self, size: f64, previous: f64) {
         if previous < ASYMPTOTIC {
             self.0 = self.0.max(size / (previous * previous));
         }
     }
 
-    /// The error that is left after a first increment, if the largest force (A/L^2)
-    /// changed by so much with it; of which nothing is made where the leaf is not known to
-    /// be near rest.
-    pub fn after_first(&self, size: f64, force: f64) -> f64 {
+    /// The error after a first increment with which the largest change of a force (A/L^2) is
+    /// `force`; the force is ignored before any convergence has been measured.
+    pub fn error_after_first(&self, size: f64, force: f64) -> f64 {
         let force = if self.0 > 0.0 { force } else { 0.0 };
-        FIRST * self.0.max(1.0) * size * size.max(force)
+        FIRST_SAFETY * self.0.max(1.0) * size * size.max(force)
     }
 }
 
-/// The error that is left after an increment of this `size`, which follows one of
-/// size `previous`: of second order at best, and never less than what the conjugate
-/// gradients left. Their accuracies, of the previous increment and of this one, are in
-/// the energy norm, in which soft modes hardly count; as this increment is not less
-/// than what they left of the previous one, it bounds by how much more they leave
-/// (an infinite one: they are not used, as rods are not coupled).
-/// Of a first increment (`previous` infinite) it is given, by [`Contraction`].
-/// `None` if the error is more than `accuracy` or that bound more than [`BOUND`] times
-/// as much, unless the increment is below `rounding` and does not shrink.
+/// The remaining error after an increment of this `size`, which follows one of size
+/// `previous`: of second order at best, and never less than the error of the conjugate
+/// gradients. Their accuracies, of the previous increment and of this one, are in the energy
+/// norm, to which soft modes contribute little; as this increment contains their error in the
+/// previous one, it bounds the factor by which they may be worse (an infinite accuracy: not
+/// used, as rods are not coupled). After a first increment (`previous` infinite) the error is
+/// `first`, from [`Contraction`]. `None` if the error exceeds `accuracy` or that bound exceeds
+/// [`BOUND`] times as much, unless the increment is below `rounding` and does not decrease.
 pub fn converged(
     size: f64,
     previous: f64,
@@ -74,15 +72,15 @@ pub fn converged(
     let [before, now] = cg_tolerances;
     let remaining = quadratic.max(now * size);
     let bounded = rate * now * size <= BOUND * accuracy * before;
-    match size < rounding && rate > SHRINKS {
+    match size < rounding && rate > DECREASING {
         true => Some(size),
         false => (remaining <= accuracy && bounded).then_some(remaining),
     }
 }
 
-/// Whether nearly rigid segments of a leaf whose nodes move no more have their lengths.
-pub fn closes(leaf: &DiscreteLeaf, state: &State, accuracy: f64) -> bool {
-    leaf.closes(state, accuracy.max(CLOSED))
+/// Whether nearly rigid segments of a converged leaf have their lengths.
+pub fn satisfies_lengths(leaf: &DiscreteLeaf, state: &State, accuracy: f64) -> bool {
+    leaf.satisfies_lengths(state, accuracy.max(LENGTH_ROUNDING))
 }
 
 /// Whether a leaf whose matrix without inertia is not positive definite rests at

@@ -40,7 +40,7 @@ impl Run<'_, '_> {
         let before = self.index;
         let level = self.levels.pop().expect("the leaf has settled");
         let spare_system = self.spare_system.take();
-        let spare_system = spare_system.filter(|spare_system| spare_system.is_for(&level.leaf));
+        let spare_system = spare_system.filter(|spare_system| spare_system.fits(&level.leaf));
         let mut system = spare_system.unwrap_or_else(|| System::new(&level.leaf));
         self.index = self.count_negative(&level, &mut system);
         self.levels.push(level);

@@ -144,8 +144,8 @@ impl Search<'_> {
             let params = [0, 1].map(|i| sample.solution.params[i] + changes[i]);
             let state = manifold.advanced(&sample.solution.state, params, &increments, 1.0)?;
             solution = Solution { state, params };
-            contraction.learn(size, previous);
-            let first = contraction.after_first(size, 0.0);
+            contraction.update(size, previous);
+            let first = contraction.error_after_first(size, 0.0);
             let accuracy = (self.accuracy, ROUNDED);
             // With less accurate derivatives, increments cannot shrink faster than these are known.
             let slopes = SLOPES.max(size / previous);

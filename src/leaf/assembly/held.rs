@@ -1,13 +1,13 @@
-//! Components of increments that are held: by the plane of a mirrored half leaf,
-//! at a tip that is pinned or clamped.
+//! Components of increments that are constrained to zero: by the mirror plane of half a leaf,
+//! or at a pinned or clamped tip.
 
 use crate::lanes::Four;
-use crate::leaf::chain::{Chain, Increments, first, place};
+use crate::leaf::chain::{Chain, Increments, first, group_and_lane};
 use crate::leaf::discrete::DiscreteLeaf;
 use glam::DVec3;
 
-/// Components of a node's increment (turn, shift) that are zero for a node in
-/// the plane of the mirror: turns about x and z, the shift along y.
+/// Components of a node's increment (rotation, displacement) that are zero for a node in the
+/// mirror plane: rotations about x and z, the displacement along y.
 const ACROSS_THE_PLANE: [usize; 3] = [0, 2, 4];
 
 impl DiscreteLeaf {
@@ -42,15 +42,15 @@ impl DiscreteLeaf {
     pub(super) fn clear_held_components(&self, j: usize, rhs: &mut [Increments]) {
         for (i, rhs) in rhs.iter_mut().enumerate().skip(self.first_held()) {
             for &c in self.held_components(j, i + 1) {
-                rhs[c].0[place(j).1] = 0.0;
+                rhs[c].0[group_and_lane(j).1] = 0.0;
             }
         }
     }
 
-    /// Replaces the rows of the held components of rod `j` in the matrix by ones of their
-    /// own, which make them zero.
+    /// Replaces rows and columns of the held components of rod `j` in the matrix by those of
+    /// the identity, which makes them zero.
     pub(super) fn hold_components<const B: usize>(&self, j: usize, chain: &mut Chain<B>) {
-        let set = |four: &mut Four, value: f64| four.0[place(j).1] = value;
+        let set = |four: &mut Four, value: f64| four.0[group_and_lane(j).1] = value;
         for i in self.first_held()..self.segments() {
             for &held in self.held_components(j, i + 1) {
                 let Some(c) = held.checked_sub(first(B)) else {

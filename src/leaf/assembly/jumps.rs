@@ -1,21 +1,21 @@
-//! What jumps of the fields along the rods do to a leaf, to first order.
+//! The first-order response of a leaf to jumps of the fields along its rods.
 
-use crate::leaf::chain::place;
+use crate::leaf::chain::group_and_lane;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::State;
 use crate::leaf::system::System;
 use crate::rod::{Blocks, Segment};
 use glam::DVec3;
 
-/// Jumps of a rod's position, rotation, force and moment at a node: what they are before
-/// it, seen from the base, less what they are behind it.
+/// Jumps of a rod's position, rotation, force and moment at a node: the values before the
+/// node, seen from the base, minus those beyond it.
 pub type Jump = [DVec3; 4];
 
 /// A segment with its derivatives.
 pub struct Tangent {
     /// The segment.
     pub segment: Segment,
-    /// Derivatives of Pi with respect to its end and the turns of both nodes.
+    /// Derivatives of Pi with respect to its end position and the rotations of both nodes.
     pub first: (DVec3, DVec3, DVec3),
     /// Second derivatives, the force condensed out.
     pub second: Blocks,
@@ -33,9 +33,9 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Writes the right-hand side of the change, to first order, by which a leaf loses
-    /// its `jumps`, rod after rod in the middles of so many equal parts; `behind` are the
-    /// segments that begin there.
+    /// Assembles the right-hand side for the first-order change that removes the `jumps` of a
+    /// leaf, given rod after rod at the midpoints of equal parts; `behind` are the segments
+    /// that begin there.
     pub fn assemble_jumps(
         &self,
         behind: &[Vec<Tangent>],
@@ -48,11 +48,12 @@ impl DiscreteLeaf {
             let part = n / rod.len();
             for (k, (&[shift, turn, force, moment], tangent)) in rod.iter().zip(behind).enumerate()
             {
-                // The segment behind the node begins where the one before ends.
+                // After the change the segment beyond the node begins where the one before it
+                // ends.
                 let i = k * part + part / 2;
                 let (second, (_, held, _)) = (&tangent.second, tangent.first);
                 let pull = second.xa * turn - second.xx * shift;
-                // A moment along the lab axes does not turn with its node.
+                // A moment with fixed lab components does not rotate with its node.
                 let at_begin =
                     second.aa * turn - second.xa.transpose() * shift + 0.5 * turn.cross(held);
                 let at_end = second.ab.transpose() * turn - second.xb.transpose() * shift;
@@ -68,7 +69,7 @@ impl DiscreteLeaf {
         }
         system.set_rhs(&rhs);
         for j in 0..self.rods() {
-            self.clear_held_components(j, &mut system.groups[place(j).0].rhs);
+            self.clear_held_components(j, &mut system.groups[group_and_lane(j).0].rhs);
         }
     }
 }
@@ -87,8 +88,9 @@ mod tests {
     "#;
     const SEGMENTS: usize = 8;
 
-    /// How a straight rod at rest answers, at its nodes from the first, to a jump in its middle.
-    fn answer(jump: Jump) -> Vec<DVec3> {
+    /// The displacements of a straight rod at rest, from its first node on, due to a jump at
+    /// its midpoint.
+    fn displacements(jump: Jump) -> Vec<DVec3> {
         let rod = Scenario::from_toml(ROD).unwrap();
         let leaf = DiscreteLeaf::new(&Leaf::new(&rod), Grid::new(SEGMENTS, &[]));
         let x = leaf.grid.sigma().iter().map(|&sigma| sigma * DVec3::X);
@@ -102,8 +104,8 @@ mod tests {
         system.solution()[0].iter().map(shift).collect()
     }
 
-    fn assert_answer(jump: Jump, expected: impl Fn(f64) -> DVec3) {
-        for (i, found) in answer(jump).into_iter().enumerate() {
+    fn assert_moved(jump: Jump, expected: impl Fn(f64) -> DVec3) {
+        for (i, found) in displacements(jump).into_iter().enumerate() {
             let expected = expected((i + 1) as f64 / SEGMENTS as f64);
             let off = (found - expected).length();
             assert!(
@@ -114,30 +116,30 @@ mod tests {
         }
     }
 
-    /// What is behind moves with its part of the rod, as one piece.
+    /// The part beyond the jump moves as a rigid body.
     #[test]
     fn behind_a_jump_the_free_part_follows() {
         let zero = DVec3::ZERO;
         let jump = DVec3::new(0.1, -0.2, 0.3);
         let behind = |sigma: f64| if sigma > 0.5 { 1.0 } else { 0.0 };
-        assert_answer([jump, zero, zero, zero], |sigma| behind(sigma) * jump);
-        assert_answer([zero, jump, zero, zero], |sigma| {
+        assert_moved([jump, zero, zero, zero], |sigma| behind(sigma) * jump);
+        assert_moved([zero, jump, zero, zero], |sigma| {
             behind(sigma) * jump.cross((sigma - 0.5) * DVec3::X)
         });
     }
 
-    /// Forces and moments that are larger before the middle than behind it leave with a load
-    /// there that is as large.
+    /// Removing a jump of force or moment is equivalent to a load of that size at the
+    /// midpoint.
     #[test]
     fn before_a_jump_of_a_force_the_held_part_bends_back() {
         let zero = DVec3::ZERO;
         let axial = DVec3::new(0.7, 0.0, 0.0);
-        assert_answer([zero, zero, axial, zero], |sigma| {
+        assert_moved([zero, zero, axial, zero], |sigma| {
             -sigma.min(0.5) / 40.0 * axial
         });
         // A cantilever of half the length under a moment M at its end: M s^2/(2 A).
         let moment = DVec3::new(0.0, 0.0, 0.6);
-        assert_answer([zero, zero, zero, moment], |sigma| {
+        assert_moved([zero, zero, zero, moment], |sigma| {
             let s = sigma.min(0.5);
             -0.6 * (0.5 * s * s + (sigma - s) * s) * DVec3::Y
         });

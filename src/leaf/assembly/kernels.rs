@@ -19,7 +19,7 @@ pub struct Rods<'a> {
     x: [&'a [DVec3]; GROUP],
     q: [&'a [DQuat]; GROUP],
     n: [&'a [DVec3]; GROUP],
-    /// Positions of the rods before and behind, or their own where there is none.
+    /// Positions of the previous and the next rods, or their own if there is none.
     beside: [[&'a [DVec3]; GROUP]; 2],
     loads: GroupLoads,
 }
@@ -94,7 +94,7 @@ impl<'a> Rods<'a> {
     }
 }
 
-/// Right-hand side and energy, and the matrix if it is wanted.
+/// Right-hand side and energy, and the matrix if requested.
 pub struct Assemble<'a, const MATRIX: bool> {
     pub rods: Rods<'a>,
     pub group: &'a mut Group,

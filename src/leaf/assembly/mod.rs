@@ -1,4 +1,4 @@
-//! A discretised leaf's unbalanced forces, its matrix, its energy.
+//! Assembly of a discretised leaf: unbalanced forces, matrix, energy.
 
 mod held;
 mod jumps;
@@ -7,7 +7,7 @@ mod kernels;
 pub use self::jumps::{Jump, Tangent};
 
 use self::kernels::{Advance, Assemble, Rods, Stiffen};
-use super::chain::{GroupMatrix, place};
+use super::chain::{GroupMatrix, group_and_lane};
 use super::discrete::DiscreteLeaf;
 use super::state::State;
 use super::system::{Sums, System, each_group, rods_of};
@@ -22,7 +22,7 @@ impl DiscreteLeaf {
         self.assemble_with::<true>(state, system)
     }
 
-    /// The right-hand side alone; the matrix is left as it is.
+    /// Assembles the right-hand side alone; the matrix is unchanged.
     pub fn assemble_forces(&self, state: &State, system: &mut System) -> Sums {
         self.assemble_with::<false>(state, system)
     }
@@ -56,8 +56,8 @@ impl DiscreteLeaf {
         total
     }
 
-    /// Writes the right-hand side of the change, to first order, if the rods
-    /// had no compliance in the components `dropped` (ones and zeros).
+    /// Assembles the right-hand side for the first-order change if the rods had no compliance
+    /// in the components `dropped` (ones and zeros).
     pub fn assemble_stiffening(&self, state: &State, dropped: DVec3, system: &mut System) {
         let arch = system.arch;
         each_group(system.parallel, &mut system.groups, |g, group| {
@@ -70,12 +70,12 @@ impl DiscreteLeaf {
             run(arch, &mut kernel);
         });
         for j in 0..self.rods() {
-            self.clear_held_components(j, &mut system.groups[place(j).0].rhs);
+            self.clear_held_components(j, &mut system.groups[group_and_lane(j).0].rhs);
         }
     }
 
-    /// Takes `times` the stiffness that the elements may have too much, with respect to
-    /// turns of their nodes, from an assembled matrix.
+    /// Subtracts `times` the excess stiffness of the elements against rotations of their nodes
+    /// from an assembled matrix.
     pub fn subtract_excess_stiffness(&self, state: &State, system: &mut System, times: f64) {
         let n = self.segments();
         let excess = |j: usize, i: usize| {
@@ -149,7 +149,7 @@ impl DiscreteLeaf {
             }
             moment += self.tip_moment();
             let (unbalanced_force, unbalanced_moment) = self.unbalanced_residual(j, force, moment);
-            // What a tip that is held does not balance, its holder does.
+            // The holder balances the remaining force on a held tip.
             match &self.leaf.held {
                 Some(held) if held.clamps.is_some() => continue,
                 Some(_) => {}

@@ -1,11 +1,10 @@
-//! The matrices of a group of rods, one rod in each lane: every rod's chain of
-//! blocks, its factorisation, base to tip, and its triangular solves. Linear in
-//! the number of nodes.
+//! The matrices of a group of rods, one rod in each lane: every rod's block-tridiagonal matrix
+//! (chain), its factorisation, base to tip, and its triangular solves. Linear in the number of
+//! nodes.
 //!
-//! The B unknowns of a node are (theta, dx): 6, or the 3 that move it within
-//! the plane z = 0. The last node's dx is either the rod's own, or belongs to
-//! the joint tip: then it is left out of the elimination, and its Schur
-//! complement is what the rod adds to the tip's 3 x 3 matrix.
+//! The B unknowns of a node are (theta, dx): 6, or the 3 within the plane z = 0. The last
+//! node's dx is either the rod's own, or belongs to the joint tip: then it is not eliminated,
+//! and its Schur complement is the rod's contribution to the tip's 3 x 3 matrix.
 
 mod kernels;
 
@@ -35,11 +34,11 @@ pub type Block<const B: usize> = [[f64; B]; B];
 /// Unknowns of a node in space.
 pub const SPATIAL: usize = 6;
 
-/// Unknowns of a node that stays in the plane z = 0: its turn about z, its
-/// shifts along x and y.
+/// Unknowns of a node that stays in the plane z = 0: its rotation about z, its displacements
+/// along x and y.
 pub const PLANAR: usize = 3;
 
-/// How many of the B unknowns of a node are turns; they come first.
+/// Number of rotations among the B unknowns of a node; they come first.
 pub const fn turns(b: usize) -> usize {
     if b == PLANAR { 1 } else { 3 }
 }
@@ -59,12 +58,12 @@ const fn entries(b: usize) -> usize {
     triangle(b) + b * b
 }
 
-/// Where the entry (r, c) of a triangle stands, r <= c.
+/// Position of the entry (r, c) of a triangle, r <= c.
 const fn upper(b: usize, r: usize, c: usize) -> usize {
     r * (2 * b - r - 1) / 2 + c
 }
 
-/// Where the entry (r, c) of a block (i, i + 1) stands.
+/// Position of the entry (r, c) of a block (i, i + 1).
 const fn off(b: usize, r: usize, c: usize) -> usize {
     triangle(b) + r * b + c
 }
@@ -82,12 +81,12 @@ pub struct Chain<const B: usize> {
     /// diagonal and 1/d on it, then L^-1 times the block (i, i + 1).
     factor: Vec<Four>,
     segments: usize,
-    /// Eliminated unknowns of the last node: with a joint tip its turns alone.
+    /// Number of eliminated unknowns of the last node: with a joint tip its rotations alone.
     last: usize,
 }
 
-/// What the masses add to a matrix: `shift` times those of a unit weight, rotary
-/// and translational, times the nodes' weights.
+/// The contribution of the masses to a matrix: `shift` times the masses per weight, rotary and
+/// translational, times the nodes' weights.
 pub struct Masses<'a> {
     pub shift: f64,
     pub per_weight: [Four; 2],
@@ -95,7 +94,7 @@ pub struct Masses<'a> {
 }
 
 impl<const B: usize> Chain<B> {
-    /// Of rods with so many segments; identities.
+    /// Identity matrices, for rods with so many segments.
     pub fn new(segments: usize, joined: bool) -> Self {
         let zeros = vec![Four::default(); segments * entries(B)];
         let mut chain = Chain {
@@ -167,8 +166,8 @@ impl<const B: usize> Chain<B> {
         (own, next)
     }
 
-    /// Factorises the matrices plus `masses`. False if a pivot is not positive, or
-    /// if one is zero where `any_sign` lets negative ones pass.
+    /// Factorises the matrices plus `masses`. False if a pivot is not positive or, with
+    /// `any_sign`, if one is zero.
     pub fn factorize(&mut self, arch: Arch, masses: &Masses, any_sign: bool) -> bool {
         let mut kernel = Factorize {
             chain: self,
@@ -180,10 +179,11 @@ impl<const B: usize> Chain<B> {
         kernel.definite
     }
 
-    /// What the rod in a lane contributes to the joint tip.
+    /// The contribution of the rod in a lane to the matrix of the joint tip.
     pub fn tip(&self, lane: usize) -> Tip {
         let node = &self.factor[(self.segments - 1) * entries(B)..];
-        // A tip that stays in the plane is held across it by a one.
+        // For a tip that stays in the plane, a one on the diagonal fixes its displacement
+        // across it.
         let mut tip = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
         let turns = turns(B);
         for r in 0..B - turns {
@@ -194,15 +194,15 @@ impl<const B: usize> Chain<B> {
         tip
     }
 
-    /// Forward substitution L y = b. With a joint tip the last dx slots of y then
-    /// hold what the rods add to the tip's right-hand side.
+    /// Forward substitution L y = b. With a joint tip the last dx slots of y then hold the
+    /// rods' contributions to the tip's right-hand side.
     pub fn forward(&self, arch: Arch, b: &[Increments], y: &mut [Increments]) {
         let chain = self;
         run(arch, &mut Forward { chain, b, y });
     }
 
-    /// Backward substitution in place, from the result of [`Chain::forward`]; with
-    /// a joint tip its displacement must stand in the last dx slots. Returns b . y.
+    /// Backward substitution in group_and_lane, from the result of [`Chain::forward`]; with a joint tip
+    /// the last dx slots must hold its displacement. Returns b . y.
     pub fn backward(&self, arch: Arch, b: &[Increments], y: &mut [Increments]) -> f64 {
         let mut kernel = Backward {
             chain: self,
@@ -240,7 +240,7 @@ impl GroupMatrix {
         }
     }
 
-    /// The same, to change it.
+    /// The same, mutably.
     pub fn spatial_mut(&mut self) -> &mut Chain<SPATIAL> {
         match self {
             GroupMatrix::Spatial(chain) => chain,
@@ -315,6 +315,6 @@ impl TipFactor {
 }
 
 /// Group and lane of rod `j`.
-pub fn place(j: usize) -> (usize, usize) {
+pub fn group_and_lane(j: usize) -> (usize, usize) {
     (j / GROUP, j % GROUP)
 }

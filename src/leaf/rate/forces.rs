@@ -1,33 +1,32 @@
-//! What a change of a leaf does to it, and how it answers.
+//! The forces by which a parameter change unbalances a leaf, and the linear response to them.
 
 use crate::leaf::state::{Field, Increment};
 use glam::DVec3;
 
-/// What a change of the leaf does in a state that is held. Rods that it does nothing to
-/// have no entries.
+/// The effect of a parameter change in a fixed state. Unaffected rods have no entries.
 #[derive(Clone, Debug)]
 pub struct Forces {
-    /// To the unbalanced forces on the nodes.
+    /// On the unbalanced forces at the nodes.
     pub nodes: Field,
-    /// To the gaps of the segments.
+    /// On the gaps of the segments (residuals of their constitutive laws).
     pub gaps: Vec<Vec<DVec3>>,
-    /// To the energy.
+    /// On the energy.
     pub energy: f64,
-    /// What it moves the tips by where they are held; none where it does not.
+    /// Increments of held tips; empty if it does not move them.
     pub tips: Vec<Increment>,
 }
 
-/// How a leaf answers forces.
+/// The linear response of a leaf to forces.
 #[derive(Clone, Debug)]
 pub struct Response {
     /// Increments of the nodes.
     pub nodes: Field,
-    /// Of the spatial forces of the segments, rod after rod.
+    /// Changes of the spatial forces of the segments, rod after rod.
     pub carried: Vec<DVec3>,
 }
 
 impl Forces {
-    /// None on any of so many rods.
+    /// Zero, for so many rods.
     pub fn none(rods: usize) -> Forces {
         Forces {
             nodes: vec![Vec::new(); rods],
@@ -37,21 +36,21 @@ impl Forces {
         }
     }
 
-    /// Those on the nodes of rod `j`, which has so many.
+    /// Those on the nodes of rod `j`, which has `segments` of them.
     pub fn on_nodes(&mut self, j: usize, segments: usize) -> &mut [Increment] {
         let nodes = &mut self.nodes[j];
         nodes.resize(segments, [0.0; 6]);
         nodes
     }
 
-    /// Those on the gaps of rod `j`, which has so many.
+    /// Those on the gaps of rod `j`, which has `segments` of them.
     pub fn on_gaps(&mut self, j: usize, segments: usize) -> &mut [DVec3] {
         let gaps = &mut self.gaps[j];
         gaps.resize(segments, DVec3::ZERO);
         gaps
     }
 
-    /// Adds others, so many times.
+    /// Adds `times` other forces.
     pub fn add(&mut self, times: f64, other: &Forces) {
         for (j, (nodes, gaps)) in other.nodes.iter().zip(&other.gaps).enumerate() {
             let count = nodes.len().max(self.nodes[j].len());
@@ -66,8 +65,8 @@ impl Forces {
         add_nodes(&mut self.tips, times, &other.tips);
     }
 
-    /// On all nodes and all gaps of rods of so many segments.
-    pub fn on_all(&self, segments: usize) -> (Field, Vec<DVec3>) {
+    /// Dense form: on all nodes and all gaps of rods of `segments` segments.
+    pub fn dense(&self, segments: usize) -> (Field, Vec<DVec3>) {
         let mut gaps = vec![DVec3::ZERO; self.gaps.len() * segments];
         for (all, own) in gaps.chunks_mut(segments.max(1)).zip(&self.gaps) {
             all[..own.len()].copy_from_slice(own);
@@ -81,7 +80,7 @@ impl Forces {
 }
 
 impl Response {
-    /// None of so many rods of so many segments.
+    /// Zero, for so many rods of so many segments.
     pub fn none(rods: usize, segments: usize) -> Response {
         Response {
             nodes: vec![vec![[0.0; 6]; segments]; rods],
@@ -89,7 +88,7 @@ impl Response {
         }
     }
 
-    /// Adds another, so many times.
+    /// Adds `times` another response.
     pub fn add(&mut self, times: f64, other: &Response) {
         for (sums, more) in self.nodes.iter_mut().zip(&other.nodes) {
             add_nodes(sums, times, more);

@@ -1,4 +1,4 @@
-//! Tips that are held: what moving their holder does, and how the force on it changes.
+//! Held tips: the effect of moving their holder, and the change of the force on it.
 
 use super::{Forces, LeafRate, Response, add};
 use crate::leaf::dimensionless::Leaf;
@@ -8,15 +8,15 @@ use crate::rod::{Section, Segment};
 use crate::scenario::{Clamp, Scenario};
 use glam::{DQuat, DVec3};
 
-/// The change of where tips are held, in the leaf's units.
+/// The rate of change of the holder's position and orientation, in the leaf's units.
 pub(super) struct HeldRate {
     shift: DVec3,
-    /// Turns of the clamps, one a rod; none of a pinned tip.
+    /// Rotations of the clamps, one per rod; empty for a pinned tip.
     turns: Vec<DVec3>,
 }
 
 impl HeldRate {
-    /// `None` if tips are free, or do not move.
+    /// `None` if the tips are free, or their holder does not move.
     pub fn new(leaf: &Leaf, terms: &[(f64, Scenario)]) -> Option<Self> {
         let held = leaf.held.as_ref()?;
         let first = terms[0].1.held_tip.as_ref()?;
@@ -39,7 +39,7 @@ impl HeldRate {
                 |clamps| clamps[j],
             )
         };
-        // By angle and twist about e3 and the d1 that results, as the clamp is made.
+        // The angle about e3, then the twist about the resulting d1, as in the clamp's definition.
         let turn = |(j, own): (usize, &Clamp)| {
             let d1 = DQuat::from_rotation_z(own.angle) * DVec3::X;
             of(&|s| clamp(s, j).angle) * DVec3::Z + of(&|s| clamp(s, j).twist) * d1
@@ -52,8 +52,8 @@ impl HeldRate {
 }
 
 impl DiscreteLeaf {
-    /// Holders that move, and turn.
-    pub(super) fn move_tips(
+    /// Adds the effect of holders that move and rotate.
+    pub(super) fn add_tip_motion(
         &self,
         state: &State,
         segments: &[Segment],
@@ -66,17 +66,17 @@ impl DiscreteLeaf {
             let turned = rate.turns.get(j).copied().unwrap_or(DVec3::ZERO);
             let section = self.section(j, n - 1);
             let segment = &segments[j * n + n - 1];
-            let bare = Section {
+            let uncondensed = Section {
                 condensing: DVec3::ZERO,
                 ..*section
             };
-            let k = segment.hessian(&bare);
+            let k = segment.hessian(&uncondensed);
             let nodes = forces.on_nodes(j, n);
             if n > 1 {
                 let moment = k.ab * turned + k.xa.transpose() * moved;
                 add(&mut nodes[n - 2], -moment, k.xx * moved + k.xb * turned);
             }
-            // A tip that is only pinned turns freely.
+            // A tip that is only pinned rotates freely.
             let moment = k.bb * turned + k.xb.transpose() * moved;
             add(&mut nodes[n - 1], -moment, DVec3::ZERO);
             forces.on_gaps(j, n)[n - 1] +=
@@ -89,9 +89,8 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The change of the force that the holder of the tip feels, as
-    /// [`DiscreteLeaf::reaction`]: that of the loads on the tip, and of the forces
-    /// that the last segments carry.
+    /// The change of the force on the holder of the tip, as in [`DiscreteLeaf::reaction`]: of
+    /// the loads on the tip, and of the forces in the last segments.
     pub fn reaction_rate(&self, rate: &LeafRate, response: &Response) -> DVec3 {
         let n = self.segments();
         let weight = self.load_factor * self.grid.weight(n);

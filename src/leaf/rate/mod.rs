@@ -1,6 +1,6 @@
-//! The change of a leaf with a number of its scenario: of its forces in a given
-//! state, and of its energy. Exact but for the combination of scenarios by which
-//! the number's effect on the scenario itself is given.
+//! The derivative of a leaf with respect to a number of its scenario: of its forces in a given
+//! state, and of its energy. Exact except for the finite differences of scenarios that define
+//! the number's effect on the scenario itself.
 
 mod forces;
 mod held;
@@ -14,7 +14,7 @@ use crate::rod::{Section, SectionRate, Segment};
 use crate::scenario::{Profile, Scenario};
 use glam::DVec3;
 
-/// The change of a leaf: sums over scenarios that differ in the number, times
+/// The derivative of a leaf: weighted sums over scenarios that differ in the number, with
 /// weights that add up to zero.
 pub struct LeafRate<'s> {
     rods: Vec<RodRate<'s>>,
@@ -25,11 +25,11 @@ pub struct LeafRate<'s> {
     held: Option<HeldRate>,
 }
 
-/// A gap that is left of one this many times larger is none: of a segment whose force
-/// is condensed out with its own stiffness.
+/// A remaining gap below this part of the initial one counts as zero: the segment's force is
+/// condensed out with its own stiffness.
 const CLOSED: f64 = 1e-12;
 
-/// The change of a rod, in the leaf's units.
+/// The derivative of a rod, in the leaf's units.
 struct RodRate<'s> {
     length: f64,
     angle: f64,
@@ -39,7 +39,7 @@ struct RodRate<'s> {
     rest_stretch: Slope<'s>,
 }
 
-/// The change of a profile.
+/// The derivative of a profile.
 enum Slope<'s> {
     None,
     Constant(f64),
@@ -77,11 +77,11 @@ impl<'s> Slope<'s> {
 }
 
 impl<'s> LeafRate<'s> {
-    /// Of a leaf, from scenarios like its own with weights.
+    /// Of a leaf, from neighbouring scenarios with their weights.
     pub fn new(leaf: &Leaf, terms: &'s [(f64, Scenario)]) -> Self {
         let scale = leaf.scale;
         let sum = |value: &dyn Fn(&Scenario) -> f64| -> f64 {
-            // Against the first: where nothing changes the sum is exactly zero.
+            // Relative to the first: without changes the sum is exactly zero.
             let first = value(&terms[0].1);
             let change = |(weight, s): &(f64, Scenario)| weight * (value(s) - first);
             terms.iter().map(change).sum()
@@ -138,8 +138,8 @@ impl LeafRate<'_> {
 }
 
 impl RodRate<'_> {
-    /// Whether no section of the rod changes.
-    fn keeps_sections(&self) -> bool {
+    /// Whether all sections of the rod are unchanged.
+    fn sections_unchanged(&self) -> bool {
         let triples = [
             &self.couple_stiffness,
             &self.force_stiffness,
@@ -149,7 +149,7 @@ impl RodRate<'_> {
         self.length == 0.0 && slopes.all(Slope::is_none)
     }
 
-    /// The change of a section at `sigma` that is the fraction `width` of the rod.
+    /// The derivative of a section at `sigma` whose segment is the fraction `width` of the rod.
     fn section(&self, section: &Section, sigma: f64, width: f64) -> SectionRate {
         let at = |slopes: &[Slope; 3]| DVec3::from_array(slopes.each_ref().map(|s| s.at(sigma)));
         let compliance = section.compliance;
@@ -164,7 +164,7 @@ impl RodRate<'_> {
 }
 
 impl DiscreteLeaf {
-    /// All segments in a state, rod after rod: what its changes have in common.
+    /// All segments in a state, rod after rod, for use by all derivatives in that state.
     pub fn all_segments(&self, state: &State) -> Vec<Segment> {
         let n = self.segments();
         let each = self.each(0..n);
@@ -172,31 +172,37 @@ impl DiscreteLeaf {
             .collect()
     }
 
-    /// What a change of the leaf (all of its rods, in space) does in a state with these
-    /// segments.
+    /// The effect of a parameter change of the leaf (all of its rods, in space) in a state
+    /// with these segments.
     pub fn rate(&self, state: &State, segments: &[Segment], rate: &LeafRate) -> Forces {
         let mut forces = Forces::none(self.rods());
         let of_all = rate.gravity != DVec3::ZERO || rate.tip_force != DVec3::ZERO;
         let of_all = of_all || rate.tip_moment != DVec3::ZERO;
         for (j, rod) in rate.rods.iter().enumerate() {
-            if !rod.keeps_sections() {
-                self.change_sections(segments, j, rod, &mut forces);
+            if !rod.sections_unchanged() {
+                self.add_section_changes(segments, j, rod, &mut forces);
             }
             let coupling = rate.coupling.get(j).is_some_and(|gap| *gap != DVec3::ZERO);
             if of_all || coupling || rod.length != 0.0 {
-                self.change_loads(state, j, rate, &mut forces);
+                self.add_load_changes(state, j, rate, &mut forces);
             }
             if rod.angle != 0.0 {
-                self.turn_base(segments, j, rod.angle, &mut forces);
+                self.add_base_rotation(segments, j, rod.angle, &mut forces);
             }
         }
         if let Some(held) = &rate.held {
-            self.move_tips(state, segments, held, &mut forces);
+            self.add_tip_motion(state, segments, held, &mut forces);
         }
         forces
     }
 
-    fn change_sections(&self, segments: &[Segment], j: usize, rod: &RodRate, forces: &mut Forces) {
+    fn add_section_changes(
+        &self,
+        segments: &[Segment],
+        j: usize,
+        rod: &RodRate,
+        forces: &mut Forces,
+    ) {
         let n = self.segments();
         forces.on_nodes(j, n);
         forces.on_gaps(j, n);
@@ -217,7 +223,7 @@ impl DiscreteLeaf {
     }
 
     /// Loads and coupling of rod `j`, as in [`DiscreteLeaf::load`].
-    fn change_loads(&self, state: &State, j: usize, rate: &LeafRate, forces: &mut Forces) {
+    fn add_load_changes(&self, state: &State, j: usize, rate: &LeafRate, forces: &mut Forces) {
         let n = self.segments();
         let rod = &rate.rods[j];
         let gravity = self.loads.gravity * rod.length + rate.gravity * self.leaf.length(j);
@@ -249,16 +255,16 @@ impl DiscreteLeaf {
         }
     }
 
-    /// A base turned about the normal of the fan.
-    fn turn_base(&self, segments: &[Segment], j: usize, angle: f64, forces: &mut Forces) {
+    /// Adds the effect of rotating a base about the normal of the fan.
+    fn add_base_rotation(&self, segments: &[Segment], j: usize, angle: f64, forces: &mut Forces) {
         let n = self.segments();
         let (section, turn) = (self.section(j, 0), angle * DVec3::Z);
         let segment = &segments[j * n];
-        let bare = Section {
+        let uncondensed = Section {
             condensing: DVec3::ZERO,
             ..*section
         };
-        let k = segment.hessian(&bare);
+        let k = segment.hessian(&uncondensed);
         add(
             &mut forces.on_nodes(j, n)[0],
             -(k.ab.transpose() * turn),
@@ -287,8 +293,8 @@ impl DiscreteLeaf {
         work
     }
 
-    /// Adds to forces on the nodes what changes of the gaps come to when the forces
-    /// of the segments are condensed out.
+    /// Adds to forces on the nodes the contribution of changes of the gaps when the forces of
+    /// the segments are condensed out.
     pub fn condense_gaps(&self, segments: &[Segment], gaps: &[DVec3], nodes: &mut Field) {
         let n = self.segments();
         for (j, i) in self.each(0..n) {
@@ -303,7 +309,7 @@ impl DiscreteLeaf {
             }
             add(&mut nodes[j][i], -g_b, -g_x);
         }
-        // A tip that is held does not answer.
+        // Held components of a tip have no equations.
         let [turns, shifts] = self.moves(n);
         for node in nodes.iter_mut().filter_map(|rod| rod.last_mut()) {
             let held = [turns, turns, turns, shifts, shifts, shifts].map(|moves| !moves);
@@ -315,9 +321,9 @@ impl DiscreteLeaf {
         }
     }
 
-    /// The changes of the forces of all segments that go with increments of the
-    /// nodes and changes of the gaps, and the gaps that are left: those by which the
-    /// stiffness that condenses the forces out falls short of the segments' own.
+    /// The changes of the forces of all segments for increments of the nodes and changes of
+    /// the gaps, and the remaining gaps, which are nonzero where the condensing stiffness is
+    /// less than the segment's own.
     pub fn carried(
         &self,
         segments: &[Segment],

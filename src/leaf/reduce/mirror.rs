@@ -1,10 +1,10 @@
-//! Leaves that are their own mirror image in the plane y = 0.
+//! Leaves with mirror symmetry in the plane y = 0.
 //!
-//! Such a leaf is found by half of its rods: rod j and rod N - 1 - j are each
-//! other's image. The midrib, if N is odd, lies in the plane: it counts half
-//! (stiffness, mass, loads), and its nodes neither leave the plane nor turn but
-//! about the plane's normal. A joint tip stays in the plane, too. Of the gap
-//! across the plane, if N is even, only the coupling along y is ever stretched.
+//! Such a leaf is determined by half of its rods: rod j and rod N - 1 - j are each other's
+//! image. The midrib, if N is odd, lies in the plane: it counts half (stiffness, mass, loads),
+//! and its nodes stay in the plane and rotate about its normal only. A joint tip stays in the
+//! plane, too. Of the gap across the plane, if N is even, only the coupling along y is ever
+//! stretched.
 
 use crate::leaf::dimensionless::Leaf;
 use crate::leaf::flow::RodFields;
@@ -43,7 +43,7 @@ fn are_images(a: &Rod, b: &Rod) -> bool {
         && opposite(&a.rest_curvature[2], &b.rest_curvature[2])
 }
 
-/// The state of the half of a leaf in the state `whole`.
+/// The state of half of a leaf that is in the state `whole`.
 pub fn half_of(half: &Leaf, whole: &State) -> State {
     if !half.mirrored {
         return whole.clone();
@@ -59,7 +59,7 @@ pub fn half_of(half: &Leaf, whole: &State) -> State {
     state
 }
 
-/// The state of the whole leaf of which a half is in the state `state`.
+/// The state of the whole leaf whose half is in the state `state`.
 pub fn whole_of(half: &Leaf, state: &State) -> State {
     if !half.mirrored {
         return state.clone();
@@ -80,7 +80,7 @@ pub fn whole_of(half: &Leaf, state: &State) -> State {
     whole
 }
 
-/// The rods of the whole leaf of which those of a half are `rods`.
+/// The rods of the whole leaf whose half has the fields `rods`.
 pub fn whole_fields(half: &Leaf, rods: Vec<Vec<RodFields>>) -> Vec<Vec<RodFields>> {
     if !half.mirrored {
         return rods;
@@ -93,7 +93,7 @@ pub fn whole_fields(half: &Leaf, rods: Vec<Vec<RodFields>>) -> Vec<Vec<RodFields
             x: reflect(node.x, image),
             q: turned(node.q, image),
             n: reflect(node.n / share, image),
-            // A moment is the axis of a rotation.
+            // A moment is an axial vector.
             m: if image { -1.0 } else { 1.0 } * reflect(node.m / share, image),
         };
         rods[own].iter().map(node).collect()
@@ -101,7 +101,7 @@ pub fn whole_fields(half: &Leaf, rods: Vec<Vec<RodFields>>) -> Vec<Vec<RodFields
     (0..count).map(rod).collect()
 }
 
-/// An axis of rotation changes sign in the mirror, but for its normal.
+/// A rotation axis changes sign in the mirror, except its normal component.
 fn turned(q: DQuat, image: bool) -> DQuat {
     match image {
         true => DQuat::from_xyzw(-q.x, q.y, -q.z, q.w),

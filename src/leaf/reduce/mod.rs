@@ -1,5 +1,5 @@
-//! Reduction by symmetry: half of a leaf that is its own mirror image, and a
-//! leaf in its plane. The equations of both are assembled in `assembly`.
+//! Reduction by symmetry: half of a mirror-symmetric leaf, and a planar leaf. The equations of
+//! both are assembled in `assembly`.
 
 mod mirror;
 mod planar;
@@ -9,9 +9,8 @@ pub use mirror::{half_of, whole_fields, whole_of};
 use super::dimensionless::Leaf;
 
 impl Leaf {
-    /// The leaf with no more unknowns than its symmetries leave it, if it has
-    /// any: half of it if it is its own mirror image, that in its plane if
-    /// nothing acts out of it.
+    /// The leaf reduced by its symmetries, if it has any: half of it if it is
+    /// mirror-symmetric, restricted to its plane if nothing acts out of it.
     pub fn reduced(&self) -> Option<Leaf> {
         if self.held.is_some() {
             return None;

@@ -1,9 +1,9 @@
-//! Leaves that nothing pulls or bends out of their plane z = 0.
+//! Leaves without loads or rest curvatures out of their plane z = 0.
 //!
-//! Such a leaf has an equilibrium in the plane, for which a node has three
-//! unknowns: its turn about z and its shifts along x and y. Whether it stays
-//! there is for the full matrix to say. Coupling along z, torsion, and bending
-//! about d2 do nothing as long as it does.
+//! Such a leaf has an equilibrium in the plane, for which a node has three unknowns: its
+//! rotation about z and its displacements along x and y. Whether it is stable against leaving
+//! the plane is decided with the full matrix. Coupling along z, torsion, and bending about d2
+//! have no effect within the plane.
 
 use crate::scenario::Scenario;
 

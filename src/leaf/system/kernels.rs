@@ -5,17 +5,17 @@ use crate::lanes::{Four, GROUP, Kernel, Lanes};
 use crate::leaf::chain::Increments;
 use pulp::Simd;
 
-/// What E p needs.
+/// The operands of E p.
 #[derive(Clone, Copy)]
 pub struct Coupled<'a> {
-    /// The p of all groups, and which is this one.
+    /// The p of all groups, and the index of this group.
     pub p: &'a [Vec<Increments>],
     pub group: usize,
     pub weights: &'a [f64],
 }
 
 impl Coupled<'_> {
-    /// The part of E p at node `i` that belongs to component `c` of the shift.
+    /// Component `c` of the displacement part of E p at node `i`.
     #[inline(always)]
     fn pull<S: Simd>(
         self,

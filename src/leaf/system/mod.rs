@@ -1,16 +1,16 @@
 //! Newton's equations of the leaf, solved rod by rod.
 //!
-//! K = B + E, where B holds every rod's own chain (its neighbours standing
-//! still) meeting in the joint tip, and E the coupling between neighbours. B is
-//! factorised in linear time, and conjugate gradients preconditioned by it
-//! take care of E, which is weak beside a rod's own stiffness ([`solve`]).
+//! K = B + E, where B consists of every rod's own block-tridiagonal matrix (with its
+//! neighbours fixed) and the joint tip, and E is the coupling between neighbours. B is
+//! factorised in linear time and preconditions conjugate gradients for K; E is weak compared
+//! with a rod's own stiffness ([`solve`]).
 
 mod kernels;
 mod solve;
 
 pub use solve::Solved;
 
-use super::chain::{GroupMatrix, Increments, Masses, TipFactor, of_lane, place, set_lane};
+use super::chain::{GroupMatrix, Increments, Masses, TipFactor, group_and_lane, of_lane, set_lane};
 use super::discrete::DiscreteLeaf;
 use super::state::{Field, Increment, shift, turn};
 use crate::lanes::{Four, GROUP, arch};
@@ -19,11 +19,11 @@ use pulp::Arch;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// From this many nodes on, groups of rods are shared out among threads.
-/// Measured: below it waking the threads costs more than they bring.
+/// From this many nodes on, groups of rods are distributed over threads. Measured: below it
+/// waking the threads costs more than it saves.
 const PARALLEL_NODES: usize = 8192;
 
-/// What an assembly sums up over all rods.
+/// Sums, and a maximum, over all rods from an assembly.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sums {
     /// Potential energy: of the strains, the coupling and the loads.
@@ -32,8 +32,8 @@ pub struct Sums {
     pub turn: f64,
 }
 
-/// All that belongs to a group of rods, one rod in each lane. In a lane without a
-/// rod all increments and forces are zero.
+/// The data of a group of rods, one rod in each lane. In a lane without a rod all increments
+/// and forces are zero.
 #[derive(Clone, Debug)]
 pub(crate) struct Group {
     pub matrix: GroupMatrix,
@@ -47,7 +47,7 @@ pub(crate) struct Group {
     pub sums: Sums,
     /// Nodal masses per weight: rotary, translational.
     masses: [Four; 2],
-    /// E: coupling per weight with the rods before, with those behind.
+    /// E: coupling per weight with the previous rods, with the next.
     coupling: [[Four; 3]; 2],
     residual: Vec<Increments>,
     z: Vec<Increments>,
@@ -55,7 +55,7 @@ pub(crate) struct Group {
     partial: f64,
 }
 
-/// The linear system of a leaf, with room for all of its solution.
+/// The linear system of a leaf, with workspace for its solution.
 #[derive(Clone, Debug)]
 pub struct System {
     pub(crate) groups: Vec<Group>,
@@ -67,11 +67,11 @@ pub struct System {
     pub(super) segments: usize,
     /// Weights of the nodes 1 to n in the masses.
     weights: Vec<f64>,
-    /// Those in E: none at a joint tip.
+    /// Weights of the nodes in E: zero at a joint tip.
     coupling_weights: Vec<f64>,
     pub(super) arch: Arch,
     tip: Option<TipFactor>,
-    /// Coupling of every gap per weight, none where the leaf has none.
+    /// Coupling of every gap per weight; empty if the leaf has no coupling.
     gaps: Vec<DVec3>,
     /// Spatial dead moment on the tip of a single rod, as of the last assembly.
     pub(super) moment: DVec3,
@@ -100,7 +100,7 @@ pub(super) fn rods_of(group: usize, rods: usize) -> Range<usize> {
 }
 
 impl System {
-    /// Room for the equations of `leaf`.
+    /// Allocates the equations of `leaf`.
     pub fn new(leaf: &DiscreteLeaf) -> Self {
         let (rods, n) = (leaf.rods(), leaf.segments());
         let joined = leaf.tips_move_together();
@@ -127,8 +127,8 @@ impl System {
         }
     }
 
-    /// Takes the coupling between rods, if it has any, from a leaf of which all else but
-    /// what is assembled is as it was for [`System::new`].
+    /// Updates the coupling between rods, if there is any, from a leaf that otherwise differs
+    /// from that of [`System::new`] only in what is assembled.
     pub fn set_coupling(&mut self, leaf: &DiscreteLeaf) {
         if self.coupled {
             self.gaps.clear();
@@ -139,8 +139,8 @@ impl System {
         }
     }
 
-    /// Whether it is for as many rods and segments as `leaf` has.
-    pub fn is_for(&self, leaf: &DiscreteLeaf) -> bool {
+    /// Whether it has the numbers of rods and segments of `leaf`.
+    pub fn fits(&self, leaf: &DiscreteLeaf) -> bool {
         (self.rods, self.segments) == (leaf.rods(), leaf.segments())
     }
 
@@ -154,7 +154,7 @@ impl System {
         self.segments
     }
 
-    /// Whether neighbours are coupled, so that conjugate gradients solve it.
+    /// Whether neighbours are coupled, so that conjugate gradients are needed.
     pub fn coupled(&self) -> bool {
         self.coupled
     }
@@ -171,16 +171,16 @@ impl System {
 
     /// Nodal mass of node `i` (from 0) of rod `j`: rotary, translational.
     pub(super) fn mass(&self, j: usize, i: usize) -> [f64; 2] {
-        let (group, lane) = place(j);
+        let (group, lane) = group_and_lane(j);
         let masses = &self.groups[group].masses;
         masses.map(|mass| mass.0[lane] * self.weights[i])
     }
 
-    /// Adds to the equations of node `i` (from 1) of rod `j`: to the matrix a
-    /// rotary and a translational part on its diagonal, to the right-hand side
-    /// a moment and a force. What inertia adds in a time step.
+    /// Adds to the equations of node `i` (from 1) of rod `j`: to the matrix a rotary and a
+    /// translational part on its diagonal, to the right-hand side a moment and a force. Used
+    /// for the inertia in a time step.
     pub fn add(&mut self, j: usize, i: usize, matrix: (DMat3, f64), rhs: (DVec3, DVec3)) {
-        let (group, lane) = place(j);
+        let (group, lane) = group_and_lane(j);
         let group = &mut self.groups[group];
         let chain = group.matrix.spatial_mut();
         let increment = &mut group.rhs[i - 1];
@@ -194,16 +194,16 @@ impl System {
         }
     }
 
-    /// The right-hand side of node `i` (from 1) of rod `j`: moment and force
-    /// on it, or on the joint tip the rod's share of it.
+    /// The right-hand side of node `i` (from 1) of rod `j`: moment and force on it; at a joint
+    /// tip the rod's share.
     pub fn unbalanced(&self, j: usize, i: usize) -> (DVec3, DVec3) {
-        let (group, lane) = place(j);
+        let (group, lane) = group_and_lane(j);
         let rhs = of_lane(&self.groups[group].rhs[i - 1], lane);
         (turn(&rhs), shift(&rhs))
     }
 
-    /// Makes the last solution the right-hand side, times the mass matrix and
-    /// scaled to a largest component of one: a step of inverse iteration.
+    /// Sets the right-hand side to the mass matrix times the last solution, scaled to a
+    /// largest component of one: a step of inverse iteration.
     pub fn iterate_mode(&mut self) {
         let (turn, shift) = self.largest();
         let scale = 1.0 / turn.max(shift);
@@ -214,10 +214,10 @@ impl System {
         self.set_rhs(&rhs);
     }
 
-    /// A right-hand side without any symmetry, the same on all grids, to begin
-    /// inverse iteration with.
+    /// Sets a right-hand side without symmetry, the same on all grids, as the start of inverse
+    /// iteration.
     pub fn seed_mode(&mut self) {
-        // Multiples of the golden ratio spread evenly: no symmetry, no chance.
+        // Multiples of the golden ratio are equidistributed: no symmetry, and deterministic.
         let golden = |k: usize| (k as f64 * 0.618_033_988_749_895).fract() - 0.5;
         let segments = self.segments as f64;
         let node = |j: usize, i: usize| {
@@ -229,9 +229,8 @@ impl System {
         self.set_rhs(&self.momentum(&seed));
     }
 
-    /// Whether K + shift M is positive definite already without the coupling,
-    /// which can only add to it: then no eigenvalue is negative. Overwrites
-    /// the matrix.
+    /// Whether K + shift M is positive definite even without the coupling, which is positive
+    /// semidefinite: then no eigenvalue is negative. Overwrites the matrix.
     pub fn stable_without_coupling(&mut self, shift: f64) -> bool {
         for group in &mut self.groups {
             let chain = group.matrix.spatial_mut();
@@ -253,7 +252,7 @@ impl System {
         self.gather(|group| &group.rhs)
     }
 
-    /// Puts another right-hand side in its place.
+    /// Replaces the right-hand side.
     pub fn set_rhs(&mut self, rhs: &Field) {
         self.scatter(rhs, |group| &mut group.rhs);
     }
@@ -263,14 +262,14 @@ impl System {
         self.gather(|group| &group.solution)
     }
 
-    /// Puts other increments in its place.
+    /// Replaces the last solution.
     pub fn set_solution(&mut self, increments: &Field) {
         self.scatter(increments, |group| &mut group.solution);
     }
 
     fn gather(&self, of: impl Fn(&Group) -> &Vec<Increments>) -> Field {
         let rod = |j: usize| {
-            let (group, lane) = place(j);
+            let (group, lane) = group_and_lane(j);
             let nodes = of(&self.groups[group]).iter();
             nodes.map(|node| of_lane(node, lane)).collect()
         };
@@ -279,7 +278,7 @@ impl System {
 
     fn scatter(&mut self, field: &Field, of: impl Fn(&mut Group) -> &mut Vec<Increments>) {
         for (j, rod) in field.iter().enumerate() {
-            let (group, lane) = place(j);
+            let (group, lane) = group_and_lane(j);
             for (node, of_rod) in of(&mut self.groups[group]).iter_mut().zip(rod) {
                 set_lane(node, lane, of_rod);
             }
@@ -322,10 +321,11 @@ impl System {
             .sum()
     }
 
-    /// Writes the velocity that covers `part` of the last solution in `dt`.
+    /// Writes the velocity that corresponds to the fraction `part` of the last solution in a
+    /// time `dt`.
     pub fn velocity(&self, part: f64, dt: f64, velocity: &mut [Vec<Increment>]) {
         for (j, rod) in velocity.iter_mut().enumerate() {
-            let (group, lane) = place(j);
+            let (group, lane) = group_and_lane(j);
             for (v, d) in rod.iter_mut().zip(&self.groups[group].solution) {
                 *v = of_lane(d, lane).map(|d| part * d / dt);
             }
@@ -336,17 +336,17 @@ impl System {
 /// Coupling of every gap per weight.
 fn gaps(leaf: &DiscreteLeaf) -> impl Iterator<Item = DVec3> {
     let gap = move |g: usize| {
-        // A node in the plane of the mirror does not answer a pull across it.
-        let answer = match leaf.leaf.in_plane(g) {
+        // A node in the mirror plane is not displaced across it.
+        let free = match leaf.leaf.in_plane(g) {
             true => DVec3::new(1.0, 0.0, 1.0),
             false => DVec3::ONE,
         };
-        answer * leaf.coupling(g - 1)
+        free * leaf.coupling(g - 1)
     };
     (1..leaf.rods()).map(gap)
 }
 
-/// Coupling of the rods of a group with those before and those behind.
+/// Coupling of the rods of a group with the previous and the next rods.
 fn coupling(rods: Range<usize>, gaps: &[DVec3]) -> [[Four; 3]; 2] {
     let mut coupling = [[Four::default(); 3]; 2];
     for (lane, j) in rods.enumerate() {
@@ -360,7 +360,7 @@ fn coupling(rods: Range<usize>, gaps: &[DVec3]) -> [[Four; 3]; 2] {
 }
 
 impl Group {
-    /// Room for the equations of a group of the rods of `leaf`.
+    /// Allocates the equations of a group of the rods of `leaf`.
     fn new(leaf: &DiscreteLeaf, group: usize, gaps: &[DVec3]) -> Self {
         let n = leaf.segments();
         let zeros = vec![Increments::default(); n];

@@ -1,7 +1,7 @@
 //! Factorisation, and conjugate gradients.
 //!
-//! B p follows p by the recursion of the method itself, so that an iteration
-//! costs one solve with B and one product with the sparse E.
+//! B p is updated by the same recursion as p, so that an iteration costs one solve with B and
+//! one product with the sparse E.
 
 use super::kernels::{Advance, Coupled, Direction, Product};
 use super::{Group, Masses, System, dot, each_group, rods_of};
@@ -11,15 +11,15 @@ use crate::leaf::state::Increment;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Iterations after which the rod-wise preconditioner is held to have failed.
+/// Largest number of iterations with the rod-wise preconditioner.
 const MAX_ITERATIONS: usize = 200;
 
-/// How a solution went.
+/// The outcome of a linear solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solved {
-    /// To the tolerance, in so many iterations.
+    /// Converged to the tolerance, in so many iterations.
     Yes(usize),
-    /// The matrix is not positive definite; noticed after so many iterations.
+    /// The matrix is not positive definite; detected after so many iterations.
     Indefinite(usize),
     /// The iteration limit was reached.
     TooSlow(usize),
@@ -73,7 +73,7 @@ impl System {
     /// plus `inertia` (mass times velocity over time step), to the relative
     /// accuracy `tolerance` in the energy norm.
     pub fn solve(&mut self, inertia: Option<(&[Vec<Increment>], f64)>, tolerance: f64) -> Solved {
-        let mut tip_residual = self.load_residual(inertia);
+        let mut tip_residual = self.set_residual(inertia);
         let (mut tip_z, mut rz) = self.precondition(tip_residual);
         if !self.coupled {
             for group in &mut self.groups {
@@ -125,7 +125,7 @@ impl System {
                 tip_p[c] = tip_z[c] + beta * tip_p[c];
                 tip_b_p[c] = tip_residual[c] + beta * tip_b_p[c];
             }
-            self.turn_direction(beta);
+            self.update_direction(beta);
         }
         if self.joined {
             for group in &mut self.groups {
@@ -136,9 +136,8 @@ impl System {
         Solved::Yes(iterations)
     }
 
-    /// Makes the right-hand side plus `inertia` the residual; returns that of a
-    /// joint tip.
-    fn load_residual(&mut self, inertia: Option<(&[Vec<Increment>], f64)>) -> [f64; 3] {
+    /// Sets the residual to the right-hand side plus `inertia`; returns that of a joint tip.
+    fn set_residual(&mut self, inertia: Option<(&[Vec<Increment>], f64)>) -> [f64; 3] {
         let (rods, weights, joined) = (self.rods, &self.weights, self.joined);
         each_group(self.parallel, &mut self.groups, |g, group| {
             group.residual.copy_from_slice(&group.rhs);
@@ -168,8 +167,8 @@ impl System {
         tip_residual
     }
 
-    /// z = B^-1 residual, complete with the tip's displacement in every rod's
-    /// last slot; returns that displacement and residual . z over all unknowns.
+    /// z = B^-1 residual, including the tip's displacement in every rod's last slot; returns
+    /// that displacement and residual . z over all unknowns.
     fn precondition(&mut self, tip_residual: [f64; 3]) -> ([f64; 3], f64) {
         let (last, arch) = (self.segments - 1, self.arch);
         each_group(self.parallel, &mut self.groups, |_, group| {
@@ -197,7 +196,7 @@ impl System {
         (tip, product + dot(&tip_residual, &tip))
     }
 
-    /// p . (B + E) p without the tip's part.
+    /// p . (B + E) p without the contribution of the tip.
     fn multiply(&mut self) -> f64 {
         let (p, weights, arch) = (&self.p, &self.coupling_weights, self.arch);
         each_group(self.parallel, &mut self.groups, |g, group| {
@@ -216,8 +215,8 @@ impl System {
         self.groups.iter().map(|group| group.partial).sum()
     }
 
-    /// Goes `alpha` times p; the residual goes with it. Of a joint tip's slots
-    /// that of the residual stays zero: no coupling acts there.
+    /// Adds `alpha` p to the solution and updates the residual, which stays zero in the slots
+    /// of a joint tip, where no coupling acts.
     fn advance(&mut self, alpha: f64) {
         let (p, weights, arch) = (&self.p, &self.coupling_weights, self.arch);
         each_group(self.parallel, &mut self.groups, |g, group| {
@@ -238,7 +237,7 @@ impl System {
     }
 
     /// The next direction: z plus `beta` times the last.
-    fn turn_direction(&mut self, beta: f64) {
+    fn update_direction(&mut self, beta: f64) {
         let arch = self.arch;
         let turn = |(group, p): (&mut _, &mut Vec<Increments>)| {
             run(arch, &mut Direction { group, p, beta });
@@ -249,10 +248,9 @@ impl System {
         }
     }
 
-    /// A dead moment M is not conservative in three dimensions: the derivative
-    /// of the tip's moment balance in spatial increments gains -[M]/2, which is
-    /// skew. It has rank two at one node and is brought in by the formula of
-    /// Sherman, Morrison and Woodbury.
+    /// A dead moment M is not conservative in three dimensions: the derivative of the tip's
+    /// moment balance in spatial increments gains -[M]/2, which is skew. It has rank two at
+    /// one node and is included by the Sherman-Morrison-Woodbury formula.
     fn correct_for_moment(&mut self) {
         use nalgebra::{Matrix3, Vector3};
         let (last, arch) = (self.segments - 1, self.arch);

@@ -65,7 +65,7 @@ impl SemiImplicit {
             work: &mut Work::default(),
             progress: &mut |_, _| {},
         };
-        let held = Equations::Held {
+        let held = Equations::Proximal {
             solver: &mut Definite::default(),
             at: &self.state,
             rate,

@@ -150,13 +150,13 @@ impl Relaxation<'_> {
                 work: self.work,
                 progress: self.progress,
             };
-            let held = Equations::Held {
+            let proximal = Equations::Proximal {
                 solver: &mut self.solver,
                 at: &from,
                 rate,
                 largest: LARGEST_STEP,
             };
-            match step.solve(leaf, &mut self.state, system, held) {
+            match step.solve(leaf, &mut self.state, system, proximal) {
                 Ok(_) if rate == 0.0 => return Ok(()),
                 Ok(size) if at_saddle(leaf, &self.state, self.state.shift_to(&from).max(size)) => {
                     saddles += 1;

@@ -14,7 +14,8 @@
 use crate::leaf::{DiscreteLeaf, Increment, State, System};
 use crate::limit::Limit;
 use crate::newton::{
-    Definite, Equations, Newton, ROUNDING, Stop, Work, at_saddle, cg_tolerance, closes, converged,
+    Definite, Equations, Newton, ROUNDING, Stop, Work, at_saddle, cg_tolerance, converged,
+    satisfies_lengths,
 };
 use crate::rod::RESOLVED_TURN;
 
@@ -206,9 +207,9 @@ impl Relaxation<'_> {
             let mut rest = None;
             if motion.is_newton() && part == 1.0 {
                 let contraction = &mut self.solver.contraction;
-                contraction.learn(size, motion.newton);
+                contraction.update(size, motion.newton);
                 motion.newton = size;
-                let first = contraction.after_first(size, trial.force_change(&self.state));
+                let first = contraction.error_after_first(size, trial.force_change(&self.state));
                 let tolerances = [previous_tolerance, tolerance];
                 rest = converged(size, previous, tolerances, (accuracy, ROUNDING), first);
             } else {
@@ -216,7 +217,7 @@ impl Relaxation<'_> {
             }
             if let Some(remaining) = rest
                 && size < SMALL
-                && closes(leaf, &trial, accuracy)
+                && satisfies_lengths(leaf, &trial, accuracy)
             {
                 if sums.turn > RESOLVED_TURN {
                     return Err(Stop::Unresolved);
@@ -246,7 +247,7 @@ impl Relaxation<'_> {
             if motion.is_newton() {
                 resting = false;
                 if let Some(remaining) = rest
-                    && closes(leaf, &self.state, accuracy)
+                    && satisfies_lengths(leaf, &self.state, accuracy)
                 {
                     return Ok(remaining);
                 }
