@@ -2,25 +2,24 @@
 //!
 //! x' = L R v,   q' = L/2 (R u) q,   n' = -f,   m' = n x x'          eqs (1) (2)
 //!
-//! with v = v0 + c R^T n and u = u0 + R^T m / A by eqs (5) and (6), n and m along the
-//! lab axes and f the force that acts per unit of sigma; and the potential energy of
-//! everything up to sigma,
+//! with v = v0 + c R^T n and u = u0 + R^T m / A by eqs (5) and (6), n and m along the lab axes
+//! and f the force per unit of sigma; and the potential energy up to sigma,
 //!
-//! E' = L/2 (n.c n + m.m/A) + that of the loads.
+//! E' = L/2 (n.c n + m.m/A) + potential of the loads.
 
 use super::section::Section;
 use crate::lanes::{Four, GROUP, Lanes, Vectors};
 use crate::rotation::{Quaternions, directors};
 use pulp::Simd;
 
-/// Numbers that describe a rod at one sigma.
+/// Number of fields of a rod at one sigma.
 pub const FIELDS: usize = 14;
 
-/// What describes the rods of a group at one sigma: positions, quaternions, forces and
-/// moments along the lab axes, energies.
+/// The fields of the rods of a group at one sigma: positions, quaternions, forces and moments
+/// along the lab axes, energies.
 pub type GroupFields = [Four; FIELDS];
 
-/// The same of several rods.
+/// The same of several rods, as vectors.
 #[derive(Clone, Copy)]
 pub struct Fields<S: Simd> {
     /// Positions.
@@ -35,10 +34,10 @@ pub struct Fields<S: Simd> {
     pub energy: Lanes<S>,
 }
 
-/// What the equations take from the sections of a group of rods: lengths, v0, u0, c, 1/A.
+/// The coefficients of the equations for a group of rods: lengths, v0, u0, c, 1/A.
 pub type GroupLaws = [Four; 13];
 
-/// The laws of sections that are as long as their rods.
+/// The coefficients from sections whose `ds` is the length of the rod.
 pub fn laws(sections: [&Section; GROUP]) -> GroupLaws {
     let number = |k: usize| {
         let of = |section: &Section| match k {
@@ -80,7 +79,8 @@ impl<S: Simd> Fields<S> {
         self.energy.put(&mut group[13], part);
     }
 
-    /// Their slopes where a force acts, with its potential, of the lanes from `part` on.
+    /// Their derivatives with respect to sigma under a force with its potential, of the lanes
+    /// from `part` on.
     #[inline(always)]
     pub fn slopes(
         &self,

@@ -13,14 +13,12 @@
 //! Pi = nu . (R^T (x1 - x0) - ds v0) - ds/2 sum_k c_k nu_k^2
 //!      + ds/2 sum_k A_k (u_k - u0_k)^2,
 //!
-//! the rest strain v0 being (stretch, 0, 0), e1 where nothing has grown, but
-//! where internal friction acts.
+//! the rest strain v0 being (stretch, 0, 0), e1 without growth, unless internal friction acts.
 //!
-//! Stationary in n this is the paper's law; the implicit midpoint rule on eqs
-//! (1) and (2) and the minimum of a discrete energy coincide. The force is
-//! condensed out segment by segment, so that the nodes see a 12 x 12 matrix,
-//! and Newton's method converges as fast for any stiffness in stretch and shear:
-//! a rigid rod is c = 0.
+//! Stationarity in n gives the paper's law; the implicit midpoint rule on eqs (1) and (2) is
+//! the stationarity condition of a discrete energy. The force is condensed out segment by
+//! segment, so that the nodes see a 12 x 12 matrix, and Newton's method converges as fast for
+//! any stiffness in stretch and shear: a rigid rod is c = 0.
 
 use super::section::Sections;
 use crate::lanes::{Lanes, Vectors};
@@ -36,7 +34,7 @@ pub struct Nodes<S: Simd> {
     pub q: [Quaternions<S>; 2],
 }
 
-/// Several segments between nodes of B unknowns: turns, then shifts.
+/// Several segments between nodes of B unknowns: rotations, then displacements.
 pub trait Element<S: Simd, const B: usize>: Sized {
     /// The segments between `nodes` that carry the spatial forces `n`.
     fn new(sections: &Sections<S>, nodes: &Nodes<S>, n: Vectors<S>) -> Self;
@@ -48,13 +46,12 @@ pub trait Element<S: Simd, const B: usize>: Sized {
     /// A_k (u_k - u0_k)^2). Infinite for a strained rigid rod.
     fn strain_energy(&self, sections: &Sections<S>) -> Lanes<S>;
 
-    /// First derivatives of Pi with respect to the unknowns of both nodes, with
-    /// the force condensed out: the right-hand side that belongs to
-    /// [`Element::hessian`].
+    /// First derivatives of Pi with respect to the unknowns of both nodes, with the force
+    /// condensed out: the right-hand side for [`Element::hessian`].
     fn condensed_gradient(&self, sections: &Sections<S>) -> [[Lanes<S>; B]; 2];
 
-    /// What the condensed gradient gains, to first order, if the compliance of
-    /// the components in `dropped` (ones and zeros) is taken away.
+    /// The first-order change of the condensed gradient if the compliance of the components in
+    /// `dropped` (ones and zeros) is removed.
     fn stiffening_gradient(
         &self,
         sections: &Sections<S>,
@@ -64,8 +61,8 @@ pub trait Element<S: Simd, const B: usize>: Sized {
     /// Second derivatives, the force condensed out.
     fn hessian(&self, sections: &Sections<S>) -> Hessian<S, B>;
 
-    /// The change of the spatial force that goes with the nodal increments
-    /// `dx` = dx1 - dx0 and the spatial rotations `turns` of both nodes.
+    /// The change of the spatial force for the nodal increments `dx` = dx1 - dx0 and the
+    /// spatial rotations `turns` of both nodes.
     fn force_increment(
         &self,
         sections: &Sections<S>,

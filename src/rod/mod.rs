@@ -14,5 +14,5 @@ pub use section::{Section, Sections};
 pub use segment::{Blocks, Ends, SectionRate, Segment};
 pub use spatial::SpatialElement;
 
-/// A segment that is bent by more than this (radians) is not resolved by its grid.
+/// Largest rotation (radians) between the ends of a segment that its grid resolves.
 pub const RESOLVED_TURN: f64 = 1.6;

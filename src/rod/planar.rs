@@ -7,8 +7,8 @@
 //! Pi = nu . (R^T (x1 - x0) - ds v0) - ds/2 sum_k c_k nu_k^2
 //!      + A_3/(2 ds) (psi - ds u0)^2,
 //!
-//! what [`Segment`](super::Segment) is if nothing leaves the plane. The turns
-//! of both nodes act alike on all but the bending: by their mean.
+//! the planar case of [`Segment`](super::Segment). Except for the bending, the rotations of
+//! the nodes enter by their mean only.
 
 use super::element::{Element, Hessian, Nodes};
 use super::section::Sections;
@@ -30,7 +30,7 @@ pub struct PlanarElement<S: Simd> {
     m: Lanes<S>,
     /// Director components of the force the segment carries.
     nu: Pair<S>,
-    /// The strain that goes with that force, v0 + c nu.
+    /// The strain for that force, v0 + c nu.
     w: Pair<S>,
     /// R^T (x1 - x0) - ds w.
     gap: Pair<S>,

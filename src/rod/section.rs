@@ -1,10 +1,10 @@
-//! What segments are made of.
+//! Sections: the material data of segments.
 
 use crate::lanes::{Four, GROUP, Lanes, Vectors};
 use glam::DVec3;
 use pulp::{Scalar, Simd};
 
-/// What a segment is made of, taken at its midpoint.
+/// The material data of a segment, at its midpoint.
 #[derive(Clone, Copy, Debug)]
 pub struct Section {
     /// Reference length of the segment.
@@ -13,21 +13,20 @@ pub struct Section {
     pub couple_stiffness: DVec3,
     /// Rest curvature u0.
     pub rest_curvature: DVec3,
-    /// Rest strain v0; (1, 0, 0) has neither grown nor been sheared.
+    /// Rest strain v0; (1, 0, 0) without growth or shear.
     pub rest_strain: DVec3,
     /// Compliance 1/H: axial, shear along d2, along d3; zero if rigid.
     pub compliance: DVec3,
-    /// Stiffness by which the force is condensed out: H, or a large one in its
-    /// place if H is larger still (see [`Section::condense`]).
+    /// Stiffness with which the force is condensed out: H, or an upper limit if H is larger
+    /// (see [`Section::condense`]).
     pub condensing: DVec3,
 }
 
 impl Section {
-    /// Sets the stiffness that condenses the force out to at most `largest`.
-    /// Beyond it the matrix is that of a softer rod while the residual stays
-    /// exact: a proximal step in the force, which changes no solution, costs
-    /// a contraction of the order of 1/`largest` an iteration, and keeps the
-    /// pivots within what double precision holds.
+    /// Limits the stiffness with which the force is condensed out to `largest`. Beyond it the
+    /// matrix is that of a softer rod while the residual stays exact: a proximal step in the
+    /// force, which leaves solutions unchanged, adds linear convergence with a factor of the
+    /// order of 1/`largest`, and keeps the pivots within double precision.
     pub fn condense(mut self, largest: f64) -> Self {
         self.condensing = self.compliance.recip().min(DVec3::splat(largest));
         self

@@ -1,4 +1,4 @@
-//! One segment, as numbers.
+//! A single segment, in scalar arithmetic.
 
 use super::element::{Element, Nodes};
 use super::section::Section;
@@ -26,7 +26,7 @@ impl From<&Ends> for Nodes<Scalar> {
     }
 }
 
-/// The change of a section with a number it depends on.
+/// The derivative of a section with respect to a parameter.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SectionRate {
     /// Of its reference length.
@@ -41,14 +41,14 @@ pub struct SectionRate {
     pub compliance: DVec3,
 }
 
-/// The change of a segment with a number that its section depends on, nodes and
-/// force held.
+/// The derivative of a segment with respect to a parameter of its section, with nodes and
+/// force fixed.
 #[derive(Clone, Copy, Debug)]
 pub struct SegmentRate {
     /// Of the derivatives of Pi with respect to the rotations of its nodes; that with
     /// respect to their positions does not change.
     pub gradient: [DVec3; 2],
-    /// Of its gap.
+    /// Of its gap, the residual of the constitutive law.
     pub gap: DVec3,
     /// Of Pi itself, the elastic energy at rest.
     pub energy: f64,
@@ -65,9 +65,9 @@ pub struct Segment {
     pub m: DVec3,
     /// Director components nu of the force the segment carries.
     pub nu: DVec3,
-    /// The strain that goes with that force, v0 + c nu.
+    /// The strain for that force, v0 + c nu.
     pub w: DVec3,
-    /// R^T (x1 - x0) - ds w: by how much the constitutive law is not yet met.
+    /// R^T (x1 - x0) - ds w: the residual of the constitutive law.
     pub gap: DVec3,
     relative: Relative<Scalar>,
 }
@@ -97,8 +97,8 @@ impl Section {
         0.5 * self.ds * segment.m.dot(segment.u - self.rest_curvature)
     }
 
-    /// Elastic energy by the force carried, which equals the strain energy where
-    /// the constitutive law is met: bending plus ds/2 sum_k c_k nu_k^2.
+    /// Elastic energy in terms of the force carried, which equals the strain energy if the
+    /// constitutive law holds: bending plus ds/2 sum_k c_k nu_k^2.
     #[inline]
     pub fn elastic_energy(&self, segment: &Segment) -> f64 {
         self.bending_energy(segment)
@@ -149,17 +149,17 @@ impl Segment {
         DVec3::from(self.relative.psi).length()
     }
 
-    /// By how much this element may be stiffer than the rod against turns about any axis
-    /// of a mode that is neutral: energy per squared radian, times two.
+    /// Bound on the excess stiffness of this element over the rod against rotations, about any
+    /// axis, in a neutral mode: twice the energy per squared radian.
     ///
-    /// Such a mode waves with a number k of at most
+    /// The wave number k of such a mode is at most
     ///
     /// k^2 = p/A + m1^2/(A2 A3) + m2^2/(A3 A1) + m3^2/(A1 A2),   p = (|nu| - nu1)/2,
     ///
-    /// A being the least of the couple stiffnesses and -p the least eigenvalue of
-    /// nu1 (theta2^2 + theta3^2) - theta1 (nu2 theta2 + nu3 theta3), the work of the force
-    /// carried with turns theta of the directors. The midpoint rule makes a wave
-    /// (2/(k ds) tan(k ds/2))^2 - 1 = (k ds)^2/6 + ... times stiffer.
+    /// A being the least of the couple stiffnesses and -p the least eigenvalue of nu1
+    /// (theta2^2 + theta3^2) - theta1 (nu2 theta2 + nu3 theta3), the work of the force carried
+    /// in rotations theta of the directors. The midpoint rule makes a wave (2/(k ds) tan(k
+    /// ds/2))^2 - 1 = (k ds)^2/6 + ... times stiffer.
     pub fn excess_stiffness(&self, section: &Section) -> f64 {
         let (stiffness, m, ds) = (section.couple_stiffness, self.m, section.ds);
         let least = stiffness.min_element();
@@ -169,8 +169,8 @@ impl Segment {
         least * (squared_wave_number * ds).powi(2) * ds / 6.0
     }
 
-    /// First derivatives of Pi, the force held: with respect to x1 (that to x0
-    /// is its negative) and to the rotations of the two nodes.
+    /// First derivatives of Pi at fixed force: with respect to x1 (that to x0 is its negative)
+    /// and to the rotations of the two nodes.
     pub fn gradient(&self, section: &Section) -> (DVec3, DVec3, DVec3) {
         self.element()
             .gradient(&section.into())
@@ -178,8 +178,8 @@ impl Segment {
             .into()
     }
 
-    /// As [`Segment::gradient`], with the force condensed out: the right-hand
-    /// side that belongs to [`Segment::hessian`].
+    /// As [`Segment::gradient`], with the force condensed out: the right-hand side for
+    /// [`Segment::hessian`].
     pub fn condensed_gradient(&self, section: &Section) -> (DVec3, DVec3, DVec3) {
         let gradient = self.element().condensed(&section.into());
         gradient.map(DVec3::from).into()
@@ -202,15 +202,15 @@ impl Segment {
         }
     }
 
-    /// The change of the spatial force that goes with the nodal increments
-    /// `dx` = dx1 - dx0 and spatial rotations `a`, `b`.
+    /// The change of the spatial force for the nodal increments `dx` = dx1 - dx0 and spatial
+    /// rotations `a`, `b`.
     pub fn force_increment(&self, section: &Section, dx: DVec3, a: DVec3, b: DVec3) -> DVec3 {
         let (element, turns) = (self.element(), [a.into(), b.into()]);
         let change = element.force_increment(&section.into(), dx.into(), turns);
         change.into()
     }
 
-    /// The change of the gap with these increments, the spatial force held.
+    /// The change of the gap for these increments at fixed spatial force.
     pub fn gap_increment(&self, section: &Section, dx: DVec3, a: DVec3, b: DVec3) -> DVec3 {
         let to_directors = self.frame.transpose();
         let (alpha, beta) = (to_directors * a, to_directors * b);
@@ -220,11 +220,11 @@ impl Segment {
         to_directors * dx - section.ds * d_mu
     }
 
-    /// The change with a number of the section.
+    /// The derivative with respect to a parameter of the section.
     pub fn rate(&self, section: &Section, rate: &SectionRate) -> SegmentRate {
         let strain = rate.rest_strain + rate.compliance * self.nu;
         let bent = self.u - section.rest_curvature;
-        // A longer segment between the same nodes is less curved.
+        // For fixed nodes the curvature is inversely proportional to ds.
         let bending = -self.u * (rate.ds / section.ds) - rate.rest_curvature;
         let moment = rate.couple_stiffness * bent + section.couple_stiffness * bending;
         let g_mu = rate.ds * self.nu.cross(self.w) + section.ds * self.nu.cross(strain);
@@ -240,7 +240,7 @@ impl Segment {
         }
     }
 
-    /// What the condensed gradient gains from a change of the gap.
+    /// The change of the condensed gradient by a change of the gap.
     pub fn gap_gradient(&self, section: &Section, gap: DVec3) -> (DVec3, DVec3, DVec3) {
         let correction = section.condensing * gap;
         let g_mu = self.nu.cross(section.compliance * correction) - self.w.cross(correction);
@@ -248,8 +248,8 @@ impl Segment {
         (self.frame * (correction / section.ds), a, b)
     }
 
-    /// From derivatives with respect to the turn of the midpoint, and the difference of
-    /// the turns of the two nodes, to these.
+    /// Converts derivatives with respect to the rotation of the midpoint, and to the
+    /// difference of the nodal rotations, to those with respect to the nodal rotations.
     fn on_nodes(&self, g_mu: DVec3, moment: DVec3) -> [DVec3; 2] {
         let g_delta = 0.5 * DVec3::from(self.relative.tau).cross(g_mu) + moment;
         [0.5 * g_mu - g_delta, 0.5 * g_mu + g_delta].map(|g| self.frame * g)
@@ -260,8 +260,8 @@ impl Segment {
 mod tests {
     use super::*;
 
-    /// Of a compressed segment, which a wave of the neutral rod makes so much stiffer; of a
-    /// pulled one nothing.
+    /// For a compressed segment the excess is that of the neutral wave; for a pulled one it is
+    /// zero.
     #[test]
     fn the_excess_is_that_of_a_neutral_wave() {
         let (ds, stiffness): (f64, f64) = (0.1, 2.0);

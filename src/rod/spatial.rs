@@ -38,7 +38,7 @@ pub struct Second<S: Simd> {
 }
 
 impl<S: Simd> SpatialElement<S> {
-    /// First derivatives of Pi, the force held.
+    /// First derivatives of Pi at fixed force.
     #[inline(always)]
     pub fn gradient(&self, sections: &Sections<S>) -> First<S> {
         self.pull_back(self.nu, self.nu.cross(self.w).scale(sections.ds), self.m)
@@ -64,8 +64,8 @@ impl<S: Simd> SpatialElement<S> {
         self.pull_back(correction.scale(sections.per_ds), g_mu, none)
     }
 
-    /// From the derivatives with respect to R^T dx and to the turn mu of the
-    /// midpoint to nodal derivatives, adding the bending moment `m`.
+    /// Converts derivatives with respect to R^T dx and to the rotation mu of the midpoint to
+    /// nodal derivatives, adding the bending moment `m`.
     #[inline(always)]
     fn pull_back(&self, nu: Vectors<S>, g_mu: Vectors<S>, m: Vectors<S>) -> First<S> {
         let g_mu = g_mu.scale(Lanes::splat(nu.x.simd, 0.5));
@@ -84,9 +84,9 @@ impl<S: Simd> SpatialElement<S> {
         self.w.cross(a) - self.nu.cross(sections.compliance * a)
     }
 
-    /// Columns of diag(k) D with the stiffness k that condenses the force out, and
-    /// the second derivatives with respect to the turn of the midpoint,
-    /// ds (D^T diag(k) D + w.nu - (w nu^T + nu w^T)/2 + \[nu\] diag(c) \[nu\]).
+    /// Columns of diag(k) D with the condensing stiffness k, and the second derivatives with
+    /// respect to the rotation of the midpoint, ds (D^T diag(k) D + w.nu - (w nu^T + nu w^T)/2
+    /// + \[nu\] diag(c) \[nu\]).
     #[inline(always)]
     fn midpoint(&self, sections: &Sections<S>) -> [Rows<S>; 2] {
         let (nu, w, c, k) = (self.nu, self.w, sections.compliance, sections.condensing);
