@@ -1,5 +1,5 @@
-//! How a leaf of coupled Cosserat rods comes to rest: its shape, an error bar
-//! on it, and whether it is stable.
+//! Equilibria of leaves made of coupled Cosserat rods: the shape, an error bound on it, and
+//! its stability.
 //!
 //! From a file to a tip position with its error and its stability:
 //!
@@ -14,10 +14,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! What comes back is a [`relax::Equilibrium`]; as JSON it is what the program
-//! writes. [`Scenario::relaxation`](scenario::Scenario::relaxation) takes a tolerance,
-//! a method or a fixed grid, says how far a long run has come, and can be cancelled.
-//! By task:
+//! The result is a [`relax::Equilibrium`]; as JSON it is what the program writes.
+//! [`Scenario::relaxation`](scenario::Scenario::relaxation) takes a tolerance, a method or a
+//! fixed grid, reports the progress of a long run, and can be cancelled. By task:
 //!
 //! | to | call |
 //! | --- | --- |
@@ -60,14 +59,13 @@
 //!   f = g - q e3          g = sum of kappa o (r_neighbour - r)     coupling, gravity
 //! ```
 //!
-//! A2 is the bending about d2, which moves a vein up and down; A3 the one
-//! about d3, sideways within the leaf. u0 is the curvature at rest; v0 is
-//! e1 or, where a vein has grown, a multiple of it (`rest.stretch`). An infinite
-//! H_i is a constraint: inextensible, unshearable. The coupling acts between
-//! neighbours at equal fractions of their lengths, axis by axis, and is kept
-//! per gap, so that what one rod gains the other loses. The boundary conditions
-//! are those of section 2.4, with a given force and, on a single rod, a given
-//! moment at the tip:
+//! A2 is the bending about d2, which moves a vein up and down; A3 the one about d3, sideways
+//! within the leaf. u0 is the curvature at rest; v0 is e1 or, where a vein has grown, a
+//! multiple of it (`rest.stretch`). An infinite H_i is a constraint: inextensible,
+//! unshearable. The coupling acts between neighbours at equal fractions of their lengths, axis
+//! by axis, and is kept per gap, so that forces between neighbours are equal and opposite. The
+//! boundary conditions are those of section 2.4, with a given force and, on a single rod, a
+//! given moment at the tip:
 //!
 //! | | at | condition |
 //! | --- | --- | --- |
@@ -89,107 +87,97 @@
 //! scaling, lengths by L0, forces by H0, moments by A0/L0, leaves the equations
 //! above in their form only if H0 L0^2/A0 = 1; `scenarios/paper` is written so.
 //!
-//! # From the equations to the answer
+//! # From the equations to the result
 //!
-//! **The element** (`rod`, `rotation`). Positions and unit quaternions live
-//! at the nodes of a grid. Each segment is oriented by the geodesic
-//! midpoint of its two nodal rotations and has an energy in the strains
-//! v = R^T (x1 - x0)/ds and u = log(q0^* q1)/ds. Its minimum is the implicit
-//! midpoint rule on eqs (1) to (6). The force each segment carries is an unknown of
-//! its own (the mixed form), eliminated again segment by segment, so that
-//! Newton's method does not feel how stiff a rod is in stretch and shear.
+//! **The element** (`rod`, `rotation`). The nodes of a grid carry positions and unit
+//! quaternions. Each segment is oriented by the geodesic midpoint of its two nodal rotations
+//! and has an energy in the strains v = R^T (x1 - x0)/ds and u = log(q0^* q1)/ds. Its
+//! stationarity is the implicit midpoint rule on eqs (1) to (6). The force each segment
+//! carries is an additional unknown (the mixed form), eliminated segment by segment, so that
+//! the convergence of Newton's method does not depend on the stiffness in stretch and shear.
 //!
-//! **The leaf** (`leaf`). All last nodes are one shared point: the tip cannot
-//! open, and needs neither penalty nor multiplier. Gravity and coupling act at
-//! the nodes. Newton's equations are solved rod by rod: every rod's own chain of
-//! 6 x 6 blocks (3 x 3 in the plane) is factorised in linear time, and conjugate gradients account
-//! for the coupling. A sparse direct factorisation of the whole stands by for
-//! what is not positive definite.
+//! **The leaf** (`leaf`). All last nodes are one shared point: the joint tip needs neither penalty
+//! nor multiplier. Gravity and coupling act at the nodes. Newton's equations are solved rod by
+//! rod: every rod's own block-tridiagonal matrix of 6 x 6 blocks (3 x 3 in the plane) is
+//! factorised in linear time and preconditions conjugate gradients for the coupled system. A
+//! sparse direct factorisation of the whole matrix serves where it is not positive definite.
 //!
-//! **The relaxation** ([`relax`]). Joined leaves start from circular arcs that
-//! meet in a point, free rods from their rest shapes, and move: linearly
-//! implicit Euler steps of a damped motion. While the energy has a direction of
-//! negative curvature, the time step is kept short enough to follow the motion;
-//! otherwise it grows until the step is Newton's. A leaf that is its own mirror
-//! image is solved by half, one that nothing pulls out of its plane with three
-//! unknowns a node. The explicit method ([`relax::Method::Explicit`])
-//! follows the same motion in steps short enough for the fastest waves into the
-//! valley, and then descends with masses and damping that serve nothing else.
+//! **The relaxation** ([`relax`]). Joined leaves start from circular arcs that meet in a
+//! point, free rods from their rest shapes, and perform a damped motion in linearly implicit
+//! Euler steps. While the energy has a direction of negative curvature, the time step is kept
+//! short enough to resolve the motion; otherwise it grows until the step is Newton's. Of a
+//! mirror-symmetric leaf one half is solved, and a leaf without loads out of its plane with
+//! three unknowns a node. The explicit method ([`relax::Method::Explicit`]) integrates the
+//! same motion in steps short enough for the fastest waves until the leaf is in a valley
+//! (basin of attraction) of its energy, and then descends with fictitious masses and damping.
 //!
-//! **Grids and the error** ([`relax::relax`]). The element is symmetric and its
-//! conditions hold exactly at nodes, so that its error is a series in even
-//! powers of ds. The leaf settles on 8 segments a rod (on 4 where that is enough), then
-//! on twice as many, and so on, each started from a prediction by those before
-//! it, and Richardson extrapolation removes one term
-//! of the series with every grid. The error of the extrapolated leaf is estimated from
-//! its defect in the equations: these are integrated along the rods by a method of
-//! order 8, and the linear response of the leaf to the jumps that are left, times two, is
-//! the bound ([`relax::Accuracy::error_estimate`]); unfinished iterations and
-//! rounding are added. Where only the shape is asked for the response is also
-//! subtracted (iterated defect correction). Grids are refined until the bound is below the
-//! tolerance. A column of the table that does not show its order is not
-//! extrapolated. Kinks of a profile are nodes of every grid.
+//! **Grids and the error** ([`relax::relax`]). The element is symmetric and the boundary
+//! conditions hold exactly at nodes, so that its error is a series in even powers of ds. The
+//! leaf settles on 8 segments a rod (on 4 where that is enough), then on twice as many, and so
+//! on, starting on each grid from a prediction by those before it, and Richardson
+//! extrapolation removes one term of the series with every grid. The error of the extrapolated
+//! leaf is estimated from its defect in the equations: these are integrated along the rods by
+//! a method of order 8, and the linear response of the leaf to the remaining jumps, times two,
+//! is the bound ([`relax::Accuracy::error_estimate`]); unfinished iterations and rounding are
+//! added. Where only the shape is requested the response is also subtracted (iterated defect
+//! correction). Grids are refined until the bound is below the tolerance. A column of the
+//! table that does not show its order of convergence is not extrapolated. Kinks of a profile
+//! are nodes of every grid.
 //!
-//! **Stability** ([`relax::Equilibrium::stable`]). The Hessian of the energy at
-//! rest is factorised as L D L^T; the negative pivots number its negative
-//! eigenvalues, the Morse index. Index zero means: stable. A leaf that
-//! rests at a saddle is pushed off along its unstable mode and relaxed on; what
-//! was met stands in [`relax::Stability::saddle`]. How a run ended is one of a
-//! few words, [`relax::Outcome`].
+//! **Stability** ([`relax::Equilibrium::stable`]). The Hessian of the energy at rest is
+//! factorised as L D L^T; the number of negative pivots is that of its negative eigenvalues,
+//! the Morse index. Index zero means: stable. A leaf at rest at a saddle is displaced along
+//! its unstable mode and relaxed further; the saddle is returned in
+//! [`relax::Stability::saddle`]. The outcome of a run is a [`relax::Outcome`].
 //!
 //! **Undulation** ([`undulation`]). Half-waves of each vein out of the leaf's
 //! surface, counted between its inflections; the twist of its section; and the
 //! waves that the paper's linear theory predicts from the axial force it
 //! carries.
 //!
-//! **Modes** (`modes`). The lowest eigenvalues of K x = lambda M x with that
-//! Hessian and the masses of the leaf in motion: squared frequencies, or negative
-//! where the leaf is unstable. A Lanczos method finds them from one factorisation,
-//! and the pivots of a second one show whether any was missed. Over the grids they
-//! are extrapolated as positions are ([`relax::Stability::modes`]).
+//! **Modes** (`modes`). The lowest eigenvalues of K x = lambda M x with that Hessian and the
+//! masses of the leaf in motion: squared frequencies, or negative where the leaf is unstable.
+//! A Lanczos method computes them with one factorisation, and the pivots of a second one show
+//! whether any was missed. They are extrapolated over the grids as positions are
+//! ([`relax::Stability::modes`]).
 //!
-//! **The independent road** (`bvp`). The same equations (1) to (6) with (a) to
-//! (e) as a boundary-value problem: 13 functions per rod, integrated from the
-//! base by a Runge-Kutta method of order 8 together with their sensitivities, and
-//! brought to satisfy the conditions at the tip by Newton's method over as many
-//! intervals as the growth of perturbations needs (multiple shooting). It starts
-//! from a relaxed leaf or from arcs. [`study::check`] compares it with the
-//! relaxation; the two share neither grid nor element nor linear algebra.
+//! **The independent method** (`bvp`). The same equations (1) to (6) with (a) to (e) as a
+//! boundary-value problem: 13 functions per rod, integrated from the base by a Runge-Kutta
+//! method of order 8 together with their sensitivities; Newton's method satisfies the
+//! conditions at the tip, over as many intervals as the growth of perturbations needs
+//! (multiple shooting). It starts from a relaxed leaf or from arcs. [`study::check`] compares
+//! it with the relaxation; the two share neither grid nor element nor linear algebra.
 //!
-//! **Branches** ([`study::trace()`]). An equilibrium is followed through a number
-//! of its scenario by arclength (`branch`), so that folds are no obstacle. Where
-//! its Morse index changes the matrix is singular; bordered by the modes that
-//! become neutral it is not, and the place is found to rounding on each grid, and
-//! extrapolated. Branches that cross there can be followed as well.
-//! [`study::boundary()`] follows such places through a second number.
-//! [`study::all()`] looks for equilibria by many starts instead.
+//! **Branches** ([`study::trace()`]). An equilibrium is continued in a number of its scenario
+//! by pseudo-arclength (`branch`), also through folds. Where its Morse index changes the
+//! matrix is singular; bordered by the modes that become neutral it is regular, and the
+//! singular point is computed to rounding on each grid, and extrapolated. Branches that cross
+//! there can be followed as well. [`study::boundary()`] continues singular points in a second
+//! number. [`study::all()`] searches for equilibria from many starts instead.
 //!
-//! **Where methods fail** ([`study::map()`]). Numbers of a scenario vary
-//! ([`study::Vary`]), and in each cell every method's answer is judged against
-//! the relaxed leaf confirmed by shooting: right, another equilibrium, a saddle,
-//! not as accurate as it says, or none.
+//! **Where methods fail** ([`study::map()`]). Numbers of a scenario vary ([`study::Vary`]),
+//! and in each cell every method's result is compared with the relaxed leaf confirmed by
+//! shooting: correct, another equilibrium, a saddle, less accurate than claimed, or none.
 //!
-//! **Speed against accuracy** ([`study::chart()`]). Every method runs over its
-//! own accuracy, in turns with all others, and is judged by its true error: the
-//! distance from the relaxed leaf at the best tolerance, confirmed by shooting.
+//! **Speed against accuracy** ([`study::chart()`]). Every method runs over a range of its
+//! accuracy parameter, in turns with all others, and is judged by its true error: the distance
+//! from the relaxed leaf at the best tolerance, confirmed by shooting.
 //!
 //! # Layout
 //!
-//! [`scenario`] (TOML to a checked [`scenario::Scenario`]) and `rotation`,
-//! `rod`, `leaf`, [`shape`], [`undulation`], `bvp`, `motion`, `modes`,
-//! [`relax`], `branch`, [`simulate`],
-//! [`study`], `report` (console, JSON, tables), `figure`, [`files`]: each module uses those named
-//! before it and knows nothing of those after it.
+//! [`scenario`] (TOML to a checked [`scenario::Scenario`]) and `rotation`, `rod`, `leaf`,
+//! [`shape`], [`undulation`], `bvp`, `motion`, `modes`, [`relax`], `branch`, [`simulate`],
+//! [`study`], `report` (console, JSON, tables), `figure`, [`files`]: each module depends only
+//! on those named before it.
 //!
-//! `motion` moves a leaf on the same grid in time, without units: by an
-//! explicit method with short, cheap steps, or by a semi-implicit one that
-//! takes any stiffness. Both behind one trait, `motion::Method`, keep the
-//! balance of energy, and can be saved and restored to the last bit.
+//! `motion` integrates the dimensionless motion of a leaf on the same grid in time: by an
+//! explicit method with short, cheap steps, or by a semi-implicit one for any stiffness. Both
+//! implement the trait `motion::Method`, keep the balance of energy, and can be saved and
+//! restored to the last bit.
 //!
-//! [`simulate`] follows the leaf of a scenario for its duration, from where
-//! the scenario says, and hands out a [`simulate::Frame`] at every output. A
-//! [`files::Recording`] writes these to files as they come, and can stop and
-//! resume.
+//! [`simulate`] integrates the motion of a scenario's leaf for its duration, from the initial
+//! state of the scenario, and returns a [`simulate::Frame`] at every output. A
+//! [`files::Recording`] writes these to files as they are computed, and can stop and resume.
 
 #![warn(missing_docs)]
 
@@ -224,8 +212,7 @@ pub mod undulation;
 #[cfg(feature = "cli")]
 pub use figure::view;
 
-/// What this project's own tests and benchmarks reach besides: it may change with
-/// any release.
+/// Internals for this project's own tests and benchmarks: they may change with any release.
 #[doc(hidden)]
 pub mod internals {
     pub mod branch {

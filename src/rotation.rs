@@ -34,7 +34,7 @@ const SINC: [f64; 9] = [
     1.0 / 355_687_428_096_000.0,
 ];
 
-/// Up to this squared half angle they are good to rounding: a turn by 1.09.
+/// Up to this squared half angle they are accurate to rounding: a rotation by 1.09.
 const SMALL: f64 = 0.3;
 
 /// (sigma - 1)/delta as a polynomial in delta, sigma being y/sin y of a half angle
@@ -72,7 +72,7 @@ pub fn exp_each<S: Simd>(theta: Vectors<S>) -> Quaternions<S> {
     let (mut sinc, mut cos) = (squared.polynomial(&SINC), squared.polynomial(&COS));
     if squared.largest() > SMALL {
         let half = squared.sqrt();
-        // Series where they are good: no quotient that tends to 0/0.
+        // Series where they are accurate: no quotient that tends to 0/0.
         let large = squared - Lanes::splat(simd, SMALL);
         sinc = (half.each(f64::sin) * half.recip()).where_positive(large, sinc);
         cos = half.each(f64::cos).where_positive(large, cos);
@@ -80,7 +80,7 @@ pub fn exp_each<S: Simd>(theta: Vectors<S>) -> Quaternions<S> {
     (theta.scale(sinc * Lanes::splat(simd, 0.5)), cos)
 }
 
-/// Products a b of unit quaternions, brought back to unit length from very near.
+/// Products a b of unit quaternions, renormalised to first order in the rounding error.
 #[inline(always)]
 pub fn multiply_each<S: Simd>((a, aw): Quaternions<S>, (b, bw): Quaternions<S>) -> Quaternions<S> {
     let simd = aw.simd;
@@ -161,18 +161,18 @@ pub fn series<S: Simd>(delta: Lanes<S>) -> [Lanes<S>; 3] {
     [b.times(delta, one), b, c]
 }
 
-/// The rotation p = q0^* q1 between the two ends of a segment, as rotation
-/// vector psi, with what its first and second derivatives are made of.
+/// The rotation p = q0^* q1 between the two ends of a segment, as rotation vector psi, with
+/// the coefficients of its first and second derivatives.
 ///
-/// Let h = p^(1/2), and let the ends turn by alpha and beta (seen from the
-/// midpoint frame q0 h), so that p becomes h exp(-alpha) exp(beta) h. With
-/// delta = beta - alpha, y the half angle |psi|/2 and w = sin y psi/|psi|,
+/// Let h = p^(1/2), and let the ends rotate by alpha and beta (seen from the midpoint frame q0
+/// h), so that p becomes h exp(-alpha) exp(beta) h. With delta = beta - alpha, y the half
+/// angle |psi|/2 and w = sin y psi/|psi|,
 ///
 /// psi' = psi + S delta - S (alpha x beta)/2
 ///        + c1 w |delta|^2 + (c2 delta + c3 w (w . delta)) (w . delta)  + O(3),
 ///
-/// where S = sigma 1 + k w w^T is symmetric (it is the derivative of the
-/// logarithm, taken half-way). The midpoint frame itself turns by
+/// where S = sigma 1 + k w w^T is symmetric (it is the derivative of the logarithm, taken
+/// half-way). The midpoint frame itself rotates by
 ///
 /// mu = eta + (delta x tau)/2
 ///      + ((delta . tau)(eta + (delta x tau)/2) - (eta . delta) tau)/4 + O(3)
@@ -191,7 +191,7 @@ pub struct Relative<S: Simd> {
     pub w: Vectors<S>,
     /// (psi/2)/sin(psi/2).
     pub sigma: Lanes<S>,
-    /// Of S.
+    /// The coefficient k of S.
     pub k: Lanes<S>,
     /// 2 c1, c2, c3.
     pub second: [Lanes<S>; 3],
@@ -238,10 +238,9 @@ impl<S: Simd> Relative<S> {
         self.w.times(self.k * self.w.dot(a), a.scale(self.sigma))
     }
 
-    /// What S diag(a) S and the second derivatives of m . psi' with respect to
-    /// delta (without the bilinear part in alpha and beta) are made of: the
-    /// diagonal matrix sigma^2 diag(a), a multiple of the identity, and half of a
-    /// dyad v w^T + w v^T, as v.
+    /// S diag(a) S plus the second derivatives of m . psi' with respect to delta (without the
+    /// bilinear part in alpha and beta), as a sum of: the diagonal matrix sigma^2 diag(a), a
+    /// multiple of the identity, and half of a dyad v w^T + w v^T, as v.
     #[inline(always)]
     pub fn second_derivatives(
         &self,

@@ -99,8 +99,8 @@ mod tests {
         (0..STAGES).for_each(|i| zero("node", inner(i, 0) - C[i]));
     }
 
-    /// The error estimates see nothing of what methods of order 5 and 3 get
-    /// right, and something of the next power.
+    /// The error estimates vanish for what methods of order 5 and 3 integrate exactly, and not
+    /// for the next power.
     #[test]
     fn the_estimates_are_of_orders_5_and_3() {
         let sum = |weights: &[f64; STAGES], k: i32| -> f64 {

@@ -1,4 +1,4 @@
-//! Several numbers at once: what one instruction of the processor works on.
+//! Vector (SIMD) arithmetic: several numbers per processor instruction.
 
 mod number;
 mod vectors;

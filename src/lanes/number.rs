@@ -1,9 +1,9 @@
-//! The numbers themselves, and code that runs for each width of instruction.
+//! Numbers in lanes, and kernels compiled for each instruction width.
 
 use pulp::{Arch, Scalar, Simd};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// So many numbers make a group: a whole number of the widest instructions used.
+/// Numbers in a group: a multiple of the width of every instruction used.
 pub const GROUP: usize = 4;
 
 /// The numbers of a group.
@@ -23,7 +23,7 @@ impl Four {
     }
 }
 
-/// The widest instructions there are, if a group is a whole number of them.
+/// The widest instructions available whose width divides a group.
 pub fn arch() -> Arch {
     struct Width;
     impl pulp::WithSimd for Width {
@@ -39,7 +39,7 @@ pub fn arch() -> Arch {
 
 /// A loop over groups.
 pub trait Kernel {
-    /// Works on the lanes from `part` on, as many as an instruction has.
+    /// Processes the lanes from `part` on, as many as an instruction has.
     fn run<S: Simd>(&mut self, simd: S, part: usize);
 }
 
@@ -60,20 +60,20 @@ pub fn run(arch: Arch, kernel: &mut impl Kernel) {
     arch.dispatch(Parts(kernel));
 }
 
-/// The part of an array at a place: index of the first, count.
+/// The part of an array given by its first index and its length.
 #[inline(always)]
 pub fn slice(array: &[f64], (first, count): (usize, usize)) -> &[f64] {
     &array[first..first + count]
 }
 
-/// The same, to be written.
+/// The same, mutably.
 #[inline(always)]
 pub fn slice_mut(array: &mut [f64], (first, count): (usize, usize)) -> &mut [f64] {
     &mut array[first..first + count]
 }
 
-/// The parts of several arrays at a place. (Written out: of `map` compilers make
-/// calls, measured at a twentieth of the time of short rods.)
+/// The same part of several arrays. (Written out, as compilers do not inline `map` here:
+/// measured at a twentieth of the time of short rods.)
 #[inline(always)]
 pub fn cut<const K: usize>(arrays: &[impl AsRef<[f64]>; K], place: (usize, usize)) -> [&[f64]; K] {
     let mut parts: [&[f64]; K] = [&[]; K];
@@ -83,7 +83,7 @@ pub fn cut<const K: usize>(arrays: &[impl AsRef<[f64]>; K], place: (usize, usize
     parts
 }
 
-/// The same of three, to be written.
+/// The same for three arrays, mutably.
 #[inline(always)]
 pub fn cut_mut(arrays: &mut [impl AsMut<[f64]>; 3], place: (usize, usize)) -> [&mut [f64]; 3] {
     let [x, y, z] = arrays;
@@ -141,7 +141,7 @@ impl<S: Simd> Lanes<S> {
         self.store(&mut group.0, part);
     }
 
-    /// This where `test` is positive, `otherwise` elsewhere and where it is no number.
+    /// `self` where `test` is positive, `otherwise` elsewhere and where `test` is NaN.
     #[inline(always)]
     pub fn where_positive(self, test: Self, otherwise: Self) -> Self {
         let zero = self.simd.splat_f64s(0.0);
@@ -186,7 +186,7 @@ impl<S: Simd> Lanes<S> {
         self.with(self.simd.sqrt_f64s(self.v))
     }
 
-    /// What `f` makes of every number.
+    /// Applies `f` to every number.
     #[inline(always)]
     pub fn each(self, f: impl Fn(f64) -> f64) -> Self {
         let mut numbers = Four::default();
@@ -209,8 +209,8 @@ impl<S: Simd> Lanes<S> {
         self.simd.reduce_sum_f64s(self.v)
     }
 
-    /// The polynomial with these coefficients, constant term first: in pairs,
-    /// then pairs of these (G. Estrin), which do not wait for each other.
+    /// The polynomial with these coefficients, constant term first: in pairs, then pairs of
+    /// these (Estrin's scheme), which are independent of each other.
     #[inline(always)]
     pub fn polynomial<const N: usize>(self, coefficients: &[f64; N]) -> Self {
         const { assert!(N <= 16, "pairs of pairs of pairs of pairs") };
@@ -228,8 +228,8 @@ impl<S: Simd> Lanes<S> {
         terms[0]
     }
 
-    /// Replaces pairs of the first `count` terms by first + self * second;
-    /// returns how many terms there are then.
+    /// Replaces pairs of the first `count` terms by first + self * second; returns the new
+    /// number of terms.
     #[inline(always)]
     fn pair<const N: usize>(self, terms: &mut [Self; N], count: usize) -> usize {
         for k in 0..count / 2 {

@@ -23,7 +23,7 @@ impl<S: Simd> Vectors<S> {
         Vectors { x, y, z }
     }
 
-    /// The same vector everywhere.
+    /// The same vector in every lane.
     #[inline(always)]
     pub fn splat(simd: S, v: [f64; 3]) -> Self {
         let [x, y, z] = v.map(|v| Lanes::splat(simd, v));
