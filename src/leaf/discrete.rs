@@ -101,8 +101,8 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Whether the ends of nearly rigid segments are apart by their lengths, with a total error of
-    /// at most `within` per rod. Their forces are found by proximal steps: if no shape nearby
+    /// Whether nearly rigid segments have their lengths, with a total error of at most
+    /// `within` per rod. Their forces are found by proximal steps: if no shape nearby
     /// satisfies the lengths, the forces grow from step to step while no node moves.
     pub fn satisfies_lengths(&self, state: &State, within: f64) -> bool {
         let n = self.segments();

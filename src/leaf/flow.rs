@@ -246,7 +246,7 @@ mod tests {
     "#;
 
     /// Largest distance from the exact circle of a rod bent by a moment of 3 A/L, integrated
-    /// in so many steps.
+    /// in `steps` steps.
     fn off_circle(steps: usize) -> f64 {
         const CURVATURE: f64 = 3.0;
         let rod = Scenario::from_toml(ROD).unwrap();

@@ -39,8 +39,8 @@ impl Grid {
         grid
     }
 
-    /// The grid whose nodes are `stations`: made with so many segments, or with a half, a
-    /// quarter ... of these and refined, which differs if there are kinks.
+    /// The grid whose nodes are `stations`: made with this number of segments, or with a half,
+    /// a quarter ... of it and refined, which differs if there are kinks.
     pub fn through(stations: &[f64], kinks: &[f64]) -> Self {
         let segments = stations.len() - 1;
         let grid = Grid::new(segments, kinks);

@@ -57,7 +57,7 @@ impl SparsePattern {
         SparsePattern::bordered(system, 0)
     }
 
-    /// The same with so many dense rows and columns at the end.
+    /// The same with `rows` dense rows and columns at the end.
     pub fn bordered(system: &System, rows: usize) -> Result<Self, SparseError> {
         let unknowns = Unknowns::new(system);
         let border = unknowns.count;
@@ -228,7 +228,7 @@ impl SparseFactor<'_> {
         negative
     }
 
-    /// Solves in group_and_lane, with unknowns numbered as by [`SparsePattern::unknowns`].
+    /// Solves in place, with unknowns numbered as by [`SparsePattern::unknowns`].
     pub fn solve_vector(&mut self, b: &mut [f64]) {
         let mut x: Vec<f64> = self.forward.iter().map(|&k| b[k]).collect();
         let mut memory = std::mem::replace(&mut self.memory, MemBuffer::new(Default::default()));

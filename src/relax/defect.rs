@@ -20,8 +20,8 @@ use crate::relax::nodes::nodes;
 use crate::rotation;
 use glam::DVec3;
 
-/// The linear equations are those of the grid so many levels below the finest, but not of the
-/// coarsest.
+/// The linear equations are those of the grid this many levels below the finest, but not of
+/// the coarsest.
 const COARSER: usize = 2;
 
 /// The part of the error assumed to remain after a correction before it has been measured, and

@@ -16,8 +16,8 @@ use serde::{Serialize, Serializer};
 pub enum Outcome {
     /// At rest in a stable equilibrium, within the tolerance.
     Converged,
-    /// As `Converged`, but a saddle was met before: the leaf was pushed
-    /// off along the unstable mode and came to rest elsewhere.
+    /// As `Converged`, but a saddle was reached before: the leaf was pushed off along the
+    /// unstable mode and came to rest elsewhere.
     ConvergedAfterSaddle,
     /// At rest within the tolerance in an unstable equilibrium, as allowed by the options.
     Saddle,
@@ -80,8 +80,8 @@ pub struct Model {
 }
 
 impl Model {
-    /// Of a leaf of `veins` rods, solved for `rods` of them, in their plane or not,
-    /// on grids of so many segments; `effects` are those of shear and stretch.
+    /// Of a leaf of `veins` rods, solved for `rods` of them, in their plane or not, on grids
+    /// of these `segments`; the effects are those of shear and stretch.
     pub fn new(
         veins: usize,
         (rods, planar): (usize, bool),

@@ -107,7 +107,7 @@ impl Method {
         }
     }
 
-    /// The same method on one grid of so many segments a rod or, without a number, on as many
+    /// The same method on one grid of `segments` segments a rod or, with `None`, on as many
     /// grids as it needs; no change for a method without grids.
     pub fn on_grid(self, segments: Option<usize>) -> Method {
         match self {
@@ -119,7 +119,8 @@ impl Method {
 
     /// The same method with the given settings.
     ///
-    /// # Errors If the method does not have one of the settings.
+    /// # Errors
+    /// If the method does not have one of the settings.
     pub fn with(self, settings: Settings) -> Result<Method, Unfit> {
         let Settings {
             segments,

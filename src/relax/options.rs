@@ -94,7 +94,8 @@ pub const MAX_INTERVALS: usize = 4096;
 
 /// Checks that a tolerance is in range.
 ///
-/// # Errors If it is not.
+/// # Errors
+/// If it is not.
 pub fn check_tolerance(tolerance: f64) -> Result<(), RelaxError> {
     match (SMALLEST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
         true => Ok(()),
@@ -111,7 +112,7 @@ pub enum RelaxError {
          (relative to the largest rod length; double precision does not carry more)"
     )]
     Tolerance {
-        /// The tolerance asked for.
+        /// The requested tolerance.
         found: f64,
     },
     /// Too few segments for the panels of the profiles.
@@ -119,7 +120,7 @@ pub enum RelaxError {
         "segments = {found}: at least {least} are needed, one for every piece between the knots of the profiles"
     )]
     TooFewSegments {
-        /// Segments asked for.
+        /// Requested number of segments.
         found: usize,
         /// Least number that can be used.
         least: usize,
@@ -154,19 +155,19 @@ pub enum RelaxError {
         "method = {found}: a tip that is held (tip.held) is led there by the relaxation; use shooting-from-rest"
     )]
     HeldTip {
-        /// The method asked for.
+        /// The requested method.
         found: &'static str,
     },
     /// Too many modes.
     #[error("modes = {found}: allowed are 0 to {MOST_MODES}")]
     Modes {
-        /// Modes asked for.
+        /// Requested number of modes.
         found: usize,
     },
     /// The number of intervals is out of range.
     #[error("intervals = {found}: allowed are 1 to {MAX_INTERVALS}")]
     Intervals {
-        /// Intervals asked for.
+        /// Requested number of intervals.
         found: usize,
     },
 }

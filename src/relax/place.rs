@@ -162,7 +162,7 @@ impl Differences {
 pub struct ErrorMeasures(Vec<[f64; 2]>);
 
 impl ErrorMeasures {
-    /// Zero, for so many stations.
+    /// Zero, for a number of stations.
     pub fn new(stations: usize) -> Self {
         ErrorMeasures(vec![[0.0; 2]; stations])
     }

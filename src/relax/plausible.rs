@@ -8,7 +8,7 @@ use glam::DVec3;
 /// Largest plausible stretch of a vein relative to its rest stretch.
 const STRETCHED: f64 = 0.2;
 
-/// A leaf so many times longer than (A/q)^(1/3) hangs like a thread: a column is stable under
+/// A leaf longer than (A/q)^(1/3) by this factor hangs like a thread: a column is stable under
 /// its own weight up to 1.99 times that length (Greenhill 1881, Proc. Camb. Phil. Soc. 4).
 const TOO_LONG: f64 = 30.0;
 

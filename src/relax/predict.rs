@@ -42,7 +42,7 @@ pub fn predict(levels: &[&Level], state: &mut State) {
     }
 }
 
-/// Weights of values on grids of so many segments in the value on another, by the polynomial
+/// Weights of values on grids of the given segments in the value on another, by the polynomial
 /// in ds^2 through all of them.
 pub fn weights(segments: &[usize], target: usize) -> Vec<f64> {
     let square = |segments: usize| (segments as f64).powi(-2);

@@ -21,13 +21,14 @@ pub struct Relaxation<'a> {
 impl Scenario {
     /// Brings the leaf to rest, to the scenario's tolerance.
     ///
-    /// # Errors Requests that cannot be met; the end of the run itself is the result's
+    /// # Errors
+    /// Requests that cannot be met; the end of the run itself is the result's
     /// [`Outcome`](crate::relax::Outcome).
     pub fn relax(&self) -> Result<Equilibrium, RelaxError> {
         self.relaxation().run()
     }
 
-    /// The same with wishes:
+    /// The same with options:
     ///
     /// ```
     /// use leafdyn::relax::Method;
@@ -63,7 +64,7 @@ impl<'a> Relaxation<'a> {
         self
     }
 
-    /// Uses one grid of so many segments a rod, without extrapolation and hence without an
+    /// Uses one grid of `segments` segments a rod, without extrapolation and hence without an
     /// error estimate.
     pub fn grid(mut self, segments: usize) -> Self {
         self.options.method = self.options.method.on_grid(Some(segments));
@@ -76,7 +77,7 @@ impl<'a> Relaxation<'a> {
         self
     }
 
-    /// Requests so many of the lowest modes of vibration.
+    /// Requests the `count` lowest modes of vibration.
     pub fn modes(mut self, count: usize) -> Self {
         self.options.modes = count;
         self.options.mode_shapes = count > 0;

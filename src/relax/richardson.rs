@@ -44,7 +44,7 @@ pub struct Richardson {
 }
 
 impl Richardson {
-    /// Adds the values of the next finer grid, with so many segments.
+    /// Adds the values of the next finer grid, which has `segments` segments.
     pub fn push(&mut self, segments: usize, values: Vec<f64>) {
         let mut row = vec![values];
         if let Some(coarser) = self.table.last() {

@@ -267,7 +267,7 @@ impl<'a, 'o> Run<'a, 'o> {
     }
 
     /// Whether errors by unfinished iterations and rounding alone exceed the tolerance on a
-    /// grid of so many `segments` and are already at least half of the present error:
+    /// grid of `segments` segments and are already at least half of the present error:
     /// refinement does not help then.
     pub fn beyond_rounding(&self, segments: usize) -> bool {
         let floor = self.unfinished(segments);

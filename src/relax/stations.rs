@@ -15,7 +15,7 @@ const BETWEEN: &str = "the tolerance is kept where the leaf was solved for, but 
     stations between: ask for a smaller tolerance, or for other stations";
 
 impl Equilibrium {
-    /// The same at stations that divide every vein into so many equal parts; `None`: at the
+    /// The same at stations that divide every vein into `parts` equal parts; `None`: at the
     /// nodes of the finest grid, with its segments halved until there are at least 17
     /// stations.
     ///

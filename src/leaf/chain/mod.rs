@@ -94,7 +94,7 @@ pub struct Masses<'a> {
 }
 
 impl<const B: usize> Chain<B> {
-    /// Identity matrices, for rods with so many segments.
+    /// Identity matrices, for rods with `segments` segments.
     pub fn new(segments: usize, joined: bool) -> Self {
         let zeros = vec![Four::default(); segments * entries(B)];
         let mut chain = Chain {
@@ -201,7 +201,7 @@ impl<const B: usize> Chain<B> {
         run(arch, &mut Forward { chain, b, y });
     }
 
-    /// Backward substitution in group_and_lane, from the result of [`Chain::forward`]; with a joint tip
+    /// Backward substitution in place, from the result of [`Chain::forward`]; with a joint tip
     /// the last dx slots must hold its displacement. Returns b . y.
     pub fn backward(&self, arch: Arch, b: &[Increments], y: &mut [Increments]) -> f64 {
         let mut kernel = Backward {

@@ -26,7 +26,7 @@ pub struct Response {
 }
 
 impl Forces {
-    /// Zero, for so many rods.
+    /// Zero, for `rods` rods.
     pub fn none(rods: usize) -> Forces {
         Forces {
             nodes: vec![Vec::new(); rods],
@@ -80,7 +80,7 @@ impl Forces {
 }
 
 impl Response {
-    /// Zero, for so many rods of so many segments.
+    /// Zero, for `rods` rods of `segments` segments.
     pub fn none(rods: usize, segments: usize) -> Response {
         Response {
             nodes: vec![vec![[0.0; 6]; segments]; rods],

@@ -126,7 +126,7 @@ impl<'s> LeafRate<'s> {
 }
 
 impl LeafRate<'_> {
-    /// The angle by which the base of rod `j` turns.
+    /// The rate of rotation of the base of rod `j`.
     pub fn base_turn(&self, j: usize) -> f64 {
         self.rods[j].angle
     }

@@ -17,9 +17,9 @@ const MAX_ITERATIONS: usize = 200;
 /// The outcome of a linear solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solved {
-    /// Converged to the tolerance, in so many iterations.
+    /// Converged to the tolerance, with the number of iterations.
     Yes(usize),
-    /// The matrix is not positive definite; detected after so many iterations.
+    /// The matrix is not positive definite; detected after this number of iterations.
     Indefinite(usize),
     /// The iteration limit was reached.
     TooSlow(usize),

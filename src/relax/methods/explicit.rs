@@ -23,8 +23,8 @@ use glam::DVec3;
 /// Time between checks of the moving leaf, in units of sqrt(rho L^4/A).
 const CHECK_INTERVAL: f64 = 0.25;
 
-/// It is in a valley if its energy is convex in so many checks in a row and its kinetic energy
-/// is at most this part of the maximum.
+/// It is in a valley if its energy is convex in this many consecutive checks and its kinetic
+/// energy is at most this part of the maximum.
 const CONVEX: usize = 3;
 const SLOW: f64 = 1e-2;
 

@@ -119,7 +119,7 @@ fn largest_turn(leaf: &Leaf) -> f64 {
 }
 
 /// The largest curvature (radians per length) of the rod under a large moment alone; `None` if
-/// the moment is small, or too large for a grid of so many segments.
+/// the moment is small, or too large for a grid of `segments` segments.
 pub fn turning(leaf: &Leaf, segments: usize) -> Option<f64> {
     if largest_turn(leaf) <= LARGEST_BY_STEPS {
         return None;

@@ -30,8 +30,8 @@ fn station_grid(scenario: &Scenario) -> Grid {
     Grid::new(segments, leaf.kinks())
 }
 
-/// Refuses a number of intervals that is out of range or needs too much memory for so many
-/// `rods`; without a number the check is for one interval, the fewest that will be chosen.
+/// Refuses a number of intervals that is out of range or needs too much memory for this number
+/// of `rods`; without a number the check is for one interval, the fewest that will be chosen.
 pub fn check_intervals(rods: usize, intervals: Option<usize>) -> Result<(), RelaxError> {
     if let Some(found) = intervals.filter(|found| !(1..=MAX_INTERVALS).contains(found)) {
         return Err(RelaxError::Intervals { found });
