@@ -171,9 +171,9 @@ pub fn apply(changes: &[Vec<Change>], known: &mut [Vec<RodFields>]) {
     }
 }
 
-/// The larger of two numbers; the second if either is NaN.
+/// The larger of two numbers; NaN if one is.
 pub fn larger(a: f64, b: f64) -> f64 {
-    if b <= a { a } else { b }
+    if a.is_nan() || b <= a { a } else { b }
 }
 
 /// The state with its nodes displaced.
@@ -185,4 +185,20 @@ fn moved(state: &State, response: &Response) -> State {
         }
     }
     moved
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_that_is_none_stays_the_largest() {
+        let largest = |numbers: [f64; 3]| numbers.into_iter().fold(0.0, larger);
+        assert_eq!(largest([1.0, 3.0, 2.0]), 3.0);
+        for at in 0..3 {
+            let mut numbers = [1.0, 3.0, 2.0];
+            numbers[at] = f64::NAN;
+            assert!(largest(numbers).is_nan(), "{at}");
+        }
+    }
 }
