@@ -21,6 +21,11 @@ const EXTRAPOLATED: f64 = 2.0;
 /// Safety factor on the error estimated from the defect of the extrapolated leaf.
 const SAFETY: f64 = 2.0;
 
+/// The least part of the largest error between the nodes of the coarsest grid that is taken
+/// for the error at these nodes: where layers are thinner than its segments the linear
+/// equations of a coarse grid are wrong by so much.
+const LAYERS: f64 = 0.1;
+
 /// Upper bound of that estimate in units of the error estimated from the last extrapolation:
 /// the response of a neutral mode to rounding is not an error.
 const LARGEST: f64 = 10.0;
@@ -211,7 +216,10 @@ impl<'a, 'o> Run<'a, 'o> {
             Some(estimate) if self.too_coarse(self.levels[0].leaf.segments()) => {
                 (SAFETY * estimate.largest()).min(LARGEST * best)
             }
-            Some(estimate) => (SAFETY * estimate.at_nodes).min(LARGEST * best),
+            Some(estimate) => {
+                let at_nodes = estimate.at_nodes.max(LAYERS * estimate.between);
+                (SAFETY * at_nodes).min(LARGEST * best)
+            }
             None => best,
         };
         Some(extrapolation + self.unfinished(segments))
