@@ -183,9 +183,9 @@ fn of_a_saddle_that_is_kept() {
     }
 }
 
-/// Error, estimate and grids at 1e-6 of a leaf that comes to rest there and at 1e-10, from
-/// which the error is uncertain: what that leaves is taken off it. From nothing of the truth
-/// are errors subtracted, as in [`Verdict::judge`].
+/// Error, estimate and grids of a leaf at a tolerance of 1e-6, if it comes to rest there and
+/// at 1e-10, its reference; the error is reduced by the uncertainty of the reference, which
+/// is extrapolated, not corrected, as in [`Verdict::judge`].
 fn at_the_edge(leaf: &Scenario) -> Option<(f64, f64, Vec<usize>)> {
     let limit = Duration::from_secs(2);
     let to = |(tolerance, modes)| {

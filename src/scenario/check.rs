@@ -4,6 +4,7 @@
 use std::f64::consts::PI;
 
 use super::dynamics::{OUTPUTS, round_inertia};
+use super::entries::MOST_RODS;
 use super::error::ScenarioError;
 use super::key::Key;
 use super::material::Sections;
@@ -12,9 +13,6 @@ use super::{Dynamics, Profile, Rod, Scenario, Start, Units, limits, tip};
 
 type Result<T> = std::result::Result<T, ScenarioError>;
 
-/// Most rods: a leaf of 100,000 rods and eight segments already has five
-/// million unknowns.
-pub const MOST_RODS: usize = 100_000;
 /// Longest name: it must be allowed everywhere as the name of a folder with files.
 const LONGEST_NAME: usize = 100;
 /// Longest name of a unit, which figures show at their axes.
