@@ -129,9 +129,9 @@ proptest! {
 #[test]
 fn the_paper_s_flat_leaf_is_found_in_its_plane() {
     for (rods, work) in [
-        (5, [6, 12, 12, 25]),
-        (21, [6, 12, 12, 23]),
-        (35, [6, 12, 12, 22]),
+        (5, [4, 10, 10, 16]),
+        (21, [4, 10, 10, 14]),
+        (35, [4, 10, 10, 13]),
     ] {
         let leaf = fig05(&format!("leaf.rods={rods}"));
         let (planar, full) = (rest(&leaf, false, None), rest(&leaf, true, None));

@@ -68,6 +68,16 @@ impl Grid {
         self.cut(|a, b, third| [a, a + third, b - third])
     }
 
+    /// The grid of which this is the refined one; `None` if there is none.
+    pub fn coarsened(&self) -> Option<Self> {
+        let pairs = self.widths.chunks(2);
+        let equal = |pair: &[f64]| matches!(pair, [a, b] if a == b);
+        pairs.clone().all(equal).then(|| Grid {
+            sigma: self.sigma.iter().copied().step_by(2).collect(),
+            widths: pairs.map(|pair| 2.0 * pair[0]).collect(),
+        })
+    }
+
     /// With every segment divided in N: `nodes` gives its first nodes from its ends and the
     /// new width.
     fn cut<const N: usize>(&self, nodes: impl Fn(f64, f64, f64) -> [f64; N]) -> Self {

@@ -1,20 +1,21 @@
-//! Defect correction: the error of an extrapolated leaf estimated from its defect, and
-//! subtracted.
+//! Defect correction: the error of a leaf on one grid, or extrapolated over several, estimated
+//! from its defect, and subtracted.
 //!
-//! The equilibrium equations are integrated from the nodes of the coarsest grid, where the
-//! extrapolated leaf is most accurate, to the midpoints between them, by a method of order 8.
-//! The jumps of position, rotation, force and moment there are the defect; to first order
-//! the error is the response of the leaf to these jumps. The linear equations are those of
-//! a coarse grid: the relative error of the response is of second order.
+//! The equilibrium equations are integrated from the nodes of the coarsest grid, where an
+//! extrapolated leaf is most accurate (of a single grid: from every second node), to the
+//! midpoints between them, by a method of order 8. The jumps of position, rotation, force and
+//! moment there are the defect; to first order the error is the response of the leaf to these
+//! jumps. The linear equations are those of a coarse grid: the relative error of the response
+//! is of second order.
 //!
 //! The response may be subtracted and the remaining error estimated again: iterated defect
 //! correction (Stetter, Numer. Math. 29 (1978) 425). The leaf then converges, on the nodes
-//! of the coarsest grid, to the solution of the equations themselves, in each round by the
-//! relative error of the linear equations: about a hundredth.
+//! from which it is integrated, to the solution of the equations themselves, in each round by
+//! the relative error of the linear equations: about a hundredth on 8 segments.
 
 use crate::leaf::{DiscreteLeaf, Flow, Grid, Jump, RodFields, Slice, System};
 use crate::newton::Work;
-use crate::relax::correction::{Response, Tangents, apply, larger, largest_rotation_and_stress};
+use crate::relax::correction::{Tangents, apply, larger, largest_rotation_and_stress};
 use crate::relax::level::Level;
 use crate::relax::nodes::nodes;
 use crate::rotation;
@@ -24,10 +25,15 @@ use glam::DVec3;
 /// the coarsest.
 const COARSER: usize = 2;
 
-/// The part of the error assumed to remain after a correction before it has been measured, and
-/// the largest measured part with which corrections continue.
-const CONTRACTION: f64 = 0.01;
+/// The part of the error assumed to remain after a correction before it has been measured: on
+/// a grid of n segments the first number over n^2, but no less than the second; and the largest
+/// measured part with which corrections continue.
+const CONTRACTION: (f64, f64) = (0.64, 0.01);
 const SLOWEST: f64 = 0.2;
+
+/// The part of the integration error that remains with halved steps, or less: with order 8 it
+/// is a 256th.
+const HALVED: f64 = 1.0 / 16.0;
 
 /// Errors of rotations, and of forces and moments, allowed in a corrected leaf, in multiples
 /// of that of the positions (dimensionless): as they are in an extrapolated one.
@@ -40,9 +46,9 @@ pub struct Linear {
     system: System,
 }
 
-/// A leaf on several grids, with its error estimated from the equilibrium equations.
+/// A leaf on one grid or several, with its error estimated from the equilibrium equations.
 pub struct Estimate {
-    /// The largest error of a position at the nodes of the coarsest grid.
+    /// The largest error of a position at the nodes from which the leaf was integrated.
     pub at_nodes: f64,
     /// The largest error on either side of the midpoints between them.
     pub between: f64,
@@ -66,8 +72,8 @@ impl Estimate {
 /// Estimates the error of the leaf on `levels`, from coarse to fine, each with twice the
 /// segments of the one before, with `columns` extrapolations. If the error is more than
 /// `enough` the leaf is corrected, up to `most` times, provided that this reduces it below.
-/// `None` where the linear equations cannot be solved; they are factorised unless `linear`
-/// has them already.
+/// `None` where the linear equations cannot be solved, or where the segments of a single level
+/// are not pairs of equal ones. The equations are factorised unless `linear` has them already.
 pub fn estimate(
     levels: &[Level],
     columns: usize,
@@ -75,43 +81,42 @@ pub fn estimate(
     linear: &mut Option<Linear>,
     work: &mut Work,
 ) -> Option<Estimate> {
-    let grid = levels
-        .len()
-        .checked_sub(2)?
-        .saturating_sub(COARSER - 1)
-        .max(1);
+    let (first, last) = (&levels.first()?.leaf, levels.len() - 1);
+    // The linear equations need two segments between nodes.
+    let (parts, grid) = match last {
+        0 => (first.grid.coarsened()?, 0),
+        _ => (first.grid.clone(), last.saturating_sub(COARSER).max(1)),
+    };
     if linear.as_ref().is_none_or(|linear| linear.grid != grid) {
         let system = factorized(&levels[grid], work)?;
         *linear = Some(Linear { grid, system });
     }
     let (level, system) = (&levels[grid], &mut linear.as_mut()?.system);
-    let (first, finest) = (&levels[0].leaf, levels.last()?.leaf.segments());
-    let (mut known, mut flow) = (nodes(levels, columns), Flow::new(first));
-    let mut tangents = Tangents::new(level, first.segments());
-    let finest_grid = &levels.last()?.leaf.grid;
-    let estimate = |round: &Round, corrections: usize, halvings: usize| Estimate {
-        at_nodes: round.largest[0],
-        between: round.largest[1],
-        rods: round.integrated.rods(&round.known),
-        energy: round.integrated.energy,
-        grid: (0..halvings).fold(finest_grid.clone(), |grid, _| grid.refined()),
-        corrections,
-    };
+    let (finest, count) = (&levels[last].leaf.grid, parts.segments());
+    let (mut known, mut flow) = (nodes(levels, columns, count), Flow::new(first));
+    let mut tangents = Tangents::new(level, count);
+    let n = level.leaf.segments() as f64;
+    let assumed = (CONTRACTION.0 / (n * n)).max(CONTRACTION.1);
     let mut uncorrected = None;
     let mut before = 0.0;
-    let (mut halvings, mut halved) = (0, false);
+    let mut steps = Steps::new(finest.segments() / count / 2);
     for corrections in 0..=most {
         satisfy_tip_conditions(first, &mut known);
-        let steps = (finest / first.segments() / 2) << halvings;
-        let Some((response, round)) = round(first, &mut flow, &known, steps, (&tangents, system))
-        else {
+        let integrated = integrated((first, &parts), &mut flow, &known, steps.count);
+        let Some(response) = tangents.response(system, &integrated.jumps) else {
             break;
         };
+        let round = Round {
+            known: known.clone(),
+            integrated,
+            largest: response.largest(),
+        };
         let largest = larger(round.largest[0], round.largest[1]);
-        // With halved steps the estimate includes the integration error of the longer steps:
-        // its ratio is no measure of the contraction.
-        let contraction = match corrections == 0 || halved {
-            true => CONTRACTION,
+        steps.measure(largest);
+        // With halved steps the error includes that of the longer ones: its ratio is no measure
+        // of the contraction.
+        let contraction = match corrections == 0 || steps.halved {
+            true => assumed,
             false => largest / before,
         };
         if !largest.is_finite() || contraction > SLOWEST {
@@ -119,35 +124,65 @@ pub fn estimate(
         }
         let rounds_left = i32::try_from(most - corrections).unwrap_or(0);
         let out_of_reach = largest * contraction.powi(rounds_left) > enough;
-        let last = corrections == 0 && (largest <= enough || out_of_reach);
-        if out_of_reach && !last {
+        if corrections == 0 && (largest <= enough || out_of_reach) {
+            return Some(round.estimate(0, 0.0, finest));
+        }
+        if out_of_reach {
             break;
         }
-        let changes = match last {
-            true => Vec::new(),
-            false => tangents.changes(&response, &round.integrated.jumps),
-        };
-        if last {
-            return Some(estimate(&round, corrections, halvings));
-        }
+        let changes = tangents.changes(&response, &round.integrated.jumps);
         if corrections == 0 {
             uncorrected = Some(round);
-        } else if largest <= enough && halved {
-            // The halved steps have accounted for the integration error, too.
+        } else if largest + steps.error <= enough {
             let [turn, stress] = largest_rotation_and_stress(&changes);
             if larger(turn / TURNS, stress / FORCES) <= enough {
-                return Some(estimate(&round, corrections, halvings));
+                return Some(round.estimate(corrections, steps.error, finest));
             }
         }
         apply(&changes, &mut known);
         before = largest;
-        halved = largest * contraction <= enough;
-        halvings += usize::from(halved);
+        steps.choose(largest * contraction, enough);
     }
-    uncorrected.map(|round| estimate(&round, 0, 0))
+    uncorrected.map(|round| round.estimate(0, 0.0, finest))
 }
 
-/// A leaf given at the nodes of the coarsest grid, integrated along its rods, with its largest
+/// The steps of the integration from a node to a midpoint.
+struct Steps {
+    count: usize,
+    /// Whether they are half of those of the round before.
+    halved: bool,
+    /// Bound on the error of the integration.
+    error: f64,
+}
+
+impl Steps {
+    fn new(count: usize) -> Self {
+        Steps {
+            count,
+            halved: false,
+            error: f64::INFINITY,
+        }
+    }
+
+    /// With the estimated error of a round: after a round with longer steps it includes their
+    /// error, and so bounds that of the halved steps.
+    fn measure(&mut self, largest: f64) {
+        if self.halved {
+            self.error = HALVED * largest;
+        }
+    }
+
+    /// Halves the steps if the next round, whose error is `expected`, may be the last and their
+    /// own error is not known to be small.
+    fn choose(&mut self, expected: f64, enough: f64) {
+        self.halved = self.error > 0.5 * enough && expected <= enough;
+        if self.halved {
+            self.count *= 2;
+        }
+    }
+}
+
+/// A leaf given at the nodes between its parts, integrated along its rods, with its largest
 /// errors at these nodes and at the midpoints between them.
 struct Round {
     known: Vec<Vec<RodFields>>,
@@ -155,23 +190,24 @@ struct Round {
     largest: [f64; 2],
 }
 
-/// The leaf `known`, integrated in `steps` steps from every node to the midpoints, and its
-/// response to the jumps there. `None` if the linear equations cannot be solved.
-fn round(
-    first: &DiscreteLeaf,
-    flow: &mut Flow,
-    known: &[Vec<RodFields>],
-    steps: usize,
-    (tangents, system): (&Tangents, &mut System),
-) -> Option<(Response, Round)> {
-    let integrated = integrated(first, flow, known, steps);
-    let response = tangents.response(system, &integrated.jumps)?;
-    let round = Round {
-        known: known.to_vec(),
-        integrated,
-        largest: response.largest(),
-    };
-    Some((response, round))
+impl Round {
+    /// The leaf on the `finest` grid, or on the refined one that has the ends of all steps;
+    /// `error` is that of the integration.
+    fn estimate(&self, corrections: usize, error: f64, finest: &Grid) -> Estimate {
+        let rods = self.integrated.rods(&self.known);
+        let mut grid = finest.clone();
+        while grid.segments() + 1 < rods[0].len() {
+            grid = grid.refined();
+        }
+        Estimate {
+            at_nodes: self.largest[0] + error,
+            between: self.largest[1] + error,
+            rods,
+            energy: self.integrated.energy,
+            grid,
+            corrections,
+        }
+    }
 }
 
 /// Assembled anew at rest: the equations of the last Newton step have the forces before it,
@@ -196,22 +232,22 @@ struct Integrated {
     energy: f64,
 }
 
-/// The leaf `known` at the nodes of the coarsest grid, integrated from there to the midpoints
-/// between them in `steps` steps, and the jumps there.
+/// The leaf `known` at the nodes of `parts`, integrated from there to the midpoints between
+/// them in `steps` steps, and the jumps there.
 fn integrated(
-    first: &DiscreteLeaf,
+    (leaf, parts): (&DiscreteLeaf, &Grid),
     flow: &mut Flow,
     known: &[Vec<RodFields>],
     steps: usize,
 ) -> Integrated {
-    let (grid, n) = (&first.grid, first.segments());
+    let n = parts.segments();
     let mut slices = vec![[(); 2].map(|()| vec![Slice::default(); steps]); n];
-    let mut jumps = vec![Vec::with_capacity(n); first.rods()];
+    let mut jumps = vec![Vec::with_capacity(n); leaf.rods()];
     let mut energy = 0.0;
     for (i, ends) in slices.iter_mut().enumerate() {
         let [before, behind] = &mut *ends;
         for (k, after, sign) in [(i, before, 1.0), (i + 1, behind, -1.0)] {
-            flow.integrate(|j| known[j][k], [grid.sigma()[k], grid.middle(i)], after);
+            flow.integrate(|j| known[j][k], [parts.sigma()[k], parts.middle(i)], after);
             energy += sign * flow.energy();
         }
         for (j, jumps) in jumps.iter_mut().enumerate() {
@@ -223,9 +259,7 @@ fn integrated(
         }
     }
     for (j, known) in known.iter().enumerate() {
-        energy -= known
-            .last()
-            .map_or(0.0, |tip| first.tip_force(j).dot(tip.x));
+        energy -= known.last().map_or(0.0, |tip| leaf.tip_force(j).dot(tip.x));
     }
     Integrated {
         slices,

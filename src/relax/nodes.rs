@@ -11,10 +11,10 @@ const FIELDS: usize = 13;
 
 pub type Node = [f64; FIELDS];
 
-/// The leaf's fields after `columns` extrapolations at the nodes of the coarsest grid, rod
-/// after rod, dimensionless.
-pub fn nodes(levels: &[Level], columns: usize) -> Vec<Vec<RodFields>> {
-    let (first, finest) = (&levels[0], &levels[levels.len() - 1]);
+/// The leaf's fields after `columns` extrapolations at the ends of `parts` equal parts of its
+/// grids, rod after rod, dimensionless.
+pub fn nodes(levels: &[Level], columns: usize, parts: usize) -> Vec<Vec<RodFields>> {
+    let finest = &levels[levels.len() - 1];
     let used: Vec<&Level> = levels[levels.len() - 1 - columns..].iter().collect();
     let node = |values: &Node| {
         let vector = |k: usize| DVec3::from_slice(&values[k..]);
@@ -27,10 +27,10 @@ pub fn nodes(levels: &[Level], columns: usize) -> Vec<Vec<RodFields>> {
         }
     };
     let rod = |j: usize| {
-        let nodes = RodNodes::new(&used, finest, j).extrapolated(first.leaf.segments());
+        let nodes = RodNodes::new(&used, finest, j).extrapolated(parts);
         nodes.iter().map(node).collect()
     };
-    (0..first.leaf.rods()).map(rod).collect()
+    (0..finest.leaf.rods()).map(rod).collect()
 }
 
 /// The nodes of a rod on several grids, each computed on first use and cached: nodes common to

@@ -34,9 +34,13 @@ const LARGEST: f64 = 10.0;
 /// not computed: it would hardly be small enough.
 const OUT_OF_REACH: f64 = 3e3;
 
+/// The smallest tolerance for which the first grid is tried alone: below it two grids, which
+/// need fewer corrections, are faster.
+const LEAST_ALONE: f64 = 5e-9;
+
 /// Largest number of corrections by the estimated error, and the part of the error that each
 /// leaves at best.
-const CORRECTIONS: usize = 4;
+const CORRECTIONS: usize = 6;
 const CORRECTED: f64 = 1e-2;
 
 /// For leaves with more nodes than this no equations are kept while others are solved, which
@@ -201,28 +205,27 @@ impl<'a, 'o> Run<'a, 'o> {
         self.options.limit.reached()
     }
 
-    /// Error estimate of the extrapolated values, relative to the leaf's length:
-    /// extrapolation, unfinished iterations and rounding.
+    /// Error estimate relative to the leaf's length: grids, unfinished iterations and rounding.
     pub fn error(&self) -> Option<f64> {
-        let segments = self.levels.last()?.leaf.segments();
-        let best = self.table.best()?.error;
+        let segments = [self.levels.first()?, self.levels.last()?].map(|it| it.leaf.segments());
+        let best = self.table.best().map(|best| best.error);
+        let most = best.map_or(f64::INFINITY, |best| LARGEST * best);
         let extrapolation = match &self.estimate {
             // The errors of unfinished iterations are corrected with the others.
             Some(estimate) if estimate.corrections > 0 => {
-                let segments = self.levels[0].leaf.segments() as f64;
-                return Some(SAFETY * estimate.largest() + ROUNDING * segments);
+                return Some(SAFETY * estimate.largest() + ROUNDING * segments[0] as f64);
             }
             // If nodes are few the midpoints are stations, too.
-            Some(estimate) if self.too_coarse(self.levels[0].leaf.segments()) => {
-                (SAFETY * estimate.largest()).min(LARGEST * best)
+            Some(estimate) if self.too_coarse(segments[0]) || best.is_none() => {
+                (SAFETY * estimate.largest()).min(most)
             }
             Some(estimate) => {
                 let at_nodes = estimate.at_nodes.max(LAYERS * estimate.between);
-                (SAFETY * at_nodes).min(LARGEST * best)
+                (SAFETY * at_nodes).min(most)
             }
-            None => best,
+            None => best?,
         };
-        Some(extrapolation + self.unfinished(segments))
+        Some(extrapolation + self.unfinished(segments[1]))
     }
 
     /// Error by unfinished iterations and rounding on a grid of `segments` segments.
@@ -258,17 +261,19 @@ impl<'a, 'o> Run<'a, 'o> {
         }
     }
 
-    /// Estimates the error of the extrapolated values from their defect, and corrects it if
-    /// that makes them accurate enough.
+    /// Estimates the error of the values on the only grid or of the extrapolated values from
+    /// their defect, and corrects it if that makes them accurate enough.
     pub fn estimate_accuracy(&mut self) {
         let most = self.corrections();
-        let farthest = OUT_OF_REACH * CORRECTED.powi(-(most as i32));
-        let best = self.table.best();
-        let near = best.filter(|best| best.error <= farthest * self.tolerance);
+        let farthest = OUT_OF_REACH * CORRECTED.powi(-(most as i32)) * self.tolerance;
+        let columns = match self.table.best() {
+            Some(best) => (best.error <= farthest).then_some(best.columns),
+            None => (most > 0 && self.tolerance >= LEAST_ALONE).then_some(0),
+        };
         let enough = (self.tolerance / SAFETY - ROUNDING * COARSEST as f64, most);
         let (levels, linear, work) = (&self.levels, &mut self.linear, &mut self.work);
         self.estimate =
-            near.and_then(|best| defect::estimate(levels, best.columns, enough, linear, work));
+            columns.and_then(|columns| defect::estimate(levels, columns, enough, linear, work));
         if (self.levels.last()).is_some_and(|level| is_large(&level.leaf)) {
             self.linear = None;
         }

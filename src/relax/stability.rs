@@ -19,10 +19,16 @@ impl Run<'_, '_> {
         }
     }
 
-    /// Counts the negative eigenvalues on the finest grid. If saddles are accepted the number
-    /// must be that on the grid before. Otherwise the leaf is pushed off a saddle, and the
-    /// grids start again from the equilibrium reached. Returns whether stability is known, as
-    /// far as possible: if not, finer grids are needed.
+    /// Whether the stability on the first grid may not be that on finer ones.
+    fn needs_comparison(&self) -> bool {
+        self.levels.len() == 1 && self.segments().is_none() && !self.clearly_stable
+    }
+
+    /// Counts the negative eigenvalues on the finest grid. On the first of several grids the
+    /// leaf must be clearly stable. If saddles are accepted the number must be that on the grid
+    /// before. Otherwise the leaf is pushed off a saddle, and the grids start again from the
+    /// equilibrium reached. Returns whether stability is known, as far as possible: if not,
+    /// finer grids are needed.
     pub fn check_stability(&mut self) -> Result<bool, Stop> {
         let level = self.levels.last().expect("the leaf has settled");
         if level.leaf.tip_moment() != DVec3::ZERO {
@@ -32,6 +38,9 @@ impl Run<'_, '_> {
             let level = complete(self.leaf, whole, level);
             let mut system = System::new(&level.leaf);
             self.index = self.count_negative(&level, &mut system);
+            if self.needs_comparison() {
+                return Ok(false);
+            }
             return match self.index {
                 Some(0) => Ok(true),
                 _ => Err(Stop::Saddle),
@@ -44,6 +53,9 @@ impl Run<'_, '_> {
         let mut system = spare_system.unwrap_or_else(|| System::new(&level.leaf));
         self.index = self.count_negative(&level, &mut system);
         self.levels.push(level);
+        if self.needs_comparison() {
+            return Ok(false);
+        }
         if !matches!(self.index, Some(1..)) {
             return Ok(true);
         }
