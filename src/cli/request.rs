@@ -9,10 +9,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use clap::{Args, ValueHint};
 use rayon::prelude::*;
 
-use crate::files::{self, Kind, Selection};
+use crate::files::{self, Kind, Selection, Written};
 use crate::memory;
 use crate::report::table::{list_files, rows_of_json};
-use crate::report::{Refused, Written, json};
+use crate::report::{Refused, json};
 use crate::scenario::Scenario;
 use crate::study::Base;
 

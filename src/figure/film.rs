@@ -14,7 +14,7 @@ use super::setting::Setting;
 use super::space::{Margins, Scene, View, common_box};
 use super::veins::Veins;
 use crate::report::numbers::short;
-use crate::report::{Document, Format};
+use crate::scenario::Scenario;
 use crate::simulate::{Record, Still};
 
 /// Duration of the film in hundredths of a second, and its most pictures.
@@ -37,20 +37,9 @@ const MARGINS: Margins = Margins {
 /// Index of a pixel that has not changed.
 const SAME: u8 = 255;
 
-/// The film as a file of this name; a single picture where no motion is recorded.
-pub struct Film(pub &'static str);
-
-impl Format<Record> for Film {
-    fn file_name(&self) -> &'static str {
-        self.0
-    }
-
-    fn write(&self, document: &Document<Record>, out: &mut dyn Write) -> io::Result<()> {
-        write(document.result, &Setting::of(document.input), out)
-    }
-}
-
-fn write(record: &Record, setting: &Setting, out: &mut dyn Write) -> io::Result<()> {
+/// Writes the film; a single picture where no motion is recorded.
+pub fn write(record: &Record, scenario: &Scenario, out: &mut dyn Write) -> io::Result<()> {
+    let setting = &Setting::of(scenario);
     let film = match record.film.as_slice() {
         [] => &record.stills,
         film => film,
@@ -270,9 +259,10 @@ mod tests {
             curves: (0..5).map(|rod| frame.centerline(rod).to_vec()).collect(),
         };
         record.film = frames.iter().enumerate().map(still).collect();
-        let setting = Setting::of(&sample::scenario("swing", 5));
+        let scenario = sample::scenario("swing", 5);
+        let setting = Setting::of(&scenario);
         let mut bytes = Vec::new();
-        write(&record, &setting, &mut bytes).unwrap();
+        write(&record, &scenario, &mut bytes).unwrap();
         assert!(bytes.len() < 5_000_000, "{}", bytes.len());
         let (repeat, delays, pictures) = decoded(&bytes);
         assert_eq!(repeat, gif::Repeat::Infinite);

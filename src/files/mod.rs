@@ -3,6 +3,7 @@
 
 mod atomic;
 mod checksum;
+mod format;
 mod journal;
 mod owner;
 mod peers;
@@ -15,38 +16,41 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 pub use atomic::{abandon_unfinished, check_writable};
+pub use format::{Format, Kind, Written};
 pub use journal::{Journal, belongs, claim, write_rows};
 pub use owner::{check_owner, source};
 pub use peers::read_peers;
 pub use recording::{Checkpointer, Recording};
 
-use crate::figure::view::{self, Page, Series, glb, vtk};
-use crate::figure::{self, Film, Picture};
+use crate::figure;
+use crate::figure::view::{self, Shape, glb, vtk};
 use crate::relax::Equilibrium;
-use crate::report::table::Table;
-use crate::report::{self, Format, json};
-pub use crate::report::{Document, FileError, Kind, Written};
+use crate::report::{self, json};
+pub use crate::report::{Document, FileError};
+use crate::scenario::Radii;
 use crate::simulate::Record;
 use crate::study::{All, Boundary, Chart, Check, Fit, Map, Scaling, Trace};
 
 impl Written for Equilibrium {
     const JSON: Option<&'static str> = Some("summary.json");
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Table("centerlines.csv", report::centerlines),
-        &Picture::svg("figure.svg", figure::leaf),
-        &Picture::png("figure.png", figure::leaf),
-        &Page("view.html"),
-        &vtk::Lines("leaf.vtp"),
-        &Table("leaf.glb", glb::leaf),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Table("centerlines.csv", report::centerlines),
+        Format::Svg("figure.svg", figure::leaf),
+        Format::Png("figure.png", figure::leaf),
+        Format::Space("view.html", view::write),
+        Format::Space("leaf.vtp", |it, input, out| {
+            vtk::leaf(it, &input.radii, out)
+        }),
+        Format::Table("leaf.glb", glb::leaf),
     ];
 
-    const MORE: &'static [&'static dyn Format<Self>] = &[
-        &Table("modes.csv", report::modes_table),
-        &Picture::svg("modes.svg", figure::modes),
-        &Picture::png("modes.png", figure::modes),
-        &Table("sensitivity.csv", report::sensitivity_table),
-        &Picture::svg("sensitivity.svg", |it, _| figure::sensitivity(it)),
-        &Picture::png("sensitivity.png", |it, _| figure::sensitivity(it)),
+    const MORE: &'static [Format<Self>] = &[
+        Format::Table("modes.csv", report::modes_table),
+        Format::Svg("modes.svg", figure::modes),
+        Format::Png("modes.png", figure::modes),
+        Format::Table("sensitivity.csv", report::sensitivity_table),
+        Format::Svg("sensitivity.svg", |it, _| figure::sensitivity(it)),
+        Format::Png("sensitivity.png", |it, _| figure::sensitivity(it)),
     ];
 
     fn has_more(&self, file: &str) -> bool {
@@ -60,92 +64,92 @@ impl Written for Equilibrium {
 
 impl Written for Check {
     const JSON: Option<&'static str> = Some("check.json");
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Picture::svg("check.svg", figure::check),
-        &Picture::png("check.png", figure::check),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Svg("check.svg", figure::check),
+        Format::Png("check.png", figure::check),
     ];
 }
 
 impl Written for Fit {
     const JSON: Option<&'static str> = Some("fit.json");
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Table("fitted.toml", report::fitted),
-        &Table("fit.csv", report::fit_table),
-        &Picture::svg("fit.svg", |it, _| figure::fit(it)),
-        &Picture::png("fit.png", |it, _| figure::fit(it)),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Table("fitted.toml", report::fitted),
+        Format::Table("fit.csv", report::fit_table),
+        Format::Svg("fit.svg", |it, _| figure::fit(it)),
+        Format::Png("fit.png", |it, _| figure::fit(it)),
     ];
 }
 
 impl Written for Map {
     const JSON: Option<&'static str> = Some("map.json");
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Table("map.csv", report::map_table),
-        &Picture::svg("map.svg", |it, _| figure::map(it)),
-        &Picture::png("map.png", |it, _| figure::map(it)),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Table("map.csv", report::map_table),
+        Format::Svg("map.svg", |it, _| figure::map(it)),
+        Format::Png("map.png", |it, _| figure::map(it)),
     ];
 }
 
 impl Written for All {
     const JSON: Option<&'static str> = Some("equilibria.json");
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Picture::svg("equilibria.svg", figure::all),
-        &Picture::png("equilibria.png", figure::all),
-        &Page("equilibria.html"),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Svg("equilibria.svg", figure::all),
+        Format::Png("equilibria.png", figure::all),
+        Format::Space("equilibria.html", view::write),
     ];
 }
 
 impl Written for Trace {
     const JSON: Option<&'static str> = Some("trace.json");
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Table("trace.csv", report::trace_table),
-        &Picture::svg("trace.svg", figure::trace),
-        &Picture::png("trace.png", figure::trace),
-        &Page("trace.html"),
-        &Series("trace.pvd", view::points),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Table("trace.csv", report::trace_table),
+        Format::Svg("trace.svg", figure::trace),
+        Format::Png("trace.png", figure::trace),
+        Format::Space("trace.html", view::write),
+        Format::Shapes("trace.pvd", view::points),
     ];
 }
 
 impl Written for Boundary {
     const JSON: Option<&'static str> = Some("boundary.json");
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Table("boundary.csv", report::boundary_table),
-        &Picture::svg("boundary.svg", figure::boundary),
-        &Picture::png("boundary.png", figure::boundary),
-        &Page("boundary.html"),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Table("boundary.csv", report::boundary_table),
+        Format::Svg("boundary.svg", figure::boundary),
+        Format::Png("boundary.png", figure::boundary),
+        Format::Space("boundary.html", view::write),
     ];
 }
 
 impl Written for Record {
     const JSON: Option<&'static str> = Some("motion.json");
     const GROWING: &'static [Kind] = &[Kind::Csv];
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Picture::svg("energy.svg", figure::energy),
-        &Picture::png("energy.png", figure::energy),
-        &Picture::svg("filmstrip.svg", figure::filmstrip),
-        &Picture::png("filmstrip.png", figure::filmstrip),
-        &Page("motion.html"),
-        &Series("motion.pvd", view::instants),
-        &Table("motion.glb", glb::motion),
-        &Film("motion.gif"),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Svg("energy.svg", figure::energy),
+        Format::Png("energy.png", figure::energy),
+        Format::Svg("filmstrip.svg", figure::filmstrip),
+        Format::Png("filmstrip.png", figure::filmstrip),
+        Format::Space("motion.html", view::write),
+        Format::Shapes("motion.pvd", view::instants),
+        Format::Table("motion.glb", glb::motion),
+        Format::Space("motion.gif", figure::film),
     ];
 }
 
 impl Written for Chart {
     const JSON: Option<&'static str> = Some("chart.json");
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Table("chart.csv", report::chart_table),
-        &Picture::svg("chart.svg", |it, _| figure::chart(it)),
-        &Picture::png("chart.png", |it, _| figure::chart(it)),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Table("chart.csv", report::chart_table),
+        Format::Svg("chart.svg", |it, _| figure::chart(it)),
+        Format::Png("chart.png", |it, _| figure::chart(it)),
     ];
 }
 
 /// The JSON of the chart includes its numbers.
 impl Written for Scaling {
     const JSON: Option<&'static str> = None;
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Table("chart_rods.csv", report::scaling_table),
-        &Picture::svg("chart_rods.svg", |it, _| figure::scaling(it)),
-        &Picture::png("chart_rods.png", |it, _| figure::scaling(it)),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Table("chart_rods.csv", report::scaling_table),
+        Format::Svg("chart_rods.svg", |it, _| figure::scaling(it)),
+        Format::Png("chart_rods.png", |it, _| figure::scaling(it)),
     ];
 }
 
@@ -223,13 +227,8 @@ pub fn write_all<R: Written>(
             let formats = formats.par_iter();
             formats
                 .map(|format| {
-                    let parts = format.parts(document);
-                    if let Some((part, _)) = parts.first() {
-                        let part = folder.join(part);
-                        atomic::make_folder(part.parent().unwrap_or(folder))?;
-                    }
-                    for (part, fill) in &parts {
-                        write_named(folder, part, fill)?;
+                    if let Format::Shapes(list, shapes) = format {
+                        write_shapes(folder, list, &shapes(result), &document.input.radii)?;
                     }
                     let name = format.file_name();
                     write_named(folder, name, |out| format.write(document, out))
@@ -244,6 +243,25 @@ pub fn write_all<R: Written>(
         }
     }
     json.into_iter().chain(others).collect()
+}
+
+/// Writes the shapes of a list, which is written after them.
+fn write_shapes(
+    folder: &Path,
+    list: &str,
+    shapes: &[Shape],
+    radii: &Radii,
+) -> Result<(), FileError> {
+    for (number, Shape(_, stations, curves)) in shapes.iter().enumerate() {
+        let part = vtk::part(list, number);
+        if number == 0 {
+            atomic::make_folder(folder.join(&part).parent().unwrap_or(folder))?;
+        }
+        write_named(folder, &part, |out| {
+            vtk::curves(curves, stations, radii, out)
+        })?;
+    }
+    Ok(())
 }
 
 /// Writes a complete table into `folder`, which is created if missing.

@@ -5,8 +5,9 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Component, Path, PathBuf, absolute};
 
+use super::Written;
 use crate::relax::Equilibrium;
-use crate::report::{FileError, Written};
+use crate::report::FileError;
 use crate::simulate::Record;
 use crate::study::{All, Boundary, Chart, Check, Fit, Map, Trace};
 

@@ -9,9 +9,7 @@ use crate::relax::{Equilibrium, Sensitivity};
 use super::table::{append_csv, header};
 
 /// The derivative of a station's position with respect to a number; rods are counted from 1.
-const COLUMNS: [&str; 8] = [
-    "key", "value", "rod", "sigma", "d_x", "d_y", "d_z", "error",
-];
+const COLUMNS: [&str; 8] = ["key", "value", "rod", "sigma", "d_x", "d_y", "d_z", "error"];
 
 /// Cells of a row.
 type Row<'s> = (&'s str, f64, usize, f64, [f64; 3], Option<f64>);

@@ -8,8 +8,6 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
-use super::{Document, Format};
-
 /// Lines of a report, each with its label; one without a label continues the one
 /// above.
 pub type Lines = Vec<(&'static str, String)>;
@@ -35,22 +33,6 @@ pub fn list_files(folder: &Path, files: &[PathBuf]) -> String {
     let names = files.iter().filter_map(|file| file.file_name());
     let names: Vec<_> = names.map(|name| name.to_string_lossy()).collect();
     format!("{}: {}", folder.display(), names.join(", "))
-}
-
-/// A table of a result, or another text or array, as a file of this name.
-pub struct Table<R>(
-    pub &'static str,
-    pub fn(&R, &mut dyn Write) -> io::Result<()>,
-);
-
-impl<R> Format<R> for Table<R> {
-    fn file_name(&self) -> &'static str {
-        self.0
-    }
-
-    fn write(&self, document: &Document<R>, out: &mut dyn Write) -> io::Result<()> {
-        (self.1)(document.result, out)
-    }
 }
 
 /// Writes a table of flat rows as CSV; the names of their fields are the header.

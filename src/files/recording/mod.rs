@@ -20,9 +20,9 @@ use glam::DVec3;
 
 pub use checkpointer::Checkpointer;
 
-use super::{Selection, atomic, write_all};
+use super::{Kind, Selection, atomic, write_all};
 use crate::report::table::header;
-use crate::report::{Document, FileError, Kind};
+use crate::report::{Document, FileError};
 use crate::scenario;
 use crate::shape::equally_spaced;
 use crate::simulate::{Frame, Moment, Record, Simulation, Still, Stopped, film, stills};
