@@ -9,7 +9,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::files::checksum::Checksum;
+use crate::checksum::Checksum;
 use crate::report::{FileError, json};
 use crate::simulate::Simulation;
 

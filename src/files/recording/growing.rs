@@ -6,8 +6,8 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::checkpoint::{Extent, damaged, unreadable};
+use crate::checksum::Checksum;
 use crate::files::atomic::{self, Draft};
-use crate::files::checksum::Checksum;
 use crate::report::FileError;
 
 /// A file that grows.
