@@ -1,6 +1,7 @@
 //! Which files a result has, and their formats.
 
 use std::io::{self, Write};
+use std::slice;
 
 use serde::Serialize;
 
@@ -10,13 +11,12 @@ use crate::report::Document;
 use crate::scenario::Scenario;
 
 /// A file of a result: its name, which does not change between releases, and its content.
+/// A figure is two files.
 pub enum Format<R> {
     /// A table, or another text or array.
     Table(&'static str, fn(&R, &mut dyn Write) -> io::Result<()>),
-    /// A figure as a vector image.
-    Svg(&'static str, fn(&R, &Scenario) -> Drawing),
-    /// A figure as a raster image.
-    Png(&'static str, fn(&R, &Scenario) -> Drawing),
+    /// A figure as a vector image and as a raster image.
+    Figure([&'static str; 2], fn(&R, &Scenario) -> Drawing),
     /// The leaf in space, for which its scenario is needed.
     Space(
         &'static str,
@@ -27,26 +27,27 @@ pub enum Format<R> {
 }
 
 impl<R> Format<R> {
-    /// Name of the file.
-    pub fn file_name(&self) -> &'static str {
+    /// Names of the files.
+    pub fn names(&self) -> &[&'static str] {
         match self {
-            Format::Table(name, _)
-            | Format::Svg(name, _)
-            | Format::Png(name, _)
-            | Format::Space(name, _)
-            | Format::Shapes(name, _) => name,
+            Format::Figure(names, _) => names,
+            Format::Table(name, _) | Format::Space(name, _) | Format::Shapes(name, _) => {
+                slice::from_ref(name)
+            }
         }
     }
 
-    /// Writes the whole file. The only errors are those of `out`.
-    pub fn write(&self, document: &Document<R>, out: &mut dyn Write) -> io::Result<()> {
+    /// Writes the whole file of this name. The only errors are those of `out`.
+    pub fn write(&self, name: &str, document: &Document<R>, out: &mut dyn Write) -> io::Result<()> {
         let (result, input) = (document.result, document.input);
         match self {
             Format::Table(_, write) => write(result, out),
-            Format::Svg(_, draw) => svg::write(&draw(result, input), out),
-            Format::Png(_, draw) => png::write(&draw(result, input), out),
+            Format::Figure(_, draw) => match Kind::of(name) {
+                Kind::Png => png::write(&draw(result, input), out),
+                _ => svg::write(&draw(result, input), out),
+            },
             Format::Space(_, write) => write(result, input, out),
-            Format::Shapes(name, shapes) => vtk::list(name, &shapes(result), out),
+            Format::Shapes(_, shapes) => vtk::list(name, &shapes(result), out),
         }
     }
 }
@@ -73,22 +74,20 @@ pub trait Written: Serialize + Sync + Sized + 'static {
 
     /// All kinds of its files.
     fn kinds() -> Vec<Kind> {
-        let formats = Self::FORMATS
-            .iter()
-            .map(|format| Kind::of(format.file_name()));
-        let json = Self::JSON.map(Kind::of).into_iter();
-        json.chain(formats)
-            .chain(Self::GROWING.iter().copied())
-            .collect()
+        let names = Self::FORMATS.iter().flat_map(Format::names).copied();
+        let kinds = Self::JSON.into_iter().chain(names).map(Kind::of);
+        kinds.chain(Self::GROWING.iter().copied()).collect()
     }
 
-    /// Its formats of these kinds.
-    fn formats(&self, kinds: &[Kind]) -> Vec<&'static Format<Self>> {
+    /// Its files of these kinds but JSON: their names and formats.
+    fn files(&self, kinds: &[Kind]) -> Vec<(&'static str, &'static Format<Self>)> {
         let more = Self::MORE.iter();
-        let more = more.filter(|format| self.has_more(format.file_name()));
+        let more = more.filter(|format| self.has_more(format.names()[0]));
         let formats = Self::FORMATS.iter().chain(more);
-        let wanted = |format: &&Format<Self>| kinds.contains(&Kind::of(format.file_name()));
-        formats.filter(wanted).collect()
+        let files = formats.flat_map(|format| format.names().iter().map(move |&it| (it, format)));
+        files
+            .filter(|(name, _)| kinds.contains(&Kind::of(name)))
+            .collect()
     }
 }
 

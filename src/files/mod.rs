@@ -2,7 +2,6 @@
 //! during a run.
 
 mod atomic;
-mod checksum;
 mod format;
 mod journal;
 mod owner;
@@ -35,8 +34,7 @@ impl Written for Equilibrium {
     const JSON: Option<&'static str> = Some("summary.json");
     const FORMATS: &'static [Format<Self>] = &[
         Format::Table("centerlines.csv", report::centerlines),
-        Format::Svg("figure.svg", figure::leaf),
-        Format::Png("figure.png", figure::leaf),
+        Format::Figure(["figure.svg", "figure.png"], figure::leaf),
         Format::Space("view.html", view::write),
         Format::Space("leaf.vtp", |it, input, out| {
             vtk::leaf(it, &input.radii, out)
@@ -46,11 +44,11 @@ impl Written for Equilibrium {
 
     const MORE: &'static [Format<Self>] = &[
         Format::Table("modes.csv", report::modes_table),
-        Format::Svg("modes.svg", figure::modes),
-        Format::Png("modes.png", figure::modes),
+        Format::Figure(["modes.svg", "modes.png"], figure::modes),
         Format::Table("sensitivity.csv", report::sensitivity_table),
-        Format::Svg("sensitivity.svg", |it, _| figure::sensitivity(it)),
-        Format::Png("sensitivity.png", |it, _| figure::sensitivity(it)),
+        Format::Figure(["sensitivity.svg", "sensitivity.png"], |it, _| {
+            figure::sensitivity(it)
+        }),
     ];
 
     fn has_more(&self, file: &str) -> bool {
@@ -64,10 +62,8 @@ impl Written for Equilibrium {
 
 impl Written for Check {
     const JSON: Option<&'static str> = Some("check.json");
-    const FORMATS: &'static [Format<Self>] = &[
-        Format::Svg("check.svg", figure::check),
-        Format::Png("check.png", figure::check),
-    ];
+    const FORMATS: &'static [Format<Self>] =
+        &[Format::Figure(["check.svg", "check.png"], figure::check)];
 }
 
 impl Written for Fit {
@@ -75,8 +71,7 @@ impl Written for Fit {
     const FORMATS: &'static [Format<Self>] = &[
         Format::Table("fitted.toml", report::fitted),
         Format::Table("fit.csv", report::fit_table),
-        Format::Svg("fit.svg", |it, _| figure::fit(it)),
-        Format::Png("fit.png", |it, _| figure::fit(it)),
+        Format::Figure(["fit.svg", "fit.png"], |it, _| figure::fit(it)),
     ];
 }
 
@@ -84,16 +79,14 @@ impl Written for Map {
     const JSON: Option<&'static str> = Some("map.json");
     const FORMATS: &'static [Format<Self>] = &[
         Format::Table("map.csv", report::map_table),
-        Format::Svg("map.svg", |it, _| figure::map(it)),
-        Format::Png("map.png", |it, _| figure::map(it)),
+        Format::Figure(["map.svg", "map.png"], |it, _| figure::map(it)),
     ];
 }
 
 impl Written for All {
     const JSON: Option<&'static str> = Some("equilibria.json");
     const FORMATS: &'static [Format<Self>] = &[
-        Format::Svg("equilibria.svg", figure::all),
-        Format::Png("equilibria.png", figure::all),
+        Format::Figure(["equilibria.svg", "equilibria.png"], figure::all),
         Format::Space("equilibria.html", view::write),
     ];
 }
@@ -102,8 +95,7 @@ impl Written for Trace {
     const JSON: Option<&'static str> = Some("trace.json");
     const FORMATS: &'static [Format<Self>] = &[
         Format::Table("trace.csv", report::trace_table),
-        Format::Svg("trace.svg", figure::trace),
-        Format::Png("trace.png", figure::trace),
+        Format::Figure(["trace.svg", "trace.png"], figure::trace),
         Format::Space("trace.html", view::write),
         Format::Shapes("trace.pvd", view::points),
     ];
@@ -113,8 +105,7 @@ impl Written for Boundary {
     const JSON: Option<&'static str> = Some("boundary.json");
     const FORMATS: &'static [Format<Self>] = &[
         Format::Table("boundary.csv", report::boundary_table),
-        Format::Svg("boundary.svg", figure::boundary),
-        Format::Png("boundary.png", figure::boundary),
+        Format::Figure(["boundary.svg", "boundary.png"], figure::boundary),
         Format::Space("boundary.html", view::write),
     ];
 }
@@ -123,10 +114,8 @@ impl Written for Record {
     const JSON: Option<&'static str> = Some("motion.json");
     const GROWING: &'static [Kind] = &[Kind::Csv];
     const FORMATS: &'static [Format<Self>] = &[
-        Format::Svg("energy.svg", figure::energy),
-        Format::Png("energy.png", figure::energy),
-        Format::Svg("filmstrip.svg", figure::filmstrip),
-        Format::Png("filmstrip.png", figure::filmstrip),
+        Format::Figure(["energy.svg", "energy.png"], figure::energy),
+        Format::Figure(["filmstrip.svg", "filmstrip.png"], figure::filmstrip),
         Format::Space("motion.html", view::write),
         Format::Shapes("motion.pvd", view::instants),
         Format::Table("motion.glb", glb::motion),
@@ -138,8 +127,7 @@ impl Written for Chart {
     const JSON: Option<&'static str> = Some("chart.json");
     const FORMATS: &'static [Format<Self>] = &[
         Format::Table("chart.csv", report::chart_table),
-        Format::Svg("chart.svg", |it, _| figure::chart(it)),
-        Format::Png("chart.png", |it, _| figure::chart(it)),
+        Format::Figure(["chart.svg", "chart.png"], |it, _| figure::chart(it)),
     ];
 }
 
@@ -148,8 +136,9 @@ impl Written for Scaling {
     const JSON: Option<&'static str> = None;
     const FORMATS: &'static [Format<Self>] = &[
         Format::Table("chart_rods.csv", report::scaling_table),
-        Format::Svg("chart_rods.svg", |it, _| figure::scaling(it)),
-        Format::Png("chart_rods.png", |it, _| figure::scaling(it)),
+        Format::Figure(["chart_rods.svg", "chart_rods.png"], |it, _| {
+            figure::scaling(it)
+        }),
     ];
 }
 
@@ -174,8 +163,8 @@ impl Default for Selection {
 
 /// Names of the files of a result, of every kind.
 pub fn names<R: Written>(result: &R) -> Vec<&'static str> {
-    let formats = result.formats(&Kind::ALL).into_iter();
-    let others = formats.map(|format| format.file_name());
+    let files = result.files(&Kind::ALL).into_iter();
+    let others = files.map(|(name, _)| name);
     R::JSON.into_iter().chain(others).collect()
 }
 
@@ -196,9 +185,9 @@ pub fn contents<R: Written>(document: &Document<R>, name: &str) -> Option<Vec<u8
         json::write(document, &mut bytes).ok()?;
         return Some(bytes);
     }
-    let mut formats = document.result.formats(&Kind::ALL).into_iter();
-    let format = formats.find(|format| format.file_name() == name)?;
-    format.write(document, &mut bytes).ok()?;
+    let mut files = document.result.files(&Kind::ALL).into_iter();
+    let (_, format) = files.find(|(file, _)| *file == name)?;
+    format.write(name, document, &mut bytes).ok()?;
     Some(bytes)
 }
 
@@ -217,26 +206,25 @@ pub fn write_all<R: Written>(
     }
     atomic::make_folder(folder)?;
     let result = document.result;
-    let formats = result.formats(kinds);
+    let files = result.files(kinds);
     let (json, others) = rayon::join(
         || {
             let name = R::JSON.filter(|_| kinds.contains(&Kind::Json))?;
             Some(write_named(folder, name, |out| json::write(document, out)))
         },
         || -> Vec<_> {
-            let formats = formats.par_iter();
-            formats
-                .map(|format| {
+            let files = files.par_iter();
+            files
+                .map(|(name, format)| {
                     if let Format::Shapes(list, shapes) = format {
                         write_shapes(folder, list, &shapes(result), &document.input.radii)?;
                     }
-                    let name = format.file_name();
-                    write_named(folder, name, |out| format.write(document, out))
+                    write_named(folder, name, |out| format.write(name, document, out))
                 })
                 .collect()
         },
     );
-    for name in R::MORE.iter().map(|format| format.file_name()) {
+    for name in R::MORE.iter().flat_map(Format::names) {
         if !result.has_more(name) {
             // Left by another result; usually there is none.
             let _ = fs::remove_file(folder.join(name));
