@@ -1,6 +1,6 @@
 //! All equilibria of a leaf that were found, lowest energy first.
 
-use super::drawing::{Drawing, NOTE};
+use super::drawing::Drawing;
 use super::page::new_page;
 use super::setting::Setting;
 use super::small::{SIDE, SmallPanels};
@@ -34,8 +34,7 @@ pub fn draw(all: &All, scenario: &Scenario) -> Drawing {
         let energy = found.equilibrium.energy.unwrap_or(f64::NAN);
         let text = format!("energy {energy:.7}, {stability}");
         drawing.group("leaf", |page| {
-            let number = (index + 1).to_string();
-            panels.draw(page, index, veins, (&number, &text, NOTE), |_, _, _| ());
+            panels.draw(page, index, veins, [&(index + 1).to_string(), &text]);
         });
     }
     drawing

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 use super::axes::Axes;
 use super::axis::Axis;
-use super::drawing::{Anchor, CURVES, Drawing, INK, NOTE, Stroke};
+use super::drawing::{Anchor, CURVES, Drawing, INK, Stroke};
 use super::indices::write_indices;
 use super::labels::Labels;
 use super::map::{DARKEST_INDEX, fill_index, name};
@@ -53,13 +53,7 @@ pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
         for (number, (veins, shown)) in shapes.iter().zip(&shown).enumerate() {
             let [first, second] = shown.leaf.values.map(short);
             let text = format!("{}, ({first}, {second})", shown.caption);
-            panels.draw(
-                page,
-                number,
-                veins,
-                (&letter(number), &text, NOTE),
-                |_, _, _| (),
-            );
+            panels.draw(page, number, veins, [&letter(number), &text]);
         }
     });
     drawing

@@ -7,6 +7,7 @@ use super::energy::notes;
 use super::page::{HEADER, KeyRows, NOTE_BASE, new_page};
 use super::setting::Setting;
 use super::small::{SIDE, SmallPanels};
+use super::space::{Scene, View};
 use super::veins::{Veins, is_drawable};
 use crate::report::numbers::short;
 use crate::scenario::Scenario;
@@ -33,9 +34,8 @@ pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
     let mut notes = notes(record);
     notes.extend(
         shapes
-            .iter()
-            .take(1)
-            .flat_map(|veins| veins.notes(&setting)),
+            .first()
+            .map_or(Vec::new(), |veins| veins.notes(&setting)),
     );
     notes.push(format!(
         "a square of the grid is {} wide",
@@ -64,20 +64,16 @@ pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
             let time = record.moments.get(still.moment).map_or(0.0, |m| m.time);
             let letter = format!("({})", char::from(b'a' + (index % 26) as u8));
             let when = format!("t = {}", short(time));
-            panels.draw(
-                page,
-                index,
-                veins,
-                (&letter, &when, NOTE),
-                |page, scene, _| {
-                    for (path, stroke) in paths.iter().zip(strokes).rev() {
-                        let path: Vec<_> = path.iter().map(|&point| scene.place(point)).collect();
-                        if path.len() > 1 {
-                            page.stroke(polyline(&path), stroke);
-                        }
+            let under = |page: &mut Drawing, scene: &Scene, _| {
+                for (path, stroke) in paths.iter().zip(strokes).rev() {
+                    let path: Vec<_> = path.iter().map(|&point| scene.place(point)).collect();
+                    if path.len() > 1 {
+                        page.stroke(polyline(&path), stroke);
                     }
-                },
-            );
+                }
+            };
+            let caption = (letter.as_str(), when.as_str(), NOTE);
+            panels.draw_over(page, index, veins, View::Oblique, caption, under);
         });
     }
     drawing

@@ -59,7 +59,7 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
                 let place = VIEWS.len() * index + k;
                 let color = if k == 0 { color } else { NOTE };
                 let caption = (caption.0.as_str(), caption.1.as_str(), color);
-                panels.draw_from(view, page, place, veins, caption, at_rest);
+                panels.draw_over(page, place, veins, view, caption, at_rest);
             }
         });
     }

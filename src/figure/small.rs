@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::drawing::{Color, Drawing};
+use super::drawing::{Color, Drawing, NOTE};
 use super::page::{Cell, HEADER, PANEL_TITLE, WIDTH, title_in};
 use super::round::round_step;
 use super::setting::Setting;
@@ -87,34 +87,22 @@ impl SmallPanels {
         (self.top + rows as f64 * row + BOTTOM).ceil()
     }
 
-    /// Draws a leaf with its letter and title in its panel, above what `under` draws
-    /// with lines of a given width. The first panel also shows the names of the axes and
-    /// gravity.
-    pub fn draw(
-        &self,
-        page: &mut Drawing,
-        index: usize,
-        veins: &Veins,
-        (letter, text, color): (&str, &str, Color),
-        under: impl FnOnce(&mut Drawing, &Scene, f64),
-    ) {
-        self.draw_from(
-            View::Oblique,
-            page,
-            index,
-            veins,
-            (letter, text, color),
-            under,
-        );
+    /// Draws a leaf with its letter and title in its panel. The first panel also shows the
+    /// names of the axes and gravity.
+    pub fn draw(&self, page: &mut Drawing, index: usize, veins: &Veins, caption: [&str; 2]) {
+        let [letter, text] = caption;
+        let caption = (letter, text, NOTE);
+        self.draw_over(page, index, veins, View::Oblique, caption, |_, _, _| ());
     }
 
-    /// The same in another view.
-    pub fn draw_from(
+    /// The same in any view, with a title in a colour, and above what `under` draws with
+    /// lines of a given width.
+    pub fn draw_over(
         &self,
-        view: View,
         page: &mut Drawing,
         index: usize,
         veins: &Veins,
+        view: View,
         (letter, text, color): (&str, &str, Color),
         under: impl FnOnce(&mut Drawing, &Scene, f64),
     ) {

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::axes::Axes;
 use super::axis::Axis;
-use super::drawing::{CURVES, Drawing, INK, NOTE, Stroke};
+use super::drawing::{CURVES, Drawing, INK, Stroke};
 use super::labels::Labels;
 use super::markers::Marker;
 use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, new_page, title};
@@ -79,11 +79,8 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     drawing.height = panels.end();
     drawing.group("leaves", |page| {
         for (index, (veins, at)) in shapes.iter().zip(&shown).enumerate() {
-            let (number, text) = (
-                (index + 1).to_string(),
-                format!("at {}", caption(point(at))),
-            );
-            panels.draw(page, index, veins, (&number, &text, NOTE), |_, _, _| ());
+            let caption = format!("at {}", caption(point(at)));
+            panels.draw(page, index, veins, [&(index + 1).to_string(), &caption]);
         }
     });
     drawing

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use crate::study::{Fit, FitOutcome, FitParameter};
 
 use super::numbers::{brief, seconds};
-use super::table::{Lines, labelled, lay_out, write_csv};
+use super::table::{Lines, labelled, lay_out};
 
 /// Most candidates that are listed.
 const CANDIDATES: usize = 5;
@@ -78,7 +78,11 @@ fn number(parameter: &FitParameter) -> String {
 
 /// `fit.csv`: one row per datum.
 pub fn table(fit: &Fit, out: &mut dyn Write) -> io::Result<()> {
-    write_csv(&fit.residuals, out)
+    let mut table = csv::Writer::from_writer(out);
+    for residual in &fit.residuals {
+        table.serialize(residual)?;
+    }
+    table.flush()
 }
 
 /// `fitted.toml`: the scenario with the fitted values.

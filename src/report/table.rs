@@ -35,18 +35,8 @@ pub fn list_files(folder: &Path, files: &[PathBuf]) -> String {
     format!("{}: {}", folder.display(), names.join(", "))
 }
 
-/// Writes a table of flat rows as CSV; the names of their fields are the header.
-///
-/// # Errors
-/// Those of `out`.
-pub fn write_csv<R: Serialize>(
-    rows: impl IntoIterator<Item = R>,
-    out: &mut dyn Write,
-) -> io::Result<()> {
-    write_rows(csv::Writer::from_writer(out), rows)
-}
-
-/// Writes rows alone; each may be a tuple of tuples and arrays, whose elements are its cells.
+/// Writes rows as CSV without a header; each may be a tuple of tuples and arrays, whose
+/// elements are its cells.
 ///
 /// # Errors
 /// Those of `out`.
@@ -54,23 +44,17 @@ pub fn append_csv<R: Serialize>(
     rows: impl IntoIterator<Item = R>,
     out: &mut dyn Write,
 ) -> io::Result<()> {
-    write_rows(csv_without_header(out), rows)
+    let mut table = csv_without_header(out);
+    for row in rows {
+        table.serialize(row)?;
+    }
+    table.flush()
 }
 
 /// A CSV writer that writes no header by itself.
 pub fn csv_without_header<W: Write>(out: W) -> csv::Writer<W> {
     let mut builder = csv::WriterBuilder::new();
     builder.has_headers(false).from_writer(out)
-}
-
-fn write_rows<R: Serialize>(
-    mut table: csv::Writer<&mut dyn Write>,
-    rows: impl IntoIterator<Item = R>,
-) -> io::Result<()> {
-    for row in rows {
-        table.serialize(row)?;
-    }
-    table.flush()
 }
 
 /// One table of several results, each given as its scenario's file, its exit status and

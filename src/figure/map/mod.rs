@@ -14,7 +14,7 @@ use super::page::{
 use crate::report::words::map_shows;
 use crate::study::{Confidence, Knob, Map, MapMethod, MapOutcome, MapRow, MapShow};
 pub use panel::{DARKEST_INDEX, fill_index, name};
-use panel::{Panel, Tile, Varied};
+use panel::{Panel, Varied, waves};
 
 const SWATCH: f64 = 12.0;
 /// Room below each panel for ticks and, below the last, for the name of the axis.
@@ -87,7 +87,7 @@ fn notes(map: &Map) -> Vec<String> {
 fn draw_key(page: &mut Drawing, map: &Map, base: f64) -> f64 {
     let mut key = KeyRows::at(LEFT, base, SWATCH);
     for outcome in MapOutcome::ALL {
-        let shown = |row: &MapRow| row.outcome == outcome && waves(map, row).is_none();
+        let shown = |row: &MapRow| row.outcome == outcome && waves(map.show, row).is_none();
         if map.rows.iter().any(shown) {
             let name = match outcome {
                 MapOutcome::Saddle => "saddle, with its index".to_string(),
@@ -96,7 +96,11 @@ fn draw_key(page: &mut Drawing, map: &Map, base: f64) -> f64 {
             key.entry(page, &name, |page, cell| panel::fill(page, cell, outcome));
         }
     }
-    let mut counts: Vec<f64> = map.rows.iter().filter_map(|row| waves(map, row)).collect();
+    let mut counts: Vec<f64> = map
+        .rows
+        .iter()
+        .filter_map(|row| waves(map.show, row))
+        .collect();
     counts.sort_by(f64::total_cmp);
     counts.dedup();
     for waves in counts {
@@ -141,24 +145,6 @@ fn has_step_axis(map: &Map) -> bool {
     let mut axes = map.request.axes.iter();
     map.request.methods.contains(&MapMethod::ExplicitMotion)
         && axes.any(|axis| axis.keys.sets(Knob::Step))
-}
-
-/// The results of a method, cell by cell.
-fn tiles(map: &Map, method: MapMethod) -> Vec<Option<Tile>> {
-    let mut tiles = vec![None; map.request.cells()];
-    for row in map.rows.iter().filter(|row| row.method == method) {
-        tiles[row.cell] = Some(Tile {
-            outcome: row.outcome,
-            index: row.index,
-            reference: row.reference,
-            waves: waves(map, row),
-        });
-    }
-    tiles
-}
-
-fn waves(map: &Map, row: &MapRow) -> Option<f64> {
-    row.stable_waves().filter(|_| map.show == MapShow::Waves)
 }
 
 fn count(map: &Map, method: MapMethod) -> String {
@@ -209,7 +195,8 @@ fn draw_panels(
         drawing.group(method.word(), |page| {
             draw_method(page, map, method, cell, y.is_some());
             let panel = Panel::new(cell, x, y, labelled);
-            panel.draw(page, &tiles(map, method));
+            let rows = map.rows.iter().filter(|row| row.method == method);
+            panel.draw(page, map.show, rows);
             if method == MapMethod::ExplicitMotion && has_step_axis(map) {
                 panel.draw_bound(page, &map.request);
             }

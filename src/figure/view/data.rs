@@ -45,7 +45,7 @@ pub struct View {
 }
 
 /// A shape of the leaf.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 pub struct Leaf {
     /// A short description, and the numbers of this leaf alone.
     pub label: String,
@@ -74,6 +74,12 @@ pub enum Points {
     Coarse { u16: String, low: DVec3, size: f64 },
 }
 
+impl Default for Points {
+    fn default() -> Self {
+        Points::Full { f32: String::new() }
+    }
+}
+
 /// A mode of the leaf at rest.
 #[derive(Serialize)]
 pub struct ModeShape {
@@ -94,7 +100,7 @@ pub struct Chart {
     pub curves: Vec<Curve>,
 }
 
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 pub struct Curve {
     /// Which of the choices it belongs to.
     pub choice: usize,
@@ -140,13 +146,14 @@ impl Leaf {
             );
         }
         Leaf {
+            label,
             nodes: stations.len(),
             stations: Some(stations.into()),
             points: Points::Full {
                 f32: vectors(shown().map(|node| node.position)),
             },
             state: Some(floats(state)),
-            ..Leaf::empty(label)
+            ..Leaf::default()
         }
     }
 
@@ -178,6 +185,7 @@ impl Leaf {
             .flat_map(step)
             .flat_map(|x| (x as u16).to_le_bytes());
         Leaf {
+            label,
             nodes: nodes.saturating_sub(1) / stride + 1,
             stations: uneven(stations).then(|| stations.iter().step_by(stride).copied().collect()),
             points: Points::Coarse {
@@ -185,19 +193,7 @@ impl Leaf {
                 low,
                 size,
             },
-            ..Leaf::empty(label)
-        }
-    }
-
-    fn empty(label: String) -> Self {
-        Leaf {
-            label,
-            summary: Vec::new(),
-            time: None,
-            stations: None,
-            nodes: 0,
-            points: Points::Full { f32: String::new() },
-            state: None,
+            ..Leaf::default()
         }
     }
 }

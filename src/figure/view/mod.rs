@@ -162,16 +162,8 @@ mod tests {
     use serde_json::Value;
 
     fn scenario(rods: usize) -> Scenario {
-        let text = format!(
-            r#"
-            name = "page"
-            leaf = {{ rods = {rods}, length = 1.0, fan = "symmetric" }}
-            stiffness = {{ torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }}
-            units = {{ length = "cm" }}
-        "#
-        );
-        let mut scenario = Scenario::from_toml(&text).unwrap();
-        scenario.name = "a < b </script>".into();
+        let mut scenario = sample::scenario("a < b </script>", rods);
+        scenario.units.length = Some("cm".into());
         scenario
     }
 

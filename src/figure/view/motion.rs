@@ -61,9 +61,7 @@ fn chart(moments: &[Moment], view: &View) -> Chart {
         color,
         x: shown().map(|moment| moment.time).collect(),
         y: shown().map(of).collect(),
-        leaves: Vec::new(),
-        unstable: Vec::new(),
-        special: Vec::new(),
+        ..Curve::default()
     };
     type Energy = fn(&Moment) -> f64;
     let energies: [(&str, Energy); 7] = [
