@@ -17,7 +17,7 @@ use super::setting::Setting;
 use super::small::SmallPanels;
 use super::veins::{Veins, length};
 use crate::branch::Kind;
-use crate::report::numbers::{power_of_ten, short};
+use crate::report::numbers::{number_of_veins, power_of_ten, short};
 use crate::report::sides;
 use crate::scenario::Scenario;
 use crate::study::{Boundary, BoundaryMap, BoundaryPoint, LeafBeside};
@@ -118,10 +118,7 @@ fn letter(number: usize) -> String {
 fn notes(boundary: &Boundary) -> Vec<String> {
     let points: usize = boundary.curves.iter().map(|curve| curve.points.len()).sum();
     let mut notes = vec![
-        match boundary.rods {
-            1 => "1 vein".into(),
-            rods => format!("{rods} veins"),
-        },
+        number_of_veins(boundary.rods),
         match boundary.curves.len() {
             1 => format!("{points} points on 1 curve"),
             curves => format!("{points} points on {curves} curves"),

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::drawing::{Color, DOT, Drawing, NOTE, Stroke, polyline};
 use super::energy::notes;
-use super::page::{HEADER, KeyRows, NOTE_BASE, new_page};
+use super::page::{HEADER, KeyRows, NOTE_BASE, letters, new_page};
 use super::setting::Setting;
 use super::small::{SIDE, SmallPanels};
 use super::space::{Scene, View};
@@ -56,13 +56,13 @@ pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
             }
         });
     }
-    for (index, (veins, still)) in shapes.iter().zip(&record.stills).enumerate() {
+    let instants = shapes.iter().zip(&record.stills).enumerate();
+    for ((index, (veins, still)), letter) in instants.zip(letters().cycle()) {
         let paths = [(since, still.moment), (0, since)];
         let paths = paths.map(|(from, to)| tip_path(record, from, to));
         since = still.moment;
         drawing.group("instant", |page| {
             let time = record.moments.get(still.moment).map_or(0.0, |m| m.time);
-            let letter = format!("({})", char::from(b'a' + (index % 26) as u8));
             let when = format!("t = {}", short(time));
             let under = |page: &mut Drawing, scene: &Scene, _| {
                 for (path, stroke) in paths.iter().zip(strokes).rev() {

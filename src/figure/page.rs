@@ -85,6 +85,11 @@ pub fn title_in(page: &mut Drawing, corner: DVec2, letter: &str, text: &str, col
     page.label(base, text, TEXT_SIZE, Anchor::Start, color);
 }
 
+/// Letters of panels: `(a)`, `(b)`, ...
+pub fn letters() -> impl Iterator<Item = String> + Clone {
+    (b'a'..=b'z').map(|letter| format!("({})", char::from(letter)))
+}
+
 const TITLE_BASE: f64 = 38.0;
 /// Base line of the notes.
 pub const NOTE_BASE: f64 = 60.0;

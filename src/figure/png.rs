@@ -56,17 +56,9 @@ fn paint_rows(drawing: &Drawing, rows: Range<u32>) -> Pixmap {
             Mark::Group(_) | Mark::EndGroup => (),
             Mark::Shape { path, fill, stroke } => {
                 let rim = stroke.map_or(1.0, |stroke| 1.0 + stroke.width);
-                let outside = |above: bool| {
-                    let mut heights = path.iter().flat_map(|step| heights(*step));
-                    heights.all(|y| {
-                        if above {
-                            y + rim < top
-                        } else {
-                            y - rim > bottom
-                        }
-                    })
-                };
-                if outside(true) || outside(false) {
+                let mut above = path.iter().flat_map(|step| heights(*step));
+                let mut below = above.clone();
+                if above.all(|y| y + rim < top) || below.all(|y| y - rim > bottom) {
                     continue;
                 }
                 let Some(path) = outline(path) else { continue };
@@ -90,7 +82,7 @@ fn paint_rows(drawing: &Drawing, rows: Range<u32>) -> Pixmap {
 }
 
 /// Heights of the points of a step, which bound it.
-fn heights(step: Step) -> impl Iterator<Item = f64> {
+fn heights(step: Step) -> impl Iterator<Item = f64> + Clone {
     let heights = match step {
         Step::Move(to) | Step::Line(to) => [Some(to.y), None, None],
         Step::Cubic(a, b, to) => [a, b, to].map(|point| Some(point.y)),

@@ -8,11 +8,11 @@ use super::axis::Axis;
 use super::drawing::{CURVES, Drawing, INK, Stroke};
 use super::labels::Labels;
 use super::markers::Marker;
-use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, new_page, title};
+use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, letters, new_page, title};
 use super::setting::{Setting, with_unit};
 use super::small::SmallPanels;
 use super::veins::{Veins, length};
-use crate::report::numbers::{power_of_ten, short};
+use crate::report::numbers::{number_of_veins, power_of_ten, short};
 use crate::report::words::branch_end;
 use crate::report::{error_location, slope_unit};
 use crate::scenario::{Scenario, Units};
@@ -54,7 +54,7 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     };
     let name = format!("{}: equilibria along {}", trace.scenario, trace.keys);
     let mut drawing = new_page(LEFT, &name, &notes(trace), None);
-    let mut letters = (b'a'..=b'z').map(|letter| format!("({})", char::from(letter)));
+    let mut letters = letters();
     let mut letter = || letters.next().unwrap_or_default();
     let mut below = HEADER;
     for (place, &quantity) in quantities.iter().enumerate() {
@@ -89,10 +89,7 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
 fn notes(trace: &Trace) -> Vec<String> {
     let points: usize = trace.branches.iter().map(|b| b.points.len()).sum();
     let mut notes = vec![
-        match trace.rods {
-            1 => "1 vein".into(),
-            rods => format!("{rods} veins"),
-        },
+        number_of_veins(trace.rods),
         match trace.branches.len() {
             1 => format!("{points} points"),
             branches => format!("{points} points on {branches} branches"),

@@ -13,10 +13,19 @@ pub fn veins(equilibrium: &Equilibrium) -> String {
 
 /// The same for any leaf.
 pub fn veins_of(count: usize, joined: bool) -> String {
+    let tips = match joined {
+        _ if count == 1 => "",
+        true => " joined at the tip",
+        false => " with free tips",
+    };
+    number_of_veins(count) + tips
+}
+
+/// As in `5 veins`.
+pub fn number_of_veins(count: usize) -> String {
     match count {
-        1 => "1 vein".to_string(),
-        count if joined => format!("{count} veins joined at the tip"),
-        count => format!("{count} veins with free tips"),
+        1 => "1 vein".into(),
+        count => format!("{count} veins"),
     }
 }
 

@@ -4,13 +4,13 @@
 //! bits, so that they are restored exactly.
 
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use crate::checksum::Checksum;
-use crate::report::{FileError, json};
+use crate::report::FileError;
 use crate::simulate::Simulation;
 
 pub const FILE_NAME: &str = "checkpoint.json";
@@ -144,10 +144,6 @@ impl Checkpoint {
         self
     }
 
-    pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        json::write(self, out)
-    }
-
     /// Reads the checkpoint in a folder; refused if it is damaged or of another run.
     pub fn read(folder: &Path, asked: &Identity) -> Result<Self, FileError> {
         let file = &folder.join(FILE_NAME);
@@ -207,7 +203,7 @@ fn number(digits: &str) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::sample;
+    use crate::report::{json, sample};
 
     fn identity() -> Identity {
         Identity::of(&sample::swing(1, 4).0, None)
@@ -224,7 +220,7 @@ mod tests {
         let checkpoint = Checkpoint::new(identity(), extents, 0.3, 12).with_state(&state);
         let folder = tempfile::tempdir().unwrap();
         let mut bytes = Vec::new();
-        checkpoint.write(&mut bytes).unwrap();
+        json::write(&checkpoint, &mut bytes).unwrap();
         fs::write(folder.path().join(FILE_NAME), bytes).unwrap();
         (folder, checkpoint)
     }

@@ -22,20 +22,6 @@ pub struct GrowingFile {
     buffer: Vec<u8>,
 }
 
-/// The path of an unfinished file, and the one where another process looks for it.
-#[derive(Clone, Debug)]
-pub struct Unfinished {
-    draft: PathBuf,
-    kept: PathBuf,
-}
-
-impl Unfinished {
-    /// Renames the file so that another process finds it.
-    pub fn keep(&self) -> io::Result<()> {
-        atomic::rename(&self.draft, &self.kept)
-    }
-}
-
 /// Where an unfinished file is kept: `motion.csv.part`.
 pub fn kept_path(file: &Path) -> PathBuf {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
@@ -96,11 +82,9 @@ impl GrowingFile {
         resumed.ok_or_else(|| damaged(&kept, "it is not as checkpoint.json says"))
     }
 
-    pub fn unfinished(&self) -> Unfinished {
-        Unfinished {
-            draft: self.draft.path().into(),
-            kept: kept_path(&self.file),
-        }
+    /// The path of the unfinished file, and the one where another process looks for it.
+    pub fn unfinished(&self) -> [PathBuf; 2] {
+        [self.draft.path().into(), kept_path(&self.file)]
     }
 
     pub fn extent(&self) -> Extent {
@@ -170,7 +154,8 @@ mod tests {
         let mut file = GrowingFile::begin(path.clone(), b"one ").unwrap();
         let extent = write(&mut file, "two ");
         write(&mut file, "and a half-written thr");
-        file.unfinished().keep().unwrap();
+        let [draft, kept] = file.unfinished();
+        atomic::rename(&draft, &kept).unwrap();
         drop(file);
         assert!(kept_path(&path).exists());
 
