@@ -107,19 +107,18 @@ impl Map {
         )?;
         files::belongs(folder, &request)?;
         let clock = Instant::now();
-        let known = self.known(folder, &request)?;
+        let known = Cells::new(request.clone(), self.known(folder, &request)?);
         // A later run identifies the rows by the request stored next to them.
         let keeps_rows = job.selection.kinds.contains(&Kind::Csv);
         if keeps_rows {
-            let map = Cells::new(request.clone(), known.clone());
-            files::claim(folder, &job.document(&map))?;
+            files::claim(folder, &job.document(&known))?;
         }
         let computed = match self.draw.is_empty() {
-            true => self.solve(job, keeps_rows, &request, &known)?,
+            true => self.solve(job, keeps_rows, &request, &known.rows)?,
             false => Vec::new(),
         };
-        let counts = [known.len(), computed.len()];
-        let mut map = Cells::new(request, [known, computed].concat());
+        let counts = [known.rows.len(), computed.len()];
+        let mut map = Cells::new(request, [known.rows, computed].concat());
         map.show = self.show;
         if self.shard.is_none() && self.draw.is_empty() {
             let line = Mutex::new(job.progress());
@@ -165,8 +164,6 @@ impl Map {
         for file in files {
             rows.extend(report::read_rows(&file, request)?);
         }
-        rows.sort_by_key(|row| (row.cell, row.method));
-        rows.dedup_by_key(|row| (row.cell, row.method));
         Ok(rows)
     }
 

@@ -9,7 +9,7 @@ use super::drawing::{
 };
 use super::font::Font;
 use super::markers::Marker;
-use super::page::{Cell, TEXT_SIZE, TICK_SIZE};
+use super::page::{Cell, TEXT_SIZE, TICK_SIZE, title};
 
 const TICK: f64 = 4.0;
 const DIVISION: f64 = 2.0;
@@ -45,6 +45,20 @@ impl Axes {
         let fraction = DVec2::new(self.across.fraction(x), 1.0 - self.up.fraction(y));
         let at = self.cell.corner + self.cell.size * fraction;
         at.is_finite().then_some(at)
+    }
+
+    /// Draws a panel of the letter and the title, with these axes.
+    pub fn titled(
+        page: &mut Drawing,
+        cell: Cell,
+        [letter, what]: [&str; 2],
+        across: Axis,
+        up: Axis,
+    ) -> Self {
+        let axes = Axes { cell, across, up };
+        title(page, cell.corner, letter, what);
+        axes.draw(page);
+        axes
     }
 
     /// Draws grid, frame, ticks and names.

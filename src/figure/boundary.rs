@@ -19,6 +19,7 @@ use super::veins::{Veins, length};
 use crate::branch::Kind;
 use crate::report::numbers::{number_of_veins, power_of_ten, short};
 use crate::report::sides;
+use crate::report::words::stable_or_index;
 use crate::scenario::Scenario;
 use crate::study::{Boundary, BoundaryMap, BoundaryPoint, LeafBeside};
 
@@ -70,8 +71,7 @@ struct DrawnLeaf<'b> {
 impl<'b> DrawnLeaf<'b> {
     fn new(kind: Kind, leaf: &'b LeafBeside) -> Self {
         let caption = match (&leaf.fallen_from, kind, leaf.index) {
-            (None, _, 0) => "stable".into(),
-            (None, _, index) => format!("index {index}"),
+            (None, _, index) => stable_or_index(index),
             (Some(_), Kind::Fold, _) => "snapped".into(),
             (Some(from), Kind::Branching, _) => return DrawnLeaf::buckled(leaf, from),
         };
@@ -228,11 +228,12 @@ fn draw_key(page: &mut Drawing, boundary: &Boundary, cell: Cell) {
         let found = map.index.iter().flatten().flatten();
         let indices: BTreeSet<usize> = found.map(|index| *index.min(&DARKEST_INDEX)).collect();
         for index in indices {
-            let name = match index {
-                0 => "stable".into(),
-                DARKEST_INDEX => format!("index {index} or more"),
-                index => format!("index {index}"),
+            let more = if index == DARKEST_INDEX {
+                " or more"
+            } else {
+                ""
             };
+            let name = stable_or_index(index) + more;
             key.entry(page, "", &name, |page, cell| fill_index(page, cell, index));
         }
     }

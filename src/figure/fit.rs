@@ -8,7 +8,7 @@ use super::axis::{Axis, Ticks};
 use super::drawing::{BLUE, DOT, Drawing, INK, NOTE, Stroke};
 use super::markers::Marker;
 use super::page::{
-    Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, WIDTH, letters, new_page, title,
+    Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, WIDTH, letters, new_page,
 };
 use crate::report::numbers::{brief, power_of_ten};
 use crate::study::{Fit, FitLeaf, FitResidual};
@@ -76,19 +76,14 @@ fn numbers(name: &str, count: usize) -> Axis {
 fn draw_result(page: &mut Drawing, top: f64, letter: &str, kind: &str, of: &[&FitResidual]) {
     let cell = Cell::left_of_key(top + PANEL_TITLE, RESULT, KEY);
     let what = format!("{kind} of the experiments");
-    title(page, cell.corner, letter, &what);
     let values = of.iter().flat_map(|r| {
         let (band, sd) = (r.band, 2.0 * r.sd);
         [r.data - sd, r.data + sd, r.model - band, r.model + band]
     });
     let mut up = Axis::holding(kind, values);
     up.emphasizes_zero = false;
-    let axes = Axes {
-        cell,
-        across: numbers("experiment", of.len()),
-        up,
-    };
-    axes.draw(page);
+    let across = numbers("experiment", of.len());
+    let axes = Axes::titled(page, cell, [letter, &what], across, up);
     let line = |value: &dyn Fn(&FitResidual) -> f64| -> Vec<(f64, f64)> {
         let points = of.iter().enumerate();
         points.map(|(k, r)| (k as f64 + 1.0, value(r))).collect()
@@ -124,7 +119,6 @@ fn draw_veins(page: &mut Drawing, top: f64, letter: &str, experiment: &str, leaf
         };
         let letter = if k == 0 { letter } else { "" };
         let what = format!("experiment {experiment}, {view}");
-        title(page, corner, letter, &what);
         let seen = |point: [Option<f64>; 3]| Some((point[axes[0]]?, point[axes[1]]?));
         let flat = |point: &DVec3| (point[axes[0]], point[axes[1]]);
         let traced = leaf.traced.iter();
@@ -134,8 +128,7 @@ fn draw_veins(page: &mut Drawing, top: f64, letter: &str, experiment: &str, leaf
         let across = Axis::holding(["x", "y", "z"][axes[0]], all.clone().map(|p| p.0));
         let up = Axis::holding(["x", "y", "z"][axes[1]], all.map(|p| p.1));
         let (across, up) = equal_scales(across, up, cell.size);
-        let panel = Axes { cell, across, up };
-        panel.draw(page);
+        let panel = Axes::titled(page, cell, [letter, &what], across, up);
         for curve in &leaf.curves {
             let line: Vec<(f64, f64)> = curve.iter().map(flat).collect();
             panel.curve(page, &line, Stroke::new(BLUE, 1.4));
@@ -159,17 +152,13 @@ fn equal_scales(mut across: Axis, mut up: Axis, size: DVec2) -> (Axis, Axis) {
 fn draw_residuals(page: &mut Drawing, top: f64, letter: &str, fit: &Fit) {
     let cell = Cell::left_of_key(top + PANEL_TITLE, RESIDUALS, KEY);
     let what = "residuals in standard deviations";
-    title(page, cell.corner, letter, what);
     let points = fit.residuals.iter().enumerate();
     let points: Vec<(f64, f64)> = points.map(|(k, r)| (k as f64 + 1.0, r.residual)).collect();
     let count = points.len() as f64;
     let values = points.iter().map(|point| point.1);
-    let axes = Axes {
-        cell,
-        across: Axis::linear("datum", 0.0, count + 1.0),
-        up: Axis::holding("residual", values.chain([-2.5, 2.5])),
-    };
-    axes.draw(page);
+    let across = Axis::linear("datum", 0.0, count + 1.0);
+    let up = Axis::holding("residual", values.chain([-2.5, 2.5]));
+    let axes = Axes::titled(page, cell, [letter, what], across, up);
     for bound in [-2.0, 2.0] {
         let line = [(0.0, bound), (count + 1.0, bound)];
         axes.curve(page, &line, Stroke::new(NOTE, 1.0).dashed(true));

@@ -5,9 +5,7 @@ use glam::DVec2;
 use super::axes::Axes;
 use super::axis::{Axis, Ticks};
 use super::drawing::{Anchor, BLUE, Drawing, INK, rectangle};
-use super::page::{
-    Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, new_page, title,
-};
+use super::page::{Cell, HEADER, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, TICK_SIZE, WIDTH, new_page};
 use crate::relax::{Equilibrium, Sensitivity};
 
 /// Room left of the panel, for the keys.
@@ -46,22 +44,16 @@ pub fn draw(leaf: &Equilibrium) -> Drawing {
         size: DVec2::new(WIDTH - LEFT - RIGHT - NAMES, height),
     };
     let values = rows.iter().map(|row| row.1);
-    let axes = Axes {
-        cell,
-        across: Axis::logarithmic(
-            "displacement of the tip by 1 %, in L",
-            values,
-            FEWEST_DECADES,
-        ),
-        up: Axis {
-            ticks: Ticks::At(Vec::new()),
-            labelled: false,
-            ..Axis::linear("", 0.0, 1.0)
-        },
+    let name = "displacement of the tip by 1 %, in L";
+    let across = Axis::logarithmic(name, values, FEWEST_DECADES);
+    let up = Axis {
+        ticks: Ticks::At(Vec::new()),
+        labelled: false,
+        ..Axis::linear("", 0.0, 1.0)
     };
     page.group("changes", |page| {
-        title(page, cell.corner, "", "by a hundredth of each number");
-        axes.draw(page);
+        let what = "by a hundredth of each number";
+        let axes = Axes::titled(page, cell, ["", what], across, up);
         for (k, (key, value)) in rows.iter().enumerate() {
             let middle = cell.corner.y + ROW * (k as f64 + 0.5);
             let at = DVec2::new(cell.corner.x - 8.0, middle);

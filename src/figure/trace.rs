@@ -8,12 +8,12 @@ use super::axis::Axis;
 use super::drawing::{CURVES, Drawing, INK, Stroke};
 use super::labels::Labels;
 use super::markers::Marker;
-use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, letters, new_page, title};
+use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, letters, new_page};
 use super::setting::{Setting, with_unit};
 use super::small::SmallPanels;
 use super::veins::{Veins, length};
 use crate::report::numbers::{number_of_veins, power_of_ten, short};
-use crate::report::words::branch_end;
+use crate::report::words::{branch_end, stable_or_index};
 use crate::report::{error_location, slope_unit};
 use crate::scenario::{Scenario, Units};
 use crate::study::{Law, PointKind, Trace, TraceBranch, TracePoint, TraceShow};
@@ -157,10 +157,9 @@ fn difference(one: &TracePoint, other: &TracePoint) -> f64 {
 }
 
 fn caption(point: &TracePoint) -> String {
-    let kind = match (point.kind, point.index) {
-        (PointKind::Regular, 0) => "stable".into(),
-        (PointKind::Regular, index) => format!("index {index}"),
-        (kind, _) => kind.word().replace('-', " "),
+    let kind = match point.kind {
+        PointKind::Regular => stable_or_index(point.index),
+        kind => kind.word().replace('-', " "),
     };
     format!("{}, {kind}", short(point.value))
 }
@@ -230,11 +229,7 @@ fn draw_branches(
     };
     // Logarithmic if the values are spaced logarithmically; they increase along the axis.
     let sign = trace.log.then(|| trace.range[0].signum());
-    let axes = Axes {
-        cell,
-        across: Axis::covering(&across, all().map(|point| at(point).0), sign),
-        up: axis_of(trace, quantity),
-    };
+    let across = Axis::covering(&across, all().map(|point| at(point).0), sign);
     // The title names only the kinds that occur.
     let indices = [true, false].map(|stable| all().any(|point| (point.index == 0) == stable));
     let what = match indices {
@@ -242,8 +237,7 @@ fn draw_branches(
         [false, true] => "unstable equilibria",
         _ => "stable equilibria",
     };
-    title(page, cell.corner, letter, what);
-    axes.draw(page);
+    let axes = Axes::titled(page, cell, [letter, what], across, axis_of(trace, quantity));
     let mut labels = Labels::within(cell);
     for (b, branch) in trace.branches.iter().enumerate() {
         let origin = branch.from.map(|[b, p]| &trace.branches[b].points[p]);
@@ -339,14 +333,10 @@ fn draw_law(
     });
     // The line may leave the range of the points.
     let drawn = || points.iter().chain(&ends);
-    let axes = Axes {
-        cell,
-        across: Axis::holding(&across, drawn().map(|p| p.0)),
-        up: Axis::holding(&up, drawn().map(|p| p.1)),
-    };
+    let across = Axis::holding(&across, drawn().map(|p| p.0));
+    let up = Axis::holding(&up, drawn().map(|p| p.1));
     let what = "force against displacement of the tip";
-    title(page, cell.corner, letter, what);
-    axes.draw(page);
+    let axes = Axes::titled(page, cell, [letter, what], across, up);
     let line = Stroke::new(CURVES[2], 1.4);
     axes.curve(page, &ends, line);
     axes.markers(page, points, Marker::Dot, CURVES[0]);

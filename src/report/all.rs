@@ -5,6 +5,7 @@ use crate::study::{All, Found};
 
 use super::numbers::{seconds, veins};
 use super::table::{Lines, lay_out};
+use super::words::stable_or_index;
 
 /// The equilibria, lowest energy first.
 pub fn report(all: &All, files: Option<String>) -> String {
@@ -47,11 +48,8 @@ pub fn lines(all: &All, files: Option<String>) -> Lines {
 
 fn line(number: usize, found: &Found) -> String {
     let leaf = &found.equilibrium;
-    let stability = match leaf.stability.negative_eigenvalues {
-        Some(0) => "stable".into(),
-        Some(index) => format!("index {index}"),
-        None => "of unknown stability".into(),
-    };
+    let index = leaf.stability.negative_eigenvalues;
+    let stability = index.map_or("of unknown stability".into(), stable_or_index);
     let tip = match &leaf.tips[..] {
         [tip] => format!(", tip ({:.6}, {:.6}, {:.6})", tip.x, tip.y, tip.z),
         _ => String::new(),

@@ -5,7 +5,7 @@ use crate::study::{Law, PointKind, Trace, TraceBranch, TracePoint};
 
 use super::numbers::{power_of_ten, seconds, short, veins_of};
 use super::table::{Lines, labelled, lay_out};
-use super::words::branch_end;
+use super::words::{branch_end, stable_or_index};
 
 /// The branches, their ends, and where the index changes.
 pub fn report(trace: &Trace, files: Option<String>) -> String {
@@ -100,10 +100,7 @@ pub fn error_location(trace: &Trace) -> &'static str {
 }
 
 fn place(trace: &Trace, point: &TracePoint) -> String {
-    let stability = match point.index {
-        0 => "stable".into(),
-        index => format!("index {index}"),
-    };
+    let stability = stable_or_index(point.index);
     let tip = match &point.tips[..] {
         [tip] if point.reaction.is_none() => {
             format!(", tip ({:.7}, {:.7}, {:.7})", tip.x, tip.y, tip.z)

@@ -48,6 +48,14 @@ pub fn equilibrium_of_index(negative_eigenvalues: Option<usize>) -> String {
     }
 }
 
+/// The same in a word or two, of a known index.
+pub fn stable_or_index(index: usize) -> String {
+    match index {
+        0 => "stable".into(),
+        index => format!("index {index}"),
+    }
+}
+
 /// The kind of shooting.
 pub fn shooting(intervals: usize) -> String {
     match intervals {

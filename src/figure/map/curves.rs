@@ -8,7 +8,7 @@ use crate::figure::axes::Axes;
 use crate::figure::axis::Axis;
 use crate::figure::drawing::{CURVES, Color, Drawing, Stroke};
 use crate::figure::markers::Marker;
-use crate::figure::page::{Cell, Key, PANEL_AXIS, PANEL_TITLE, title};
+use crate::figure::page::{Cell, Key, PANEL_AXIS, PANEL_TITLE};
 use crate::figure::setting::with_unit;
 use crate::study::{Map, MapRow, MapShow};
 
@@ -96,13 +96,8 @@ fn draw_panel(
         })
         .collect();
     let known = lines.iter().flatten().map(|point| point.1);
-    let axes = Axes {
-        cell,
-        across: x.axis.clone(),
-        up: Axis::holding(name, known.filter(|value| value.is_finite())).at_least(ROUNDING),
-    };
-    title(page, cell.corner, "", what);
-    axes.draw(page);
+    let up = Axis::holding(name, known.filter(|value| value.is_finite())).at_least(ROUNDING);
+    let axes = Axes::titled(page, cell, ["", what], x.axis.clone(), up);
     let mut key = Key::right_of(cell);
     for ((name, color, _), line) in curves.iter().zip(lines) {
         axes.curve(page, &line, Stroke::new(*color, 1.6));

@@ -144,13 +144,8 @@ pub fn stations(scenario: &Scenario, knobs: Knobs) -> Vec<f64> {
         Ok(segments) if knobs.segments.is_some() => {
             let grid = fine_grid(scenario, segments);
             let every = grid.segments().div_ceil(MOST_STATIONS);
-            let tip = [1.0].into_iter();
-            grid.sigma()
-                .iter()
-                .copied()
-                .step_by(every)
-                .chain(tip)
-                .collect()
+            let some = grid.sigma().iter().copied().step_by(every);
+            some.chain([1.0]).collect()
         }
         _ => vec![0.0, 1.0],
     }
