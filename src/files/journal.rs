@@ -90,10 +90,9 @@ impl Journal {
     ) -> Result<Self, FileError> {
         write_rows(folder, name, request, known)?;
         let path = folder.join(name);
-        match OpenOptions::new().append(true).open(&path) {
-            Ok(file) => Ok(Journal { path, file }),
-            Err(reason) => Err(FileError::write(&path, reason)),
-        }
+        let file = OpenOptions::new().append(true).open(&path);
+        let file = file.map_err(|reason| FileError::write(&path, reason))?;
+        Ok(Journal { path, file })
     }
 
     /// Appends rows with a single write.

@@ -268,8 +268,7 @@ fn write_named(
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<PathBuf, FileError> {
     let file = folder.join(name);
-    match atomic::write_file(&file, fill) {
-        Ok(()) => Ok(file),
-        Err(reason) => Err(FileError::write(&file, reason)),
-    }
+    let written = atomic::write_file(&file, fill);
+    written.map_err(|reason| FileError::write(&file, reason))?;
+    Ok(file)
 }

@@ -57,8 +57,6 @@ fn write(latest: &mut Option<Latest>) -> Option<Result<f64, FileError>> {
         let mut files = latest.files.iter();
         files.try_for_each(|[draft, kept]| atomic::rename(draft, kept))
     });
-    Some(match written {
-        Ok(()) => Ok(checkpoint.time),
-        Err(reason) => Err(FileError::write(&file, reason)),
-    })
+    let written = written.map_err(|reason| FileError::write(&file, reason));
+    Some(written.map(|()| checkpoint.time))
 }

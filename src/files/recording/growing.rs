@@ -31,10 +31,8 @@ pub fn kept_path(file: &Path) -> PathBuf {
 impl GrowingFile {
     /// Begins a file with these bytes.
     pub fn begin(file: PathBuf, start: &[u8]) -> Result<Self, FileError> {
-        let (draft, out) = match Draft::begin(&file) {
-            Ok(begun) => begun,
-            Err(reason) => return Err(FileError::write(&file, reason)),
-        };
+        let begun = Draft::begin(&file).map_err(|reason| FileError::write(&file, reason));
+        let (draft, out) = begun?;
         let mut begun = GrowingFile {
             file,
             draft,

@@ -39,13 +39,6 @@ struct Judged<'a> {
     error: Option<f64>,
 }
 
-impl<'a> Judged<'a> {
-    /// The answer, if the leaf is at rest.
-    fn at_rest(&self) -> Option<&'a Answer> {
-        self.measured.answer().filter(|run| run.at_rest())
-    }
-}
-
 /// The rows of cells of one leaf.
 pub fn rows(
     scenario: &Scenario,
@@ -55,14 +48,12 @@ pub fn rows(
 ) -> Vec<Row> {
     let unit = longest(&scenario.rods);
     let judged = cells.iter().zip(measured).map(|(cell, measured)| {
-        let mut judged = Judged {
+        let distance = reference.and_then(|it| measured.at_rest()?.distance(it));
+        Judged {
             cell,
             measured,
-            error: None,
-        };
-        let distance = reference.and_then(|it| judged.at_rest()?.distance(it));
-        judged.error = distance.map(|distance| distance / unit);
-        judged
+            error: distance.map(|distance| distance / unit),
+        }
     });
     let judged: Vec<Judged> = judged.collect();
     (0..judged.len())
@@ -73,7 +64,7 @@ pub fn rows(
 /// Whether the error of a run is due to another equilibrium.
 fn is_elsewhere(i: usize, judged: &[Judged], unit: f64) -> bool {
     let this = &judged[i];
-    let (Some(answer), Some(error)) = (this.at_rest(), this.error) else {
+    let (Some(answer), Some(error)) = (this.measured.at_rest(), this.error) else {
         return false;
     };
     if error <= ELSEWHERE {
@@ -87,14 +78,12 @@ fn is_elsewhere(i: usize, judged: &[Judged], unit: f64) -> bool {
     // or the next grid has nearly the same shape.
     let alike = |other: &&Judged| other.cell.contender == this.cell.contender;
     let mut coarser = judged[..i].iter().filter(alike);
-    if coarser.any(|it| {
-        it.error
-            .is_some_and(|error_there| error_there < MUCH_LESS * error)
-    }) {
+    if coarser.any(|it| it.error.is_some_and(|there| there < MUCH_LESS * error)) {
         return true;
     }
-    let finer = judged[i + 1..].iter().find(alike).and_then(Judged::at_rest);
-    let coarser = || judged[..i].iter().rfind(alike)?.at_rest();
+    let finer = judged[i + 1..].iter().find(alike);
+    let finer = finer.and_then(|it| it.measured.at_rest());
+    let coarser = || judged[..i].iter().rfind(alike)?.measured.at_rest();
     let next = finer.or_else(coarser);
     let apart = next.and_then(|next| answer.distance(next));
     apart.is_some_and(|apart| apart / unit < MUCH_LESS * error)
