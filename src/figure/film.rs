@@ -151,11 +151,8 @@ impl Palette {
                     let squared = |a: u8, b: u8| (i32::from(a) - i32::from(b)).pow(2);
                     squared(*r, rgb[0]) + squared(*g, rgb[1]) + squared(*b, rgb[2])
                 };
-                let nearest = self
-                    .colors
-                    .iter()
-                    .enumerate()
-                    .min_by_key(|(_, color)| distance(color));
+                let colors = self.colors.iter().enumerate();
+                let nearest = colors.min_by_key(|(_, color)| distance(color));
                 nearest.map_or(0, |(index, _)| index as u8)
             })
         })
@@ -170,11 +167,8 @@ fn encode(
     out: &mut dyn Write,
 ) -> Result<(), gif::EncodingError> {
     let [width, height] = (2.0 * SIZE).to_array().map(|pixels| pixels as u16);
-    let palette = Palette::new().colors;
-    let mut table: Vec<u8> = palette
-        .iter()
-        .flat_map(|&Color(r, g, b)| [r, g, b])
-        .collect();
+    let colors = Palette::new().colors.into_iter();
+    let mut table: Vec<u8> = colors.flat_map(|Color(r, g, b)| [r, g, b]).collect();
     table.resize(3 * 256, 0);
     let mut encoder = gif::Encoder::new(out, width, height, &table)?;
     encoder.set_repeat(gif::Repeat::Infinite)?;
@@ -207,16 +201,14 @@ fn changed(
         return (0..picture.len() / width, picture.to_vec());
     };
     let pixels = before.iter().zip(picture);
-    let pixels: Vec<u8> = pixels
-        .map(|(a, b)| if a == b { SAME } else { *b })
-        .collect();
+    let pixels = pixels.map(|(a, b)| if a == b { SAME } else { *b });
+    let pixels: Vec<u8> = pixels.collect();
     let differs = |pixel: &u8| *pixel != SAME;
     let first = pixels.iter().position(differs).unwrap_or(0) / width;
     let last = pixels.iter().rposition(differs).unwrap_or(0) / width;
-    (
-        first..last + 1,
-        pixels[first * width..(last + 1) * width].to_vec(),
-    )
+    let rows = first..last + 1;
+    let changed = &pixels[rows.start * width..rows.end * width];
+    (rows, changed.to_vec())
 }
 
 #[cfg(test)]
@@ -292,10 +284,8 @@ mod tests {
             );
         }
         // Five veins, five colours.
-        let seen: HashSet<[u8; 3]> = pictures[0]
-            .chunks_exact(4)
-            .map(|c| [c[0], c[1], c[2]])
-            .collect();
+        let pixels = pictures[0].chunks_exact(4);
+        let seen: HashSet<[u8; 3]> = pixels.map(|c| [c[0], c[1], c[2]]).collect();
         for vein in 0..5 {
             let Color(r, g, b) = vein_color(f64::from(vein) / 4.0);
             let near =

@@ -110,11 +110,8 @@ mod tests {
         // In all pictures but the first, or the first two, and in the key.
         assert_eq!(paths(&record), [8, 7]);
         record.joined = false;
-        record.tips = record.stills[0]
-            .curves
-            .iter()
-            .map(|curve| curve[0])
-            .collect();
+        let curves = record.stills[0].curves.iter();
+        record.tips = curves.map(|curve| curve[0]).collect();
         assert_eq!(paths(&record), [0, 0]);
     }
 }

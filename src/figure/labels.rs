@@ -54,11 +54,8 @@ impl Labels {
 
     /// Requests a label next to a point; points close to each other share one.
     pub fn add(&mut self, at: DVec2, text: &str) {
-        match self
-            .wanted
-            .iter_mut()
-            .find(|(place, _)| place.distance(at) < CLOSE)
-        {
+        let mut wanted = self.wanted.iter_mut();
+        match wanted.find(|(place, _)| place.distance(at) < CLOSE) {
             Some((_, texts)) => *texts += &format!(", {text}"),
             None => self.wanted.push((at, text.into())),
         }

@@ -217,16 +217,12 @@ mod tests {
             rotation: shape,
         }]);
         svg::text(&modes(&fan, &scenario()));
-        fan.shape
-            .curves
-            .iter_mut()
-            .for_each(|curve| curve[4].z = value);
+        let curves = fan.shape.curves.iter_mut();
+        curves.for_each(|curve| curve[4].z = value);
         fan.tips[0].x = value;
         leaf(&fan, &scenario());
-        fan.shape
-            .curves
-            .iter_mut()
-            .for_each(|curve| curve.fill(DVec3::splat(value)));
+        let curves = fan.shape.curves.iter_mut();
+        curves.for_each(|curve| curve.fill(DVec3::splat(value)));
         leaf(&fan, &scenario());
         fan.shape.curves.clear();
         leaf(&fan, &scenario());

@@ -76,21 +76,14 @@ fn draw_flat(
     let mut order: Vec<&Vein> = veins.veins.iter().collect();
     order.sort_by(|a, b| nearness(a).total_cmp(&nearness(b)));
     for vein in order {
-        page.stroke(
-            vein.path(place),
-            Stroke::new(vein.color, veins.line_width()),
-        );
+        let stroke = Stroke::new(vein.color, veins.line_width());
+        page.stroke(vein.path(place), stroke);
     }
     leaf_markers(page, veins, place);
     if let Some(gravity) = setting.gravity {
         let direction = DVec2::new(gravity[across], -gravity[up]);
-        gravity::draw(
-            page,
-            cell,
-            veins.points().map(place),
-            direction,
-            toward.dot(gravity) > 0.0,
-        );
+        let (points, toward) = (veins.points().map(place), toward.dot(gravity) > 0.0);
+        gravity::draw(page, cell, points, direction, toward);
     }
 }
 

@@ -20,18 +20,15 @@ pub fn draw(leaf: &Equilibrium) -> Drawing {
     let found = leaf.sensitivities.as_deref().unwrap_or_default();
     let length = leaf.shape.longest();
     let change = |found: &Sensitivity| {
-        let by = if found.value == 0.0 {
-            1.0
-        } else {
-            0.01 * found.value
+        let by = match found.value {
+            0.0 => 1.0,
+            value => 0.01 * value,
         };
         let moved = found.tips.iter().map(|tip| (*tip * by).length());
         moved.fold(0.0, f64::max) / length
     };
-    let mut rows: Vec<(&str, f64)> = found
-        .iter()
-        .map(|found| (found.key.as_str(), change(found)))
-        .collect();
+    let rows = found.iter().map(|it| (it.key.as_str(), change(it)));
+    let mut rows: Vec<(&str, f64)> = rows.collect();
     rows.sort_by(|a, b| b.1.total_cmp(&a.1));
     rows.truncate(MOST);
     let height = ROW * rows.len().max(1) as f64;

@@ -99,11 +99,8 @@ fn notes(trace: &Trace) -> Vec<String> {
     let errors = trace.branches.iter().flat_map(|b| &b.points);
     let worst = errors.filter_map(|p| p.error).fold(0.0, f64::max);
     if worst > 0.0 {
-        notes.push(format!(
-            "{} within {}",
-            error_location(trace),
-            power_of_ten(worst)
-        ));
+        let (what, worst) = (error_location(trace), power_of_ten(worst));
+        notes.push(format!("{what} within {worst}"));
     }
     notes
 }
@@ -127,10 +124,8 @@ fn shown(trace: &Trace) -> Vec<[usize; 2]> {
     let point = |[b, p]: [usize; 2]| &trace.branches[b].points[p];
     let first = wanted.first().map(|&(_, at)| at);
     let distance = |at: [usize; 2]| first.map_or(0.0, |first| difference(point(at), point(first)));
-    let farthest = wanted
-        .iter()
-        .map(|&(_, at)| distance(at))
-        .fold(0.0, f64::max);
+    let farthest = wanted.iter().map(|&(_, at)| distance(at));
+    let farthest = farthest.fold(0.0, f64::max);
     let visible = VISIBLE.min(VISIBLE_FRACTION * farthest);
     let mut shown: Vec<[usize; 2]> = Vec::new();
     for (_, at) in wanted {

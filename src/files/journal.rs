@@ -63,11 +63,8 @@ fn difference(theirs: &Value, ours: &Value) -> Option<String> {
     if theirs == ours {
         return None;
     }
-    let keys = ours
-        .as_object()
-        .into_iter()
-        .flat_map(|object| object.keys());
-    let other = keys.into_iter().find(|key| theirs[*key] != ours[*key]);
+    let mut keys = ours.as_object().into_iter().flat_map(|it| it.keys());
+    let other = keys.find(|key| theirs[*key] != ours[*key]);
     Some(other.map_or("request", |key| key.as_str()).to_string())
 }
 

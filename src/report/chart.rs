@@ -19,12 +19,8 @@ pub fn report(chart: &Chart, files: Vec<String>) -> String {
     if let Some(scaling) = &chart.scaling {
         lines.extend(labelled("veins", veins(scaling)));
     }
-    lines.extend(
-        chart
-            .remarks
-            .iter()
-            .map(|remark| ("remark", remark.clone())),
-    );
+    let remarks = chart.remarks.iter();
+    lines.extend(remarks.map(|remark| ("remark", remark.clone())));
     lines.extend(labelled("written", files));
     let veins = veins_of(chart.rods, chart.joined);
     let heading = format!("{}: {veins}, speed against accuracy", chart.scenario);
@@ -75,10 +71,8 @@ fn front(chart: &Chart) -> Vec<String> {
     let rows = chart.rows.iter().filter(|row| row.pareto == Some(true));
     let rows = rows.filter_map(|row| {
         let point = row.point()?;
-        Some((
-            point,
-            entry(point, contender(row.contender), &row.knob.to_string()),
-        ))
+        let line = entry(point, contender(row.contender), &row.knob.to_string());
+        Some((point, line))
     });
     let peers = chart.peers.iter().filter(|peer| peer.pareto);
     let peers = peers.filter_map(|peer| {
@@ -123,16 +117,10 @@ fn failed(chart: &Chart) -> Vec<String> {
         }
     }
     let line = |(row, knobs): (&Row, Vec<String>)| {
-        let why = row
-            .remark
-            .as_ref()
-            .map_or(String::new(), |why| format!(": {why}"));
-        format!(
-            "{}, {}, {}{why}",
-            contender(row.contender),
-            listed(&knobs),
-            row.ending.word()
-        )
+        let why = row.remark.as_ref();
+        let why = why.map_or(String::new(), |why| format!(": {why}"));
+        let (who, knobs, end) = (contender(row.contender), listed(&knobs), row.ending.word());
+        format!("{who}, {knobs}, {end}{why}")
     };
     kinds.into_iter().map(line).collect()
 }
@@ -198,10 +186,8 @@ fn veins(scaling: &Scaling) -> Vec<String> {
     let mut lines = vec![format!("to a tolerance of {:e}", scaling.tolerance)];
     if !scaling.unconfirmed.is_empty() {
         let rods: Vec<String> = scaling.unconfirmed.iter().map(usize::to_string).collect();
-        lines.push(format!(
-            "reference NOT CONFIRMED for N = {}",
-            rods.join(", ")
-        ));
+        let rods = rods.join(", ");
+        lines.push(format!("reference NOT CONFIRMED for N = {rods}"));
     }
     let mut last = None;
     for found in &scaling.rows {

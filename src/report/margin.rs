@@ -62,10 +62,8 @@ fn destabilizing_push(margin: &Margin, push: &Push) -> String {
 
 /// Directions in which the leaf stays stable up to the largest push.
 fn stable_directions(margin: &Margin) -> Option<String> {
-    let none = margin
-        .pushes
-        .iter()
-        .filter(|push| push.kind == Loss::NoneUpTo);
+    let none = margin.pushes.iter();
+    let none = none.filter(|push| push.kind == Loss::NoneUpTo);
     let none: Vec<String> = none.map(|push| push.direction.to_string()).collect();
     let largest = force(margin, margin.largest_push?);
     (!none.is_empty()).then(|| format!("more than {largest} is needed along {}", none.join(", ")))

@@ -125,10 +125,8 @@ fn waves(equilibrium: &Equilibrium) -> Option<String> {
 /// The lowest eigenvalues, as growth rates and frequencies.
 fn modes(equilibrium: &Equilibrium) -> Option<String> {
     let Some(modes) = &equilibrium.stability.modes else {
-        return equilibrium
-            .stability
-            .mode_shapes
-            .then(|| "not known".into());
+        let asked = equilibrium.stability.mode_shapes;
+        return asked.then(|| "not known".into());
     };
     let unstable = |mode: &&Mode| mode.growth().is_some() && !mode.is_neutral();
     let list = |values: &mut dyn Iterator<Item = f64>| {

@@ -96,11 +96,8 @@ fn draw_key(page: &mut Drawing, map: &Map, base: f64) -> f64 {
             key.entry(page, &name, |page, cell| panel::fill(page, cell, outcome));
         }
     }
-    let mut counts: Vec<f64> = map
-        .rows
-        .iter()
-        .filter_map(|row| waves(map.show, row))
-        .collect();
+    let counts = map.rows.iter().filter_map(|row| waves(map.show, row));
+    let mut counts: Vec<f64> = counts.collect();
     counts.sort_by(f64::total_cmp);
     counts.dedup();
     for waves in counts {
@@ -284,16 +281,9 @@ mod tests {
             .retain(|row| row.cell < 4 && row.method == MapMethod::default());
         let curves = |svg: &str| -> Vec<usize> {
             let groups = svg.split("<g id=\"curves\">").skip(1);
-            groups
-                .map(|group| {
-                    group
-                        .split("</g>")
-                        .next()
-                        .unwrap()
-                        .matches("stroke-width=\"1.6\"")
-                        .count()
-                })
-                .collect()
+            let groups = groups.map(|group| group.split("</g>").next().unwrap());
+            let lines = groups.map(|group| group.matches("stroke-width=\"1.6\"").count());
+            lines.collect()
         };
         // The lines of the panels and those of their keys.
         let svg = svg(&map);
