@@ -184,10 +184,8 @@ impl Map {
             .filter(|&cell| shard.contains(cell))
             .map(|cell| {
                 let methods = request.methods.iter().copied();
-                (
-                    cell,
-                    methods.filter(|&method| !is_known(cell, method)).collect(),
-                )
+                let missing = methods.filter(|&method| !is_known(cell, method));
+                (cell, missing.collect())
             })
             .filter(|(_, methods): &(usize, Vec<_>)| !methods.is_empty())
             .collect();
@@ -203,9 +201,8 @@ impl Map {
         let (mut rows, mut finished) = (Vec::new(), 0);
         let mut failed: Option<FileError> = None;
         study::map(request, &todo, &mut |new| {
-            failed = journal
-                .as_mut()
-                .and_then(|it| it.append(request, &new).err());
+            let journal = journal.as_mut();
+            failed = journal.and_then(|it| it.append(request, &new).err());
             rows.extend(new);
             finished += 1;
             let cells = todo.len();
@@ -231,9 +228,8 @@ fn shards(folder: &Path) -> Vec<PathBuf> {
         .filter_map(|entry| Some(entry.ok()?.path()))
         .filter(|file| {
             let name = file.file_name().unwrap_or_default().to_string_lossy();
-            let middle = name
-                .strip_prefix("map-")
-                .and_then(|n| n.strip_suffix(".csv"));
+            let middle = name.strip_prefix("map-");
+            let middle = middle.and_then(|rest| rest.strip_suffix(".csv"));
             let shard = middle.and_then(|middle| middle.replace("-of-", "/").parse::<Shard>().ok());
             shard.is_some_and(|shard| name == shard.file_name())
         })

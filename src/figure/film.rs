@@ -242,6 +242,10 @@ mod tests {
         (decoder.repeat(), delays, pictures)
     }
 
+    fn total(delays: &[u16]) -> u32 {
+        delays.iter().map(|&delay| u32::from(delay)).sum()
+    }
+
     #[test]
     fn a_film_lasts_ten_seconds_loops_and_shows_the_leaf() {
         let mut record = sample::record(5, 8);
@@ -259,10 +263,7 @@ mod tests {
         let (repeat, delays, pictures) = decoded(&bytes);
         assert_eq!(repeat, gif::Repeat::Infinite);
         assert_eq!(pictures.len(), 101);
-        assert_eq!(
-            delays.iter().map(|&delay| u32::from(delay)).sum::<u32>(),
-            1000
-        );
+        assert_eq!(total(&delays), 1000);
         // Every picture shows its instant, in colours that are close enough.
         let stills = record.film.iter();
         let shapes: Vec<Veins> = stills.map(|it| Veins::at_instant(&record, it)).collect();
@@ -278,10 +279,7 @@ mod tests {
                 |(a, b): (&[u8], &[u8])| (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap_or(0);
             let off: Vec<u8> = pairs.map(difference).collect();
             let worst = off.iter().filter(|&&off| off > 48).count();
-            assert!(
-                worst < off.len() / 2000,
-                "picture {k}: {worst} pixels are off"
-            );
+            assert!(worst < off.len() / 2000, "picture {k}: {worst} are off");
         }
         // Five veins, five colours.
         let pixels = pictures[0].chunks_exact(4);
@@ -299,10 +297,7 @@ mod tests {
         assert_eq!(delays(&[0.0, 1.0, 2.0, 4.0]), [100, 100, 100, 100]);
         let even: Vec<f64> = (0..140).map(f64::from).collect();
         let delays = delays(&even);
-        assert_eq!(
-            delays.iter().map(|&delay| u32::from(delay)).sum::<u32>(),
-            1000
-        );
+        assert_eq!(total(&delays), 1000);
         assert!(delays.iter().all(|delay| (7..=8).contains(delay)));
         assert_eq!(super::delays(&[0.0]), [100]);
         assert!(super::delays(&[]).is_empty());

@@ -32,16 +32,11 @@ pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
         false => panels,
     };
     let mut notes = notes(record);
-    notes.extend(
-        shapes
-            .first()
-            .map_or(Vec::new(), |veins| veins.notes(&setting)),
-    );
-    notes.push(format!(
-        "a square of the grid is {} wide",
-        panels.grid_width()
-    ));
-    let mut drawing = new_page(SIDE, &name, &notes, shapes.first());
+    let first = shapes.first();
+    notes.extend(first.map_or(Vec::new(), |veins| veins.notes(&setting)));
+    let width = panels.grid_width();
+    notes.push(format!("a square of the grid is {width} wide"));
+    let mut drawing = new_page(SIDE, &name, &notes, first);
     drawing.height = panels.end();
     let mut since = record.stills.first().map_or(0, |still| still.moment);
     let strokes = [DOT, PALE].map(|color| Stroke::new(color, 1.0));

@@ -62,10 +62,10 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
 fn caption(mode: &Mode) -> (String, Color) {
     match (mode.is_neutral(), mode.growth()) {
         (true, _) => ("neutral: ω = 0".into(), NOTE),
-        (_, None) => (
-            format!("ω = {}", short(mode.frequency().unwrap_or_default())),
-            NOTE,
-        ),
+        (_, None) => {
+            let frequency = short(mode.frequency().unwrap_or_default());
+            (format!("ω = {frequency}"), NOTE)
+        }
         (_, Some(growth)) => (format!("unstable: grows at {}", short(growth)), DOT),
     }
 }

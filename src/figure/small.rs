@@ -108,14 +108,8 @@ impl SmallPanels {
     ) {
         let cell = self.cell(index);
         title_in(page, cell.corner, letter, text, color);
-        let scene = Scene::new(
-            self.bounds,
-            &self.setting,
-            view,
-            cell,
-            MARGINS,
-            Some(self.step),
-        );
+        let (bounds, setting, step) = (self.bounds, &self.setting, Some(self.step));
+        let scene = Scene::new(bounds, setting, view, cell, MARGINS, step);
         scene.draw_box(page);
         if index == 0 {
             scene.draw_names(page, 9.0, false);

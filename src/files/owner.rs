@@ -63,13 +63,9 @@ pub fn check_owner(folder: &Path, source: &str) -> Result<(), FileError> {
         };
         let other = folder.join(other);
         let other = without_dots(absolute(&other).unwrap_or(other));
-        return Err(FileError::unfit(
-            &file,
-            &format!(
-                "is of another scenario, in {}: name a folder with --out DIR, or give this scenario another name",
-                other.display()
-            ),
-        ));
+        let change = "name a folder with --out DIR, or give this scenario another name";
+        let why = format!("is of another scenario, in {}: {change}", other.display());
+        return Err(FileError::unfit(&file, &why));
     }
     Ok(())
 }

@@ -29,20 +29,15 @@ pub fn lines(all: &All, files: Option<String>) -> Lines {
         0 => String::new(),
         failed => format!(", {failed} of them without coming to rest"),
     };
-    lines.push((
-        "work",
-        format!(
-            "{stable} stable and {others} other equilibria from {} starts{failed}, in {}",
-            all.starts,
-            seconds(all.wall_seconds)
-        ),
-    ));
+    let (starts, time) = (all.starts, seconds(all.wall_seconds));
+    let work = format!(
+        "{stable} stable and {others} other equilibria from {starts} starts{failed}, in {time}"
+    );
+    lines.push(("work", work));
     lines.extend(files.map(|files| ("written", files)));
     lines.extend(all.remark.clone().map(|remark| ("remark", remark)));
-    lines.push((
-        "remark",
-        "there may be more: no number of starts proves that these are all".into(),
-    ));
+    let more = "there may be more: no number of starts proves that these are all";
+    lines.push(("remark", more.into()));
     lines
 }
 
@@ -67,9 +62,6 @@ fn line(number: usize, found: &Found) -> String {
         1 => "1 start".into(),
         starts => format!("{starts} starts"),
     };
-    format!(
-        "{:>2}. energy {:.10}: {stability}{tip}{within} ({starts}{plain})",
-        number + 1,
-        leaf.energy.unwrap_or(f64::NAN)
-    )
+    let (number, energy) = (number + 1, leaf.energy.unwrap_or(f64::NAN));
+    format!("{number:>2}. energy {energy:.10}: {stability}{tip}{within} ({starts}{plain})")
 }

@@ -18,25 +18,16 @@ pub fn report(fit: &Fit, files: Option<String>) -> String {
         FitOutcome::NotConverged => "no minimum",
     };
     let mut lines: Lines = vec![("found", found.into())];
-    lines.extend(labelled(
-        "numbers",
-        fit.parameters.iter().map(number).collect(),
-    ));
+    let numbers = fit.parameters.iter().map(number);
+    lines.extend(labelled("numbers", numbers.collect()));
     lines.extend(labelled("data say", fit.says.clone()));
     let (count, freedom) = (fit.residuals.len(), fit.degrees_of_freedom);
-    lines.push((
-        "misfit",
-        match fit.standard_deviation {
-            Some(sd) => format!(
-                "standard deviation {} over {count} data, {freedom} degrees of freedom",
-                brief(sd)
-            ),
-            None => format!(
-                "chi squared {} over {count} data, {freedom} degrees of freedom",
-                brief(fit.chi_squared)
-            ),
-        },
-    ));
+    let misfit = match fit.standard_deviation {
+        Some(sd) => format!("standard deviation {}", brief(sd)),
+        None => format!("chi squared {}", brief(fit.chi_squared)),
+    };
+    let misfit = format!("{misfit} over {count} data, {freedom} degrees of freedom");
+    lines.push(("misfit", misfit));
     let candidates = fit.candidates.iter().take(CANDIDATES).map(|candidate| {
         let text = match &candidate.remark {
             Some(remark) => remark.clone(),
@@ -50,20 +41,13 @@ pub fn report(fit: &Fit, files: Option<String>) -> String {
     lines.extend(labelled("measure", candidates.collect()));
     let time = seconds(fit.wall_seconds);
     let evaluations = fit.work.evaluations;
-    lines.push((
-        "work",
-        format!("all leaves brought to rest {evaluations} times in {time}"),
-    ));
+    let work = format!("all leaves brought to rest {evaluations} times in {time}");
+    lines.push(("work", work));
     lines.extend(files.map(|files| ("written", files)));
     lines.extend(labelled("remark", fit.remarks.clone()));
-    lay_out(
-        &format!(
-            "{}: fit of {} numbers to {count} data",
-            fit.scenario,
-            fit.parameters.len()
-        ),
-        &lines,
-    )
+    let (name, numbers) = (&fit.scenario, fit.parameters.len());
+    let heading = format!("{name}: fit of {numbers} numbers to {count} data");
+    lay_out(&heading, &lines)
 }
 
 fn number(parameter: &FitParameter) -> String {

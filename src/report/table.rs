@@ -88,11 +88,8 @@ pub fn rows_of_json(results: &[(String, i32, Vec<u8>)]) -> io::Result<Vec<u8>> {
     let mut table = csv::Writer::from_writer(Vec::new());
     table.write_record(&columns)?;
     for row in &rows {
-        table.write_record(
-            columns
-                .iter()
-                .map(|column| row.get(column).map_or("", String::as_str)),
-        )?;
+        let cells = columns.iter().map(|column| row.get(column));
+        table.write_record(cells.map(|cell| cell.map_or("", String::as_str)))?;
     }
     table.into_inner().map_err(|error| error.into_error())
 }
@@ -156,19 +153,16 @@ impl<'de> Deserialize<'de> for Flat {
                         "tip" | "tip_force_sum" => {
                             let tip = object.next_value::<Option<[f64; 3]>>()?;
                             for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-                                let cell =
-                                    tip.map_or(String::new(), |tip| format!("{:?}", tip[axis]));
-                                cells.push((format!("{key}_{name}"), cell));
+                                let cell = tip.map(|tip| format!("{:?}", tip[axis]));
+                                cells.push((format!("{key}_{name}"), cell.unwrap_or_default()));
                             }
                         }
                         _ => {
                             let Flat(inner) = object.next_value()?;
-                            cells.extend(inner.into_iter().map(
-                                |(name, cell)| match name.as_str() {
-                                    "" => (key.clone(), cell),
-                                    name => (format!("{key}_{name}"), cell),
-                                },
-                            ));
+                            for (name, cell) in inner {
+                                let below = if name.is_empty() { "" } else { "_" };
+                                cells.push((format!("{key}{below}{name}"), cell));
+                            }
                         }
                     }
                 }

@@ -32,14 +32,9 @@ pub fn lines(trace: &Trace, files: Option<String>) -> Lines {
         let error = format!("{what} within {worst}, followed on {segments} segments a vein");
         ("error", error)
     }));
-    lines.push((
-        "work",
-        format!(
-            "{} factorisations to follow, {} in all",
-            trace.factorizations,
-            seconds(trace.wall_seconds)
-        ),
-    ));
+    let (count, time) = (trace.factorizations, seconds(trace.wall_seconds));
+    let work = format!("{count} factorisations to follow, {time} in all");
+    lines.push(("work", work));
     lines.extend(files.map(|files| ("written", files)));
     lines.extend((trace.remark.iter()).map(|remark| ("remark", remark.clone())));
     lines
@@ -112,10 +107,8 @@ fn place(trace: &Trace, point: &TracePoint) -> String {
         format!(", reaction ({x}, {y}, {z})")
     });
     let reaction = reaction.unwrap_or_default();
-    format!(
-        "{}: {stability}{tip}{reaction}",
-        trace.keys.text(point.value)
-    )
+    let value = trace.keys.text(point.value);
+    format!("{value}: {stability}{tip}{reaction}")
 }
 
 fn critical(trace: &Trace, point: &TracePoint, before: usize) -> String {
@@ -128,9 +121,6 @@ fn critical(trace: &Trace, point: &TracePoint, before: usize) -> String {
         Some(error) => format!(", within {}", power_of_ten(error)),
         None => String::new(),
     };
-    let value = trace.keys.text(point.value);
-    format!(
-        "{what} at {value}{within}: index {before} to {}",
-        point.index
-    )
+    let (value, after) = (trace.keys.text(point.value), point.index);
+    format!("{what} at {value}{within}: index {before} to {after}")
 }

@@ -8,14 +8,12 @@ use crate::study::{Contender, MapShow, Verdict};
 pub fn verdict(equilibrium: &Equilibrium) -> String {
     match equilibrium.outcome {
         Outcome::Converged => at_rest(equilibrium),
-        Outcome::ConvergedAfterSaddle => match &equilibrium.stability.saddle {
-            Some(saddle) => format!(
-                "{}, after leaving a saddle of index {}",
-                at_rest(equilibrium),
-                saddle.negative_eigenvalues
-            ),
-            None => format!("{}, after leaving a saddle", at_rest(equilibrium)),
-        },
+        Outcome::ConvergedAfterSaddle => {
+            let saddle = equilibrium.stability.saddle.as_ref();
+            let index = saddle.map(|saddle| format!(" of index {}", saddle.negative_eigenvalues));
+            let left = format!(", after leaving a saddle{}", index.unwrap_or_default());
+            at_rest(equilibrium) + &left
+        }
         Outcome::Saddle => at_rest(equilibrium),
         Outcome::ToleranceNotReached => {
             format!("{}, tolerance not reached", at_rest(equilibrium))

@@ -139,11 +139,8 @@ impl Leaf {
         for node in shown() {
             let q = node.rotation;
             state.extend([q.w, q.x, q.y, q.z]);
-            state.extend(
-                [node.v, node.u, node.n, node.m]
-                    .map(|v| v.to_array())
-                    .as_flattened(),
-            );
+            let vectors = [node.v, node.u, node.n, node.m].map(|v| v.to_array());
+            state.extend(vectors.as_flattened());
         }
         Leaf {
             label,
@@ -181,9 +178,8 @@ impl Leaf {
         let size = (high - low).max_element().max(f64::MIN_POSITIVE);
         let step = |point: DVec3| ((point - low) / size * 65535.0).round().to_array();
         // NaN becomes a corner of the box.
-        let steps = shown()
-            .flat_map(step)
-            .flat_map(|x| (x as u16).to_le_bytes());
+        let steps = shown().flat_map(step);
+        let steps = steps.flat_map(|x| (x as u16).to_le_bytes());
         Leaf {
             label,
             nodes: nodes.saturating_sub(1) / stride + 1,
@@ -211,11 +207,8 @@ pub fn vectors(vectors: impl Iterator<Item = DVec3>) -> String {
 }
 
 fn floats(numbers: impl IntoIterator<Item = f64>) -> String {
-    base64(
-        numbers
-            .into_iter()
-            .flat_map(|number| (number as f32).to_le_bytes()),
-    )
+    let numbers = numbers.into_iter();
+    base64(numbers.flat_map(|number| (number as f32).to_le_bytes()))
 }
 
 #[cfg(test)]

@@ -137,11 +137,8 @@ fn write(
     let corners = Tubes::triangles(veins, points);
     let accessor =
         json!({ "componentType": UNSIGNED_INT, "count": corners.len(), "type": "SCALAR" });
-    let indices = file.add(
-        corners.into_iter().flat_map(u32::to_le_bytes),
-        Some(ELEMENT_ARRAY),
-        accessor,
-    );
+    let corners = corners.into_iter().flat_map(u32::to_le_bytes);
+    let indices = file.add(corners, Some(ELEMENT_ARRAY), accessor);
 
     let mut targets = Vec::new();
     for curves in &thinned[1..] {

@@ -127,15 +127,11 @@ fn write(
     });
     integers("offsets", ends, out)?;
     writeln!(out, "</Lines>\n<PointData>")?;
-    let numbers = veins.iter().enumerate();
-    integers(
-        "rod",
-        numbers.flat_map(|(j, vein)| vein.iter().map(move |_| j + 1)),
-        out,
-    )?;
-    let sigma = veins
-        .iter()
-        .flat_map(|vein| stations.iter().copied().take(vein.len()));
+    let rods = veins.iter().enumerate();
+    let rods = rods.flat_map(|(j, vein)| vein.iter().map(move |_| j + 1));
+    integers("rod", rods, out)?;
+    let lengths = veins.iter().map(Vec::len);
+    let sigma = lengths.flat_map(|nodes| stations.iter().copied().take(nodes));
     floats("sigma", 1, &sigma.collect::<Vec<f64>>(), out)?;
     for Array(name, components, numbers) in arrays {
         floats(name, *components, numbers, out)?;

@@ -67,22 +67,17 @@ impl Identity {
     /// The properties that distinguish runs, as readable text.
     fn descriptions(&self) -> [(&'static str, String); 8] {
         let number = |digits: &str| number(digits).map_or("?".into(), |number| number.to_string());
-        let step = self.step.as_deref();
+        let step = self.step.as_deref().map(number);
+        let stations = self.stations.map(|count| count.to_string());
         [
             ("version", self.version.clone()),
             ("scenario", self.scenario.clone()),
             ("content", self.content.clone()),
             ("method", self.method.clone()),
             ("segments", self.segments.to_string()),
-            (
-                "time step",
-                step.map_or("left to the tolerance".into(), number),
-            ),
+            ("time step", step.unwrap_or("left to the tolerance".into())),
             ("tolerance", number(&self.tolerance)),
-            (
-                "stations",
-                (self.stations).map_or("of the grid".into(), |count| count.to_string()),
-            ),
+            ("stations", stations.unwrap_or("of the grid".into())),
         ]
     }
 

@@ -222,11 +222,8 @@ impl Recording {
             None => {
                 let last = self.moments.len().saturating_sub(1);
                 let nodes = self.last.len() / self.size.rods;
-                split(
-                    &[last],
-                    &mem::take(&mut self.last),
-                    Size { nodes, ..self.size },
-                )
+                let size = Size { nodes, ..self.size };
+                split(&[last], &mem::take(&mut self.last), size)
             }
         };
         let moments = mem::take(&mut self.moments);

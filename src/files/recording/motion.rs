@@ -116,10 +116,8 @@ impl Form {
 /// All numbers of a node.
 fn numbers(frame: &Frame, node: usize) -> [f64; NUMBERS] {
     let (r, q) = (frame.positions[node], frame.rotations[node]);
-    let (v, w) = (
-        frame.velocities[node].linear,
-        frame.velocities[node].angular,
-    );
+    let velocity = &frame.velocities[node];
+    let (v, w) = (velocity.linear, velocity.angular);
     [
         r.x, r.y, r.z, q.w, q.x, q.y, q.z, v.x, v.y, v.z, w.x, w.y, w.z,
     ]

@@ -138,14 +138,12 @@ pub fn remarks(
     let floor = reference.map_or(0.0, |found| found.known_within);
     let neutral = reference.and_then(|found| found.neutral.as_ref());
     let mut remarks = Vec::new();
-    if contenders
-        .iter()
-        .any(|contender| matches!(contender.method, Method::Explicit { .. }))
-    {
-        remarks.push(
-            "explicit relaxation has no knob for its time step: it takes the longest stable one"
-                .into(),
-        );
+    let mut methods = contenders.iter().map(|contender| contender.method);
+    if methods.any(|method| matches!(method, Method::Explicit { .. })) {
+        let step = "it takes the longest stable one";
+        remarks.push(format!(
+            "explicit relaxation has no knob for its time step: {step}"
+        ));
     }
     if let Some(neutral) = neutral {
         remarks.push(format!(
@@ -168,20 +166,16 @@ fn remarks_on(contender: Contender, rows: &[Row], floor: f64, neutral: bool) -> 
         remarks.push(format!("{word} is not charted: {why}"));
     }
     if let Some(first) = of_it().find(|row| row.ending == Ending::NotRun) {
-        remarks.push(format!(
-            "{word} is not run from {} on: the run before took too long; allow more --seconds",
-            first.knob
-        ));
+        let why = "the run before took too long; allow more --seconds";
+        remarks.push(format!("{word} is not run from {} on: {why}", first.knob));
     }
     // Estimates that are smaller than the true error are reported here.
     let too_small = |row: &&Row| {
         let estimate = row.error_estimate.unwrap_or(f64::INFINITY).max(floor);
         row.ending.is_success() && row.true_error.is_some_and(|error| error > estimate)
     };
-    let knobs: Vec<String> = of_it()
-        .filter(too_small)
-        .map(|row| row.knob.to_string())
-        .collect();
+    let knobs = of_it().filter(too_small).map(|row| row.knob.to_string());
+    let knobs: Vec<String> = knobs.collect();
     if !knobs.is_empty() && !neutral {
         let knobs = knobs.join(", ");
         remarks.push(format!("{word} underestimates its error at {knobs}"));

@@ -176,10 +176,8 @@ impl<'a> Cell<'a> {
         };
         let neutral = solution.neutral.as_ref();
         let neutral = neutral.map_or(String::new(), |neutral| format!("; {neutral}"));
-        let note = format!(
-            "over {intervals}, growth 10^{:.1}{neutral}",
-            solution.growth
-        );
+        let growth = solution.growth;
+        let note = format!("over {intervals}, growth 10^{growth:.1}{neutral}");
         let answer = Answer::of_solution(self.scenario, solution, accuracy);
         if !answer.outcome.is_success() {
             let known = format!("the solution is only known within {:.1e}", answer.error());
@@ -219,10 +217,8 @@ impl<'a> Cell<'a> {
             lower if lower < 0.0 => format!("energy lower by {:.1e}", -lower),
             higher => format!("energy higher by {higher:.1e}"),
         };
-        let text = format!(
-            "{:.1e} lengths from the reference, {lower}; {note}",
-            distance / longest(&self.scenario.rods)
-        );
+        let apart = distance / longest(&self.scenario.rods);
+        let text = format!("{apart:.1e} lengths from the reference, {lower}; {note}");
         match self.is_elsewhere(answer, reference, distance) {
             true => (MapOutcome::OtherEquilibrium, text),
             false => (MapOutcome::Inaccurate, text),
