@@ -47,11 +47,11 @@ pub fn draw_chart(chart: &Chart) -> Drawing {
     let reference = match &chart.reference {
         None => "no reference: no equilibrium was found".into(),
         Some(found) => {
-            let within = power_of_ten(found.known_within);
-            match found.confirmed {
-                true => format!("reference confirmed by two methods, known within {within}"),
-                false => format!("the reference is NOT confirmed; taken to be within {within}"),
-            }
+            let what = match found.confirmed {
+                true => "reference confirmed by two methods, known within",
+                false => "the reference is NOT confirmed; taken to be within",
+            };
+            format!("{what} {}", power_of_ten(found.known_within))
         }
     };
     let notes = [

@@ -31,6 +31,13 @@ const PADDING: f64 = 0.06;
 /// Least distance between grid lines.
 const TICK_DISTANCE: f64 = 36.0;
 
+/// The flat panels: names of their groups, letters, titles, and the two axes.
+const FLAT: [(&str, &str, &str, [usize; 2]); 3] = [
+    ("top", "(a)", "from above", [0, 1]),
+    ("side", "(b)", "from the side", [0, 2]),
+    ("front", "(c)", "from the front", [1, 2]),
+];
+
 /// Of the panel in space.
 const MARGINS: Margins = Margins {
     left: 56.0,
@@ -139,17 +146,9 @@ impl Panels {
             corner: DVec2::new(column.0, row.0),
             size: DVec2::new(column.1, row.1),
         };
-        for (name, letter, text, cell, axes) in [
-            ("top", "(a)", "from above", cell(left, top), [0, 1]),
-            ("side", "(b)", "from the side", cell(left, bottom), [0, 2]),
-            (
-                "front",
-                "(c)",
-                "from the front",
-                cell(right, bottom),
-                [1, 2],
-            ),
-        ] {
+        let cells = [(left, top), (left, bottom), (right, bottom)];
+        for ((name, letter, text, axes), (column, row)) in FLAT.into_iter().zip(cells) {
+            let cell = cell(column, row);
             drawing.group(name, |page| {
                 title(page, cell.corner, letter, text);
                 draw_flat(page, veins, setting, cell, self.scale, axes);

@@ -196,22 +196,16 @@ mod tests {
     fn bands_are_one_picture() {
         let mut page = Drawing::new(300.0, "");
         page.height = 700.0;
-        page.shape(
-            rectangle(DVec2::new(20.0, 20.0), DVec2::new(200.0, 600.0)),
-            DOT,
-            None,
-        );
+        let (corner, size) = (DVec2::new(20.0, 20.0), DVec2::new(200.0, 600.0));
+        page.shape(rectangle(corner, size), DOT, None);
         for k in 0..14 {
             let at = DVec2::new(30.0 + 10.0 * f64::from(k), 50.0 * f64::from(k));
             page.stroke(circle(at, 45.0), Stroke::new(INK, 3.0));
             page.label(at, "name", 20.0, Anchor::Start, INK);
             page.rotated_label(at, "a long name of an axis", 20.0, INK);
         }
-        page.line(
-            DVec2::new(0.0, 10.0),
-            DVec2::new(300.0, 690.0),
-            Stroke::new(INK, 4.0),
-        );
+        let (from, to) = (DVec2::new(0.0, 10.0), DVec2::new(300.0, 690.0));
+        page.line(from, to, Stroke::new(INK, 4.0));
         let mut bytes = Vec::new();
         write(&page, &mut bytes).unwrap();
         let mut reader = ::png::Decoder::new(Cursor::new(&bytes))

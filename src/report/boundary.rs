@@ -60,14 +60,12 @@ const MOST_NAMED: usize = 5;
 /// Whether the map agrees with the curves.
 fn map_lines(map: &BoundaryMap) -> Vec<String> {
     let (columns, rows) = (map.first.len(), map.second.len());
-    let mut lines = vec![format!(
-        "{columns} x {rows} cells, {} with an equilibrium of the branch, {}",
-        map.known(),
-        match map.disagreeing.len() {
-            0 => "all as the curves say".into(),
-            count => format!("{count} not as the curves say: others may begin elsewhere"),
-        }
-    )];
+    let verdict = match map.disagreeing.len() {
+        0 => "all as the curves say".into(),
+        count => format!("{count} not as the curves say: others may begin elsewhere"),
+    };
+    let known = format!("{} with an equilibrium of the branch", map.known());
+    let mut lines = vec![format!("{columns} x {rows} cells, {known}, {verdict}")];
     let named = map.disagreeing.iter().take(MOST_NAMED);
     lines.extend(named.map(|[column, row]| {
         let (first, second) = (map.first[column - 1], map.second[row - 1]);

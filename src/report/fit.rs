@@ -29,12 +29,10 @@ pub fn report(fit: &Fit, files: Option<String>) -> String {
     let misfit = format!("{misfit} over {count} data, {freedom} degrees of freedom");
     lines.push(("misfit", misfit));
     let candidates = fit.candidates.iter().take(CANDIDATES).map(|candidate| {
+        let (bits, part) = (candidate.bits, candidate.shrinks);
         let text = match &candidate.remark {
             Some(remark) => remark.clone(),
-            None => format!(
-                "{:.1} bits; what is least known shrinks to {:.2} of it",
-                candidate.bits, candidate.shrinks
-            ),
+            None => format!("{bits:.1} bits; what is least known shrinks to {part:.2} of it"),
         };
         format!("{}: {text}", candidate.experiment)
     });

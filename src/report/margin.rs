@@ -27,10 +27,10 @@ pub fn lines(margin: &Margin) -> Vec<String> {
     }));
     match &margin.barrier {
         Some(found) => lines.push(barrier(margin, found)),
-        None if margin.climbs > 0 => lines.push(format!(
-            "no pass to another equilibrium found from {} places",
-            margin.climbs
-        )),
+        None if margin.climbs > 0 => {
+            let what = "no pass to another equilibrium found";
+            lines.push(format!("{what} from {} places", margin.climbs));
+        }
         None => {}
     }
     lines.extend(margin.remark.clone());

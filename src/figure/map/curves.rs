@@ -51,8 +51,7 @@ pub fn draw(page: &mut Drawing, map: &Map, x: &Varied, strip: Cell, start: f64) 
                 "their amplitude",
                 with_unit("amplitude", Some("L")),
                 vec![("amplitude", CURVES[1], |row| {
-                    row.margin_amplitude
-                        .filter(|_| row.stable_waves().is_some())
+                    row.stable_waves().and(row.margin_amplitude)
                 })],
             ),
             (

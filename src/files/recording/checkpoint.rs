@@ -156,10 +156,13 @@ impl Checkpoint {
             return Err(damaged(file, "its content does not match its checksum"));
         }
         match found.run.difference(asked) {
-            Some(what) => Err(FileError(format!(
-                "cannot resume: {} is of another run: {what}; ask for the same run, or {BEGIN_ANEW}",
-                file.display()
-            ))),
+            Some(what) => {
+                let (file, change) = (file.display(), "ask for the same run");
+                let why = format!("{file} is of another run: {what}");
+                Err(FileError(format!(
+                    "cannot resume: {why}; {change}, or {BEGIN_ANEW}"
+                )))
+            }
             None => Ok(found),
         }
     }

@@ -119,12 +119,10 @@ impl Recording {
         let mut recording = Recording::new(folder, simulation, selection);
         let found = Checkpoint::read(folder, &recording.run)?;
         let state = found.state().filter(|state| simulation.restore(state));
-        state.ok_or_else(|| {
-            damaged(
-                &folder.join(checkpoint::FILE_NAME),
-                "it does not fit the leaf, or a number of it is not finite",
-            )
-        })?;
+        if state.is_none() {
+            let why = "it does not fit the leaf, or a number of it is not finite";
+            return Err(damaged(&folder.join(checkpoint::FILE_NAME), why));
+        }
         let motion = folder.join(recording.form.file_name());
         let motion = GrowingFile::resume(motion, &found.motion)?;
         let energy = GrowingFile::resume(folder.join(energy::FILE_NAME), &found.energy)?;
