@@ -219,10 +219,7 @@ mod tests {
     #[test]
     fn curves_are_clipped_at_the_frame_and_have_gaps_at_invalid_points() {
         let axes = Axes {
-            cell: Cell {
-                corner: DVec2::new(10.0, 20.0),
-                size: DVec2::new(100.0, 50.0),
-            },
+            cell: Cell::new(DVec2::new(10.0, 20.0), DVec2::new(100.0, 50.0)),
             across: Axis::linear("x", 0.0, 1.0),
             up: Axis::linear("y", 0.0, 1.0),
         };

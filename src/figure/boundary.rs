@@ -190,10 +190,7 @@ fn draw_cells(page: &mut Drawing, axes: &Axes, boundary: &Boundary, map: &Bounda
                 continue;
             };
             let corner = a.min(b);
-            let cell = Cell {
-                corner,
-                size: a.max(b) - corner,
-            };
+            let cell = Cell::new(corner, a.max(b) - corner);
             fill_index(page, cell, *index);
         }
     }

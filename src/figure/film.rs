@@ -98,10 +98,7 @@ fn delays(times: &[f64]) -> Vec<u16> {
 fn picture(veins: &Veins, bounds: [DVec3; 2], setting: &Setting, text: &str) -> Drawing {
     let mut page = Drawing::new(SIZE.x, text);
     page.height = SIZE.y;
-    let cell = Cell {
-        corner: DVec2::new(0.0, TITLE),
-        size: SIZE - DVec2::new(0.0, TITLE),
-    };
+    let cell = Cell::new(DVec2::new(0.0, TITLE), SIZE - DVec2::new(0.0, TITLE));
     let scene = Scene::new(bounds, setting, View::Oblique, cell, MARGINS, None);
     scene.draw_box(&mut page);
     scene.draw_labels(&mut page);

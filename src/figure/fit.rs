@@ -113,10 +113,7 @@ fn draw_veins(page: &mut Drawing, top: f64, letter: &str, experiment: &str, leaf
         .enumerate()
     {
         let corner = DVec2::new(LEFT + k as f64 * (width + GAP), top + PANEL_TITLE);
-        let cell = Cell {
-            corner,
-            size: DVec2::new(width, VEINS),
-        };
+        let cell = Cell::new(corner, DVec2::new(width, VEINS));
         let letter = if k == 0 { letter } else { "" };
         let what = format!("experiment {experiment}, {view}");
         let seen = |point: [Option<f64>; 3]| Some((point[axes[0]]?, point[axes[1]]?));

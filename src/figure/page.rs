@@ -27,12 +27,16 @@ pub struct Cell {
 }
 
 impl Cell {
+    pub fn new(corner: DVec2, size: DVec2) -> Self {
+        Cell { corner, size }
+    }
+
     /// A panel across the page that leaves this width on the right for a key.
     pub fn left_of_key(top: f64, height: f64, key: f64) -> Self {
-        Cell {
-            corner: DVec2::new(LEFT, top),
-            size: DVec2::new(WIDTH - LEFT - RIGHT - key, height),
-        }
+        Cell::new(
+            DVec2::new(LEFT, top),
+            DVec2::new(WIDTH - LEFT - RIGHT - key, height),
+        )
     }
 
     pub fn end(&self) -> DVec2 {
@@ -263,8 +267,8 @@ impl KeyRows {
 }
 
 fn sample_cell(at: DVec2, width: f64) -> Cell {
-    Cell {
-        corner: at - DVec2::new(0.0, 0.5 * SAMPLE_HEIGHT),
-        size: DVec2::new(width, SAMPLE_HEIGHT),
-    }
+    Cell::new(
+        at - DVec2::new(0.0, 0.5 * SAMPLE_HEIGHT),
+        DVec2::new(width, SAMPLE_HEIGHT),
+    )
 }

@@ -142,9 +142,8 @@ impl Panels {
     pub fn draw(&self, drawing: &mut Drawing, veins: &Veins, setting: &Setting) {
         let [left, right] = self.columns;
         let [top, bottom] = self.rows;
-        let cell = |column: (f64, f64), row: (f64, f64)| Cell {
-            corner: DVec2::new(column.0, row.0),
-            size: DVec2::new(column.1, row.1),
+        let cell = |column: (f64, f64), row: (f64, f64)| {
+            Cell::new(DVec2::new(column.0, row.0), DVec2::new(column.1, row.1))
         };
         let cells = [(left, top), (left, bottom), (right, bottom)];
         for ((name, letter, text, axes), (column, row)) in FLAT.into_iter().zip(cells) {

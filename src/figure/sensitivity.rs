@@ -36,10 +36,10 @@ pub fn draw(leaf: &Equilibrium) -> Drawing {
     let notes = ["a number that is zero: one of its units".to_string()];
     let mut page = new_page(LEFT, &name, &notes, None);
     page.height = HEADER + PANEL_TITLE + height + PANEL_AXIS + BOTTOM;
-    let cell = Cell {
-        corner: DVec2::new(LEFT + NAMES, HEADER + PANEL_TITLE),
-        size: DVec2::new(WIDTH - LEFT - RIGHT - NAMES, height),
-    };
+    let cell = Cell::new(
+        DVec2::new(LEFT + NAMES, HEADER + PANEL_TITLE),
+        DVec2::new(WIDTH - LEFT - RIGHT - NAMES, height),
+    );
     let values = rows.iter().map(|row| row.1);
     let name = "displacement of the tip by 1 %, in L";
     let across = Axis::logarithmic(name, values, FEWEST_DECADES);

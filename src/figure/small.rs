@@ -48,10 +48,7 @@ impl SmallPanels {
         let bounds = common_box(shapes);
         let width = (WIDTH - 2.0 * SIDE - (COLUMNS - 1) as f64 * GAP) / COLUMNS as f64;
         let size = DVec2::new(width, height(bounds, width));
-        let any = Cell {
-            corner: DVec2::ZERO,
-            size,
-        };
+        let any = Cell::new(DVec2::ZERO, size);
         let scale = Camera::facing(bounds, View::Oblique, any, MARGINS).scale;
         SmallPanels {
             bounds,
@@ -75,10 +72,10 @@ impl SmallPanels {
     pub fn cell(&self, index: usize) -> Cell {
         let place = DVec2::new((index % COLUMNS) as f64, (index / COLUMNS) as f64);
         let pitch = self.size + DVec2::new(GAP, PANEL_TITLE + GAP);
-        Cell {
-            corner: DVec2::new(SIDE, self.top + PANEL_TITLE) + place * pitch,
-            size: self.size,
-        }
+        Cell::new(
+            DVec2::new(SIDE, self.top + PANEL_TITLE) + place * pitch,
+            self.size,
+        )
     }
 
     pub fn end(&self) -> f64 {
@@ -123,10 +120,10 @@ impl SmallPanels {
 
 /// The height that the box needs in a panel of this width.
 fn height(bounds: [DVec3; 2], width: f64) -> f64 {
-    let any = Cell {
-        corner: DVec2::ZERO,
-        size: DVec2::ONE * (MARGINS.left + MARGINS.right + 1.0),
-    };
+    let any = Cell::new(
+        DVec2::ZERO,
+        DVec2::ONE * (MARGINS.left + MARGINS.right + 1.0),
+    );
     let (first, last) = Camera::facing(bounds, View::Oblique, any, MARGINS).outline(bounds);
     let needed = (last - first).y / (last - first).x * (width - MARGINS.left - MARGINS.right);
     (needed + MARGINS.below).clamp(LOWEST, HIGHEST)

@@ -64,10 +64,10 @@ pub fn draw(page: &mut Drawing, map: &Map, x: &Varied, strip: Cell, start: f64) 
     let mut top = start;
     for (what, name, curves) in panels {
         let height = if curves.len() > 1 { TALL } else { LOW };
-        let cell = Cell {
-            corner: DVec2::new(strip.corner.x, top + PANEL_TITLE),
-            size: DVec2::new(strip.size.x, height),
-        };
+        let cell = Cell::new(
+            DVec2::new(strip.corner.x, top + PANEL_TITLE),
+            DVec2::new(strip.size.x, height),
+        );
         page.group("curves", |page| {
             draw_panel(page, map, x, cell, (what, &name), &curves)
         });

@@ -183,10 +183,7 @@ fn draw_panels(
     let mut last = Cell { corner, size };
     for (i, &method) in methods.iter().enumerate() {
         let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
-        let cell = Cell {
-            corner: corner + place * pitch,
-            size,
-        };
+        let cell = Cell::new(corner + place * pitch, size);
         // A single strip has its axis below the curves.
         let labelled = y.is_some() || (i + 1 == methods.len() && i > 0);
         drawing.group(method.word(), |page| {

@@ -182,10 +182,10 @@ impl<'a> Panel<'a> {
         let (low, high) = self
             .y
             .map_or((0.0, 1.0), |y| (y.edges[row], y.edges[row + 1]));
-        Cell {
-            corner: corner + size * DVec2::new(left, 1.0 - high),
-            size: size * DVec2::new(right - left, high - low),
-        }
+        Cell::new(
+            corner + size * DVec2::new(left, 1.0 - high),
+            size * DVec2::new(right - left, high - low),
+        )
     }
 
     fn draw_cell(&self, page: &mut Drawing, row: &MapRow, waves: Option<f64>) {
