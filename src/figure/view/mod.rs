@@ -162,7 +162,8 @@ mod tests {
     use serde_json::Value;
 
     fn scenario(rods: usize) -> Scenario {
-        let mut scenario = sample::scenario("a < b </script>", rods);
+        let mut scenario = sample::scenario("page", rods);
+        scenario.name = "a < b </script>".into();
         scenario.units.length = Some("cm".into());
         scenario
     }
