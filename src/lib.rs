@@ -183,6 +183,7 @@
 
 mod branch;
 mod bvp;
+mod checksum;
 #[cfg(feature = "cli")]
 pub mod cli;
 #[cfg(feature = "cli")]

@@ -60,9 +60,8 @@ impl Chart {
     fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
         let scenario = &job.scenario;
         if self.request.tolerance.is_some() && self.rods.is_empty() {
-            return Err(
-                "--tolerance: a chart runs over all tolerances; it is that of --rods".into(),
-            );
+            let why = "a chart runs over all tolerances; it is that of --rods";
+            return Err(format!("--tolerance: {why}").into());
         }
         let leaves = self.leaves(job)?;
         let mut options = ChartOptions {
@@ -86,14 +85,11 @@ impl Chart {
             }
             let fraction = fraction_of(turn.round - first, rounds - first + 1);
             line.update(fraction, || {
-                format!(
-                    "{} veins, {}, {}, round {} of {}",
-                    turn.rods,
-                    contender(turn.contender),
-                    turn.knob,
-                    turn.round,
-                    turn.rounds,
-                )
+                let Turn {
+                    rods, knob, round, ..
+                } = turn;
+                let who = contender(turn.contender);
+                format!("{rods} veins, {who}, {knob}, round {round} of {rounds}")
             });
         };
         // The options of the scaling are checked before the chart is made.

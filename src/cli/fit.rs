@@ -55,19 +55,12 @@ impl Fit {
     fn one(&self, job: &Job) -> Result<Delivered, Refusal> {
         let base = job.base()?;
         let mut data = Data::default();
+        let rods = base.scenario().rods.len();
         for file in &self.data {
-            let text = read(file)?;
-            data.read(
-                &text,
-                &file.display().to_string(),
-                base.scenario().rods.len(),
-            )?;
+            data.read(&read(file)?, &file.display().to_string(), rods)?;
         }
         let candidates = match &self.candidates {
-            Some(file) => {
-                let text = read(file)?;
-                FitRequest::read_candidates(&text, &file.display().to_string())?
-            }
+            Some(file) => FitRequest::read_candidates(&read(file)?, &file.display().to_string())?,
             None => Vec::new(),
         };
         let request = FitRequest {

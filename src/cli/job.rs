@@ -3,9 +3,9 @@
 use std::fmt::Display;
 use std::path::PathBuf;
 
-use crate::files::{self, Document, Selection};
+use crate::files::{self, Document, Selection, Written};
 use crate::report::table::list_files;
-use crate::report::{Refused, Written, json};
+use crate::report::{Refused, json};
 use crate::scenario::Scenario;
 use crate::study::Base;
 

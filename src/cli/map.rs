@@ -107,19 +107,18 @@ impl Map {
         )?;
         files::belongs(folder, &request)?;
         let clock = Instant::now();
-        let known = self.known(folder, &request)?;
+        let known = Cells::new(request.clone(), self.known(folder, &request)?);
         // A later run identifies the rows by the request stored next to them.
         let keeps_rows = job.selection.kinds.contains(&Kind::Csv);
         if keeps_rows {
-            let map = Cells::new(request.clone(), known.clone());
-            files::claim(folder, &job.document(&map))?;
+            files::claim(folder, &job.document(&known))?;
         }
         let computed = match self.draw.is_empty() {
-            true => self.solve(job, keeps_rows, &request, &known)?,
+            true => self.solve(job, keeps_rows, &request, &known.rows)?,
             false => Vec::new(),
         };
-        let counts = [known.len(), computed.len()];
-        let mut map = Cells::new(request, [known, computed].concat());
+        let counts = [known.rows.len(), computed.len()];
+        let mut map = Cells::new(request, [known.rows, computed].concat());
         map.show = self.show;
         if self.shard.is_none() && self.draw.is_empty() {
             let line = Mutex::new(job.progress());
@@ -165,8 +164,6 @@ impl Map {
         for file in files {
             rows.extend(report::read_rows(&file, request)?);
         }
-        rows.sort_by_key(|row| (row.cell, row.method));
-        rows.dedup_by_key(|row| (row.cell, row.method));
         Ok(rows)
     }
 
@@ -187,10 +184,8 @@ impl Map {
             .filter(|&cell| shard.contains(cell))
             .map(|cell| {
                 let methods = request.methods.iter().copied();
-                (
-                    cell,
-                    methods.filter(|&method| !is_known(cell, method)).collect(),
-                )
+                let missing = methods.filter(|&method| !is_known(cell, method));
+                (cell, missing.collect())
             })
             .filter(|(_, methods): &(usize, Vec<_>)| !methods.is_empty())
             .collect();
@@ -206,9 +201,8 @@ impl Map {
         let (mut rows, mut finished) = (Vec::new(), 0);
         let mut failed: Option<FileError> = None;
         study::map(request, &todo, &mut |new| {
-            failed = journal
-                .as_mut()
-                .and_then(|it| it.append(request, &new).err());
+            let journal = journal.as_mut();
+            failed = journal.and_then(|it| it.append(request, &new).err());
             rows.extend(new);
             finished += 1;
             let cells = todo.len();
@@ -234,9 +228,8 @@ fn shards(folder: &Path) -> Vec<PathBuf> {
         .filter_map(|entry| Some(entry.ok()?.path()))
         .filter(|file| {
             let name = file.file_name().unwrap_or_default().to_string_lossy();
-            let middle = name
-                .strip_prefix("map-")
-                .and_then(|n| n.strip_suffix(".csv"));
+            let middle = name.strip_prefix("map-");
+            let middle = middle.and_then(|rest| rest.strip_suffix(".csv"));
             let shard = middle.and_then(|middle| middle.replace("-of-", "/").parse::<Shard>().ok());
             shard.is_some_and(|shard| name == shard.file_name())
         })

@@ -101,11 +101,8 @@ impl ProgressLine {
 /// The elapsed time of a run and an estimate of the remaining time, given the completed
 /// fraction.
 pub fn time_left(elapsed: Duration, fraction: Option<f64>) -> String {
-    format!(
-        "{:.0} s{}",
-        elapsed.as_secs_f64(),
-        remaining(elapsed, fraction)
-    )
+    let left = remaining(elapsed, fraction);
+    format!("{:.0} s{left}", elapsed.as_secs_f64())
 }
 
 /// An estimate of the remaining time, to follow the elapsed time; empty if unknown.

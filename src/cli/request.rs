@@ -9,10 +9,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use clap::{Args, ValueHint};
 use rayon::prelude::*;
 
-use crate::files::{self, Kind, Selection};
+use crate::files::{self, Kind, Selection, Written};
 use crate::memory;
 use crate::report::table::{list_files, rows_of_json};
-use crate::report::{Refused, Written, json};
+use crate::report::{Refused, json};
 use crate::scenario::Scenario;
 use crate::study::Base;
 
@@ -68,9 +68,8 @@ fn kinds(list: &str) -> Result<Kinds, String> {
         return Ok(Kinds(Vec::new()));
     }
     let kind = |word: &str| {
-        let found = Kind::ALL
-            .into_iter()
-            .find(|kind| kind.word() == word.trim());
+        let mut all = Kind::ALL.into_iter();
+        let found = all.find(|kind| kind.word() == word.trim());
         found.ok_or_else(|| {
             let words = Kind::ALL.map(Kind::word).join(", ");
             format!("{word}: must be some of {words}, with commas between them, or none")
@@ -133,10 +132,8 @@ impl Request {
             if let (true, Ok(mut line)) = (traits.parallel, line.lock()) {
                 let all = self.scenarios.len();
                 line.show(|time| {
-                    format!(
-                        "{count} of {all}, {}",
-                        time_left(time, fraction_of(count, all))
-                    )
+                    let time = time_left(time, fraction_of(count, all));
+                    format!("{count} of {all}, {time}")
                 });
             }
             done
@@ -191,10 +188,8 @@ impl Request {
             }
         }
         if self.json {
-            let texts: Vec<_> = documents
-                .iter()
-                .map(|(_, _, json)| json.trim_ascii())
-                .collect();
+            let texts = documents.iter().map(|(_, _, json)| json.trim_ascii());
+            let texts: Vec<_> = texts.collect();
             show(&[b"[\n", texts.join(&b",\n"[..]).as_slice(), b"\n]\n"].concat())?;
         }
         Ok(status)

@@ -76,11 +76,9 @@ impl Simulate {
         if let Some((steps, seconds)) = simulation.expected()
             && seconds > ANNOUNCED
         {
-            let (time, steps) = (progress::duration(seconds), brief(steps));
-            note(&format!(
-                "{}: {steps} steps to make, some {time}",
-                job.scenario.name
-            ));
+            let (name, steps) = (&job.scenario.name, brief(steps));
+            let time = progress::duration(seconds);
+            note(&format!("{name}: {steps} steps to make, some {time}"));
         }
         checkpoint_on_interrupt(recording.checkpointer());
         let ended = self.follow(&mut simulation, &mut recording, job);

@@ -148,11 +148,8 @@ impl Trace {
             }
             // Relative to the end it moves to; the number of branches is not known.
             let [from, to] = ends(vary);
-            let to = if (value - seen.1) * (to - from) < 0.0 {
-                from
-            } else {
-                to
-            };
+            let backwards = (value - seen.1) * (to - from) < 0.0;
+            let to = if backwards { from } else { to };
             line.update(fraction_between(seen.1, value, to, vary.log), || {
                 let at = brief(value);
                 format!("branch {}, {points} points, at {at}", branch + 1)

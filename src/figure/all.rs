@@ -1,10 +1,11 @@
 //! All equilibria of a leaf that were found, lowest energy first.
 
-use super::drawing::{Drawing, NOTE};
+use super::drawing::Drawing;
 use super::page::new_page;
 use super::setting::Setting;
 use super::small::{SIDE, SmallPanels};
 use super::veins::Veins;
+use crate::report::words::stable_or_index;
 use crate::scenario::Scenario;
 use crate::study::All;
 
@@ -26,16 +27,12 @@ pub fn draw(all: &All, scenario: &Scenario) -> Drawing {
     let mut drawing = new_page(SIDE, &name, &notes, shapes.first());
     drawing.height = panels.end();
     for (index, (found, veins)) in shown.iter().zip(&shapes).enumerate() {
-        let stability = match found.equilibrium.stability.negative_eigenvalues {
-            Some(0) => "stable".into(),
-            Some(index) => format!("index {index}"),
-            None => String::new(),
-        };
+        let negative = found.equilibrium.stability.negative_eigenvalues;
+        let stability = negative.map_or(String::new(), stable_or_index);
         let energy = found.equilibrium.energy.unwrap_or(f64::NAN);
         let text = format!("energy {energy:.7}, {stability}");
         drawing.group("leaf", |page| {
-            let number = (index + 1).to_string();
-            panels.draw(page, index, veins, (&number, &text, NOTE), |_, _, _| ());
+            panels.draw(page, index, veins, [&(index + 1).to_string(), &text]);
         });
     }
     drawing

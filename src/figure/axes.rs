@@ -9,7 +9,7 @@ use super::drawing::{
 };
 use super::font::Font;
 use super::markers::Marker;
-use super::page::{Cell, TEXT_SIZE, TICK_SIZE};
+use super::page::{Cell, TEXT_SIZE, TICK_SIZE, title};
 
 const TICK: f64 = 4.0;
 const DIVISION: f64 = 2.0;
@@ -45,6 +45,20 @@ impl Axes {
         let fraction = DVec2::new(self.across.fraction(x), 1.0 - self.up.fraction(y));
         let at = self.cell.corner + self.cell.size * fraction;
         at.is_finite().then_some(at)
+    }
+
+    /// Draws a panel of the letter and the title, with these axes.
+    pub fn titled(
+        page: &mut Drawing,
+        cell: Cell,
+        [letter, what]: [&str; 2],
+        across: Axis,
+        up: Axis,
+    ) -> Self {
+        let axes = Axes { cell, across, up };
+        title(page, cell.corner, letter, what);
+        axes.draw(page);
+        axes
     }
 
     /// Draws grid, frame, ticks and names.
@@ -205,10 +219,7 @@ mod tests {
     #[test]
     fn curves_are_clipped_at_the_frame_and_have_gaps_at_invalid_points() {
         let axes = Axes {
-            cell: Cell {
-                corner: DVec2::new(10.0, 20.0),
-                size: DVec2::new(100.0, 50.0),
-            },
+            cell: Cell::new(DVec2::new(10.0, 20.0), DVec2::new(100.0, 50.0)),
             across: Axis::linear("x", 0.0, 1.0),
             up: Axis::linear("y", 0.0, 1.0),
         };

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 use super::axes::Axes;
 use super::axis::Axis;
-use super::drawing::{Anchor, CURVES, Drawing, INK, NOTE, Stroke};
+use super::drawing::{Anchor, CURVES, Drawing, INK, Stroke};
 use super::indices::write_indices;
 use super::labels::Labels;
 use super::map::{DARKEST_INDEX, fill_index, name};
@@ -17,8 +17,9 @@ use super::setting::Setting;
 use super::small::SmallPanels;
 use super::veins::{Veins, length};
 use crate::branch::Kind;
-use crate::report::numbers::{power_of_ten, short};
+use crate::report::numbers::{number_of_veins, power_of_ten, short};
 use crate::report::sides;
+use crate::report::words::stable_or_index;
 use crate::scenario::Scenario;
 use crate::study::{Boundary, BoundaryMap, BoundaryPoint, LeafBeside};
 
@@ -53,13 +54,7 @@ pub fn draw(boundary: &Boundary, scenario: &Scenario) -> Drawing {
         for (number, (veins, shown)) in shapes.iter().zip(&shown).enumerate() {
             let [first, second] = shown.leaf.values.map(short);
             let text = format!("{}, ({first}, {second})", shown.caption);
-            panels.draw(
-                page,
-                number,
-                veins,
-                (&letter(number), &text, NOTE),
-                |_, _, _| (),
-            );
+            panels.draw(page, number, veins, [&letter(number), &text]);
         }
     });
     drawing
@@ -76,8 +71,7 @@ struct DrawnLeaf<'b> {
 impl<'b> DrawnLeaf<'b> {
     fn new(kind: Kind, leaf: &'b LeafBeside) -> Self {
         let caption = match (&leaf.fallen_from, kind, leaf.index) {
-            (None, _, 0) => "stable".into(),
-            (None, _, index) => format!("index {index}"),
+            (None, _, index) => stable_or_index(index),
             (Some(_), Kind::Fold, _) => "snapped".into(),
             (Some(from), Kind::Branching, _) => return DrawnLeaf::buckled(leaf, from),
         };
@@ -124,10 +118,7 @@ fn letter(number: usize) -> String {
 fn notes(boundary: &Boundary) -> Vec<String> {
     let points: usize = boundary.curves.iter().map(|curve| curve.points.len()).sum();
     let mut notes = vec![
-        match boundary.rods {
-            1 => "1 vein".into(),
-            rods => format!("{rods} veins"),
-        },
+        number_of_veins(boundary.rods),
         match boundary.curves.len() {
             1 => format!("{points} points on 1 curve"),
             curves => format!("{points} points on {curves} curves"),
@@ -199,10 +190,7 @@ fn draw_cells(page: &mut Drawing, axes: &Axes, boundary: &Boundary, map: &Bounda
                 continue;
             };
             let corner = a.min(b);
-            let cell = Cell {
-                corner,
-                size: a.max(b) - corner,
-            };
+            let cell = Cell::new(corner, a.max(b) - corner);
             fill_index(page, cell, *index);
         }
     }
@@ -237,11 +225,12 @@ fn draw_key(page: &mut Drawing, boundary: &Boundary, cell: Cell) {
         let found = map.index.iter().flatten().flatten();
         let indices: BTreeSet<usize> = found.map(|index| *index.min(&DARKEST_INDEX)).collect();
         for index in indices {
-            let name = match index {
-                0 => "stable".into(),
-                DARKEST_INDEX => format!("index {index} or more"),
-                index => format!("index {index}"),
+            let more = if index == DARKEST_INDEX {
+                " or more"
+            } else {
+                ""
             };
+            let name = stable_or_index(index) + more;
             key.entry(page, "", &name, |page, cell| fill_index(page, cell, index));
         }
     }

@@ -47,11 +47,11 @@ pub fn draw_chart(chart: &Chart) -> Drawing {
     let reference = match &chart.reference {
         None => "no reference: no equilibrium was found".into(),
         Some(found) => {
-            let within = power_of_ten(found.known_within);
-            match found.confirmed {
-                true => format!("reference confirmed by two methods, known within {within}"),
-                false => format!("the reference is NOT confirmed; taken to be within {within}"),
-            }
+            let what = match found.confirmed {
+                true => "reference confirmed by two methods, known within",
+                false => "the reference is NOT confirmed; taken to be within",
+            };
+            format!("{what} {}", power_of_ten(found.known_within))
         }
     };
     let notes = [
@@ -129,17 +129,9 @@ fn style(who: Contender) -> (Color, Marker) {
 fn contenders(rows: &[(usize, &Row)], over_veins: bool) -> Vec<Series> {
     let of = |who: Contender| {
         let (color, marker) = style(who);
-        let mut series = Series {
-            name: match who.is_default() {
-                true => format!("{} (default)", contender(who)),
-                false => contender(who).into(),
-            },
-            color,
-            dashed: false,
-            marker,
-            points: Vec::new(),
-            failures: Vec::new(),
-        };
+        let default = if who.is_default() { " (default)" } else { "" };
+        let name = format!("{}{default}", contender(who));
+        let mut series = Series::new(name, color, marker);
         for (rods, row) in rows.iter().filter(|(_, row)| row.contender == who) {
             let rods = *rods as f64;
             let place = |seconds: f64, error: f64| match over_veins {
@@ -180,14 +172,10 @@ fn peers(peers: &[Peer]) -> Vec<Series> {
     for peer in peers {
         let place = all.iter().position(|series| series.name == peer.name);
         let place = place.unwrap_or_else(|| {
-            all.push(Series {
-                name: peer.name.clone(),
-                color: peer_color(&peer.name, all.len()),
-                dashed: true,
-                marker: Marker::Ring,
-                points: Vec::new(),
-                failures: Vec::new(),
-            });
+            let color = peer_color(&peer.name, all.len());
+            let series = Series::new(peer.name.clone(), color, Marker::Ring);
+            let dashed = true;
+            all.push(Series { dashed, ..series });
             all.len() - 1
         });
         match peer.point().map(|(x, y)| (x, y.max(SMALLEST))) {

@@ -47,6 +47,18 @@ pub struct Series {
 }
 
 impl Series {
+    /// Without points so far, joined by a solid line.
+    pub fn new(name: String, color: Color, marker: Marker) -> Self {
+        Series {
+            name,
+            color,
+            dashed: false,
+            marker,
+            points: Vec::new(),
+            failures: Vec::new(),
+        }
+    }
+
     fn stroke(&self) -> Stroke {
         Stroke::new(self.color, 1.5).dashed(self.dashed)
     }
@@ -147,12 +159,7 @@ impl ChartPanel {
         page.centered_label(at, &name, TICK_SIZE, Anchor::Start, NOTE);
         let mut from_right = right;
         for series in &self.series {
-            let failures = || {
-                series
-                    .failures
-                    .iter()
-                    .filter(|failure| failure.word == word)
-            };
+            let failures = || series.failures.iter().filter(|it| it.word == word);
             let places = failures().filter_map(|it| Some(self.across.fraction(it.x?)));
             for fraction in places.filter(|fraction| fraction.is_finite()) {
                 let x = left + fraction.clamp(0.0, 1.0) * cell.size.x;

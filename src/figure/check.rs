@@ -36,13 +36,8 @@ pub fn draw(check: &Check, scenario: &Scenario) -> Drawing {
     let mut drawing = Drawing::new(WIDTH, &title);
     drawing.height = (panels.end() + below).ceil();
     drawing.group("header", |page| {
-        header(
-            page,
-            LEFT,
-            &title,
-            &notes(check, &veins, &setting),
-            Some(&veins),
-        );
+        let notes = notes(check, &veins, &setting);
+        header(page, LEFT, &title, &notes, Some(&veins));
         for (line, text) in reason.iter().enumerate() {
             let base = DVec2::new(LEFT, NOTE_BASE + LINE * (line + 1) as f64);
             page.label(base, text, TEXT_SIZE, Anchor::Start, INK);

@@ -85,10 +85,10 @@ pub fn draw(page: &mut Drawing, check: &Check, unit: f64, start: f64) {
 /// below it.
 fn draw_zeros(page: &mut Drawing, curves: &[Curve], above: Cell, stations: Axis) {
     let strip = Axes {
-        cell: Cell {
-            corner: DVec2::new(above.corner.x, above.end().y),
-            size: DVec2::new(above.size.x, ZERO_STRIP),
-        },
+        cell: Cell::new(
+            DVec2::new(above.corner.x, above.end().y),
+            DVec2::new(above.size.x, ZERO_STRIP),
+        ),
         across: stations,
         up: Axis {
             ticks: Ticks::At(vec![0.0]),

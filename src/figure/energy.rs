@@ -3,7 +3,7 @@
 use super::axes::{Axes, Curve};
 use super::axis::Axis;
 use super::drawing::{CURVES, Drawing, INK, Stroke};
-use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, new_page, title};
+use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, new_page};
 use super::setting::with_unit;
 use crate::motion::Energy;
 use crate::report::numbers::short;
@@ -47,36 +47,28 @@ pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
     let values = curves.iter().flat_map(Curve::values);
     let unit = scenario.units.energy();
     let energy = with_unit("energy", unit.as_deref());
-    let axes = Axes {
-        cell: Cell::left_of_key(upper, ENERGIES, KEY),
-        across: Axis::linear("", 0.0, end),
-        up: Axis::holding(&energy, values.chain([0.0])),
-    };
+    let across = Axis::linear("", 0.0, end);
+    let up = Axis::holding(&energy, values.chain([0.0]));
+    let cell = Cell::left_of_key(upper, ENERGIES, KEY);
     drawing.group("energies", |page| {
-        title(page, axes.cell.corner, "(a)", "where the energy is");
-        axes.draw(page);
+        let what = "where the energy is";
+        let axes = Axes::titled(page, cell, ["(a)", what], across.clone(), up);
         // In reverse, so that the balance, which should be zero, is below all others.
         for curve in curves.iter().rev() {
             axes.curve(page, &curve.points, Stroke::new(curve.color, 1.6));
         }
-        let mut key = Key::right_of(axes.cell);
+        let mut key = Key::right_of(cell);
         for curve in &curves {
             draw_key_line(page, &mut key, curve);
         }
     });
-    let axes = Axes {
-        cell: Cell::left_of_key(lower, BALANCE, KEY),
-        across: Axis::linear("", 0.0, end),
-        up: Axis::holding(
-            &with_unit("balance", unit.as_deref()),
-            balance.values().chain([0.0]),
-        ),
-    };
+    let cell = Cell::left_of_key(lower, BALANCE, KEY);
+    let name = with_unit("balance", unit.as_deref());
+    let up = Axis::holding(&name, balance.values().chain([0.0]));
     drawing.group("balance", |page| {
         let what =
             "its balance, which no motion changes, magnified: all energies less the work put in";
-        title(page, axes.cell.corner, "(b)", what);
-        axes.draw(page);
+        let axes = Axes::titled(page, cell, ["(b)", what], across, up);
         axes.curve(page, &balance.points, Stroke::new(INK, 1.3));
     });
     let cell = Cell::left_of_key(lowest, TIP, KEY);
@@ -96,20 +88,14 @@ fn draw_tip(page: &mut Drawing, record: &Record, units: &Units, cell: Cell, end:
             .collect(),
     };
     let curves = [0, 1, 2].map(coordinate);
-    let axes = Axes {
-        cell,
-        across: Axis::linear("time, in the scenario's unit", 0.0, end),
-        up: Axis::holding(
-            &with_unit("tip", units.length.as_deref()),
-            curves.iter().flat_map(Curve::values).chain([0.0]),
-        ),
-    };
+    let across = Axis::linear("time, in the scenario's unit", 0.0, end);
+    let name = with_unit("tip", units.length.as_deref());
+    let up = Axis::holding(&name, curves.iter().flat_map(Curve::values).chain([0.0]));
     let what = match record.joined {
         true => "where the tip is",
         false => "where the tips are, in the mean",
     };
-    title(page, cell.corner, "(c)", what);
-    axes.draw(page);
+    let axes = Axes::titled(page, cell, ["(c)", what], across, up);
     let mut key = Key::right_of(cell);
     for curve in &curves {
         axes.curve(page, &curve.points, Stroke::new(curve.color, 1.6));

@@ -14,7 +14,7 @@ use super::setting::Setting;
 use super::space::{Margins, Scene, View, common_box};
 use super::veins::Veins;
 use crate::report::numbers::short;
-use crate::report::{Document, Format};
+use crate::scenario::Scenario;
 use crate::simulate::{Record, Still};
 
 /// Duration of the film in hundredths of a second, and its most pictures.
@@ -37,20 +37,9 @@ const MARGINS: Margins = Margins {
 /// Index of a pixel that has not changed.
 const SAME: u8 = 255;
 
-/// The film as a file of this name; a single picture where no motion is recorded.
-pub struct Film(pub &'static str);
-
-impl Format<Record> for Film {
-    fn file_name(&self) -> &'static str {
-        self.0
-    }
-
-    fn write(&self, document: &Document<Record>, out: &mut dyn Write) -> io::Result<()> {
-        write(document.result, &Setting::of(document.input), out)
-    }
-}
-
-fn write(record: &Record, setting: &Setting, out: &mut dyn Write) -> io::Result<()> {
+/// Writes the film; a single picture where no motion is recorded.
+pub fn write(record: &Record, scenario: &Scenario, out: &mut dyn Write) -> io::Result<()> {
+    let setting = &Setting::of(scenario);
     let film = match record.film.as_slice() {
         [] => &record.stills,
         film => film,
@@ -109,10 +98,7 @@ fn delays(times: &[f64]) -> Vec<u16> {
 fn picture(veins: &Veins, bounds: [DVec3; 2], setting: &Setting, text: &str) -> Drawing {
     let mut page = Drawing::new(SIZE.x, text);
     page.height = SIZE.y;
-    let cell = Cell {
-        corner: DVec2::new(0.0, TITLE),
-        size: SIZE - DVec2::new(0.0, TITLE),
-    };
+    let cell = Cell::new(DVec2::new(0.0, TITLE), SIZE - DVec2::new(0.0, TITLE));
     let scene = Scene::new(bounds, setting, View::Oblique, cell, MARGINS, None);
     scene.draw_box(&mut page);
     scene.draw_labels(&mut page);
@@ -162,11 +148,8 @@ impl Palette {
                     let squared = |a: u8, b: u8| (i32::from(a) - i32::from(b)).pow(2);
                     squared(*r, rgb[0]) + squared(*g, rgb[1]) + squared(*b, rgb[2])
                 };
-                let nearest = self
-                    .colors
-                    .iter()
-                    .enumerate()
-                    .min_by_key(|(_, color)| distance(color));
+                let colors = self.colors.iter().enumerate();
+                let nearest = colors.min_by_key(|(_, color)| distance(color));
                 nearest.map_or(0, |(index, _)| index as u8)
             })
         })
@@ -181,11 +164,8 @@ fn encode(
     out: &mut dyn Write,
 ) -> Result<(), gif::EncodingError> {
     let [width, height] = (2.0 * SIZE).to_array().map(|pixels| pixels as u16);
-    let palette = Palette::new().colors;
-    let mut table: Vec<u8> = palette
-        .iter()
-        .flat_map(|&Color(r, g, b)| [r, g, b])
-        .collect();
+    let colors = Palette::new().colors.into_iter();
+    let mut table: Vec<u8> = colors.flat_map(|Color(r, g, b)| [r, g, b]).collect();
     table.resize(3 * 256, 0);
     let mut encoder = gif::Encoder::new(out, width, height, &table)?;
     encoder.set_repeat(gif::Repeat::Infinite)?;
@@ -218,16 +198,14 @@ fn changed(
         return (0..picture.len() / width, picture.to_vec());
     };
     let pixels = before.iter().zip(picture);
-    let pixels: Vec<u8> = pixels
-        .map(|(a, b)| if a == b { SAME } else { *b })
-        .collect();
+    let pixels = pixels.map(|(a, b)| if a == b { SAME } else { *b });
+    let pixels: Vec<u8> = pixels.collect();
     let differs = |pixel: &u8| *pixel != SAME;
     let first = pixels.iter().position(differs).unwrap_or(0) / width;
     let last = pixels.iter().rposition(differs).unwrap_or(0) / width;
-    (
-        first..last + 1,
-        pixels[first * width..(last + 1) * width].to_vec(),
-    )
+    let rows = first..last + 1;
+    let changed = &pixels[rows.start * width..rows.end * width];
+    (rows, changed.to_vec())
 }
 
 #[cfg(test)]
@@ -261,6 +239,10 @@ mod tests {
         (decoder.repeat(), delays, pictures)
     }
 
+    fn total(delays: &[u16]) -> u32 {
+        delays.iter().map(|&delay| u32::from(delay)).sum()
+    }
+
     #[test]
     fn a_film_lasts_ten_seconds_loops_and_shows_the_leaf() {
         let mut record = sample::record(5, 8);
@@ -270,17 +252,15 @@ mod tests {
             curves: (0..5).map(|rod| frame.centerline(rod).to_vec()).collect(),
         };
         record.film = frames.iter().enumerate().map(still).collect();
-        let setting = Setting::of(&sample::scenario("swing", 5));
+        let scenario = sample::scenario("swing", 5);
+        let setting = Setting::of(&scenario);
         let mut bytes = Vec::new();
-        write(&record, &setting, &mut bytes).unwrap();
+        write(&record, &scenario, &mut bytes).unwrap();
         assert!(bytes.len() < 5_000_000, "{}", bytes.len());
         let (repeat, delays, pictures) = decoded(&bytes);
         assert_eq!(repeat, gif::Repeat::Infinite);
         assert_eq!(pictures.len(), 101);
-        assert_eq!(
-            delays.iter().map(|&delay| u32::from(delay)).sum::<u32>(),
-            1000
-        );
+        assert_eq!(total(&delays), 1000);
         // Every picture shows its instant, in colours that are close enough.
         let stills = record.film.iter();
         let shapes: Vec<Veins> = stills.map(|it| Veins::at_instant(&record, it)).collect();
@@ -296,16 +276,11 @@ mod tests {
                 |(a, b): (&[u8], &[u8])| (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap_or(0);
             let off: Vec<u8> = pairs.map(difference).collect();
             let worst = off.iter().filter(|&&off| off > 48).count();
-            assert!(
-                worst < off.len() / 2000,
-                "picture {k}: {worst} pixels are off"
-            );
+            assert!(worst < off.len() / 2000, "picture {k}: {worst} are off");
         }
         // Five veins, five colours.
-        let seen: HashSet<[u8; 3]> = pictures[0]
-            .chunks_exact(4)
-            .map(|c| [c[0], c[1], c[2]])
-            .collect();
+        let pixels = pictures[0].chunks_exact(4);
+        let seen: HashSet<[u8; 3]> = pixels.map(|c| [c[0], c[1], c[2]]).collect();
         for vein in 0..5 {
             let Color(r, g, b) = vein_color(f64::from(vein) / 4.0);
             let near =
@@ -319,10 +294,7 @@ mod tests {
         assert_eq!(delays(&[0.0, 1.0, 2.0, 4.0]), [100, 100, 100, 100]);
         let even: Vec<f64> = (0..140).map(f64::from).collect();
         let delays = delays(&even);
-        assert_eq!(
-            delays.iter().map(|&delay| u32::from(delay)).sum::<u32>(),
-            1000
-        );
+        assert_eq!(total(&delays), 1000);
         assert!(delays.iter().all(|delay| (7..=8).contains(delay)));
         assert_eq!(super::delays(&[0.0]), [100]);
         assert!(super::delays(&[]).is_empty());

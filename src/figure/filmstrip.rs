@@ -4,9 +4,10 @@ use glam::DVec3;
 
 use super::drawing::{Color, DOT, Drawing, NOTE, Stroke, polyline};
 use super::energy::notes;
-use super::page::{HEADER, KeyRows, NOTE_BASE, new_page};
+use super::page::{HEADER, KeyRows, NOTE_BASE, letters, new_page};
 use super::setting::Setting;
 use super::small::{SIDE, SmallPanels};
+use super::space::{Scene, View};
 use super::veins::{Veins, is_drawable};
 use crate::report::numbers::short;
 use crate::scenario::Scenario;
@@ -31,17 +32,11 @@ pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
         false => panels,
     };
     let mut notes = notes(record);
-    notes.extend(
-        shapes
-            .iter()
-            .take(1)
-            .flat_map(|veins| veins.notes(&setting)),
-    );
-    notes.push(format!(
-        "a square of the grid is {} wide",
-        panels.grid_width()
-    ));
-    let mut drawing = new_page(SIDE, &name, &notes, shapes.first());
+    let first = shapes.first();
+    notes.extend(first.map_or(Vec::new(), |veins| veins.notes(&setting)));
+    let width = panels.grid_width();
+    notes.push(format!("a square of the grid is {width} wide"));
+    let mut drawing = new_page(SIDE, &name, &notes, first);
     drawing.height = panels.end();
     let mut since = record.stills.first().map_or(0, |still| still.moment);
     let strokes = [DOT, PALE].map(|color| Stroke::new(color, 1.0));
@@ -56,28 +51,24 @@ pub fn draw(record: &Record, scenario: &Scenario) -> Drawing {
             }
         });
     }
-    for (index, (veins, still)) in shapes.iter().zip(&record.stills).enumerate() {
+    let instants = shapes.iter().zip(&record.stills).enumerate();
+    for ((index, (veins, still)), letter) in instants.zip(letters().cycle()) {
         let paths = [(since, still.moment), (0, since)];
         let paths = paths.map(|(from, to)| tip_path(record, from, to));
         since = still.moment;
         drawing.group("instant", |page| {
             let time = record.moments.get(still.moment).map_or(0.0, |m| m.time);
-            let letter = format!("({})", char::from(b'a' + (index % 26) as u8));
             let when = format!("t = {}", short(time));
-            panels.draw(
-                page,
-                index,
-                veins,
-                (&letter, &when, NOTE),
-                |page, scene, _| {
-                    for (path, stroke) in paths.iter().zip(strokes).rev() {
-                        let path: Vec<_> = path.iter().map(|&point| scene.place(point)).collect();
-                        if path.len() > 1 {
-                            page.stroke(polyline(&path), stroke);
-                        }
+            let under = |page: &mut Drawing, scene: &Scene, _| {
+                for (path, stroke) in paths.iter().zip(strokes).rev() {
+                    let path: Vec<_> = path.iter().map(|&point| scene.place(point)).collect();
+                    if path.len() > 1 {
+                        page.stroke(polyline(&path), stroke);
                     }
-                },
-            );
+                }
+            };
+            let caption = (letter.as_str(), when.as_str(), NOTE);
+            panels.draw_over(page, index, veins, View::Oblique, caption, under);
         });
     }
     drawing
@@ -114,11 +105,8 @@ mod tests {
         // In all pictures but the first, or the first two, and in the key.
         assert_eq!(paths(&record), [8, 7]);
         record.joined = false;
-        record.tips = record.stills[0]
-            .curves
-            .iter()
-            .map(|curve| curve[0])
-            .collect();
+        let curves = record.stills[0].curves.iter();
+        record.tips = curves.map(|curve| curve[0]).collect();
         assert_eq!(paths(&record), [0, 0]);
     }
 }

@@ -8,7 +8,7 @@ use super::axis::{Axis, Ticks};
 use super::drawing::{BLUE, DOT, Drawing, INK, NOTE, Stroke};
 use super::markers::Marker;
 use super::page::{
-    Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, WIDTH, new_page, title,
+    Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, RIGHT, WIDTH, letters, new_page,
 };
 use crate::report::numbers::{brief, power_of_ten};
 use crate::study::{Fit, FitLeaf, FitResidual};
@@ -27,12 +27,9 @@ const GAP: f64 = 70.0;
 
 pub fn draw(fit: &Fit) -> Drawing {
     let name = format!("{}: fit", fit.scenario);
+    let (count, free) = (fit.residuals.len(), fit.parameters.len());
     let mut notes = vec![
-        format!(
-            "{} data, {} free numbers",
-            fit.residuals.len(),
-            fit.parameters.len()
-        ),
+        format!("{count} data, {free} free numbers"),
         fit.outcome.word().into(),
     ];
     if let Some(sd) = fit.standard_deviation {
@@ -40,42 +37,28 @@ pub fn draw(fit: &Fit) -> Drawing {
     }
     let mut page = new_page(LEFT, &name, &notes, None);
     let mut top = HEADER;
-    let mut letter = b'a';
-    let mut next_letter = || {
-        let this = format!("({})", char::from(letter));
-        letter = (letter + 1).min(b'z');
-        this
-    };
+    let mut letters = letters();
+    let mut letter = || letters.next().unwrap_or_default();
+    let results = || fit.residuals.iter().filter(|it| it.rod.is_none());
     let mut kinds: Vec<&str> = Vec::new();
-    for residual in fit
-        .residuals
-        .iter()
-        .filter(|residual| residual.rod.is_none())
-    {
-        if !kinds.contains(&residual.what.as_str()) {
-            kinds.push(&residual.what);
+    for result in results() {
+        if !kinds.contains(&result.what.as_str()) {
+            kinds.push(&result.what);
         }
     }
     for kind in kinds.into_iter().take(MOST_RESULTS) {
-        let of: Vec<&FitResidual> = (fit.residuals.iter())
-            .filter(|residual| residual.rod.is_none() && residual.what == kind)
-            .collect();
-        let letter = next_letter();
+        let of: Vec<&FitResidual> = results().filter(|it| it.what == kind).collect();
+        let letter = letter();
         page.group("result", |page| draw_result(page, top, &letter, kind, &of));
         top += PANEL_TITLE + RESULT + PANEL_AXIS;
     }
-    let traced = fit
-        .leaves
-        .iter()
-        .filter(|(_, leaf)| !leaf.traced.is_empty());
-    for (experiment, leaf) in traced.take(MOST_LEAVES) {
-        let letter = next_letter();
-        page.group("veins", |page| {
-            draw_veins(page, top, &letter, experiment, leaf)
-        });
+    let traced = fit.leaves.iter().filter(|(_, it)| !it.traced.is_empty());
+    for (name, leaf) in traced.take(MOST_LEAVES) {
+        let letter = letter();
+        page.group("veins", |page| draw_veins(page, top, &letter, name, leaf));
         top += PANEL_TITLE + VEINS + PANEL_AXIS;
     }
-    let letter = next_letter();
+    let letter = letter();
     page.group("residuals", |page| draw_residuals(page, top, &letter, fit));
     page.height = (top + PANEL_TITLE + RESIDUALS + PANEL_AXIS + BOTTOM).ceil();
     page
@@ -92,24 +75,15 @@ fn numbers(name: &str, count: usize) -> Axis {
 
 fn draw_result(page: &mut Drawing, top: f64, letter: &str, kind: &str, of: &[&FitResidual]) {
     let cell = Cell::left_of_key(top + PANEL_TITLE, RESULT, KEY);
-    title(
-        page,
-        cell.corner,
-        letter,
-        &format!("{kind} of the experiments"),
-    );
+    let what = format!("{kind} of the experiments");
     let values = of.iter().flat_map(|r| {
         let (band, sd) = (r.band, 2.0 * r.sd);
         [r.data - sd, r.data + sd, r.model - band, r.model + band]
     });
     let mut up = Axis::holding(kind, values);
     up.emphasizes_zero = false;
-    let axes = Axes {
-        cell,
-        across: numbers("experiment", of.len()),
-        up,
-    };
-    axes.draw(page);
+    let across = numbers("experiment", of.len());
+    let axes = Axes::titled(page, cell, [letter, &what], across, up);
     let line = |value: &dyn Fn(&FitResidual) -> f64| -> Vec<(f64, f64)> {
         let points = of.iter().enumerate();
         points.map(|(k, r)| (k as f64 + 1.0, value(r))).collect()
@@ -125,12 +99,8 @@ fn draw_result(page: &mut Drawing, top: f64, letter: &str, kind: &str, of: &[&Fi
     }
     axes.markers(page, line(&|r| r.data), Marker::Dot, DOT);
     let mut key = Key::right_of(cell);
-    key.marker(
-        page,
-        "data",
-        "with two standard deviations",
-        (Marker::Dot, DOT),
-    );
+    let bars = "with two standard deviations";
+    key.marker(page, "data", bars, (Marker::Dot, DOT));
     key.line(page, "model", "", Stroke::new(BLUE, 1.6));
     key.line(page, "95 % band", "what the data leave open", dashed);
 }
@@ -143,31 +113,19 @@ fn draw_veins(page: &mut Drawing, top: f64, letter: &str, experiment: &str, leaf
         .enumerate()
     {
         let corner = DVec2::new(LEFT + k as f64 * (width + GAP), top + PANEL_TITLE);
-        let cell = Cell {
-            corner,
-            size: DVec2::new(width, VEINS),
-        };
+        let cell = Cell::new(corner, DVec2::new(width, VEINS));
         let letter = if k == 0 { letter } else { "" };
-        title(
-            page,
-            corner,
-            letter,
-            &format!("experiment {experiment}, {view}"),
-        );
+        let what = format!("experiment {experiment}, {view}");
         let seen = |point: [Option<f64>; 3]| Some((point[axes[0]]?, point[axes[1]]?));
         let flat = |point: &DVec3| (point[axes[0]], point[axes[1]]);
-        let points: Vec<(f64, f64)> = leaf
-            .traced
-            .iter()
-            .filter_map(|(_, point)| seen(*point))
-            .collect();
+        let traced = leaf.traced.iter();
+        let points: Vec<(f64, f64)> = traced.filter_map(|(_, it)| seen(*it)).collect();
         let all: Vec<(f64, f64)> = leaf.curves.iter().flatten().map(flat).collect();
         let all = all.iter().chain(&points);
         let across = Axis::holding(["x", "y", "z"][axes[0]], all.clone().map(|p| p.0));
         let up = Axis::holding(["x", "y", "z"][axes[1]], all.map(|p| p.1));
         let (across, up) = equal_scales(across, up, cell.size);
-        let panel = Axes { cell, across, up };
-        panel.draw(page);
+        let panel = Axes::titled(page, cell, [letter, &what], across, up);
         for curve in &leaf.curves {
             let line: Vec<(f64, f64)> = curve.iter().map(flat).collect();
             panel.curve(page, &line, Stroke::new(BLUE, 1.4));
@@ -190,32 +148,21 @@ fn equal_scales(mut across: Axis, mut up: Axis, size: DVec2) -> (Axis, Axis) {
 
 fn draw_residuals(page: &mut Drawing, top: f64, letter: &str, fit: &Fit) {
     let cell = Cell::left_of_key(top + PANEL_TITLE, RESIDUALS, KEY);
-    title(
-        page,
-        cell.corner,
-        letter,
-        "residuals in standard deviations",
-    );
+    let what = "residuals in standard deviations";
     let points = fit.residuals.iter().enumerate();
     let points: Vec<(f64, f64)> = points.map(|(k, r)| (k as f64 + 1.0, r.residual)).collect();
     let count = points.len() as f64;
     let values = points.iter().map(|point| point.1);
-    let axes = Axes {
-        cell,
-        across: Axis::linear("datum", 0.0, count + 1.0),
-        up: Axis::holding("residual", values.chain([-2.5, 2.5])),
-    };
-    axes.draw(page);
+    let across = Axis::linear("datum", 0.0, count + 1.0);
+    let up = Axis::holding("residual", values.chain([-2.5, 2.5]));
+    let axes = Axes::titled(page, cell, [letter, what], across, up);
     for bound in [-2.0, 2.0] {
         let line = [(0.0, bound), (count + 1.0, bound)];
         axes.curve(page, &line, Stroke::new(NOTE, 1.0).dashed(true));
     }
     axes.markers(page, points, Marker::Dot, INK);
     let mut key = Key::right_of(cell);
-    let freedom = fit.degrees_of_freedom;
-    let sum = format!(
-        "sum of squares {} for {freedom} degrees of freedom",
-        brief(fit.chi_squared)
-    );
+    let (sum, freedom) = (brief(fit.chi_squared), fit.degrees_of_freedom);
+    let sum = format!("sum of squares {sum} for {freedom} degrees of freedom");
     key.marker(page, "data less model", &sum, (Marker::Dot, INK));
 }

@@ -70,16 +70,14 @@ impl Curve {
         let pieces = curve.points.windows(2).filter_map(|pair| {
             let ends = [place(pair[0].values)?, place(pair[1].values)?];
             // Where curves cross, the index counts other modes as well.
-            let point = if is_special(&pair[1]) {
-                &pair[0]
-            } else {
-                &pair[1]
+            let point = match is_special(&pair[1]) {
+                true => &pair[0],
+                false => &pair[1],
             };
             let (before, after) = (point.index_before, point.index_behind);
-            let sides = if from < to {
-                [before, after]
-            } else {
-                [after, before]
+            let sides = match from < to {
+                true => [before, after],
+                false => [after, before],
             };
             Some((ends, sides))
         });
@@ -146,11 +144,8 @@ impl Sides {
         let own = own.min_by(|(a, _), (b, _)| a.abs().total_cmp(&b.abs()));
         let (_, sides) = own.unwrap_or((0.0, [0; 2]));
         if curves[c].fold {
-            let text = format!(
-                "{} and {} meet",
-                sides[0].min(sides[1]),
-                sides[0].max(sides[1])
-            );
+            let (fewer, more) = (sides[0].min(sides[1]), sides[0].max(sides[1]));
+            let text = format!("{fewer} and {more} meet");
             return Sides {
                 texts: vec![label(0.0, 1.0, text)],
                 curves: vec![c],
@@ -159,11 +154,8 @@ impl Sides {
         // From the curve outwards, while the next one is close and the indices between them agree.
         let mut others: Vec<(f64, [usize; 2], usize)> = Vec::new();
         for (k, other) in curves.iter().enumerate().filter(|(_, it)| !it.fold) {
-            others.extend(
-                other
-                    .crossings(at, normal)
-                    .map(|(along, it)| (along, it, k)),
-            );
+            let crossings = other.crossings(at, normal);
+            others.extend(crossings.map(|(along, it)| (along, it, k)));
         }
         others.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut named = vec![c];

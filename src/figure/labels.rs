@@ -54,11 +54,8 @@ impl Labels {
 
     /// Requests a label next to a point; points close to each other share one.
     pub fn add(&mut self, at: DVec2, text: &str) {
-        match self
-            .wanted
-            .iter_mut()
-            .find(|(place, _)| place.distance(at) < CLOSE)
-        {
+        let mut wanted = self.wanted.iter_mut();
+        match wanted.find(|(place, _)| place.distance(at) < CLOSE) {
             Some((_, texts)) => *texts += &format!(", {text}"),
             None => self.wanted.push((at, text.into())),
         }
@@ -80,10 +77,7 @@ impl Labels {
             for offset in places {
                 // Wide labels are placed farther to the side.
                 let side = DVec2::new(0.5 * (size.x - size.y).max(0.0) * offset.normalize().x, 0.0);
-                let cell = Cell {
-                    corner: at + offset + side - 0.5 * size,
-                    size,
-                };
+                let cell = Cell::new(at + offset + side - 0.5 * size, size);
                 let clear = self.clearance(&cell);
                 if best.as_ref().is_none_or(|(least, _)| clear > *least) {
                     best = Some((clear, cell));
@@ -135,10 +129,7 @@ mod tests {
 
     #[test]
     fn labels_cover_neither_curves_nor_each_other() {
-        let cell = Cell {
-            corner: DVec2::ZERO,
-            size: DVec2::new(300.0, 200.0),
-        };
+        let cell = Cell::new(DVec2::ZERO, DVec2::new(300.0, 200.0));
         let axes = Axes {
             cell,
             across: Axis::linear("", 0.0, 1.0),

@@ -33,10 +33,8 @@ fn notes(equilibrium: &Equilibrium, veins: &Veins, setting: &Setting) -> Vec<Str
     }
     if let Some(error) = equilibrium.accuracy.error_estimate {
         let (error, unit) = setting.in_unit(error / veins.unit);
-        notes.push(format!(
-            "error of positions ≤ {} {unit}",
-            power_of_ten(error)
-        ));
+        let error = power_of_ten(error);
+        notes.push(format!("error of positions ≤ {error} {unit}"));
     }
     notes.extend(veins.notes(setting));
     notes

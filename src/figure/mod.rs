@@ -30,25 +30,23 @@ mod markers;
 mod modes;
 mod page;
 mod panels;
-mod png;
+pub mod png;
 mod round;
 mod sensitivity;
 mod setting;
 mod small;
 mod space;
-mod svg;
+pub mod svg;
 mod trace;
 mod veins;
 pub mod view;
-
-use std::io::{self, Write};
 
 pub use all::draw as all;
 pub use boundary::draw as boundary;
 pub use chart::{draw_chart as chart, draw_scaling as scaling};
 pub use check::draw as check;
 pub use energy::draw as energy;
-pub use film::Film;
+pub use film::write as film;
 pub use filmstrip::draw as filmstrip;
 pub use fit::draw as fit;
 pub use leaf::draw as leaf;
@@ -57,40 +55,7 @@ pub use modes::draw as modes;
 pub use sensitivity::draw as sensitivity;
 pub use trace::draw as trace;
 
-use crate::report::{Document, Format};
-use crate::scenario::Scenario;
-use drawing::Drawing;
-
-/// A figure as a file of this name.
-pub struct Picture<R> {
-    file: &'static str,
-    draw: fn(&R, &Scenario) -> Drawing,
-    write: fn(&Drawing, &mut dyn Write) -> io::Result<()>,
-}
-
-impl<R> Picture<R> {
-    /// A vector image.
-    pub const fn svg(file: &'static str, draw: fn(&R, &Scenario) -> Drawing) -> Self {
-        let write = svg::write;
-        Picture { file, draw, write }
-    }
-
-    /// A raster image.
-    pub const fn png(file: &'static str, draw: fn(&R, &Scenario) -> Drawing) -> Self {
-        let write = png::write;
-        Picture { file, draw, write }
-    }
-}
-
-impl<R> Format<R> for Picture<R> {
-    fn file_name(&self) -> &'static str {
-        self.file
-    }
-
-    fn write(&self, document: &Document<R>, out: &mut dyn Write) -> io::Result<()> {
-        (self.write)(&(self.draw)(document.result, document.input), out)
-    }
-}
+pub use drawing::Drawing;
 
 #[cfg(test)]
 mod tests {
@@ -99,6 +64,7 @@ mod tests {
     use super::*;
     use crate::relax::Mode;
     use crate::report::sample;
+    use crate::scenario::Scenario;
     use crate::simulate::{Record, Stopped};
     use glam::DVec3;
 
@@ -251,16 +217,12 @@ mod tests {
             rotation: shape,
         }]);
         svg::text(&modes(&fan, &scenario()));
-        fan.shape
-            .curves
-            .iter_mut()
-            .for_each(|curve| curve[4].z = value);
+        let curves = fan.shape.curves.iter_mut();
+        curves.for_each(|curve| curve[4].z = value);
         fan.tips[0].x = value;
         leaf(&fan, &scenario());
-        fan.shape
-            .curves
-            .iter_mut()
-            .for_each(|curve| curve.fill(DVec3::splat(value)));
+        let curves = fan.shape.curves.iter_mut();
+        curves.for_each(|curve| curve.fill(DVec3::splat(value)));
         leaf(&fan, &scenario());
         fan.shape.curves.clear();
         leaf(&fan, &scenario());

@@ -25,10 +25,8 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     let rest = Veins::of(equilibrium);
     let modes = equilibrium.stability.modes.as_deref().unwrap_or_default();
     let drawn = &modes[..modes.len().min(MOST)];
-    let shapes: Vec<Veins> = drawn
-        .iter()
-        .map(|mode| displaced(equilibrium, &rest, mode))
-        .collect();
+    let shapes = drawn.iter().map(|mode| displaced(equilibrium, &rest, mode));
+    let shapes: Vec<Veins> = shapes.collect();
     // Every mode in two views.
     let count = VIEWS.len() * drawn.len();
     let panels = SmallPanels::holding(shapes.iter().chain([&rest]), count, &setting);
@@ -44,12 +42,8 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     for (index, (mode, veins)) in drawn.iter().zip(&shapes).enumerate() {
         drawing.group("mode", |page| {
             let (number, (text, color)) = ((index + 1).to_string(), caption(mode));
-            let front = "from the front".to_string();
-            for (k, (view, caption)) in VIEWS
-                .into_iter()
-                .zip([(number, text), (String::new(), front)])
-                .enumerate()
-            {
+            let captions = [(&*number, &*text, color), ("", "from the front", NOTE)];
+            for (k, (view, caption)) in VIEWS.into_iter().zip(captions).enumerate() {
                 let at_rest = |page: &mut Drawing, scene: &Scene, width: f64| {
                     for vein in &rest.veins {
                         let path = vein.path(|point| scene.place(point));
@@ -57,9 +51,7 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
                     }
                 };
                 let place = VIEWS.len() * index + k;
-                let color = if k == 0 { color } else { NOTE };
-                let caption = (caption.0.as_str(), caption.1.as_str(), color);
-                panels.draw_from(view, page, place, veins, caption, at_rest);
+                panels.draw_over(page, place, veins, view, caption, at_rest);
             }
         });
     }
@@ -70,10 +62,10 @@ pub fn draw(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
 fn caption(mode: &Mode) -> (String, Color) {
     match (mode.is_neutral(), mode.growth()) {
         (true, _) => ("neutral: ω = 0".into(), NOTE),
-        (_, None) => (
-            format!("ω = {}", short(mode.frequency().unwrap_or_default())),
-            NOTE,
-        ),
+        (_, None) => {
+            let frequency = short(mode.frequency().unwrap_or_default());
+            (format!("ω = {frequency}"), NOTE)
+        }
         (_, Some(growth)) => (format!("unstable: grows at {}", short(growth)), DOT),
     }
 }

@@ -27,12 +27,16 @@ pub struct Cell {
 }
 
 impl Cell {
+    pub fn new(corner: DVec2, size: DVec2) -> Self {
+        Cell { corner, size }
+    }
+
     /// A panel across the page that leaves this width on the right for a key.
     pub fn left_of_key(top: f64, height: f64, key: f64) -> Self {
-        Cell {
-            corner: DVec2::new(LEFT, top),
-            size: DVec2::new(WIDTH - LEFT - RIGHT - key, height),
-        }
+        Cell::new(
+            DVec2::new(LEFT, top),
+            DVec2::new(WIDTH - LEFT - RIGHT - key, height),
+        )
     }
 
     pub fn end(&self) -> DVec2 {
@@ -83,6 +87,11 @@ pub fn title_in(page: &mut Drawing, corner: DVec2, letter: &str, text: &str, col
     page.label(base, letter, TEXT_SIZE, Anchor::Start, INK);
     let base = base + DVec2::new(24.0, 0.0);
     page.label(base, text, TEXT_SIZE, Anchor::Start, color);
+}
+
+/// Letters of panels: `(a)`, `(b)`, ...
+pub fn letters() -> impl Iterator<Item = String> + Clone {
+    (b'a'..=b'z').map(|letter| format!("({})", char::from(letter)))
 }
 
 const TITLE_BASE: f64 = 38.0;
@@ -258,8 +267,8 @@ impl KeyRows {
 }
 
 fn sample_cell(at: DVec2, width: f64) -> Cell {
-    Cell {
-        corner: at - DVec2::new(0.0, 0.5 * SAMPLE_HEIGHT),
-        size: DVec2::new(width, SAMPLE_HEIGHT),
-    }
+    Cell::new(
+        at - DVec2::new(0.0, 0.5 * SAMPLE_HEIGHT),
+        DVec2::new(width, SAMPLE_HEIGHT),
+    )
 }

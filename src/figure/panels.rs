@@ -31,6 +31,13 @@ const PADDING: f64 = 0.06;
 /// Least distance between grid lines.
 const TICK_DISTANCE: f64 = 36.0;
 
+/// The flat panels: names of their groups, letters, titles, and the two axes.
+const FLAT: [(&str, &str, &str, [usize; 2]); 3] = [
+    ("top", "(a)", "from above", [0, 1]),
+    ("side", "(b)", "from the side", [0, 2]),
+    ("front", "(c)", "from the front", [1, 2]),
+];
+
 /// Of the panel in space.
 const MARGINS: Margins = Margins {
     left: 56.0,
@@ -76,21 +83,14 @@ fn draw_flat(
     let mut order: Vec<&Vein> = veins.veins.iter().collect();
     order.sort_by(|a, b| nearness(a).total_cmp(&nearness(b)));
     for vein in order {
-        page.stroke(
-            vein.path(place),
-            Stroke::new(vein.color, veins.line_width()),
-        );
+        let stroke = Stroke::new(vein.color, veins.line_width());
+        page.stroke(vein.path(place), stroke);
     }
     leaf_markers(page, veins, place);
     if let Some(gravity) = setting.gravity {
         let direction = DVec2::new(gravity[across], -gravity[up]);
-        gravity::draw(
-            page,
-            cell,
-            veins.points().map(place),
-            direction,
-            toward.dot(gravity) > 0.0,
-        );
+        let (points, toward) = (veins.points().map(place), toward.dot(gravity) > 0.0);
+        gravity::draw(page, cell, points, direction, toward);
     }
 }
 
@@ -142,21 +142,12 @@ impl Panels {
     pub fn draw(&self, drawing: &mut Drawing, veins: &Veins, setting: &Setting) {
         let [left, right] = self.columns;
         let [top, bottom] = self.rows;
-        let cell = |column: (f64, f64), row: (f64, f64)| Cell {
-            corner: DVec2::new(column.0, row.0),
-            size: DVec2::new(column.1, row.1),
+        let cell = |column: (f64, f64), row: (f64, f64)| {
+            Cell::new(DVec2::new(column.0, row.0), DVec2::new(column.1, row.1))
         };
-        for (name, letter, text, cell, axes) in [
-            ("top", "(a)", "from above", cell(left, top), [0, 1]),
-            ("side", "(b)", "from the side", cell(left, bottom), [0, 2]),
-            (
-                "front",
-                "(c)",
-                "from the front",
-                cell(right, bottom),
-                [1, 2],
-            ),
-        ] {
+        let cells = [(left, top), (left, bottom), (right, bottom)];
+        for ((name, letter, text, axes), (column, row)) in FLAT.into_iter().zip(cells) {
+            let cell = cell(column, row);
             drawing.group(name, |page| {
                 title(page, cell.corner, letter, text);
                 draw_flat(page, veins, setting, cell, self.scale, axes);

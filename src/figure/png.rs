@@ -56,17 +56,9 @@ fn paint_rows(drawing: &Drawing, rows: Range<u32>) -> Pixmap {
             Mark::Group(_) | Mark::EndGroup => (),
             Mark::Shape { path, fill, stroke } => {
                 let rim = stroke.map_or(1.0, |stroke| 1.0 + stroke.width);
-                let outside = |above: bool| {
-                    let mut heights = path.iter().flat_map(|step| heights(*step));
-                    heights.all(|y| {
-                        if above {
-                            y + rim < top
-                        } else {
-                            y - rim > bottom
-                        }
-                    })
-                };
-                if outside(true) || outside(false) {
+                let mut above = path.iter().flat_map(|step| heights(*step));
+                let mut below = above.clone();
+                if above.all(|y| y + rim < top) || below.all(|y| y - rim > bottom) {
                     continue;
                 }
                 let Some(path) = outline(path) else { continue };
@@ -90,7 +82,7 @@ fn paint_rows(drawing: &Drawing, rows: Range<u32>) -> Pixmap {
 }
 
 /// Heights of the points of a step, which bound it.
-fn heights(step: Step) -> impl Iterator<Item = f64> {
+fn heights(step: Step) -> impl Iterator<Item = f64> + Clone {
     let heights = match step {
         Step::Move(to) | Step::Line(to) => [Some(to.y), None, None],
         Step::Cubic(a, b, to) => [a, b, to].map(|point| Some(point.y)),
@@ -204,22 +196,16 @@ mod tests {
     fn bands_are_one_picture() {
         let mut page = Drawing::new(300.0, "");
         page.height = 700.0;
-        page.shape(
-            rectangle(DVec2::new(20.0, 20.0), DVec2::new(200.0, 600.0)),
-            DOT,
-            None,
-        );
+        let (corner, size) = (DVec2::new(20.0, 20.0), DVec2::new(200.0, 600.0));
+        page.shape(rectangle(corner, size), DOT, None);
         for k in 0..14 {
             let at = DVec2::new(30.0 + 10.0 * f64::from(k), 50.0 * f64::from(k));
             page.stroke(circle(at, 45.0), Stroke::new(INK, 3.0));
             page.label(at, "name", 20.0, Anchor::Start, INK);
             page.rotated_label(at, "a long name of an axis", 20.0, INK);
         }
-        page.line(
-            DVec2::new(0.0, 10.0),
-            DVec2::new(300.0, 690.0),
-            Stroke::new(INK, 4.0),
-        );
+        let (from, to) = (DVec2::new(0.0, 10.0), DVec2::new(300.0, 690.0));
+        page.line(from, to, Stroke::new(INK, 4.0));
         let mut bytes = Vec::new();
         write(&page, &mut bytes).unwrap();
         let mut reader = ::png::Decoder::new(Cursor::new(&bytes))

@@ -64,10 +64,8 @@ impl Setting {
 
     /// The value shown for a drawn length, and its unit.
     pub fn in_unit(&self, length: f64) -> (f64, &str) {
-        (
-            self.scale() * length,
-            self.units.length.as_deref().unwrap_or("L"),
-        )
+        let unit = self.units.length.as_deref();
+        (self.scale() * length, unit.unwrap_or("L"))
     }
 
     /// Formats a drawn length with its unit.

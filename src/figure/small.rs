@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::drawing::{Color, Drawing};
+use super::drawing::{Color, Drawing, NOTE};
 use super::page::{Cell, HEADER, PANEL_TITLE, WIDTH, title_in};
 use super::round::round_step;
 use super::setting::Setting;
@@ -48,10 +48,7 @@ impl SmallPanels {
         let bounds = common_box(shapes);
         let width = (WIDTH - 2.0 * SIDE - (COLUMNS - 1) as f64 * GAP) / COLUMNS as f64;
         let size = DVec2::new(width, height(bounds, width));
-        let any = Cell {
-            corner: DVec2::ZERO,
-            size,
-        };
+        let any = Cell::new(DVec2::ZERO, size);
         let scale = Camera::facing(bounds, View::Oblique, any, MARGINS).scale;
         SmallPanels {
             bounds,
@@ -75,10 +72,10 @@ impl SmallPanels {
     pub fn cell(&self, index: usize) -> Cell {
         let place = DVec2::new((index % COLUMNS) as f64, (index / COLUMNS) as f64);
         let pitch = self.size + DVec2::new(GAP, PANEL_TITLE + GAP);
-        Cell {
-            corner: DVec2::new(SIDE, self.top + PANEL_TITLE) + place * pitch,
-            size: self.size,
-        }
+        Cell::new(
+            DVec2::new(SIDE, self.top + PANEL_TITLE) + place * pitch,
+            self.size,
+        )
     }
 
     pub fn end(&self) -> f64 {
@@ -87,47 +84,29 @@ impl SmallPanels {
         (self.top + rows as f64 * row + BOTTOM).ceil()
     }
 
-    /// Draws a leaf with its letter and title in its panel, above what `under` draws
-    /// with lines of a given width. The first panel also shows the names of the axes and
-    /// gravity.
-    pub fn draw(
-        &self,
-        page: &mut Drawing,
-        index: usize,
-        veins: &Veins,
-        (letter, text, color): (&str, &str, Color),
-        under: impl FnOnce(&mut Drawing, &Scene, f64),
-    ) {
-        self.draw_from(
-            View::Oblique,
-            page,
-            index,
-            veins,
-            (letter, text, color),
-            under,
-        );
+    /// Draws a leaf with its letter and title in its panel. The first panel also shows the
+    /// names of the axes and gravity.
+    pub fn draw(&self, page: &mut Drawing, index: usize, veins: &Veins, caption: [&str; 2]) {
+        let [letter, text] = caption;
+        let caption = (letter, text, NOTE);
+        self.draw_over(page, index, veins, View::Oblique, caption, |_, _, _| ());
     }
 
-    /// The same in another view.
-    pub fn draw_from(
+    /// The same in any view, with a title in a colour, and above what `under` draws with
+    /// lines of a given width.
+    pub fn draw_over(
         &self,
-        view: View,
         page: &mut Drawing,
         index: usize,
         veins: &Veins,
+        view: View,
         (letter, text, color): (&str, &str, Color),
         under: impl FnOnce(&mut Drawing, &Scene, f64),
     ) {
         let cell = self.cell(index);
         title_in(page, cell.corner, letter, text, color);
-        let scene = Scene::new(
-            self.bounds,
-            &self.setting,
-            view,
-            cell,
-            MARGINS,
-            Some(self.step),
-        );
+        let (bounds, setting, step) = (self.bounds, &self.setting, Some(self.step));
+        let scene = Scene::new(bounds, setting, view, cell, MARGINS, step);
         scene.draw_box(page);
         if index == 0 {
             scene.draw_names(page, 9.0, false);
@@ -141,10 +120,10 @@ impl SmallPanels {
 
 /// The height that the box needs in a panel of this width.
 fn height(bounds: [DVec3; 2], width: f64) -> f64 {
-    let any = Cell {
-        corner: DVec2::ZERO,
-        size: DVec2::ONE * (MARGINS.left + MARGINS.right + 1.0),
-    };
+    let any = Cell::new(
+        DVec2::ZERO,
+        DVec2::ONE * (MARGINS.left + MARGINS.right + 1.0),
+    );
     let (first, last) = Camera::facing(bounds, View::Oblique, any, MARGINS).outline(bounds);
     let needed = (last - first).y / (last - first).x * (width - MARGINS.left - MARGINS.right);
     (needed + MARGINS.below).clamp(LOWEST, HIGHEST)

@@ -264,8 +264,7 @@ impl Scene {
     /// are shown.
     pub fn draw_names(&self, page: &mut Drawing, distance: f64, values: bool) {
         for edge in &self.edges {
-            let middle = self.place(edge.point(0.5 * (edge.low + edge.high)));
-            let at = middle + label_offset(self.outward(edge), distance);
+            let at = self.middle(edge) + label_offset(self.outward(edge), distance);
             let name = self.setting.brief_axis(edge.axis, values);
             // A long name extends away from its edge, or is placed on top of it.
             let (at, anchor) = match edge.axis {
@@ -290,17 +289,14 @@ impl Scene {
         let ends = [self.low, self.high];
         let corner = |k: usize| DVec3::new(ends[k & 1].x, ends[k >> 1 & 1].y, ends[k >> 2].z);
         let corners = (0..8).map(|k| self.place(corner(k)));
-        let names = self
-            .edges
-            .iter()
-            .map(|edge| self.place(edge.point(0.5 * (edge.low + edge.high))));
-        gravity::draw(
-            page,
-            self.cell,
-            corners.chain(names),
-            direction,
-            toward.dot(gravity) > 0.0,
-        );
+        let names = self.edges.iter().map(|edge| self.middle(edge));
+        let toward = toward.dot(gravity) > 0.0;
+        gravity::draw(page, self.cell, corners.chain(names), direction, toward);
+    }
+
+    /// The middle of an edge on the page.
+    fn middle(&self, edge: &Edge) -> DVec2 {
+        self.place(edge.point(0.5 * (edge.low + edge.high)))
     }
 
     /// The outward direction of an edge on the page.
@@ -315,13 +311,11 @@ impl Scene {
             let shadow = vein.path(|point| self.place(point.with_z(self.low.z)));
             page.stroke(shadow, Stroke::new(SHADOW, width));
         }
-        let pieces = veins
-            .veins
-            .iter()
-            .flat_map(|vein| vein.pieces.iter().map(move |p| (p, vein)));
         let depth = |piece: &Piece| self.camera.toward.dot(piece[0] + piece[3]);
-        let pieces = pieces.map(|(piece, vein)| (depth(piece), piece, vein));
-        let mut pieces: Vec<(f64, &Piece, &Vein)> = pieces.collect();
+        let mut pieces: Vec<(f64, &Piece, &Vein)> = Vec::new();
+        for vein in &veins.veins {
+            pieces.extend(vein.pieces.iter().map(|piece| (depth(piece), piece, vein)));
+        }
         pieces.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (_, piece, vein) in pieces {
             let [start, a, b, end] = piece.map(|point| self.place(point));

@@ -5,15 +5,15 @@ use glam::DVec3;
 
 use super::axes::Axes;
 use super::axis::Axis;
-use super::drawing::{CURVES, Drawing, INK, NOTE, Stroke};
+use super::drawing::{CURVES, Drawing, INK, Stroke};
 use super::labels::Labels;
 use super::markers::Marker;
-use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, new_page, title};
+use super::page::{Cell, HEADER, Key, LEFT, PANEL_AXIS, PANEL_TITLE, letters, new_page};
 use super::setting::{Setting, with_unit};
 use super::small::SmallPanels;
 use super::veins::{Veins, length};
-use crate::report::numbers::{power_of_ten, short};
-use crate::report::words::branch_end;
+use crate::report::numbers::{number_of_veins, power_of_ten, short};
+use crate::report::words::{branch_end, stable_or_index};
 use crate::report::{error_location, slope_unit};
 use crate::scenario::{Scenario, Units};
 use crate::study::{Law, PointKind, Trace, TraceBranch, TracePoint, TraceShow};
@@ -54,7 +54,7 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     };
     let name = format!("{}: equilibria along {}", trace.scenario, trace.keys);
     let mut drawing = new_page(LEFT, &name, &notes(trace), None);
-    let mut letters = (b'a'..=b'z').map(|letter| format!("({})", char::from(letter)));
+    let mut letters = letters();
     let mut letter = || letters.next().unwrap_or_default();
     let mut below = HEADER;
     for (place, &quantity) in quantities.iter().enumerate() {
@@ -79,11 +79,8 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     drawing.height = panels.end();
     drawing.group("leaves", |page| {
         for (index, (veins, at)) in shapes.iter().zip(&shown).enumerate() {
-            let (number, text) = (
-                (index + 1).to_string(),
-                format!("at {}", caption(point(at))),
-            );
-            panels.draw(page, index, veins, (&number, &text, NOTE), |_, _, _| ());
+            let caption = format!("at {}", caption(point(at)));
+            panels.draw(page, index, veins, [&(index + 1).to_string(), &caption]);
         }
     });
     drawing
@@ -92,10 +89,7 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
 fn notes(trace: &Trace) -> Vec<String> {
     let points: usize = trace.branches.iter().map(|b| b.points.len()).sum();
     let mut notes = vec![
-        match trace.rods {
-            1 => "1 vein".into(),
-            rods => format!("{rods} veins"),
-        },
+        number_of_veins(trace.rods),
         match trace.branches.len() {
             1 => format!("{points} points"),
             branches => format!("{points} points on {branches} branches"),
@@ -105,11 +99,8 @@ fn notes(trace: &Trace) -> Vec<String> {
     let errors = trace.branches.iter().flat_map(|b| &b.points);
     let worst = errors.filter_map(|p| p.error).fold(0.0, f64::max);
     if worst > 0.0 {
-        notes.push(format!(
-            "{} within {}",
-            error_location(trace),
-            power_of_ten(worst)
-        ));
+        let (what, worst) = (error_location(trace), power_of_ten(worst));
+        notes.push(format!("{what} within {worst}"));
     }
     notes
 }
@@ -133,10 +124,8 @@ fn shown(trace: &Trace) -> Vec<[usize; 2]> {
     let point = |[b, p]: [usize; 2]| &trace.branches[b].points[p];
     let first = wanted.first().map(|&(_, at)| at);
     let distance = |at: [usize; 2]| first.map_or(0.0, |first| difference(point(at), point(first)));
-    let farthest = wanted
-        .iter()
-        .map(|&(_, at)| distance(at))
-        .fold(0.0, f64::max);
+    let farthest = wanted.iter().map(|&(_, at)| distance(at));
+    let farthest = farthest.fold(0.0, f64::max);
     let visible = VISIBLE.min(VISIBLE_FRACTION * farthest);
     let mut shown: Vec<[usize; 2]> = Vec::new();
     for (_, at) in wanted {
@@ -163,10 +152,9 @@ fn difference(one: &TracePoint, other: &TracePoint) -> f64 {
 }
 
 fn caption(point: &TracePoint) -> String {
-    let kind = match (point.kind, point.index) {
-        (PointKind::Regular, 0) => "stable".into(),
-        (PointKind::Regular, index) => format!("index {index}"),
-        (kind, _) => kind.word().replace('-', " "),
+    let kind = match point.kind {
+        PointKind::Regular => stable_or_index(point.index),
+        kind => kind.word().replace('-', " "),
     };
     format!("{}, {kind}", short(point.value))
 }
@@ -236,11 +224,7 @@ fn draw_branches(
     };
     // Logarithmic if the values are spaced logarithmically; they increase along the axis.
     let sign = trace.log.then(|| trace.range[0].signum());
-    let axes = Axes {
-        cell,
-        across: Axis::covering(&across, all().map(|point| at(point).0), sign),
-        up: axis_of(trace, quantity),
-    };
+    let across = Axis::covering(&across, all().map(|point| at(point).0), sign);
     // The title names only the kinds that occur.
     let indices = [true, false].map(|stable| all().any(|point| (point.index == 0) == stable));
     let what = match indices {
@@ -248,8 +232,7 @@ fn draw_branches(
         [false, true] => "unstable equilibria",
         _ => "stable equilibria",
     };
-    title(page, cell.corner, letter, what);
-    axes.draw(page);
+    let axes = Axes::titled(page, cell, [letter, what], across, axis_of(trace, quantity));
     let mut labels = Labels::within(cell);
     for (b, branch) in trace.branches.iter().enumerate() {
         let origin = branch.from.map(|[b, p]| &trace.branches[b].points[p]);
@@ -345,14 +328,10 @@ fn draw_law(
     });
     // The line may leave the range of the points.
     let drawn = || points.iter().chain(&ends);
-    let axes = Axes {
-        cell,
-        across: Axis::holding(&across, drawn().map(|p| p.0)),
-        up: Axis::holding(&up, drawn().map(|p| p.1)),
-    };
+    let across = Axis::holding(&across, drawn().map(|p| p.0));
+    let up = Axis::holding(&up, drawn().map(|p| p.1));
     let what = "force against displacement of the tip";
-    title(page, cell.corner, letter, what);
-    axes.draw(page);
+    let axes = Axes::titled(page, cell, [letter, what], across, up);
     let line = Stroke::new(CURVES[2], 1.4);
     axes.curve(page, &ends, line);
     axes.markers(page, points, Marker::Dot, CURVES[0]);

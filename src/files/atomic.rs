@@ -95,10 +95,8 @@ fn draft_path(file: &Path) -> PathBuf {
 
 /// Creates the output folder and its parents.
 pub(super) fn make_folder(folder: &Path) -> Result<(), FileError> {
-    match fs::create_dir_all(folder) {
-        Ok(()) => Ok(()),
-        Err(reason) => Err(not_writable(folder, nearest_existing(folder), reason)),
-    }
+    let created = fs::create_dir_all(folder);
+    created.map_err(|reason| not_writable(folder, nearest_existing(folder), reason))
 }
 
 /// Checks that files can be written to `folder`, without leaving anything there, before
@@ -106,10 +104,8 @@ pub(super) fn make_folder(folder: &Path) -> Result<(), FileError> {
 pub fn check_writable(folder: &Path) -> Result<(), FileError> {
     let existing = nearest_existing(folder);
     let probe = draft_path(&existing.join("probe"));
-    match File::create(&probe).and_then(|_| fs::remove_file(&probe)) {
-        Ok(()) => Ok(()),
-        Err(reason) => Err(not_writable(folder, existing, reason)),
-    }
+    let written = File::create(&probe).and_then(|_| fs::remove_file(&probe));
+    written.map_err(|reason| not_writable(folder, existing, reason))
 }
 
 fn not_writable(folder: &Path, existing: PathBuf, reason: io::Error) -> FileError {

@@ -63,11 +63,8 @@ fn difference(theirs: &Value, ours: &Value) -> Option<String> {
     if theirs == ours {
         return None;
     }
-    let keys = ours
-        .as_object()
-        .into_iter()
-        .flat_map(|object| object.keys());
-    let other = keys.into_iter().find(|key| theirs[*key] != ours[*key]);
+    let mut keys = ours.as_object().into_iter().flat_map(|it| it.keys());
+    let other = keys.find(|key| theirs[*key] != ours[*key]);
     Some(other.map_or("request", |key| key.as_str()).to_string())
 }
 
@@ -90,10 +87,9 @@ impl Journal {
     ) -> Result<Self, FileError> {
         write_rows(folder, name, request, known)?;
         let path = folder.join(name);
-        match OpenOptions::new().append(true).open(&path) {
-            Ok(file) => Ok(Journal { path, file }),
-            Err(reason) => Err(FileError::write(&path, reason)),
-        }
+        let file = OpenOptions::new().append(true).open(&path);
+        let file = file.map_err(|reason| FileError::write(&path, reason))?;
+        Ok(Journal { path, file })
     }
 
     /// Appends rows with a single write.

@@ -2,7 +2,7 @@
 //! during a run.
 
 mod atomic;
-mod checksum;
+mod format;
 mod journal;
 mod owner;
 mod peers;
@@ -15,38 +15,40 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 pub use atomic::{abandon_unfinished, check_writable};
+pub use format::{Format, Kind, Written};
 pub use journal::{Journal, belongs, claim, write_rows};
 pub use owner::{check_owner, source};
 pub use peers::read_peers;
 pub use recording::{Checkpointer, Recording};
 
-use crate::figure::view::{self, Page, Series, glb, vtk};
-use crate::figure::{self, Film, Picture};
+use crate::figure;
+use crate::figure::view::{self, Shape, glb, vtk};
 use crate::relax::Equilibrium;
-use crate::report::table::Table;
-use crate::report::{self, Format, json};
-pub use crate::report::{Document, FileError, Kind, Written};
+use crate::report::{self, json};
+pub use crate::report::{Document, FileError};
+use crate::scenario::Radii;
 use crate::simulate::Record;
 use crate::study::{All, Boundary, Chart, Check, Fit, Map, Scaling, Trace};
 
 impl Written for Equilibrium {
     const JSON: Option<&'static str> = Some("summary.json");
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Table("centerlines.csv", report::centerlines),
-        &Picture::svg("figure.svg", figure::leaf),
-        &Picture::png("figure.png", figure::leaf),
-        &Page("view.html"),
-        &vtk::Lines("leaf.vtp"),
-        &Table("leaf.glb", glb::leaf),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Table("centerlines.csv", report::centerlines),
+        Format::Figure(["figure.svg", "figure.png"], figure::leaf),
+        Format::Space("view.html", view::write),
+        Format::Space("leaf.vtp", |it, input, out| {
+            vtk::leaf(it, &input.radii, out)
+        }),
+        Format::Table("leaf.glb", glb::leaf),
     ];
 
-    const MORE: &'static [&'static dyn Format<Self>] = &[
-        &Table("modes.csv", report::modes_table),
-        &Picture::svg("modes.svg", figure::modes),
-        &Picture::png("modes.png", figure::modes),
-        &Table("sensitivity.csv", report::sensitivity_table),
-        &Picture::svg("sensitivity.svg", |it, _| figure::sensitivity(it)),
-        &Picture::png("sensitivity.png", |it, _| figure::sensitivity(it)),
+    const MORE: &'static [Format<Self>] = &[
+        Format::Table("modes.csv", report::modes_table),
+        Format::Figure(["modes.svg", "modes.png"], figure::modes),
+        Format::Table("sensitivity.csv", report::sensitivity_table),
+        Format::Figure(["sensitivity.svg", "sensitivity.png"], |it, _| {
+            figure::sensitivity(it)
+        }),
     ];
 
     fn has_more(&self, file: &str) -> bool {
@@ -60,92 +62,83 @@ impl Written for Equilibrium {
 
 impl Written for Check {
     const JSON: Option<&'static str> = Some("check.json");
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Picture::svg("check.svg", figure::check),
-        &Picture::png("check.png", figure::check),
-    ];
+    const FORMATS: &'static [Format<Self>] =
+        &[Format::Figure(["check.svg", "check.png"], figure::check)];
 }
 
 impl Written for Fit {
     const JSON: Option<&'static str> = Some("fit.json");
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Table("fitted.toml", report::fitted),
-        &Table("fit.csv", report::fit_table),
-        &Picture::svg("fit.svg", |it, _| figure::fit(it)),
-        &Picture::png("fit.png", |it, _| figure::fit(it)),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Table("fitted.toml", report::fitted),
+        Format::Table("fit.csv", report::fit_table),
+        Format::Figure(["fit.svg", "fit.png"], |it, _| figure::fit(it)),
     ];
 }
 
 impl Written for Map {
     const JSON: Option<&'static str> = Some("map.json");
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Table("map.csv", report::map_table),
-        &Picture::svg("map.svg", |it, _| figure::map(it)),
-        &Picture::png("map.png", |it, _| figure::map(it)),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Table("map.csv", report::map_table),
+        Format::Figure(["map.svg", "map.png"], |it, _| figure::map(it)),
     ];
 }
 
 impl Written for All {
     const JSON: Option<&'static str> = Some("equilibria.json");
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Picture::svg("equilibria.svg", figure::all),
-        &Picture::png("equilibria.png", figure::all),
-        &Page("equilibria.html"),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Figure(["equilibria.svg", "equilibria.png"], figure::all),
+        Format::Space("equilibria.html", view::write),
     ];
 }
 
 impl Written for Trace {
     const JSON: Option<&'static str> = Some("trace.json");
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Table("trace.csv", report::trace_table),
-        &Picture::svg("trace.svg", figure::trace),
-        &Picture::png("trace.png", figure::trace),
-        &Page("trace.html"),
-        &Series("trace.pvd", view::points),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Table("trace.csv", report::trace_table),
+        Format::Figure(["trace.svg", "trace.png"], figure::trace),
+        Format::Space("trace.html", view::write),
+        Format::Shapes("trace.pvd", view::points),
     ];
 }
 
 impl Written for Boundary {
     const JSON: Option<&'static str> = Some("boundary.json");
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Table("boundary.csv", report::boundary_table),
-        &Picture::svg("boundary.svg", figure::boundary),
-        &Picture::png("boundary.png", figure::boundary),
-        &Page("boundary.html"),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Table("boundary.csv", report::boundary_table),
+        Format::Figure(["boundary.svg", "boundary.png"], figure::boundary),
+        Format::Space("boundary.html", view::write),
     ];
 }
 
 impl Written for Record {
     const JSON: Option<&'static str> = Some("motion.json");
     const GROWING: &'static [Kind] = &[Kind::Csv];
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Picture::svg("energy.svg", figure::energy),
-        &Picture::png("energy.png", figure::energy),
-        &Picture::svg("filmstrip.svg", figure::filmstrip),
-        &Picture::png("filmstrip.png", figure::filmstrip),
-        &Page("motion.html"),
-        &Series("motion.pvd", view::instants),
-        &Table("motion.glb", glb::motion),
-        &Film("motion.gif"),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Figure(["energy.svg", "energy.png"], figure::energy),
+        Format::Figure(["filmstrip.svg", "filmstrip.png"], figure::filmstrip),
+        Format::Space("motion.html", view::write),
+        Format::Shapes("motion.pvd", view::instants),
+        Format::Table("motion.glb", glb::motion),
+        Format::Space("motion.gif", figure::film),
     ];
 }
 
 impl Written for Chart {
     const JSON: Option<&'static str> = Some("chart.json");
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Table("chart.csv", report::chart_table),
-        &Picture::svg("chart.svg", |it, _| figure::chart(it)),
-        &Picture::png("chart.png", |it, _| figure::chart(it)),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Table("chart.csv", report::chart_table),
+        Format::Figure(["chart.svg", "chart.png"], |it, _| figure::chart(it)),
     ];
 }
 
 /// The JSON of the chart includes its numbers.
 impl Written for Scaling {
     const JSON: Option<&'static str> = None;
-    const FORMATS: &'static [&'static dyn Format<Self>] = &[
-        &Table("chart_rods.csv", report::scaling_table),
-        &Picture::svg("chart_rods.svg", |it, _| figure::scaling(it)),
-        &Picture::png("chart_rods.png", |it, _| figure::scaling(it)),
+    const FORMATS: &'static [Format<Self>] = &[
+        Format::Table("chart_rods.csv", report::scaling_table),
+        Format::Figure(["chart_rods.svg", "chart_rods.png"], |it, _| {
+            figure::scaling(it)
+        }),
     ];
 }
 
@@ -170,8 +163,8 @@ impl Default for Selection {
 
 /// Names of the files of a result, of every kind.
 pub fn names<R: Written>(result: &R) -> Vec<&'static str> {
-    let formats = result.formats(&Kind::ALL).into_iter();
-    let others = formats.map(|format| format.file_name());
+    let files = result.files(&Kind::ALL).into_iter();
+    let others = files.map(|(name, _)| name);
     R::JSON.into_iter().chain(others).collect()
 }
 
@@ -192,9 +185,9 @@ pub fn contents<R: Written>(document: &Document<R>, name: &str) -> Option<Vec<u8
         json::write(document, &mut bytes).ok()?;
         return Some(bytes);
     }
-    let mut formats = document.result.formats(&Kind::ALL).into_iter();
-    let format = formats.find(|format| format.file_name() == name)?;
-    format.write(document, &mut bytes).ok()?;
+    let mut files = document.result.files(&Kind::ALL).into_iter();
+    let (_, format) = files.find(|(file, _)| *file == name)?;
+    format.write(name, document, &mut bytes).ok()?;
     Some(bytes)
 }
 
@@ -213,37 +206,50 @@ pub fn write_all<R: Written>(
     }
     atomic::make_folder(folder)?;
     let result = document.result;
-    let formats = result.formats(kinds);
+    let files = result.files(kinds);
     let (json, others) = rayon::join(
         || {
             let name = R::JSON.filter(|_| kinds.contains(&Kind::Json))?;
             Some(write_named(folder, name, |out| json::write(document, out)))
         },
         || -> Vec<_> {
-            let formats = formats.par_iter();
-            formats
-                .map(|format| {
-                    let parts = format.parts(document);
-                    if let Some((part, _)) = parts.first() {
-                        let part = folder.join(part);
-                        atomic::make_folder(part.parent().unwrap_or(folder))?;
+            let files = files.par_iter();
+            files
+                .map(|(name, format)| {
+                    if let Format::Shapes(list, shapes) = format {
+                        write_shapes(folder, list, &shapes(result), &document.input.radii)?;
                     }
-                    for (part, fill) in &parts {
-                        write_named(folder, part, fill)?;
-                    }
-                    let name = format.file_name();
-                    write_named(folder, name, |out| format.write(document, out))
+                    write_named(folder, name, |out| format.write(name, document, out))
                 })
                 .collect()
         },
     );
-    for name in R::MORE.iter().map(|format| format.file_name()) {
+    for name in R::MORE.iter().flat_map(Format::names) {
         if !result.has_more(name) {
             // Left by another result; usually there is none.
             let _ = fs::remove_file(folder.join(name));
         }
     }
     json.into_iter().chain(others).collect()
+}
+
+/// Writes the shapes of a list, which is written after them.
+fn write_shapes(
+    folder: &Path,
+    list: &str,
+    shapes: &[Shape],
+    radii: &Radii,
+) -> Result<(), FileError> {
+    for (number, Shape(_, stations, curves)) in shapes.iter().enumerate() {
+        let part = vtk::part(list, number);
+        if number == 0 {
+            atomic::make_folder(folder.join(&part).parent().unwrap_or(folder))?;
+        }
+        write_named(folder, &part, |out| {
+            vtk::curves(curves, stations, radii, out)
+        })?;
+    }
+    Ok(())
 }
 
 /// Writes a complete table into `folder`, which is created if missing.
@@ -262,8 +268,7 @@ fn write_named(
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<PathBuf, FileError> {
     let file = folder.join(name);
-    match atomic::write_file(&file, fill) {
-        Ok(()) => Ok(file),
-        Err(reason) => Err(FileError::write(&file, reason)),
-    }
+    let written = atomic::write_file(&file, fill);
+    written.map_err(|reason| FileError::write(&file, reason))?;
+    Ok(file)
 }

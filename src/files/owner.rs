@@ -5,8 +5,9 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Component, Path, PathBuf, absolute};
 
+use super::Written;
 use crate::relax::Equilibrium;
-use crate::report::{FileError, Written};
+use crate::report::FileError;
 use crate::simulate::Record;
 use crate::study::{All, Boundary, Chart, Check, Fit, Map, Trace};
 
@@ -62,13 +63,9 @@ pub fn check_owner(folder: &Path, source: &str) -> Result<(), FileError> {
         };
         let other = folder.join(other);
         let other = without_dots(absolute(&other).unwrap_or(other));
-        return Err(FileError::unfit(
-            &file,
-            &format!(
-                "is of another scenario, in {}: name a folder with --out DIR, or give this scenario another name",
-                other.display()
-            ),
-        ));
+        let change = "name a folder with --out DIR, or give this scenario another name";
+        let why = format!("is of another scenario, in {}: {change}", other.display());
+        return Err(FileError::unfit(&file, &why));
     }
     Ok(())
 }

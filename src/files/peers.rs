@@ -47,10 +47,8 @@ pub fn read_peers(file: &Path) -> Result<Vec<PeerRow>, FileError> {
 /// Parses the rows; an error has the line and the problem.
 fn parse(bytes: &[u8]) -> Result<Vec<PeerRow>, (u64, String)> {
     let mut table = csv::ReaderBuilder::new().flexible(true).from_reader(bytes);
-    let header = match table.headers() {
-        Ok(header) => header.clone(),
-        Err(error) => return Err((1, message(&error))),
-    };
+    let header = table.headers().map_err(|error| (1, message(&error)))?;
+    let header = header.clone();
     let mut columns = [0; COLUMNS.len()];
     for (column, name) in columns.iter_mut().zip(COLUMNS) {
         let mut places = (0..header.len()).filter(|&i| header[i].trim() == name);
@@ -58,10 +56,8 @@ fn parse(bytes: &[u8]) -> Result<Vec<PeerRow>, (u64, String)> {
             (Some(place), None) => place,
             _ => {
                 let wanted = COLUMNS.join(", ");
-                return Err((
-                    1,
-                    format!("the first line must name the columns {wanted}, each once"),
-                ));
+                let what = format!("the first line must name the columns {wanted}, each once");
+                return Err((1, what));
             }
         };
     }
@@ -75,10 +71,8 @@ fn parse(bytes: &[u8]) -> Result<Vec<PeerRow>, (u64, String)> {
         let line = record.position().map_or(0, csv::Position::line);
         if record.len() != header.len() {
             let (found, wanted) = (record.len(), header.len());
-            return Err((
-                line,
-                format!("{found} cells, not {wanted} as in the first line"),
-            ));
+            let what = format!("{found} cells, not {wanted} as in the first line");
+            return Err((line, what));
         }
         let cell = columns.map(|column| record[column].trim());
         if rows.len() == MOST_ROWS {
@@ -118,10 +112,8 @@ fn row(
         cell => Ok(cell.to_string()),
     };
     let number = |name: &str, cell: &str, allowed: &str, good: fn(f64) -> bool| {
-        let value = cell
-            .parse()
-            .ok()
-            .filter(|&value: &f64| value.is_finite() && good(value));
+        let value = cell.parse().ok();
+        let value = value.filter(|&value: &f64| value.is_finite() && good(value));
         value.ok_or_else(|| format!("{name} = {cell:?}: must be {allowed}"))
     };
     Ok(PeerRow {
@@ -136,17 +128,13 @@ fn row(
             }
         },
         knob: knob.into(),
-        seconds: number("seconds", seconds, "a number greater than 0", |value| {
-            value > 0.0
-        })?,
+        seconds: number("seconds", seconds, "a number greater than 0", |it| it > 0.0)?,
         error: match error {
             "" => None,
-            error => Some(number(
-                "error",
-                error,
-                "empty, or a number not below 0",
-                |value| value >= 0.0,
-            )?),
+            cell => {
+                let allowed = "empty, or a number not below 0";
+                Some(number("error", cell, allowed, |it| it >= 0.0)?)
+            }
         },
         outcome: named("outcome", outcome)?,
     })
@@ -196,26 +184,17 @@ mod tests {
         let long = HEADER.to_string() + &row("p") + &row(&"x".repeat(1_000_000));
         refused(long.as_bytes(), 3, "program: more than 200 characters");
         let many: String = (0..60_000).map(|i| row(&format!("p{i}"))).collect();
-        refused(
-            (HEADER.to_string() + &many).as_bytes(),
-            102,
-            "more than 100 programs",
-        );
         let settings: String = (0..101).map(|i| format!("p,s,5,k s{i},1,,c\n")).collect();
-        refused(
-            (HEADER.to_string() + &settings).as_bytes(),
-            102,
-            "more than 100 programs",
-        );
+        for rows in [many, settings] {
+            let text = HEADER.to_string() + &rows;
+            refused(text.as_bytes(), 102, "more than 100 programs");
+        }
         let rows = HEADER.to_string() + &row("p").repeat(10_001);
         refused(rows.as_bytes(), 10_002, "more than 10000 rows");
         refused(b"", 1, "must name the columns program,");
         refused(b"program,scenario\n", 1, "must name the columns");
         refused(format!("program,{HEADER}").as_bytes(), 1, "each once");
-        refused(
-            &[HEADER.as_bytes(), b"p,\xff,5,k,0.1,,c\n"].concat(),
-            2,
-            "UTF-8",
-        );
+        let invalid = [HEADER.as_bytes(), b"p,\xff,5,k,0.1,,c\n"].concat();
+        refused(&invalid, 2, "UTF-8");
     }
 }

@@ -5,6 +5,7 @@ use crate::study::{All, Found};
 
 use super::numbers::{seconds, veins};
 use super::table::{Lines, lay_out};
+use super::words::stable_or_index;
 
 /// The equilibria, lowest energy first.
 pub fn report(all: &All, files: Option<String>) -> String {
@@ -28,30 +29,22 @@ pub fn lines(all: &All, files: Option<String>) -> Lines {
         0 => String::new(),
         failed => format!(", {failed} of them without coming to rest"),
     };
-    lines.push((
-        "work",
-        format!(
-            "{stable} stable and {others} other equilibria from {} starts{failed}, in {}",
-            all.starts,
-            seconds(all.wall_seconds)
-        ),
-    ));
+    let (starts, time) = (all.starts, seconds(all.wall_seconds));
+    let work = format!(
+        "{stable} stable and {others} other equilibria from {starts} starts{failed}, in {time}"
+    );
+    lines.push(("work", work));
     lines.extend(files.map(|files| ("written", files)));
     lines.extend(all.remark.clone().map(|remark| ("remark", remark)));
-    lines.push((
-        "remark",
-        "there may be more: no number of starts proves that these are all".into(),
-    ));
+    let more = "there may be more: no number of starts proves that these are all";
+    lines.push(("remark", more.into()));
     lines
 }
 
 fn line(number: usize, found: &Found) -> String {
     let leaf = &found.equilibrium;
-    let stability = match leaf.stability.negative_eigenvalues {
-        Some(0) => "stable".into(),
-        Some(index) => format!("index {index}"),
-        None => "of unknown stability".into(),
-    };
+    let index = leaf.stability.negative_eigenvalues;
+    let stability = index.map_or("of unknown stability".into(), stable_or_index);
     let tip = match &leaf.tips[..] {
         [tip] => format!(", tip ({:.6}, {:.6}, {:.6})", tip.x, tip.y, tip.z),
         _ => String::new(),
@@ -69,9 +62,6 @@ fn line(number: usize, found: &Found) -> String {
         1 => "1 start".into(),
         starts => format!("{starts} starts"),
     };
-    format!(
-        "{:>2}. energy {:.10}: {stability}{tip}{within} ({starts}{plain})",
-        number + 1,
-        leaf.energy.unwrap_or(f64::NAN)
-    )
+    let (number, energy) = (number + 1, leaf.energy.unwrap_or(f64::NAN));
+    format!("{number:>2}. energy {energy:.10}: {stability}{tip}{within} ({starts}{plain})")
 }

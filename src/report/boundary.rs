@@ -27,13 +27,9 @@ pub fn lines(boundary: &Boundary, files: Option<String>) -> Lines {
     let curves = boundary.curves.iter().enumerate();
     let curves = curves.flat_map(|(number, curve)| curve_lines(boundary, number, curve));
     lines.extend(labelled("curve", curves.collect()));
-    let points = || boundary.curves.iter().flat_map(|curve| &curve.points);
-    lines.extend(
-        points()
-            .map(|point| point.error)
-            .reduce(f64::max)
-            .map(|worst| ("error", format!("tips within {}", power_of_ten(worst)))),
-    );
+    let points = boundary.curves.iter().flat_map(|curve| &curve.points);
+    let worst = points.map(|point| point.error).reduce(f64::max);
+    lines.extend(worst.map(|worst| ("error", format!("tips within {}", power_of_ten(worst)))));
     lines.extend((boundary.map.iter()).flat_map(|map| labelled("map", map_lines(map))));
     lines.push(("work", format!("{} in all", seconds(boundary.wall_seconds))));
     lines.extend(files.map(|files| ("written", files)));
@@ -64,14 +60,12 @@ const MOST_NAMED: usize = 5;
 /// Whether the map agrees with the curves.
 fn map_lines(map: &BoundaryMap) -> Vec<String> {
     let (columns, rows) = (map.first.len(), map.second.len());
-    let mut lines = vec![format!(
-        "{columns} x {rows} cells, {} with an equilibrium of the branch, {}",
-        map.known(),
-        match map.disagreeing.len() {
-            0 => "all as the curves say".into(),
-            count => format!("{count} not as the curves say: others may begin elsewhere"),
-        }
-    )];
+    let verdict = match map.disagreeing.len() {
+        0 => "all as the curves say".into(),
+        count => format!("{count} not as the curves say: others may begin elsewhere"),
+    };
+    let known = format!("{} with an equilibrium of the branch", map.known());
+    let mut lines = vec![format!("{columns} x {rows} cells, {known}, {verdict}")];
     let named = map.disagreeing.iter().take(MOST_NAMED);
     lines.extend(named.map(|[column, row]| {
         let (first, second) = (map.first[column - 1], map.second[row - 1]);
@@ -123,10 +117,8 @@ pub fn boundary_table(boundary: &Boundary, out: &mut dyn Write) -> io::Result<()
     for (number, curve) in boundary.curves.iter().enumerate() {
         for point in &curve.points {
             // The joint tip, or the first rod's; adding zero turns -0 into 0.
-            let tip = point
-                .tips
-                .first()
-                .map_or([f64::NAN; 3], |tip| tip.to_array());
+            let tip = point.tips.first();
+            let tip = tip.map_or([f64::NAN; 3], |tip| tip.to_array());
             table.serialize((
                 (number + 1, point.point, point.kind),
                 point.values,

@@ -19,12 +19,8 @@ pub fn report(chart: &Chart, files: Vec<String>) -> String {
     if let Some(scaling) = &chart.scaling {
         lines.extend(labelled("veins", veins(scaling)));
     }
-    lines.extend(
-        chart
-            .remarks
-            .iter()
-            .map(|remark| ("remark", remark.clone())),
-    );
+    let remarks = chart.remarks.iter();
+    lines.extend(remarks.map(|remark| ("remark", remark.clone())));
     lines.extend(labelled("written", files));
     let veins = veins_of(chart.rods, chart.joined);
     let heading = format!("{}: {veins}, speed against accuracy", chart.scenario);
@@ -55,30 +51,24 @@ fn reference(reference: Option<&Reference>) -> Vec<String> {
 fn measured(chart: &Chart) -> String {
     let spreads = || chart.rows.iter().filter_map(|row| row.seconds);
     let runs: usize = spreads().map(|spread| spread.runs).sum();
+    let (settings, rounds) = (spreads().count(), chart.rounds);
     format!(
-        "{runs} runs of {} settings in turns, {} rounds, one thread; times are medians",
-        spreads().count(),
-        chart.rounds
+        "{runs} runs of {settings} settings in turns, {rounds} rounds, one thread; times are medians"
     )
 }
 
 /// A line of a table: time, error, method and setting.
 fn entry((time, error): (f64, f64), method: &str, knob: &str) -> String {
-    format!(
-        "{:>10}  {:<9} {method}, {knob}",
-        seconds(time),
-        power_of_ten(error)
-    )
+    let (time, error) = (seconds(time), power_of_ten(error));
+    format!("{time:>10}  {error:<9} {method}, {knob}")
 }
 
 fn front(chart: &Chart) -> Vec<String> {
     let rows = chart.rows.iter().filter(|row| row.pareto == Some(true));
     let rows = rows.filter_map(|row| {
         let point = row.point()?;
-        Some((
-            point,
-            entry(point, contender(row.contender), &row.knob.to_string()),
-        ))
+        let line = entry(point, contender(row.contender), &row.knob.to_string());
+        Some((point, line))
     });
     let peers = chart.peers.iter().filter(|peer| peer.pareto);
     let peers = peers.filter_map(|peer| {
@@ -99,12 +89,10 @@ fn fastest(chart: &Chart) -> Vec<String> {
             }
             _ => "the default does not get there".to_string(),
         };
+        let (time, error) = (seconds(decade.seconds?), format!("{:e}", decade.error));
+        let (who, knob) = (contender(decade.contender?), decade.knob?);
         Some(format!(
-            "{:>10}  to {:<7} {}, {}; {default}",
-            seconds(decade.seconds?),
-            format!("{:e}", decade.error),
-            contender(decade.contender?),
-            decade.knob?
+            "{time:>10}  to {error:<7} {who}, {knob}; {default}"
         ))
     };
     chart.decades.iter().filter_map(line).collect()
@@ -114,25 +102,17 @@ fn fastest(chart: &Chart) -> Vec<String> {
 fn failed(chart: &Chart) -> Vec<String> {
     let mut kinds: Vec<(&Row, Vec<String>)> = Vec::new();
     for row in chart.rows.iter().filter(|row| !row.ending.is_success()) {
-        let same = kinds
-            .iter_mut()
-            .find(|(other, _)| other.contender == row.contender && other.ending == row.ending);
-        match same {
+        let same = |other: &Row| other.contender == row.contender && other.ending == row.ending;
+        match kinds.iter_mut().find(|(other, _)| same(other)) {
             Some((_, knobs)) => knobs.push(row.knob.to_string()),
             None => kinds.push((row, vec![row.knob.to_string()])),
         }
     }
     let line = |(row, knobs): (&Row, Vec<String>)| {
-        let why = row
-            .remark
-            .as_ref()
-            .map_or(String::new(), |why| format!(": {why}"));
-        format!(
-            "{}, {}, {}{why}",
-            contender(row.contender),
-            listed(&knobs),
-            row.ending.word()
-        )
+        let why = row.remark.as_ref();
+        let why = why.map_or(String::new(), |why| format!(": {why}"));
+        let (who, knobs, end) = (contender(row.contender), listed(&knobs), row.ending.word());
+        format!("{who}, {knobs}, {end}{why}")
     };
     kinds.into_iter().map(line).collect()
 }
@@ -162,9 +142,8 @@ fn peers(chart: &Chart) -> Vec<String> {
     let mut lines = Vec::new();
     for name in names {
         let rows = || chart.peers.iter().filter(|peer| peer.name == name);
-        let mut measured: Vec<(&Peer, f64)> = rows()
-            .filter_map(|peer| Some((peer, peer.true_error?)))
-            .collect();
+        let measured = rows().filter_map(|peer| Some((peer, peer.true_error?)));
+        let mut measured: Vec<(&Peer, f64)> = measured.collect();
         measured.sort_by(|a, b| b.1.total_cmp(&a.1));
         for (peer, error) in measured {
             let ratio = match peer.ratio {
@@ -176,10 +155,8 @@ fn peers(chart: &Chart) -> Vec<String> {
         }
         for peer in rows().filter(|peer| peer.true_error.is_none()) {
             let time = seconds(peer.seconds.median);
-            lines.push(format!(
-                "{time:>10}  {name}, {}, {}",
-                peer.knob, peer.outcome
-            ));
+            let (knob, outcome) = (&peer.knob, &peer.outcome);
+            lines.push(format!("{time:>10}  {name}, {knob}, {outcome}"));
         }
     }
     lines
@@ -198,10 +175,8 @@ fn veins(scaling: &Scaling) -> Vec<String> {
     let mut lines = vec![format!("to a tolerance of {:e}", scaling.tolerance)];
     if !scaling.unconfirmed.is_empty() {
         let rods: Vec<String> = scaling.unconfirmed.iter().map(usize::to_string).collect();
-        lines.push(format!(
-            "reference NOT CONFIRMED for N = {}",
-            rods.join(", ")
-        ));
+        let rods = rods.join(", ");
+        lines.push(format!("reference NOT CONFIRMED for N = {rods}"));
     }
     let mut last = None;
     for found in &scaling.rows {

@@ -33,11 +33,8 @@ pub fn report(check: &Check, files: Option<String>) -> String {
 }
 
 fn judgement(check: &Check) -> String {
-    let allowed = format!(
-        "positions within {}, rotations within {} rad",
-        power_of_ten(check.allowed()),
-        power_of_ten(check.allowed_rotation())
-    );
+    let [position, rotation] = [check.allowed(), check.allowed_rotation()].map(power_of_ten);
+    let allowed = format!("positions within {position}, rotations within {rotation} rad");
     let headline = headline(&check.verdict);
     match &check.verdict {
         Verdict::Agree => format!("{headline}: {allowed}"),
@@ -128,24 +125,11 @@ fn errors(check: &Check) -> Vec<String> {
 
 /// Growth of perturbations, defect and conditioning of the shooting.
 fn shooting_details(solution: &Solution) -> Lines {
-    let mut lines = vec![
-        (
-            "growth",
-            format!(
-                "perturbations grow 10^{:.1} times from base to tip: {}",
-                solution.growth,
-                shooting(solution.intervals.len() - 1)
-            ),
-        ),
-        (
-            "defect",
-            format!(
-                "{}, ratio of singular values {:.1e}",
-                power_of_ten(solution.defect),
-                solution.condition
-            ),
-        ),
-    ];
+    let (growth, method) = (solution.growth, shooting(solution.intervals.len() - 1));
+    let growth = format!("perturbations grow 10^{growth:.1} times from base to tip: {method}");
+    let (defect, ratio) = (power_of_ten(solution.defect), solution.condition);
+    let defect = format!("{defect}, ratio of singular values {ratio:.1e}");
+    let mut lines = vec![("growth", growth), ("defect", defect)];
     lines.extend((solution.neutral.iter()).map(|neutral| ("neutral", neutral.to_string())));
     lines
 }

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use crate::study::{Fit, FitOutcome, FitParameter};
 
 use super::numbers::{brief, seconds};
-use super::table::{Lines, labelled, lay_out, write_csv};
+use super::table::{Lines, labelled, lay_out};
 
 /// Most candidates that are listed.
 const CANDIDATES: usize = 5;
@@ -18,52 +18,34 @@ pub fn report(fit: &Fit, files: Option<String>) -> String {
         FitOutcome::NotConverged => "no minimum",
     };
     let mut lines: Lines = vec![("found", found.into())];
-    lines.extend(labelled(
-        "numbers",
-        fit.parameters.iter().map(number).collect(),
-    ));
+    let numbers = fit.parameters.iter().map(number);
+    lines.extend(labelled("numbers", numbers.collect()));
     lines.extend(labelled("data say", fit.says.clone()));
     let (count, freedom) = (fit.residuals.len(), fit.degrees_of_freedom);
-    lines.push((
-        "misfit",
-        match fit.standard_deviation {
-            Some(sd) => format!(
-                "standard deviation {} over {count} data, {freedom} degrees of freedom",
-                brief(sd)
-            ),
-            None => format!(
-                "chi squared {} over {count} data, {freedom} degrees of freedom",
-                brief(fit.chi_squared)
-            ),
-        },
-    ));
+    let misfit = match fit.standard_deviation {
+        Some(sd) => format!("standard deviation {}", brief(sd)),
+        None => format!("chi squared {}", brief(fit.chi_squared)),
+    };
+    let misfit = format!("{misfit} over {count} data, {freedom} degrees of freedom");
+    lines.push(("misfit", misfit));
     let candidates = fit.candidates.iter().take(CANDIDATES).map(|candidate| {
+        let (bits, part) = (candidate.bits, candidate.shrinks);
         let text = match &candidate.remark {
             Some(remark) => remark.clone(),
-            None => format!(
-                "{:.1} bits; what is least known shrinks to {:.2} of it",
-                candidate.bits, candidate.shrinks
-            ),
+            None => format!("{bits:.1} bits; what is least known shrinks to {part:.2} of it"),
         };
         format!("{}: {text}", candidate.experiment)
     });
     lines.extend(labelled("measure", candidates.collect()));
     let time = seconds(fit.wall_seconds);
     let evaluations = fit.work.evaluations;
-    lines.push((
-        "work",
-        format!("all leaves brought to rest {evaluations} times in {time}"),
-    ));
+    let work = format!("all leaves brought to rest {evaluations} times in {time}");
+    lines.push(("work", work));
     lines.extend(files.map(|files| ("written", files)));
     lines.extend(labelled("remark", fit.remarks.clone()));
-    lay_out(
-        &format!(
-            "{}: fit of {} numbers to {count} data",
-            fit.scenario,
-            fit.parameters.len()
-        ),
-        &lines,
-    )
+    let (name, numbers) = (&fit.scenario, fit.parameters.len());
+    let heading = format!("{name}: fit of {numbers} numbers to {count} data");
+    lay_out(&heading, &lines)
 }
 
 fn number(parameter: &FitParameter) -> String {
@@ -78,7 +60,11 @@ fn number(parameter: &FitParameter) -> String {
 
 /// `fit.csv`: one row per datum.
 pub fn table(fit: &Fit, out: &mut dyn Write) -> io::Result<()> {
-    write_csv(&fit.residuals, out)
+    let mut table = csv::Writer::from_writer(out);
+    for residual in &fit.residuals {
+        table.serialize(residual)?;
+    }
+    table.flush()
 }
 
 /// `fitted.toml`: the scenario with the fitted values.

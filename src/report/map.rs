@@ -6,7 +6,7 @@ use crate::study::{Map, MapOutcome};
 
 use super::numbers::{brief, seconds};
 use super::table::{labelled, lay_out};
-use super::words;
+use super::words::map_shows;
 
 /// Most jumps that are listed.
 const JUMPS: usize = 5;
@@ -36,30 +36,16 @@ pub fn report(map: &Map, work: Work, files: Option<String>) -> String {
     }
     let (known, confirmed) = map.known_and_confirmed();
     let cells = request.cells();
-    lines.push((
-        "cells",
-        format!("{known} of {cells}, reference confirmed in {confirmed}"),
-    ));
-    lines.push((
-        "rows",
-        format!(
-            "{} were there, {} computed in {}",
-            work.known,
-            work.computed,
-            seconds(work.seconds)
-        ),
-    ));
+    let cells = format!("{known} of {cells}, reference confirmed in {confirmed}");
+    lines.push(("cells", cells));
+    let (known, computed, time) = (work.known, work.computed, seconds(work.seconds));
+    let rows = format!("{known} were there, {computed} computed in {time}");
+    lines.push(("rows", rows));
     lines.extend(labelled("found", counts(map)));
     lines.extend(labelled("jumps", jumps(map)));
     lines.extend(files.map(|files| ("written", files)));
-    lay_out(
-        &format!(
-            "{}: {}",
-            request.base.scenario().name,
-            words::map_shows(map.show)
-        ),
-        &lines,
-    )
+    let (name, what) = (&request.base.scenario().name, map_shows(map.show));
+    lay_out(&format!("{name}: {what}"), &lines)
 }
 
 /// The first few pairs of cells between which the leaf jumps to another equilibrium.

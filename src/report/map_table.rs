@@ -76,9 +76,10 @@ pub fn read_rows(file: &Path, request: &MapRequest) -> Result<Vec<MapRow>, FileE
     let mut rows = Vec::new();
     for (count, record) in table.records().enumerate() {
         let refuse = |line: u64, why: String| {
+            let change = "give the same --vary as when it was made, or another --out DIR";
+            let file = file.display();
             FileError(format!(
-                "{}:{line}: is no row of this map: {why}; give the same --vary as when it was made, or another --out DIR",
-                file.display()
+                "{file}:{line}: is no row of this map: {why}; {change}"
             ))
         };
         let record = record.map_err(|error| refuse(count as u64 + 1, error.to_string()))?;
@@ -87,13 +88,8 @@ pub fn read_rows(file: &Path, request: &MapRequest) -> Result<Vec<MapRow>, FileE
             continue;
         }
         if count == 0 {
-            return Err(refuse(
-                line,
-                format!(
-                    "the columns are not {}",
-                    header.iter().collect::<Vec<_>>().join(", ")
-                ),
-            ));
+            let wanted = header.iter().collect::<Vec<_>>().join(", ");
+            return Err(refuse(line, format!("the columns are not {wanted}")));
         }
         let row = row(&record, &header, request, &cells);
         rows.push(row.map_err(|why| refuse(line, why))?);
@@ -115,11 +111,11 @@ fn row(
     let Some(&cell) = cells.get(&place) else {
         return Err(format!("it has no cell {}", place.join(", ")));
     };
-    let row: MapRow = record
-        .deserialize(Some(header))
-        .map_err(|error| match error.kind() {
+    match record.deserialize::<MapRow>(Some(header)) {
+        Ok(row) => Ok(MapRow { cell, ..row }),
+        Err(error) => Err(match error.kind() {
             csv::ErrorKind::Deserialize { err, .. } => err.to_string(),
             _ => error.to_string(),
-        })?;
-    Ok(MapRow { cell, ..row })
+        }),
+    }
 }

@@ -27,10 +27,10 @@ pub fn lines(margin: &Margin) -> Vec<String> {
     }));
     match &margin.barrier {
         Some(found) => lines.push(barrier(margin, found)),
-        None if margin.climbs > 0 => lines.push(format!(
-            "no pass to another equilibrium found from {} places",
-            margin.climbs
-        )),
+        None if margin.climbs > 0 => {
+            let what = "no pass to another equilibrium found";
+            lines.push(format!("{what} from {} places", margin.climbs));
+        }
         None => {}
     }
     lines.extend(margin.remark.clone());
@@ -46,17 +46,14 @@ fn destabilizing_push(margin: &Margin, push: &Push) -> String {
     };
     let rest = (push.neighbour.as_ref()).map(|it| format!(" to rest with tip {}", tip(it.tip)));
     let error = push.error.map(|error| format!(", within {}", bound(error)));
-    let weights = push
-        .per_weight
-        .map(|part| format!(" ({} weights)", brief(part)));
+    let weights = (push.per_weight).map(|part| format!(" ({} weights)", brief(part)));
+    let place = match margin.every_tip {
+        true => "at every tip",
+        false => "at the tip",
+    };
     format!(
-        "a push of {at} {} {} {then}{}{}{}",
+        "a push of {at} {} {place} {then}{}{}{}",
         directions(margin, push),
-        if margin.every_tip {
-            "at every tip"
-        } else {
-            "at the tip"
-        },
         rest.unwrap_or_default(),
         error.unwrap_or_default(),
         weights.unwrap_or_default(),
@@ -65,32 +62,22 @@ fn destabilizing_push(margin: &Margin, push: &Push) -> String {
 
 /// Directions in which the leaf stays stable up to the largest push.
 fn stable_directions(margin: &Margin) -> Option<String> {
-    let none = margin
-        .pushes
-        .iter()
-        .filter(|push| push.kind == Loss::NoneUpTo);
+    let none = margin.pushes.iter();
+    let none = none.filter(|push| push.kind == Loss::NoneUpTo);
     let none: Vec<String> = none.map(|push| push.direction.to_string()).collect();
     let largest = force(margin, margin.largest_push?);
     (!none.is_empty()).then(|| format!("more than {largest} is needed along {}", none.join(", ")))
 }
 
 fn barrier(margin: &Margin, barrier: &Barrier) -> String {
-    let energy = brief(barrier.energy);
-    let unit = margin.units.energy().map(|unit| format!(" {unit}"));
-    let error = barrier
-        .error
-        .map(|error| format!(" within {}", bound(error)));
+    let energy = with_unit(barrier.energy, margin.units.energy().as_deref());
+    let error = (barrier.error).map(|error| format!(" within {}", bound(error)));
     let lifted = barrier.height.map(|height| {
-        let unit = margin.units.length.as_ref().map(|unit| format!(" {unit}"));
-        format!(
-            ", as the leaf lifted by {}{}",
-            brief(height),
-            unit.unwrap_or_default()
-        )
+        let height = with_unit(height, margin.units.length.as_deref());
+        format!(", as the leaf lifted by {height}")
     });
     format!(
-        "barrier of {energy}{}{}{}, over a saddle with tip {} to rest with tip {}",
-        unit.unwrap_or_default(),
+        "barrier of {energy}{}{}, over a saddle with tip {} to rest with tip {}",
         error.unwrap_or_default(),
         lifted.unwrap_or_default(),
         tip(barrier.saddle.tip),
@@ -103,9 +90,13 @@ fn tip(tip: DVec3) -> String {
 }
 
 fn force(margin: &Margin, force: f64) -> String {
-    match &margin.units.force {
-        Some(unit) => format!("{} {unit}", brief(force)),
-        None => brief(force),
+    with_unit(force, margin.units.force.as_deref())
+}
+
+fn with_unit(value: f64, unit: Option<&str>) -> String {
+    match unit {
+        Some(unit) => format!("{} {unit}", brief(value)),
+        None => brief(value),
     }
 }
 

@@ -13,10 +13,19 @@ pub fn veins(equilibrium: &Equilibrium) -> String {
 
 /// The same for any leaf.
 pub fn veins_of(count: usize, joined: bool) -> String {
+    let tips = match joined {
+        _ if count == 1 => "",
+        true => " joined at the tip",
+        false => " with free tips",
+    };
+    number_of_veins(count) + tips
+}
+
+/// As in `5 veins`.
+pub fn number_of_veins(count: usize) -> String {
     match count {
-        1 => "1 vein".to_string(),
-        count if joined => format!("{count} veins joined at the tip"),
-        count => format!("{count} veins with free tips"),
+        1 => "1 vein".into(),
+        count => format!("{count} veins"),
     }
 }
 
@@ -31,12 +40,8 @@ pub fn eigenvalues(count: Option<usize>) -> String {
 
 /// The grids of a relaxation.
 pub fn grids(equilibrium: &Equilibrium) -> String {
-    let grids: Vec<String> = equilibrium
-        .accuracy
-        .segments
-        .iter()
-        .map(usize::to_string)
-        .collect();
+    let grids = equilibrium.accuracy.segments.iter();
+    let grids: Vec<String> = grids.map(usize::to_string).collect();
     format!("grids of {} segments a vein", grids.join(", "))
 }
 
@@ -59,11 +64,8 @@ pub fn seconds(time: f64) -> String {
 /// The number of decimals of a position that its error leaves, and one more.
 pub fn decimals(equilibrium: &Equilibrium) -> usize {
     let relative = 10f64.powi(-DIGITS) * equilibrium.shape.longest();
-    let error = equilibrium
-        .accuracy
-        .error_estimate
-        .unwrap_or(relative)
-        .max(1e-16);
+    let error = equilibrium.accuracy.error_estimate;
+    let error = error.unwrap_or(relative).max(1e-16);
     (1.0 - error.log10().ceil()).clamp(0.0, 15.0) as usize
 }
 

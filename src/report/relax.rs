@@ -14,12 +14,8 @@ const MOST_MODES: usize = 6;
 
 /// The method, the result, its accuracy, and the files.
 pub fn report(equilibrium: &Equilibrium, files: Option<String>) -> String {
-    let heading = format!(
-        "{}: {}, method {}",
-        equilibrium.scenario,
-        veins(equilibrium),
-        equilibrium.method
-    );
+    let (name, veins) = (&equilibrium.scenario, veins(equilibrium));
+    let heading = format!("{name}: {veins}, method {}", equilibrium.method);
     lay_out(&heading, &lines(equilibrium, files))
 }
 
@@ -27,15 +23,10 @@ pub fn report(equilibrium: &Equilibrium, files: Option<String>) -> String {
 pub fn lines(equilibrium: &Equilibrium, files: Option<String>) -> Lines {
     let mut lines = vec![("found", found(equilibrium))];
     if let Some(saddle) = &equilibrium.stability.saddle {
-        lines.push((
-            "left",
-            format!(
-                "a saddle of index {} with energy {} and tip {}",
-                saddle.negative_eigenvalues,
-                significant(saddle.energy),
-                point(saddle.tip.to_array(), decimals(equilibrium)),
-            ),
-        ));
+        let (index, energy) = (saddle.negative_eigenvalues, significant(saddle.energy));
+        let tip = point(saddle.tip.to_array(), decimals(equilibrium));
+        let left = format!("a saddle of index {index} with energy {energy} and tip {tip}");
+        lines.push(("left", left));
     }
     // Where shooting failed, the shape is not that of the leaf: it has no energy, and
     // its tip is meaningless.
@@ -84,10 +75,10 @@ fn error(equilibrium: &Equilibrium) -> String {
     };
     let wanted = bound(equilibrium.accuracy.tolerance * equilibrium.shape.longest());
     match equilibrium.accuracy.error_estimate {
-        Some(error) => format!(
-            "positions within {} (wanted {wanted}), {source}",
-            bound(error)
-        ),
+        Some(error) => {
+            let error = bound(error);
+            format!("positions within {error} (wanted {wanted}), {source}")
+        }
         None => match equilibrium.accuracy.segments.as_slice() {
             [segments] => format!("not estimated on a single grid of {segments} segments a vein"),
             _ => "not known".into(),
@@ -102,33 +93,26 @@ fn waves(equilibrium: &Equilibrium) -> Option<String> {
     if undulation.veins.iter().all(|vein| vein.waves() == 0.0) {
         return None;
     }
-    let predicted = format!(
-        "linear theory: {:.1} at |T| L²/A2 = {:.1} of {}",
-        margin.predicted_waves(),
-        margin.load_number,
-        match margin.tension < 0.0 {
-            true => "compression",
-            false => "tension",
-        }
-    );
+    let load = match margin.tension < 0.0 {
+        true => "compression",
+        false => "tension",
+    };
+    let (predicted, number) = (margin.predicted_waves(), margin.load_number);
+    let theory = format!("linear theory: {predicted:.1} at |T| L²/A2 = {number:.1} of {load}");
+    let (waves, high) = (margin.waves(), margin.amplitude);
     Some(match margin.wavelength {
-        Some(length) => format!(
-            "{} along the margins, {:.4} high and {:.3} long; {predicted}",
-            margin.waves(),
-            margin.amplitude,
-            length
-        ),
-        None => format!("none along the margins; {predicted}"),
+        Some(long) => {
+            format!("{waves} along the margins, {high:.4} high and {long:.3} long; {theory}")
+        }
+        None => format!("none along the margins; {theory}"),
     })
 }
 
 /// The lowest eigenvalues, as growth rates and frequencies.
 fn modes(equilibrium: &Equilibrium) -> Option<String> {
     let Some(modes) = &equilibrium.stability.modes else {
-        return equilibrium
-            .stability
-            .mode_shapes
-            .then(|| "not known".into());
+        let asked = equilibrium.stability.mode_shapes;
+        return asked.then(|| "not known".into());
     };
     let unstable = |mode: &&Mode| mode.growth().is_some() && !mode.is_neutral();
     let list = |values: &mut dyn Iterator<Item = f64>| {

@@ -11,12 +11,9 @@ const DECIMALS: f64 = 7.0;
 
 /// The time reached, the steps, and the energies.
 pub fn report(record: &Record, files: Option<String>) -> String {
-    let heading = format!(
-        "{}: {}, method {}",
-        record.scenario,
-        veins_of(record.rods, record.joined),
-        record.scheme.name()
-    );
+    let veins = veins_of(record.rods, record.joined);
+    let method = record.scheme.name();
+    let heading = format!("{}: {veins}, method {method}", record.scenario);
     lay_out(&heading, &lines(record, files))
 }
 
@@ -39,34 +36,28 @@ pub fn lines(record: &Record, files: Option<String>) -> Lines {
 
 fn moved(record: &Record) -> String {
     let steps = record.moments.last().map_or(0, |moment| moment.steps);
-    let reached = format!(
-        "t = {} in {steps} steps, {} outputs",
-        brief(record.time),
-        record.moments.len()
-    );
+    let (time, outputs) = (brief(record.time), record.moments.len());
+    let reached = format!("t = {time} in {steps} steps, {outputs} outputs");
+    let (outcome, duration) = (record.outcome(), brief(record.duration));
     match record.stopped {
         None => format!("to {reached}"),
-        Some(_) => format!(
-            "{}: only to {reached}, of t = {}",
-            record.outcome(),
-            brief(record.duration)
-        ),
+        Some(_) => format!("{outcome}: only to {reached}, of t = {duration}"),
     }
 }
 
 fn step(record: &Record) -> String {
     let longest = match record.time_step {
         Some(step) => format!("at most {step:.3e}"),
-        None => format!(
-            "so that its local error is within {}",
-            power_of_ten(record.tolerance)
-        ),
+        None => {
+            let error = power_of_ten(record.tolerance);
+            format!("so that its local error is within {error}")
+        }
     };
     match record.stable_step {
-        Some(bound) => format!(
-            "{longest}, stable up to {:.3e} ({})",
-            bound.step, bound.limit
-        ),
+        Some(bound) => {
+            let (step, limit) = (bound.step, bound.limit);
+            format!("{longest}, stable up to {step:.3e} ({limit})")
+        }
         None => longest,
     }
 }
@@ -104,15 +95,12 @@ fn tip(record: &Record) -> Option<(&'static str, String)> {
 fn speed(record: &Record) -> String {
     let wall = record.wall_seconds;
     let work = record.steps * record.rods * record.segments;
-    match wall > 0.0 && work > 0 {
-        true => format!(
-            "{} in all: {} of simulated time a second, {:.0} ns a step and segment",
-            seconds(wall),
-            brief(record.time / wall),
-            1e9 * wall / work as f64
-        ),
-        false => format!("{} in all", seconds(wall)),
+    let all = format!("{} in all", seconds(wall));
+    if !(wall > 0.0 && work > 0) {
+        return all;
     }
+    let (speed, each) = (brief(record.time / wall), 1e9 * wall / work as f64);
+    format!("{all}: {speed} of simulated time a second, {each:.0} ns a step and segment")
 }
 
 #[cfg(test)]

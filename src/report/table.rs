@@ -8,8 +8,6 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
-use super::{Document, Format};
-
 /// Lines of a report, each with its label; one without a label continues the one
 /// above.
 pub type Lines = Vec<(&'static str, String)>;
@@ -37,34 +35,8 @@ pub fn list_files(folder: &Path, files: &[PathBuf]) -> String {
     format!("{}: {}", folder.display(), names.join(", "))
 }
 
-/// A table of a result, or another text or array, as a file of this name.
-pub struct Table<R>(
-    pub &'static str,
-    pub fn(&R, &mut dyn Write) -> io::Result<()>,
-);
-
-impl<R> Format<R> for Table<R> {
-    fn file_name(&self) -> &'static str {
-        self.0
-    }
-
-    fn write(&self, document: &Document<R>, out: &mut dyn Write) -> io::Result<()> {
-        (self.1)(document.result, out)
-    }
-}
-
-/// Writes a table of flat rows as CSV; the names of their fields are the header.
-///
-/// # Errors
-/// Those of `out`.
-pub fn write_csv<R: Serialize>(
-    rows: impl IntoIterator<Item = R>,
-    out: &mut dyn Write,
-) -> io::Result<()> {
-    write_rows(csv::Writer::from_writer(out), rows)
-}
-
-/// The same without the header.
+/// Writes rows as CSV without a header; each may be a tuple of tuples and arrays, whose
+/// elements are its cells.
 ///
 /// # Errors
 /// Those of `out`.
@@ -72,23 +44,17 @@ pub fn append_csv<R: Serialize>(
     rows: impl IntoIterator<Item = R>,
     out: &mut dyn Write,
 ) -> io::Result<()> {
-    write_rows(csv_without_header(out), rows)
+    let mut table = csv_without_header(out);
+    for row in rows {
+        table.serialize(row)?;
+    }
+    table.flush()
 }
 
 /// A CSV writer that writes no header by itself.
 pub fn csv_without_header<W: Write>(out: W) -> csv::Writer<W> {
     let mut builder = csv::WriterBuilder::new();
     builder.has_headers(false).from_writer(out)
-}
-
-fn write_rows<R: Serialize>(
-    mut table: csv::Writer<&mut dyn Write>,
-    rows: impl IntoIterator<Item = R>,
-) -> io::Result<()> {
-    for row in rows {
-        table.serialize(row)?;
-    }
-    table.flush()
 }
 
 /// One table of several results, each given as its scenario's file, its exit status and
@@ -122,11 +88,8 @@ pub fn rows_of_json(results: &[(String, i32, Vec<u8>)]) -> io::Result<Vec<u8>> {
     let mut table = csv::Writer::from_writer(Vec::new());
     table.write_record(&columns)?;
     for row in &rows {
-        table.write_record(
-            columns
-                .iter()
-                .map(|column| row.get(column).map_or("", String::as_str)),
-        )?;
+        let cells = columns.iter().map(|column| row.get(column));
+        table.write_record(cells.map(|cell| cell.map_or("", String::as_str)))?;
     }
     table.into_inner().map_err(|error| error.into_error())
 }
@@ -190,19 +153,16 @@ impl<'de> Deserialize<'de> for Flat {
                         "tip" | "tip_force_sum" => {
                             let tip = object.next_value::<Option<[f64; 3]>>()?;
                             for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-                                let cell =
-                                    tip.map_or(String::new(), |tip| format!("{:?}", tip[axis]));
-                                cells.push((format!("{key}_{name}"), cell));
+                                let cell = tip.map(|tip| format!("{:?}", tip[axis]));
+                                cells.push((format!("{key}_{name}"), cell.unwrap_or_default()));
                             }
                         }
                         _ => {
                             let Flat(inner) = object.next_value()?;
-                            cells.extend(inner.into_iter().map(
-                                |(name, cell)| match name.as_str() {
-                                    "" => (key.clone(), cell),
-                                    name => (format!("{key}_{name}"), cell),
-                                },
-                            ));
+                            for (name, cell) in inner {
+                                let below = if name.is_empty() { "" } else { "_" };
+                                cells.push((format!("{key}{below}{name}"), cell));
+                            }
                         }
                     }
                 }
@@ -214,12 +174,7 @@ impl<'de> Deserialize<'de> for Flat {
     }
 }
 
-/// The header of a table of such rows.
-pub fn header(row: impl Serialize) -> Vec<u8> {
-    let mut table = Vec::new();
-    // Writing to memory cannot fail.
-    let _ = write_csv([row], &mut table);
-    let end = table.iter().position(|&byte| byte == b'\n');
-    table.truncate(end.map_or(0, |end| end + 1));
-    table
+/// The header of a table with these columns.
+pub fn header(columns: &[&str]) -> Vec<u8> {
+    (columns.join(",") + "\n").into_bytes()
 }

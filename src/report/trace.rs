@@ -5,7 +5,7 @@ use crate::study::{Law, PointKind, Trace, TraceBranch, TracePoint};
 
 use super::numbers::{power_of_ten, seconds, short, veins_of};
 use super::table::{Lines, labelled, lay_out};
-use super::words::branch_end;
+use super::words::{branch_end, stable_or_index};
 
 /// The branches, their ends, and where the index changes.
 pub fn report(trace: &Trace, files: Option<String>) -> String {
@@ -32,14 +32,9 @@ pub fn lines(trace: &Trace, files: Option<String>) -> Lines {
         let error = format!("{what} within {worst}, followed on {segments} segments a vein");
         ("error", error)
     }));
-    lines.push((
-        "work",
-        format!(
-            "{} factorisations to follow, {} in all",
-            trace.factorizations,
-            seconds(trace.wall_seconds)
-        ),
-    ));
+    let (count, time) = (trace.factorizations, seconds(trace.wall_seconds));
+    let work = format!("{count} factorisations to follow, {time} in all");
+    lines.push(("work", work));
     lines.extend(files.map(|files| ("written", files)));
     lines.extend((trace.remark.iter()).map(|remark| ("remark", remark.clone())));
     lines
@@ -100,10 +95,7 @@ pub fn error_location(trace: &Trace) -> &'static str {
 }
 
 fn place(trace: &Trace, point: &TracePoint) -> String {
-    let stability = match point.index {
-        0 => "stable".into(),
-        index => format!("index {index}"),
-    };
+    let stability = stable_or_index(point.index);
     let tip = match &point.tips[..] {
         [tip] if point.reaction.is_none() => {
             format!(", tip ({:.7}, {:.7}, {:.7})", tip.x, tip.y, tip.z)
@@ -115,10 +107,8 @@ fn place(trace: &Trace, point: &TracePoint) -> String {
         format!(", reaction ({x}, {y}, {z})")
     });
     let reaction = reaction.unwrap_or_default();
-    format!(
-        "{}: {stability}{tip}{reaction}",
-        trace.keys.text(point.value)
-    )
+    let value = trace.keys.text(point.value);
+    format!("{value}: {stability}{tip}{reaction}")
 }
 
 fn critical(trace: &Trace, point: &TracePoint, before: usize) -> String {
@@ -131,9 +121,6 @@ fn critical(trace: &Trace, point: &TracePoint, before: usize) -> String {
         Some(error) => format!(", within {}", power_of_ten(error)),
         None => String::new(),
     };
-    let value = trace.keys.text(point.value);
-    format!(
-        "{what} at {value}{within}: index {before} to {}",
-        point.index
-    )
+    let (value, after) = (trace.keys.text(point.value), point.index);
+    format!("{what} at {value}{within}: index {before} to {after}")
 }

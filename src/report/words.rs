@@ -8,14 +8,12 @@ use crate::study::{Contender, MapShow, Verdict};
 pub fn verdict(equilibrium: &Equilibrium) -> String {
     match equilibrium.outcome {
         Outcome::Converged => at_rest(equilibrium),
-        Outcome::ConvergedAfterSaddle => match &equilibrium.stability.saddle {
-            Some(saddle) => format!(
-                "{}, after leaving a saddle of index {}",
-                at_rest(equilibrium),
-                saddle.negative_eigenvalues
-            ),
-            None => format!("{}, after leaving a saddle", at_rest(equilibrium)),
-        },
+        Outcome::ConvergedAfterSaddle => {
+            let saddle = equilibrium.stability.saddle.as_ref();
+            let index = saddle.map(|saddle| format!(" of index {}", saddle.negative_eigenvalues));
+            let left = format!(", after leaving a saddle{}", index.unwrap_or_default());
+            at_rest(equilibrium) + &left
+        }
         Outcome::Saddle => at_rest(equilibrium),
         Outcome::ToleranceNotReached => {
             format!("{}, tolerance not reached", at_rest(equilibrium))
@@ -45,6 +43,14 @@ pub fn equilibrium_of_index(negative_eigenvalues: Option<usize>) -> String {
         Some(0) => "stable equilibrium".into(),
         Some(index) => format!("unstable equilibrium of index {index}"),
         None => "equilibrium of unknown stability".into(),
+    }
+}
+
+/// The same in a word or two, of a known index.
+pub fn stable_or_index(index: usize) -> String {
+    match index {
+        0 => "stable".into(),
+        index => format!("index {index}"),
     }
 }
 

@@ -8,7 +8,7 @@ use crate::figure::axes::Axes;
 use crate::figure::axis::Axis;
 use crate::figure::drawing::{CURVES, Color, Drawing, Stroke};
 use crate::figure::markers::Marker;
-use crate::figure::page::{Cell, Key, PANEL_AXIS, PANEL_TITLE, title};
+use crate::figure::page::{Cell, Key, PANEL_AXIS, PANEL_TITLE};
 use crate::figure::setting::with_unit;
 use crate::study::{Map, MapRow, MapShow};
 
@@ -51,8 +51,7 @@ pub fn draw(page: &mut Drawing, map: &Map, x: &Varied, strip: Cell, start: f64) 
                 "their amplitude",
                 with_unit("amplitude", Some("L")),
                 vec![("amplitude", CURVES[1], |row| {
-                    row.margin_amplitude
-                        .filter(|_| row.stable_waves().is_some())
+                    row.stable_waves().and(row.margin_amplitude)
                 })],
             ),
             (
@@ -65,10 +64,10 @@ pub fn draw(page: &mut Drawing, map: &Map, x: &Varied, strip: Cell, start: f64) 
     let mut top = start;
     for (what, name, curves) in panels {
         let height = if curves.len() > 1 { TALL } else { LOW };
-        let cell = Cell {
-            corner: DVec2::new(strip.corner.x, top + PANEL_TITLE),
-            size: DVec2::new(strip.size.x, height),
-        };
+        let cell = Cell::new(
+            DVec2::new(strip.corner.x, top + PANEL_TITLE),
+            DVec2::new(strip.size.x, height),
+        );
         page.group("curves", |page| {
             draw_panel(page, map, x, cell, (what, &name), &curves)
         });
@@ -96,13 +95,8 @@ fn draw_panel(
         })
         .collect();
     let known = lines.iter().flatten().map(|point| point.1);
-    let axes = Axes {
-        cell,
-        across: x.axis.clone(),
-        up: Axis::holding(name, known.filter(|value| value.is_finite())).at_least(ROUNDING),
-    };
-    title(page, cell.corner, "", what);
-    axes.draw(page);
+    let up = Axis::holding(name, known.filter(|value| value.is_finite())).at_least(ROUNDING);
+    let axes = Axes::titled(page, cell, ["", what], x.axis.clone(), up);
     let mut key = Key::right_of(cell);
     for ((name, color, _), line) in curves.iter().zip(lines) {
         axes.curve(page, &line, Stroke::new(*color, 1.6));

@@ -14,7 +14,7 @@ use super::page::{
 use crate::report::words::map_shows;
 use crate::study::{Confidence, Knob, Map, MapMethod, MapOutcome, MapRow, MapShow};
 pub use panel::{DARKEST_INDEX, fill_index, name};
-use panel::{Panel, Tile, Varied};
+use panel::{Panel, Varied, waves};
 
 const SWATCH: f64 = 12.0;
 /// Room below each panel for ticks and, below the last, for the name of the axis.
@@ -87,7 +87,7 @@ fn notes(map: &Map) -> Vec<String> {
 fn draw_key(page: &mut Drawing, map: &Map, base: f64) -> f64 {
     let mut key = KeyRows::at(LEFT, base, SWATCH);
     for outcome in MapOutcome::ALL {
-        let shown = |row: &MapRow| row.outcome == outcome && waves(map, row).is_none();
+        let shown = |row: &MapRow| row.outcome == outcome && waves(map.show, row).is_none();
         if map.rows.iter().any(shown) {
             let name = match outcome {
                 MapOutcome::Saddle => "saddle, with its index".to_string(),
@@ -96,7 +96,8 @@ fn draw_key(page: &mut Drawing, map: &Map, base: f64) -> f64 {
             key.entry(page, &name, |page, cell| panel::fill(page, cell, outcome));
         }
     }
-    let mut counts: Vec<f64> = map.rows.iter().filter_map(|row| waves(map, row)).collect();
+    let counts = map.rows.iter().filter_map(|row| waves(map.show, row));
+    let mut counts: Vec<f64> = counts.collect();
     counts.sort_by(f64::total_cmp);
     counts.dedup();
     for waves in counts {
@@ -143,24 +144,6 @@ fn has_step_axis(map: &Map) -> bool {
         && axes.any(|axis| axis.keys.sets(Knob::Step))
 }
 
-/// The results of a method, cell by cell.
-fn tiles(map: &Map, method: MapMethod) -> Vec<Option<Tile>> {
-    let mut tiles = vec![None; map.request.cells()];
-    for row in map.rows.iter().filter(|row| row.method == method) {
-        tiles[row.cell] = Some(Tile {
-            outcome: row.outcome,
-            index: row.index,
-            reference: row.reference,
-            waves: waves(map, row),
-        });
-    }
-    tiles
-}
-
-fn waves(map: &Map, row: &MapRow) -> Option<f64> {
-    row.stable_waves().filter(|_| map.show == MapShow::Waves)
-}
-
 fn count(map: &Map, method: MapMethod) -> String {
     let waving = |row: &&MapRow| row.method == method && row.stable_waves() > Some(0.0);
     let (count, what) = match map.show {
@@ -200,16 +183,14 @@ fn draw_panels(
     let mut last = Cell { corner, size };
     for (i, &method) in methods.iter().enumerate() {
         let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
-        let cell = Cell {
-            corner: corner + place * pitch,
-            size,
-        };
+        let cell = Cell::new(corner + place * pitch, size);
         // A single strip has its axis below the curves.
         let labelled = y.is_some() || (i + 1 == methods.len() && i > 0);
         drawing.group(method.word(), |page| {
             draw_method(page, map, method, cell, y.is_some());
             let panel = Panel::new(cell, x, y, labelled);
-            panel.draw(page, &tiles(map, method));
+            let rows = map.rows.iter().filter(|row| row.method == method);
+            panel.draw(page, map.show, rows);
             if method == MapMethod::ExplicitMotion && has_step_axis(map) {
                 panel.draw_bound(page, &map.request);
             }
@@ -297,16 +278,9 @@ mod tests {
             .retain(|row| row.cell < 4 && row.method == MapMethod::default());
         let curves = |svg: &str| -> Vec<usize> {
             let groups = svg.split("<g id=\"curves\">").skip(1);
-            groups
-                .map(|group| {
-                    group
-                        .split("</g>")
-                        .next()
-                        .unwrap()
-                        .matches("stroke-width=\"1.6\"")
-                        .count()
-                })
-                .collect()
+            let groups = groups.map(|group| group.split("</g>").next().unwrap());
+            let lines = groups.map(|group| group.matches("stroke-width=\"1.6\"").count());
+            lines.collect()
         };
         // The lines of the panels and those of their keys.
         let svg = svg(&map);

@@ -8,7 +8,7 @@ use crate::figure::drawing::{
     Anchor, Color, Drawing, FRAME, INK, Stroke, WHITE, circle, rectangle, vein_color,
 };
 use crate::figure::page::Cell;
-use crate::study::{Confidence, Knob, MapOutcome, MapRequest, Vary};
+use crate::study::{Confidence, Knob, MapOutcome, MapRequest, MapRow, MapShow, Vary};
 
 /// Smaller cells have no gaps between them and no marks.
 const SEPARATE: f64 = 5.0;
@@ -18,15 +18,6 @@ const NUMBER_SIZE: f64 = 8.0;
 const PALE: Color = Color(226, 236, 226);
 /// More waves than this have the same colour.
 const MOST_WAVES: f64 = 2.5;
-
-#[derive(Clone, Copy)]
-pub struct Tile {
-    pub outcome: MapOutcome,
-    pub index: Option<usize>,
-    pub reference: Confidence,
-    /// Waves along the margins, where these are shown and the leaf is stable.
-    pub waves: Option<f64>,
-}
 
 /// Colours that the colour-blind can distinguish (Okabe and Ito); that of right answers is
 /// light.
@@ -41,6 +32,11 @@ fn color(outcome: MapOutcome) -> Color {
         MapOutcome::Refused => Color(232, 232, 236),
         MapOutcome::OutOfTime => Color(0, 92, 158),
     }
+}
+
+/// Waves along the margins, where these are shown and the leaf is stable.
+pub fn waves(show: MapShow, row: &MapRow) -> Option<f64> {
+    row.stable_waves().filter(|_| show == MapShow::Waves)
 }
 
 /// Fills a cell; one that was refused is crossed out.
@@ -162,11 +158,14 @@ impl<'a> Panel<'a> {
     }
 
     /// Cells are counted along the last axis first.
-    pub fn draw(&self, page: &mut Drawing, tiles: &[Option<Tile>]) {
-        for (i, tile) in tiles.iter().enumerate() {
-            if let Some(tile) = tile {
-                self.draw_tile(page, i, *tile);
-            }
+    pub fn draw<'r>(
+        &self,
+        page: &mut Drawing,
+        show: MapShow,
+        rows: impl Iterator<Item = &'r MapRow>,
+    ) {
+        for row in rows {
+            self.draw_cell(page, row, waves(show, row));
         }
         self.axes.draw_frame(page);
     }
@@ -183,28 +182,28 @@ impl<'a> Panel<'a> {
         let (low, high) = self
             .y
             .map_or((0.0, 1.0), |y| (y.edges[row], y.edges[row + 1]));
-        Cell {
-            corner: corner + size * DVec2::new(left, 1.0 - high),
-            size: size * DVec2::new(right - left, high - low),
-        }
+        Cell::new(
+            corner + size * DVec2::new(left, 1.0 - high),
+            size * DVec2::new(right - left, high - low),
+        )
     }
 
-    fn draw_tile(&self, page: &mut Drawing, i: usize, tile: Tile) {
-        let mut cell = self.rectangle(i);
+    fn draw_cell(&self, page: &mut Drawing, row: &MapRow, waves: Option<f64>) {
+        let mut cell = self.rectangle(row.cell);
         let large = cell.size.min_element() >= SEPARATE;
         if large {
             let inset = DVec2::splat(0.4);
             cell.corner += inset;
             cell.size -= 2.0 * inset;
         }
-        match tile.waves {
+        match waves {
             Some(waves) => fill_waves(page, cell, waves),
-            None => fill(page, cell, tile.outcome),
+            None => fill(page, cell, row.outcome),
         }
         if large {
-            mark(page, cell, tile.reference);
+            mark(page, cell, row.reference);
         }
-        let number = match (tile.outcome, tile.index, tile.waves) {
+        let number = match (row.outcome, row.index, waves) {
             (MapOutcome::Saddle, Some(index), _) => index.to_string(),
             (_, _, Some(waves)) if waves > 0.0 => waves.to_string(),
             _ => return,

@@ -38,13 +38,8 @@ impl Viewed for Boundary {
 fn leaf(point: &BoundaryPoint, drawn: &[usize]) -> Leaf {
     let [first, second] = point.values.map(brief);
     let kind = point.kind.replace('-', " ");
-    Leaf::coarse(
-        format!("{first}, {second}: {kind}"),
-        &point.stations,
-        &point.curves,
-        drawn,
-        MOST_NODES,
-    )
+    let label = format!("{first}, {second}: {kind}");
+    Leaf::coarse(label, &point.stations, &point.curves, drawn, MOST_NODES)
 }
 
 /// The plane: the second number, or its logarithm, against the first.

@@ -45,7 +45,7 @@ pub struct View {
 }
 
 /// A shape of the leaf.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 pub struct Leaf {
     /// A short description, and the numbers of this leaf alone.
     pub label: String,
@@ -74,6 +74,12 @@ pub enum Points {
     Coarse { u16: String, low: DVec3, size: f64 },
 }
 
+impl Default for Points {
+    fn default() -> Self {
+        Points::Full { f32: String::new() }
+    }
+}
+
 /// A mode of the leaf at rest.
 #[derive(Serialize)]
 pub struct ModeShape {
@@ -94,7 +100,7 @@ pub struct Chart {
     pub curves: Vec<Curve>,
 }
 
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 pub struct Curve {
     /// Which of the choices it belongs to.
     pub choice: usize,
@@ -133,20 +139,18 @@ impl Leaf {
         for node in shown() {
             let q = node.rotation;
             state.extend([q.w, q.x, q.y, q.z]);
-            state.extend(
-                [node.v, node.u, node.n, node.m]
-                    .map(|v| v.to_array())
-                    .as_flattened(),
-            );
+            let vectors = [node.v, node.u, node.n, node.m].map(|v| v.to_array());
+            state.extend(vectors.as_flattened());
         }
         Leaf {
+            label,
             nodes: stations.len(),
             stations: Some(stations.into()),
             points: Points::Full {
                 f32: vectors(shown().map(|node| node.position)),
             },
             state: Some(floats(state)),
-            ..Leaf::empty(label)
+            ..Leaf::default()
         }
     }
 
@@ -174,10 +178,10 @@ impl Leaf {
         let size = (high - low).max_element().max(f64::MIN_POSITIVE);
         let step = |point: DVec3| ((point - low) / size * 65535.0).round().to_array();
         // NaN becomes a corner of the box.
-        let steps = shown()
-            .flat_map(step)
-            .flat_map(|x| (x as u16).to_le_bytes());
+        let steps = shown().flat_map(step);
+        let steps = steps.flat_map(|x| (x as u16).to_le_bytes());
         Leaf {
+            label,
             nodes: nodes.saturating_sub(1) / stride + 1,
             stations: uneven(stations).then(|| stations.iter().step_by(stride).copied().collect()),
             points: Points::Coarse {
@@ -185,19 +189,7 @@ impl Leaf {
                 low,
                 size,
             },
-            ..Leaf::empty(label)
-        }
-    }
-
-    fn empty(label: String) -> Self {
-        Leaf {
-            label,
-            summary: Vec::new(),
-            time: None,
-            stations: None,
-            nodes: 0,
-            points: Points::Full { f32: String::new() },
-            state: None,
+            ..Leaf::default()
         }
     }
 }
@@ -215,11 +207,8 @@ pub fn vectors(vectors: impl Iterator<Item = DVec3>) -> String {
 }
 
 fn floats(numbers: impl IntoIterator<Item = f64>) -> String {
-    base64(
-        numbers
-            .into_iter()
-            .flat_map(|number| (number as f32).to_le_bytes()),
-    )
+    let numbers = numbers.into_iter();
+    base64(numbers.flat_map(|number| (number as f32).to_le_bytes()))
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use super::tubes::Tubes;
 use crate::figure::drawing::{Color, color_of_vein};
 use crate::figure::veins::is_drawable;
 use crate::relax::Equilibrium;
-use crate::simulate::{Record, Still};
+use crate::simulate::Record;
 
 /// Most shapes of a film: each has all vertices.
 const MOST_SHAPES: usize = 61;
@@ -45,23 +45,11 @@ pub fn leaf(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
 /// Those of `out`.
 pub fn motion(record: &Record, out: &mut dyn Write) -> io::Result<()> {
     let film = &record.film;
-    let stride = film
-        .len()
-        .saturating_sub(1)
-        .div_ceil(MOST_SHAPES - 1)
-        .max(1);
-    let time = |still: &'_ Still| record.moments[still.moment].time;
-    let mut shapes: Vec<(f64, &[Vec<DVec3>])> = film
-        .iter()
-        .step_by(stride)
-        .map(|still| (time(still), &still.curves[..]))
-        .collect();
-    if let Some(last) = film
-        .last()
-        .filter(|_| !(film.len().saturating_sub(1)).is_multiple_of(stride))
-    {
-        shapes.push((time(last), &last.curves[..]));
-    }
+    let last = film.len().saturating_sub(1);
+    let stride = last.div_ceil(MOST_SHAPES - 1).max(1);
+    let kept = (0..film.len()).filter(|&k| k.is_multiple_of(stride) || k == last);
+    let shape = |k: usize| (record.moments[film[k].moment].time, &film[k].curves[..]);
+    let shapes: Vec<(f64, &[Vec<DVec3>])> = kept.map(shape).collect();
     write(&record.scenario, &shapes, RADIUS * record.length, out)
 }
 
@@ -96,36 +84,27 @@ impl File {
     }
 
     fn vectors(&mut self, vectors: &[Vec3]) -> usize {
-        let low = vectors
-            .iter()
-            .copied()
-            .reduce(Vec3::min)
-            .unwrap_or_default();
-        let high = vectors
-            .iter()
-            .copied()
-            .reduce(Vec3::max)
-            .unwrap_or_default();
+        let all = || vectors.iter().copied();
+        let low = all().reduce(Vec3::min).unwrap_or_default();
+        let high = all().reduce(Vec3::max).unwrap_or_default();
         let accessor = json!({
             "componentType": FLOAT, "count": vectors.len(), "type": "VEC3",
             "min": low.to_array(), "max": high.to_array(),
         });
-        let bytes = vectors
-            .iter()
-            .flat_map(|v| v.to_array())
-            .flat_map(f32::to_le_bytes);
-        self.add(bytes, Some(ARRAY), accessor)
+        let bytes = all().flat_map(|v| v.to_array().map(f32::to_le_bytes));
+        self.add(bytes.flatten(), Some(ARRAY), accessor)
     }
 
     fn scalars(&mut self, numbers: &[f32]) -> usize {
+        let all = || numbers.iter().copied();
         let (low, high) = (
-            numbers.iter().copied().fold(f32::MAX, f32::min),
-            numbers.iter().copied().fold(f32::MIN, f32::max),
+            all().fold(f32::MAX, f32::min),
+            all().fold(f32::MIN, f32::max),
         );
         let accessor = json!({
             "componentType": FLOAT, "count": numbers.len(), "type": "SCALAR", "min": [low], "max": [high],
         });
-        let bytes = numbers.iter().copied().flat_map(f32::to_le_bytes);
+        let bytes = all().flat_map(f32::to_le_bytes);
         self.add(bytes, None, accessor)
     }
 }
@@ -158,11 +137,8 @@ fn write(
     let corners = Tubes::triangles(veins, points);
     let accessor =
         json!({ "componentType": UNSIGNED_INT, "count": corners.len(), "type": "SCALAR" });
-    let indices = file.add(
-        corners.into_iter().flat_map(u32::to_le_bytes),
-        Some(ELEMENT_ARRAY),
-        accessor,
-    );
+    let corners = corners.into_iter().flat_map(u32::to_le_bytes);
+    let indices = file.add(corners, Some(ELEMENT_ARRAY), accessor);
 
     let mut targets = Vec::new();
     for curves in &thinned[1..] {
@@ -195,10 +171,10 @@ fn animate(file: &mut File, shapes: &[(f64, &[Vec<DVec3>])]) -> Value {
     } else {
         1.0
     };
-    let times: Vec<f32> = shapes
+    let times = shapes
         .iter()
-        .map(|(time, _)| ((time - start) * rate) as f32)
-        .collect();
+        .map(|(time, _)| ((time - start) * rate) as f32);
+    let times: Vec<f32> = times.collect();
     let targets = shapes.len() - 1;
     let weight = |shape: usize, target: usize| f32::from(u8::from(shape == target + 1));
     let weights =
@@ -242,17 +218,10 @@ fn finish(
     if !file.bytes.is_empty() {
         chunks.push((*b"BIN\0", &file.bytes));
     }
-    let size = 12
-        + chunks
-            .iter()
-            .map(|(_, chunk)| 8 + chunk.len())
-            .sum::<usize>();
-    let sizes = [
-        2,
-        u32::try_from(size).map_err(|_| io::ErrorKind::FileTooLarge)?,
-    ];
+    let size: usize = chunks.iter().map(|(_, chunk)| 8 + chunk.len()).sum();
+    let size = u32::try_from(12 + size).map_err(|_| io::ErrorKind::FileTooLarge)?;
     out.write_all(b"glTF")?;
-    out.write_all(sizes.map(u32::to_le_bytes).as_flattened())?;
+    out.write_all([2, size].map(u32::to_le_bytes).as_flattened())?;
     for (kind, chunk) in chunks {
         out.write_all(&(chunk.len() as u32).to_le_bytes())?;
         out.write_all(&kind)?;

@@ -31,14 +31,13 @@ pub mod vtk;
 use super::drawing::{Drawing, color_of_vein};
 use super::svg::{self, hex};
 use super::veins::is_drawn;
-use crate::report::{Document, Format, Part, json};
+use crate::report::json;
 use crate::scenario::{self, Scenario};
 use crate::simulate::Record;
 use crate::study::Trace;
 use data::View;
 use glam::DVec3;
 use std::io::{self, Write};
-use std::path::Path;
 
 const FRAME: &str = include_str!("page.html");
 const STYLE: &str = include_str!("page.css");
@@ -62,57 +61,8 @@ pub trait Viewed {
     fn still(&self, scenario: &Scenario) -> Drawing;
 }
 
-/// The page of a result as a file of this name.
-pub(crate) struct Page(pub &'static str);
-
-impl<R: Viewed> Format<R> for Page {
-    fn file_name(&self) -> &'static str {
-        self.0
-    }
-
-    fn write(&self, document: &Document<R>, out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(page(document.result, document.input).as_bytes())
-    }
-}
-
 /// One of several shapes: its time or number, its stations and its centrelines.
-pub(crate) struct Shape<'r>(f64, &'r [f64], &'r [Vec<DVec3>]);
-
-/// Shapes for ParaView: a list of this name, and a folder with the shapes next to it.
-pub(crate) struct Series<R>(pub &'static str, pub fn(&R) -> Vec<Shape<'_>>);
-
-impl<R> Series<R> {
-    /// The name of a shape's file.
-    fn part(&self, number: usize) -> String {
-        let stem = Path::new(self.0).file_stem().unwrap_or_default();
-        format!("{}_vtp/{number:05}.vtp", stem.display())
-    }
-}
-
-impl<R> Format<R> for Series<R> {
-    fn file_name(&self) -> &'static str {
-        self.0
-    }
-
-    fn write(&self, document: &Document<R>, out: &mut dyn Write) -> io::Result<()> {
-        let shapes = (self.1)(document.result);
-        let files = shapes.iter().enumerate();
-        let files: Vec<_> = files
-            .map(|(k, Shape(time, ..))| (*time, self.part(k)))
-            .collect();
-        vtk::series(&files, out)
-    }
-
-    fn parts<'d>(&self, document: &'d Document<R>) -> Vec<Part<'d>> {
-        let shapes = (self.1)(document.result).into_iter().enumerate();
-        let radii = &document.input.radii;
-        let part = |(k, Shape(_, stations, curves)): (usize, Shape<'d>)| -> Part<'d> {
-            let fill = move |out: &mut dyn Write| vtk::curves(curves, stations, radii, out);
-            (self.part(k), Box::new(fill))
-        };
-        shapes.map(part).collect()
-    }
-}
+pub struct Shape<'r>(pub f64, pub &'r [f64], pub &'r [Vec<DVec3>]);
 
 /// The instants of a motion.
 pub(crate) fn instants(record: &Record) -> Vec<Shape<'_>> {
@@ -130,6 +80,15 @@ pub(crate) fn points(trace: &Trace) -> Vec<Shape<'_>> {
     (points.enumerate())
         .map(|(number, point)| Shape(number as f64, &point.stations, &point.curves))
         .collect()
+}
+
+/// Writes the page of a result.
+pub(crate) fn write<R: Viewed>(
+    result: &R,
+    input: &Scenario,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    out.write_all(page(result, input).as_bytes())
 }
 
 /// The page of a result of this scenario: a self-contained HTML file.
@@ -198,20 +157,14 @@ fn assemble(view: &View, still: &Drawing) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::checksum::Checksum;
     use crate::report::sample;
     use serde_json::Value;
 
     fn scenario(rods: usize) -> Scenario {
-        let text = format!(
-            r#"
-            name = "page"
-            leaf = {{ rods = {rods}, length = 1.0, fan = "symmetric" }}
-            stiffness = {{ torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }}
-            units = {{ length = "cm" }}
-        "#
-        );
-        let mut scenario = Scenario::from_toml(&text).unwrap();
+        let mut scenario = sample::scenario("page", rods);
         scenario.name = "a < b </script>".into();
+        scenario.units.length = Some("cm".into());
         scenario
     }
 
@@ -223,13 +176,9 @@ mod tests {
 
     #[test]
     fn the_bundle_is_the_one_that_was_made() {
-        let fnv1a = THREE
-            .bytes()
-            .fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
-                (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-            });
         let noted = include_str!("three/three.min.js.fnv1a");
-        assert_eq!(format!("{fnv1a:016x}"), noted.trim());
+        let found = Checksum::of(format_args!("{THREE}"));
+        assert_eq!(found.to_string(), noted.trim());
         assert!(THREE.contains("SPDX-License-Identifier: MIT"));
         assert!(!THREE.contains("</script") && !THREE.contains("<!--"));
     }

@@ -19,27 +19,19 @@ impl Viewed for Record {
         view.kind = "motion";
         view.verdict = match self.stopped {
             None => format!("followed to t = {}", short(self.time)),
-            Some(_) => format!(
-                "ended early at t = {}: {}",
-                short(self.time),
-                self.outcome()
-            ),
+            Some(_) => {
+                let (time, outcome) = (short(self.time), self.outcome());
+                format!("ended early at t = {time}: {outcome}")
+            }
         };
         view.success = self.stopped.is_none();
         view.summary = simulate_lines(self, None);
         let shapes = self.film.iter().map(|still| {
             let time = self.moments[still.moment].time;
-            let label = format!("t = {}", short(time));
-            let time = Some(time);
+            let (label, curves) = (format!("t = {}", short(time)), &still.curves);
             Leaf {
-                time,
-                ..Leaf::coarse(
-                    label,
-                    &self.stations,
-                    &still.curves,
-                    &view.drawn,
-                    MOST_NODES,
-                )
+                time: Some(time),
+                ..Leaf::coarse(label, &self.stations, curves, &view.drawn, MOST_NODES)
             }
         });
         view.leaves = shapes.collect();
@@ -61,9 +53,7 @@ fn chart(moments: &[Moment], view: &View) -> Chart {
         color,
         x: shown().map(|moment| moment.time).collect(),
         y: shown().map(of).collect(),
-        leaves: Vec::new(),
-        unstable: Vec::new(),
-        special: Vec::new(),
+        ..Curve::default()
     };
     type Energy = fn(&Moment) -> f64;
     let energies: [(&str, Energy); 7] = [

@@ -42,15 +42,10 @@ fn leaf(trace: &Trace, point: &TracePoint, drawn: &[usize]) -> Leaf {
         PointKind::Regular => brief(point.value),
         _ => trace.keys.text(point.value),
     };
+    let label = format!("{at}: {kind}");
     Leaf {
         summary: vec![("energy", significant(point.energy))],
-        ..Leaf::coarse(
-            format!("{at}: {kind}"),
-            &point.stations,
-            &point.curves,
-            drawn,
-            MOST_NODES,
-        )
+        ..Leaf::coarse(label, &point.stations, &point.curves, drawn, MOST_NODES)
     }
 }
 

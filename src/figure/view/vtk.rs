@@ -4,31 +4,19 @@
 //! Source: "VTK XML formats", version 1.0, of the VTK documentation.
 
 use std::io::{self, Write};
+use std::path::Path;
 
 use glam::DVec3;
 
+use super::Shape;
 use crate::figure::svg::escaped;
 use crate::relax::Equilibrium;
-use crate::report::{Document, Format, base64};
+use crate::report::base64;
 use crate::scenario::Radii;
 use crate::shape::NodeState;
 
 /// Values at all nodes, vein by vein: name, values per node, all values.
 struct Array<'a>(&'a str, usize, Vec<f64>);
-
-/// A leaf at rest as a file of this name: per node its vein, place along it, directors,
-/// strains, forces and moments, and the radius where sections are given.
-pub(crate) struct Lines(pub &'static str);
-
-impl Format<Equilibrium> for Lines {
-    fn file_name(&self) -> &'static str {
-        self.0
-    }
-
-    fn write(&self, document: &Document<Equilibrium>, out: &mut dyn Write) -> io::Result<()> {
-        leaf(document.result, &document.input.radii, out)
-    }
-}
 
 /// A leaf at rest: per node its vein, place along it, directors, strains, forces and
 /// moments, and the radius where sections are given.
@@ -79,6 +67,19 @@ fn radius(rods: usize, stations: &[f64], radii: &Radii) -> Option<Array<'static>
     radius.map(|radius| Array("radius", 1, radius))
 }
 
+/// The file of a shape in the list of this name.
+pub(crate) fn part(list: &str, number: usize) -> String {
+    let stem = Path::new(list).file_stem().unwrap_or_default();
+    format!("{}_vtp/{number:05}.vtp", stem.display())
+}
+
+/// The list of this name.
+pub(crate) fn list(name: &str, shapes: &[Shape], out: &mut dyn Write) -> io::Result<()> {
+    let files = shapes.iter().enumerate();
+    let files: Vec<_> = files.map(|(k, shape)| (shape.0, part(name, k))).collect();
+    series(&files, out)
+}
+
 /// Lists files by time, or by a number that varies in its place.
 ///
 /// # Errors
@@ -126,15 +127,11 @@ fn write(
     });
     integers("offsets", ends, out)?;
     writeln!(out, "</Lines>\n<PointData>")?;
-    let numbers = veins.iter().enumerate();
-    integers(
-        "rod",
-        numbers.flat_map(|(j, vein)| vein.iter().map(move |_| j + 1)),
-        out,
-    )?;
-    let sigma = veins
-        .iter()
-        .flat_map(|vein| stations.iter().copied().take(vein.len()));
+    let rods = veins.iter().enumerate();
+    let rods = rods.flat_map(|(j, vein)| vein.iter().map(move |_| j + 1));
+    integers("rod", rods, out)?;
+    let lengths = veins.iter().map(Vec::len);
+    let sigma = lengths.flat_map(|nodes| stations.iter().copied().take(nodes));
     floats("sigma", 1, &sigma.collect::<Vec<f64>>(), out)?;
     for Array(name, components, numbers) in arrays {
         floats(name, *components, numbers, out)?;

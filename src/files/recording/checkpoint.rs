@@ -4,13 +4,13 @@
 //! bits, so that they are restored exactly.
 
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::files::checksum::Checksum;
-use crate::report::{FileError, json};
+use crate::checksum::Checksum;
+use crate::report::FileError;
 use crate::simulate::Simulation;
 
 pub const FILE_NAME: &str = "checkpoint.json";
@@ -67,22 +67,17 @@ impl Identity {
     /// The properties that distinguish runs, as readable text.
     fn descriptions(&self) -> [(&'static str, String); 8] {
         let number = |digits: &str| number(digits).map_or("?".into(), |number| number.to_string());
-        let step = self.step.as_deref();
+        let step = self.step.as_deref().map(number);
+        let stations = self.stations.map(|count| count.to_string());
         [
             ("version", self.version.clone()),
             ("scenario", self.scenario.clone()),
             ("content", self.content.clone()),
             ("method", self.method.clone()),
             ("segments", self.segments.to_string()),
-            (
-                "time step",
-                step.map_or("left to the tolerance".into(), number),
-            ),
+            ("time step", step.unwrap_or("left to the tolerance".into())),
             ("tolerance", number(&self.tolerance)),
-            (
-                "stations",
-                (self.stations).map_or("of the grid".into(), |count| count.to_string()),
-            ),
+            ("stations", stations.unwrap_or("of the grid".into())),
         ]
     }
 
@@ -144,10 +139,6 @@ impl Checkpoint {
         self
     }
 
-    pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        json::write(self, out)
-    }
-
     /// Reads the checkpoint in a folder; refused if it is damaged or of another run.
     pub fn read(folder: &Path, asked: &Identity) -> Result<Self, FileError> {
         let file = &folder.join(FILE_NAME);
@@ -165,10 +156,13 @@ impl Checkpoint {
             return Err(damaged(file, "its content does not match its checksum"));
         }
         match found.run.difference(asked) {
-            Some(what) => Err(FileError(format!(
-                "cannot resume: {} is of another run: {what}; ask for the same run, or {BEGIN_ANEW}",
-                file.display()
-            ))),
+            Some(what) => {
+                let (file, change) = (file.display(), "ask for the same run");
+                let why = format!("{file} is of another run: {what}");
+                Err(FileError(format!(
+                    "cannot resume: {why}; {change}, or {BEGIN_ANEW}"
+                )))
+            }
             None => Ok(found),
         }
     }
@@ -207,7 +201,7 @@ fn number(digits: &str) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::sample;
+    use crate::report::{json, sample};
 
     fn identity() -> Identity {
         Identity::of(&sample::swing(1, 4).0, None)
@@ -224,7 +218,7 @@ mod tests {
         let checkpoint = Checkpoint::new(identity(), extents, 0.3, 12).with_state(&state);
         let folder = tempfile::tempdir().unwrap();
         let mut bytes = Vec::new();
-        checkpoint.write(&mut bytes).unwrap();
+        json::write(&checkpoint, &mut bytes).unwrap();
         fs::write(folder.path().join(FILE_NAME), bytes).unwrap();
         (folder, checkpoint)
     }

@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::checkpoint::{self, Checkpoint};
-use super::growing::Unfinished;
 use crate::files::atomic;
-use crate::report::FileError;
+use crate::report::{FileError, json};
 
 /// The state of a simulation at its last output.
 pub struct Latest {
     pub folder: PathBuf,
-    pub files: [Unfinished; 2],
+    /// Paths of the growing files, and those under which a resumed run looks for them.
+    pub files: [[PathBuf; 2]; 2],
     pub checkpoint: Checkpoint,
     /// The state of the motion.
     pub state: Vec<f64>,
@@ -50,14 +50,13 @@ fn write(latest: &mut Option<Latest>) -> Option<Result<f64, FileError>> {
     let file = latest.folder.join(checkpoint::FILE_NAME);
     let checkpoint = latest.checkpoint.with_state(&latest.state);
     let written = atomic::write_file(&file, |out| {
-        checkpoint.write(out)?;
+        json::write(&checkpoint, out)?;
         out.flush()?;
         // Last, because an older checkpoint needs its files until this one is written and
         // only has to be renamed.
-        latest.files.iter().try_for_each(Unfinished::keep)
+        let mut files = latest.files.iter();
+        files.try_for_each(|[draft, kept]| atomic::rename(draft, kept))
     });
-    Some(match written {
-        Ok(()) => Ok(checkpoint.time),
-        Err(reason) => Err(FileError::write(&file, reason)),
-    })
+    let written = written.map_err(|reason| FileError::write(&file, reason));
+    Some(written.map(|()| checkpoint.time))
 }

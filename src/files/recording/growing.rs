@@ -6,8 +6,8 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::checkpoint::{Extent, damaged, unreadable};
+use crate::checksum::Checksum;
 use crate::files::atomic::{self, Draft};
-use crate::files::checksum::Checksum;
 use crate::report::FileError;
 
 /// A file that grows.
@@ -22,20 +22,6 @@ pub struct GrowingFile {
     buffer: Vec<u8>,
 }
 
-/// The path of an unfinished file, and the one where another process looks for it.
-#[derive(Clone, Debug)]
-pub struct Unfinished {
-    draft: PathBuf,
-    kept: PathBuf,
-}
-
-impl Unfinished {
-    /// Renames the file so that another process finds it.
-    pub fn keep(&self) -> io::Result<()> {
-        atomic::rename(&self.draft, &self.kept)
-    }
-}
-
 /// Where an unfinished file is kept: `motion.csv.part`.
 pub fn kept_path(file: &Path) -> PathBuf {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
@@ -45,10 +31,8 @@ pub fn kept_path(file: &Path) -> PathBuf {
 impl GrowingFile {
     /// Begins a file with these bytes.
     pub fn begin(file: PathBuf, start: &[u8]) -> Result<Self, FileError> {
-        let (draft, out) = match Draft::begin(&file) {
-            Ok(begun) => begun,
-            Err(reason) => return Err(FileError::write(&file, reason)),
-        };
+        let begun = Draft::begin(&file).map_err(|reason| FileError::write(&file, reason));
+        let (draft, out) = begun?;
         let mut begun = GrowingFile {
             file,
             draft,
@@ -96,11 +80,9 @@ impl GrowingFile {
         resumed.ok_or_else(|| damaged(&kept, "it is not as checkpoint.json says"))
     }
 
-    pub fn unfinished(&self) -> Unfinished {
-        Unfinished {
-            draft: self.draft.path().into(),
-            kept: kept_path(&self.file),
-        }
+    /// The path of the unfinished file, and the one where another process looks for it.
+    pub fn unfinished(&self) -> [PathBuf; 2] {
+        [self.draft.path().into(), kept_path(&self.file)]
     }
 
     pub fn extent(&self) -> Extent {
@@ -170,7 +152,8 @@ mod tests {
         let mut file = GrowingFile::begin(path.clone(), b"one ").unwrap();
         let extent = write(&mut file, "two ");
         write(&mut file, "and a half-written thr");
-        file.unfinished().keep().unwrap();
+        let [draft, kept] = file.unfinished();
+        atomic::rename(&draft, &kept).unwrap();
         drop(file);
         assert!(kept_path(&path).exists());
 

@@ -20,9 +20,9 @@ use glam::DVec3;
 
 pub use checkpointer::Checkpointer;
 
-use super::{Selection, atomic, write_all};
+use super::{Kind, Selection, atomic, write_all};
 use crate::report::table::header;
-use crate::report::{Document, FileError, Kind};
+use crate::report::{Document, FileError};
 use crate::scenario;
 use crate::shape::equally_spaced;
 use crate::simulate::{Frame, Moment, Record, Simulation, Still, Stopped, film, stills};
@@ -97,7 +97,7 @@ impl Recording {
             let form = recording.form;
             let start = form.start(recording.size, outputs(simulation));
             let motion = GrowingFile::begin(folder.join(form.file_name()), &start)?;
-            let start = header(energy::Row::default());
+            let start = header(&energy::COLUMNS);
             let energy = GrowingFile::begin(folder.join(energy::FILE_NAME), &start)?;
             recording.growing = Some([motion, energy]);
         }
@@ -119,12 +119,10 @@ impl Recording {
         let mut recording = Recording::new(folder, simulation, selection);
         let found = Checkpoint::read(folder, &recording.run)?;
         let state = found.state().filter(|state| simulation.restore(state));
-        state.ok_or_else(|| {
-            damaged(
-                &folder.join(checkpoint::FILE_NAME),
-                "it does not fit the leaf, or a number of it is not finite",
-            )
-        })?;
+        if state.is_none() {
+            let why = "it does not fit the leaf, or a number of it is not finite";
+            return Err(damaged(&folder.join(checkpoint::FILE_NAME), why));
+        }
         let motion = folder.join(recording.form.file_name());
         let motion = GrowingFile::resume(motion, &found.motion)?;
         let energy = GrowingFile::resume(folder.join(energy::FILE_NAME), &found.energy)?;
@@ -222,11 +220,8 @@ impl Recording {
             None => {
                 let last = self.moments.len().saturating_sub(1);
                 let nodes = self.last.len() / self.size.rods;
-                split(
-                    &[last],
-                    &mem::take(&mut self.last),
-                    Size { nodes, ..self.size },
-                )
+                let size = Size { nodes, ..self.size };
+                split(&[last], &mem::take(&mut self.last), size)
             }
         };
         let moments = mem::take(&mut self.moments);

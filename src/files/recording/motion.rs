@@ -3,7 +3,6 @@
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
 use crate::report::table::{append_csv, header};
 use crate::simulate::Frame;
@@ -11,27 +10,12 @@ use crate::simulate::Frame;
 /// Most rows of a CSV file, some 60 MB.
 const MOST_ROWS: usize = 200_000;
 
-/// A row of the CSV file. Velocities and angular velocities are along the lab
+/// Columns of the CSV file. Velocities and angular velocities are along the lab
 /// axes.
-#[derive(Default, Serialize, Deserialize)]
-struct Row {
-    time: f64,
-    rod: usize,
-    sigma: f64,
-    x: f64,
-    y: f64,
-    z: f64,
-    qw: f64,
-    qx: f64,
-    qy: f64,
-    qz: f64,
-    vx: f64,
-    vy: f64,
-    vz: f64,
-    wx: f64,
-    wy: f64,
-    wz: f64,
-}
+const COLUMNS: [&str; 16] = [
+    "time", "rod", "sigma", "x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy",
+    "wz",
+];
 
 /// Numbers per node of a NumPy array: the columns from `x` on.
 const NUMBERS: usize = 13;
@@ -87,7 +71,7 @@ impl Form {
     /// The header of a file with this number of outputs.
     pub fn start(self, size: Size, outputs: usize) -> Vec<u8> {
         match self {
-            Form::Table => header(Row::default()),
+            Form::Table => header(&COLUMNS),
             Form::Array => npy_header(size, outputs),
         }
     }
@@ -96,7 +80,13 @@ impl Form {
     pub fn write(self, frame: &Frame, stations: &[f64], out: &mut Vec<u8>) -> io::Result<()> {
         let nodes = 0..frame.positions.len();
         match self {
-            Form::Table => append_csv(nodes.map(|node| row(frame, stations, node)), out),
+            Form::Table => {
+                let rows = nodes.map(|node| {
+                    let (rod, station) = (node / stations.len(), node % stations.len());
+                    (frame.time, rod + 1, stations[station], numbers(frame, node))
+                });
+                append_csv(rows, out)
+            }
             Form::Array => {
                 let numbers = nodes.flat_map(|node| numbers(frame, node));
                 out.extend(numbers.flat_map(f64::to_le_bytes));
@@ -126,37 +116,13 @@ impl Form {
 /// All numbers of a node.
 fn numbers(frame: &Frame, node: usize) -> [f64; NUMBERS] {
     let (r, q) = (frame.positions[node], frame.rotations[node]);
-    let (v, w) = (
-        frame.velocities[node].linear,
-        frame.velocities[node].angular,
-    );
+    let velocity = &frame.velocities[node];
+    let (v, w) = (velocity.linear, velocity.angular);
     [
         r.x, r.y, r.z, q.w, q.x, q.y, q.z, v.x, v.y, v.z, w.x, w.y, w.z,
     ]
     // Adding zero turns -0 into 0.
     .map(|value| value + 0.0)
-}
-
-fn row(frame: &Frame, stations: &[f64], node: usize) -> Row {
-    let [x, y, z, qw, qx, qy, qz, vx, vy, vz, wx, wy, wz] = numbers(frame, node);
-    Row {
-        time: frame.time,
-        rod: node / stations.len() + 1,
-        sigma: stations[node % stations.len()],
-        x,
-        y,
-        z,
-        qw,
-        qx,
-        qy,
-        qz,
-        vx,
-        vy,
-        vz,
-        wx,
-        wy,
-        wz,
-    }
 }
 
 fn read_rows(size: Size, outputs: &[usize], file: impl Read) -> io::Result<Vec<DVec3>> {
@@ -165,8 +131,8 @@ fn read_rows(size: Size, outputs: &[usize], file: impl Read) -> io::Result<Vec<D
     for (number, row) in rows.enumerate() {
         let row = row?;
         if outputs.binary_search(&(number / size.rows())).is_ok() {
-            let row: Row = row.deserialize(None)?;
-            points.push(DVec3::new(row.x, row.y, row.z));
+            let row: (f64, usize, f64, [f64; NUMBERS]) = row.deserialize(None)?;
+            points.push(DVec3::from_slice(&row.3));
         }
     }
     Ok(points)

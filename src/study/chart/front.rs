@@ -14,15 +14,6 @@ pub fn front(points: &[(f64, f64)], floor: f64) -> Vec<bool> {
         .collect()
 }
 
-/// The fastest of the points with an error of at most `error`.
-pub fn fastest(points: impl IntoIterator<Item = (f64, f64)>, error: f64) -> Option<usize> {
-    let points = points.into_iter().enumerate();
-    points
-        .filter(|(_, point)| point.1 <= error)
-        .min_by(|(_, a), (_, b)| a.0.total_cmp(&b.0))
-        .map(|(i, _)| i)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

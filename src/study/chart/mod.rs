@@ -80,12 +80,8 @@ pub fn chart(
         Ok((reference, rows, rounds))
     })?;
     let rods = scenario.rods.len();
-    let (peers, others) = peers::about(
-        &options.peers,
-        &scenario.name,
-        rods,
-        longest(&scenario.rods),
-    );
+    let longest = longest(&scenario.rods);
+    let (peers, others) = peers::about(&options.peers, &scenario.name, rods, longest);
     let mut remarks = rows::remarks(&rows, &options.contenders, reference.as_ref());
     remarks.extend(others);
     let chart = Chart {

@@ -83,9 +83,9 @@ pub fn about(
         let true_error = row.error.filter(|_| at_rest).map(|error| error / longest);
         let (knob, settings) = row.knob.split_once(' ').unwrap_or((&row.knob, ""));
         let name = format!("{} {settings}", row.program).trim_end().to_string();
-        let same = peers
-            .iter()
-            .position(|peer| peer.name == name && peer.knob == knob && peer.outcome == row.outcome);
+        let same =
+            |peer: &Peer| peer.name == name && peer.knob == knob && peer.outcome == row.outcome;
+        let same = peers.iter().position(same);
         let same = same.unwrap_or_else(|| {
             peers.push(Peer {
                 name,
@@ -117,10 +117,8 @@ pub fn about(
         remarks.push(format!("{} about another leaf, and left out", rows(other)));
     }
     if silent > 0 {
-        remarks.push(format!(
-            "{} without the error of a leaf at rest, and left out",
-            rows(silent)
-        ));
+        let what = "without the error of a leaf at rest, and left out";
+        remarks.push(format!("{} {what}", rows(silent)));
     }
     (peers, remarks)
 }

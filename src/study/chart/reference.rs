@@ -48,11 +48,8 @@ pub fn find(
     let stations = union(wanted.into_iter().chain(known.copied()).collect());
     let start = relaxed.as_ref().map_or(Start::Arcs, Answer::as_start);
     let precision = bvp::Precision::Error(SMALLEST_TOLERANCE);
-    let solved = bvp::solve(
-        scenario,
-        &bvp::Options::new(start, &stations, precision),
-        &mut |_| {},
-    );
+    let options = bvp::Options::new(start, &stations, precision);
+    let solved = bvp::solve(scenario, &options, &mut |_| {});
     let neutral = match &solved {
         Ok(solution) => solution.neutral.as_ref().map(ToString::to_string),
         Err(_) => None,
@@ -121,18 +118,14 @@ fn best_relaxed(scenario: &Scenario) -> Result<Option<Answer>, RelaxError> {
 /// The boundary-value solution, which is known at all stations, if both agree;
 /// otherwise the one with the smaller error estimate.
 fn choose(leaf: Answer, shot: Answer, confirmed: bool) -> (String, Answer) {
-    let (told, answer) = match (confirmed, leaf.error() < shot.error()) {
-        (true, _) => (
-            "relaxation and shooting agree within their error estimates",
-            shot,
-        ),
-        (false, true) => ("the relaxed leaf: shooting finds another shape", leaf),
-        (false, false) => (
-            "the boundary-value solution: the relaxed leaf has another shape",
-            shot,
-        ),
+    let leaf_is_better = leaf.error() < shot.error();
+    let told = match (confirmed, leaf_is_better) {
+        (true, _) => "relaxation and shooting agree within their error estimates",
+        (false, true) => "the relaxed leaf: shooting finds another shape",
+        (false, false) => "the boundary-value solution: the relaxed leaf has another shape",
     };
-    (told.into(), answer)
+    let takes_leaf = !confirmed && leaf_is_better;
+    (told.into(), if takes_leaf { leaf } else { shot })
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer};
 
-use super::front;
+use super::front::front;
 use super::peers::Peer;
 use super::plan::{Contender, Setting};
 use super::reference::Reference;
@@ -193,11 +193,11 @@ impl Chart {
 
     /// The fastest row with an error of at most `error` among those wanted.
     fn fastest(&self, error: f64, wanted: impl Fn(&Row) -> bool) -> Option<&Row> {
-        let points = self.rows.iter().map(|row| match row.point() {
-            Some(point) if wanted(row) => point,
-            _ => (f64::INFINITY, f64::INFINITY),
-        });
-        front::fastest(points, error).map(|place| &self.rows[place])
+        let rows = self.rows.iter().filter(|row| wanted(row));
+        let timed = rows.filter_map(|row| Some((row.point()?, row)));
+        let accurate = timed.filter(|((_, its_error), _)| *its_error <= error);
+        let fastest = accurate.min_by(|((a, _), _), ((b, _), _)| a.total_cmp(b));
+        fastest.map(|(_, row)| row)
     }
 
     fn decade(&self, error: f64) -> Decade {
@@ -223,7 +223,7 @@ impl Chart {
         let points = self.rows.iter().map(Row::point);
         let points = points.chain(self.peers.iter().map(Peer::point));
         let points: Vec<(f64, f64)> = points.map(|point| point.unwrap_or(NOWHERE)).collect();
-        let mut marks = front::front(&points, self.floor()).into_iter();
+        let mut marks = front(&points, self.floor()).into_iter();
         for (row, on_front) in self.rows.iter_mut().zip(&mut marks) {
             row.pareto = Some(on_front && row.point().is_some());
         }

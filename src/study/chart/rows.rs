@@ -39,13 +39,6 @@ struct Judged<'a> {
     error: Option<f64>,
 }
 
-impl<'a> Judged<'a> {
-    /// The answer, if the leaf is at rest.
-    fn at_rest(&self) -> Option<&'a Answer> {
-        self.measured.answer().filter(|run| run.at_rest())
-    }
-}
-
 /// The rows of cells of one leaf.
 pub fn rows(
     scenario: &Scenario,
@@ -55,14 +48,12 @@ pub fn rows(
 ) -> Vec<Row> {
     let unit = longest(&scenario.rods);
     let judged = cells.iter().zip(measured).map(|(cell, measured)| {
-        let mut judged = Judged {
+        let distance = reference.and_then(|it| measured.at_rest()?.distance(it));
+        Judged {
             cell,
             measured,
-            error: None,
-        };
-        let distance = reference.and_then(|it| judged.at_rest()?.distance(it));
-        judged.error = distance.map(|distance| distance / unit);
-        judged
+            error: distance.map(|distance| distance / unit),
+        }
     });
     let judged: Vec<Judged> = judged.collect();
     (0..judged.len())
@@ -73,7 +64,7 @@ pub fn rows(
 /// Whether the error of a run is due to another equilibrium.
 fn is_elsewhere(i: usize, judged: &[Judged], unit: f64) -> bool {
     let this = &judged[i];
-    let (Some(answer), Some(error)) = (this.at_rest(), this.error) else {
+    let (Some(answer), Some(error)) = (this.measured.at_rest(), this.error) else {
         return false;
     };
     if error <= ELSEWHERE {
@@ -87,14 +78,12 @@ fn is_elsewhere(i: usize, judged: &[Judged], unit: f64) -> bool {
     // or the next grid has nearly the same shape.
     let alike = |other: &&Judged| other.cell.contender == this.cell.contender;
     let mut coarser = judged[..i].iter().filter(alike);
-    if coarser.any(|it| {
-        it.error
-            .is_some_and(|error_there| error_there < MUCH_LESS * error)
-    }) {
+    if coarser.any(|it| it.error.is_some_and(|there| there < MUCH_LESS * error)) {
         return true;
     }
-    let finer = judged[i + 1..].iter().find(alike).and_then(Judged::at_rest);
-    let coarser = || judged[..i].iter().rfind(alike)?.at_rest();
+    let finer = judged[i + 1..].iter().find(alike);
+    let finer = finer.and_then(|it| it.measured.at_rest());
+    let coarser = || judged[..i].iter().rfind(alike)?.measured.at_rest();
     let next = finer.or_else(coarser);
     let apart = next.and_then(|next| answer.distance(next));
     apart.is_some_and(|apart| apart / unit < MUCH_LESS * error)
@@ -149,14 +138,12 @@ pub fn remarks(
     let floor = reference.map_or(0.0, |found| found.known_within);
     let neutral = reference.and_then(|found| found.neutral.as_ref());
     let mut remarks = Vec::new();
-    if contenders
-        .iter()
-        .any(|contender| matches!(contender.method, Method::Explicit { .. }))
-    {
-        remarks.push(
-            "explicit relaxation has no knob for its time step: it takes the longest stable one"
-                .into(),
-        );
+    let mut methods = contenders.iter().map(|contender| contender.method);
+    if methods.any(|method| matches!(method, Method::Explicit { .. })) {
+        let step = "it takes the longest stable one";
+        remarks.push(format!(
+            "explicit relaxation has no knob for its time step: {step}"
+        ));
     }
     if let Some(neutral) = neutral {
         remarks.push(format!(
@@ -179,20 +166,16 @@ fn remarks_on(contender: Contender, rows: &[Row], floor: f64, neutral: bool) -> 
         remarks.push(format!("{word} is not charted: {why}"));
     }
     if let Some(first) = of_it().find(|row| row.ending == Ending::NotRun) {
-        remarks.push(format!(
-            "{word} is not run from {} on: the run before took too long; allow more --seconds",
-            first.knob
-        ));
+        let why = "the run before took too long; allow more --seconds";
+        remarks.push(format!("{word} is not run from {} on: {why}", first.knob));
     }
     // Estimates that are smaller than the true error are reported here.
     let too_small = |row: &&Row| {
         let estimate = row.error_estimate.unwrap_or(f64::INFINITY).max(floor);
         row.ending.is_success() && row.true_error.is_some_and(|error| error > estimate)
     };
-    let knobs: Vec<String> = of_it()
-        .filter(too_small)
-        .map(|row| row.knob.to_string())
-        .collect();
+    let knobs = of_it().filter(too_small).map(|row| row.knob.to_string());
+    let knobs: Vec<String> = knobs.collect();
     if !knobs.is_empty() && !neutral {
         let knobs = knobs.join(", ");
         remarks.push(format!("{word} underestimates its error at {knobs}"));

@@ -53,10 +53,9 @@ pub fn scaling(
     let (rows, unconfirmed) = on_one_thread(options.seconds, || {
         measure(&leaves, tolerance, options, progress)
     })?;
+    let first = leaves.first();
     Ok(Scaling {
-        scenario: leaves
-            .first()
-            .map_or(String::new(), |leaf| leaf.name.clone()),
+        scenario: first.map_or(String::new(), |leaf| leaf.name.clone()),
         tolerance,
         unconfirmed,
         rows,
@@ -120,16 +119,10 @@ fn measure(
     }
     let (measured, _) = timing::measure(&cells, options.seconds, progress);
     for ((cell, leaf), measured) in cells.iter().zip(of_leaf).zip(measured) {
-        let row = rows::rows(
-            leaf.scenario,
-            &[*cell],
-            &[measured],
-            leaf.reference.as_ref(),
-        );
-        rows.extend(row.into_iter().map(|row| ScalingRow {
-            rods: leaf.scenario.rods.len(),
-            row,
-        }));
+        let (scenario, reference) = (leaf.scenario, leaf.reference.as_ref());
+        let rods = scenario.rods.len();
+        let row = rows::rows(scenario, &[*cell], &[measured], reference);
+        rows.extend(row.into_iter().map(|row| ScalingRow { rods, row }));
     }
     let order = |contender| Contender::ALL.iter().position(|other| *other == contender);
     rows.sort_by_key(|found| (order(found.row.contender), found.rods));

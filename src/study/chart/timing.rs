@@ -44,6 +44,11 @@ impl Measured {
     pub fn answer(&self) -> Option<&Answer> {
         self.found.as_ref()?.as_ref().ok()
     }
+
+    /// The answer, if the leaf is at rest.
+    pub fn at_rest(&self) -> Option<&Answer> {
+        self.answer().filter(|run| run.at_rest())
+    }
 }
 
 /// The spread of repeated measurements, in seconds.

@@ -125,10 +125,8 @@ impl<'a> Cell<'a> {
             MapMethod::ToRest(method) => !method.is_shooting(),
         };
         if on_grid && nodes as f64 * LEAST_SECONDS > self.limit.as_secs_f64() {
-            let why = format!(
-                "{nodes} nodes take longer than {} s",
-                self.limit.as_secs_f64()
-            );
+            let limit = self.limit.as_secs_f64();
+            let why = format!("{nodes} nodes take longer than {limit} s");
             return (Err((MapOutcome::OutOfTime, why)), 0.0);
         }
         within(self.limit, self.all, |limit| match method {
@@ -178,10 +176,8 @@ impl<'a> Cell<'a> {
         };
         let neutral = solution.neutral.as_ref();
         let neutral = neutral.map_or(String::new(), |neutral| format!("; {neutral}"));
-        let note = format!(
-            "over {intervals}, growth 10^{:.1}{neutral}",
-            solution.growth
-        );
+        let growth = solution.growth;
+        let note = format!("over {intervals}, growth 10^{growth:.1}{neutral}");
         let answer = Answer::of_solution(self.scenario, solution, accuracy);
         if !answer.outcome.is_success() {
             let known = format!("the solution is only known within {:.1e}", answer.error());
@@ -197,10 +193,10 @@ impl<'a> Cell<'a> {
     fn shoot_from_rest(&self, accuracy: f64, limit: &Limit) -> Found {
         match &self.relaxed.0 {
             Ok(relaxed) => self.shoot(relaxed.as_start(), accuracy, None, limit),
-            Err((outcome, why)) => Err((
-                *outcome,
-                format!("the leaf to start from is not at rest: {why}"),
-            )),
+            Err((outcome, why)) => {
+                let why = format!("the leaf to start from is not at rest: {why}");
+                Err((*outcome, why))
+            }
         }
     }
 
@@ -211,10 +207,8 @@ impl<'a> Cell<'a> {
             return (MapOutcome::Saddle, format!("index {index}; {note}"));
         }
         let (Some(reference), Some(distance)) = (&self.reference, distance) else {
-            return (
-                MapOutcome::Right,
-                format!("stable, with nothing to compare with; {note}"),
-            );
+            let text = format!("stable, with nothing to compare with; {note}");
+            return (MapOutcome::Right, text);
         };
         if answer.confirms(reference, distance) {
             return (MapOutcome::Right, note.into());
@@ -223,10 +217,8 @@ impl<'a> Cell<'a> {
             lower if lower < 0.0 => format!("energy lower by {:.1e}", -lower),
             higher => format!("energy higher by {higher:.1e}"),
         };
-        let text = format!(
-            "{:.1e} lengths from the reference, {lower}; {note}",
-            distance / longest(&self.scenario.rods)
-        );
+        let apart = distance / longest(&self.scenario.rods);
+        let text = format!("{apart:.1e} lengths from the reference, {lower}; {note}");
         match self.is_elsewhere(answer, reference, distance) {
             true => (MapOutcome::OtherEquilibrium, text),
             false => (MapOutcome::Inaccurate, text),
@@ -275,10 +267,8 @@ pub fn relaxed(scenario: &Scenario, method: Method, tolerance: f64, limit: &Limi
     };
     let leaf = relax::relax(scenario, &options, &mut |_| {});
     let leaf = leaf.map_err(|refused| (MapOutcome::Refused, refused.to_string()))?;
-    let saddle = leaf
-        .stability
-        .saddle
-        .map(|saddle| saddle.negative_eigenvalues);
+    let saddle = leaf.stability.saddle;
+    let saddle = saddle.map(|saddle| saddle.negative_eigenvalues);
     let mut answer = Answer::from(leaf);
     if !answer.outcome.is_success() {
         let outcome = match answer.outcome {

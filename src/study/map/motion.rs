@@ -46,29 +46,23 @@ pub fn answer(scenario: &Scenario, knobs: Knobs, tolerance: f64, limit: &Limit) 
         return refused("no time step is stable for rigid rods (a stiffness is inf)".into());
     };
     let stable = motion.stable_step();
-    let note = format!(
-        "step {:.3e}, stable up to {:.3e} because of {}",
-        step,
-        stable.step * physics.time,
-        stable.limit
-    );
+    let (most, why) = (stable.step * physics.time, stable.limit);
+    let note = format!("step {step:.3e}, stable up to {most:.3e} because of {why}");
     let failed = |outcome, what: String| Err((outcome, format!("{what}; {note}")));
     let (duration, _) = physics.duration();
     while motion.time() < duration {
         let until = motion.time() + LOOK * h;
         if let Err(stopped) = motion.advance(until.min(duration)) {
+            let (Stopped::Unresolved { time, .. }
+            | Stopped::Diverged { time, .. }
+            | Stopped::StepTooShort { time, .. }) = stopped;
+            let at = format!("at t = {:.3e}", time * physics.time);
             return match stopped {
-                Stopped::Unresolved { time, turn, .. } => failed(
-                    MapOutcome::NotConverged,
-                    format!(
-                        "at t = {:.3e} a segment bends by {turn:.2} rad, more than it resolves",
-                        time * physics.time
-                    ),
-                ),
-                Stopped::Diverged { time, .. } | Stopped::StepTooShort { time, .. } => failed(
-                    MapOutcome::Diverged,
-                    format!("energy from nowhere at t = {:.3e}", time * physics.time),
-                ),
+                Stopped::Unresolved { turn, .. } => {
+                    let bent = format!("a segment bends by {turn:.2} rad, more than it resolves");
+                    failed(MapOutcome::NotConverged, format!("{at} {bent}"))
+                }
+                _ => failed(MapOutcome::Diverged, format!("energy from nowhere {at}")),
             };
         }
         if limit.reached() {
@@ -144,13 +138,8 @@ pub fn stations(scenario: &Scenario, knobs: Knobs) -> Vec<f64> {
         Ok(segments) if knobs.segments.is_some() => {
             let grid = fine_grid(scenario, segments);
             let every = grid.segments().div_ceil(MOST_STATIONS);
-            let tip = [1.0].into_iter();
-            grid.sigma()
-                .iter()
-                .copied()
-                .step_by(every)
-                .chain(tip)
-                .collect()
+            let some = grid.sigma().iter().copied().step_by(every);
+            some.chain([1.0]).collect()
         }
         _ => vec![0.0, 1.0],
     }

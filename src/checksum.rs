@@ -1,8 +1,8 @@
-//! Checksums of files, to detect damage.
+//! Checksums of files and texts, to detect damage and changes.
 
 use std::fmt::{self, Display};
 
-/// The 64-bit FNV-1a hash: detects damage, not malice.
+/// The 64-bit FNV-1a hash, stable across releases: detects damage, not malice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Checksum(u64);
 
