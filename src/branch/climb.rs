@@ -119,7 +119,7 @@ impl Equations<'_> {
         let modes = self.soft_modes(point, SOFT)?;
         let linear = self.linearise(&mut point.state.clone(), point.fraction)?;
         let border = [self.momentum(&modes[0])];
-        let solved = self.solve_shifted(&border, &linear.forces, &[], 0.0)?;
+        let solved = self.solve_bordered(&border, &linear.forces, &[], 0.0)?;
         Ok(-solved.h[(0, 0)] / self.mass)
     }
 
@@ -210,7 +210,7 @@ impl Equations<'_> {
         let mut shift = linear.shift;
         while shift < LARGEST_SHIFT {
             let solved = self
-                .solve_shifted(&border, &linear.forces, &[], shift)
+                .solve_bordered(&border, &linear.forces, &[], shift)
                 .ok()?;
             // One negative eigenvalue is due to the border.
             if solved.negative <= 1 {

@@ -136,6 +136,11 @@ impl<'a> Equations<'a> {
         times(&self.system.momentum(a), 1.0 / self.mass)
     }
 
+    /// The same for each of these.
+    pub(super) fn momenta(&self, all: &[Field]) -> Vec<Field> {
+        all.iter().map(|a| self.momentum(a)).collect()
+    }
+
     pub(super) fn rods(&self) -> usize {
         self.system.rods()
     }

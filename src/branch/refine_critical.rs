@@ -176,9 +176,9 @@ fn extrapolated(
     let mut found = Vec::new();
     let mut near = critical.clone();
     for k in (0..CUBIC.len()).rev() {
-        let soft = family.softened(softening * (k + 1) as f64);
         let mut equations = Equations::new(family, grid.clone())?;
-        equations.softened = Some(Leaves::new(&soft, grid.clone()));
+        let softening = softening * (k + 1) as f64;
+        equations.softened = Some(Leaves::softened(family, grid.clone(), softening));
         near = near.relocated(&mut equations)?;
         found.push(Values::of(&mut equations, &near.state, near.fraction)?);
     }

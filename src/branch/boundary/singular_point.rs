@@ -98,26 +98,46 @@ impl SingularPoint {
             kind: critical.kind,
             neutral: critical.modes.len(),
             soft,
-            tangent: along.clone(),
-            normal: across.clone(),
+            tangent: along,
+            normal: across,
             slope,
             index: 0,
             others: Vec::new(),
             speed: 0.0,
             heading: [0.0; 2],
         };
-        let found = Search {
-            solution: &like.solution,
-            across: &across,
-            slope,
-            along: &along,
-            soft: &like.soft,
-            neutral: like.neutral,
-            accuracy: 1e-11,
-            furthest: 0.1,
-        };
-        let found = found.secant(manifold)?;
+        let search = like.search(manifold, None, like.solution.clone(), (1e-11, 0.1));
+        let found = search.secant(manifold)?;
         like.completed(manifold, found)
+    }
+
+    /// The search for a point of the boundary near this one, from `solution`: in the plane normal
+    /// to the tangent here or, if a parameter is `given`, with its value constant. To this
+    /// accuracy, and not further than this.
+    pub fn search(
+        &self,
+        manifold: &Manifold,
+        given: Option<usize>,
+        solution: Solution,
+        (accuracy, furthest): (f64, f64),
+    ) -> Search {
+        let (across, slope, along) = match given {
+            Some(which) => {
+                let (across, slope) = self.across_at(manifold, which);
+                (across, slope, manifold.unit_parameter(which))
+            }
+            None => (self.normal.clone(), self.slope, self.tangent.clone()),
+        };
+        Search {
+            solution,
+            across,
+            slope,
+            along,
+            soft: self.soft.clone(),
+            neutral: self.neutral,
+            accuracy,
+            furthest,
+        }
     }
 
     /// The boundary point that was found from this one, with the directions of this one.
@@ -138,11 +158,7 @@ impl SingularPoint {
         manifold: &mut Manifold,
         found: Found,
     ) -> Result<SingularPoint, NotFound> {
-        let border = self
-            .soft
-            .iter()
-            .map(|mode| manifold.equations.momentum(mode));
-        let border: Vec<Field> = border.collect();
+        let border = manifold.equations.momenta(&self.soft);
         let sample = manifold.sample_at_rest(found.sample.solution, &border)?;
         let eigen = search::eigen(&sample, self.neutral);
         let basis = self.basis(manifold, &sample, &eigen)?;
@@ -196,10 +212,7 @@ impl SingularPoint {
         soft: &[Field],
     ) -> Result<[f64; 2], NotFound> {
         let modes = &soft[..self.neutral.min(soft.len())];
-        let border: Vec<Field> = soft
-            .iter()
-            .map(|it| manifold.equations.momentum(it))
-            .collect();
+        let border = manifold.equations.momenta(soft);
         let stiff = manifold.leaf(sample.solution.params)?.stiffest() * STIFF <= 1.0;
         let mut change = [0.0; 2];
         for (change, direction) in change.iter_mut().zip(basis) {
