@@ -1,5 +1,7 @@
 //! Equilibria at points of the parameter plane, each continued from a neighbouring one.
 
+use glam::DVec3;
+
 use super::manifold::Solution;
 use super::plane::Plane;
 use crate::branch::Point;
@@ -41,7 +43,7 @@ pub struct Path {
     /// The grid on which it was followed, if that could be begun.
     pub grid: Option<Grid>,
     /// Tips of all rods along it, in the family's units.
-    pub tips: Vec<Vec<[f64; 3]>>,
+    pub tips: Vec<Vec<DVec3>>,
     /// Its critical points on that grid; the parameter goes from 0 to 1 along the path.
     pub critical: Vec<Critical>,
     /// Whether the branch turns back before the end of the path.
@@ -142,9 +144,9 @@ fn follow(equations: &mut Equations, first: &Point, path: &mut Path) -> Option<P
     }
 }
 
-fn tips(point: &Point) -> Vec<[f64; 3]> {
+fn tips(point: &Point) -> Vec<DVec3> {
     let state = &point.state;
-    (0..state.rods()).map(|j| state.tip(j).to_array()).collect()
+    (0..state.rods()).map(|j| state.tip(j)).collect()
 }
 
 /// A critical point on the path between two points of the plane, extrapolated over grids.

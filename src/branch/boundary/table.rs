@@ -1,5 +1,7 @@
 //! A point of a boundary, extrapolated over finer and finer grids.
 
+use glam::DVec3;
+
 use super::manifold::{Direction, Manifold};
 use super::search::NotFound;
 use super::singular_point::SingularPoint;
@@ -22,7 +24,7 @@ pub struct Verified {
     pub params: [f64; 2],
     pub errors: [f64; 2],
     /// Tips of all rods, in the family's units, and a bound on their error.
-    pub tips: Vec<[f64; 3]>,
+    pub tips: Vec<DVec3>,
     pub error: f64,
     /// The state on the finest grid.
     pub state: State,
@@ -185,7 +187,7 @@ impl Table {
                 }
                 false => 0.0,
             }),
-            tips: tips.chunks(3).map(|tip| [tip[0], tip[1], tip[2]]).collect(),
+            tips: tips.chunks(3).map(DVec3::from_slice).collect(),
             // No tip is more accurate than machine precision.
             error: (self.tips.best()).map_or(f64::INFINITY, |best| {
                 best.error + KEPT * self.iteration_error + f64::EPSILON

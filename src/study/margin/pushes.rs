@@ -86,7 +86,7 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
         more_than: None,
         then: Some(then),
         neighbour: rest_after_fold(stable, &mut grids, (critical, refined), &starts),
-        tips: tips(stable, refined),
+        tips: family.tips(&refined.tips),
         mirrored: false,
         remark: None,
     };
@@ -189,7 +189,7 @@ fn rest_after_fold(
     let scale = family.scale();
     Some(Neighbour {
         energy: rest.energy * scale.moment(),
-        tip: DVec3::from_array(*rest.tips.first()?) * scale.length,
+        tip: *rest.tips.first()? * scale.length,
     })
 }
 
@@ -213,16 +213,4 @@ fn starts(grids: &mut Grids, critical: &Critical) -> Vec<StartPoint> {
         direction: direction(sign),
     };
     signs.into_iter().map(start).collect()
-}
-
-/// Tips in the scenario's units: the shared one alone, or each.
-fn tips(stable: &Stable, refined: &Refined) -> Vec<DVec3> {
-    let length = stable.scenario.scale().length;
-    let count = if stable.scenario.joined {
-        1
-    } else {
-        usize::MAX
-    };
-    let tips = refined.tips.iter().take(count);
-    tips.map(|tip| DVec3::from_array(*tip) * length).collect()
 }
