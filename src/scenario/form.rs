@@ -6,7 +6,7 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 use super::error::{Place, ScenarioError};
 use super::key::Range;
 use super::section::{Outline, Section};
-use super::{Key, Profile, Rod, Scenario, Schedule, Start};
+use super::{Key, Profile, Rod, Scenario, Schedule, Start, ascending};
 
 /// A value to be written.
 enum Written<'a> {
@@ -212,9 +212,7 @@ fn quantity<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Written<'static>
         return number_or_list(profiles.iter().map(|profile| profile.at(0.0)));
     }
     let kinks = profiles.iter().flat_map(|profile| profile.kinks());
-    let mut at: Vec<f64> = [0.0, 1.0].iter().chain(kinks).copied().collect();
-    at.sort_by(f64::total_cmp);
-    at.dedup();
+    let at = ascending([0.0, 1.0].iter().chain(kinks).copied());
     let values = |profile: &Profile| list(at.iter().map(|&sigma| profile.at(sigma)));
     let value = match profiles.iter().all(|profile| *profile == profiles[0]) {
         true => values(profiles[0]),
