@@ -104,6 +104,12 @@ impl Case {
             start: OnceLock::new(),
         }
     }
+
+    /// Its position in the data as the beginning of a message, if it has one.
+    pub fn place(&self) -> String {
+        let origin = self.origin.as_ref();
+        origin.map_or_else(String::new, |origin| format!("{origin}: "))
+    }
 }
 
 impl CaseAt {

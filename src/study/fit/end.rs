@@ -56,7 +56,7 @@ type Known = (DVector<f64>, Point);
 pub(super) fn ends(near: &Neighbourhood, k: usize, first: f64, half: f64) -> Option<Ends> {
     let stats = near.stats;
     let slopes = near.slopes();
-    let along = stats.conditional(k, OPEN);
+    let along = stats.conditional(k);
     let mut known: Option<Known> = None;
     if half <= OPEN {
         let expected = stats.quantile.powi(2);

@@ -156,7 +156,7 @@ fn fate(stable: &Stable, grids: &mut Grids, critical: &Critical) -> Fate {
     if critical.kind == Kind::Fold {
         return Fate::Snaps;
     }
-    let branches = switch(grids.of(&critical.state), critical, 0, stable.accuracy);
+    let branches = switch(grids.of(&critical.state), critical, stable.accuracy);
     match branches.iter().any(|point| point.index == 0) {
         true => Fate::BendsAside,
         false => Fate::Snaps,

@@ -208,7 +208,7 @@ impl Run<'_, '_> {
             self.crossings.push(refined.clone());
             // If several modes become neutral at once due to symmetry, the branches
             // of all their combinations are rotated copies of each other.
-            let new = switch(self.grids.of(&critical.state), critical, 0, self.tolerance);
+            let new = switch(self.grids.of(&critical.state), critical, self.tolerance);
             let new = new.into_iter();
             let from = Some([number, after + 1 + which]);
             entrances.extend(new.map(|point| (point, from)));
