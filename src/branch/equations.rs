@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::family::{Family, Leaves, OutOfRange, clamp};
 use super::field::{add, between, dot, is_finite, largest, plus, times};
-use super::states::{advanced, forces_on, rate};
+use super::states::{advanced, forces_on, rate, stiffest_condensed};
 use super::{Point, Tangent};
 use crate::leaf::{DiscreteLeaf, Field, Grid, Solved, SparseFactor, SparsePattern, State, System};
 use crate::newton::{Contraction, converged};
@@ -159,6 +159,14 @@ impl<'a> Equations<'a> {
         }
     }
 
+    /// The one of two opposite directions that is more along another one.
+    pub(super) fn oriented(&self, t: Tangent, along: &Tangent) -> Tangent {
+        match self.inner(&t, along) < 0.0 {
+            true => reversed(t),
+            false => t,
+        }
+    }
+
     /// The state `step` further along a direction, for the leaf at this fraction.
     pub fn moved(
         &mut self,
@@ -241,8 +249,8 @@ impl<'a> Equations<'a> {
             through: None,
         });
         let (mut point, iterations) = self.correct_within(state, fraction, plane.as_ref())?;
-        if normal.is_some_and(|normal| self.inner(&point.tangent, normal) < 0.0) {
-            point.tangent = reversed(point.tangent);
+        if let Some(normal) = normal {
+            point.tangent = self.oriented(point.tangent, normal);
         }
         Ok((point, iterations))
     }
@@ -355,8 +363,7 @@ pub(super) fn assembled(
     if !turn.is_finite() || turn > RESOLVED_TURN {
         return Err(Stuck::Unresolved);
     }
-    let sections = leaf.sections.iter();
-    let stiffest = sections.fold(1.0, |m: f64, s| m.max(s.condensing.max_element()));
+    let stiffest = stiffest_condensed(leaf).max(1.0);
     Ok((system.rhs(), ROUNDING * f64::EPSILON * stiffest))
 }
 

@@ -7,6 +7,7 @@ use super::family::{Family, Leaves};
 use super::field::prolong as prolong_field;
 use super::refine::{FINEST, GRIDS, STILL};
 use super::refined::{Doubt, Refined, Table, Values};
+use super::states::stiffest_condensed;
 use crate::leaf::Grid;
 use crate::relax::prolong::prolong;
 
@@ -114,8 +115,7 @@ impl Softening {
     ) -> Result<(Values, f64), Stuck> {
         let leaf = equations.leaves.at(critical.fraction)?;
         let rigid = leaf.stiffest() * NEARLY_RIGID < 1.0;
-        let condensing = leaf.sections.iter().map(|it| it.condensing.max_element());
-        let mut stiffest = condensing.fold(0.0_f64, f64::max);
+        let mut stiffest = stiffest_condensed(leaf);
         let segments = leaf.segments() as f64;
         let fold = critical.kind == Kind::Fold;
         let mut growth = 1.0;

@@ -27,6 +27,12 @@ pub fn rate<E>(mut forces: impl FnMut(f64) -> Result<Field, E>) -> Result<Field,
     Ok(times(&rate, 1.0 / (after - before)))
 }
 
+/// The largest stiffness in stretch and shear with which segment forces are condensed out.
+pub fn stiffest_condensed(leaf: &DiscreteLeaf) -> f64 {
+    let stiffnesses = leaf.sections.iter().map(|it| it.condensing.max_element());
+    stiffnesses.fold(0.0, f64::max)
+}
+
 /// The unbalanced forces on a leaf in a state whose clamped nodes are put where it clamps them.
 pub fn forces_on(leaf: &DiscreteLeaf, state: &State, system: &mut System) -> Field {
     let mut moved = state.clone();

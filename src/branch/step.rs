@@ -1,7 +1,7 @@
 //! One step along a branch, which may end where the range of the parameter does.
 
 use super::Point;
-use super::equations::{Equations, Stuck, reversed};
+use super::equations::{Equations, Stuck};
 use super::family::OutOfRange;
 
 /// A point found by a step.
@@ -94,8 +94,6 @@ fn at_edge(
     let increments = &now.tangent.increments;
     let state = equations.moved(&now.state, edge, increments, length)?;
     let (mut point, iterations) = equations.correct(&state, edge, None)?;
-    if equations.inner(&point.tangent, &now.tangent) < 0.0 {
-        point.tangent = reversed(point.tangent);
-    }
+    point.tangent = equations.oriented(point.tangent, &now.tangent);
     Ok((point, iterations))
 }

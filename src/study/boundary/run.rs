@@ -5,11 +5,11 @@ use std::time::Instant;
 use super::known::{Start, coarsened, remove_known, traced};
 use super::map::{Cells, Unexplained};
 use super::neighbours::add_leaves;
-use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, CurveEnd, word};
+use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, word};
 use super::{BoundaryRequest, MOST_CURVES};
 use crate::branch::Family;
 use crate::branch::boundary::{
-    self as curves, Accuracy, AtRest, Plane, Solution, Verified, WalkOptions,
+    self as curves, Accuracy, AtRest, Halt, Plane, Solution, Verified, WalkOptions,
 };
 use crate::scenario::Scenario;
 use crate::study::trace::{Trace, TraceError, TraceRequest};
@@ -146,7 +146,7 @@ fn walk_options(request: &BoundaryRequest, tolerance: f64) -> WalkOptions {
 /// of the first trace are.
 fn conclude(boundary: &mut Boundary, traced: bool) {
     let curves = &boundary.curves;
-    let whole = (curves.iter().flat_map(|curve| curve.ends)).all(CurveEnd::complete);
+    let whole = (curves.iter().flat_map(|curve| curve.ends)).all(Halt::complete);
     if curves.is_empty() && boundary.remark.is_none() {
         let [vary, across] = &boundary.keys;
         let at = across.text(boundary.start);
@@ -244,7 +244,7 @@ fn in_units(plane: &Plane, curve: &curves::Boundary) -> BoundaryCurve {
     BoundaryCurve {
         kind: curve.kind,
         multiplicity: curve.neutral,
-        ends: curve.ends.map(CurveEnd),
+        ends: curve.ends,
         points: (curve.points.iter().enumerate())
             .map(|(k, point)| point_in_units(plane, k + 1, point))
             .collect(),

@@ -35,25 +35,27 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
         scenario.tip_force[direction.axis] += direction.sign() * force;
         Ok(scenario)
     };
-    let unknown = |why: String| {
-        let push = Push {
-            direction,
-            kind: Loss::Unknown,
-            force: None,
-            error: None,
-            per_weight: None,
-            more_than: Some(0.0),
-            then: None,
-            neighbour: None,
-            tips: Vec::new(),
-            mirrored: false,
-            remark: Some(why),
-        };
-        (push, Vec::new())
+    let unknown = Push {
+        direction,
+        kind: Loss::Unknown,
+        force: None,
+        error: None,
+        per_weight: None,
+        more_than: None,
+        then: None,
+        neighbour: None,
+        tips: Vec::new(),
+        mirrored: false,
+        remark: None,
+    };
+    let failed = |why: String| Push {
+        more_than: Some(0.0),
+        remark: Some(why),
+        ..unknown.clone()
     };
     let family = match Family::new(&make, (0.0, stable.largest), false) {
         Ok(family) => family,
-        Err(out) => return unknown(out.to_string()),
+        Err(out) => return (failed(out.to_string()), Vec::new()),
     };
     let followed = Grids::new(&family, stable.grid.clone())
         .map_err(Stuck::from)
@@ -63,19 +65,17 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
         });
     let (mut grids, followed) = match followed {
         Ok(followed) => followed,
-        Err(stuck) => return unknown(stuck.to_string()),
+        Err(stuck) => return (failed(stuck.to_string()), Vec::new()),
     };
     let critical = followed.branch.critical.iter().zip(&followed.critical);
     let lost = |critical: &Critical| critical.indices[0] == 0 && critical.indices[1] > 0;
     let Some(((_, critical), refined)) = critical.into_iter().find(|((_, it), _)| lost(it)) else {
-        let push = not_lost(stable, &followed, &unknown(String::new()).0);
-        return (push, Vec::new());
+        return (not_lost(stable, &followed, unknown), Vec::new());
     };
     let force = refined.fraction * stable.largest;
     let then = fate(stable, &mut grids, critical);
     let starts = starts(&mut grids, critical);
     let push = Push {
-        direction,
         kind: match critical.kind {
             Kind::Fold => Loss::Fold,
             Kind::Branching => Loss::BranchPoint,
@@ -83,12 +83,10 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
         force: Some(force),
         error: Some(refined.fraction_error * stable.largest + rounding(stable, force, weight)),
         per_weight: (weight > 0.0).then(|| force / weight),
-        more_than: None,
         then: Some(then),
         neighbour: rest_after_fold(stable, &mut grids, (critical, refined), &starts),
         tips: family.tips(&refined.tips),
-        mirrored: false,
-        remark: None,
+        ..unknown
     };
     (push, starts)
 }
@@ -126,7 +124,7 @@ fn follow(stable: &Stable, direction: Direction, grids: &mut Grids) -> Result<Fo
 }
 
 /// The result of a push under which the leaf was stable as far as it was followed.
-fn not_lost(stable: &Stable, followed: &Followed, unknown: &Push) -> Push {
+fn not_lost(stable: &Stable, followed: &Followed, unknown: Push) -> Push {
     let points = followed.branch.points.iter().zip(&followed.points);
     let stably = points.take_while(|(point, _)| point.index == 0);
     let furthest = stably.fold(0.0, |most: f64, (_, refined)| most.max(refined.fraction));
@@ -146,7 +144,7 @@ fn not_lost(stable: &Stable, followed: &Followed, unknown: &Push) -> Push {
                 Some("the branch could not be followed further".into())
             }
         },
-        ..unknown.clone()
+        ..unknown
     }
 }
 
