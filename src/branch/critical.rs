@@ -113,7 +113,6 @@ struct Search<'s, 'a> {
     soft: &'s [Field],
 }
 
-/// Result of an evaluation.
 struct Sample {
     deflated: Deflated,
     eigenvalues: Vec<f64>,

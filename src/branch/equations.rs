@@ -16,7 +16,6 @@ pub(super) const ITERATIONS: usize = 10;
 /// Largest increment (radians, lengths, fractions) of an iteration.
 pub(super) const LARGEST: f64 = 1.0;
 
-/// Relative accuracy of the conjugate gradients.
 const CG_TOLERANCE: f64 = 1e-11;
 
 /// Accuracy of a point (radians, lengths).

@@ -45,7 +45,6 @@ impl<'a> Family<'a> {
         Family::in_units(make, (from, to), log, scale)
     }
 
-    /// The same in given units.
     fn in_units(
         make: &'a (dyn Fn(f64) -> Result<Scenario, String> + Sync),
         (from, to): (f64, f64),

@@ -127,7 +127,6 @@ impl Values {
         })
     }
 
-    /// The weighted sum of values.
     pub fn sum(parts: &[(f64, Values)]) -> Self {
         let sum = |of: &dyn Fn(&Values) -> f64| parts.iter().map(|(w, v)| w * of(v)).sum();
         let points = parts.first().map_or(0, |(_, values)| values.points.len());

@@ -46,7 +46,6 @@ impl Found {
     }
 }
 
-/// One step along the branch.
 fn advance(equations: &mut Equations, now: &Point, step: f64) -> Result<Found, Stuck> {
     let tangent = &now.tangent;
     let fraction = now.fraction + step * tangent.fraction;

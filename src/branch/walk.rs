@@ -189,7 +189,6 @@ impl Branch {
         self.end = None;
     }
 
-    /// Multiplies the next step by `part`.
     pub fn shorten(&mut self, part: f64) {
         self.step *= part;
     }

@@ -126,7 +126,6 @@ impl Strategy {
         Ok(near)
     }
 
-    /// The solution near a trajectory.
     fn solve_near(
         self,
         equations: &Equations,

@@ -189,7 +189,6 @@ impl<'a> Equations<'a> {
         self.part * self.coupling[g]
     }
 
-    /// Whether gap `g` has any coupling.
     pub fn coupled(&self, g: usize) -> bool {
         self.coupling[g] != DVec3::ZERO
     }
@@ -337,7 +336,6 @@ impl<'a> Equations<'a> {
             .collect()
     }
 
-    /// The constraint on the tips.
     pub fn tip(&self) -> Tip {
         match &self.scenario.held_tip {
             Some(held) if held.clamps.is_some() => Tip::Clamped,

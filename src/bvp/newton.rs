@@ -54,7 +54,6 @@ pub struct Newton<'e, 'a, 'p> {
     /// Largest defect at the last evaluation, in the units.
     pub defect: f64,
     now: Correction,
-    /// Counts work and reports progress.
     log: &'e mut Log<'p>,
 }
 
@@ -182,7 +181,6 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         Err(NewtonFailure::NoProgress(size))
     }
 
-    /// Linearises at the present unknowns.
     fn linearize(&mut self, tolerance: f64) -> Result<Residuals, NewtonFailure> {
         let integrated = self.integrate(&self.nodes.clone(), tolerance, true)?;
         let residuals = self.residuals(&self.nodes, &integrated);

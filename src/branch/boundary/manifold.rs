@@ -14,7 +14,6 @@ const ALONG_MODE: f64 = 1e-5;
 /// An equilibrium or an approximation to one, with its parameters.
 #[derive(Clone, Debug)]
 pub struct Solution {
-    /// The state of the leaf.
     pub state: State,
     /// Both parameters, as fractions of their ranges.
     pub params: [f64; 2],
@@ -112,7 +111,6 @@ impl<'a> Manifold<'a> {
         self.leaves.at(params)
     }
 
-    /// Inner product of two directions.
     pub fn inner(&self, a: &Direction, b: &Direction) -> f64 {
         let numbers = a.params[0] * b.params[0] + a.params[1] * b.params[1];
         self.equations.product(&a.increments, &b.increments) + numbers
@@ -138,7 +136,6 @@ impl<'a> Manifold<'a> {
         }
     }
 
-    /// The difference of two solutions.
     pub fn difference(&self, a: &Solution, b: &Solution) -> Direction {
         Direction {
             increments: between(&a.state, &b.state),

@@ -61,7 +61,6 @@ pub struct Accuracy {
 pub struct Step {
     /// Where it is on a grid.
     pub point: SingularPoint,
-    /// Whether it is a special point.
     pub special: Option<Special>,
     /// The parameter that is fixed: at an end of its range.
     pub given: Option<usize>,

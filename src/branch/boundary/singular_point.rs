@@ -54,13 +54,18 @@ pub struct SingularPoint {
 #[derive(Clone, Copy)]
 pub struct Seed<'c> {
     pub critical: &'c Critical,
-    /// Both parameters, as fractions of their ranges,
-    pub params: [f64; 2],
-    /// and their derivatives with respect to the parameter of the branch.
+    /// Both parameters at the start of the branch, as fractions of their ranges,
+    pub from: [f64; 2],
+    /// and their derivatives with respect to its parameter.
     pub direction: [f64; 2],
 }
 
 impl Seed<'_> {
+    /// Both parameters at a value of the branch's parameter.
+    pub fn params(&self, parameter: f64) -> [f64; 2] {
+        [0, 1].map(|i| self.from[i] + parameter * self.direction[i])
+    }
+
     /// The parameter that is constant along the branch, if there is one.
     pub fn given(&self) -> Option<usize> {
         [1, 0]
@@ -74,14 +79,14 @@ impl SingularPoint {
     pub fn begin(manifold: &mut Manifold, seed: &Seed) -> Result<SingularPoint, NotFound> {
         let Seed {
             critical,
-            params,
             direction,
+            ..
         } = seed;
         let modes = critical.modes.iter().chain(&critical.soft);
         let soft = independent(manifold, modes, critical.soft.len());
         let solution = Solution {
             state: critical.state.clone(),
-            params: *params,
+            params: seed.params(critical.fraction),
         };
         let across = Direction {
             increments: critical.tangent.increments.clone(),

@@ -25,7 +25,6 @@ const EXACT: f64 = 1e-13;
 /// Accuracy of points at a given parameter.
 const GIVEN: f64 = 1e-12;
 
-/// Kind of a special point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Special {
     /// A curve of folds turns back: two folds meet and vanish.

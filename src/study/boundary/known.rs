@@ -42,12 +42,8 @@ pub fn traced(
 
 /// A critical point of a branch, extrapolated over grids.
 pub struct Start<'a> {
-    pub critical: &'a Critical,
+    pub seed: Seed<'a>,
     pub refined: &'a Refined,
-    /// Both parameters at the start of the branch, as fractions, and their derivatives with respect
-    /// to its parameter.
-    pub from: [f64; 2],
-    pub direction: [f64; 2],
 }
 
 /// Parameters (as fractions) and tips that agree within this plus both error bounds are
@@ -65,35 +61,27 @@ const APART: f64 = 1e-3;
 const BEYOND: f64 = 0.05;
 
 impl Start<'_> {
-    /// Both parameters at a value of the branch's parameter.
-    fn numbers(&self, parameter: f64) -> [f64; 2] {
-        [0, 1].map(|i| self.from[i] + parameter * self.direction[i])
-    }
-
-    /// The start of a curve.
-    pub fn seed(&self) -> Seed<'_> {
-        Seed {
-            critical: self.critical,
-            params: self.numbers(self.critical.fraction),
-            direction: self.direction,
-        }
-    }
-
     /// Its grid, for leaves with these kinks.
     pub fn grid(&self, kinks: &[f64]) -> Grid {
-        coarsened(&self.refined.grid, self.critical.state.segments(), kinks)
+        let segments = self.seed.critical.state.segments();
+        coarsened(&self.refined.grid, segments, kinks)
     }
 
     /// Whether it lies on a curve.
     pub fn is_on(&self, curve: &Boundary) -> bool {
-        let numbers = self.numbers(self.refined.fraction);
-        let length = self.direction[0].hypot(self.direction[1]);
+        let Seed {
+            critical,
+            direction,
+            ..
+        } = self.seed;
+        let params = self.seed.params(self.refined.fraction);
+        let length = direction[0].hypot(direction[1]);
         let singular = Singular {
-            coordinates: coordinates(numbers, &self.refined.tips),
+            coordinates: coordinates(params, &self.refined.tips),
             error: self.refined.fraction_error * length + self.refined.error,
-            kind: self.critical.kind,
-            modes: self.critical.modes.len(),
-            sides: sorted(self.critical.indices),
+            kind: critical.kind,
+            modes: critical.modes.len(),
+            sides: sorted(critical.indices),
         };
         singular.is_on(curve)
     }

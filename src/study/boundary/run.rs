@@ -9,7 +9,7 @@ use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, word};
 use super::{BoundaryRequest, MOST_CURVES};
 use crate::branch::Family;
 use crate::branch::boundary::{
-    self as curves, Accuracy, AtRest, Halt, Plane, Solution, Verified, WalkOptions,
+    self as curves, Accuracy, AtRest, Halt, Plane, Seed, Solution, Verified, WalkOptions,
 };
 use crate::scenario::Scenario;
 use crate::study::trace::{Trace, TraceError, TraceRequest};
@@ -73,13 +73,12 @@ pub fn boundary(
         progress,
     };
     for (critical, refined) in &begun.critical {
-        let start = Start {
+        let seed = Seed {
             critical,
-            refined,
             from: [0.0, plane.fraction(start)],
             direction: [1.0, 0.0],
         };
-        run.follow_new(&start, &mut boundary);
+        run.follow_new(&Start { seed, refined }, &mut boundary);
     }
     if let (Some(size), Some((point, grid))) = (request.map, begun.first) {
         let kinks = family.first().kinks();
@@ -188,7 +187,7 @@ impl Run<'_, '_> {
         let number = boundary.curves.len();
         let mut report = |points, params| progress(Some(number), points, plane.values(params));
         let grid = start.grid(plane.family.first().kinks());
-        let mut curve = curves::follow(plane, &grid, &start.seed(), &self.how, &mut report);
+        let mut curve = curves::follow(plane, &grid, &start.seed, &self.how, &mut report);
         boundary.factorizations += curve.factorizations;
         if !curve.points.is_empty() {
             remove_known(&mut curve, &self.known);
@@ -222,13 +221,12 @@ impl Run<'_, '_> {
                         curves::refine_on_path(&self.plane, *ends, grid, critical, accuracy);
                     if let Ok(refined) = &refined {
                         let direction = [0, 1].map(|i| to[i] - from[i]);
-                        let start = Start {
+                        let seed = Seed {
                             critical,
-                            refined,
                             from,
                             direction,
                         };
-                        self.follow_new(&start, boundary);
+                        self.follow_new(&Start { seed, refined }, boundary);
                     }
                 }
             }
@@ -239,7 +237,6 @@ impl Run<'_, '_> {
     }
 }
 
-/// A curve in the scenario's units.
 fn in_units(plane: &Plane, curve: &curves::Boundary) -> BoundaryCurve {
     BoundaryCurve {
         kind: curve.kind,
@@ -252,7 +249,6 @@ fn in_units(plane: &Plane, curve: &curves::Boundary) -> BoundaryCurve {
     }
 }
 
-/// A point in the scenario's units.
 fn point_in_units(plane: &Plane, number: usize, point: &Verified) -> BoundaryPoint {
     let values = plane.values(point.params);
     let beyond = plane.values([0, 1].map(|i| point.params[i] + point.errors[i]));

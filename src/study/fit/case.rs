@@ -52,7 +52,6 @@ pub(super) struct Component {
     pub origin: Option<Origin>,
 }
 
-/// The quantity compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Compared {
     Result(Quantity),

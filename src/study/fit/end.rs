@@ -128,7 +128,6 @@ struct Search<'s, 'j, 'm, 'a> {
     before: (f64, f64),
     /// Where derivatives are known, if not only at the minimum.
     there: Option<(Point, Slopes)>,
-    /// The longest correction.
     longest: f64,
     last: Correction,
 }

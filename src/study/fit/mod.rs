@@ -244,7 +244,6 @@ fn coordinates(request: &FitRequest) -> Result<Vec<Coordinate>, FitError> {
     Ok(coordinates)
 }
 
-/// Checks that there are enough data.
 fn check_count(free: usize, count: usize, known: bool) -> Result<(), FitError> {
     if free == 0 || free > count {
         return Err(FitError::Free(match free {

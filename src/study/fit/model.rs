@@ -268,7 +268,6 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// The changes of the numbers.
     pub fn steps(&self, from: &[f64], to: &[f64]) -> Vec<f64> {
         let each = self.coordinates.iter().zip(to).zip(from);
         each.map(|((free, to), from)| free.value(*to) - free.value(*from))

@@ -91,7 +91,6 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
     (push, starts)
 }
 
-/// Rounding error of a critical force.
 fn rounding(stable: &Stable, force: f64, weight: f64) -> f64 {
     let rods = stable.scenario.rods.iter();
     let stiffness = rods.flat_map(|rod| &rod.force_stiffness);
