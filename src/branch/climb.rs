@@ -107,7 +107,7 @@ impl Equations<'_> {
             }
             state = self.moved(&state, fraction, &step, 1.0).ok()?;
             if newton && size < NEAR {
-                let (point, _) = self.correct(&state, fraction, None).ok()?;
+                let point = self.correct(&state, fraction, None).ok()?;
                 return (point.index == 1).then_some(point);
             }
         }
@@ -162,8 +162,7 @@ impl Equations<'_> {
             state = next;
             if near {
                 let rest = self.correct(&state, fraction, None).ok();
-                let rest = rest.filter(|(point, _)| point.index == 0);
-                return rest.map(|(point, _)| point).ok_or(state);
+                return rest.filter(|point| point.index == 0).ok_or(state);
             }
         }
         Err(state)

@@ -215,6 +215,7 @@ impl Critical {
             fraction: self.fraction,
             tangent: self.tangent.clone(),
             index: self.indices[0],
+            iterations: 0,
         };
         let mut search = Search {
             equations,

@@ -234,24 +234,24 @@ impl<'a> Equations<'a> {
     }
 
     /// Newton corrector: back to the branch within the plane normal to `normal`
-    /// through the given state; without a normal, at the given parameter. Returns
-    /// the point, its tangent oriented along `normal`, and the number of iterations.
+    /// through the given state; without a normal, at the given parameter. The
+    /// tangent of the point is oriented along `normal`.
     pub fn correct(
         &mut self,
         state: &State,
         fraction: f64,
         normal: Option<&Tangent>,
-    ) -> Result<(Point, usize), Stuck> {
+    ) -> Result<Point, Stuck> {
         let plane = normal.map(|t| Plane {
             dual: self.momentum(&t.increments),
             own: t.fraction,
             through: None,
         });
-        let (mut point, iterations) = self.correct_within(state, fraction, plane.as_ref())?;
+        let mut point = self.correct_within(state, fraction, plane.as_ref())?;
         if let Some(normal) = normal {
             point.tangent = self.oriented(point.tangent, normal);
         }
-        Ok((point, iterations))
+        Ok(point)
     }
 
     /// As [`Equations::correct`], within any plane; the tangent points to growing
@@ -261,10 +261,10 @@ impl<'a> Equations<'a> {
         state: &State,
         fraction: f64,
         plane: Option<&Plane>,
-    ) -> Result<(Point, usize), Stuck> {
+    ) -> Result<Point, Stuck> {
         let (mut state, mut fraction) = (state.clone(), fraction);
         let mut previous = f64::INFINITY;
-        for iteration in 1..=ITERATIONS {
+        for iterations in 1..=ITERATIONS {
             let linear = self.linearise(&mut state, fraction)?;
             let (forces, mut rate, counted) = self.solve(&linear)?;
             if let Some(held) = self.held_rate(&state, fraction)? {
@@ -292,13 +292,13 @@ impl<'a> Equations<'a> {
                     Some(index) if size < SAME_INDEX => index,
                     _ => self.index(&state, fraction)?,
                 };
-                let point = Point {
+                return Ok(Point {
                     state,
                     fraction,
                     tangent,
                     index,
-                };
-                return Ok((point, iteration));
+                    iterations,
+                });
             }
             previous = size;
         }

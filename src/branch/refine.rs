@@ -111,8 +111,7 @@ fn on_next_grid<'a>(
         increments: prolong_field(&point.tangent.increments),
         ..point.tangent
     });
-    let found = equations.correct_within(&guess, point.fraction, condition.as_plane())?;
-    let (mut found, _) = found;
+    let mut found = equations.correct_within(&guess, point.fraction, condition.as_plane())?;
     if equations.inner(&found.tangent, &tangent) < 0.0 {
         found.tangent = reversed(found.tangent);
     }

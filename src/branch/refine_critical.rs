@@ -226,7 +226,7 @@ fn interpolate_across(
             let increments = &critical.tangent.increments;
             let at = fraction + side * unit;
             let moved = equations.moved(&critical.state, at, increments, side * apart);
-            let (point, _) = equations.correct(&moved.ok()?, at, None).ok()?;
+            let point = equations.correct(&moved.ok()?, at, None).ok()?;
             Values::of(equations, &point.state, at).ok()
         };
         let pairs = [1.0, 2.0, 3.0].into_iter();

@@ -41,6 +41,5 @@ fn first_point(
     let increments = &direction.increments;
     let fraction = critical.fraction + away * direction.fraction;
     let state = equations.moved(&critical.state, fraction, increments, away)?;
-    let (point, _) = equations.correct(&state, fraction, Some(direction))?;
-    Ok(point)
+    equations.correct(&state, fraction, Some(direction))
 }

@@ -77,7 +77,7 @@ pub fn follow_path(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Path {
     let Ok(family) = family else { return path };
     let equations = Equations::new(&family, from.grid.clone());
     let first = equations.map_err(Stuck::from).and_then(|mut equations| {
-        let (first, _) = equations.correct(&from.solution.state, 0.0, None)?;
+        let first = equations.correct(&from.solution.state, 0.0, None)?;
         Ok((equations, first))
     });
     let Ok((mut equations, mut first)) = first else {
@@ -115,7 +115,7 @@ pub fn recount(plane: &Plane, at: &AtRest) -> Option<usize> {
     let make = between(plane, [at.solution.params; 2]);
     let family = plane.family.along_path(&*make).ok()?;
     let mut equations = Equations::new(&family, at.grid.clone()).ok()?;
-    let (mut point, _) = equations.correct(&at.solution.state, 0.0, None).ok()?;
+    let mut point = equations.correct(&at.solution.state, 0.0, None).ok()?;
     while point.state.segments() < RECOUNTED {
         (equations, point) = on_finer(&mut equations, &point).ok()?;
     }

@@ -110,7 +110,7 @@ fn on_refined(family: &Family, start: &StartPoint) -> Option<StartPoint> {
 /// Both directions along the softest modes of the leaf.
 fn along_modes(stable: &Stable, family: &Family) -> Option<Vec<StartPoint>> {
     let mut equations = Equations::new(family, stable.grid.clone()).ok()?;
-    let (point, _) = equations.correct(&stable.state, 0.0, None).ok()?;
+    let point = equations.correct(&stable.state, 0.0, None).ok()?;
     let modes = equations.soft_modes(&point, MODES).ok()?;
     let start = |mode: &Field, sign: f64| StartPoint {
         grid: stable.grid.clone(),
@@ -133,7 +133,7 @@ fn climb(stable: &Stable, family: &Family, start: &StartPoint) -> Option<Pass> {
     let stop = || stable.limit.reached();
     let saddle = equations.climb(&start.state, 0.0, &start.direction, &stop)?;
     let mut own = Equations::new(family, stable.grid.clone()).ok()?;
-    let (mut leaf, _) = own.correct(&stable.state, 0.0, None).ok()?;
+    let mut leaf = own.correct(&stable.state, 0.0, None).ok()?;
     while own.grid().segments() < start.grid.segments() {
         (own, leaf) = on_finer(&mut own, &leaf).ok()?;
     }
@@ -177,7 +177,7 @@ fn in_units(
     weight: f64,
 ) -> Option<Barrier> {
     let mut equations = Equations::new(family, pass.grid.clone()).ok()?;
-    let (neighbour, _) = equations.correct(neighbour, 0.0, None).ok()?;
+    let neighbour = equations.correct(neighbour, 0.0, None).ok()?;
     let mut three = [pass.saddle.clone(), neighbour, pass.leaf.clone()];
     let rounding = ROUNDING * equations.leaves.at(0.0).ok()?.energy(&three[0].state).abs();
     let mut table = Richardson::default();

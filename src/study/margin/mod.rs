@@ -223,7 +223,7 @@ fn continuation_grid(scenario: &Scenario, levels: &[Level]) -> Result<(Grid, Sta
     });
     let on_level = |level: &Level| {
         let mut equations = Equations::new(&family, level.leaf.grid.clone())?;
-        let (point, _) = equations.correct(&level.state, 0.0, None)?;
+        let point = equations.correct(&level.state, 0.0, None)?;
         Ok::<_, Stuck>((equations, point))
     };
     let mut now = on_level(&levels[0]).map_err(|_| UNDECIDED)?;

@@ -102,7 +102,7 @@ fn rounding(stable: &Stable, force: f64, weight: f64) -> f64 {
 
 /// The branch of a push, until it is known to have lost its stability.
 fn follow(stable: &Stable, direction: Direction, grids: &mut Grids) -> Result<Followed, Stuck> {
-    let (mut first, _) = (grids.of(&stable.state)).correct(&stable.state, 0.0, None)?;
+    let mut first = (grids.of(&stable.state)).correct(&stable.state, 0.0, None)?;
     first.tangent = first.tangent.towards(true);
     let enough = |points: &[Point]| {
         let behind = points.len().checked_sub(CONFIRMING);
@@ -181,7 +181,7 @@ fn rest_after_fold(
         }
     };
     let point = equations.correct(&state, fold.fraction, None);
-    let (point, _) = point.ok().filter(|(point, _)| point.index == 0)?;
+    let point = point.ok().filter(|point| point.index == 0)?;
     let rest = refine_at(family, &start.grid, &point, stable.accuracy).ok()?;
     let scale = family.scale();
     Some(Neighbour {
