@@ -77,16 +77,12 @@ impl Equations<'_> {
                 direction = self.lowest_mode(&direction)?;
                 valley = self.valley(&direction, &linear)?;
             }
-            let Valley {
-                solved,
-                shift,
-                curvature,
-            } = valley;
+            let (curvature, solved) = (valley.curvature, valley.solved);
             let (along, force) = (&solved.modes[0], solved.forces.multipliers[0]);
             let across = &solved.forces.increments;
             let mut increments = across.clone();
             // With exactly one negative eigenvalue the full step is Newton's.
-            let newton = curvature < 0.0 && shift == linear.shift;
+            let newton = curvature < 0.0 && valley.shift == linear.shift;
             if newton {
                 add(&mut increments, force / curvature, along);
             }
@@ -177,23 +173,17 @@ impl Equations<'_> {
         length: &mut f64,
     ) -> Option<(State, bool)> {
         let linear = self.linearise(state, fraction).ok()?;
-        let Valley {
-            solved,
-            shift,
-            curvature,
-        } = self.valley(direction, &linear)?;
+        let valley = self.valley(direction, &linear)?;
+        let (curvature, solved) = (valley.curvature, valley.solved);
         let (along, force) = (&solved.modes[0], solved.forces.multipliers[0]);
         let across = &solved.forces.increments;
-        let newton = curvature > 0.0 && shift == linear.shift;
+        let newton = curvature > 0.0 && valley.shift == linear.shift;
         let mut increments = across.clone();
         if newton {
             add(&mut increments, force / curvature, along);
         } else if largest(across) < LONGEST {
-            add(
-                &mut increments,
-                length.copysign(force) / largest(along),
-                along,
-            );
+            let part = length.copysign(force) / largest(along);
+            add(&mut increments, part, along);
             *length = (GROWTH * *length).min(LONGEST);
         }
         *direction = self.unit(along);

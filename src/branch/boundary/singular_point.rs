@@ -77,11 +77,7 @@ impl Seed<'_> {
 impl SingularPoint {
     /// The first point of a boundary, the normal of which is along the branch.
     pub fn begin(manifold: &mut Manifold, seed: &Seed) -> Result<SingularPoint, NotFound> {
-        let Seed {
-            critical,
-            direction,
-            ..
-        } = seed;
+        let (critical, direction) = (seed.critical, seed.direction);
         let modes = critical.modes.iter().chain(&critical.soft);
         let soft = independent(manifold, modes, critical.soft.len());
         let solution = Solution {

@@ -69,11 +69,7 @@ impl Start<'_> {
 
     /// Whether it lies on a curve.
     pub fn is_on(&self, curve: &Boundary) -> bool {
-        let Seed {
-            critical,
-            direction,
-            ..
-        } = self.seed;
+        let (critical, direction) = (self.seed.critical, self.seed.direction);
         let params = self.seed.params(self.refined.fraction);
         let length = direction[0].hypot(direction[1]);
         let singular = Singular {

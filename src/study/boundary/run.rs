@@ -3,13 +3,14 @@
 use std::time::Instant;
 
 use super::known::{Start, coarsened, remove_known, traced};
-use super::map::{Cells, Unexplained};
+use super::map::Cells;
 use super::neighbours::add_leaves;
 use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, word};
 use super::{BoundaryRequest, MOST_CURVES};
 use crate::branch::Family;
 use crate::branch::boundary::{
     self as curves, Accuracy, AtRest, Halt, Plane, Seed, Solution, Verified, WalkOptions,
+    refine_on_path,
 };
 use crate::scenario::Scenario;
 use crate::study::trace::{Trace, TraceError, TraceRequest};
@@ -209,18 +210,13 @@ impl Run<'_, '_> {
         let mut cells = Cells::new(self.plane, size);
         let mut next = Some(cells.begin(first, &self.known));
         while let Some(unexplained) = next {
-            for Unexplained {
-                ends,
-                grid,
-                critical,
-            } in &unexplained
-            {
-                let [from, to] = *ends;
-                for critical in critical {
-                    let refined =
-                        curves::refine_on_path(&self.plane, *ends, grid, critical, accuracy);
+            for path in &unexplained {
+                let [from, to] = path.ends;
+                let direction = [0, 1].map(|i| to[i] - from[i]);
+                for critical in &path.critical {
+                    let (plane, grid) = (&self.plane, &path.grid);
+                    let refined = refine_on_path(plane, path.ends, grid, critical, accuracy);
                     if let Ok(refined) = &refined {
-                        let direction = [0, 1].map(|i| to[i] - from[i]);
                         let seed = Seed {
                             critical,
                             from,
