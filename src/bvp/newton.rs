@@ -13,6 +13,7 @@ use super::march::March;
 use super::solution::{Correction, Log, Reason};
 use super::trajectory::{Nodes, Trajectory};
 use crate::memory::Request;
+use crate::shape::equally_spaced;
 
 const MAX_ITERATIONS: usize = 60;
 
@@ -75,7 +76,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
     ) -> Result<Self, Reason> {
         let mut nodes = match intervals {
             Some(count) => {
-                let sigma: Vec<f64> = (0..=count).map(|k| k as f64 / count as f64).collect();
+                let sigma = equally_spaced(count);
                 let states = sigma[..count].iter().map(|&sigma| near.at(sigma)).collect();
                 Nodes { sigma, states }
             }
