@@ -226,16 +226,6 @@ impl<'a> Manifold<'a> {
         Ok(modes.iter().map(along).sum::<f64>() / modes.len() as f64)
     }
 
-    /// As [`Manifold::sample`] at an equilibrium, with its own rates.
-    pub fn sample_at_rest(
-        &mut self,
-        solution: Solution,
-        border: &[Field],
-    ) -> Result<Sample, Stuck> {
-        let rates = self.rates(&solution)?;
-        Ok(self.sample(solution, border, rates, true)?.0)
-    }
-
     /// Derivatives of the forces with respect to both parameters.
     pub fn rates(&mut self, solution: &Solution) -> Result<Vec<Field>, Stuck> {
         let mut rates = Vec::new();

@@ -160,7 +160,9 @@ impl SingularPoint {
         found: Found,
     ) -> Result<SingularPoint, NotFound> {
         let border = manifold.equations.momenta(&self.soft);
-        let sample = manifold.sample_at_rest(found.sample.solution, &border)?;
+        let solution = found.sample.solution;
+        let rates = manifold.rates(&solution)?;
+        let (sample, _) = manifold.sample(solution, &border, rates, true)?;
         let eigen = search::eigen(&sample, self.neutral);
         let basis = self.basis(manifold, &sample, &eigen)?;
         let soft = soft(manifold, &sample, &eigen);

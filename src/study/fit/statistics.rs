@@ -113,13 +113,6 @@ impl<'m, 'a> Statistics<'m, 'a> {
         along / own
     }
 
-    /// The component of a coordinate in combinations to which the data are insensitive.
-    fn insensitive_part(&self, k: usize) -> f64 {
-        let insensitive =
-            (0..self.insensitive).map(|direction| self.directions[(k, direction)].powi(2));
-        insensitive.sum::<f64>().sqrt()
-    }
-
     /// Whether the residuals are larger than their standard deviations allow: by five
     /// deviations of their sum of squares.
     pub fn suspicious(&self) -> bool {
@@ -130,7 +123,9 @@ impl<'m, 'a> Statistics<'m, 'a> {
 
     /// Whether the data are sensitive to every change of a coordinate.
     pub fn is_sensitive_to(&self, k: usize) -> bool {
-        self.insensitive_part(k) <= INSENSITIVE
+        let insensitive =
+            (0..self.insensitive).map(|direction| self.directions[(k, direction)].powi(2));
+        insensitive.sum::<f64>().sqrt() <= INSENSITIVE
     }
 
     /// The standard deviation of a candidate's datum: that of the fit's data of its kind.
