@@ -25,11 +25,11 @@ fn a_leaf_falls_off_a_saddle_that_it_stands_on_exactly() {
     let grid = Grid::new(32, leaf.kinks());
     let from = start(&DiscreteLeaf::new(&leaf, grid.clone()));
     let mut equations = Equations::new(&family, grid.clone()).unwrap();
-    let (flat, _) = equations.correct(&from, 0.0, None).ok().unwrap();
+    let flat = equations.correct(&from, 0.0, None).ok().unwrap();
     assert!(flat.index > 1, "{}", flat.index);
     assert!(flat.state.x.iter().all(|x| x.z.abs() < 1e-12));
     let rest = settle_from(&leaf, &grid, flat.state.clone(), &Limit::default()).unwrap();
-    let (rest, _) = equations.correct(&rest, 0.0, None).ok().unwrap();
+    let rest = equations.correct(&rest, 0.0, None).ok().unwrap();
     assert_eq!(rest.index, 0);
     assert!(rest.state.shift_to(&flat.state) > 1e-2);
 }

@@ -46,7 +46,7 @@ fn advanced(
     way: [f64; 2],
     halvings: usize,
 ) -> Option<State> {
-    if let Ok((point, _)) = equations.correct(state, way[1].max(0.0), None)
+    if let Ok(point) = equations.correct(state, way[1].max(0.0), None)
         && state.shift_to(&point.state) < 0.05
         && point.index == 0
     {

@@ -27,7 +27,7 @@ fn begin(scenario: &Scenario, equations: &mut Equations) -> Option<Point> {
     let leaf = Leaf::new(scenario);
     let grid = Grid::new(rest.shape.stations.len() - 1, leaf.kinks());
     let state = project(&leaf, &DiscreteLeaf::new(&leaf, grid), &rest.shape.rods);
-    let (mut point, _) = equations.correct(&state, 0.0, None).ok()?;
+    let mut point = equations.correct(&state, 0.0, None).ok()?;
     point.tangent = point.tangent.towards(true);
     Some(point)
 }

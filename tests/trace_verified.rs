@@ -5,7 +5,6 @@ mod common;
 
 use common::random::{drawn, leaves};
 use common::{relaxed, to};
-use glam::DVec3;
 use leafdyn::internals::branch::{End, Family, Followed, Walk, begin};
 use leafdyn::internals::bvp::{self, Precision::LocalError, Start};
 use leafdyn::internals::relax::index_near;
@@ -157,7 +156,7 @@ fn is_equilibrium(what: &str, family: &Family, branch: &Followed, number: usize)
     let shot = bvp::solve(&scenario, &options, &mut |_| {}).ok()?;
     let length = family.scale().length;
     for (rod, tip) in shot.rods.iter().zip(&point.tips) {
-        let off = rod.nodes.last()?.position / length - DVec3::from_array(*tip);
+        let off = rod.nodes.last()?.position / length - *tip;
         let allowed = point.error + shot.error.position / length + 1e-9;
         let off = off.length();
         assert!(

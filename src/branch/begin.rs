@@ -71,7 +71,7 @@ fn search<'a>(
                 grids.of(&state).correct(&state, 0.0, None)
             });
             match point {
-                Ok((point, _)) => {
+                Ok(point) => {
                     let same = Some(point.index) == rest.stability.negative_eigenvalues;
                     found = Ok((grids, point));
                     if same || any_index {

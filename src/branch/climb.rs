@@ -77,16 +77,12 @@ impl Equations<'_> {
                 direction = self.lowest_mode(&direction)?;
                 valley = self.valley(&direction, &linear)?;
             }
-            let Valley {
-                solved,
-                shift,
-                curvature,
-            } = valley;
+            let (curvature, solved) = (valley.curvature, valley.solved);
             let (along, force) = (&solved.modes[0], solved.forces.multipliers[0]);
             let across = &solved.forces.increments;
             let mut increments = across.clone();
             // With exactly one negative eigenvalue the full step is Newton's.
-            let newton = curvature < 0.0 && shift == linear.shift;
+            let newton = curvature < 0.0 && valley.shift == linear.shift;
             if newton {
                 add(&mut increments, force / curvature, along);
             }
@@ -107,7 +103,7 @@ impl Equations<'_> {
             }
             state = self.moved(&state, fraction, &step, 1.0).ok()?;
             if newton && size < NEAR {
-                let (point, _) = self.correct(&state, fraction, None).ok()?;
+                let point = self.correct(&state, fraction, None).ok()?;
                 return (point.index == 1).then_some(point);
             }
         }
@@ -119,7 +115,7 @@ impl Equations<'_> {
         let modes = self.soft_modes(point, SOFT)?;
         let linear = self.linearise(&mut point.state.clone(), point.fraction)?;
         let border = [self.momentum(&modes[0])];
-        let solved = self.solve_shifted(&border, &linear.forces, &[], 0.0)?;
+        let solved = self.solve_bordered(&border, &linear.forces, &[], 0.0)?;
         Ok(-solved.h[(0, 0)] / self.mass)
     }
 
@@ -162,8 +158,7 @@ impl Equations<'_> {
             state = next;
             if near {
                 let rest = self.correct(&state, fraction, None).ok();
-                let rest = rest.filter(|(point, _)| point.index == 0);
-                return rest.map(|(point, _)| point).ok_or(state);
+                return rest.filter(|point| point.index == 0).ok_or(state);
             }
         }
         Err(state)
@@ -178,23 +173,17 @@ impl Equations<'_> {
         length: &mut f64,
     ) -> Option<(State, bool)> {
         let linear = self.linearise(state, fraction).ok()?;
-        let Valley {
-            solved,
-            shift,
-            curvature,
-        } = self.valley(direction, &linear)?;
+        let valley = self.valley(direction, &linear)?;
+        let (curvature, solved) = (valley.curvature, valley.solved);
         let (along, force) = (&solved.modes[0], solved.forces.multipliers[0]);
         let across = &solved.forces.increments;
-        let newton = curvature > 0.0 && shift == linear.shift;
+        let newton = curvature > 0.0 && valley.shift == linear.shift;
         let mut increments = across.clone();
         if newton {
             add(&mut increments, force / curvature, along);
         } else if largest(across) < LONGEST {
-            add(
-                &mut increments,
-                length.copysign(force) / largest(along),
-                along,
-            );
+            let part = length.copysign(force) / largest(along);
+            add(&mut increments, part, along);
             *length = (GROWTH * *length).min(LONGEST);
         }
         *direction = self.unit(along);
@@ -210,7 +199,7 @@ impl Equations<'_> {
         let mut shift = linear.shift;
         while shift < LARGEST_SHIFT {
             let solved = self
-                .solve_shifted(&border, &linear.forces, &[], shift)
+                .solve_bordered(&border, &linear.forces, &[], shift)
                 .ok()?;
             // One negative eigenvalue is due to the border.
             if solved.negative <= 1 {

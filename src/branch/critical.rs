@@ -113,7 +113,6 @@ struct Search<'s, 'a> {
     soft: &'s [Field],
 }
 
-/// Result of an evaluation.
 struct Sample {
     deflated: Deflated,
     eigenvalues: Vec<f64>,
@@ -216,6 +215,7 @@ impl Critical {
             fraction: self.fraction,
             tangent: self.tangent.clone(),
             index: self.indices[0],
+            iterations: 0,
         };
         let mut search = Search {
             equations,
@@ -261,10 +261,10 @@ impl Critical {
         }
     }
 
-    /// A direction along which another branch may leave: a neutral mode
+    /// A direction along which another branch may leave: the first neutral mode
     /// orthogonalised against this branch.
-    pub fn across(&self, equations: &Equations, mode: usize) -> Tangent {
-        let mode = &self.modes[mode];
+    pub fn across(&self, equations: &Equations) -> Tangent {
+        let mode = &self.modes[0];
         let part = equations.product(&self.tangent.increments, mode);
         equations.normalised(Tangent {
             increments: plus(mode, -part, &self.tangent.increments),

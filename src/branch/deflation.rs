@@ -46,7 +46,7 @@ impl Equations<'_> {
         modes: &[Field],
     ) -> Result<Deflated, Stuck> {
         let (mut state, mut fraction) = (state.clone(), fraction);
-        let border: Vec<Field> = modes.iter().map(|mode| self.momentum(mode)).collect();
+        let border = self.momenta(modes);
         let (dual, own) = (self.momentum(&normal.increments), normal.fraction);
         let mut previous = f64::INFINITY;
         let mut finished = false;
@@ -58,7 +58,7 @@ impl Equations<'_> {
                 true => self.linearise_softened(&mut state, fraction)?,
                 false => self.linearise(&mut state, fraction)?,
             };
-            let solved = self.solve_bordered(&border, &linear.forces, &[&linear.rate])?;
+            let solved = self.solve_bordered(&border, &linear.forces, &[&linear.rate], 0.0)?;
             if finished {
                 let [rate] = solved.rates.try_into().map_err(|_| Stuck::NotConverged)?;
                 return Ok(Deflated {
@@ -85,19 +85,9 @@ impl Equations<'_> {
         Err(Stuck::NotConverged)
     }
 
-    /// Solves the bordered equations with the assembled matrix: for the forces, their rates, and
-    /// the unit vectors of the border.
+    /// Solves the bordered equations with K + `shift` M, where K is the assembled matrix: for the
+    /// forces, their rates, and the unit vectors of the border.
     pub(super) fn solve_bordered(
-        &mut self,
-        border: &[Field],
-        forces: &Field,
-        rates: &[&Field],
-    ) -> Result<Solved, Stuck> {
-        self.solve_shifted(border, forces, rates, 0.0)
-    }
-
-    /// The same with K + `shift` M.
-    pub(super) fn solve_shifted(
         &mut self,
         border: &[Field],
         forces: &Field,
@@ -154,7 +144,7 @@ impl Equations<'_> {
                 let norm = self.product(&modes[k], &modes[k]).sqrt();
                 modes[k] = times(&modes[k], 1.0 / norm);
             }
-            let momenta: Vec<Field> = modes.iter().map(|mode| self.momentum(mode)).collect();
+            let momenta = self.momenta(&modes);
             let image = |momentum| factor.solve_bordered(momentum, &[]).increments;
             let images: Vec<Field> = momenta.iter().map(image).collect();
             let ritz = DMatrix::from_fn(count, count, |r, c| {
@@ -170,7 +160,7 @@ impl Equations<'_> {
             if !modes.iter().all(is_finite) {
                 return Err(Stuck::NotConverged);
             }
-            modes = modes.iter().map(|mode| self.momentum(mode)).collect();
+            modes = self.momenta(&modes);
         }
         let modes = modes.iter().map(|momentum| {
             let mode = factor.solve_bordered(momentum, &[]).increments;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::family::{Family, Leaves, OutOfRange, clamp};
 use super::field::{add, between, dot, is_finite, largest, plus, times};
-use super::states::{advanced, forces_on, rate};
+use super::states::{advanced, forces_on, rate, stiffest_condensed};
 use super::{Point, Tangent};
 use crate::leaf::{DiscreteLeaf, Field, Grid, Solved, SparseFactor, SparsePattern, State, System};
 use crate::newton::{Contraction, converged};
@@ -16,7 +16,6 @@ pub(super) const ITERATIONS: usize = 10;
 /// Largest increment (radians, lengths, fractions) of an iteration.
 pub(super) const LARGEST: f64 = 1.0;
 
-/// Relative accuracy of the conjugate gradients.
 const CG_TOLERANCE: f64 = 1e-11;
 
 /// Accuracy of a point (radians, lengths).
@@ -136,6 +135,11 @@ impl<'a> Equations<'a> {
         times(&self.system.momentum(a), 1.0 / self.mass)
     }
 
+    /// The same for each of these.
+    pub(super) fn momenta(&self, all: &[Field]) -> Vec<Field> {
+        all.iter().map(|a| self.momentum(a)).collect()
+    }
+
     pub(super) fn rods(&self) -> usize {
         self.system.rods()
     }
@@ -151,6 +155,14 @@ impl<'a> Equations<'a> {
         Tangent {
             increments: times(&t.increments, 1.0 / length),
             fraction: t.fraction / length,
+        }
+    }
+
+    /// The one of two opposite directions that is more along another one.
+    pub(super) fn oriented(&self, t: Tangent, along: &Tangent) -> Tangent {
+        match self.inner(&t, along) < 0.0 {
+            true => reversed(t),
+            false => t,
         }
     }
 
@@ -222,24 +234,24 @@ impl<'a> Equations<'a> {
     }
 
     /// Newton corrector: back to the branch within the plane normal to `normal`
-    /// through the given state; without a normal, at the given parameter. Returns
-    /// the point, its tangent oriented along `normal`, and the number of iterations.
+    /// through the given state; without a normal, at the given parameter. The
+    /// tangent of the point is oriented along `normal`.
     pub fn correct(
         &mut self,
         state: &State,
         fraction: f64,
         normal: Option<&Tangent>,
-    ) -> Result<(Point, usize), Stuck> {
+    ) -> Result<Point, Stuck> {
         let plane = normal.map(|t| Plane {
             dual: self.momentum(&t.increments),
             own: t.fraction,
             through: None,
         });
-        let (mut point, iterations) = self.correct_within(state, fraction, plane.as_ref())?;
-        if normal.is_some_and(|normal| self.inner(&point.tangent, normal) < 0.0) {
-            point.tangent = reversed(point.tangent);
+        let mut point = self.correct_within(state, fraction, plane.as_ref())?;
+        if let Some(normal) = normal {
+            point.tangent = self.oriented(point.tangent, normal);
         }
-        Ok((point, iterations))
+        Ok(point)
     }
 
     /// As [`Equations::correct`], within any plane; the tangent points to growing
@@ -249,10 +261,10 @@ impl<'a> Equations<'a> {
         state: &State,
         fraction: f64,
         plane: Option<&Plane>,
-    ) -> Result<(Point, usize), Stuck> {
+    ) -> Result<Point, Stuck> {
         let (mut state, mut fraction) = (state.clone(), fraction);
         let mut previous = f64::INFINITY;
-        for iteration in 1..=ITERATIONS {
+        for iterations in 1..=ITERATIONS {
             let linear = self.linearise(&mut state, fraction)?;
             let (forces, mut rate, counted) = self.solve(&linear)?;
             if let Some(held) = self.held_rate(&state, fraction)? {
@@ -280,13 +292,13 @@ impl<'a> Equations<'a> {
                     Some(index) if size < SAME_INDEX => index,
                     _ => self.index(&state, fraction)?,
                 };
-                let point = Point {
+                return Ok(Point {
                     state,
                     fraction,
                     tangent,
                     index,
-                };
-                return Ok((point, iteration));
+                    iterations,
+                });
             }
             previous = size;
         }
@@ -350,8 +362,7 @@ pub(super) fn assembled(
     if !turn.is_finite() || turn > RESOLVED_TURN {
         return Err(Stuck::Unresolved);
     }
-    let sections = leaf.sections.iter();
-    let stiffest = sections.fold(1.0, |m: f64, s| m.max(s.condensing.max_element()));
+    let stiffest = stiffest_condensed(leaf).max(1.0);
     Ok((system.rhs(), ROUNDING * f64::EPSILON * stiffest))
 }
 

@@ -24,7 +24,6 @@ pub struct Family<'a> {
     log: bool,
     /// The leaves at the fractions 0 and 1.
     ends: [Leaf; 2],
-    softening: Option<f64>,
     /// Sparsity patterns of their matrices.
     pub patterns: Arc<Patterns>,
 }
@@ -46,7 +45,6 @@ impl<'a> Family<'a> {
         Family::in_units(make, (from, to), log, scale)
     }
 
-    /// The same in given units.
     fn in_units(
         make: &'a (dyn Fn(f64) -> Result<Scenario, String> + Sync),
         (from, to): (f64, f64),
@@ -64,7 +62,6 @@ impl<'a> Family<'a> {
             to,
             log,
             ends: [first, last],
-            softening: None,
             patterns: Arc::default(),
         })
     }
@@ -81,21 +78,24 @@ impl<'a> Family<'a> {
         })
     }
 
-    /// The same family, its matrices those of leaves with this additional
-    /// compliance in stretch and shear (in units of L^2/A), its equilibria
-    /// unchanged. The soft modes of a nearly rigid leaf are lost to rounding in its matrix;
-    /// the point at which they become neutral is analytic in the softening, and can be
-    /// extrapolated to zero softening.
-    pub fn softened(&self, softening: f64) -> Self {
-        Family {
-            softening: Some(softening),
-            ..self.clone()
-        }
-    }
-
     /// The units of all its leaves.
     pub fn scale(&self) -> Scale {
         self.ends[0].scale
+    }
+
+    /// Tips of all rods in the scenario's units: the shared one alone, or each.
+    pub fn tips(&self, tips: &[DVec3]) -> Vec<DVec3> {
+        let count = if self.first().joined() { 1 } else { tips.len() };
+        let tips = tips.iter().take(count);
+        tips.map(|tip| *tip * self.scale().length).collect()
+    }
+
+    /// Centerlines of a state in the scenario's units, one per rod.
+    pub fn curves(&self, state: &State) -> Vec<Vec<DVec3>> {
+        let length = self.scale().length;
+        let rods = state.x.chunks(state.segments() + 1);
+        rods.map(|rod| rod.iter().map(|x| *x * length).collect())
+            .collect()
     }
 
     /// The leaf at the fraction 0.
@@ -126,18 +126,6 @@ impl<'a> Family<'a> {
         })
     }
 
-    /// A leaf of the family on a grid.
-    pub(super) fn discretised(&self, leaf: &Leaf, grid: &Grid) -> DiscreteLeaf {
-        let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
-        for section in &mut discrete.sections {
-            section.condensing = match self.softening {
-                Some(softening) => (section.compliance + DVec3::splat(softening)).recip(),
-                None => section.condensing.min(DVec3::splat(STIFFEST)),
-            };
-        }
-        discrete
-    }
-
     /// Calls `act` with the leaf at a fraction, on a grid.
     pub fn with<R>(
         &self,
@@ -145,8 +133,20 @@ impl<'a> Family<'a> {
         grid: &Grid,
         act: impl FnOnce(&DiscreteLeaf) -> R,
     ) -> Result<R, OutOfRange> {
-        Ok(act(&self.discretised(&self.leaf(fraction)?, grid)))
+        Ok(act(&discretised(&self.leaf(fraction)?, grid, None)))
     }
+}
+
+/// A leaf on a grid, if requested softened: see [`Leaves::softened`].
+pub(super) fn discretised(leaf: &Leaf, grid: &Grid, softening: Option<f64>) -> DiscreteLeaf {
+    let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
+    for section in &mut discrete.sections {
+        section.condensing = match softening {
+            Some(softening) => (section.compliance + DVec3::splat(softening)).recip(),
+            None => section.condensing.min(DVec3::splat(STIFFEST)),
+        };
+    }
+    discrete
 }
 
 /// Leaves of a family on one grid. The last few are cached: iterations
@@ -154,6 +154,7 @@ impl<'a> Family<'a> {
 pub struct Leaves<'a> {
     pub family: &'a Family<'a>,
     pub grid: Grid,
+    softening: Option<f64>,
     cache: LruCache<f64, DiscreteLeaf, CACHED>,
 }
 
@@ -165,26 +166,40 @@ impl<'a> Leaves<'a> {
         Leaves {
             family,
             grid,
+            softening: None,
             cache: LruCache::default(),
+        }
+    }
+
+    /// The same, the matrices being those of leaves with this additional
+    /// compliance in stretch and shear (in units of L^2/A), equilibria
+    /// unchanged. The soft modes of a nearly rigid leaf are lost to rounding in its matrix;
+    /// the point at which they become neutral is analytic in the softening, and can be
+    /// extrapolated to zero softening.
+    pub fn softened(family: &'a Family<'a>, grid: Grid, softening: f64) -> Self {
+        Leaves {
+            softening: Some(softening),
+            ..Leaves::new(family, grid)
         }
     }
 
     /// The same on the grid with all segments halved.
     pub fn refined(&self) -> Self {
-        let grid = self.grid.refined();
-        let finer = |leaf: &DiscreteLeaf| self.family.discretised(&leaf.leaf, &grid);
+        let (grid, softening) = (self.grid.refined(), self.softening);
+        let finer = |leaf: &DiscreteLeaf| discretised(&leaf.leaf, &grid, softening);
         Leaves {
             cache: self.cache.map(finer),
             family: self.family,
             grid,
+            softening,
         }
     }
 
     /// The leaf at a fraction of the range.
     pub fn at(&mut self, fraction: f64) -> Result<&DiscreteLeaf, OutOfRange> {
-        let (family, grid) = (self.family, &self.grid);
+        let Leaves { family, grid, .. } = self;
         self.cache.at(fraction, || {
-            Ok(family.discretised(&family.leaf(fraction)?, grid))
+            Ok(discretised(&family.leaf(fraction)?, grid, self.softening))
         })
     }
 }

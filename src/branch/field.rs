@@ -59,7 +59,6 @@ pub fn between(a: &State, b: &State) -> Field {
     (0..a.rods()).map(|j| rod(j).map(node).collect()).collect()
 }
 
-/// Whether all components are finite.
 pub fn is_finite(a: &Field) -> bool {
     a.iter().flatten().flatten().all(|v| v.is_finite())
 }

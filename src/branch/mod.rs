@@ -70,6 +70,8 @@ pub struct Point {
     pub tangent: Tangent,
     /// Morse index.
     pub index: usize,
+    /// Newton iterations by which it was found.
+    pub iterations: usize,
 }
 
 /// A direction along a branch, of length one.

@@ -1,10 +1,10 @@
 //! Regular points of a branch on finer and finer grids.
 
 use super::equations::{Equations, Plane, Stuck, reversed};
-use super::family::Family;
+use super::family::{Family, OutOfRange};
 use super::field::{at_same_nodes, prolong as prolong_field};
 use super::refined::{Doubt, Refined, Table, Values, observed_nodes};
-use super::states::DIFFERENCE;
+use super::states::both_sides;
 use super::{Point, Tangent};
 use crate::leaf::{DiscreteLeaf, Grid};
 use crate::relax::prolong::prolong;
@@ -111,8 +111,7 @@ fn on_next_grid<'a>(
         increments: prolong_field(&point.tangent.increments),
         ..point.tangent
     });
-    let found = equations.correct_within(&guess, point.fraction, condition.as_plane())?;
-    let (mut found, _) = found;
+    let mut found = equations.correct_within(&guess, point.fraction, condition.as_plane())?;
     if equations.inner(&found.tangent, &tangent) < 0.0 {
         found.tangent = reversed(found.tangent);
     }
@@ -223,18 +222,11 @@ fn refine_in(
 /// neighbouring states.
 fn slope(equations: &mut Equations, point: &Point) -> Result<Values, Stuck> {
     let tangent = &point.tangent;
-    let mut energy = |step: f64| {
+    let [after, before] = both_sides(|step| {
         let at = point.fraction + step;
-        let leaf = equations
-            .leaves
-            .at(at)
-            .map(|leaf| (at, leaf.energy(&point.state)));
-        leaf.ok()
-    };
-    // At an end of the range there may be no leaf beyond.
-    let here = energy(0.0);
-    let (after, before) = (energy(DIFFERENCE).or(here), energy(-DIFFERENCE).or(here));
-    let (after, before) = after.zip(before).ok_or(Stuck::NotConverged)?;
+        let leaf = equations.leaves.at(at)?;
+        Ok::<_, OutOfRange>((at, leaf.energy(&point.state)))
+    })?;
     let reaction = reaction_rate(equations, point)?;
     let leaf = equations.leaves.at(point.fraction)?;
     let nodes = observed_nodes(leaf, leaf.segments());
@@ -255,16 +247,11 @@ fn reaction_rate(equations: &mut Equations, point: &Point) -> Result<DVec3, Stuc
         return Ok(DVec3::ZERO);
     }
     let tangent = &point.tangent;
-    let mut reaction_at = |step: f64| {
+    let [(after, force), (before, force_before)] = both_sides(|step| {
         let at = point.fraction + step;
         let length = step / tangent.fraction;
         let state = equations.moved(&point.state, at, &tangent.increments, length)?;
-        Ok((at, equations.leaves.at(at)?.reaction(&state).0))
-    };
-    let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
-        // At an end of the range there may be no leaf beyond.
-        reaction_at(step).or_else(|_: Stuck| reaction_at(0.0))
-    });
-    let ((after, force), (before, force_before)) = (after?, before?);
+        Ok::<_, OutOfRange>((at, equations.leaves.at(at)?.reaction(&state).0))
+    })?;
     Ok((force - force_before) / (after - before))
 }

@@ -7,6 +7,7 @@ use super::family::{Family, Leaves};
 use super::field::prolong as prolong_field;
 use super::refine::{FINEST, GRIDS, STILL};
 use super::refined::{Doubt, Refined, Table, Values};
+use super::states::stiffest_condensed;
 use crate::leaf::Grid;
 use crate::relax::prolong::prolong;
 
@@ -114,8 +115,7 @@ impl Softening {
     ) -> Result<(Values, f64), Stuck> {
         let leaf = equations.leaves.at(critical.fraction)?;
         let rigid = leaf.stiffest() * NEARLY_RIGID < 1.0;
-        let condensing = leaf.sections.iter().map(|it| it.condensing.max_element());
-        let mut stiffest = condensing.fold(0.0_f64, f64::max);
+        let mut stiffest = stiffest_condensed(leaf);
         let segments = leaf.segments() as f64;
         let fold = critical.kind == Kind::Fold;
         let mut growth = 1.0;
@@ -176,9 +176,9 @@ fn extrapolated(
     let mut found = Vec::new();
     let mut near = critical.clone();
     for k in (0..CUBIC.len()).rev() {
-        let soft = family.softened(softening * (k + 1) as f64);
         let mut equations = Equations::new(family, grid.clone())?;
-        equations.softened = Some(Leaves::new(&soft, grid.clone()));
+        let softening = softening * (k + 1) as f64;
+        equations.softened = Some(Leaves::softened(family, grid.clone(), softening));
         near = near.relocated(&mut equations)?;
         found.push(Values::of(&mut equations, &near.state, near.fraction)?);
     }
@@ -226,7 +226,7 @@ fn interpolate_across(
             let increments = &critical.tangent.increments;
             let at = fraction + side * unit;
             let moved = equations.moved(&critical.state, at, increments, side * apart);
-            let (point, _) = equations.correct(&moved.ok()?, at, None).ok()?;
+            let point = equations.correct(&moved.ok()?, at, None).ok()?;
             Values::of(equations, &point.state, at).ok()
         };
         let pairs = [1.0, 2.0, 3.0].into_iter();

@@ -20,7 +20,7 @@ pub struct Refined {
     /// Energy, in the family's units.
     pub energy: f64,
     /// Tips of all rods, likewise.
-    pub tips: Vec<[f64; 3]>,
+    pub tips: Vec<DVec3>,
     /// The reaction at held tips, likewise; zero if they are free.
     pub reaction: DVec3,
     /// Bound on the error of the tips, or of the rods' midpoints if the tips are held: of the
@@ -127,7 +127,6 @@ impl Values {
         })
     }
 
-    /// The weighted sum of values.
     pub fn sum(parts: &[(f64, Values)]) -> Self {
         let sum = |of: &dyn Fn(&Values) -> f64| parts.iter().map(|(w, v)| w * of(v)).sum();
         let points = parts.first().map_or(0, |(_, values)| values.points.len());
@@ -240,7 +239,7 @@ impl Table {
         Refined {
             fraction,
             energy,
-            tips: tips.map(|tip| [tip[0], tip[1], tip[2]]).collect(),
+            tips: tips.map(DVec3::from_slice).collect(),
             reaction,
             error: self.error(),
             fraction_error: self.fraction_error() + self.softening + self.rounding,

@@ -7,19 +7,30 @@ use crate::leaf::{DiscreteLeaf, Field, State, System};
 
 /// Step of central differences of forces, as a part of the parameter's range: truncation
 /// error and rounding error are both about 1e-10.
-pub const DIFFERENCE: f64 = 1e-5;
+const DIFFERENCE: f64 = 1e-5;
+
+/// A value after and before the present one of a parameter, for a central difference; `value`
+/// takes the distance from it. At an end of the range, where there may be no leaf beyond, the
+/// present one takes the place of that.
+pub fn both_sides<T, E>(mut value: impl FnMut(f64) -> Result<T, E>) -> Result<[T; 2], E> {
+    let sides = [DIFFERENCE, -DIFFERENCE];
+    let [after, before] = sides.map(|step| value(step).or_else(|_| value(0.0)));
+    Ok([after?, before?])
+}
 
 /// Derivative of the forces with respect to a parameter, by central differences; `forces` takes
 /// the distance from the present value of the parameter.
 pub fn rate<E>(mut forces: impl FnMut(f64) -> Result<Field, E>) -> Result<Field, E> {
-    let [after, before] = [DIFFERENCE, -DIFFERENCE].map(|step| {
-        // At an end of the range there may be no leaf beyond.
-        let mut at = |step: f64| Ok((step, forces(step)?));
-        at(step).or_else(|_: E| at(0.0))
-    });
-    let ((after, forces_after), (before, forces_before)) = (after?, before?);
+    let at = |step: f64| Ok((step, forces(step)?));
+    let [(after, forces_after), (before, forces_before)] = both_sides(at)?;
     let rate = plus(&forces_after, -1.0, &forces_before);
     Ok(times(&rate, 1.0 / (after - before)))
+}
+
+/// The largest stiffness in stretch and shear with which segment forces are condensed out.
+pub fn stiffest_condensed(leaf: &DiscreteLeaf) -> f64 {
+    let stiffnesses = leaf.sections.iter().map(|it| it.condensing.max_element());
+    stiffnesses.fold(0.0, f64::max)
 }
 
 /// The unbalanced forces on a leaf in a state whose clamped nodes are put where it clamps them.

@@ -1,13 +1,12 @@
 //! One step along a branch, which may end where the range of the parameter does.
 
 use super::Point;
-use super::equations::{Equations, Stuck, reversed};
+use super::equations::{Equations, Stuck};
 use super::family::OutOfRange;
 
 /// A point found by a step.
 pub struct Found {
     pub point: Point,
-    pub iterations: usize,
     /// Length of the step along the tangent at its start.
     pub step: f64,
     /// Distance between the predicted and the corrected point.
@@ -40,25 +39,19 @@ impl Found {
             _ => return Ok(None),
         };
         let part = (edge - now.fraction) / (self.point.fraction - now.fraction);
-        (self.point, _) = at_edge(equations, now, edge, part * step)?;
+        self.point = at_edge(equations, now, edge, part * step)?;
         self.step = part * step;
         Ok(Some(edge))
     }
 }
 
-/// One step along the branch.
 fn advance(equations: &mut Equations, now: &Point, step: f64) -> Result<Found, Stuck> {
     let tangent = &now.tangent;
     let fraction = now.fraction + step * tangent.fraction;
     let state = equations.moved(&now.state, fraction, &tangent.increments, step)?;
-    let (point, iterations) = equations.correct(&state, fraction, Some(tangent))?;
+    let point = equations.correct(&state, fraction, Some(tangent))?;
     let drift = (state.shift_to(&point.state)).max((point.fraction - fraction).abs());
-    Ok(Found {
-        point,
-        iterations,
-        step,
-        drift,
-    })
+    Ok(Found { point, step, drift })
 }
 
 /// A step to the end of the range, if one of this length would leave it.
@@ -73,29 +66,21 @@ fn advance_to_edge(
     if length <= 0.0 || length > step {
         return Err(out.into());
     }
-    let (point, iterations) = at_edge(equations, now, edge, length)?;
+    let point = at_edge(equations, now, edge, length)?;
     let part = length / step;
     let state = equations.moved(&now.state, edge, &now.tangent.increments, length)?;
     Ok(Found {
         drift: state.shift_to(&point.state) / part,
         point,
-        iterations,
         step: length,
     })
 }
 
 /// The point at an end of the range, predicted `length` along the tangent.
-fn at_edge(
-    equations: &mut Equations,
-    now: &Point,
-    edge: f64,
-    length: f64,
-) -> Result<(Point, usize), Stuck> {
+fn at_edge(equations: &mut Equations, now: &Point, edge: f64, length: f64) -> Result<Point, Stuck> {
     let increments = &now.tangent.increments;
     let state = equations.moved(&now.state, edge, increments, length)?;
-    let (mut point, iterations) = equations.correct(&state, edge, None)?;
-    if equations.inner(&point.tangent, &now.tangent) < 0.0 {
-        point.tangent = reversed(point.tangent);
-    }
-    Ok((point, iterations))
+    let mut point = equations.correct(&state, edge, None)?;
+    point.tangent = equations.oriented(point.tangent, &now.tangent);
+    Ok(point)
 }

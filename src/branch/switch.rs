@@ -9,15 +9,10 @@ use super::{Point, Tangent};
 const AWAY: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
 
 /// The first points of the branches that cross at `critical` in the plane of
-/// one of its neutral modes, one on either side: as near as possible, but so far from the
+/// the first of its neutral modes, one on either side: as near as possible, but so far from the
 /// branch point that finer grids have them too, with this accuracy of their tips.
-pub fn switch(
-    equations: &mut Equations,
-    critical: &Critical,
-    mode: usize,
-    accuracy: f64,
-) -> Vec<Point> {
-    let across = critical.across(equations, mode);
+pub fn switch(equations: &mut Equations, critical: &Critical, accuracy: f64) -> Vec<Point> {
+    let across = critical.across(equations);
     let (family, grid) = (equations.leaves.family, equations.grid().clone());
     [across.clone(), reversed(across)]
         .iter()
@@ -46,6 +41,5 @@ fn first_point(
     let increments = &direction.increments;
     let fraction = critical.fraction + away * direction.fraction;
     let state = equations.moved(&critical.state, fraction, increments, away)?;
-    let (point, _) = equations.correct(&state, fraction, Some(direction))?;
-    Ok(point)
+    equations.correct(&state, fraction, Some(direction))
 }

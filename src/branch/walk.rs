@@ -189,7 +189,6 @@ impl Branch {
         self.end = None;
     }
 
-    /// Multiplies the next step by `part`.
     pub fn shorten(&mut self, part: f64) {
         self.step *= part;
     }
@@ -243,6 +242,7 @@ impl Branch {
             Err(stuck) => return Err(stuck),
         };
         let turn = equations.inner(&now.tangent, &next.point.tangent);
+        let easy = next.point.iterations <= FEW && turn > STRAIGHT;
         let mut end = next.stop_at_edge(equations, now, step)?.map(End::at_edge);
         if let Some(first) = &self.first
             && end.is_none()
@@ -285,7 +285,7 @@ impl Branch {
         self.steps.push(next.step);
         self.points.push(next.point);
         self.end = end;
-        if next.iterations <= FEW && turn > STRAIGHT {
+        if easy {
             self.step = (GROWTH * step).min(how.longest);
         }
         Ok(())
@@ -345,7 +345,7 @@ fn closed_at(equations: &mut Equations, first: &Point, near: &Point, step: f64) 
         let increments = &near.tangent.increments;
         let fraction = near.fraction + shift * near.tangent.fraction;
         let state = (equations.moved(&near.state, fraction, increments, shift)).ok()?;
-        (near, _) = (equations.correct(&state, fraction, Some(&first.tangent))).ok()?;
+        near = (equations.correct(&state, fraction, Some(&first.tangent))).ok()?;
     }
     None
 }

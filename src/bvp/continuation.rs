@@ -5,6 +5,7 @@ use super::equations::Equations;
 use super::newton::Newton;
 use super::solution::{Log, Reason};
 use super::trajectory::Trajectory;
+use crate::shape::equally_spaced;
 
 /// Accuracy of intermediate solutions.
 const ROUGH: f64 = 1e-6;
@@ -56,7 +57,13 @@ pub fn from_arcs(
 ) -> Result<Trajectory, Interrupted> {
     let mut first = None;
     for strategy in STRATEGIES {
-        match strategy.follow(equations, intervals, log) {
+        let mut attempt = Attempt {
+            strategy,
+            equations,
+            intervals,
+            log,
+        };
+        match attempt.follow() {
             Ok(near) => return Ok(near),
             Err(failure) => first = first.or(Some(failure)),
         }
@@ -64,91 +71,81 @@ pub fn from_arcs(
     Err(first.expect("there is a strategy"))
 }
 
-impl Strategy {
-    fn follow(
-        self,
-        equations: &mut Equations,
-        intervals: Option<usize>,
-        log: &mut Log,
-    ) -> Result<Trajectory, Interrupted> {
-        equations.part = 0.0;
-        let stiff = self == Strategy::Stiff;
-        equations.softened = if stiff { 0.0 } else { 1.0 };
-        let unstressed = Trajectory::unstressed(equations, ROUGH);
+/// A continuation by one of the strategies.
+struct Attempt<'c, 'a, 'p> {
+    strategy: Strategy,
+    equations: &'c mut Equations<'a>,
+    intervals: Option<usize>,
+    log: &'c mut Log<'p>,
+}
+
+impl Attempt<'_, '_, '_> {
+    fn follow(&mut self) -> Result<Trajectory, Interrupted> {
+        self.equations.part = 0.0;
+        let stiff = self.strategy == Strategy::Stiff;
+        self.equations.softened = if stiff { 0.0 } else { 1.0 };
+        let unstressed = Trajectory::unstressed(self.equations, ROUGH);
         let near = unstressed.map_err(|unbounded| Interrupted {
             reason: unbounded.into(),
             part: 0.0,
-            near: Trajectory::straight(equations),
+            near: Trajectory::straight(self.equations),
         })?;
-        let load: Stage = |equations| &mut equations.part;
-        let near = self.follow_stage(load, equations, near, intervals, log)?;
-        if !stiff {
-            return Ok(near);
+        let near = self.follow_stage(|equations| &mut equations.part, near)?;
+        match stiff {
+            true => self.follow_stage(|equations| &mut equations.softened, near),
+            false => Ok(near),
         }
-        let soften: Stage = |equations| &mut equations.softened;
-        self.follow_stage(soften, equations, near, intervals, log)
     }
 
     /// Changes the equations by one stage; the first attempt is the whole change.
     fn follow_stage(
-        self,
+        &mut self,
         stage: Stage,
-        equations: &mut Equations,
         mut near: Trajectory,
-        intervals: Option<usize>,
-        log: &mut Log,
     ) -> Result<Trajectory, Interrupted> {
         let (mut part, mut step) = (0.0, 1.0);
         let mut before: Option<(Trajectory, f64)> = None;
-        let (begun, rods) = (log.work.slopes, equations.rods());
+        let (begun, rods) = (self.log.work.slopes, self.equations.rods());
         while part < 1.0 {
-            log.part = part;
-            let spent = |log: &Log| (log.work.slopes - begun) * rods;
+            self.log.part = part;
             let next = if step >= 1.0 - part { 1.0 } else { part + step };
-            *stage(equations) = next;
+            *stage(self.equations) = next;
             let predicted = match &before {
-                Some((earlier, at)) => near.beyond(equations, earlier, (next - part) / (part - at)),
+                Some((earlier, at)) => {
+                    near.beyond(self.equations, earlier, (next - part) / (part - at))
+                }
                 None => near.clone(),
             };
-            match self.solve_near(equations, &predicted, intervals, log) {
+            let found = self.solve_near(&predicted);
+            let spent = (self.log.work.slopes - begun) * rods;
+            match found {
                 Ok(trajectory) => {
                     before = Some((std::mem::replace(&mut near, trajectory), part));
                     part = next;
                     step *= 2.0;
                 }
-                Err(_) if step > LEAST_STEP && spent(log) < BUDGET => step *= 0.5,
+                Err(_) if step > LEAST_STEP && spent < BUDGET => step *= 0.5,
                 Err(reason) => {
                     return Err(Interrupted { reason, part, near });
                 }
             }
         }
-        log.part = 1.0;
+        self.log.part = 1.0;
         Ok(near)
     }
 
-    /// The solution near a trajectory.
-    fn solve_near(
-        self,
-        equations: &Equations,
-        near: &Trajectory,
-        intervals: Option<usize>,
-        log: &mut Log,
-    ) -> Result<Trajectory, Reason> {
-        let count = intervals.unwrap_or_else(|| {
+    fn solve_near(&mut self, near: &Trajectory) -> Result<Trajectory, Reason> {
+        let equations = &*self.equations;
+        let count = self.intervals.unwrap_or_else(|| {
             let turns = (near.turn(equations) / TURN).ceil() as usize;
             turns.clamp(LEAST_INTERVALS, MOST_INTERVALS)
         });
-        let mut newton = Newton::from_trajectory(equations, near, Some(count), log)?;
-        newton.only_near = self != Strategy::Far;
+        let mut newton = Newton::from_trajectory(equations, near, Some(count), self.log)?;
+        newton.only_near = self.strategy != Strategy::Far;
         newton.solve(ROUGH)?;
-        let stations = STATIONS * count.max(LEAST_INTERVALS);
-        let stations: Vec<f64> = (0..=stations).map(|i| i as f64 / stations as f64).collect();
-        Ok(Trajectory::sampled(
-            equations,
-            &newton.nodes,
-            &stations,
-            ROUGH,
-        )?)
+        let stations = equally_spaced(STATIONS * count.max(LEAST_INTERVALS));
+        let sampled = Trajectory::sampled(equations, &newton.nodes, &stations, ROUGH);
+        Ok(sampled?)
     }
 }
 

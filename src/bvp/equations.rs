@@ -16,7 +16,7 @@ use glam::{DMat3, DQuat, DVec3};
 use super::arcs::{self, Arc};
 pub use super::state::{RodState, STATE, TANGENT};
 use crate::limit::Limit;
-use crate::scenario::{Profile, Scenario, longest};
+use crate::scenario::{Profile, Rod, Scenario, ascending, longest};
 
 /// The boundary-value problem of a leaf, dimensionless.
 ///
@@ -189,7 +189,6 @@ impl<'a> Equations<'a> {
         self.part * self.coupling[g]
     }
 
-    /// Whether gap `g` has any coupling.
     pub fn coupled(&self, g: usize) -> bool {
         self.coupling[g] != DVec3::ZERO
     }
@@ -337,7 +336,6 @@ impl<'a> Equations<'a> {
             .collect()
     }
 
-    /// The constraint on the tips.
     pub fn tip(&self) -> Tip {
         match &self.scenario.held_tip {
             Some(held) if held.clamps.is_some() => Tip::Clamped,
@@ -358,18 +356,8 @@ impl<'a> Equations<'a> {
 }
 
 fn kinks(scenario: &Scenario) -> Vec<f64> {
-    let profiles = scenario.rods.iter().flat_map(|rod| {
-        let (a, h, u) = (
-            &rod.couple_stiffness,
-            &rod.force_stiffness,
-            &rod.rest_curvature,
-        );
-        a.iter().chain(h).chain(u).chain([&rod.rest_stretch])
-    });
-    let mut kinks: Vec<f64> = profiles.flat_map(Profile::kinks).copied().collect();
-    kinks.sort_by(f64::total_cmp);
-    kinks.dedup();
-    kinks
+    let profiles = scenario.rods.iter().flat_map(Rod::profiles);
+    ascending(profiles.flat_map(Profile::kinks).copied())
 }
 
 /// The matrix \[a\] with \[a\] b = a x b.

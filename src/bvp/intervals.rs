@@ -58,7 +58,6 @@ impl Units {
         self.force.iter().fold(0.0, |m, f| m.max(*f))
     }
 
-    /// The largest unit of moments.
     pub fn largest_moment(&self) -> f64 {
         self.moment.iter().fold(0.0, |m, f| m.max(*f))
     }
@@ -95,7 +94,6 @@ impl Units {
 
 /// Result of the integration over an interval.
 pub struct Integrated {
-    /// The state at its end.
     pub end: Vec<f64>,
     /// The linearised equations along it, if requested.
     steps: Vec<LinearStep>,

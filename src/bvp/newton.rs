@@ -13,6 +13,7 @@ use super::march::March;
 use super::solution::{Correction, Log, Reason};
 use super::trajectory::{Nodes, Trajectory};
 use crate::memory::Request;
+use crate::shape::equally_spaced;
 
 const MAX_ITERATIONS: usize = 60;
 
@@ -54,7 +55,6 @@ pub struct Newton<'e, 'a, 'p> {
     /// Largest defect at the last evaluation, in the units.
     pub defect: f64,
     now: Correction,
-    /// Counts work and reports progress.
     log: &'e mut Log<'p>,
 }
 
@@ -76,7 +76,7 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
     ) -> Result<Self, Reason> {
         let mut nodes = match intervals {
             Some(count) => {
-                let sigma: Vec<f64> = (0..=count).map(|k| k as f64 / count as f64).collect();
+                let sigma = equally_spaced(count);
                 let states = sigma[..count].iter().map(|&sigma| near.at(sigma)).collect();
                 Nodes { sigma, states }
             }
@@ -182,7 +182,6 @@ impl<'e, 'a, 'p> Newton<'e, 'a, 'p> {
         Err(NewtonFailure::NoProgress(size))
     }
 
-    /// Linearises at the present unknowns.
     fn linearize(&mut self, tolerance: f64) -> Result<Residuals, NewtonFailure> {
         let integrated = self.integrate(&self.nodes.clone(), tolerance, true)?;
         let residuals = self.residuals(&self.nodes, &integrated);

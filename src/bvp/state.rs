@@ -35,7 +35,6 @@ impl RodState {
         }
     }
 
-    /// Writes them.
     #[inline]
     pub fn write(&self, y: &mut [f64], j: usize) {
         let y = &mut y[STATE * j..STATE * (j + 1)];

@@ -1,6 +1,6 @@
 //! The motion of a leaf: its mass, damping and duration, and loads that change in time.
 
-use super::{Profile, Rod, Scale, Schedule};
+use super::{Profile, Rod, Scale, Schedule, ascending};
 
 /// Radius of the section over the length of the longest rod: half of it, the radius of
 /// gyration, is that of the relaxation.
@@ -154,9 +154,7 @@ pub(super) fn round_inertia(density: &Profile, radius: &Profile) -> Profile {
     if let (Profile::Constant(_), Profile::Constant(_)) = (density, radius) {
         return Profile::Constant(at_fraction(0.0));
     }
-    let mut at = [&[0.0], density.kinks(), radius.kinks(), &[1.0]].concat();
-    at.sort_by(f64::total_cmp);
-    at.dedup();
+    let at = ascending([&[0.0], density.kinks(), radius.kinks(), &[1.0]].concat());
     let value = at.iter().map(|&sigma| at_fraction(sigma)).collect();
     Profile::Linear { at, value }
 }

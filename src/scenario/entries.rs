@@ -38,7 +38,6 @@ impl Default for Entries {
 
 /// An override with the whole value of its key.
 pub(crate) struct Override {
-    /// As it was given.
     pub given: String,
     pub key: Key,
     pub value: String,
@@ -170,7 +169,6 @@ impl Entries {
         entries
     }
 
-    /// The given entries.
     pub(super) fn given(&self) -> impl Iterator<Item = (Key, &Value)> {
         Key::all().filter_map(|key| Some((key, self.0[key as usize].as_deref()?)))
     }
@@ -194,7 +192,6 @@ impl Entries {
         Some(())
     }
 
-    /// The value of a part.
     pub(crate) fn value_at(&self, part: Part) -> Option<&Value> {
         let mut place = self.get(part.key)?;
         if let Some(list) = part.list {

@@ -19,6 +19,16 @@ pub struct ScenarioError {
 }
 
 impl ScenarioError {
+    /// The error about a file, or a line of it, that is not one about the value of a key.
+    pub(super) fn in_file(file: &str, line: Option<usize>, problem: String) -> Self {
+        let file = file.to_string();
+        ScenarioError {
+            place: Place::File { file, line },
+            key: None,
+            problem,
+        }
+    }
+
     /// The error for a file that is not TOML itself, whose lines differ.
     pub(super) fn without_line(mut self) -> Self {
         if let Place::File { line, .. } = &mut self.place {

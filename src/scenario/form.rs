@@ -3,10 +3,10 @@
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-use super::error::{Place, ScenarioError};
+use super::error::ScenarioError;
 use super::key::Range;
 use super::section::{Outline, Section};
-use super::{Key, Profile, Rod, Scenario, Schedule, Start};
+use super::{Key, Profile, Rod, Scenario, Schedule, Start, ascending};
 
 /// A value to be written.
 enum Written<'a> {
@@ -64,8 +64,13 @@ impl Serialize for Scenario {
 impl Scenario {
     /// The value of a key; `None` if other keys determine it.
     fn written(&self, key: Key) -> Option<Written<'_>> {
-        let text = |text: &'static str| Some(Written::Text(text));
-        let dynamics = &self.dynamics;
+        match key.parts().0 {
+            "section" => return self.of_section(key),
+            "stiffness" if self.section(0).is_some() => return None,
+            "tip" => return self.of_tip(key),
+            "dynamics" => return self.of_dynamics(key),
+            _ => {}
+        }
         Some(match key {
             Key::Name => Written::Text(&self.name),
             Key::UnitLength => Written::Text(self.units.length.as_deref()?),
@@ -74,26 +79,6 @@ impl Scenario {
             Key::Length => number_or_list(self.rods.iter().map(|rod| rod.length)),
             Key::Fan => list(self.rods.iter().map(|rod| rod.angle)),
             Key::Joined => Written::Switch(self.joined),
-            Key::SectionShape
-            | Key::Diameter
-            | Key::Width
-            | Key::Thickness
-            | Key::Young
-            | Key::Poisson
-            | Key::MassDensity => self.of_section(key)?,
-            Key::Torsion
-            | Key::Bending2
-            | Key::Bending3
-            | Key::Axial
-            | Key::Shear2
-            | Key::Shear3
-                if self.section(0).is_some() =>
-            {
-                return None;
-            }
-            Key::Density | Key::RotaryInertia if section_of(&dynamics.density[0]).is_some() => {
-                return None;
-            }
             Key::Torsion | Key::Bending2 | Key::Bending3 => {
                 self.of_rods(Key::COUPLE, key, |rod| &rod.couple_stiffness)
             }
@@ -112,36 +97,48 @@ impl Scenario {
             Key::Gravity => list(self.gravity),
             Key::TipForce => list(self.tip_force),
             Key::TipMoment => list(self.tip_moment),
-            Key::TipHeld | Key::TipPosition | Key::TipAngles | Key::TipTwist => {
-                let held = self.held_tip.as_ref()?;
-                let clamps = held.clamps.as_deref();
-                match key {
-                    Key::TipHeld if clamps.is_some() => return text("clamped"),
-                    Key::TipHeld => return text("pinned"),
-                    Key::TipPosition => list(held.position),
-                    Key::TipAngles => number_or_list(clamps?.iter().map(|clamp| clamp.angle)),
-                    _ => number_or_list(clamps?.iter().map(|clamp| clamp.twist)),
-                }
-            }
             Key::Tolerance => Written::Number(self.tolerance),
+            _ => return None,
+        })
+    }
+
+    /// The value of a key of `[tip]`.
+    fn of_tip(&self, key: Key) -> Option<Written<'_>> {
+        let held = self.held_tip.as_ref()?;
+        let clamps = held.clamps.as_deref();
+        Some(match key {
+            Key::TipHeld if clamps.is_some() => Written::Text("clamped"),
+            Key::TipHeld => Written::Text("pinned"),
+            Key::TipPosition => list(held.position),
+            Key::TipAngles => number_or_list(clamps?.iter().map(|clamp| clamp.angle)),
+            _ => number_or_list(clamps?.iter().map(|clamp| clamp.twist)),
+        })
+    }
+
+    /// The value of a key of `[dynamics]`.
+    fn of_dynamics(&self, key: Key) -> Option<Written<'_>> {
+        let dynamics = &self.dynamics;
+        let of_section = section_of(&dynamics.density[0]).is_some();
+        Some(match key {
+            Key::Density | Key::RotaryInertia if of_section => return None,
             Key::Density => quantity(dynamics.density.iter()),
             // If given, it would be larger about d1.
             Key::RotaryInertia if dynamics.polar_excess == 0.0 => return None,
             Key::RotaryInertia => quantity(dynamics.rotary_inertia.iter()),
-            Key::SectionRadius => return None,
             Key::ExternalDamping => Written::Number(dynamics.external_damping),
             Key::InternalDamping => Written::Number(dynamics.internal_damping),
             Key::Duration => Written::Number(dynamics.duration),
             Key::OutputInterval => Written::Number(dynamics.output_interval),
             Key::Clamped => Written::Switch(dynamics.clamped),
-            Key::Start => match dynamics.start {
-                Start::Released => return text("released"),
-                Start::AtRest => return text("at-rest"),
-            },
+            Key::Start => Written::Text(match dynamics.start {
+                Start::Released => "released",
+                Start::AtRest => "at-rest",
+            }),
             Key::GravityInTime => in_time(&dynamics.gravity, self.gravity, "value", list)?,
             Key::TipForceInTime => in_time(&dynamics.tip_force, self.tip_force, "value", list)?,
             Key::TipMomentInTime => in_time(&dynamics.tip_moment, self.tip_moment, "value", list)?,
             Key::RestInTime => in_time(&dynamics.rest, 1.0, "factor", Written::Number)?,
+            _ => return None,
         })
     }
 
@@ -212,9 +209,7 @@ fn quantity<'p>(profiles: impl Iterator<Item = &'p Profile>) -> Written<'static>
         return number_or_list(profiles.iter().map(|profile| profile.at(0.0)));
     }
     let kinks = profiles.iter().flat_map(|profile| profile.kinks());
-    let mut at: Vec<f64> = [0.0, 1.0].iter().chain(kinks).copied().collect();
-    at.sort_by(f64::total_cmp);
-    at.dedup();
+    let at = ascending([0.0, 1.0].iter().chain(kinks).copied());
     let values = |profile: &Profile| list(at.iter().map(|&sigma| profile.at(sigma)));
     let value = match profiles.iter().all(|profile| *profile == profiles[0]) {
         true => values(profiles[0]),
@@ -245,17 +240,9 @@ pub(super) fn from_json(text: &str, file: &str) -> Option<Result<String, Scenari
     if !text.trim_start().starts_with('{') {
         return None;
     }
-    let refuse = |line: Option<usize>, problem: String| {
-        let file = file.to_string();
-        ScenarioError {
-            place: Place::File { file, line },
-            key: None,
-            problem,
-        }
-    };
     let parsed = serde_json::from_str::<serde_json::Value>(text).map_err(|error| {
         let line = Some(error.line());
-        refuse(line, format!("not valid JSON: {error}"))
+        ScenarioError::in_file(file, line, format!("not valid JSON: {error}"))
     });
     Some(parsed.and_then(|mut document| {
         let form = match document.get_mut("input") {
@@ -263,7 +250,9 @@ pub(super) fn from_json(text: &str, file: &str) -> Option<Result<String, Scenari
             None => document,
         };
         let form = toml::Table::try_from(form);
-        let mut form = form.map_err(|error| refuse(None, format!("is no scenario: {error}")))?;
+        let mut form = form.map_err(|error| {
+            ScenarioError::in_file(file, None, format!("is no scenario: {error}"))
+        })?;
         for key in Key::all().filter(|key| key.form().range() == Range::PositiveOrInfinite) {
             let (table, name) = key.parts();
             let value = form.get_mut(table).and_then(|table| table.get_mut(name));

@@ -33,6 +33,16 @@ impl Limit {
             "gives {formula} = {value:.3e}, the limit is {limit:e}: {because}"
         )))
     }
+
+    /// The same for the extremes of a profile of each rod, times `natural`.
+    fn check_profiles(&self, item: Item, profiles: &[Profile], natural: f64) -> Result {
+        for (index, profile) in profiles.iter().enumerate() {
+            for value in [profile.min(), profile.max_abs()] {
+                self.check(item.entry(index), value * natural)?;
+            }
+        }
+        Ok(())
+    }
 }
 
 const fn most(formula: &'static str, most: f64, because: &'static str) -> Limit {
@@ -243,11 +253,7 @@ fn dynamics(raw: &Raw, scenario: &Scenario) -> Result {
             limit.check(item, item.number()? * natural)?;
             continue;
         };
-        for (index, profile) in item.quantity(scenario.rods.len())?.iter().enumerate() {
-            for value in [profile.min(), profile.max_abs()] {
-                limit.check(item.entry(index), value * natural)?;
-            }
-        }
+        limit.check_profiles(item, &item.quantity(scenario.rods.len())?, natural)?;
     }
     Ok(())
 }
@@ -268,12 +274,7 @@ fn masses(raw: &Raw, scenario: &Scenario) -> Result {
             &dynamics.rotary_inertia,
         ),
     ] {
-        let natural = natural_factor(key, scale, time);
-        for (index, profile) in profiles.iter().enumerate() {
-            for value in [profile.min(), profile.max_abs()] {
-                limit.check(item.entry(index), value * natural)?;
-            }
-        }
+        limit.check_profiles(item, profiles, natural_factor(key, scale, time))?;
     }
     Ok(())
 }

@@ -110,7 +110,6 @@ impl Sections {
         self.sections.iter().map(profile).collect()
     }
 
-    /// The radii, for pictures.
     pub(super) fn radii(&self) -> Radii {
         Radii::of(&self.sections)
     }

@@ -35,6 +35,7 @@ pub(crate) use key::Form;
 pub use key::Key;
 pub use part::Part;
 pub use profile::Profile;
+pub(crate) use profile::ascending;
 pub use radii::Radii;
 pub use read::text;
 #[cfg(feature = "cli")]
@@ -137,4 +138,29 @@ pub struct Rod {
     /// Growth of the rest length: an element ds rests at this factor times ds,
     /// v0 = (stretch, 0, 0); positive, 1 without growth.
     pub rest_stretch: Profile,
+}
+
+impl Rod {
+    /// All its profiles.
+    pub(crate) fn profiles(&self) -> impl Iterator<Item = &Profile> {
+        let triples = [
+            &self.couple_stiffness,
+            &self.force_stiffness,
+            &self.rest_curvature,
+        ];
+        triples.into_iter().flatten().chain([&self.rest_stretch])
+    }
+
+    /// The same, to be changed.
+    pub(crate) fn profiles_mut(&mut self) -> impl Iterator<Item = &mut Profile> {
+        let triples = [
+            &mut self.couple_stiffness,
+            &mut self.force_stiffness,
+            &mut self.rest_curvature,
+        ];
+        triples
+            .into_iter()
+            .flatten()
+            .chain([&mut self.rest_stretch])
+    }
 }

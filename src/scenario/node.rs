@@ -45,7 +45,6 @@ impl<'e> Node<'e> {
         }
     }
 
-    /// A number.
     pub(super) fn number(self) -> Option<Result<f64, TooLarge>> {
         let value = match self {
             Node::Bare(value) => return number(value).map(Ok),

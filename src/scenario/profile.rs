@@ -125,11 +125,27 @@ impl Profile {
         }
     }
 
+    /// The numbers that it is given by; none for a section.
+    pub(crate) fn numbers(&self) -> &[f64] {
+        match self {
+            Profile::Constant(value) => std::slice::from_ref(value),
+            Profile::Linear { value, .. } => value,
+            Profile::Section { .. } => &[],
+        }
+    }
+
+    /// The same, to be changed.
+    pub(crate) fn numbers_mut(&mut self) -> &mut [f64] {
+        match self {
+            Profile::Constant(value) => std::slice::from_mut(value),
+            Profile::Linear { value, .. } => value,
+            Profile::Section { .. } => &mut [],
+        }
+    }
+
     /// Folds values that include the extremes.
     fn fold(&self, start: f64, with: impl Fn(f64, f64) -> f64) -> f64 {
         match self {
-            Profile::Constant(value) => with(start, *value),
-            Profile::Linear { value, .. } => value.iter().copied().fold(start, with),
             Profile::Section {
                 section,
                 property,
@@ -138,8 +154,17 @@ impl Profile {
                 let values = section.samples(*property).map(|value| factor * value);
                 values.fold(start, with)
             }
+            _ => self.numbers().iter().copied().fold(start, with),
         }
     }
+}
+
+/// Numbers in ascending order, each once.
+pub(crate) fn ascending(numbers: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut numbers: Vec<f64> = numbers.into_iter().collect();
+    numbers.sort_by(f64::total_cmp);
+    numbers.dedup();
+    numbers
 }
 
 #[cfg(test)]

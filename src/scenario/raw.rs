@@ -104,17 +104,21 @@ impl<'a> Source<'a> {
 }
 
 impl<'a> Raw<'a> {
+    fn empty(file: &'a str) -> Raw<'a> {
+        Raw {
+            file,
+            entries: [const { None }; Key::COUNT],
+            tables: Vec::new(),
+        }
+    }
+
     /// Parses `text`, then applies `overrides`.
     pub(super) fn parse(
         text: &'a str,
         file: &'a str,
         overrides: &'a [Override],
     ) -> Result<Raw<'a>, ScenarioError> {
-        let mut raw = Raw {
-            file,
-            entries: [const { None }; Key::COUNT],
-            tables: Vec::new(),
-        };
+        let mut raw = Raw::empty(file);
         let origin = Origin::File(file);
         let source = Source { text, origin };
         let document = source.parse(DeTable::parse(text))?;
@@ -128,11 +132,7 @@ impl<'a> Raw<'a> {
 
     /// The same from values without a text; errors then have no useful place.
     pub(super) fn of(entries: &'a Entries) -> Raw<'a> {
-        let mut raw = Raw {
-            file: "",
-            entries: [const { None }; Key::COUNT],
-            tables: Vec::new(),
-        };
+        let mut raw = Raw::empty("");
         let source = Source {
             text: "",
             origin: Origin::File(""),
@@ -232,17 +232,16 @@ impl<'a> Raw<'a> {
                 _ if self.tables.contains(&table) => format!("add {entry} below [{table}]"),
                 _ => format!("add the table [{table}], and below it {entry}"),
             };
-            let (file, line) = (self.file.to_string(), None);
             let others = self.missing().filter(|other| *other != key);
             let others: Vec<&str> = others.map(Key::path).collect();
             let also = match others.is_empty() {
                 true => String::new(),
                 false => format!("; also missing: {}", others.join(", ")),
             };
+            let problem = format!("{} is missing: {how}{also}", key.path());
             ScenarioError {
-                place: Place::File { file, line },
                 key: Some(key),
-                problem: format!("{} is missing: {how}{also}", key.path()),
+                ..ScenarioError::in_file(self.file, None, problem)
             }
         })
     }

@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 use super::entries::{Entries, resolve};
-use super::error::{Place, ScenarioError};
+use super::error::ScenarioError;
 use super::excerpt::line_of;
 use super::form::from_json;
 use super::raw::Raw;
@@ -86,9 +86,9 @@ pub fn text(path: &Path) -> Result<String, ScenarioError> {
         .and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|reason| match reason.kind() {
             ErrorKind::IsADirectory => {
-                refused(&file, None, "is a folder: give the TOML file itself".into())
+                ScenarioError::in_file(&file, None, "is a folder: give the TOML file itself".into())
             }
-            _ => refused(&file, None, format!("cannot be read: {reason}")),
+            _ => ScenarioError::in_file(&file, None, format!("cannot be read: {reason}")),
         })?;
     utf8(bytes, &file)
 }
@@ -97,25 +97,16 @@ pub fn text(path: &Path) -> Result<String, ScenarioError> {
 pub(crate) fn utf8(bytes: Vec<u8>, file: &str) -> Result<String, ScenarioError> {
     if bytes.len() as u64 > MOST_BYTES {
         let problem = format!("is larger than {MOST_BYTES} bytes: this is no scenario");
-        return Err(refused(file, None, problem));
+        return Err(ScenarioError::in_file(file, None, problem));
     }
     let weight = Request::Scenario { bytes: bytes.len() };
-    (weight.weigh()).map_err(|why| refused(file, None, why.to_string()))?;
+    (weight.weigh()).map_err(|why| ScenarioError::in_file(file, None, why.to_string()))?;
     String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
         let bytes = error.as_bytes();
         let byte = bytes[offset];
         let problem =
             format!("is not text in UTF-8: byte {offset} is 0x{byte:02x}: save the file as UTF-8");
-        refused(file, Some(line_of(bytes, offset)), problem)
+        ScenarioError::in_file(file, Some(line_of(bytes, offset)), problem)
     })
-}
-
-fn refused(file: &str, line: Option<usize>, problem: String) -> ScenarioError {
-    let file = file.to_string();
-    ScenarioError {
-        place: Place::File { file, line },
-        key: None,
-        problem,
-    }
 }

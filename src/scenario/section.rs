@@ -17,7 +17,7 @@
 
 use std::f64::consts::PI;
 
-use super::Profile;
+use super::{Profile, ascending};
 
 /// Steps between two knots in the search for extremes.
 const SAMPLES: usize = 16;
@@ -65,36 +65,36 @@ impl Section {
         [width, thickness]: [Profile; 2],
         [young, poisson, mass_density]: [Profile; 3],
     ) -> Section {
-        let profiles = [&width, &thickness, &young, &poisson, &mass_density];
-        let mut kinks: Vec<f64> = profiles
-            .into_iter()
-            .flat_map(Profile::kinks)
-            .copied()
-            .collect();
-        kinks.sort_by(f64::total_cmp);
-        kinks.dedup();
-        Section {
+        let mut section = Section {
             outline,
             width,
             thickness,
             young,
             poisson,
             mass_density,
-            kinks,
-        }
+            kinks: Vec::new(),
+        };
+        let profiles = section.profiles().into_iter();
+        section.kinks = ascending(profiles.flat_map(Profile::kinks).copied());
+        section
+    }
+
+    fn profiles(&self) -> [&Profile; 5] {
+        let Section {
+            width,
+            thickness,
+            young,
+            poisson,
+            mass_density,
+            ..
+        } = self;
+        [width, thickness, young, poisson, mass_density]
     }
 
     /// Whether it is the same along the whole rod.
     pub(super) fn is_constant(&self) -> bool {
-        [
-            &self.width,
-            &self.thickness,
-            &self.young,
-            &self.poisson,
-            &self.mass_density,
-        ]
-        .into_iter()
-        .all(|profile| matches!(profile, Profile::Constant(_)))
+        let mut profiles = self.profiles().into_iter();
+        profiles.all(|profile| matches!(profile, Profile::Constant(_)))
     }
 
     /// Fractions inside (0, 1) where the slope of a property may jump.

@@ -129,10 +129,7 @@ impl Target {
     }
 
     fn text(self, value: f64) -> String {
-        match self.is_whole() {
-            true => format!("{value:.0}"),
-            false => format!("{value:?}"),
-        }
+        written(value, self.is_whole())
     }
 
     /// The value that this text denotes; none if a whole number would be too large.
@@ -228,10 +225,14 @@ impl Keys {
 
     /// A value of these keys as it is written into the scenario and into tables.
     pub fn text(&self, value: f64) -> String {
-        match self.is_whole() {
-            true => format!("{value:.0}"),
-            false => format!("{value:?}"),
-        }
+        written(value, self.is_whole())
+    }
+}
+
+fn written(value: f64, whole: bool) -> String {
+    match whole {
+        true => format!("{value:.0}"),
+        false => format!("{value:?}"),
     }
 }
 
@@ -261,6 +262,13 @@ pub struct Vary {
     pub values: Vec<f64>,
     /// Whether they are spaced logarithmically.
     pub log: bool,
+}
+
+impl Vary {
+    /// FROM and TO.
+    pub fn ends(&self) -> [f64; 2] {
+        [self.values[0], self.values[self.values.len() - 1]]
+    }
 }
 
 impl FromStr for Vary {

@@ -1,5 +1,7 @@
 //! Equilibria at points of the parameter plane, each continued from a neighbouring one.
 
+use glam::DVec3;
+
 use super::manifold::Solution;
 use super::plane::Plane;
 use crate::branch::Point;
@@ -41,7 +43,7 @@ pub struct Path {
     /// The grid on which it was followed, if that could be begun.
     pub grid: Option<Grid>,
     /// Tips of all rods along it, in the family's units.
-    pub tips: Vec<Vec<[f64; 3]>>,
+    pub tips: Vec<Vec<DVec3>>,
     /// Its critical points on that grid; the parameter goes from 0 to 1 along the path.
     pub critical: Vec<Critical>,
     /// Whether the branch turns back before the end of the path.
@@ -75,7 +77,7 @@ pub fn follow_path(plane: &Plane, from: &AtRest, to: [f64; 2]) -> Path {
     let Ok(family) = family else { return path };
     let equations = Equations::new(&family, from.grid.clone());
     let first = equations.map_err(Stuck::from).and_then(|mut equations| {
-        let (first, _) = equations.correct(&from.solution.state, 0.0, None)?;
+        let first = equations.correct(&from.solution.state, 0.0, None)?;
         Ok((equations, first))
     });
     let Ok((mut equations, mut first)) = first else {
@@ -113,7 +115,7 @@ pub fn recount(plane: &Plane, at: &AtRest) -> Option<usize> {
     let make = between(plane, [at.solution.params; 2]);
     let family = plane.family.along_path(&*make).ok()?;
     let mut equations = Equations::new(&family, at.grid.clone()).ok()?;
-    let (mut point, _) = equations.correct(&at.solution.state, 0.0, None).ok()?;
+    let mut point = equations.correct(&at.solution.state, 0.0, None).ok()?;
     while point.state.segments() < RECOUNTED {
         (equations, point) = on_finer(&mut equations, &point).ok()?;
     }
@@ -142,9 +144,9 @@ fn follow(equations: &mut Equations, first: &Point, path: &mut Path) -> Option<P
     }
 }
 
-fn tips(point: &Point) -> Vec<[f64; 3]> {
+fn tips(point: &Point) -> Vec<DVec3> {
     let state = &point.state;
-    (0..state.rods()).map(|j| state.tip(j).to_array()).collect()
+    (0..state.rods()).map(|j| state.tip(j)).collect()
 }
 
 /// A critical point on the path between two points of the plane, extrapolated over grids.

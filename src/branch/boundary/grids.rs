@@ -6,7 +6,7 @@ use super::search::NotFound;
 use super::singular_point::SingularPoint;
 use crate::branch::field::prolong as prolong_field;
 use crate::leaf::{Field, Grid, State};
-use crate::relax::prolong::prolong;
+use crate::relax::prolong::{prolong, restrict};
 
 /// Segments of the coarsest.
 const COARSEST: usize = 8;
@@ -19,21 +19,11 @@ pub fn on_finer<'a>(
 ) -> Result<(Manifold<'a>, SingularPoint), NotFound> {
     let state = prolong(manifold.leaf(point.solution.params)?, &point.solution.state);
     let finer = manifold.refined()?;
-    let direction = |it: &Direction| {
-        finer.normalised(Direction {
-            increments: prolong_field(&it.increments),
-            params: it.params,
-        })
-    };
+    let point = transferred(point, state, prolong_field);
     let point = SingularPoint {
-        solution: Solution {
-            state,
-            ..point.solution
-        },
-        soft: point.soft.iter().map(prolong_field).collect(),
-        tangent: direction(&point.tangent),
-        normal: direction(&point.normal),
-        ..point.clone()
+        tangent: finer.normalised(point.tangent),
+        normal: finer.normalised(point.normal),
+        ..point
     };
     Ok((finer, point))
 }
@@ -45,21 +35,29 @@ pub fn on_coarser(
     point: &SingularPoint,
 ) -> Option<(Grid, SingularPoint)> {
     let (coarse, state) = state_on_coarser(plane, grid, &point.solution.state)?;
+    Some((coarse, transferred(point, state, every_second)))
+}
+
+/// The point on the grid of this state, to which `field` transfers increments.
+fn transferred(
+    point: &SingularPoint,
+    state: State,
+    field: impl Fn(&Field) -> Field,
+) -> SingularPoint {
     let direction = |it: &Direction| Direction {
-        increments: every_second(&it.increments),
+        increments: field(&it.increments),
         params: it.params,
     };
-    let point = SingularPoint {
+    SingularPoint {
         solution: Solution {
             state,
             ..point.solution
         },
-        soft: point.soft.iter().map(every_second).collect(),
+        soft: point.soft.iter().map(&field).collect(),
         tangent: direction(&point.tangent),
         normal: direction(&point.normal),
         ..point.clone()
-    };
-    Some((coarse, point))
+    }
 }
 
 /// A state on the grid with every second node; none if that would be too coarse, or if `grid` is
@@ -67,19 +65,9 @@ pub fn on_coarser(
 pub fn state_on_coarser(plane: Plane, grid: &Grid, state: &State) -> Option<(Grid, State)> {
     let stations: Vec<f64> = grid.sigma().iter().copied().step_by(2).collect();
     let coarse = Grid::through(&stations, plane.family.first().kinks());
-    let (n, rods) = (state.segments(), state.rods());
-    if n % 2 != 0 || n / 2 < COARSEST || coarse.refined() != *grid {
-        return None;
-    }
-    let nodes = (0..rods).flat_map(|j| (0..=n).step_by(2).map(move |i| state.base(j) + i));
-    let (x, q) = nodes.map(|k| (state.x[k], state.q[k])).unzip();
-    let mut fewer = State::new(n / 2, x, q);
-    fewer.n = state
-        .n
-        .chunks(2)
-        .map(|pair| 0.5 * (pair[0] + pair[1]))
-        .collect();
-    Some((coarse, fewer))
+    let n = state.segments();
+    let refined = n.is_multiple_of(2) && n / 2 >= COARSEST && coarse.refined() == *grid;
+    refined.then(|| (coarse, restrict(state)))
 }
 
 /// A field at every second node.

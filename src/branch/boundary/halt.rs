@@ -4,7 +4,7 @@ use super::search::NotFound;
 use crate::branch::equations::Stuck;
 use crate::branch::refined::Doubt;
 
-/// The end on one of its sides.
+/// How a curve ended, on one of its sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Halt {
     /// At an end of one of the ranges.

@@ -1,9 +1,9 @@
 //! Equilibria of leaves that differ in two parameters, a manifold, on one grid.
 
-use super::plane::{LeafCache, Plane};
+use super::plane::{Plane, PlaneLeaves};
 use crate::branch::deflation::{STIFF, Solved};
 use crate::branch::equations::{Equations, ITERATIONS, LARGEST, Stuck, assembled, at_rest};
-use crate::branch::family::{Family, OutOfRange};
+use crate::branch::family::OutOfRange;
 use crate::branch::field::{add, between, dot, is_finite, largest, plus, times};
 use crate::branch::states::{advanced, forces_on, rate};
 use crate::leaf::{DiscreteLeaf, Field, Grid, State, System};
@@ -14,7 +14,6 @@ const ALONG_MODE: f64 = 1e-5;
 /// An equilibrium or an approximation to one, with its parameters.
 #[derive(Clone, Debug)]
 pub struct Solution {
-    /// The state of the leaf.
     pub state: State,
     /// Both parameters, as fractions of their ranges.
     pub params: [f64; 2],
@@ -37,6 +36,11 @@ impl Direction {
         }
     }
 
+    /// Parameters `step` further along it than these.
+    fn further(&self, params: [f64; 2], step: f64) -> [f64; 2] {
+        [0, 1].map(|i| params[i] + step * self.params[i])
+    }
+
     pub fn reversed(&self) -> Direction {
         Direction {
             increments: times(&self.increments, -1.0),
@@ -57,9 +61,9 @@ pub struct Sample {
 pub struct Manifold<'a> {
     pub plane: Plane<'a>,
     pub equations: Equations<'a>,
-    cache: LeafCache,
-    /// The softened family whose matrices determine what is singular, if any.
-    softened: Option<(Family<'a>, LeafCache)>,
+    leaves: PlaneLeaves<'a>,
+    /// The softened ones whose matrices determine what is singular, if any.
+    softened: Option<PlaneLeaves<'a>>,
 }
 
 impl<'a> Manifold<'a> {
@@ -70,11 +74,10 @@ impl<'a> Manifold<'a> {
     }
 
     fn of(plane: Plane<'a>, mut equations: Equations<'a>) -> Result<Self, OutOfRange> {
-        let mut cache = LeafCache::default();
+        let mut leaves = PlaneLeaves::new(plane, equations.grid().clone(), None);
         // Veins may be coupled at one end of the second range only.
         for end in [0.0, 1.0] {
-            let grid = equations.leaves.grid.clone();
-            let leaf = cache.at(&plane, plane.family, &grid, [0.0, end])?;
+            let leaf = leaves.at([0.0, end])?;
             if leaf.coupled() && !equations.leaves.at(0.0)?.coupled() {
                 equations.system = System::new(leaf);
             }
@@ -82,7 +85,7 @@ impl<'a> Manifold<'a> {
         Ok(Manifold {
             plane,
             equations,
-            cache,
+            leaves,
             softened: None,
         })
     }
@@ -93,10 +96,10 @@ impl<'a> Manifold<'a> {
     }
 
     /// Lets the matrices of leaves with this additional compliance determine what is singular:
-    /// see [`Family::softened`].
+    /// see [`Leaves::softened`](crate::branch::family::Leaves::softened).
     pub fn soften(&mut self, softening: f64) {
-        let family = self.plane.family.softened(softening);
-        self.softened = Some((family, LeafCache::default()));
+        let leaves = PlaneLeaves::new(self.plane, self.grid().clone(), Some(softening));
+        self.softened = Some(leaves);
     }
 
     pub fn grid(&self) -> &Grid {
@@ -105,11 +108,9 @@ impl<'a> Manifold<'a> {
 
     /// The leaf at fractions of both ranges.
     pub fn leaf(&mut self, params: [f64; 2]) -> Result<&DiscreteLeaf, OutOfRange> {
-        let grid = &self.equations.leaves.grid;
-        self.cache.at(&self.plane, self.plane.family, grid, params)
+        self.leaves.at(params)
     }
 
-    /// Inner product of two directions.
     pub fn inner(&self, a: &Direction, b: &Direction) -> f64 {
         let numbers = a.params[0] * b.params[0] + a.params[1] * b.params[1];
         self.equations.product(&a.increments, &b.increments) + numbers
@@ -135,7 +136,6 @@ impl<'a> Manifold<'a> {
         }
     }
 
-    /// The difference of two solutions.
     pub fn difference(&self, a: &Solution, b: &Solution) -> Direction {
         Direction {
             increments: between(&a.state, &b.state),
@@ -150,7 +150,7 @@ impl<'a> Manifold<'a> {
         to: &Direction,
         step: f64,
     ) -> Result<Solution, OutOfRange> {
-        let params = [0, 1].map(|i| solution.params[i] + step * to.params[i]);
+        let params = to.further(solution.params, step);
         let state = self.advanced(&solution.state, params, &to.increments, step)?;
         Ok(Solution { state, params })
     }
@@ -163,15 +163,9 @@ impl<'a> Manifold<'a> {
         to: &Direction,
         step: f64,
     ) -> Result<Solution, OutOfRange> {
-        let params = [0, 1].map(|i| solution.params[i] + step * to.params[i]);
-        let state = self.advanced(
-            &solution.state,
-            params,
-            &self.unit_parameter(0).increments,
-            1.0,
-        )?;
-        let state = self.advanced(&state, params, &to.increments, step)?;
-        Ok(Solution { state, params })
+        let (params, none) = (solution.params, self.unit_parameter(0).increments);
+        let state = self.advanced(&solution.state, to.further(params, step), &none, 1.0)?;
+        self.moved(&Solution { state, params }, to, step)
     }
 
     /// A state after `step` times these increments, for the leaf at these parameters.
@@ -182,10 +176,7 @@ impl<'a> Manifold<'a> {
         increments: &Field,
         step: f64,
     ) -> Result<State, OutOfRange> {
-        let grid = &self.equations.leaves.grid;
-        let family = self.plane.family;
-        let leaf = self.cache.at(&self.plane, family, grid, params)?;
-        let system = &mut self.equations.system;
+        let (leaf, system) = (self.leaves.at(params)?, &mut self.equations.system);
         Ok(advanced(leaf, state, system, increments, step))
     }
 
@@ -200,7 +191,7 @@ impl<'a> Manifold<'a> {
     ) -> Result<(Sample, f64), Stuck> {
         let (forces, noise) = self.assemble(&mut solution, soft)?;
         let each: Vec<&Field> = rates.iter().collect();
-        let solved = self.equations.solve_bordered(border, &forces, &each)?;
+        let solved = self.equations.solve_bordered(border, &forces, &each, 0.0)?;
         let sample = Sample {
             solution,
             solved,
@@ -212,18 +203,12 @@ impl<'a> Manifold<'a> {
     /// Returns the forces and their rounding error; the matrix (the softened one, if `soft` and
     /// there is one) is left in the system.
     fn assemble(&mut self, solution: &mut Solution, soft: bool) -> Result<(Field, f64), Stuck> {
-        let Manifold {
-            plane,
-            equations,
-            cache,
-            softened,
-        } = self;
-        let grid = &equations.leaves.grid;
-        let leaf = match softened {
-            Some((family, cache)) if soft => cache.at(plane, family, grid, solution.params)?,
-            _ => cache.at(plane, plane.family, grid, solution.params)?,
+        let leaves = match &mut self.softened {
+            Some(softened) if soft => softened,
+            _ => &mut self.leaves,
         };
-        assembled(leaf, &mut equations.system, &mut solution.state)
+        let leaf = leaves.at(solution.params)?;
+        assembled(leaf, &mut self.equations.system, &mut solution.state)
     }
 
     /// The product of the matrix and a mode.
@@ -241,32 +226,14 @@ impl<'a> Manifold<'a> {
         Ok(modes.iter().map(along).sum::<f64>() / modes.len() as f64)
     }
 
-    /// As [`Manifold::sample`] at an equilibrium, with its own rates.
-    pub fn sample_at_rest(
-        &mut self,
-        solution: Solution,
-        border: &[Field],
-    ) -> Result<Sample, Stuck> {
-        let rates = self.rates(&solution)?;
-        Ok(self.sample(solution, border, rates, true)?.0)
-    }
-
     /// Derivatives of the forces with respect to both parameters.
     pub fn rates(&mut self, solution: &Solution) -> Result<Vec<Field>, Stuck> {
-        let Manifold {
-            plane,
-            equations,
-            cache,
-            ..
-        } = self;
-        let grid = equations.leaves.grid.clone();
         let mut rates = Vec::new();
         for which in [0, 1] {
             rates.push(rate(|step| {
                 let mut params = solution.params;
                 params[which] += step;
-                let leaf = cache.at(plane, plane.family, &grid, params)?;
-                Ok::<_, OutOfRange>(forces_on(leaf, &solution.state, &mut equations.system))
+                self.forces(&solution.state, params)
             })?);
         }
         Ok(rates)
@@ -299,13 +266,13 @@ impl<'a> Manifold<'a> {
             *number = -dot(&changed, mode);
         }
         // Last, so that the system holds the increments of this state again.
-        self.forces(solution)?;
+        self.forces(&solution.state, solution.params)?;
         Ok((change, numbers))
     }
 
     /// A solution with the segment forces computed from its strains.
     pub fn with_segment_forces(&mut self, solution: &Solution) -> Result<Solution, OutOfRange> {
-        self.forces(solution)?;
+        self.forces(&solution.state, solution.params)?;
         let none = Direction {
             params: [0.0; 2],
             ..self.unit_parameter(0)
@@ -314,10 +281,9 @@ impl<'a> Manifold<'a> {
     }
 
     /// The unbalanced forces; the system is left with the segments of this state.
-    fn forces(&mut self, solution: &Solution) -> Result<Field, OutOfRange> {
-        let grid = &self.equations.leaves.grid;
-        let leaf = (self.cache).at(&self.plane, self.plane.family, grid, solution.params)?;
-        Ok(forces_on(leaf, &solution.state, &mut self.equations.system))
+    fn forces(&mut self, state: &State, params: [f64; 2]) -> Result<Field, OutOfRange> {
+        let (leaf, system) = (self.leaves.at(params)?, &mut self.equations.system);
+        Ok(forces_on(leaf, state, system))
     }
 
     /// Newton's method to the manifold within the plane normal to two directions through a

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::branch::family::{Family, OutOfRange};
+use crate::branch::family::{Family, OutOfRange, discretised};
 use crate::branch::lru_cache::LruCache;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf};
 use crate::scenario::Scenario;
@@ -58,24 +58,34 @@ impl Plane<'_> {
     }
 }
 
-/// Cache of the last leaves of a plane on a grid, as in [`crate::branch::family::Leaves`].
-#[derive(Default)]
-pub struct LeafCache(LruCache<[f64; 2], DiscreteLeaf, CACHED>);
+/// Leaves of a plane on one grid, as [`crate::branch::family::Leaves`] of a family: the last few
+/// are cached, and they may be softened.
+pub struct PlaneLeaves<'a> {
+    plane: Plane<'a>,
+    grid: Grid,
+    softening: Option<f64>,
+    cache: LruCache<[f64; 2], DiscreteLeaf, CACHED>,
+}
 
 /// Number of cached leaves: those of differences over both parameters, and one more.
 const CACHED: usize = 6;
 
-impl LeafCache {
-    pub fn at(
-        &mut self,
-        plane: &Plane,
-        family: &Family,
-        grid: &Grid,
-        params: [f64; 2],
-    ) -> Result<&DiscreteLeaf, OutOfRange> {
-        self.0.at(params, || {
-            let scenario = Arc::new(plane.scenario(params)?);
-            Ok(family.discretised(&Leaf::in_units(scenario, family.scale()), grid))
+impl<'a> PlaneLeaves<'a> {
+    pub fn new(plane: Plane<'a>, grid: Grid, softening: Option<f64>) -> Self {
+        PlaneLeaves {
+            plane,
+            grid,
+            softening,
+            cache: LruCache::default(),
+        }
+    }
+
+    /// The leaf at fractions of both ranges.
+    pub fn at(&mut self, params: [f64; 2]) -> Result<&DiscreteLeaf, OutOfRange> {
+        self.cache.at(params, || {
+            let scenario = Arc::new(self.plane.scenario(params)?);
+            let leaf = Leaf::in_units(scenario, self.plane.family.scale());
+            Ok(discretised(&leaf, &self.grid, self.softening))
         })
     }
 }

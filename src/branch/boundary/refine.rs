@@ -1,9 +1,9 @@
 //! Points of a boundary on finer and finer grids: extrapolated and thereby verified.
 
 use super::grids::{on_coarser, on_finer};
-use super::manifold::{Direction, Manifold, Solution};
+use super::manifold::{Manifold, Solution};
 use super::plane::Plane;
-use super::search::{Found, NotFound, Search};
+use super::search::{NotFound, Search};
 use super::singular_point::SingularPoint;
 use super::special::{Special, locate_near};
 use super::table::{Parameters, Table, Verified};
@@ -61,7 +61,6 @@ pub struct Accuracy {
 pub struct Step {
     /// Where it is on a grid.
     pub point: SingularPoint,
-    /// Whether it is a special point.
     pub special: Option<Special>,
     /// The parameter that is fixed: at an end of its range.
     pub given: Option<usize>,
@@ -233,61 +232,19 @@ fn newton_or_secant(
     accuracy: f64,
     contraction: &mut Contraction,
 ) -> Result<(SingularPoint, f64), NotFound> {
-    let mut search = sought(manifold, near, given);
-    let own = std::mem::replace(&mut search.near.solution, start.clone());
+    let search = near.search(manifold, given, start.clone(), (accuracy, NEAR));
     let frozen = near.kind == Kind::Branching;
-    let found = search
-        .search(accuracy)
-        .newton(manifold, frozen, contraction);
+    let found = search.newton(manifold, frozen, contraction);
     let (found, left) = found.or_else(|_| {
-        search.near.solution = own;
+        let search = sought(manifold, near, given);
         search.secant(manifold).map(|found| (found, 0.0))
     })?;
     Ok((near.moved(manifold, found), left))
 }
 
 /// The search for the point, starting from that on the previous grid.
-fn sought(manifold: &Manifold, near: &SingularPoint, given: Option<usize>) -> PointSearch {
-    let (across, slope, along) = match given {
-        Some(which) => {
-            let (across, slope) = near.across_at(manifold, which);
-            (across, slope, manifold.unit_parameter(which))
-        }
-        None => (near.normal.clone(), near.slope, near.tangent.clone()),
-    };
-    PointSearch {
-        near: near.clone(),
-        across,
-        slope,
-        along,
-    }
-}
-
-/// A search that owns its directions.
-struct PointSearch {
-    near: SingularPoint,
-    across: Direction,
-    slope: f64,
-    along: Direction,
-}
-
-impl PointSearch {
-    fn secant(&self, manifold: &mut Manifold) -> Result<Found, NotFound> {
-        self.search(ACCURACY).secant(manifold)
-    }
-
-    fn search(&self, accuracy: f64) -> Search<'_> {
-        Search {
-            solution: &self.near.solution,
-            across: &self.across,
-            slope: self.slope,
-            along: &self.along,
-            soft: &self.near.soft,
-            neutral: self.near.neutral,
-            accuracy,
-            furthest: NEAR,
-        }
-    }
+fn sought(manifold: &Manifold, near: &SingularPoint, given: Option<usize>) -> Search {
+    near.search(manifold, given, near.solution.clone(), (ACCURACY, NEAR))
 }
 
 /// The parameters at a point of a nearly rigid leaf on its first grid: the softening is reduced
@@ -329,11 +286,18 @@ fn unsoftened(
     for (k, params) in values_by_softening.iter_mut().enumerate().rev() {
         let mut soft = Manifold::new(manifold.plane, grid.clone())?;
         soft.soften(softening * (k + 1) as f64);
-        search.near.solution = match special {
-            Some(special) => locate_near(&mut soft, &search.near, special)?.0.solution,
-            None => search.secant(&mut soft)?.solution().clone(),
+        search.solution = match special {
+            Some(special) => {
+                let solution = search.solution;
+                let near = SingularPoint {
+                    solution,
+                    ..near.clone()
+                };
+                locate_near(&mut soft, &near, special)?.0.solution
+            }
+            None => search.secant(&mut soft)?.sample.solution,
         };
-        *params = search.near.solution.params;
+        *params = search.solution.params;
     }
     let by = |weights: [f64; 4]| {
         let sum = |i: usize| {

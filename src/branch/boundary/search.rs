@@ -44,16 +44,16 @@ impl<E: Into<Stuck>> From<E> for NotFound {
 }
 
 /// A search for a point of a boundary.
-pub struct Search<'s> {
+pub struct Search {
     /// From here,
-    pub solution: &'s Solution,
+    pub solution: Solution,
     /// in this direction, along which the eigenvalue has this derivative,
-    pub across: &'s Direction,
+    pub across: Direction,
     pub slope: f64,
     /// in the plane normal to this,
-    pub along: &'s Direction,
+    pub along: Direction,
     /// with these modes in the border, the first `neutral` of which become neutral,
-    pub soft: &'s [Field],
+    pub soft: Vec<Field>,
     pub neutral: usize,
     /// to this accuracy, and not further than this.
     pub accuracy: f64,
@@ -66,12 +66,6 @@ pub struct Found {
     pub eigen: Eigen,
     /// Distance from the start of the search.
     pub distance: f64,
-}
-
-impl Found {
-    pub fn solution(&self) -> &Solution {
-        &self.sample.solution
-    }
 }
 
 /// The eigenvalues of H; the first `neutral` modes of the border become neutral.
@@ -98,7 +92,7 @@ pub fn eigen(sample: &Sample, neutral: usize) -> Eigen {
     }
 }
 
-impl Search<'_> {
+impl Search {
     /// The same point by Newton's method for the state and the zero of the eigenvalue
     /// together, from a good initial guess; also returns the estimated iteration error. At branch
     /// points the modes are `frozen`: the manifold is that of a symmetric branch, whose forces do
@@ -110,11 +104,9 @@ impl Search<'_> {
         frozen: bool,
         contraction: &mut Contraction,
     ) -> Result<(Found, f64), NotFound> {
-        let border: Vec<Field> = (self.soft.iter())
-            .map(|mode| manifold.equations.momentum(mode))
-            .collect();
+        let border = manifold.equations.momenta(&self.soft);
         let along = manifold.equations.momentum(&self.along.increments);
-        let mut solution = manifold.with_segment_forces(self.solution)?;
+        let mut solution = manifold.with_segment_forces(&self.solution)?;
         let mut previous = f64::INFINITY;
         for _ in 0..ITERATIONS {
             let rates = manifold.rates(&solution)?;
@@ -150,8 +142,8 @@ impl Search<'_> {
             // With less accurate derivatives, increments cannot shrink faster than these are known.
             let slopes = SLOPES.max(size / previous);
             if let Some(left) = converged(size, previous, [slopes; 2], accuracy, first) {
-                let distance =
-                    manifold.inner(&manifold.difference(self.solution, &solution), self.across);
+                let moved = manifold.difference(&self.solution, &solution);
+                let distance = manifold.inner(&moved, &self.across);
                 sample.solution = solution;
                 let found = Found {
                     sample,
@@ -198,14 +190,13 @@ impl Search<'_> {
 
     /// The zero of the eigenvalue by a secant method.
     pub fn secant(&self, manifold: &mut Manifold) -> Result<Found, NotFound> {
-        let border: Vec<Field> = (self.soft.iter())
-            .map(|mode| manifold.equations.momentum(mode))
-            .collect();
-        let rates = manifold.rates(self.solution)?;
+        let border = manifold.equations.momenta(&self.soft);
+        let rates = manifold.rates(&self.solution)?;
         // From the previous solution, to which the next is close.
         let mut at = |from: &Solution, step: f64, distance: f64| -> Result<Found, NotFound> {
-            let solution = manifold.moved(from, self.across, step)?;
-            let sample = manifold.correct(&solution, [self.along, self.across], &border, &rates)?;
+            let solution = manifold.moved(from, &self.across, step)?;
+            let normals = [&self.along, &self.across];
+            let sample = manifold.correct(&solution, normals, &border, &rates)?;
             let eigen = eigen(&sample, self.neutral);
             Ok(Found {
                 sample,
@@ -214,8 +205,8 @@ impl Search<'_> {
             })
         };
         let (mut distance, mut slope) = (0.0, self.slope);
-        let mut best = at(self.solution, 0.0, distance)?;
-        let (mut value, mut last) = (best.eigen.value, best.solution().clone());
+        let mut best = at(&self.solution, 0.0, distance)?;
+        let (mut value, mut last) = (best.eigen.value, best.sample.solution.clone());
         let mut worse = 0;
         for _ in 0..EVALUATIONS {
             let step = -value / slope;
@@ -227,7 +218,7 @@ impl Search<'_> {
             }
             let next = at(&last, step, distance + step)?;
             let after = next.eigen.value;
-            last.clone_from(next.solution());
+            last.clone_from(&next.sample.solution);
             if step.abs() > LOCAL {
                 slope = (after - value) / step;
             }

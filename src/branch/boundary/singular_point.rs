@@ -54,13 +54,18 @@ pub struct SingularPoint {
 #[derive(Clone, Copy)]
 pub struct Seed<'c> {
     pub critical: &'c Critical,
-    /// Both parameters, as fractions of their ranges,
-    pub params: [f64; 2],
-    /// and their derivatives with respect to the parameter of the branch.
+    /// Both parameters at the start of the branch, as fractions of their ranges,
+    pub from: [f64; 2],
+    /// and their derivatives with respect to its parameter.
     pub direction: [f64; 2],
 }
 
 impl Seed<'_> {
+    /// Both parameters at a value of the branch's parameter.
+    pub fn params(&self, parameter: f64) -> [f64; 2] {
+        [0, 1].map(|i| self.from[i] + parameter * self.direction[i])
+    }
+
     /// The parameter that is constant along the branch, if there is one.
     pub fn given(&self) -> Option<usize> {
         [1, 0]
@@ -72,16 +77,12 @@ impl Seed<'_> {
 impl SingularPoint {
     /// The first point of a boundary, the normal of which is along the branch.
     pub fn begin(manifold: &mut Manifold, seed: &Seed) -> Result<SingularPoint, NotFound> {
-        let Seed {
-            critical,
-            params,
-            direction,
-        } = seed;
+        let (critical, direction) = (seed.critical, seed.direction);
         let modes = critical.modes.iter().chain(&critical.soft);
         let soft = independent(manifold, modes, critical.soft.len());
         let solution = Solution {
             state: critical.state.clone(),
-            params: *params,
+            params: seed.params(critical.fraction),
         };
         let across = Direction {
             increments: critical.tangent.increments.clone(),
@@ -98,26 +99,46 @@ impl SingularPoint {
             kind: critical.kind,
             neutral: critical.modes.len(),
             soft,
-            tangent: along.clone(),
-            normal: across.clone(),
+            tangent: along,
+            normal: across,
             slope,
             index: 0,
             others: Vec::new(),
             speed: 0.0,
             heading: [0.0; 2],
         };
-        let found = Search {
-            solution: &like.solution,
-            across: &across,
-            slope,
-            along: &along,
-            soft: &like.soft,
-            neutral: like.neutral,
-            accuracy: 1e-11,
-            furthest: 0.1,
-        };
-        let found = found.secant(manifold)?;
+        let search = like.search(manifold, None, like.solution.clone(), (1e-11, 0.1));
+        let found = search.secant(manifold)?;
         like.completed(manifold, found)
+    }
+
+    /// The search for a point of the boundary near this one, from `solution`: in the plane normal
+    /// to the tangent here or, if a parameter is `given`, with its value constant. To this
+    /// accuracy, and not further than this.
+    pub fn search(
+        &self,
+        manifold: &Manifold,
+        given: Option<usize>,
+        solution: Solution,
+        (accuracy, furthest): (f64, f64),
+    ) -> Search {
+        let (across, slope, along) = match given {
+            Some(which) => {
+                let (across, slope) = self.across_at(manifold, which);
+                (across, slope, manifold.unit_parameter(which))
+            }
+            None => (self.normal.clone(), self.slope, self.tangent.clone()),
+        };
+        Search {
+            solution,
+            across,
+            slope,
+            along,
+            soft: self.soft.clone(),
+            neutral: self.neutral,
+            accuracy,
+            furthest,
+        }
     }
 
     /// The boundary point that was found from this one, with the directions of this one.
@@ -138,12 +159,10 @@ impl SingularPoint {
         manifold: &mut Manifold,
         found: Found,
     ) -> Result<SingularPoint, NotFound> {
-        let border = self
-            .soft
-            .iter()
-            .map(|mode| manifold.equations.momentum(mode));
-        let border: Vec<Field> = border.collect();
-        let sample = manifold.sample_at_rest(found.sample.solution, &border)?;
+        let border = manifold.equations.momenta(&self.soft);
+        let solution = found.sample.solution;
+        let rates = manifold.rates(&solution)?;
+        let (sample, _) = manifold.sample(solution, &border, rates, true)?;
         let eigen = search::eigen(&sample, self.neutral);
         let basis = self.basis(manifold, &sample, &eigen)?;
         let soft = soft(manifold, &sample, &eigen);
@@ -196,10 +215,7 @@ impl SingularPoint {
         soft: &[Field],
     ) -> Result<[f64; 2], NotFound> {
         let modes = &soft[..self.neutral.min(soft.len())];
-        let border: Vec<Field> = soft
-            .iter()
-            .map(|it| manifold.equations.momentum(it))
-            .collect();
+        let border = manifold.equations.momenta(soft);
         let stiff = manifold.leaf(sample.solution.params)?.stiffest() * STIFF <= 1.0;
         let mut change = [0.0; 2];
         for (change, direction) in change.iter_mut().zip(basis) {

@@ -1,7 +1,7 @@
 //! Special points of a boundary: cusps, and crossings with another boundary.
 
 use super::manifold::Manifold;
-use super::search::{NotFound, Search};
+use super::search::NotFound;
 use super::singular_point::SingularPoint;
 use crate::branch::critical::Kind;
 use crate::branch::equations::Stuck;
@@ -25,7 +25,6 @@ const EXACT: f64 = 1e-13;
 /// Accuracy of points at a given parameter.
 const GIVEN: f64 = 1e-12;
 
-/// Kind of a special point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Special {
     /// A curve of folds turns back: two folds meet and vanish.
@@ -57,16 +56,7 @@ pub fn at_distance(
     furthest: f64,
 ) -> Result<(SingularPoint, f64), NotFound> {
     let solution = manifold.moved(&now.solution, &now.tangent, step)?;
-    let search = Search {
-        solution: &solution,
-        across: &now.normal,
-        slope: now.slope,
-        along: &now.tangent,
-        soft: &now.soft,
-        neutral: now.neutral,
-        accuracy,
-        furthest,
-    };
+    let search = now.search(manifold, None, solution, (accuracy, furthest));
     let found = search.secant(manifold)?;
     let off = found.distance.abs();
     Ok((now.completed(manifold, found)?, off))
@@ -143,18 +133,7 @@ pub fn at_value(
 ) -> Result<SingularPoint, NotFound> {
     let mut solution = manifold.moved(&now.solution, &now.tangent, step)?;
     solution.params[which] = value;
-    let (across, slope) = now.across_at(manifold, which);
-    let along = manifold.unit_parameter(which);
-    let search = Search {
-        solution: &solution,
-        across: &across,
-        slope,
-        along: &along,
-        soft: &now.soft,
-        neutral: now.neutral,
-        accuracy: GIVEN,
-        furthest: 0.5,
-    };
+    let search = now.search(manifold, Some(which), solution, (GIVEN, 0.5));
     let found = search.secant(manifold)?;
     let mut point = now.completed(manifold, found)?;
     point.solution.params[which] = value;

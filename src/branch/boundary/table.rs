@@ -1,10 +1,13 @@
 //! A point of a boundary, extrapolated over finer and finer grids.
 
+use glam::DVec3;
+
 use super::manifold::{Direction, Manifold};
 use super::search::NotFound;
 use super::singular_point::SingularPoint;
 use super::special::Special;
 use crate::branch::critical::Kind;
+use crate::branch::states::stiffest_condensed;
 use crate::leaf::State;
 use crate::relax::richardson::Richardson;
 
@@ -22,7 +25,7 @@ pub struct Verified {
     pub params: [f64; 2],
     pub errors: [f64; 2],
     /// Tips of all rods, in the family's units, and a bound on their error.
-    pub tips: Vec<[f64; 3]>,
+    pub tips: Vec<DVec3>,
     pub error: f64,
     /// The state on the finest grid.
     pub state: State,
@@ -99,9 +102,7 @@ impl Table {
             None => (point.normal.clone(), point.slope),
         };
         let leaf = manifold.leaf(point.solution.params)?;
-        let limit = 1.0 / softening;
-        let condensing = leaf.sections.iter().map(|it| it.condensing.max_element());
-        let stiffest = condensing.fold(0.0_f64, |most, it| most.max(it.min(limit)));
+        let stiffest = stiffest_condensed(leaf).min(1.0 / softening);
         let rounding = f64::EPSILON * stiffest * segments * segments;
         Ok([0, 1].map(|i| {
             let own = (rounding / slope * across.params[i]).abs();
@@ -135,23 +136,22 @@ impl Table {
     }
 
     pub fn errors(&self) -> [f64; 2] {
-        let error = |i: usize| {
-            self.numbers[i]
-                .best()
-                .map_or(f64::INFINITY, |best| best.error)
-        };
-        [0, 1].map(|i| match self.given {
-            Some((which, _)) if which == i => 0.0,
-            _ => error(i),
+        [0, 1].map(|i| match self.given_value(i) {
+            Some(_) => 0.0,
+            None => (self.numbers[i].best()).map_or(f64::INFINITY, |best| best.error),
         })
+    }
+
+    /// The value of a parameter, if it is fixed.
+    fn given_value(&self, i: usize) -> Option<f64> {
+        let given = self.given.filter(|(which, _)| *which == i);
+        given.map(|(_, value)| value)
     }
 
     /// Whether the errors of both parameters are below this, or below rounding.
     pub fn is_exact(&self, enough: f64) -> bool {
-        let errors = self.errors().into_iter().zip(self.rounded);
-        errors
-            .into_iter()
-            .all(|(error, rounded)| error <= enough.max(rounded))
+        let mut errors = self.errors().into_iter().zip(self.rounded);
+        errors.all(|(error, rounded)| error <= enough.max(rounded))
     }
 
     pub fn verified(
@@ -163,11 +163,10 @@ impl Table {
         let columns = |table: &Richardson| table.best().map_or(0, |best| best.columns);
         let tips = self.tips.column(columns(&self.tips));
         let errors = self.errors();
-        let number = |i: usize| match self.given {
-            Some((which, value)) if which == i => value,
-            _ => self.numbers[i].column(columns(&self.numbers[i]))[0],
+        let number = |i: usize| {
+            let own = &self.numbers[i];
+            (self.given_value(i)).unwrap_or_else(|| own.column(columns(own))[0])
         };
-        let free = |i: usize| self.given.is_none_or(|(which, _)| which != i);
         let (beyond, below) = (point.index, point.index.saturating_sub(point.neutral));
         let forward = match point.kind {
             Kind::Branching => {
@@ -178,14 +177,14 @@ impl Table {
         };
         Verified {
             params: [number(0), number(1)],
-            errors: [0, 1].map(|i| match free(i) {
-                true => {
+            errors: [0, 1].map(|i| match self.given_value(i) {
+                Some(_) => 0.0,
+                None => {
                     let rounded = self.amplified * self.rounded[i];
                     errors[i] + self.softened[i] + rounded + KEPT * self.iteration_error
                 }
-                false => 0.0,
             }),
-            tips: tips.chunks(3).map(|tip| [tip[0], tip[1], tip[2]]).collect(),
+            tips: tips.chunks(3).map(DVec3::from_slice).collect(),
             // No tip is more accurate than machine precision.
             error: (self.tips.best()).map_or(f64::INFINITY, |best| {
                 best.error + KEPT * self.iteration_error + f64::EPSILON

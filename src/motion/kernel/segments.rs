@@ -101,13 +101,8 @@ fn bend<S: Simd, const DAMPED: bool, const CHANGES: bool>(
     block: &mut Block,
     sums: &mut SegmentSums<S>,
 ) {
-    let Nodes {
-        range: (start, count),
-        q,
-        material,
-        law,
-        ..
-    } = nodes;
+    let ((start, count), q) = (nodes.range, nodes.q);
+    let (material, law) = (nodes.material, nodes.law);
     // All arrays have one length: an index valid for one is valid for the others.
     let (range, own) = ((start, count), (GROUP, count));
     let (q0, q1) = (cut(q, range), cut(q, (start + 1, count)));
@@ -184,13 +179,8 @@ fn stretch<S: Simd, const DAMPED: bool>(
     block: &mut Block,
     sums: &mut SegmentSums<S>,
 ) {
-    let Nodes {
-        range: (start, count),
-        x,
-        q,
-        material,
-        law,
-    } = nodes;
+    let ((start, count), x, q) = (nodes.range, nodes.x, nodes.q);
+    let (material, law) = (nodes.material, nodes.law);
     let (range, after, own) = ((start, count), (start + 1, count), (GROUP, count));
     let (x0, x1) = (cut(x, range), cut(x, after));
     let (q0, q1) = (cut(q, range), cut(q, after));

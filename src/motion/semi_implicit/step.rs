@@ -2,7 +2,7 @@
 
 use super::super::friction::rates;
 use super::super::physics::Inertia;
-use super::{SemiImplicit, Steps, Weights};
+use super::{SemiImplicit, Steps};
 use crate::leaf::{State, System};
 use crate::newton::Work;
 use crate::rotation;
@@ -72,21 +72,16 @@ impl SemiImplicit {
     /// Motion at the end of a step of h that leads from the state to the trial.
     fn update_motion(&mut self, h: f64) {
         let nodes = self.leaf.segments() + 1;
-        let Weights {
-            alpha_m,
-            alpha_f,
-            gamma,
-            beta,
-        } = self.weights;
+        let w = self.weights;
         for k in (0..self.state.x.len()).filter(|k| !k.is_multiple_of(nodes)) {
             let (m, d) = (self.moving[k], self.increment(k));
             let next = &mut self.next_moving[k];
             for c in 0..2 {
-                let a1 = (d[c] - h * m.v[c] - h * h * (0.5 - beta) * m.a[c]) / (beta * h * h);
+                let a1 = (d[c] - h * m.v[c] - h * h * (0.5 - w.beta) * m.a[c]) / (w.beta * h * h);
+                let mean = (1.0 - w.alpha_m) * a1 + w.alpha_m * m.a[c];
                 next.a[c] = a1;
-                next.v[c] = m.v[c] + h * ((1.0 - gamma) * m.a[c] + gamma * a1);
-                next.w[c] =
-                    ((1.0 - alpha_m) * a1 + alpha_m * m.a[c] - alpha_f * m.w[c]) / (1.0 - alpha_f);
+                next.v[c] = m.v[c] + h * ((1.0 - w.gamma) * m.a[c] + w.gamma * a1);
+                next.w[c] = (mean - w.alpha_f * m.w[c]) / (1.0 - w.alpha_f);
             }
         }
     }
@@ -94,14 +89,9 @@ impl SemiImplicit {
     /// Attempts a step of h; returns its local error, or `None` if it was too long.
     pub(super) fn attempt(&mut self, h: f64) -> Option<f64> {
         let damping = self.physics.damping;
-        let Weights {
-            alpha_m,
-            alpha_f,
-            gamma,
-            beta,
-        } = self.weights;
-        let per_mass =
-            (1.0 - alpha_m) / ((1.0 - alpha_f) * beta * h * h) + damping * gamma / (beta * h);
+        let w = self.weights;
+        let of_acceleration = (1.0 - w.alpha_m) / ((1.0 - w.alpha_f) * w.beta * h * h);
+        let per_mass = of_acceleration + damping * w.gamma / (w.beta * h);
         self.apply_loads_and_damping(self.time + h, h, per_mass);
         self.predict(h);
         let last = match self.steps {

@@ -1,8 +1,11 @@
 //! The index along a straight path through the plane, as implied by the curves.
 
+use glam::DVec3;
+
 use super::known::IMAGES;
 use crate::branch::Kind;
 use crate::branch::boundary::{Boundary, Special, Verified};
+use crate::shape::weights;
 
 /// Points closer than this part of both ranges are merged: their errors would dominate the
 /// slopes of interpolating polynomials.
@@ -25,7 +28,7 @@ pub struct Edge {
     /// The index at its start.
     pub index: usize,
     /// Tips along it, in the units of the curves: only one if they are joined.
-    pub tips: Vec<Vec<[f64; 3]>>,
+    pub tips: Vec<Vec<DVec3>>,
     /// Critical points on it with indices too large for the curves.
     pub beyond: Vec<Crossing>,
     /// The index at its end; none if the branch does not reach it.
@@ -131,9 +134,7 @@ impl Edge {
     /// known at its points only, anywhere along it.
     fn is_near(&self, [a, b]: [&Verified; 2], part: f64) -> bool {
         let tips = a.tips.iter().zip(&b.tips);
-        let between =
-            |(a, b): (&[f64; 3], &[f64; 3])| [0, 1, 2].map(|c| a[c] + part * (b[c] - a[c]));
-        let tips: Vec<[f64; 3]> = tips.map(between).collect();
+        let tips: Vec<DVec3> = tips.map(|(a, b)| a + part * (b - a)).collect();
         // The mirror image in a plane of the axes has the same index.
         let images = IMAGES.map(|signs| image(&tips, signs));
         let own = self.tips.iter();
@@ -148,29 +149,21 @@ impl Edge {
 }
 
 /// The mirror image of tips, by the signs of y and z.
-fn image(tips: &[[f64; 3]], [y, z]: [f64; 2]) -> Vec<[f64; 3]> {
-    let tips = tips.iter();
-    tips.map(|tip| [tip[0], y * tip[1], z * tip[2]]).collect()
+fn image(tips: &[DVec3], [y, z]: [f64; 2]) -> Vec<DVec3> {
+    let signs = DVec3::new(1.0, y, z);
+    tips.iter().map(|tip| signs * tip).collect()
 }
 
 /// The largest distance between corresponding tips.
-fn distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
-    let squares = a.iter().zip(b).map(|(a, b)| {
-        let parts = a.iter().zip(b).map(|(x, y)| (x - y) * (x - y));
-        parts.sum::<f64>()
-    });
-    squares.fold(0.0, f64::max).sqrt()
+fn distance(a: &[DVec3], b: &[DVec3]) -> f64 {
+    let distances = a.iter().zip(b).map(|(a, b)| a.distance(*b));
+    distances.fold(0.0, f64::max)
 }
 
 /// Interpolates points by a polynomial in their second coordinate.
 fn through(points: &[[f64; 2]], at: f64) -> f64 {
-    let mut sum = 0.0;
-    for (i, [value, own]) in points.iter().enumerate() {
-        let others = points.iter().enumerate().filter(|(j, _)| *j != i);
-        let weight: f64 = others
-            .map(|(_, [_, other])| (at - other) / (own - other))
-            .product();
-        sum += weight * value;
-    }
-    sum
+    let own: Vec<f64> = points.iter().map(|point| point[1]).collect();
+    let (_, weights) = weights(&own, at, own.len());
+    let terms = points.iter().zip(weights);
+    terms.map(|(point, weight)| weight * point[0]).sum()
 }

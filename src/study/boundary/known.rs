@@ -1,8 +1,11 @@
 //! Critical points of branches in the plane, and whether they lie on a known curve.
 
+use glam::DVec3;
+
 use crate::branch::boundary::{Boundary, Halt, Seed, Verified};
 use crate::branch::{Critical, Kind, Point, Refined};
 use crate::leaf::Grid;
+use crate::shape::weights;
 use crate::study::trace::{Trace, TraceError, TraceRequest, trace_observed};
 
 /// A trace along the first parameter, with its first point and its critical points.
@@ -39,12 +42,8 @@ pub fn traced(
 
 /// A critical point of a branch, extrapolated over grids.
 pub struct Start<'a> {
-    pub critical: &'a Critical,
+    pub seed: Seed<'a>,
     pub refined: &'a Refined,
-    /// Both parameters at the start of the branch, as fractions, and their derivatives with respect
-    /// to its parameter.
-    pub from: [f64; 2],
-    pub direction: [f64; 2],
 }
 
 /// Parameters (as fractions) and tips that agree within this plus both error bounds are
@@ -62,36 +61,23 @@ const APART: f64 = 1e-3;
 const BEYOND: f64 = 0.05;
 
 impl Start<'_> {
-    /// Both parameters at a value of the branch's parameter.
-    fn numbers(&self, parameter: f64) -> [f64; 2] {
-        [0, 1].map(|i| self.from[i] + parameter * self.direction[i])
-    }
-
-    /// The start of a curve.
-    pub fn seed(&self) -> Seed<'_> {
-        Seed {
-            critical: self.critical,
-            params: self.numbers(self.critical.fraction),
-            direction: self.direction,
-        }
-    }
-
     /// Its grid, for leaves with these kinks.
     pub fn grid(&self, kinks: &[f64]) -> Grid {
-        coarsened(&self.refined.grid, self.critical.state.segments(), kinks)
+        let segments = self.seed.critical.state.segments();
+        coarsened(&self.refined.grid, segments, kinks)
     }
 
     /// Whether it lies on a curve.
     pub fn is_on(&self, curve: &Boundary) -> bool {
-        let tips = self.refined.tips.iter().flatten();
-        let numbers = self.numbers(self.refined.fraction);
-        let length = self.direction[0].hypot(self.direction[1]);
+        let (critical, direction) = (self.seed.critical, self.seed.direction);
+        let params = self.seed.params(self.refined.fraction);
+        let length = direction[0].hypot(direction[1]);
         let singular = Singular {
-            coordinates: numbers.into_iter().chain(tips.copied()).collect(),
+            coordinates: coordinates(params, &self.refined.tips),
             error: self.refined.fraction_error * length + self.refined.error,
-            kind: self.critical.kind,
-            modes: self.critical.modes.len(),
-            sides: sorted(self.critical.indices),
+            kind: critical.kind,
+            modes: critical.modes.len(),
+            sides: sorted(critical.indices),
         };
         singular.is_on(curve)
     }
@@ -101,7 +87,7 @@ impl Start<'_> {
 pub fn remove_known(curve: &mut Boundary, known: &[Boundary]) {
     let is_known = |point: &Verified| {
         let singular = Singular {
-            coordinates: coordinates(point),
+            coordinates: coordinates(point.params, &point.tips),
             error: error(point),
             kind: point.kind,
             modes: curve.neutral,
@@ -152,7 +138,7 @@ impl Singular {
         }
         let (mut points, mut points_of_curve) = (Vec::new(), Vec::<Vec<f64>>::new());
         for point in &curve.points {
-            let coordinates = coordinates(point);
+            let coordinates = coordinates(point.params, &point.tips);
             if (points_of_curve.last()).is_none_or(|last| distance(last, &coordinates) > APART) {
                 points.push(point);
                 points_of_curve.push(coordinates);
@@ -199,10 +185,10 @@ fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// A point of a curve as a vector: both parameters, then the tips.
-fn coordinates(point: &Verified) -> Vec<f64> {
-    let tips = point.tips.iter().flatten();
-    point.params.into_iter().chain(tips.copied()).collect()
+/// A singular point as a vector: both parameters, then the tips.
+fn coordinates(params: [f64; 2], tips: &[DVec3]) -> Vec<f64> {
+    let tips = tips.iter().flat_map(|tip| tip.to_array());
+    params.into_iter().chain(tips).collect()
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
@@ -252,11 +238,7 @@ fn is_between(points_of_curve: &[Vec<f64>], k: usize, target: &[f64], error: f64
 /// The polynomial through points at these arclengths.
 fn through(points_of_curve: &[Vec<f64>], at: &[f64], t: f64) -> Vec<f64> {
     let mut sum = vec![0.0; points_of_curve[0].len()];
-    for (i, coordinates) in points_of_curve.iter().enumerate() {
-        let others = at.iter().enumerate().filter(|(j, _)| *j != i);
-        let weight: f64 = others
-            .map(|(_, other)| (t - other) / (at[i] - other))
-            .product();
+    for (coordinates, weight) in points_of_curve.iter().zip(weights(at, t, at.len()).1) {
         for (sum, x) in sum.iter_mut().zip(coordinates) {
             *sum += weight * x;
         }
@@ -269,7 +251,7 @@ mod tests {
     use super::*;
     use crate::branch::boundary::Direction;
     use crate::leaf::State;
-    use glam::{DQuat, DVec3};
+    use glam::DQuat;
 
     /// A parabola over the second parameter, between two of its values, with tips that move.
     fn curve(from: f64, to: f64, y: f64) -> Boundary {
@@ -278,7 +260,7 @@ mod tests {
             Verified {
                 params: [0.3 + 0.2 * at * at, at],
                 errors: [1e-9, 0.0],
-                tips: vec![[1.0 - 0.3 * at, y * at, 0.0]],
+                tips: vec![DVec3::new(1.0 - 0.3 * at, y * at, 0.0)],
                 error: 1e-9,
                 state: State::new(1, vec![DVec3::ZERO; 2], vec![DQuat::IDENTITY; 2]),
                 across: Direction {

@@ -17,7 +17,6 @@ pub struct Cells<'p> {
     plane: Plane<'p>,
     /// Columns and rows.
     size: [usize; 2],
-    joined: bool,
     /// The equilibria found in the last sweep, from which others may be reached.
     front: Vec<Option<AtRest>>,
     /// Paths that were followed, by the cell at their end; only the last one may have reached it.
@@ -37,12 +36,11 @@ const NEIGHBOURS: [[isize; 2]; 4] = [[-1, 0], [1, 0], [0, -1], [0, 1]];
 
 impl<'p> Cells<'p> {
     /// A map of so many cells, all unknown.
-    pub fn new(plane: Plane<'p>, size: [usize; 2], joined: bool) -> Self {
+    pub fn new(plane: Plane<'p>, size: [usize; 2]) -> Self {
         let count = size[0] * size[1];
         Cells {
             plane,
             size,
-            joined,
             front: vec![None; count],
             edges: (0..count).map(|_| Vec::new()).collect(),
             factorizations: 0,
@@ -168,7 +166,7 @@ impl<'p> Cells<'p> {
         curves: &[Boundary],
     ) -> Option<Unexplained> {
         self.factorizations += path.factorizations;
-        if self.joined {
+        if self.plane.family.first().joined() {
             path.tips.iter_mut().for_each(|tips| tips.truncate(1));
         }
         let ends = [from.solution.params, to];

@@ -7,7 +7,8 @@ mod neighbours;
 mod result;
 mod run;
 
-pub use result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, CurveEnd, LeafBeside};
+pub use crate::branch::boundary::Halt as CurveEnd;
+pub use result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, LeafBeside};
 pub use run::boundary;
 
 use super::trace::{TraceError, TraceRequest};

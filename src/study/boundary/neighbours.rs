@@ -4,7 +4,6 @@ use glam::DVec3;
 
 use super::result::{Boundary, LeafBeside};
 use crate::branch::boundary::{self as curves, Neighbour, Plane, Verified, beside};
-use crate::leaf::State;
 
 /// Largest number of curves with leaves on either side.
 const MOST: usize = 4;
@@ -37,27 +36,20 @@ pub fn add_leaves(plane: Plane, known: &[curves::Boundary], boundary: &mut Bound
         let along = [0, 1].map(|i| after.params[i] - before.params[i]);
         Some((number, beside(plane, &points[at], along)?))
     });
-    let joined = boundary.joined;
     for (number, pair) in found.take(MOST) {
-        let leaves = pair.map(|leaf| in_units(&plane, joined, leaf));
+        let leaves = pair.map(|leaf| in_units(&plane, leaf));
         boundary.curves[number].beside = leaves.into();
     }
 }
 
-fn in_units(plane: &Plane, joined: bool, leaf: Neighbour) -> LeafBeside {
-    let length = plane.family.scale().length;
-    let curves = |state: &State| -> Vec<Vec<DVec3>> {
-        let rods = state.x.chunks(state.segments() + 1);
-        rods.map(|rod| rod.iter().map(|x| *x * length).collect())
-            .collect()
-    };
-    let state = &leaf.solution.state;
-    let tips = (0..state.rods()).map(|j| state.tip(j) * length);
+fn in_units(plane: &Plane, leaf: Neighbour) -> LeafBeside {
+    let (family, state) = (plane.family, &leaf.solution.state);
+    let tips: Vec<DVec3> = (0..state.rods()).map(|j| state.tip(j)).collect();
     LeafBeside {
         values: plane.values(leaf.solution.params),
         index: leaf.index,
-        tips: tips.take(if joined { 1 } else { usize::MAX }).collect(),
-        curves: curves(state),
-        fallen_from: leaf.fallen_from.as_ref().map(curves),
+        tips: family.tips(&tips),
+        curves: family.curves(state),
+        fallen_from: leaf.fallen_from.as_ref().map(|state| family.curves(state)),
     }
 }

@@ -62,7 +62,7 @@ pub struct BoundaryCurve {
     /// How many modes become neutral.
     pub multiplicity: usize,
     /// How it ended: before its first point, and after its last.
-    pub ends: [CurveEnd; 2],
+    pub ends: [Halt; 2],
     /// Its points, ordered so that the second parameter increases from the first point or, where
     /// that is also the last, has increased.
     pub points: Vec<BoundaryPoint>,
@@ -144,14 +144,10 @@ impl BoundaryMap {
     }
 }
 
-/// How a curve ended.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CurveEnd(pub(super) Halt);
-
-impl CurveEnd {
+impl Halt {
     /// The word used in files.
     pub fn word(self) -> &'static str {
-        match self.0 {
+        match self {
             Halt::Reached => "reached",
             Halt::Closed => "closed",
             Halt::Met => "met",
@@ -164,14 +160,9 @@ impl CurveEnd {
         }
     }
 
-    /// Whether the curve is known as far as requested.
-    pub fn complete(self) -> bool {
-        self.0.complete()
-    }
-
     /// The same as a phrase for people.
     pub fn phrase(self) -> &'static str {
-        match self.0 {
+        match self {
             Halt::Reached => "the end of a range",
             Halt::Closed => "closed",
             Halt::Met => "on a curve above",
@@ -188,7 +179,7 @@ impl CurveEnd {
     }
 }
 
-impl Serialize for CurveEnd {
+impl Serialize for Halt {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.word())
     }

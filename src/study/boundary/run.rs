@@ -2,19 +2,19 @@
 
 use std::time::Instant;
 
-use glam::DVec3;
-
 use super::known::{Start, coarsened, remove_known, traced};
-use super::map::{Cells, Unexplained};
+use super::map::Cells;
 use super::neighbours::add_leaves;
-use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, CurveEnd, word};
+use super::result::{Boundary, BoundaryCurve, BoundaryMap, BoundaryPoint, word};
 use super::{BoundaryRequest, MOST_CURVES};
 use crate::branch::Family;
 use crate::branch::boundary::{
-    self as curves, Accuracy, AtRest, Plane, Solution, Verified, WalkOptions,
+    self as curves, Accuracy, AtRest, Halt, Plane, Seed, Solution, Verified, WalkOptions,
+    refine_on_path,
 };
 use crate::scenario::Scenario;
-use crate::study::trace::{TraceError, TraceRequest};
+use crate::study::trace::{Trace, TraceError, TraceRequest};
+use crate::study::vary::Vary;
 
 /// Longest step along a curve if few values are asked for.
 const LONGEST: f64 = 0.1;
@@ -39,7 +39,7 @@ pub fn boundary(
     request.check()?;
     let clock = Instant::now();
     let (vary, across) = (&request.trace.vary, &request.across);
-    let ends = [vary, across].map(|it| [it.values[0], it.values[it.values.len() - 1]]);
+    let ends = [vary, across].map(Vary::ends);
     let base = &request.trace.base;
     let make = |[first, second]: [f64; 2]| -> Result<Scenario, String> {
         let at = base.at(&[(&vary.keys, first), (&across.keys, second)]);
@@ -48,10 +48,7 @@ pub fn boundary(
     for second in ends[1] {
         base.at(&[(&vary.keys, ends[0][0]), (&across.keys, second)])?;
     }
-    let [low, high] = [ends[1][0].min(ends[1][1]), ends[1][0].max(ends[1][1])];
-    let present = base.number(&across.keys);
-    let start = present.filter(|value| (low..=high).contains(value));
-    let start = start.unwrap_or(ends[1][0]);
+    let start = start(request);
     let along = TraceRequest {
         base: base.with(&across.keys, start)?,
         ..request.trace.clone()
@@ -59,7 +56,7 @@ pub fn boundary(
     let begun = traced(&along, &mut |points, value| {
         progress(None, points, [value, start]);
     })?;
-    let (trace, first) = (begun.trace, |value: f64| make([value, start]));
+    let first = |value: f64| make([value, start]);
     let family = Family::new(&first, (ends[0][0], ends[0][1]), vary.log);
     let family = family.map_err(|out| TraceError::Vary(format!("{}: {out}", vary.keys)))?;
     let plane = Plane {
@@ -68,45 +65,21 @@ pub fn boundary(
         range: ends[1],
         log: across.log,
     };
-    let mut boundary = Boundary {
-        scenario: trace.scenario,
-        keys: [vary.keys.clone(), across.keys.clone()],
-        ranges: ends,
-        log: [vary.log, across.log],
-        start,
-        units: trace.units,
-        rods: trace.rods,
-        joined: trace.joined,
-        tolerance: trace.tolerance,
-        complete: false,
-        remark: trace.remark,
-        curves: Vec::new(),
-        map: None,
-        factorizations: trace.factorizations,
-        wall_seconds: 0.0,
-    };
+    let mut boundary = without_curves(request, &begun.trace, start);
     let mut run = Run {
         plane,
-        how: WalkOptions {
-            longest: (1.0 / (across.values.len() - 1) as f64).min(LONGEST),
-            most: request.trace.most_points,
-            accuracy: Accuracy {
-                tips: trace.tolerance,
-                numbers: EXACTER * trace.tolerance,
-            },
-        },
+        how: walk_options(request, begun.trace.tolerance),
         known: Vec::new(),
         tried: 0,
         progress,
     };
     for (critical, refined) in &begun.critical {
-        let start = Start {
+        let seed = Seed {
             critical,
-            refined,
             from: [0.0, plane.fraction(start)],
             direction: [1.0, 0.0],
         };
-        run.follow_new(&start, &mut boundary);
+        run.follow_new(&Start { seed, refined }, &mut boundary);
     }
     if let (Some(size), Some((point, grid))) = (request.map, begun.first) {
         let kinks = family.first().kinks();
@@ -121,24 +94,73 @@ pub fn boundary(
         boundary.map = Some(run.map(size, first, &mut boundary));
     }
     add_leaves(plane, &run.known, &mut boundary);
+    conclude(&mut boundary, begun.trace.complete);
+    boundary.wall_seconds = clock.elapsed().as_secs_f64();
+    Ok(boundary)
+}
+
+/// The second parameter at the first trace.
+fn start(request: &BoundaryRequest) -> f64 {
+    let across = &request.across;
+    let [from, to] = across.ends();
+    let present = request.trace.base.number(&across.keys);
+    let within = present.filter(|value| (from.min(to)..=from.max(to)).contains(value));
+    within.unwrap_or(from)
+}
+
+/// The result before any curve is known.
+fn without_curves(request: &BoundaryRequest, trace: &Trace, start: f64) -> Boundary {
+    let both = [&request.trace.vary, &request.across];
+    Boundary {
+        scenario: trace.scenario.clone(),
+        keys: both.map(|it| it.keys.clone()),
+        ranges: both.map(Vary::ends),
+        log: both.map(|it| it.log),
+        start,
+        units: trace.units.clone(),
+        rods: trace.rods,
+        joined: trace.joined,
+        tolerance: trace.tolerance,
+        complete: false,
+        remark: trace.remark.clone(),
+        curves: Vec::new(),
+        map: None,
+        factorizations: trace.factorizations,
+        wall_seconds: 0.0,
+    }
+}
+
+/// How curves through the critical points of the first trace are followed.
+fn walk_options(request: &BoundaryRequest, tolerance: f64) -> WalkOptions {
+    WalkOptions {
+        longest: (1.0 / (request.across.values.len() - 1) as f64).min(LONGEST),
+        most: request.trace.most_points,
+        accuracy: Accuracy {
+            tips: tolerance,
+            numbers: EXACTER * tolerance,
+        },
+    }
+}
+
+/// Whether all curves are known as far as requested; if not, why. `traced`: whether all branches
+/// of the first trace are.
+fn conclude(boundary: &mut Boundary, traced: bool) {
     let curves = &boundary.curves;
-    let whole = (curves.iter().flat_map(|curve| curve.ends)).all(CurveEnd::complete);
+    let whole = (curves.iter().flat_map(|curve| curve.ends)).all(Halt::complete);
     if curves.is_empty() && boundary.remark.is_none() {
-        let at = across.keys.text(start);
-        let (vary, across) = (&vary.keys, &across.keys);
+        let [vary, across] = &boundary.keys;
+        let at = across.text(boundary.start);
         let why = format!("along {vary} the index changes nowhere at {across} = {at}");
         boundary.remark = Some(why);
     }
-    boundary.complete = whole && trace.complete && boundary.remark.is_none();
-    if !trace.complete && boundary.remark.is_none() {
+    boundary.complete = whole && traced && boundary.remark.is_none();
+    if !traced && boundary.remark.is_none() {
         boundary.remark = Some(
             "not all branches along the first number are followed to \
-                               their ends: see a trace of it alone"
+                 their ends: see a trace of it alone"
                 .into(),
         );
     }
-    boundary.wall_seconds = clock.elapsed().as_secs_f64();
-    Ok(boundary)
 }
 
 /// The run that follows the curves.
@@ -166,7 +188,7 @@ impl Run<'_, '_> {
         let number = boundary.curves.len();
         let mut report = |points, params| progress(Some(number), points, plane.values(params));
         let grid = start.grid(plane.family.first().kinks());
-        let mut curve = curves::follow(plane, &grid, &start.seed(), &self.how, &mut report);
+        let mut curve = curves::follow(plane, &grid, &start.seed, &self.how, &mut report);
         boundary.factorizations += curve.factorizations;
         if !curve.points.is_empty() {
             remove_known(&mut curve, &self.known);
@@ -174,7 +196,7 @@ impl Run<'_, '_> {
                 return;
             }
         }
-        (boundary.curves).push(in_units(&plane, boundary.joined, &curve));
+        (boundary.curves).push(in_units(&plane, &curve));
         self.known.push(curve);
     }
 
@@ -185,28 +207,22 @@ impl Run<'_, '_> {
         let accuracy = self.how.accuracy.tips;
         self.how.longest = self.how.longest.max(OF_MAP);
         self.how.accuracy.numbers = accuracy;
-        let mut cells = Cells::new(self.plane, size, boundary.joined);
+        let mut cells = Cells::new(self.plane, size);
         let mut next = Some(cells.begin(first, &self.known));
         while let Some(unexplained) = next {
-            for Unexplained {
-                ends,
-                grid,
-                critical,
-            } in &unexplained
-            {
-                let [from, to] = *ends;
-                for critical in critical {
-                    let refined =
-                        curves::refine_on_path(&self.plane, *ends, grid, critical, accuracy);
+            for path in &unexplained {
+                let [from, to] = path.ends;
+                let direction = [0, 1].map(|i| to[i] - from[i]);
+                for critical in &path.critical {
+                    let (plane, grid) = (&self.plane, &path.grid);
+                    let refined = refine_on_path(plane, path.ends, grid, critical, accuracy);
                     if let Ok(refined) = &refined {
-                        let direction = [0, 1].map(|i| to[i] - from[i]);
-                        let start = Start {
+                        let seed = Seed {
                             critical,
-                            refined,
                             from,
                             direction,
                         };
-                        self.follow_new(&start, boundary);
+                        self.follow_new(&Start { seed, refined }, boundary);
                     }
                 }
             }
@@ -217,38 +233,31 @@ impl Run<'_, '_> {
     }
 }
 
-/// A curve in the scenario's units.
-fn in_units(plane: &Plane, joined: bool, curve: &curves::Boundary) -> BoundaryCurve {
+fn in_units(plane: &Plane, curve: &curves::Boundary) -> BoundaryCurve {
     BoundaryCurve {
         kind: curve.kind,
         multiplicity: curve.neutral,
-        ends: curve.ends.map(CurveEnd),
+        ends: curve.ends,
         points: (curve.points.iter().enumerate())
-            .map(|(k, point)| point_in_units(plane, joined, k + 1, point))
+            .map(|(k, point)| point_in_units(plane, k + 1, point))
             .collect(),
         beside: Vec::new(),
     }
 }
 
-/// A point in the scenario's units.
-fn point_in_units(plane: &Plane, joined: bool, number: usize, point: &Verified) -> BoundaryPoint {
-    let length = plane.family.scale().length;
+fn point_in_units(plane: &Plane, number: usize, point: &Verified) -> BoundaryPoint {
     let values = plane.values(point.params);
     let beyond = plane.values([0, 1].map(|i| point.params[i] + point.errors[i]));
-    let tips = (point.tips.iter()).map(|tip| DVec3::from_array(*tip) * length);
-    let nodes = point.state.segments() + 1;
     BoundaryPoint {
         point: number,
         kind: word(point.kind, point.special),
         values,
         errors: [0, 1].map(|i| (beyond[i] - values[i]).abs()),
-        tips: tips.take(if joined { 1 } else { usize::MAX }).collect(),
-        error: point.error * length,
+        tips: plane.family.tips(&point.tips),
+        error: point.error * plane.family.scale().length,
         index_before: point.indices[0],
         index_behind: point.indices[1],
         stations: point.stations.clone(),
-        curves: (point.state.x.chunks(nodes))
-            .map(|rod| rod.iter().map(|x| *x * length).collect())
-            .collect(),
+        curves: plane.family.curves(&point.state),
     }
 }

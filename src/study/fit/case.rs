@@ -52,7 +52,6 @@ pub(super) struct Component {
     pub origin: Option<Origin>,
 }
 
-/// The quantity compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Compared {
     Result(Quantity),
@@ -103,6 +102,12 @@ impl Case {
             changes: OnceLock::new(),
             start: OnceLock::new(),
         }
+    }
+
+    /// Its position in the data as the beginning of a message, if it has one.
+    pub fn place(&self) -> String {
+        let origin = self.origin.as_ref();
+        origin.map_or_else(String::new, |origin| format!("{origin}: "))
     }
 }
 

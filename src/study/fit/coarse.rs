@@ -1,15 +1,13 @@
 //! A model with the accuracy of a search: on the coarsest grids whose error is insignificant
 //! relative to the data.
 
-use std::sync::Arc;
-
 use rayon::prelude::*;
 
 use super::FitError;
 use super::case::{CaseAt, Component};
 use super::least_squares::Weighting;
 use super::model::{INSIGNIFICANT, Model, Point};
-use crate::relax::{Grids, LARGEST_TOLERANCE, Lost, Options};
+use crate::relax::{Grids, LARGEST_TOLERANCE, Options};
 
 /// Error of an iteration on them: of positions, in standard deviations.
 const ITERATED: f64 = 10.0 * INSIGNIFICANT;
@@ -30,17 +28,12 @@ impl<'a> Model<'a> {
         let least = accurate.components().map(sd).fold(f64::INFINITY, f64::min);
         let tolerance = (ITERATED * least / length).min(LARGEST_TOLERANCE);
         let model = Model {
-            base: self.base,
-            coordinates: self.coordinates,
             options: Options {
                 tolerance: Some(tolerance.max(self.tolerance())),
                 ..self.options.clone()
             },
-            cases: Arc::clone(&self.cases),
             grids: Grids::These,
-            linear: self.linear,
-            changes: Arc::clone(&self.changes),
-            additions: Arc::clone(&self.additions),
+            ..self.clone()
         };
         let coarse = |case: usize| -> Result<CaseAt, FitError> {
             let lost = |lost| self.no_equilibrium(case, &lost);
@@ -73,14 +66,9 @@ impl<'a> Model<'a> {
         [theta, before.theta.as_slice()]
             .into_iter()
             .find_map(|theta| {
-                let (there, _) = self.find(theta).ok()?;
+                let there = self.find(theta).ok()?;
                 let nearer = weighting.sum(&weighting.residuals(&there), bound) < sum;
                 nearer.then_some(there)
             })
-    }
-
-    /// The leaves of a point of another model, with the accuracy of this one.
-    pub fn refined(&self, point: &Point) -> Result<Point, Lost> {
-        self.follow(point, &point.theta)
     }
 }

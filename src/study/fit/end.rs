@@ -56,7 +56,7 @@ type Known = (DVector<f64>, Point);
 pub(super) fn ends(near: &Neighbourhood, k: usize, first: f64, half: f64) -> Option<Ends> {
     let stats = near.stats;
     let slopes = near.slopes();
-    let along = stats.conditional(k, OPEN);
+    let along = stats.conditional(k);
     let mut known: Option<Known> = None;
     if half <= OPEN {
         let expected = stats.quantile.powi(2);
@@ -128,7 +128,6 @@ struct Search<'s, 'j, 'm, 'a> {
     before: (f64, f64),
     /// Where derivatives are known, if not only at the minimum.
     there: Option<(Point, Slopes)>,
-    /// The longest correction.
     longest: f64,
     last: Correction,
 }
@@ -141,15 +140,11 @@ struct Correction {
     gain: f64,
 }
 
-/// Continuation of the search after a point.
-enum Next {
-    /// Another point.
-    Point,
-    /// This is the end.
-    End(Side),
-    /// The search fails.
-    Failed,
-}
+/// The search fails.
+struct Failed;
+
+/// The result at a point: the end if this is it, or none, if another point follows.
+type Next = Result<Option<Side>, Failed>;
 
 impl Search<'_, '_, '_, '_> {
     /// Finds the end; `known` is the point at the first guess.
@@ -171,9 +166,9 @@ impl Search<'_, '_, '_, '_> {
                 continue;
             };
             match self.evaluate(step == 0, found) {
-                Next::Point => {}
-                Next::End(side) => return Ok(side),
-                Next::Failed => break,
+                Ok(None) => {}
+                Ok(Some(side)) => return Ok(side),
+                Err(Failed) => break,
             }
         }
         Err(self.distance)
@@ -191,12 +186,13 @@ impl Search<'_, '_, '_, '_> {
         found.ok()
     }
 
-    fn least(&self, residuals: &DVector<f64>) -> Option<Least> {
+    fn least(&self, residuals: &DVector<f64>) -> Result<Least, Failed> {
         let slopes = match &self.there {
             Some((_, slopes)) => slopes,
             None => self.at_minimum,
         };
-        self.near.least(slopes, self.k, residuals, self.longest)
+        let least = self.near.least(slopes, self.k, residuals, self.longest);
+        least.ok_or(Failed)
     }
 
     /// Whether the sum is the least one, and that of an end.
@@ -212,30 +208,24 @@ impl Search<'_, '_, '_, '_> {
 
     fn evaluate(&mut self, first: bool, (residuals, point): Known) -> Next {
         let wanted = self.near.stats.quantile.powi(2);
-        let Some(mut least) = self.least(&residuals) else {
-            return Next::Failed;
-        };
+        let mut least = self.least(&residuals)?;
         if least.straight < -BETTER {
-            return Next::Failed;
+            return Err(Failed);
         }
         if self.distance >= self.most && least.straight < wanted {
-            return Next::End(Side::Open);
+            return Ok(Some(Side::Open));
         }
         if first && (least.above / wanted - 1.0).abs() < QUADRATIC {
-            return Next::End(Side::At(self.distance));
+            return Ok(Some(Side::At(self.distance)));
         }
         let gain = least.straight - least.above;
         let stagnates = self.there.is_some() && gain > STAGNATION * self.last.gain;
         if stagnates || self.settled(&least) {
             // With the derivatives there it may be reduced further.
-            self.there = self.near.slopes_at(point).ok();
-            let updated = self.there.as_ref().and_then(|_| self.least(&residuals));
-            let Some(updated) = updated else {
-                return Next::Failed;
-            };
-            least = updated;
+            self.there = Some(self.near.slopes_at(point).map_err(|_| Failed)?);
+            least = self.least(&residuals)?;
             if self.settled(&least) {
-                return Next::End(Side::At(self.distance));
+                return Ok(Some(Side::At(self.distance)));
             }
         }
         if stagnates {
@@ -244,10 +234,7 @@ impl Search<'_, '_, '_, '_> {
                 true => SHORTER * self.last.length,
                 false => 2.0 * self.longest,
             };
-            let Some(other) = self.least(&residuals) else {
-                return Next::Failed;
-            };
-            least = other;
+            least = self.least(&residuals)?;
         }
         self.advance(&least)
     }
@@ -268,12 +255,12 @@ impl Search<'_, '_, '_, '_> {
             _ => self.distance + self.sign * least.step(wanted, self.sign),
         };
         if !next.is_finite() {
-            return Next::Failed;
+            return Err(Failed);
         }
         self.before = (self.distance, root);
         self.distance = next
             .clamp(0.5 * self.distance, 2.0 * self.distance)
             .min(self.most);
-        Next::Point
+        Ok(None)
     }
 }

@@ -4,7 +4,6 @@ use super::candidates;
 use super::case::Compared;
 use super::data::Experiment;
 use super::directions::sparse;
-use super::free::Coordinate;
 use super::least_squares::End;
 use super::model::Model;
 use super::result::{Fit, FitLeaf, FitOutcome, FitParameter, FitResidual, FitWork};
@@ -17,10 +16,20 @@ use crate::study::Keys;
 /// largest are left out.
 const NEGLIGIBLE: f64 = 0.1;
 
+/// Number of times the leaves of all experiments were relaxed.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Evaluations {
+    /// With the accuracy of a search.
+    pub coarse: usize,
+    /// With the required accuracy.
+    pub accurate: usize,
+}
+
 pub(super) fn fit(
     stats: &Statistics,
     end: &End,
     parameters: Vec<FitParameter>,
+    evaluations: Evaluations,
     wanted: &[Experiment],
 ) -> Fit {
     let base = stats.model.base;
@@ -36,7 +45,8 @@ pub(super) fn fit(
         .map(|free| free.keys.to_string())
         .collect();
     let logs: Vec<bool> = coordinates.iter().map(|free| free.log).collect();
-    let units: Vec<f64> = coordinates.iter().map(unit).collect();
+    // Ratios of the coefficients of coordinates to those of their numbers.
+    let units: Vec<f64> = coordinates.iter().map(|free| 1.0 / free.unit).collect();
     let outcome = match end {
         End::Converged if open.is_empty() && parameters.iter().all(|p| p.determined) => {
             FitOutcome::Converged
@@ -75,8 +85,8 @@ pub(super) fn fit(
         residuals: compared(stats),
         candidates,
         work: FitWork {
-            evaluations: stats.evaluations.coarse + stats.evaluations.accurate,
-            accurate: stats.evaluations.accurate,
+            evaluations: evaluations.coarse + evaluations.accurate,
+            accurate: evaluations.accurate,
             last: Model::work(stats.point),
         },
         wall_seconds: 0.0,
@@ -213,9 +223,4 @@ fn leaves(stats: &Statistics) -> Vec<(String, FitLeaf)> {
             Some((case.name.clone(), leaf))
         })
         .collect()
-}
-
-/// Ratio of a coefficient of a coordinate to that of its number.
-fn unit(free: &Coordinate) -> f64 {
-    1.0 / free.unit
 }

@@ -88,7 +88,7 @@ fn parameter(
     };
     if let Some(found) = few {
         parameter.profiled = true;
-        let along = shape.conditional(k, OPEN);
+        let along = shape.conditional(k);
         for ((side, sign), found) in sides.iter_mut().zip([-1.0, 1.0]).zip(found) {
             *side = match found {
                 Ok(found) => found,

@@ -65,7 +65,6 @@ impl Weighting {
         DVector::from_vec(residual.collect())
     }
 
-    /// Their derivatives.
     pub fn jacobian(&self, point: &Point) -> DMatrix<f64> {
         let sd: Vec<f64> = point
             .components()

@@ -38,10 +38,11 @@ use std::time::Instant;
 use super::{Base, VaryError};
 use crate::limit::Limit;
 use crate::relax::{Lost, Options, RelaxError, check_tolerance};
+use found::Evaluations;
 use free::Coordinate;
 use least_squares::{ASSUMED, End, Iteration, Weighting};
-use model::Model;
-use statistics::{Evaluations, Statistics};
+use model::{Model, Point};
+use statistics::Statistics;
 
 /// Largest number of minima abandoned for better ones.
 const MOST_MINIMA: usize = 4;
@@ -125,75 +126,102 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
     let model = Model::new(base, &coordinates, &options, request.data.clone())?;
     let start: Vec<f64> = coordinates.iter().map(|free| free.start).collect();
     let assumed = ASSUMED * model.unit();
-    let (first, _) = model.with_loose_tolerance(assumed).find(&start)?;
+    let first = model.with_loose_tolerance(assumed).find(&start)?;
     let known = model.check_deviations(&first)?;
     let measured = first.components().filter(|component| !component.free);
     check_count(coordinates.len(), measured.count(), known)?;
-    let weighting = Weighting {
-        assumed,
-        robust: request.robust,
+    let search = Search {
+        model: &model,
+        weighting: Weighting {
+            assumed,
+            robust: request.robust,
+        },
+        known,
+        candidates: &request.candidates,
     };
-    let (mut coarse, mut point) = model.coarse(&first, weighting)?;
-    let mut evaluations = Evaluations::default();
-    let mut attempts = 0;
-    let mut jumps = 0;
-    let mut found = loop {
-        // The search on coarse grids; the last steps use all.
-        let mut searching = |step, sum| {
-            let known = None;
-            progress(&FitStep { step, sum, known });
-        };
-        let mut search = Iteration::new(&coarse, weighting, &mut searching);
-        let (near, searched, more) = search.run(point);
-        evaluations.coarse += more;
-        attempts += 1;
-        let there = model.refined(&near).or_else(|_| {
-            let found = model.find(&near.theta);
-            found.map(|(there, _)| there)
-        })?;
-        let mut last = Iteration::new(&model, weighting, &mut searching);
-        last.lean = true;
-        let (mut least, end, more) = last.run(there);
-        evaluations.accurate += 1 + more;
-        let beyond = last
-            .jump
-            .filter(|_| end == End::Stuck(Some(Lost::Elsewhere)));
-        if let Some(theta) = beyond.filter(|_| jumps < MOST_JUMPS)
-            && let Some(there) = model.beyond(&theta, &least, weighting)
-        {
-            jumps += 1;
-            attempts -= 1;
-            (coarse, point) = model.coarse(&there, weighting)?;
-            continue;
-        }
-        let of_search = Statistics::new(&coarse, weighting, known, &near, evaluations);
-        let spread = Statistics::new(&model, weighting, known, &least, evaluations).spread;
-        let same = searched == End::Converged && of_search.spread < SAME_SPREAD * spread;
-        if !same && end == End::Converged {
-            // Its neighbourhood is computed with its own leaves.
-            let differentiated = model.differentiate(&mut least);
-            differentiated.map_err(|lost| model.no_equilibrium(0, &lost))?;
-        }
-        let stats = Statistics::new(&model, weighting, known, &least, evaluations);
-        let shape = if same { &of_search } else { &stats };
-        let parameters = match end {
-            End::Converged => interval::intervals(&stats, shape, progress),
-            _ => Ok(interval::without_intervals(&stats)),
-        };
-        match parameters {
-            Ok(parameters) => break found::fit(&stats, &end, parameters, &request.candidates),
-            Err(better) if attempts < MOST_MINIMA => point = better,
-            Err(_) => {
-                let parameters = interval::without_intervals(&stats);
-                break found::fit(&stats, &End::MostSteps, parameters, &request.candidates);
-            }
-        }
-    };
-    if jumps > 0 {
-        found.remarks.push(JUMPED.into());
-    }
+    let mut found = search.run(&first, progress)?;
     found.wall_seconds = clock.elapsed().as_secs_f64();
     Ok(found)
+}
+
+/// The search for the best minimum.
+struct Search<'m, 'a> {
+    model: &'m Model<'a>,
+    weighting: Weighting,
+    /// Whether the standard deviations of the data are known.
+    known: bool,
+    candidates: &'m [Experiment],
+}
+
+impl<'m, 'a> Search<'m, 'a> {
+    /// Begins with these leaves. If a profile leads to a better minimum, the search goes on from
+    /// there.
+    fn run(&self, first: &Point, progress: &mut dyn FnMut(&FitStep)) -> Result<Fit, FitError> {
+        let (model, weighting) = (self.model, self.weighting);
+        let (mut coarse, mut point) = model.coarse(first, weighting)?;
+        let mut evaluations = Evaluations::default();
+        let mut attempts = 0;
+        let mut jumps = 0;
+        let mut found = loop {
+            // The search on coarse grids; the last steps use all.
+            let mut searching = |step, sum| {
+                let known = None;
+                progress(&FitStep { step, sum, known });
+            };
+            let mut search = Iteration::new(&coarse, weighting, &mut searching);
+            let (near, searched, more) = search.run(point);
+            evaluations.coarse += more;
+            attempts += 1;
+            let there = model.follow(&near, &near.theta);
+            let there = there.or_else(|_| model.find(&near.theta))?;
+            let mut last = Iteration::new(model, weighting, &mut searching);
+            last.lean = true;
+            let (mut least, end, more) = last.run(there);
+            evaluations.accurate += 1 + more;
+            let beyond = last
+                .jump
+                .filter(|_| end == End::Stuck(Some(Lost::Elsewhere)));
+            if let Some(theta) = beyond.filter(|_| jumps < MOST_JUMPS)
+                && let Some(there) = model.beyond(&theta, &least, weighting)
+            {
+                jumps += 1;
+                attempts -= 1;
+                (coarse, point) = model.coarse(&there, weighting)?;
+                continue;
+            }
+            let of_search = Statistics::new(&coarse, weighting, self.known, &near);
+            let spread = self.statistics(&least).spread;
+            let same = searched == End::Converged && of_search.spread < SAME_SPREAD * spread;
+            if !same && end == End::Converged {
+                // Its neighbourhood is computed with its own leaves.
+                let differentiated = model.differentiate(&mut least);
+                differentiated.map_err(|lost| model.no_equilibrium(0, &lost))?;
+            }
+            let stats = self.statistics(&least);
+            let shape = if same { &of_search } else { &stats };
+            let parameters = match end {
+                End::Converged => interval::intervals(&stats, shape, progress),
+                _ => Ok(interval::without_intervals(&stats)),
+            };
+            let (end, parameters) = match parameters {
+                Ok(parameters) => (end, parameters),
+                Err(better) if attempts < MOST_MINIMA => {
+                    point = better;
+                    continue;
+                }
+                Err(_) => (End::MostSteps, interval::without_intervals(&stats)),
+            };
+            break found::fit(&stats, &end, parameters, evaluations, self.candidates);
+        };
+        if jumps > 0 {
+            found.remarks.push(JUMPED.into());
+        }
+        Ok(found)
+    }
+
+    fn statistics<'p>(&'p self, point: &'p Point) -> Statistics<'p, 'a> {
+        Statistics::new(self.model, self.weighting, self.known, point)
+    }
 }
 
 /// The coordinates of the free numbers, checked to be distinct.
@@ -216,7 +244,6 @@ fn coordinates(request: &FitRequest) -> Result<Vec<Coordinate>, FitError> {
     Ok(coordinates)
 }
 
-/// Checks that there are enough data.
 fn check_count(free: usize, count: usize, known: bool) -> Result<(), FitError> {
     if free == 0 || free > count {
         return Err(FitError::Free(match free {

@@ -12,7 +12,7 @@ use super::data::{Data, Experiment, Measured, Origin};
 use super::free::Coordinate;
 use super::quantity::Kind;
 use crate::newton::Work;
-use crate::relax::{AtRest, Equilibrium, Grids, Lost, Options};
+use crate::relax::{AtRest, Grids, Lost, Options};
 use crate::scenario::Scenario;
 use crate::study::{Base, Keys};
 
@@ -23,6 +23,7 @@ pub(super) const INSIGNIFICANT: f64 = 0.05;
 const LOOSEST: f64 = 1e-4;
 
 /// Data common to all points of a fit.
+#[derive(Clone)]
 pub(super) struct Model<'a> {
     pub base: &'a Base,
     pub coordinates: &'a [Coordinate],
@@ -136,9 +137,8 @@ impl<'a> Model<'a> {
             let both =
                 |(keys, _): &&(Keys, f64)| coordinates.iter().any(|free| free.keys.overlaps(keys));
             if let Some((keys, _)) = case.settings.iter().find(both) {
-                let place = case.origin.as_ref().map(Origin::to_string);
-                let place = place.unwrap_or_default();
-                let why = format!("{place}: {keys} is set by the experiment, and free");
+                let place = case.place();
+                let why = format!("{place}{keys} is set by the experiment, and free");
                 return Err(FitError::Data(why));
             }
         }
@@ -169,10 +169,7 @@ impl<'a> Model<'a> {
         }
         let values = self.values(case, theta);
         let made = self.base.at(&values).map(|varied| varied.scenario);
-        let made = made.map_err(|refused| {
-            let place = case.origin.as_ref().map(|origin| format!("{origin}: "));
-            FitError::Data(format!("{}{refused}", place.unwrap_or_default()))
-        })?;
+        let made = made.map_err(|refused| FitError::Data(format!("{}{refused}", case.place())))?;
         let made = Arc::new(made);
         if self.starts(theta) {
             return Ok(Arc::clone(case.start.get_or_init(|| made)));
@@ -205,36 +202,30 @@ impl<'a> Model<'a> {
     }
 
     /// The leaves at rest, relaxed from their usual starts.
-    pub fn find(&self, theta: &[f64]) -> Result<(Point, Vec<Equilibrium>), FitError> {
-        let find = |case: usize| -> Result<(CaseAt, Equilibrium), FitError> {
+    pub fn find(&self, theta: &[f64]) -> Result<Point, FitError> {
+        let find = |case: usize| -> Result<CaseAt, FitError> {
             let scenario = self.scenario(&self.cases[case], theta)?;
             let found = AtRest::find(&scenario, &self.options)?;
-            let (at, leaf) = found.map_err(|lost| self.no_equilibrium(case, &lost))?;
-            let case_at = CaseAt::new(&self.cases[case], case, at);
-            Ok((
-                case_at.map_err(|lost| self.no_equilibrium(case, &lost))?,
-                leaf,
-            ))
+            let found = found.and_then(|(at, _)| CaseAt::new(&self.cases[case], case, at));
+            found.map_err(|lost| self.no_equilibrium(case, &lost))
         };
         let cases = (0..self.cases.len()).into_par_iter().map(find);
-        let cases = cases.collect::<Result<Vec<_>, _>>()?;
-        let (cases, leaves) = cases.into_iter().unzip();
-        let theta = theta.to_vec();
-        Ok((Point { theta, cases }, leaves))
+        Ok(Point {
+            theta: theta.to_vec(),
+            cases: cases.collect::<Result<_, _>>()?,
+        })
     }
 
     pub(super) fn no_equilibrium(&self, case: usize, lost: &Lost) -> FitError {
         let case = &self.cases[case];
-        let place = case.origin.as_ref().map(|origin| format!("{origin}: "));
+        let (place, name) = (case.place(), &case.name);
         let why = match lost {
             Lost::NotAtRest(why) => why.as_str(),
             Lost::Elsewhere => "it jumps to another equilibrium",
         };
         FitError::NoEquilibrium(format!(
-            "{}experiment {}: with the numbers of the scenario there is no stable equilibrium ({why}): \
-             start from other numbers, or leave this experiment out",
-            place.unwrap_or_default(),
-            case.name
+            "{place}experiment {name}: with the numbers of the scenario there is no stable equilibrium ({why}): \
+             start from other numbers, or leave this experiment out"
         ))
     }
 
@@ -277,7 +268,6 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// The changes of the numbers.
     pub fn steps(&self, from: &[f64], to: &[f64]) -> Vec<f64> {
         let each = self.coordinates.iter().zip(to).zip(from);
         each.map(|((free, to), from)| free.value(*to) - free.value(*from))
@@ -309,10 +299,7 @@ impl<'a> Model<'a> {
                 tolerance: Some(tolerance.min(LOOSEST).max(self.tolerance())),
                 ..self.options.clone()
             },
-            cases: Arc::clone(&self.cases),
-            changes: Arc::clone(&self.changes),
-            additions: Arc::clone(&self.additions),
-            ..*self
+            ..self.clone()
         }
     }
 

@@ -18,7 +18,6 @@ impl Quantity {
     pub(super) const ALL: &str =
         "tip_x, tip_y, tip_z, reaction_x, reaction_y, reaction_z, frequency_1, frequency_2, ...";
 
-    /// Its kind.
     pub(super) fn kind(self) -> Kind {
         match self {
             Quantity::Tip(_) => Kind::Length,

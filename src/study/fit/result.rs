@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::newton::Work;
+use crate::study::words::words;
 
 /// How a fit ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FitOutcome {
     /// At a minimum, and the data determine every free number.
     Converged,
@@ -18,14 +18,11 @@ pub enum FitOutcome {
     Undetermined,
 }
 
-impl FitOutcome {
-    /// The word in files.
-    pub fn word(self) -> &'static str {
-        match self {
-            FitOutcome::Converged => "converged",
-            FitOutcome::NotConverged => "not-converged",
-            FitOutcome::Undetermined => "undetermined",
-        }
+words! {
+    FitOutcome {
+        Converged = "converged",
+        NotConverged = "not-converged",
+        Undetermined = "undetermined",
     }
 }
 

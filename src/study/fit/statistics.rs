@@ -16,15 +16,6 @@ pub(super) const OPEN: f64 = std::f64::consts::LN_10;
 /// is not determined.
 const INSENSITIVE: f64 = 1e-3;
 
-/// Number of times the leaves of all experiments were relaxed.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Evaluations {
-    /// With the accuracy of a search.
-    pub coarse: usize,
-    /// With the required accuracy.
-    pub accurate: usize,
-}
-
 /// The minimum and its statistics.
 pub(super) struct Statistics<'m, 'a> {
     pub model: &'m Model<'a>,
@@ -32,7 +23,6 @@ pub(super) struct Statistics<'m, 'a> {
     /// Whether the standard deviations of the data are known.
     pub known: bool,
     pub point: &'m Point,
-    pub evaluations: Evaluations,
     pub residuals: DVector<f64>,
     pub jacobian: DMatrix<f64>,
     /// Singular directions of the coordinates, in ascending order of the sensitivity of the data,
@@ -50,13 +40,7 @@ pub(super) struct Statistics<'m, 'a> {
 }
 
 impl<'m, 'a> Statistics<'m, 'a> {
-    pub fn new(
-        model: &'m Model<'a>,
-        weighting: Weighting,
-        known: bool,
-        point: &'m Point,
-        evaluations: Evaluations,
-    ) -> Self {
+    pub fn new(model: &'m Model<'a>, weighting: Weighting, known: bool, point: &'m Point) -> Self {
         let residuals = weighting.residuals(point);
         let roots = weighting.roots(&residuals);
         let mut jacobian = match point.gradients().next() {
@@ -90,7 +74,6 @@ impl<'m, 'a> Statistics<'m, 'a> {
             weighting,
             known,
             point,
-            evaluations,
             residuals,
             jacobian,
             directions,
@@ -118,23 +101,16 @@ impl<'m, 'a> Statistics<'m, 'a> {
     }
 
     /// The changes of the others that are correlated with that of a coordinate, if none of them has
-    /// a larger uncertainty than `open`: weakly determined combinations then do not change.
-    pub fn conditional(&self, k: usize, open: f64) -> DVector<f64> {
+    /// a larger uncertainty than [`OPEN`]: weakly determined combinations then do not change.
+    pub fn conditional(&self, k: usize) -> DVector<f64> {
         let mut along = DVector::zeros(self.values.len());
         for (direction, value) in self.values.iter().enumerate() {
             let v = self.directions.column(direction);
             let sensitive = (value / self.spread).powi(2);
-            along += v * (v[k] / (sensitive + (self.quantile / open).powi(2)));
+            along += v * (v[k] / (sensitive + (self.quantile / OPEN).powi(2)));
         }
         let own = along[k];
         along / own
-    }
-
-    /// The component of a coordinate in combinations to which the data are insensitive.
-    fn insensitive_part(&self, k: usize) -> f64 {
-        let insensitive =
-            (0..self.insensitive).map(|direction| self.directions[(k, direction)].powi(2));
-        insensitive.sum::<f64>().sqrt()
     }
 
     /// Whether the residuals are larger than their standard deviations allow: by five
@@ -147,7 +123,9 @@ impl<'m, 'a> Statistics<'m, 'a> {
 
     /// Whether the data are sensitive to every change of a coordinate.
     pub fn is_sensitive_to(&self, k: usize) -> bool {
-        self.insensitive_part(k) <= INSENSITIVE
+        let insensitive =
+            (0..self.insensitive).map(|direction| self.directions[(k, direction)].powi(2));
+        insensitive.sum::<f64>().sqrt() <= INSENSITIVE
     }
 
     /// The standard deviation of a candidate's datum: that of the fit's data of its kind.

@@ -74,12 +74,8 @@ fn sentence(open: &Undetermined, parameters: &[FitParameter], logs: &[bool]) -> 
         },
         [(a, one), (b, two)] if all_logs && (one.abs() - two.abs()).abs() < 1e-3 => {
             let only = if one * two > 0.0 { "ratio" } else { "product" };
-            format!(
-                "{} and {}: {}only as their {only}",
-                key(*a),
-                key(*b),
-                how_weakly(open)
-            )
+            let how = if open.exactly { "" } else { "nearly " };
+            format!("{} and {}: {how}only as their {only}", key(*a), key(*b))
         }
         parts => {
             let change = |(k, part): &(usize, f64)| match logs[*k] {
@@ -95,10 +91,6 @@ fn sentence(open: &Undetermined, parameters: &[FitParameter], logs: &[bool]) -> 
             format!("{unseen}: {} together, for any t", changes.join(", "))
         }
     }
-}
-
-fn how_weakly(open: &Undetermined) -> &'static str {
-    if open.exactly { "" } else { "nearly " }
 }
 
 fn short(value: f64) -> String {

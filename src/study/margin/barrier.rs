@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{Stable, StartPoint};
-use crate::branch::{Equations, Family, Point, between, on_finer, prolong_field};
+use crate::branch::{Equations, Point, between, on_finer, prolong_field};
 use crate::leaf::{Field, Grid, State};
 use crate::relax::fall::settle_from;
 use crate::relax::prolong::prolong;
@@ -53,36 +53,32 @@ pub(super) fn barrier(
     mut starts: Vec<StartPoint>,
     weight: f64,
 ) -> (Option<Barrier>, usize) {
-    let make = |_: f64| Ok(stable.scenario.clone());
-    let Ok(family) = Family::new(&make, (0.0, 1.0), false) else {
-        return (None, 0);
-    };
-    starts.extend(along_modes(stable, &family).unwrap_or_default());
+    starts.extend(along_modes(stable).unwrap_or_default());
     let all = &stable.searches.all;
     let counted = all.load(std::sync::atomic::Ordering::Relaxed);
     let pushes = counted.saturating_sub(MODE_CLIMBS);
     all.store(pushes + starts.len(), std::sync::atomic::Ordering::Relaxed);
     let count = starts.len();
     for _ in 0..HALVINGS {
-        let found = lowest(stable, &family, &starts, weight);
+        let found = lowest(stable, &starts, weight);
         if found.is_some() || stable.limit.reached() {
             return (found, count);
         }
-        let finer: Option<_> = starts.iter().map(|it| on_refined(&family, it)).collect();
+        let finer: Option<_> = starts.iter().map(|it| on_refined(stable, it)).collect();
         match finer {
             Some(finer) => starts = finer,
             None => return (None, count),
         }
         all.fetch_add(count, std::sync::atomic::Ordering::Relaxed);
     }
-    (lowest(stable, &family, &starts, weight), count)
+    (lowest(stable, &starts, weight), count)
 }
 
 /// The lowest pass found from these start points on their grids.
-fn lowest(stable: &Stable, family: &Family, starts: &[StartPoint], weight: f64) -> Option<Barrier> {
+fn lowest(stable: &Stable, starts: &[StartPoint], weight: f64) -> Option<Barrier> {
     let mut passes: Vec<Pass> = (starts.par_iter())
         .filter_map(|start| {
-            let pass = climb(stable, family, start);
+            let pass = climb(stable, start);
             stable.searches.finish_one();
             pass
         })
@@ -90,15 +86,15 @@ fn lowest(stable: &Stable, family: &Family, starts: &[StartPoint], weight: f64) 
     passes.sort_by(|a, b| a.height.total_cmp(&b.height));
     passes.dedup_by(|a, b| (a.height - b.height).abs() < SAME_HEIGHT * b.height);
     let (pass, neighbour) = passes.iter().find_map(|pass| {
-        let neighbour = beyond(stable, family, pass)?;
+        let neighbour = beyond(stable, pass)?;
         Some((pass, neighbour))
     })?;
-    in_units(stable, family, pass, &neighbour, weight)
+    in_units(stable, pass, &neighbour, weight)
 }
 
 /// The same start point on the grid with all segments halved; none if it has too many nodes.
-fn on_refined(family: &Family, start: &StartPoint) -> Option<StartPoint> {
-    let mut equations = Equations::new(family, start.grid.clone()).ok()?;
+fn on_refined(stable: &Stable, start: &StartPoint) -> Option<StartPoint> {
+    let mut equations = Equations::new(stable.family, start.grid.clone()).ok()?;
     let leaf = equations.leaves.at(0.0).ok()?;
     (2 * leaf.rods() * leaf.segments() <= FEW_NODES).then(|| StartPoint {
         grid: start.grid.refined(),
@@ -108,9 +104,9 @@ fn on_refined(family: &Family, start: &StartPoint) -> Option<StartPoint> {
 }
 
 /// Both directions along the softest modes of the leaf.
-fn along_modes(stable: &Stable, family: &Family) -> Option<Vec<StartPoint>> {
-    let mut equations = Equations::new(family, stable.grid.clone()).ok()?;
-    let (point, _) = equations.correct(&stable.state, 0.0, None).ok()?;
+fn along_modes(stable: &Stable) -> Option<Vec<StartPoint>> {
+    let mut equations = Equations::new(stable.family, stable.grid.clone()).ok()?;
+    let point = equations.correct(&stable.state, 0.0, None).ok()?;
     let modes = equations.soft_modes(&point, MODES).ok()?;
     let start = |mode: &Field, sign: f64| StartPoint {
         grid: stable.grid.clone(),
@@ -128,12 +124,12 @@ fn along_modes(stable: &Stable, family: &Family) -> Option<Vec<StartPoint>> {
 }
 
 /// Climbs to a saddle, and finds the stable leaf on the same grid.
-fn climb(stable: &Stable, family: &Family, start: &StartPoint) -> Option<Pass> {
-    let mut equations = Equations::new(family, start.grid.clone()).ok()?;
+fn climb(stable: &Stable, start: &StartPoint) -> Option<Pass> {
+    let mut equations = Equations::new(stable.family, start.grid.clone()).ok()?;
     let stop = || stable.limit.reached();
     let saddle = equations.climb(&start.state, 0.0, &start.direction, &stop)?;
-    let mut own = Equations::new(family, stable.grid.clone()).ok()?;
-    let (mut leaf, _) = own.correct(&stable.state, 0.0, None).ok()?;
+    let mut own = Equations::new(stable.family, stable.grid.clone()).ok()?;
+    let mut leaf = own.correct(&stable.state, 0.0, None).ok()?;
     while own.grid().segments() < start.grid.segments() {
         (own, leaf) = on_finer(&mut own, &leaf).ok()?;
     }
@@ -148,17 +144,17 @@ fn climb(stable: &Stable, family: &Family, start: &StartPoint) -> Option<Pass> {
 }
 
 /// The equilibrium beyond a pass, if the one on this side is the leaf.
-fn beyond(stable: &Stable, family: &Family, pass: &Pass) -> Option<State> {
+fn beyond(stable: &Stable, pass: &Pass) -> Option<State> {
     let distance = pass.saddle.state.shift_to(&pass.leaf.state);
     let same = |state: &State| state.shift_to(&pass.leaf.state) < SAME.min(SAME_PART * distance);
-    let mut equations = Equations::new(family, pass.grid.clone()).ok()?;
+    let mut equations = Equations::new(stable.family, pass.grid.clone()).ok()?;
     let towards = between(&pass.saddle.state, &pass.leaf.state);
     let stop = || stable.limit.reached();
     let both = equations.fall(&pass.saddle, &towards, &stop).ok()?;
     let rest = |fallen: Result<Point, State>| match fallen {
         Ok(point) => Some(point.state),
         // Not reached by the descent: relax from its last state.
-        Err(state) => settle_from(family.first(), &pass.grid, state, stable.limit),
+        Err(state) => settle_from(stable.family.first(), &pass.grid, state, stable.limit),
     };
     let both = both.map(rest);
     match both {
@@ -169,15 +165,9 @@ fn beyond(stable: &Stable, family: &Family, pass: &Pass) -> Option<State> {
 }
 
 /// A pass in the scenario's units, its energy extrapolated over grids.
-fn in_units(
-    stable: &Stable,
-    family: &Family,
-    pass: &Pass,
-    neighbour: &State,
-    weight: f64,
-) -> Option<Barrier> {
-    let mut equations = Equations::new(family, pass.grid.clone()).ok()?;
-    let (neighbour, _) = equations.correct(neighbour, 0.0, None).ok()?;
+fn in_units(stable: &Stable, pass: &Pass, neighbour: &State, weight: f64) -> Option<Barrier> {
+    let mut equations = Equations::new(stable.family, pass.grid.clone()).ok()?;
+    let neighbour = equations.correct(neighbour, 0.0, None).ok()?;
     let mut three = [pass.saddle.clone(), neighbour, pass.leaf.clone()];
     let rounding = ROUNDING * equations.leaves.at(0.0).ok()?.energy(&three[0].state).abs();
     let mut table = Richardson::default();
@@ -203,7 +193,7 @@ fn in_units(
         table.push(segments, heights(&mut equations, &three, pass.height)?);
     }
     let [saddle, neighbour, _] = three;
-    let scale = family.scale();
+    let scale = stable.family.scale();
     let best = table.best();
     let values = table.column(best.map_or(0, |best| best.columns));
     let [energy, above] = [values[0], values[3]].map(|it| it * pass.height * scale.moment());

@@ -102,6 +102,8 @@ pub fn relax_with_margin(
 /// A stable leaf on the grid on which it is pushed, with the options.
 struct Stable<'a> {
     scenario: &'a Scenario,
+    /// The scenario's leaf alone, at any value of the parameter.
+    family: &'a Family<'a>,
     rest: &'a Equilibrium,
     grid: Grid,
     state: State,
@@ -151,7 +153,11 @@ fn margin(
     progress: &mut (dyn FnMut(&MarginProgress) + Send),
 ) -> Result<Margin, MarginError> {
     let clock = Instant::now();
-    let (grid, state) = match continuation_grid(scenario, levels) {
+    let make = |_: f64| Ok(scenario.clone());
+    let Ok(family) = Family::new(&make, (0.0, 1.0), false) else {
+        return Ok(Margin::none(UNDECIDED));
+    };
+    let (grid, state) = match continuation_grid(&family, levels) {
         Ok(found) => found,
         Err(why) => return Ok(Margin::none(why)),
     };
@@ -162,6 +168,7 @@ fn margin(
     let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
     let stable = Stable {
         scenario,
+        family: &family,
         rest,
         grid,
         state,
@@ -213,17 +220,15 @@ fn margin(
 
 /// The leaf on the coarsest grid on which its softest eigenvalue agrees with the next finer one:
 /// near a bifurcation that of a coarse grid differs. Or why there is none.
-fn continuation_grid(scenario: &Scenario, levels: &[Level]) -> Result<(Grid, State), &'static str> {
-    let make = |_: f64| Ok(scenario.clone());
-    let family = Family::new(&make, (0.0, 1.0), false).map_err(|_| UNDECIDED)?;
+fn continuation_grid(family: &Family, levels: &[Level]) -> Result<(Grid, State), &'static str> {
     let first = levels[0].leaf.segments();
     let mut nested = levels.iter().filter(|level| {
         let segments = level.leaf.segments();
         segments.is_multiple_of(first) && (segments / first).is_power_of_two()
     });
     let on_level = |level: &Level| {
-        let mut equations = Equations::new(&family, level.leaf.grid.clone())?;
-        let (point, _) = equations.correct(&level.state, 0.0, None)?;
+        let mut equations = Equations::new(family, level.leaf.grid.clone())?;
+        let point = equations.correct(&level.state, 0.0, None)?;
         Ok::<_, Stuck>((equations, point))
     };
     let mut now = on_level(&levels[0]).map_err(|_| UNDECIDED)?;

@@ -35,25 +35,27 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
         scenario.tip_force[direction.axis] += direction.sign() * force;
         Ok(scenario)
     };
-    let unknown = |why: String| {
-        let push = Push {
-            direction,
-            kind: Loss::Unknown,
-            force: None,
-            error: None,
-            per_weight: None,
-            more_than: Some(0.0),
-            then: None,
-            neighbour: None,
-            tips: Vec::new(),
-            mirrored: false,
-            remark: Some(why),
-        };
-        (push, Vec::new())
+    let unknown = Push {
+        direction,
+        kind: Loss::Unknown,
+        force: None,
+        error: None,
+        per_weight: None,
+        more_than: None,
+        then: None,
+        neighbour: None,
+        tips: Vec::new(),
+        mirrored: false,
+        remark: None,
+    };
+    let failed = |why: String| Push {
+        more_than: Some(0.0),
+        remark: Some(why),
+        ..unknown.clone()
     };
     let family = match Family::new(&make, (0.0, stable.largest), false) {
         Ok(family) => family,
-        Err(out) => return unknown(out.to_string()),
+        Err(out) => return (failed(out.to_string()), Vec::new()),
     };
     let followed = Grids::new(&family, stable.grid.clone())
         .map_err(Stuck::from)
@@ -63,19 +65,17 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
         });
     let (mut grids, followed) = match followed {
         Ok(followed) => followed,
-        Err(stuck) => return unknown(stuck.to_string()),
+        Err(stuck) => return (failed(stuck.to_string()), Vec::new()),
     };
     let critical = followed.branch.critical.iter().zip(&followed.critical);
     let lost = |critical: &Critical| critical.indices[0] == 0 && critical.indices[1] > 0;
     let Some(((_, critical), refined)) = critical.into_iter().find(|((_, it), _)| lost(it)) else {
-        let push = not_lost(stable, &followed, &unknown(String::new()).0);
-        return (push, Vec::new());
+        return (not_lost(stable, &followed, unknown), Vec::new());
     };
     let force = refined.fraction * stable.largest;
     let then = fate(stable, &mut grids, critical);
     let starts = starts(&mut grids, critical);
     let push = Push {
-        direction,
         kind: match critical.kind {
             Kind::Fold => Loss::Fold,
             Kind::Branching => Loss::BranchPoint,
@@ -83,17 +83,14 @@ pub(super) fn push(stable: &Stable, direction: Direction, weight: f64) -> (Push,
         force: Some(force),
         error: Some(refined.fraction_error * stable.largest + rounding(stable, force, weight)),
         per_weight: (weight > 0.0).then(|| force / weight),
-        more_than: None,
         then: Some(then),
         neighbour: rest_after_fold(stable, &mut grids, (critical, refined), &starts),
-        tips: tips(stable, refined),
-        mirrored: false,
-        remark: None,
+        tips: family.tips(&refined.tips),
+        ..unknown
     };
     (push, starts)
 }
 
-/// Rounding error of a critical force.
 fn rounding(stable: &Stable, force: f64, weight: f64) -> f64 {
     let rods = stable.scenario.rods.iter();
     let stiffness = rods.flat_map(|rod| &rod.force_stiffness);
@@ -105,7 +102,7 @@ fn rounding(stable: &Stable, force: f64, weight: f64) -> f64 {
 
 /// The branch of a push, until it is known to have lost its stability.
 fn follow(stable: &Stable, direction: Direction, grids: &mut Grids) -> Result<Followed, Stuck> {
-    let (mut first, _) = (grids.of(&stable.state)).correct(&stable.state, 0.0, None)?;
+    let mut first = (grids.of(&stable.state)).correct(&stable.state, 0.0, None)?;
     first.tangent = first.tangent.towards(true);
     let enough = |points: &[Point]| {
         let behind = points.len().checked_sub(CONFIRMING);
@@ -126,7 +123,7 @@ fn follow(stable: &Stable, direction: Direction, grids: &mut Grids) -> Result<Fo
 }
 
 /// The result of a push under which the leaf was stable as far as it was followed.
-fn not_lost(stable: &Stable, followed: &Followed, unknown: &Push) -> Push {
+fn not_lost(stable: &Stable, followed: &Followed, unknown: Push) -> Push {
     let points = followed.branch.points.iter().zip(&followed.points);
     let stably = points.take_while(|(point, _)| point.index == 0);
     let furthest = stably.fold(0.0, |most: f64, (_, refined)| most.max(refined.fraction));
@@ -146,7 +143,7 @@ fn not_lost(stable: &Stable, followed: &Followed, unknown: &Push) -> Push {
                 Some("the branch could not be followed further".into())
             }
         },
-        ..unknown.clone()
+        ..unknown
     }
 }
 
@@ -156,7 +153,7 @@ fn fate(stable: &Stable, grids: &mut Grids, critical: &Critical) -> Fate {
     if critical.kind == Kind::Fold {
         return Fate::Snaps;
     }
-    let branches = switch(grids.of(&critical.state), critical, 0, stable.accuracy);
+    let branches = switch(grids.of(&critical.state), critical, stable.accuracy);
     match branches.iter().any(|point| point.index == 0) {
         true => Fate::BendsAside,
         false => Fate::Snaps,
@@ -184,12 +181,12 @@ fn rest_after_fold(
         }
     };
     let point = equations.correct(&state, fold.fraction, None);
-    let (point, _) = point.ok().filter(|(point, _)| point.index == 0)?;
+    let point = point.ok().filter(|point| point.index == 0)?;
     let rest = refine_at(family, &start.grid, &point, stable.accuracy).ok()?;
     let scale = family.scale();
     Some(Neighbour {
         energy: rest.energy * scale.moment(),
-        tip: DVec3::from_array(*rest.tips.first()?) * scale.length,
+        tip: *rest.tips.first()? * scale.length,
     })
 }
 
@@ -213,16 +210,4 @@ fn starts(grids: &mut Grids, critical: &Critical) -> Vec<StartPoint> {
         direction: direction(sign),
     };
     signs.into_iter().map(start).collect()
-}
-
-/// Tips in the scenario's units: the shared one alone, or each.
-fn tips(stable: &Stable, refined: &Refined) -> Vec<DVec3> {
-    let length = stable.scenario.scale().length;
-    let count = if stable.scenario.joined {
-        1
-    } else {
-        usize::MAX
-    };
-    let tips = refined.tips.iter().take(count);
-    tips.map(|tip| DVec3::from_array(*tip) * length).collect()
 }

@@ -44,7 +44,7 @@ pub fn trace_observed(
     request.check()?;
     let clock = Instant::now();
     let (keys, vary) = (&request.vary.keys, &request.vary);
-    let ends = [vary.values[0], vary.values[vary.values.len() - 1]];
+    let ends = vary.ends();
     let make = |value: f64| -> Result<Scenario, String> {
         let at = request.base.at(&[(keys, value)]);
         Ok(at.map_err(|refused| refused.to_string())?.scenario)
@@ -208,7 +208,7 @@ impl Run<'_, '_> {
             self.crossings.push(refined.clone());
             // If several modes become neutral at once due to symmetry, the branches
             // of all their combinations are rotated copies of each other.
-            let new = switch(self.grids.of(&critical.state), critical, 0, self.tolerance);
+            let new = switch(self.grids.of(&critical.state), critical, self.tolerance);
             let new = new.into_iter();
             let from = Some([number, after + 1 + which]);
             entrances.extend(new.map(|point| (point, from)));
@@ -257,12 +257,6 @@ impl Run<'_, '_> {
     fn point(&self, point: usize, kind: PointKind, index: usize, refined: &Refined) -> TracePoint {
         let scale = self.family.scale();
         let value = self.family.value(refined.fraction);
-        let joined = self.request.base.scenario().joined;
-        let tips = refined
-            .tips
-            .iter()
-            .map(|tip| DVec3::from_array(*tip) * scale.length);
-        let nodes = refined.grid.segments() + 1;
         TracePoint {
             point,
             kind,
@@ -274,7 +268,7 @@ impl Run<'_, '_> {
                     Some((self.family.value(above) - value).abs())
                 }
             },
-            tips: tips.take(if joined { 1 } else { usize::MAX }).collect(),
+            tips: self.family.tips(&refined.tips),
             reaction: (self.request.base.scenario().held_tip.is_some())
                 .then_some(refined.reaction * scale.force()),
             error: Some(refined.error * scale.length),
@@ -282,9 +276,7 @@ impl Run<'_, '_> {
             index,
             undulation: self.undulation(refined).unwrap_or_default(),
             stations: refined.grid.sigma().to_vec(),
-            curves: (refined.state.x.chunks(nodes))
-                .map(|rod| rod.iter().map(|x| *x * scale.length).collect())
-                .collect(),
+            curves: self.family.curves(&refined.state),
         }
     }
 }

@@ -99,15 +99,10 @@ impl Base {
     /// If the scenario is then invalid, or has no such entry.
     pub fn with(&self, keys: &Keys, value: f64) -> Result<Base, VaryError> {
         let Varied { scenario, knobs } = self.at(&[(keys, value)])?;
-        let entries = keys.targets().iter().filter_map(|target| match target {
-            Target::Entry(part) => Some(format!("{part}={}", target.text(value))),
-            Target::Knob(_) => None,
-        });
-        let entries: Vec<String> = entries.collect();
-        let overrides = self.overrides.iter().chain(&entries).cloned().collect();
+        let entries = overriding(&[(keys, value)]);
         Ok(Base {
             entries: (self.entries.as_ref()).and_then(|all| all.replaced(&entries)),
-            overrides,
+            overrides: [&self.overrides[..], &entries].concat(),
             knobs,
             scenario,
             ..self.clone()
@@ -130,7 +125,7 @@ impl Base {
         if let Some(scenario) = self.changed(values) {
             return Ok(Varied { scenario, knobs });
         }
-        let overrides = self.overriding(values);
+        let overrides = [&self.overrides[..], &overriding(values)].concat();
         // An entry that does not exist does so at no value, unless rods are added.
         let mut targets = values.iter().flat_map(|(keys, _)| keys.targets());
         let adds = |target: &Target| matches!(target, Target::Entry(part) if part.key == Key::Rods);
@@ -155,19 +150,6 @@ impl Base {
             }
         }
         entries.scenario()
-    }
-
-    /// All overrides, including those that set these values.
-    fn overriding(&self, values: &[(&Keys, f64)]) -> Vec<String> {
-        let mut overrides = self.overrides.clone();
-        for (keys, value) in values {
-            for &target in keys.targets() {
-                if let Target::Entry(part) = target {
-                    overrides.push(format!("{part}={}", target.text(*value)));
-                }
-            }
-        }
-        overrides
     }
 
     /// The number at these keys: one with respect to which derivatives exist, the
@@ -232,8 +214,22 @@ impl Base {
 
     /// The scenario with these values, as TOML.
     pub(crate) fn toml(&self, values: &[(&Keys, f64)]) -> Option<String> {
-        with_overrides(&self.text, &self.overriding(values))
+        let overrides = [&self.overrides[..], &overriding(values)].concat();
+        with_overrides(&self.text, &overrides)
     }
+}
+
+/// The overrides that set these values.
+fn overriding(values: &[(&Keys, f64)]) -> Vec<String> {
+    let mut overrides = Vec::new();
+    for (keys, value) in values {
+        for &target in keys.targets() {
+            if let Target::Entry(part) = target {
+                overrides.push(format!("{part}={}", target.text(*value)));
+            }
+        }
+    }
+    overrides
 }
 
 /// Parses the setting of a method from its path and its value.
