@@ -3,15 +3,14 @@
 
 mod common;
 
-use common::{scenario, to};
-use leafdyn::relax::{Equilibrium, Method, Options, relax};
-use leafdyn::scenario::Scenario;
-use leafdyn::shape::{Difference, NodeState, RodShape};
+use common::*;
+use leafdyn::relax::Method;
+use leafdyn::shape::Difference;
 
 const TOLERANCE: f64 = 1e-9;
 
 fn found(leaf: &Scenario, options: &Options) -> Equilibrium {
-    let found = relax(leaf, options, &mut |_| {}).unwrap();
+    let found = relaxed(leaf, options);
     assert!(
         found.outcome.is_at_rest(),
         "{}: {:?}",
@@ -45,32 +44,21 @@ fn two_or_three_coarse_grids_tell_what_shooting_does() {
             ..to(1e-11)
         };
         let shot = found(&leaf, &shot);
-        let bar = corrected.accuracy.error_estimate.unwrap();
-        let off = common::distance(&corrected, &shot);
-        let uncertain = shot.accuracy.error_estimate.unwrap();
-        println!("{what}: {segments:?}, off {off:.1e}, bar {bar:.1e}");
+        let (bar, uncertain) = (estimate(&corrected), estimate(&shot));
+        let off = distance(&corrected, &shot);
         assert!(off <= bar + uncertain, "{what}: {off:e} for {bar:e}");
         for (a, b) in corrected.shape.rods.iter().zip(&shot.shape.rods) {
-            for (a, b) in [(&a.nodes[0], &b.nodes[0]), (tip(a), tip(b))] {
-                let Difference {
-                    rotation,
-                    force,
-                    moment,
-                    ..
-                } = Difference::of(a, b);
-                let others = rotation.max(force).max(moment);
+            let ends = [
+                a.nodes.first().zip(b.nodes.first()),
+                a.nodes.last().zip(b.nodes.last()),
+            ];
+            for (a, b) in ends.into_iter().flatten() {
+                let off = Difference::of(a, b);
+                let others = largest([off.rotation, off.force, off.moment]);
                 assert!(others <= 50.0 * TOLERANCE, "{what}: {others:e}");
             }
         }
         let [a, b] = [&corrected, &shot].map(|leaf| leaf.energy.unwrap());
-        println!("energy off by {:.1e}", a - b);
-        assert!(
-            (a - b).abs() <= 0.1 * TOLERANCE * a.abs().max(1.0),
-            "{what}: {a} for {b}"
-        );
+        close(&what, a, b, 0.1 * TOLERANCE * a.abs().max(1.0));
     }
-}
-
-fn tip(rod: &RodShape) -> &NodeState {
-    &rod.nodes[rod.nodes.len() - 1]
 }
