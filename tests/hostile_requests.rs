@@ -73,20 +73,6 @@ fn leaves_that_do_not_fit_are_refused() {
 }
 
 #[test]
-fn loads_beyond_reason_are_refused_by_what_they_amount_to() {
-    for force in ["[1e300,0,0]", "[0,0,-1e300]", "[1e308,1e308,1e308]"] {
-        for (key, formula) in [("tip_force", "|F| L^2/A"), ("gravity", "|g| L^3/A")] {
-            let key = format!("load.{key}");
-            refused(&format!("--set {key}={force}"), &[&key, formula, "limit"]);
-        }
-    }
-    for force in ["[1e309,0,0]", "[nan,0,0]"] {
-        let force = format!("--set load.tip_force={force}");
-        refused(&force, &["load.tip_force"]);
-    }
-}
-
-#[test]
 fn the_library_refuses_alike() {
     let leaf = Scenario::from_toml(LEAF).unwrap();
     let ask = |options: Options| {

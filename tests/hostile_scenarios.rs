@@ -148,6 +148,7 @@ fn numbers_out_of_range() {
             "leaf.toml:11: stiffness.torsion, entry 2 = -1.0: must be greater than 0";
         "torsion = inf" => "inf (rigid) is allowed for stiffness.axial, shear_2 and shear_3 only";
         "torsion = 1e999" => "stiffness.torsion = 1e999: is not a number a computer can hold";
+        "tip_force = [1e309, 0.0, 0.0]" => "leaf.toml:25: load.tip_force";
         "axial = 1e999" => "leaf.toml:12: stiffness.axial = 1e999: is not a number";
         "axial = -inf" => "leaf.toml:12: stiffness.axial = -inf: must be a finite number";
         "axial = { at = [0.0, 1.0], value = [1.0, inf] }" =>
@@ -243,6 +244,7 @@ fn limits_that_values_set_together() {
             "leaf.toml:25: load.tip_force = [1e300, 0.0, 0.0]: gives |F| L^2/A = 4.000e301, the limit is 1e8",
             "confined to less than 1e-4 of the length";
         "tip_force = [1.7e308, 1.7e308, 1.7e308]" => "load.tip_force", "the limit is 1e8";
+        "gravity = [1e308, 1e308, 1e308]" => "load.gravity", "|g| L^3/A";
         "gravity = [0, 0, -1e7]" => "load.gravity", "|g| L^3/A = 8.000e8, the limit is 1e8";
         "y = 1e12" => "leaf.toml:21: coupling.y = 1e12: gives kappa L^4/A = 1.600e14, the limit is 1e12";
         "z = [1, 1e300]" => "leaf.toml:22: coupling.z, entry 2 = 1e300", "kappa L^4/A";

@@ -78,7 +78,6 @@ fn bad_requests_are_refused_before_anything_is_written() {
         "relax",
         "leaf.toml --method newton => newton
         leaf.toml --method newton => semi-implicit
-        leaf.toml --method implicit => implicit
         leaf.toml --method implicit => semi-implicit
         absent.toml => absent.toml
         leaf.toml --tolerance 0 => tolerance

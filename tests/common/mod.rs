@@ -63,9 +63,13 @@ pub fn asked(name: &str, otherwise: usize) -> usize {
     std::env::var(name).map_or(otherwise, |text| text.parse().expect(name))
 }
 
-/// Largest of some numbers, none of which is negative.
+/// Largest of some numbers, none of which is negative; NaN if one of them is.
 pub fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
-    numbers.into_iter().fold(0.0, f64::max)
+    let larger = |most: f64, number: f64| match number > most || number.is_nan() {
+        true => number,
+        false => most,
+    };
+    numbers.into_iter().fold(0.0, larger)
 }
 
 /// The scenario of a text with [`entries`] replaced, to be varied.
